@@ -1,0 +1,66 @@
+"""The command line. Each command parses, calls one function, prints; what is heavy is imported inside it.
+
+Exit 0 done; 1 a finding or a failed variant; 2 asked wrongly; 130 interrupted. No traceback reaches a user.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+from unitcad import __version__
+from unitcad.cli.output import say_error
+from unitcad.errors import UnitcadError
+
+app = typer.Typer(
+    name="unitcad",
+    help="Haptic units, their casting moulds and an attenuation estimate, from a short TOML spec.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"unitcad {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Entry point of `unitcad`: run a command, turn every error into one line and an exit code."""
+    as_json = "--json" in sys.argv
+    try:
+        app()
+    except UnitcadError as error:
+        say_error(error, as_json)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        typer.echo("interrupted", err=True)
+        sys.exit(130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except Exception as error:
+        if os.environ.get("UNITCAD_TRACEBACK"):
+            raise
+        say_error(
+            UnitcadError(
+                f"internal error: {type(error).__name__}: {error} (a bug; UNITCAD_TRACEBACK=1 shows where)"
+            ),
+            as_json,
+        )
+        sys.exit(1)
