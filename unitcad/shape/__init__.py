@@ -1,0 +1,53 @@
+"""Solids as data: profiles and trees of them. No kernel is loaded here."""
+
+from unitcad.shape.profile import (
+    Profile,
+    ProfileError,
+    mm,
+    polygon,
+    rectangle,
+    rounded_rectangle,
+)
+from unitcad.shape.tree import (
+    Common,
+    Cut,
+    Extrude,
+    Place,
+    Revolve,
+    Shape,
+    Union,
+    box,
+    content_hash,
+    cut,
+    cylinder,
+    exact_volume,
+    moved,
+    ring,
+    turned,
+    union,
+)
+
+__all__ = [
+    "Common",
+    "Cut",
+    "Extrude",
+    "Place",
+    "Profile",
+    "ProfileError",
+    "Revolve",
+    "Shape",
+    "Union",
+    "box",
+    "content_hash",
+    "cut",
+    "cylinder",
+    "exact_volume",
+    "mm",
+    "moved",
+    "polygon",
+    "rectangle",
+    "ring",
+    "rounded_rectangle",
+    "turned",
+    "union",
+]

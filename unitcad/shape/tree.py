@@ -1,0 +1,177 @@
+"""Solids as data: a small frozen tree that three kernels realise. Lengths in mm on the grid, angles by quarter turns.
+
+A tree is hashable, picklable and costs nothing to import; `content_hash` is stable over processes and machines.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from unitcad.shape.profile import Profile, ProfileError, mm, rectangle
+
+SCHEMA = 1
+"""Part of every hash: raise it when a node's meaning changes."""
+
+
+@dataclass(frozen=True)
+class Revolve:
+    """A profile in the (r, z) half-plane, turned fully about the z axis. Raises ProfileError where r < 0."""
+
+    profile: Profile
+
+    def __post_init__(self) -> None:
+        if self.profile.bounds[0] < 0:
+            raise ProfileError(f"crosses the axis: r = {self.profile.bounds[0]}")
+
+
+@dataclass(frozen=True)
+class Extrude:
+    """A profile in (x, y), from z0 up to z1, with `holes`; `top`, with as many vertices, makes a ruled taper."""
+
+    profile: Profile
+    z0: float
+    z1: float
+    holes: tuple[Profile, ...] = ()
+    top: Profile | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "z0", mm(self.z0))
+        object.__setattr__(self, "z1", mm(self.z1))
+        if self.z1 <= self.z0:
+            raise ProfileError(f"has no height: z0 = {self.z0}, z1 = {self.z1}")
+        if self.top is not None and (self.holes or len(self.top.vertices) != len(self.profile.vertices)):
+            raise ProfileError("a taper has no holes and as many vertices above as below")
+
+
+@dataclass(frozen=True)
+class Union:
+    """All of `parts` together."""
+
+    parts: tuple[Shape, ...]
+
+
+@dataclass(frozen=True)
+class Cut:
+    """`body` less every one of `tools`."""
+
+    body: Shape
+    tools: tuple[Shape, ...]
+
+
+@dataclass(frozen=True)
+class Common:
+    """What `parts` share."""
+
+    parts: tuple[Shape, ...]
+
+
+@dataclass(frozen=True)
+class Place:
+    """`shape` turned by a signed axis permutation (rows of `turn`, a proper rotation), then moved by `move` (mm)."""
+
+    shape: Shape
+    turn: tuple[tuple[int, int, int], ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    move: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        x, y, z = self.move
+        object.__setattr__(self, "move", (mm(x), mm(y), mm(z)))
+
+
+Shape = Revolve | Extrude | Union | Cut | Common | Place
+
+
+def cylinder(radius: float, z0: float, z1: float) -> Revolve:
+    """A cylinder about the z axis (mm)."""
+    return Revolve(rectangle(0, z0, radius, z1))
+
+
+def ring(inner: float, outer: float, z0: float, z1: float) -> Revolve:
+    """A tube about the z axis between two radii (mm)."""
+    return Revolve(rectangle(inner, z0, outer, z1))
+
+
+def box(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> Extrude:
+    """An upright box (mm)."""
+    return Extrude(rectangle(x0, y0, x1, y1), z0, z1)
+
+
+def union(parts: Iterable[Shape]) -> Shape:
+    """The union of one or more shapes; one is returned as it is."""
+    parts = tuple(parts)
+    return parts[0] if len(parts) == 1 else Union(parts)
+
+
+def cut(body: Shape, tools: Iterable[Shape]) -> Shape:
+    """`body` less `tools`; without tools it is returned as it is."""
+    tools = tuple(tools)
+    return Cut(body, tools) if tools else body
+
+
+def moved(shape: Shape, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Shape:
+    """`shape` moved by (x, y, z) mm; not wrapped where that is nothing."""
+    return Place(shape, move=(x, y, z)) if (x, y, z) != (0.0, 0.0, 0.0) else shape
+
+
+_QUARTERS = {
+    "x": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+    "y": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
+    "z": ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
+}
+
+
+def turned(shape: Shape, axis: str, quarters: int) -> Shape:
+    """`shape` turned about an axis through the origin by a number of quarter turns, counter-clockwise."""
+    turn = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    for _ in range(quarters % 4):
+        q = _QUARTERS[axis]
+        turn = tuple(tuple(sum(q[i][k] * turn[k][j] for k in range(3)) for j in range(3)) for i in range(3))
+    return Place(shape, turn=turn) if quarters % 4 else shape  # type: ignore[arg-type]
+
+
+def content_hash(shape: Shape, *more: object) -> str:
+    """SHA-256 (64 hex digits) of the tree's values, the schema version and `more` (plain values)."""
+    digest = hashlib.sha256(repr((SCHEMA, more)).encode())
+    _feed(shape, digest)
+    return digest.hexdigest()
+
+
+def exact_volume(shape: Shape) -> float:
+    """Volume in mm3 of a revolved or extruded body, placed or not, in closed form.
+
+    Revolve: Pappus. Extrude: area times height, or for a taper Simpson's rule, exact for a ruled solid whose section
+    is quadratic in z. Raises TypeError for a boolean: it has no closed form here.
+    """
+    match shape:
+        case Revolve(profile):
+            return 2 * math.pi * profile.first_moment
+        case Extrude(profile, z0, z1, holes, None):
+            return (profile.area - sum(hole.area for hole in holes)) * (z1 - z0)
+        case Extrude(profile, z0, z1, _, Profile() as top):
+            # Twice the size keeps the halved vertices on the grid: the middle section's area is a quarter of the sum's.
+            pairs = zip(profile.vertices, top.vertices, strict=True)
+            middle = Profile(tuple((a[0] + b[0], a[1] + b[1], a[2]) for a, b in pairs)).area / 4
+            return (profile.area + 4 * middle + top.area) * (z1 - z0) / 6
+        case Place(inner):
+            return exact_volume(inner)
+    raise TypeError(f"no closed form for {type(shape).__name__}")
+
+
+def _feed(node: object, digest: hashlib._Hash) -> None:
+    """Stream a tree into a digest, type and length before contents, so that no two trees share a stream."""
+    match node:
+        case float():
+            digest.update(float.hex(node + 0.0).encode() + b";")
+        case int() | str() | None:
+            digest.update(repr(node).encode() + b";")
+        case tuple():
+            digest.update(b"(%d" % len(node))
+            for item in node:
+                _feed(item, digest)
+        case _:
+            digest.update(type(node).__name__.encode() + b"{")
+            for name in node.__dataclass_fields__:  # type: ignore[union-attr]
+                _feed(getattr(node, name), digest)
