@@ -46,6 +46,14 @@ def unknown_name(field: str, value: str, known: Iterable[str]) -> Refusal:
     return Refusal(field, value, f"not known; closest: {', '.join(close)}", close[0] if close else None)
 
 
+def unknown_key(field: str, known: Iterable[str]) -> Refusal:
+    """A refusal of a key that no table has; `field` is its whole path, `known` the keys of that table."""
+    table, _, key = field.rpartition(".")
+    close = difflib.get_close_matches(key, list(known), n=1, cutoff=0.4)
+    nearest = f"{table}.{close[0]}" if table and close else close[0] if close else None
+    return Refusal(field, key, "unknown key", nearest)
+
+
 def _shown(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"

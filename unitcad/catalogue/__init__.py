@@ -145,9 +145,7 @@ def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, Any]] | None = 
     known.update(own or {})
     if name not in known:
         raise unknown_name("estimate.tissue", name, known)
-    return tuple(
-        _entry(Tissue, layer, table, f"tissue.{name}.{layer}") for layer, table in known[name].items()
-    )
+    return tuple(_entry(Tissue, layer, table, f"tissue.{name}.{layer}") for layer, table in known[name].items())
 
 
 @cache
@@ -187,9 +185,7 @@ def _raw(file: str) -> dict[str, Any]:
     return tomllib.loads((files(__package__) / file).read_text("utf-8"))
 
 
-def _entry(
-    kind: type[_Entry], name: str, table: Mapping[str, Any], path: str, spec: set[str] | None = None
-) -> _Entry:
+def _entry(kind: type[_Entry], name: str, table: Mapping[str, Any], path: str, spec: set[str] | None = None) -> _Entry:
     """An entry from its table; keys in `spec` (an own entry's) have status "spec" unless they say otherwise."""
     known = {f.name: f for f in fields(kind) if f.name != "name"}
     status, source = table.get("status", "spec"), table.get("source", "the spec")

@@ -1,0 +1,241 @@
+"""The checks at the door: defaults written out, and everything refused that no kernel would notice.
+
+Each refusal names the field, its value, the limit and the nearest accepted value: that value, put in, meets this limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from unitcad import catalogue
+from unitcad.errors import Refusal, unknown_name
+from unitcad.spec.dimensions import MOTOR_CLEARANCE, Dimensions, dimensions
+from unitcad.spec.models import Spec
+
+DESIGNS = ("embedded", "encapsulating")
+LEAST_LAYER = 0.5
+"""Least wall and cap of a layer, mm: thinner ones tear on demoulding and hide a printer's play."""
+TAIL_SHARE = 0.7
+"""Half the tail's width over the core's radius, at most: beyond it the ledge has no shoulders."""
+SLOT_CLEARANCE = 0.2
+"""Least height of the slot over the circuit's thickness, mm."""
+UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
+"""What is assumed of a motor whose entry does not say: the paper's motor."""
+_EPS = 1e-9
+
+
+def checked(spec: Spec) -> Spec:
+    """The effective spec, or a Refusal for the first thing that can't be."""
+    if spec.design not in DESIGNS:
+        raise unknown_name("design", spec.design, DESIGNS)
+    spec = _with_defaults(spec)
+    dims = dimensions(spec)
+    _check_layers(spec)
+    _check_motor(spec, dims)
+    if spec.fpcb:
+        _check_circuit(spec, dims)
+    _check_tooling(spec, dims)
+    return spec
+
+
+def warnings(spec: Spec) -> list[str]:
+    """What is unwise but not refused: layers thinner than their silicone's casting floor, the ring of air."""
+    found = []
+    known = catalogue.materials(spec.materials)
+    for i, layer in enumerate(spec.layers):
+        floor = float(known[layer.material].casting_floor_mm)
+        for field in ("wall_mm", "cap_mm"):
+            value = getattr(layer, field)
+            if value is not None and value < floor - _EPS:
+                found.append(
+                    f"layers.{i}.{field} = {value:g} mm is below the casting floor of {layer.material}, "
+                    f"about {floor:g} mm"
+                )
+    return found
+
+
+def _with_defaults(spec: Spec) -> Spec:
+    """Every default written out: motor sizes, pad, mould values from the printer, frequency and amplitude."""
+    motor = spec.motor
+    catalogue_motor = None
+    if motor.part is not None:
+        catalogue_motor = catalogue.choose("motor.part", motor.part, catalogue.motors(spec.motors))
+        motor = motor.model_copy(
+            update={
+                "diameter_mm": motor.diameter_mm or float(catalogue_motor.diameter_mm),
+                "thickness_mm": motor.thickness_mm or float(catalogue_motor.thickness_mm),
+            }
+        )
+    for field in ("diameter_mm", "thickness_mm"):
+        if getattr(motor, field) is None:
+            raise Refusal(f"motor.{field}", "nothing", "is required where no part is named")
+    known = catalogue.materials(spec.materials)
+    for i, layer in enumerate(spec.layers):
+        catalogue.choose(f"layers.{i}.material", layer.material, known)
+    printer = catalogue.choose("moulds.printer", spec.moulds.printer, catalogue.printers(spec.printers))
+    filled = {
+        name: float(getattr(printer, name)) for name, value in spec.moulds if value is None and hasattr(printer, name)
+    }
+    if spec.fpcb and spec.moulds.slot_height_mm is None:
+        filled["slot_height_mm"] = max(filled["slot_height_mm"], spec.fpcb.thickness_mm + SLOT_CLEARANCE)
+    moulds = spec.moulds.model_copy(update=filled)
+    fpcb = spec.fpcb
+    if fpcb and fpcb.pad_diameter_mm is None:
+        inner = spec.diameter_mm / 2 - sum(layer.wall_mm for layer in spec.layers)
+        cavity = (motor.diameter_mm or 0.0) / 2 if motor.fill else inner
+        radius = (
+            spec.diameter_mm / 2 - min(0.5, spec.layers[-1].wall_mm / 2) if spec.design == "embedded" else cavity - 0.3
+        )
+        if radius > 0:
+            fpcb = fpcb.model_copy(update={"pad_diameter_mm": round(2 * radius, 9)})
+    motor_values = {
+        field: getattr(spec.estimate, field) or float(getattr(catalogue_motor, field, None) or default)
+        for field, default in UNKNOWN_MOTOR.items()
+    }
+    estimate = spec.estimate.model_copy(update=motor_values)
+    catalogue.tissue(spec.estimate.tissue, spec.tissue)
+    return spec.model_copy(update={"motor": motor, "moulds": moulds, "fpcb": fpcb, "estimate": estimate})
+
+
+def _check_layers(spec: Spec) -> None:
+    for i, layer in enumerate(spec.layers):
+        if spec.design == "embedded" and layer.cap_mm is not None:
+            raise Refusal(
+                f"layers.{i}.cap_mm", layer.cap_mm, "an embedded layer is an open ring and has no cap; leave it out"
+            )
+        if spec.design == "encapsulating" and layer.cap_mm is None:
+            raise Refusal(f"layers.{i}.cap_mm", "nothing", "every encapsulating layer has a cap", layer.wall_mm)
+        for field in ("wall_mm", "cap_mm"):
+            value = getattr(layer, field)
+            if value is not None:
+                _at_least(f"layers.{i}.{field}", value, LEAST_LAYER, "a layer's least thickness is")
+
+
+def _check_motor(spec: Spec, dims: Dimensions) -> None:
+    clearance = 0.0 if spec.motor.fill else MOTOR_CLEARANCE
+    walls = sum(layer.wall_mm for layer in spec.layers)
+    least = 2 * (dims.motor_radius + clearance + walls)
+    _at_least(
+        "diameter_mm",
+        spec.diameter_mm,
+        least,
+        f"the motor ({2 * dims.motor_radius:g}), {clearance:g} of clearance and walls of {walls:g} a side need",
+    )
+
+
+def _check_circuit(spec: Spec, dims: Dimensions) -> None:
+    fpcb, moulds = spec.fpcb, spec.moulds
+    assert fpcb is not None
+    assert moulds.slot_height_mm is not None
+    assert moulds.window_clearance_mm is not None
+    assert moulds.least_wall_mm is not None
+    assert dims.pad_radius is not None
+    tail, pad = fpcb.tail_width_mm, fpcb.pad_diameter_mm or 0.0
+    if spec.design == "embedded":
+        _at_most("fpcb.pad_diameter_mm", pad, spec.diameter_mm, "the pad stays on the body, whose diameter is")
+        outermost = 2 * (dims.radii[-2] if len(dims.radii) > 1 else dims.cavity_radius)
+        _at_least(
+            "fpcb.pad_diameter_mm", pad, outermost + 0.2, "the embedded pad lies on every layer, so it reaches at least"
+        )
+        _at_most("fpcb.tail_width_mm", tail, pad, "the tail is no wider than the pad, which has")
+        return
+    _at_most(
+        "fpcb.tail_width_mm",
+        tail,
+        2 * TAIL_SHARE * dims.cavity_radius,
+        "half the tail is at most 0.7 of the core's radius, so the tail at most",
+    )
+    _at_most(
+        "fpcb.pad_diameter_mm",
+        pad,
+        2 * dims.cavity_radius,
+        "the encapsulated pad touches Layer 1 only, so it stays in the cavity of",
+    )
+    _at_least("fpcb.pad_diameter_mm", pad, tail, "the pad is no narrower than the tail, which has")
+    _at_least(
+        "moulds.slot_height_mm",
+        moulds.slot_height_mm,
+        fpcb.thickness_mm + SLOT_CLEARANCE,
+        "the slot is higher than the circuit by 0.2, so at least",
+    )
+    half_window = moulds.slot_height_mm / 2 + moulds.window_clearance_mm - fpcb.thickness_mm / 2
+    first = spec.layers[0].cap_mm or 0.0
+    _at_least(
+        "layers.0.cap_mm",
+        first,
+        moulds.least_wall_mm + half_window,
+        "with a tail, the cup's wall over the window needs a first cap of at least",
+    )
+    _at_least(
+        "motor.thickness_mm",
+        dims.motor_height,
+        moulds.least_wall_mm + half_window,
+        "with a tail, the cup's wall under the window needs a motor of at least",
+    )
+
+
+def _check_tooling(spec: Spec, dims: Dimensions) -> None:
+    moulds = spec.moulds
+    printer = catalogue.printers(spec.printers)[moulds.printer]
+    wall = moulds.least_wall_mm or 0.0
+    feature = float(printer.least_feature_mm)
+    _at_least(
+        "moulds.least_wall_mm", wall, float(printer.least_wall_mm), f"{moulds.printer} prints no wall thinner than"
+    )
+    for field in ("skirt_wall_mm", "land_mm", "plate_mm"):
+        _at_least(f"moulds.{field}", getattr(moulds, field), wall, "the printer's least wall is")
+    for field in ("engraving_stroke_mm", "groove_width_mm", "slot_height_mm"):
+        _at_least(f"moulds.{field}", getattr(moulds, field), feature, "the printer's least feature is")
+    relief = moulds.seat_relief_mm or 0.0
+    _at_most(
+        "moulds.seat_relief_mm",
+        relief,
+        moulds.plinth_height_mm - 0.5,
+        "half a millimetre of skirt must stay to centre the cup, so at most",
+    )
+    if spec.design == "encapsulating":
+        hole = moulds.filament_hole_mm or 0.0
+        _at_least("moulds.filament_hole_mm", hole, moulds.filament_mm, "the hole takes the filament of")
+        _at_least(
+            "moulds.plate_mm",
+            moulds.plate_mm,
+            groove_depth(spec) + wall,
+            "the plate holds the filament's groove and a wall over it, so at least",
+        )
+        inside = dims.ledge_radius if dims.sides else dims.cavity_radius
+        if inside < hole / 2 + wall - _EPS:
+            more = 2 * (hole / 2 + wall - inside)
+            raise Refusal(
+                "diameter_mm",
+                spec.diameter_mm,
+                "the core must hold the filament's hole with a wall round it, and the ledge",
+                _up(spec.diameter_mm + more) if not spec.motor.fill else None,
+            )
+
+
+def groove_depth(spec: Spec) -> float:
+    """Depth and width of the groove that takes the bent filament under the plate, mm."""
+    return spec.moulds.filament_mm + 0.5
+
+
+def _at_least(field: str, value: float, limit: float, why: str) -> None:
+    _bound(field, value, limit, why, value < limit - _EPS, _up)
+
+
+def _at_most(field: str, value: float, limit: float, why: str) -> None:
+    _bound(field, value, limit, why, value > limit + _EPS, _down)
+
+
+def _bound(field: str, value: float, limit: float, why: str, broken: bool, nearest: Callable[[float], float]) -> None:
+    if broken:
+        raise Refusal(field, value, f"{why} {limit:.4g} mm", nearest(limit))
+
+
+def _up(limit: float) -> float:
+    """The least typed value (three decimals) that is not below `limit`."""
+    return round(math.ceil(limit * 1000 - 1e-6) / 1000, 3)
+
+
+def _down(limit: float) -> float:
+    return round(math.floor(limit * 1000 + 1e-6) / 1000, 3)

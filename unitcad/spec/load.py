@@ -1,0 +1,197 @@
+"""From a TOML file, a template's name or plain data to a `Spec` that has passed the door."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
+from unitcad.spec.door import checked
+from unitcad.spec.models import Spec
+
+
+def templates() -> dict[str, Path]:
+    """The shipped templates by name."""
+    package = Path(str(files("unitcad")))
+    folder = next((f for f in (package / "templates", package.parent / "templates") if f.is_dir()), package)
+    return {file.stem: file for file in sorted(folder.glob("*.toml"))}
+
+
+def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Spec:
+    """The effective spec of a file (a path separator or .toml in `source`) or of a template (a bare name).
+
+    `overrides` are "path=value" with a value in TOML syntax (a bare word counts as a string). Raises Refusal or
+    UnitcadError, naming the field, for whatever can't be.
+    """
+    return from_data(override(read(source), overrides))
+
+
+def read(source: str | os.PathLike[str]) -> dict[str, Any]:
+    """The data of a spec file or template, not checked. Raises UnitcadError for a file that can't be read as TOML."""
+    text = os.fspath(source)
+    if os.sep in text or "/" in text or text.endswith(".toml"):
+        path = Path(text)
+    else:
+        known = templates()
+        if text not in known:
+            raise unknown_name("SPEC", text, known)
+        path = known[text]
+    return read_toml(path)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """A TOML file's data. Raises UnitcadError with line and column where it does not parse."""
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8"))
+    except FileNotFoundError:
+        raise UnitcadError(f"{path}: no such file") from None
+    except UnicodeDecodeError as error:
+        raise UnitcadError(f"{path}: not UTF-8 (byte {error.start})") from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise UnitcadError(f"{path}: not TOML: {error}") from None
+    except OSError as error:
+        raise UnitcadError(f"{path}: {error.strerror}") from None
+
+
+def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+    """`data` with each "path=value" put in. Raises Refusal for a path that runs through something not there."""
+    result: dict[str, Any] = json.loads(json.dumps(data, default=str))
+    for text in overrides:
+        path, equals, raw = text.partition("=")
+        if not equals or not path.strip():
+            raise Refusal("--set", text, "needs the form path=value, such as layers.0.wall_mm=1.0")
+        put(result, path.strip(), _parsed(raw.strip()))
+    return result
+
+
+def put(data: dict[str, Any], path: str, value: Any) -> None:
+    """Set `value` at a dotted path ("layers.0.wall_mm"), making tables on the way but no list entries."""
+    *way, last = path.split(".")
+    node: Any = data
+    for step in way:
+        if isinstance(node, list):
+            node = node[_index(node, step, path)]
+        elif isinstance(node, dict):
+            node = node.setdefault(step, {})
+        else:
+            break
+    if isinstance(node, list):
+        node[_index(node, last, path)] = value
+    elif isinstance(node, dict):
+        node[last] = value
+    else:
+        raise Refusal(path, value, "the path runs through a value, not a table")
+
+
+def from_data(data: Mapping[str, Any]) -> Spec:
+    """A checked, effective `Spec` of plain data. Raises Refusal for the first thing that can't be."""
+    try:
+        spec = Spec.model_validate(data)
+    except ValidationError as error:
+        raise _refusal(error) from None
+    return checked(spec)
+
+
+def to_toml(spec: Spec) -> str:
+    """The spec as TOML: the same spec when read again. Keys in the order of the models, None left out."""
+    return _table(spec.model_dump(mode="json", exclude_none=True), ())
+
+
+def _table(data: Mapping[str, Any], path: tuple[str, ...]) -> str:
+    def is_table(value: Any) -> bool:
+        return isinstance(value, dict)
+
+    def is_tables(value: Any) -> bool:
+        return isinstance(value, list) and bool(value) and all(map(is_table, value))
+
+    lines = [f"{_key(k)} = {_toml(v)}\n" for k, v in data.items() if not is_table(v) and not is_tables(v)]
+    for key, value in data.items():
+        name = ".".join(map(_key, (*path, key)))
+        if is_table(value) and value:
+            lines.append(f"\n[{name}]\n" + _table(value, (*path, key)))
+        elif is_tables(value):
+            lines += [f"\n[[{name}]]\n" + _table(item, (*path, key)) for item in value]
+    return "".join(lines)
+
+
+def _key(key: str) -> str:
+    plain = key.isascii() and key.replace("-", "").replace("_", "").isalnum()
+    return key if plain else _toml(key)
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def _parsed(raw: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {raw}")["value"]
+    except tomllib.TOMLDecodeError:
+        pass
+    try:
+        return float(raw)
+    except ValueError:
+        return raw
+
+
+def _index(node: list[Any], step: str, path: str) -> int:
+    if not step.isdigit() or int(step) >= len(node):
+        raise Refusal(path, step, f"needs an index from 0 to {len(node) - 1} here", len(node) - 1 if node else None)
+    return int(step)
+
+
+def _refusal(error: ValidationError) -> Refusal:
+    """The first of pydantic's findings in our words; an unknown key comes with the closest that exist."""
+    first = error.errors(include_url=False)[0]
+    where = [part for part in first["loc"] if not (isinstance(part, str) and ("[" in part or part == "tuple"))]
+    field = ".".join(map(str, where))
+    value = first.get("input")
+    if first["type"] == "extra_forbidden":
+        return unknown_key(field, _known_keys(where[:-1]))
+    if first["type"] == "missing":
+        return Refusal(field, "nothing", "is required")
+    context = first.get("ctx", {})
+    nearest = context.get("ge", context.get("le"))
+    if first["type"] == "greater_than":
+        nearest = 0.001
+    if first["type"] == "literal_error":
+        names = [word.strip("'") for word in str(context.get("expected", "")).replace(" or ", ", ").split(", ")]
+        if isinstance(value, str):
+            return unknown_name(field, value, names)
+    return Refusal(field, value if isinstance(value, int | float | str) else str(value), first["msg"].lower(), nearest)
+
+
+def _known_keys(where: list[Any]) -> list[str]:
+    model: Any = Spec
+    for part in where:
+        if isinstance(part, int):
+            continue
+        annotation = str(model.model_fields[part].annotation)
+        model = next(
+            (m for m in _tables() if m.__name__ in annotation),
+            Spec,
+        )
+    return list(model.model_fields)
+
+
+def _tables() -> list[Any]:
+    from unitcad.spec import models
+
+    return [
+        m
+        for m in vars(models).values()
+        if isinstance(m, type) and issubclass(m, models.Table) and m is not models.Table
+    ]

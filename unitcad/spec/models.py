@@ -1,0 +1,127 @@
+"""What a person may ask for: the tables of a spec. Lengths in mm, the unit in each name; values are kept as typed.
+
+Only types and signs are settled here; what depends on several values at once is settled in `door`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(strict=True, gt=0)]
+NotNegative = Annotated[float, Field(strict=True, ge=0)]
+Count = Annotated[int, Field(strict=True, ge=1)]
+Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
+Model = Literal["paper", "consistent", "fitted"]
+Entries = dict[str, dict[str, Any]]
+
+
+class Table(BaseModel):
+    """A table of the spec: frozen, unknown keys refused, no NaN or infinity."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class MotorTable(Table):
+    """The motor: a catalogue `part`, or its size; a size given beside a part overrides the catalogue's."""
+
+    part: str | None = None
+    diameter_mm: Positive | None = None
+    thickness_mm: Positive | None = None
+    fill: bool = Field(False, description="Layer 1 reaches the motor: no ring of air between them")
+
+
+class FpcbTable(Table):
+    """The flexible circuit: a round pad on the motor's back and a straight tail to one side or to both."""
+
+    tail: Literal["one", "both"] = "one"
+    thickness_mm: Positive = 0.11
+    tail_width_mm: Positive = 3.0
+    tail_length_mm: Positive = Field(10.0, description="how far the tail stands out of the body")
+    pad_diameter_mm: Positive | None = None
+
+
+class LayerTable(Table):
+    """One silicone layer: a wall and, in the encapsulating design, a cap."""
+
+    material: str
+    wall_mm: Positive
+    cap_mm: Positive | None = None
+
+
+class MouldsTable(Table):
+    """The tooling. Whatever the printer's catalogue entry gives can be overridden; None takes the printer's value."""
+
+    printer: str = "fdm-0.4"
+    cavities: tuple[Count, Count] | Literal["fill"] = (1, 1)
+    bed_x_mm: Positive | None = None
+    bed_y_mm: Positive | None = None
+    bed_z_mm: Positive | None = None
+    layer_mm: Positive | None = None
+    xy_play_mm: NotNegative | None = None
+    plinth_clearance_mm: Positive | None = None
+    seat_relief_mm: Positive | None = None
+    slot_height_mm: Positive | None = None
+    slot_width_clearance_mm: Positive | None = None
+    window_clearance_mm: Positive | None = None
+    least_wall_mm: Positive | None = None
+    skirt_wall_mm: Positive | None = None
+    land_mm: Positive | None = None
+    groove_width_mm: Positive | None = None
+    groove_depth_mm: Positive | None = None
+    filament_hole_mm: Positive | None = None
+    engraving_depth_mm: Positive | None = None
+    engraving_stroke_mm: Positive | None = None
+    filament_mm: Positive = 1.75
+    plinth_height_mm: Positive = 2.0
+    plate_mm: Positive = 4.0
+    ledge_mm: Positive = 0.6
+
+
+class CastingTable(Table):
+    """The lab: scale, mixing, room and the margin on a silicone's elongation."""
+
+    scale_resolution_g: Positive = 0.01
+    minimum_mix_g: Positive = 2.0
+    waste: NotNegative = Field(0.5, description="extra mix as a fraction of what the cavities take")
+    room_c: Annotated[float, Field(strict=True, ge=5, le=45)] = 23.0
+    vacuum: bool = True
+    strain_margin: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+        0.5, description="the part of a silicone's elongation at break that demoulding may use"
+    )
+
+
+class EstimateTable(Table):
+    """What the attenuation estimate is asked for; None takes the motor's value."""
+
+    frequency_hz: Positive | None = None
+    amplitude_um: Positive | None = None
+    tissue: str = "forearm"
+    models: tuple[Model, ...] = ("paper", "consistent", "fitted")
+
+
+class OutputTable(Table):
+    """Formats, and the largest distance of a mesh from the true surface."""
+
+    formats: tuple[Format, ...] = ("step", "stl", "3mf")
+    tolerance_mm: Annotated[float, Field(strict=True, ge=0.0005, le=0.2)] = 0.01
+
+
+class Spec(Table):
+    """A haptic unit as asked for; `layers` run from the inside out, one entry being a single-layer control."""
+
+    name: Annotated[str, Field(min_length=1, max_length=120)]
+    design: str
+    diameter_mm: Positive
+    motor: MotorTable = MotorTable(part="LCM0720A3463F")
+    fpcb: FpcbTable | None = None
+    layers: Annotated[tuple[LayerTable, ...], Field(min_length=1, max_length=15)]
+    moulds: MouldsTable = MouldsTable()
+    casting: CastingTable = CastingTable()
+    estimate: EstimateTable = EstimateTable()
+    output: OutputTable = OutputTable()
+    materials: Entries = {}
+    motors: Entries = {}
+    printers: Entries = {}
+    tissue: dict[str, Entries] = {}
