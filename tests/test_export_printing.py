@@ -1,0 +1,108 @@
+import manifold3d
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sample_bodies import all_bodies, cup
+
+from unitcad.errors import UnitcadError
+from unitcad.export import printing, stl
+from unitcad.kernels.mesh import arrays, realise
+
+BODIES = {body.name: body for body in all_bodies()}
+
+
+def judged(vertices: np.ndarray, faces: np.ndarray) -> tuple[bool, float, float]:
+    """By trimesh, another library: watertight volume, signed volume (mm3), least altitude of a face (mm)."""
+    mesh = trimesh.Trimesh(vertices.astype(float), faces, process=False)
+    sides = np.linalg.norm(np.diff(mesh.triangles[:, (0, 1, 2, 0)], axis=1), axis=2)
+    return bool(mesh.is_volume), float(mesh.volume), float((2 * mesh.area_faces / sides.max(axis=1)).min())
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_ready_mesh_is_closed_and_keeps_its_volume(name):
+    solid = realise(BODIES[name].shape, 96)
+    vertices, faces = printing.print_ready(*arrays(solid), BODIES[name].upside_down)
+    sound, volume, altitude = judged(vertices, faces)
+    step = printing.resolution(vertices)
+    assert vertices.dtype == np.float32
+    assert sound
+    assert altitude > step
+    assert volume == pytest.approx(solid.volume(), abs=4 * step * solid.surface_area())
+    assert vertices[:, 2].min() == 0
+    assert manifold3d.Manifold(manifold3d.Mesh(vertices, faces.astype(np.uint32))).status() == manifold3d.Error.NoError
+
+
+def test_upside_down_stands_on_the_side_that_was_up():
+    vertices, _ = arrays(realise(cup().shape, 96))
+    laid = printing.laid_down(vertices, True)
+    assert laid[:, 2].min() == 0
+    assert np.array_equal(laid[:, 0], vertices[:, 0])
+    assert np.allclose(laid[:, 2], 4.61 - vertices[:, 2], atol=1 / 1024)
+    assert np.array_equal(laid[:, 1], -vertices[:, 1])
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.floats(-50, 50),
+    st.floats(-50, 50),
+    st.floats(0, 6.3),
+    st.floats(-7, 0).map(lambda power: 10**power),
+)
+def test_slivers_of_booleans_survive_the_rounding(x, y, angle, gap):
+    """A turned block cut a hair's breadth off its own face: the thin faces that this leaves are the rounding's trap."""
+    block = manifold3d.Manifold.cube((10, 10, 10)).rotate((0, 0, np.degrees(angle))).translate((x, y, 0))
+    other = block.translate((gap, 3 * gap, gap))
+    drum = manifold3d.Manifold.cylinder(20, 4 + gap, 4, 64).translate((x + gap, y, -5))
+    solid = (block + other) - drum
+    vertices, faces = printing.print_ready(*arrays(solid))
+    sound, volume, altitude = judged(vertices, faces)
+    assert sound
+    assert altitude > printing.resolution(vertices)
+    assert volume == pytest.approx(solid.volume(), abs=64 * printing.resolution(vertices) * solid.surface_area())
+
+
+def test_plain_rounding_is_what_this_guards_against():
+    """The rounding alone leaves faces without area on such a body, so the tests above can fail."""
+    block = manifold3d.Manifold.cube((10, 10, 10)).rotate((0, 0, 20)).translate((40, 40, 0))
+    solid = block + block.translate((2e-7, 1e-7, 3e-7))
+    vertices, faces = arrays(solid)
+    rounded = trimesh.Trimesh(vertices.astype(np.float32).astype(float), faces, process=False)
+    assert (rounded.area_faces < 1e-9).any()
+    assert judged(*printing.print_ready(vertices, faces))[0]
+
+
+def test_a_body_thinner_than_single_precision_is_refused():
+    vertices, faces = arrays(manifold3d.Manifold.cube((100, 100, 1e-7)))
+    with pytest.raises(UnitcadError, match="single precision"):
+        printing.print_ready(vertices, faces)
+
+
+def test_ready_mesh_does_not_depend_on_the_order_of_faces():
+    vertices, faces = arrays(realise(cup().shape, 96))
+    first = printing.print_ready(vertices, faces)
+    again = printing.print_ready(*first)
+    assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
+
+
+def test_stl_bytes_are_the_format(tmp_path):
+    vertices, faces = printing.print_ready(*arrays(realise(cup().shape, 96)))
+    path = tmp_path / "cup2.stl"
+    stl.write(path, vertices, faces, "cup2")
+    data = path.read_bytes()
+    assert len(data) == 84 + 50 * len(faces)
+    assert data[:80].decode("ascii").rstrip() == "unitcad, mm: cup2"
+    assert int.from_bytes(data[80:84], "little") == len(faces)
+    read = trimesh.load_mesh(path, process=False)
+    assert np.array_equal(read.triangles, vertices[faces].astype(float))
+    stored = np.frombuffer(data[84:], dtype=np.uint8).reshape(-1, 50)[:, :12].copy().view("<f4")
+    assert np.abs(stored - trimesh.triangles.normals(read.triangles)[0]).max() < 1e-6
+    assert stl.content(vertices, faces, "cup2") == data
+
+
+def test_stl_header_never_starts_with_solid_and_never_overflows():
+    vertices, faces = printing.print_ready(*arrays(manifold3d.Manifold.cube((1, 1, 1))))
+    data = stl.content(vertices, faces, "solid " + "é" * 100)
+    assert not data.lower().startswith(b"solid")
+    assert len(data) == 84 + 50 * 12

@@ -1,0 +1,94 @@
+import io
+import zipfile
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sample_bodies import all_bodies
+
+from unitcad.export import printing, threemf
+from unitcad.kernels.mesh import arrays, realise
+
+CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+
+
+@pytest.fixture(scope="module")
+def parts():
+    return [
+        threemf.MeshPart(
+            body.name, body.colour, *printing.print_ready(*arrays(realise(body.shape, 48)), body.upside_down)
+        )
+        for body in all_bodies()
+    ]
+
+
+def model(data: bytes) -> ElementTree.Element:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        assert archive.testzip() is None
+        return ElementTree.fromstring(archive.read("3D/3dmodel.model"))
+
+
+def placed_boxes(root: ElementTree.Element) -> list[tuple[np.ndarray, np.ndarray]]:
+    objects = {o.get("id"): o for o in root.iter(f"{CORE}object")}
+    found = []
+    for item in root.iter(f"{CORE}item"):
+        move = np.array(item.get("transform", "").split()[9:], dtype=float)
+        table = [
+            [float(v.get(axis, "")) for axis in "xyz"] for v in objects[item.get("objectid")].iter(f"{CORE}vertex")
+        ]
+        found.append((np.min(table, axis=0) + move, np.max(table, axis=0) + move))
+    return found
+
+
+def test_read_back_equals_written(parts):
+    root = model(threemf.content(parts))
+    assert root.get("unit") == "millimeter"
+    objects = list(root.iter(f"{CORE}object"))
+    bases = list(root.iter(f"{CORE}base"))
+    assert [o.get("name") for o in objects] == [part.name for part in parts]
+    for part, node in zip(parts, objects, strict=True):
+        vertices = [[np.float32(v.get(axis)) for axis in "xyz"] for v in node.iter(f"{CORE}vertex")]
+        faces = [[int(t.get(key, "")) for key in ("v1", "v2", "v3")] for t in node.iter(f"{CORE}triangle")]
+        assert np.array_equal(np.array(vertices), part.vertices)
+        assert np.array_equal(faces, part.faces)
+        base = bases[int(node.get("pindex", ""))]
+        shown = tuple(int(base.get("displaycolor", "")[i : i + 2], 16) for i in (1, 3, 5))
+        assert shown == tuple(round(255 * channel) for channel in part.colour)
+
+
+def test_parts_stand_on_the_bed_apart_from_each_other(parts):
+    boxes = placed_boxes(model(threemf.content(parts)))
+    for i, (low, high) in enumerate(boxes):
+        assert low[2] == 0
+        assert (low[:2] >= 0).all()
+        assert (high[:2] <= 220).all()
+        for other_low, other_high in boxes[:i]:
+            clear = np.maximum(low - other_high, other_low - high)[:2].max()
+            assert clear >= threemf.GAP_MM - 1e-5
+
+
+@given(st.lists(st.tuples(st.floats(0.1, 150), st.floats(0.1, 150)), min_size=1, max_size=12))
+def test_layout_never_overlaps(footprints):
+    corners = threemf.layout(footprints, (220, 220))
+    for i, ((x, y), (w, d)) in enumerate(zip(corners, footprints, strict=True)):
+        assert x >= 0
+        assert x + w <= 220 + 1e-9
+        for (ox, oy), (ow, od) in zip(corners[:i], footprints[:i], strict=True):
+            assert max(x - ox - ow, ox - x - w, y - oy - od, oy - y - d) >= threemf.GAP_MM - 1e-9
+
+
+def test_same_bytes_and_fixed_dates(parts, tmp_path):
+    data = threemf.content(parts)
+    threemf.write(tmp_path / "unit.3mf", parts)
+    assert (tmp_path / "unit.3mf").read_bytes() == data
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        assert archive.namelist()[0] == "[Content_Types].xml"
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+
+
+def test_names_are_escaped(parts):
+    odd = threemf.MeshPart('a<b>"&', (0, 0.5, 1), parts[-1].vertices, parts[-1].faces)
+    node = next(model(threemf.content([odd])).iter(f"{CORE}object"))
+    assert node.get("name") == 'a<b>"&'

@@ -1,0 +1,29 @@
+"""Binary STL: little-endian single precision, mm by custom (the format has no unit)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+def write(path: Path, vertices: np.ndarray, faces: np.ndarray, name: str) -> None:
+    """Write a mesh (vertices (n, 3) in mm, faces (m, 3)); `print_ready` makes one that survives the rounding.
+
+    The header names the part. It never starts with "solid", by which some readers take a file for the ASCII kind.
+    """
+    path.write_bytes(content(vertices, faces, name))
+
+
+def content(vertices: np.ndarray, faces: np.ndarray, name: str) -> bytes:
+    """The bytes of the file."""
+    corners = np.asarray(vertices, dtype=np.float32)[faces]
+    edges = corners[:, 1:].astype(np.float64) - corners[:, :1]
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    facets = np.zeros(len(faces), dtype=_FACET)
+    facets["normal"] = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    facets["corners"] = corners
+    header = f"unitcad, mm: {name}".encode("ascii", "replace")[:80].ljust(80)
+    return header + len(faces).to_bytes(4, "little") + facets.tobytes()

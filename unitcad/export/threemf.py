@@ -1,0 +1,119 @@
+"""3MF core: one model part with mm, names and colours, the parts side by side on the bed.
+
+Written after the 3MF Core Specification 1.3 (https://github.com/3MFConsortium/spec_core).
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+GAP_MM = 5.0
+
+_CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
+ <Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+ <Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>
+</Types>
+"""
+_RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
+<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+ <Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
+</Relationships>
+"""
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """A named mesh in print attitude: vertices (n, 3) float32 in mm, faces (m, 3), colour as three numbers 0 to 1."""
+
+    name: str
+    colour: tuple[float, float, float]
+    vertices: np.ndarray
+    faces: np.ndarray
+
+
+def write(path: Path, parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220.0)) -> None:
+    """Write `parts` in their order, in rows along x within the bed's width, GAP_MM apart."""
+    path.write_bytes(content(parts, bed_mm))
+
+
+def content(parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220.0)) -> bytes:
+    """The bytes of the package: fixed dates, order and compression."""
+    entries = {
+        "[Content_Types].xml": _CONTENT_TYPES,
+        "_rels/.rels": _RELATIONSHIPS,
+        "3D/3dmodel.model": _model(parts, bed_mm),
+    }
+    package = io.BytesIO()
+    with zipfile.ZipFile(package, "w") as archive:
+        for name, text in entries.items():
+            entry = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
+            entry.create_system = 3
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, text.encode(), compresslevel=6)
+    return package.getvalue()
+
+
+def layout(footprints: Sequence[tuple[float, float]], bed_mm: tuple[float, float]) -> list[tuple[float, float]]:
+    """Where each footprint's (x, y) lower left corner goes (mm): rows along x, a new one where the bed's width ends,
+    all about the bed's middle. What does not fit on it runs over its far edges; nothing overlaps.
+    """
+    corners: list[tuple[float, float]] = []
+    x = y = row_depth = reach = 0.0
+    for width, depth in footprints:
+        if x > 0 and x + width > bed_mm[0]:
+            x, y, row_depth = 0.0, y + row_depth + GAP_MM, 0.0
+        corners.append((x, y))
+        reach, row_depth = max(reach, x + width), max(row_depth, depth)
+        x += width + GAP_MM
+    dx, dy = max(0.0, (bed_mm[0] - reach) / 2), max(0.0, (bed_mm[1] - y - row_depth) / 2)
+    return [(x + dx, y + dy) for x, y in corners]
+
+
+def colour_hex(colour: tuple[float, float, float]) -> str:
+    """#RRGGBB of three numbers 0 to 1."""
+    return "#" + "".join(f"{round(channel * 255):02X}" for channel in colour)
+
+
+def _model(parts: Sequence[MeshPart], bed_mm: tuple[float, float]) -> str:
+    low = [part.vertices.min(axis=0).astype(float) for part in parts]
+    size = [part.vertices.max(axis=0).astype(float) - least for part, least in zip(parts, low, strict=True)]
+    places = layout([(float(width), float(depth)) for width, depth, _ in size], bed_mm)
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<model unit="millimeter" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">',
+        '<metadata name="Application">unitcad</metadata>',
+        "<resources>",
+        '<basematerials id="1">',
+        *(f"<base name={quoteattr(part.name)} displaycolor={quoteattr(colour_hex(part.colour))}/>" for part in parts),
+        "</basematerials>",
+    ]
+    for index, part in enumerate(parts):
+        lines += [
+            f'<object id="{index + 2}" type="model" name={quoteattr(part.name)} pid="1" pindex="{index}">',
+            "<mesh>",
+            "<vertices>",
+            *_rows('<vertex x="%s" y="%s" z="%s"/>', np.asarray(part.vertices, np.float32).astype(str)),
+            "</vertices>",
+            "<triangles>",
+            *_rows('<triangle v1="%s" v2="%s" v3="%s"/>', part.faces),
+            "</triangles>",
+            "</mesh>",
+            "</object>",
+        ]
+    lines += ["</resources>", "<build>"]
+    for index, (x, y) in enumerate(places):
+        move = " ".join(f"{value + 0.0:.6f}" for value in (x, y, 0.0) - low[index])
+        lines.append(f'<item objectid="{index + 2}" transform="1 0 0 0 1 0 0 0 1 {move}"/>')
+    return "\n".join([*lines, "</build>", "</model>", ""])
+
+
+def _rows(form: str, table: np.ndarray) -> list[str]:
+    return [form % tuple(row) for row in table.tolist()]
