@@ -18,15 +18,11 @@ FINEST, COARSEST = 4096, 24
 def segment_count(radius: float, tolerance: float) -> int:
     """Sides of an area-true polygon whose distance from a circle of `radius` nowhere exceeds `tolerance` (both mm).
 
-    The corner of such a polygon stands r (sqrt(x / sin x) - 1) outside, x = 2 pi / n, its side r (1 - cos(x/2) sqrt(x / sin x))
-    inside; the side's distance is the larger. A multiple of 8, so that the axes and diagonals are vertices.
+    With x = 2 pi / n its corners stand radius (sqrt(x / sin x) - 1), about radius x^2 / 12, outside the circle, and its
+    sides half as much inside. A multiple of 8, so that the axes and the diagonals are vertices.
     """
-
-    def distance(n: int) -> float:
-        return radius * (1 - math.cos(math.pi / n) * area_true(n))
-
     n = COARSEST
-    while n < FINEST and distance(n) > tolerance:
+    while n < FINEST and radius * (area_true(n) - 1) > tolerance:
         n += 8
     return n
 
@@ -48,9 +44,7 @@ def _realise(shape: Shape, segments: int) -> Manifold:
         case Revolve(profile):
             # Scaled after revolving: CrossSection rounds to a grid that the scaled radii would not lie on.
             swell = area_true(segments)
-            return Manifold.revolve(CrossSection([points(profile, segments)]), segments).scale(
-                (swell, swell, 1.0)
-            )
+            return Manifold.revolve(CrossSection([points(profile, segments)]), segments).scale((swell, swell, 1.0))
         case Extrude(profile, z0, z1, holes, None):
             loops = [points(profile, segments), *(points(hole, segments)[::-1] for hole in holes)]
             return Manifold.extrude(CrossSection(loops), z1 - z0).translate((0, 0, z0))
@@ -62,9 +56,7 @@ def _realise(shape: Shape, segments: int) -> Manifold:
             bodies = [_realise(body, segments), *(_realise(tool, segments) for tool in tools)]
             return Manifold.batch_boolean(bodies, manifold3d.OpType.Subtract)
         case Common(parts):
-            return Manifold.batch_boolean(
-                [_realise(part, segments) for part in parts], manifold3d.OpType.Intersect
-            )
+            return Manifold.batch_boolean([_realise(part, segments) for part in parts], manifold3d.OpType.Intersect)
         case Place(inner, turn, move):
             rows = [[*(float(v) for v in row), shift] for row, shift in zip(turn, move, strict=True)]
             return _realise(inner, segments).transform(rows)
@@ -91,7 +83,5 @@ def _taper(below: np.ndarray, above: np.ndarray, z0: float, z1: float) -> Manifo
     cap_above = manifold3d.triangulate([above]) + n
     i, j = np.arange(n), np.roll(np.arange(n), -1)
     sides = np.vstack([np.column_stack([i, j, j + n]), np.column_stack([i, j + n, i + n])])
-    mesh = manifold3d.Mesh64(
-        np.vstack([floor, roof]), np.vstack([cap_below, cap_above, sides]).astype(np.uint64)
-    )
+    mesh = manifold3d.Mesh64(np.vstack([floor, roof]), np.vstack([cap_below, cap_above, sides]).astype(np.uint64))
     return Manifold(mesh)

@@ -1,0 +1,36 @@
+"""Designs: from a spec to the named bodies of a unit."""
+
+from __future__ import annotations
+
+from unitcad.designs import common, embedded, encapsulating
+from unitcad.shape.body import Body
+from unitcad.spec import Spec, dimensions
+
+_LAYERS = {"embedded": embedded.layers, "encapsulating": encapsulating.layers}
+_LAYER_COLOURS = (
+    (0.38, 0.65, 1.00),
+    (0.54, 0.87, 0.54),
+    (0.98, 0.80, 0.40),
+    (0.87, 0.56, 0.87),
+    (0.55, 0.85, 0.85),
+    (0.95, 0.60, 0.55),
+)
+_MOTOR_COLOUR, _CIRCUIT_COLOUR = (0.70, 0.70, 0.78), (0.93, 0.56, 0.15)
+
+
+def layer_colour(index: int) -> tuple[float, float, float]:
+    """The colour of layer `index` (from 0, inside out)."""
+    return _LAYER_COLOURS[index % len(_LAYER_COLOURS)]
+
+
+def unit_bodies(spec: Spec) -> tuple[Body, ...]:
+    """The bodies of the unit: layers from the inside out, then motor and circuit, as assembled on the skin z = 0."""
+    dims = dimensions(spec)
+    bodies = [
+        Body(f"layer{i + 1}", "unit", shape, layer_colour(i), made="cast", step=i + 1)
+        for i, shape in enumerate(_LAYERS[spec.design](dims))
+    ]
+    bodies.append(Body("motor", "unit", common.motor(dims), _MOTOR_COLOUR, made="bought"))
+    if spec.fpcb:
+        bodies.append(Body("fpcb", "unit", common.circuit(spec, dims), _CIRCUIT_COLOUR, made="bought"))
+    return tuple(bodies)

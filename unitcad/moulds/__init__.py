@@ -1,0 +1,1 @@
+"""Casting moulds: the plan of pours, the tooling, the laws that they keep."""

@@ -1,0 +1,103 @@
+"""A casting plan: every tool drawn once, and the pours as records that laws, procedure and pictures run through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from unitcad.designs import unit_bodies
+from unitcad.moulds import tooling
+from unitcad.moulds.layout import Cell, Layout, layout
+from unitcad.shape import Shape, Union, content_hash, moved, turned
+from unitcad.shape.body import Body
+from unitcad.spec import Dimensions, Spec, dimensions
+
+_BASE, _CUP, _CUP2, _TONGUE = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.73, 0.83, 0.93), (0.90, 0.30, 0.30)
+_BLADE, _STUB = (0.87, 0.87, 0.55), (0.22, 0.22, 0.22)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One pour: the layer it casts, the tools that stand around it (by name), and what is there already.
+
+    `layer` is the cast layer in the frame of the tools, one solid a cell; `earlier` the cured ones; `seals` what
+    silicone is kept from though no tool fills it. `rim` is z of the plane that the blade runs on.
+    """
+
+    index: int
+    name: str
+    material: str
+    tools: tuple[str, ...]
+    layer: tuple[Shape, ...]
+    earlier: tuple[Shape, ...]
+    seals: tuple[Shape, ...]
+    rim: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All tools as assembled, the pours in their order, and the four characters that their labels end in."""
+
+    tools: tuple[Body, ...]
+    steps: tuple[Step, ...]
+    layout: Layout
+    label: str
+
+    def tool(self, name: str) -> Body:
+        """The tool of that name. Raises KeyError."""
+        return {tool.name: tool for tool in self.tools}[name]
+
+
+def plan(spec: Spec) -> Plan:
+    """The plan of a spec. Raises Refusal where the moulds can't be: beyond the bed, a tail that reaches no edge."""
+    dims = dimensions(spec)
+    lay = layout(spec, dims)
+    blank = _tools(spec, dims, lay, "")
+    unit = unit_bodies(spec)
+    layers = tuple(body.shape for body in unit if body.made == "cast")
+    # Material variants share pieces: the label is of geometry alone, drawn before there is a label on it.
+    label = content_hash(Union((*(tool.shape for tool in blank), *layers)))[:4].upper()
+    tools = _tools(spec, dims, lay, label)
+    cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
+    around = [t.name for t in tools if t.name.startswith(("tongue", "stub"))]
+    steps = tuple(
+        Step(
+            index=i + 1,
+            name=f"layer{i + 1}",
+            material=layer.material,
+            tools=("base", f"cup{i + 1}", *around),
+            layer=cast[i],
+            earlier=tuple(shape for earlier in cast[:i] for shape in earlier),
+            seals=tuple(tooling.seals(spec, dims, lay, i)),
+            rim=dims.heights[i],
+        )
+        for i, layer in enumerate(spec.layers)
+    )
+    return Plan(tools, steps, lay, label)
+
+
+def placed(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
+    """A unit's solid in its cell: turned by half where the cell's one tail leaves to -x."""
+    return moved(turned(shape, "z", 2 if cell.sides == (-1,) and dims.sides == (1,) else 0), cell.x, cell.y)
+
+
+def _tools(spec: Spec, dims: Dimensions, lay: Layout, label: str) -> tuple[Body, ...]:
+    found = [Body("base", "tool", tooling.base(spec, dims, lay, f"B{label}" if label else ""), _BASE)]
+    for i in range(len(spec.layers)):
+        text = (f"C{i + 1:X}", label[:2], label[2:]) if label else None
+        shape = tooling.cup(spec, dims, lay, i, text)
+        found.append(Body(f"cup{i + 1}", "tool", shape, _CUP2 if i % 2 else _CUP, step=i + 1, upside_down=True))
+    brittle = spec.moulds.slot_height_mm is not None and spec.moulds.printer.startswith("sla")
+    strips = tooling.tongues(spec, dims, lay)
+    found += [
+        Body(_numbered("tongue", i, strips), "tool", shape, _TONGUE, made="cut" if brittle else "printed")
+        for i, shape in enumerate(strips)
+    ]
+    if spec.design == "encapsulating":
+        stubs = [tooling.stub(spec, dims, lay, cell) for cell in lay.cells]
+        found += [Body(_numbered("stub", i, stubs), "tool", s, _STUB, made="cut") for i, s in enumerate(stubs)]
+    found.append(Body("blade", "tool", tooling.blade(lay, dims.heights[-1]), _BLADE, upside_down=True))
+    return tuple(found)
+
+
+def _numbered(name: str, index: int, among: list[Shape]) -> str:
+    return name if len(among) == 1 else f"{name}{index + 1}"

@@ -1,0 +1,293 @@
+"""The pieces of a mould, each a function of the spec: base, cups, tongues, blade, filament stubs, and the seals.
+
+Tools are drawn from the spec's lengths. None is made by subtracting the unit: law 1 compares the two.
+
+        section of pour 1            cup          rim, z = heights[0]
+            .-----------.  groove .--_-----------.
+            |           '--'      | |            |
+            |     cup   | cavity .'-'. tongue ====== grip
+        .---'  .--------+--------'core|-----------'---.
+        | skirt|  plinth            stub              |   seat, z = 0
+        '------'  ........................ .----------'   skirt ends above the plate
+        |  plate                     |   |            |
+        '----------------------------'   '- groove ---'
+"""
+
+from __future__ import annotations
+
+import math
+
+from unitcad.designs.common import BEYOND, strip
+from unitcad.moulds.layout import CORNER_RADIUS, KEY, PLINTH_DRAFT_DEG, TEXT_MARGIN, Cell, Layout
+from unitcad.shape import (
+    Common,
+    Extrude,
+    Profile,
+    Revolve,
+    Shape,
+    box,
+    cut,
+    cylinder,
+    moved,
+    polygon,
+    ring,
+    rounded_rectangle,
+    turned,
+    union,
+)
+from unitcad.shape.lettering import HEIGHT, engraving, text_width
+from unitcad.spec import Dimensions, Spec
+from unitcad.spec.door import groove_depth
+
+PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER = 1.5, 4.0, 1.5
+GRIP_LENGTH, GRIP_WIDTH, GRIP_GAP = 8.0, 10.0, 3.0
+BLADE_THICKNESS, BLADE_HEIGHT, BLADE_EDGE = 3.0, 12.0, 0.8
+FLARE = 1.0
+"""Of the filament hole's lower end: the filament bends round it."""
+STUB_TAIL = 8.0
+SLACK = 0.125
+"""Of the lying filament under its groove's roof."""
+
+
+def plate_top(spec: Spec) -> float:
+    """z of the plate's upper face."""
+    return -spec.moulds.plinth_height_mm
+
+
+def plate_bottom(spec: Spec) -> float:
+    """z of the plate's lower face."""
+    return plate_top(spec) - spec.moulds.plate_mm
+
+
+def base(spec: Spec, dims: Dimensions, lay: Layout, label: str) -> Shape:
+    """Plate, keyed plinth and cores in one piece, with pry slots, filament holes and grooves, ledges and a label."""
+    top, bottom = plate_top(spec), plate_bottom(spec)
+    plate = Extrude(rounded_rectangle(*lay.plate, CORNER_RADIUS), bottom, top)
+    body = union((plate, plinth(spec, lay), *(moved(core(dims), c.x, c.y) for c in lay.cells)))
+    tools: list[Shape] = [_pry_slot(lay, top, side) for side in (1, -1)]
+    if spec.design == "encapsulating":
+        tools += [moved(_filament_way(spec, dims, lay, c), c.x, c.y) for c in lay.cells]
+    tools += [moved(notch(spec, dims, s), c.x, c.y) for c in lay.cells for s in c.sides if dims.slot_z]
+    if label:
+        stroke, depth = spec.moulds.engraving_stroke_mm or 0, spec.moulds.engraving_depth_mm or 0
+        text = engraving(label, stroke, top - depth, top + BEYOND)
+        width = text_width(label, stroke)
+        tools.append(moved(text, -width / 2, (lay.cup[1] + lay.plate[1]) / 2 - lay.label_height / 2))
+    return cut(body, tools)
+
+
+def plinth(spec: Spec, lay: Layout) -> Shape:
+    """The keyed square on the plate, 5 degrees a side, that every cup fits over; its top is the seat z = 0."""
+    height = spec.moulds.plinth_height_mm
+    return _tapered(lay, 0.0, -height)
+
+
+def core(dims: Dimensions) -> Shape:
+    """The positive of a cavity, standing on the plinth (its foot sunk in it)."""
+    return cylinder(dims.cavity_radius, -BEYOND, dims.core_height)
+
+
+def notch(spec: Spec, dims: Dimensions, side: int) -> Shape:
+    """What the ledge removes from a core: the tongue's seat and a window's clearance beside it, open upwards."""
+    assert dims.slot_z is not None
+    half = dims.slot_width / 2 + (spec.moulds.window_clearance_mm or 0)
+    return strip(dims, side, dims.cavity_radius + BEYOND, half, dims.slot_z[0], dims.slot_z[1] + BEYOND)
+
+
+def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int, label: tuple[str, str, str] | None) -> Shape:
+    """The one-piece cup of a layer (from 0): recess over the plinth, seat at z = 0, bores, windows, grooves."""
+    rim, radius = dims.heights[layer], dims.radii[layer]
+    tools: list[Shape] = [recess(spec, lay)]
+    tools += [moved(cylinder(radius, -BEYOND, rim + BEYOND), c.x, c.y) for c in lay.cells]
+    tools += [groove(spec, dims, layer, c) for c in lay.cells]
+    tools += windows(spec, dims, lay)
+    if label:
+        tools += _corner_labels(spec, lay, rim, label)
+    return cut(cup_blank(spec, lay, rim), tools)
+
+
+def cup_blank(spec: Spec, lay: Layout, rim: float) -> Shape:
+    """The block that a cup is cut from: the skirt ends above the plate, so that the seat bears."""
+    return Extrude(rounded_rectangle(*lay.cup, CORNER_RADIUS), skirt_end(spec), rim)
+
+
+def skirt_end(spec: Spec) -> float:
+    """z of the skirt's lower edge."""
+    return plate_top(spec) + (spec.moulds.seat_relief_mm or 0)
+
+
+def recess(spec: Spec, lay: Layout) -> Shape:
+    """The cup's recess: the plinth's taper, wider by the printer's clearance measured square to its sides."""
+    clearance = (spec.moulds.plinth_clearance_mm or 0) / math.cos(math.radians(PLINTH_DRAFT_DEG))
+    return _tapered(lay, clearance, skirt_end(spec))
+
+
+def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
+    """The overflow groove round a rim, behind the land; it stops over a window that would leave too thin a wall."""
+    moulds, rim, radius = spec.moulds, dims.heights[layer], dims.radii[layer]
+    inner = radius + (moulds.land_mm or 0)
+    outer = inner + (moulds.groove_width_mm or 0)
+    depth = min(moulds.groove_depth_mm or 0, rim / 2)
+    channel = ring(inner, outer, rim - depth, rim + BEYOND)
+    if dims.slot_z:
+        wall = moulds.least_wall_mm or 0
+        half, _, high = _window_section(spec, dims)
+        if rim - depth - high < wall:
+            stops = (
+                box(min(0, s * (outer + 1)), max(0, s * (outer + 1)), -half - wall, half + wall, 0, rim + 2 * BEYOND)
+                for s in cell.sides
+            )
+            channel = cut(channel, stops)
+    return moved(channel, cell.x, cell.y)
+
+
+def windows(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:
+    """The passages of the tongues through a cup's wall, from each cell outwards to the edge."""
+    if not dims.slot_z:
+        return []
+    half, low, high = _window_section(spec, dims)
+    edge = lay.cup[0] + BEYOND
+    return [
+        box(min(c.x, s * edge), max(c.x, s * edge), c.y - half, c.y + half, low, high)
+        for c in lay.cells
+        for s in c.sides
+    ]
+
+
+def tongue(spec: Spec, dims: Dimensions, lay: Layout) -> Shape:
+    """The strip that forms the slot, with a grip outside the cup; for a single cell on the axis, leaving along +x.
+
+    Its tip is round and stops against the core's riser, its underside rests on the ledge.
+    """
+    assert dims.slot_z is not None
+    low, high = dims.slot_z
+    edge = max(lay.cup[0] - abs(c.x) for c in lay.cells)
+    reach = edge + GRIP_GAP + GRIP_LENGTH
+    half = max(GRIP_WIDTH, dims.slot_width + 4) / 2
+    grip = box(edge + GRIP_GAP, reach, -half, half, low, high)
+    return union((strip(dims, 1, reach - 1, dims.slot_width / 2, low, high), grip))
+
+
+def tongues(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:
+    """Every tongue in its place."""
+    if not dims.slot_z:
+        return []
+    one = tongue(spec, dims, lay)
+    return [moved(turned(one, "z", 0 if s > 0 else 2), c.x, c.y) for c in lay.cells for s in c.sides]
+
+
+def blade(lay: Layout, rim: float) -> Shape:
+    """The strike-off blade, edge down on the rim: a bar longer than the cup, bevelled to a flat edge."""
+    half, t, e, h = lay.cup[1] + 5.0, BLADE_THICKNESS, BLADE_EDGE, BLADE_HEIGHT
+    section = polygon((0, 0), (e, 0), (t, 2 * (t - e)), (t, h), (0, h))
+    # Drawn in (x, z) and stood up: x to x, y to z, extrusion to -y.
+    return moved(turned(Extrude(section, -half, half), "x", 1), 0, 0, rim)
+
+
+def stub(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell) -> Shape:
+    """The stub of printer filament: flush with the core's top, bent below into the plate's groove."""
+    radius = spec.moulds.filament_mm / 2
+    elbow = plate_bottom(spec) + groove_depth(spec) - radius - SLACK
+    ball = Revolve(Profile(((0, -radius, _QUARTER), (radius, 0, _QUARTER), (0, radius, 0.0))))
+    upright = cylinder(radius, elbow, dims.core_height)
+    length = _groove_length(spec, dims, lay, cell) - radius
+    outside = STUB_TAIL if _meets_edge(lay, cell) else 0.0
+    lying = turned(cylinder(radius, 0, length + outside), "x", 1)
+    bent = union((upright, moved(ball, z=elbow), moved(lying, z=elbow)))
+    return moved(bent, cell.x, cell.y)
+
+
+def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
+    """What silicone is kept from though no tool fills it: grease round a tongue, the annulus round a filament.
+
+    A window's seal is what the window removes from the cup, less the tongue; never a solid built a second time.
+    """
+    found: list[Shape] = []
+    if dims.slot_z:
+        around = tongues(spec, dims, lay)
+        walls = cut(
+            cup_blank(spec, lay, dims.heights[layer]),
+            [moved(cylinder(dims.radii[layer], -BEYOND, dims.heights[layer] + BEYOND), c.x, c.y) for c in lay.cells],
+        )
+        found += [cut(Common((walls, window)), around) for window in windows(spec, dims, lay)]
+        found += [
+            cut(Common((moved(core(dims), c.x, c.y), moved(notch(spec, dims, s), c.x, c.y))), around)
+            for c in lay.cells
+            for s in c.sides
+        ]
+    if spec.design == "encapsulating":
+        annulus = ring(spec.moulds.filament_mm / 2, (spec.moulds.filament_hole_mm or 0) / 2, -BEYOND, dims.core_height)
+        found += [moved(annulus, c.x, c.y) for c in lay.cells]
+    return found
+
+
+_QUARTER = math.tan(math.pi / 8)
+
+
+def _tapered(lay: Layout, clearance: float, bottom: float) -> Shape:
+    """The plinth's taper from `bottom` up to the seat, grown by `clearance` on every side."""
+
+    def section(z: float) -> Profile:
+        grow = clearance - z * math.tan(math.radians(PLINTH_DRAFT_DEG))
+        # A side moved out by g moves a 45 degree cut by g too, which shortens its leg by (2 - sqrt 2) g.
+        key = KEY + (2 - math.sqrt(2)) * grow
+        return rounded_rectangle(lay.plinth[0] + grow, lay.plinth[1] + grow, CORNER_RADIUS + grow, key)
+
+    return Extrude(section(bottom), bottom, 0.0, top=section(0.0))
+
+
+def _window_section(spec: Spec, dims: Dimensions) -> tuple[float, float, float]:
+    """Half width, bottom and top of a window."""
+    assert dims.slot_z is not None
+    clearance = spec.moulds.window_clearance_mm or 0
+    return dims.slot_width / 2 + clearance, dims.slot_z[0] - clearance, dims.slot_z[1] + clearance
+
+
+def _pry_slot(lay: Layout, top: float, side: int) -> Shape:
+    """A slot in the plate's edge that reaches under the skirt: a screwdriver lifts the cup there."""
+    inner, outer = side * (lay.cup[0] - PRY_UNDER), side * (lay.plate[0] + BEYOND)
+    return box(min(inner, outer), max(inner, outer), -PRY_HALF_WIDTH, PRY_HALF_WIDTH, top - PRY_DEPTH, top + BEYOND / 4)
+
+
+def _filament_way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell) -> Shape:
+    """The hole through a core, flared below, and the groove under the plate that takes the filament's bent end."""
+    radius, bottom = (spec.moulds.filament_hole_mm or 0) / 2, plate_bottom(spec)
+    depth = groove_depth(spec)
+    roof = bottom + depth
+    hole = Revolve(
+        polygon(
+            (0, roof - BEYOND / 2),
+            (radius + FLARE, roof - BEYOND / 2),
+            (radius + FLARE, roof),
+            (radius, roof + FLARE),
+            (radius, dims.core_height + BEYOND),
+            (0, dims.core_height + BEYOND),
+        )
+    )
+    length = _groove_length(spec, dims, lay, cell)
+    back = radius + FLARE
+    channel = box(-depth / 2, depth / 2, -length, back, bottom - BEYOND, roof)
+    return union((hole, channel))
+
+
+def _meets_edge(lay: Layout, cell: Cell) -> bool:
+    return cell.y == min(c.y for c in lay.cells)
+
+
+def _groove_length(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell) -> float:
+    """From the hole to the plate's edge at -y, or, behind another cell, a pocket as long as the pitch allows."""
+    if _meets_edge(lay, cell):
+        return cell.y + lay.plate[1] + BEYOND
+    return lay.pitch - (spec.moulds.filament_hole_mm or 0) / 2 - FLARE - 2 * (spec.moulds.least_wall_mm or 0)
+
+
+def _corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, str]) -> list[Shape]:
+    """Three pairs of characters in the rim's free corners; the fourth corner is the key's."""
+    stroke, depth = spec.moulds.engraving_stroke_mm or 0, spec.moulds.engraving_depth_mm or 0
+    width, height = text_width("00", stroke), HEIGHT * stroke
+    x, y = lay.cup[0] - TEXT_MARGIN, lay.cup[1] - TEXT_MARGIN
+    corners = ((-x, y - height), (-x, -y), (x - width, -y))
+    return [
+        moved(engraving(text, stroke, rim - depth, rim + BEYOND), *corner)
+        for text, corner in zip(label, corners, strict=True)
+    ]
