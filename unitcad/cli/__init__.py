@@ -12,6 +12,8 @@ from typing import Annotated
 import typer
 
 from unitcad import __version__
+from unitcad.cli.build import build
+from unitcad.cli.list import list_
 from unitcad.cli.output import say_error
 from unitcad.errors import UnitcadError
 
@@ -29,6 +31,10 @@ def _version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"unitcad {__version__}")
         raise typer.Exit()
+
+
+app.command("build")(build)
+app.command("list")(list_)
 
 
 @app.callback()
@@ -58,9 +64,7 @@ def main() -> None:
         if os.environ.get("UNITCAD_TRACEBACK"):
             raise
         say_error(
-            UnitcadError(
-                f"internal error: {type(error).__name__}: {error} (a bug; UNITCAD_TRACEBACK=1 shows where)"
-            ),
+            UnitcadError(f"internal error: {type(error).__name__}: {error} (a bug; UNITCAD_TRACEBACK=1 shows where)"),
             as_json,
         )
         sys.exit(1)

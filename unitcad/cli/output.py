@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import sys
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from unitcad.errors import UnitcadError
@@ -19,3 +21,15 @@ def say_error(error: UnitcadError, as_json: bool) -> None:
     sys.stderr.write(f"error: {error}\n")
     if as_json:
         print_json({"error": error.as_dict()})
+
+
+@contextlib.contextmanager
+def progress(name: str) -> Iterator[Callable[[str], None]]:
+    """A spinner with the stage of work on a terminal; silent in a pipe. Yields the function that names the stage."""
+    if not sys.stderr.isatty():
+        yield lambda stage: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(name) as status:
+        yield lambda stage: status.update(f"{name}: {stage}")

@@ -1,0 +1,68 @@
+"""unitcad build."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Specs = Annotated[list[str], typer.Argument(metavar="SPEC...", help="A spec file, or the name of a template.")]
+Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the spec.")]
+
+
+def build(
+    specs: Specs,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Where the result's folder goes.")] = Path("out"),
+    sets: Sets = None,
+    formats: Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb; else the spec's.")] = None,
+    only: Annotated[str | None, typer.Option(help="unit,moulds,estimate,casting; else all.")] = None,
+    no_check: Annotated[bool, typer.Option("--no-check", help="Leave out the laws and the mesh checks.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Make a unit and its casting moulds. The last line printed is the folder."""
+    from unitcad.cli.output import print_json, progress
+    from unitcad.errors import unknown_name
+    from unitcad.pipeline import FORMATS, OUTPUTS
+    from unitcad.pipeline import build as run
+    from unitcad.spec import load
+
+    overrides = list(sets or [])
+    if formats is not None:
+        names = [name.strip() for name in formats.split(",") if name.strip()]
+        for name in names:
+            if name not in FORMATS:
+                raise unknown_name("--formats", name, FORMATS)
+        overrides.append(f"output.formats={names}")
+    chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
+    # Every spec passes the door before the first one is built.
+    wanted = [load(spec, overrides) for spec in specs]
+    results = []
+    for spec in wanted:
+        with progress(spec.name) as say:
+            results.append(run(spec, out, only=chosen, check=not no_check, say=say))
+    if as_json:
+        print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
+    else:
+        for result in results:
+            _tell(result.manifest)
+            typer.echo(str(result.folder))
+    if not all(result.ok for result in results):
+        sys.exit(1)
+
+
+def _tell(manifest: dict) -> None:
+    """What a person should know of a result: warnings, broken laws, bad files."""
+    for warning in manifest["warnings"]:
+        typer.echo(f"warning: {warning}", err=True)
+    for law in manifest["laws"]:
+        if not law["ok"]:
+            typer.echo(
+                f"{law['code']} {law['where']}: {law['value']:g} {law['unit']}, limit {law['limit']:g}", err=True
+            )
+    for finding in manifest["check"]["findings"]:
+        typer.echo(f"{finding['path']}: {finding['code']} {finding['message']}", err=True)
+    if manifest["laws"]:
+        held = sum(law["ok"] for law in manifest["laws"])
+        typer.echo(f"{manifest['name']}: {len(manifest['parts'])} bodies, {held} of {len(manifest['laws'])} laws hold")

@@ -1,0 +1,62 @@
+"""unitcad list."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+KINDS = ("templates", "designs", "materials", "motors", "printers", "rules")
+
+
+def list_(
+    kind: Annotated[str, typer.Argument(help=", ".join(KINDS))],
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """List what is shipped, each value with its source and status."""
+    from unitcad.cli.output import print_json
+    from unitcad.errors import unknown_name
+
+    if kind not in KINDS:
+        raise unknown_name("list", kind, KINDS)
+    entries = _entries(kind)
+    if as_json:
+        print_json({kind: entries})
+        return
+    for name, entry in entries.items():
+        if isinstance(entry, str):
+            typer.echo(f"{name}\t{entry}" if entry else name)
+            continue
+        typer.echo(name)
+        for key, value in entry.items():
+            bounds = f" ({value['low']:g} to {value['high']:g})" if "low" in value else ""
+            typer.echo(f"  {key} = {value['value']}{bounds}  [{value['status']}] {value['source']}")
+
+
+def _entries(kind: str) -> dict[str, Any]:
+    from unitcad import catalogue
+    from unitcad.spec import read, templates
+    from unitcad.spec.door import DESIGNS
+
+    if kind == "templates":
+        return {name: _first_comment(path.read_text("utf-8")) for name, path in templates().items() if read(name)}
+    if kind == "designs":
+        return dict.fromkeys(DESIGNS, "")
+    if kind == "rules":
+        from unitcad.check import rules
+
+        return {code: rule.title for code, rule in rules.RULES.items()}
+    found = {"materials": catalogue.materials, "motors": catalogue.motors, "printers": catalogue.printers}[kind]()
+    return {
+        name: {
+            key: {k: v for k, v in vars(value).items() if v is not None}
+            for key, value in vars(entry).items()
+            if isinstance(value, catalogue.Value)
+        }
+        for name, entry in found.items()
+    }
+
+
+def _first_comment(text: str) -> str:
+    line = text.partition("\n")[0]
+    return line.lstrip("# ") if line.startswith("#") else ""

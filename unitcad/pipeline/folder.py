@@ -1,0 +1,105 @@
+"""Result folders: named by content, written under a temporary name, then put in place whole."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from unitcad.errors import UnitcadError
+from unitcad.spec import Spec, read_toml, to_toml
+
+TEMPORARY = ".tmp-"
+
+
+def folder_name(spec: Spec) -> str:
+    """<slug>-<hash12>, at most 63 characters; the hash covers the effective spec without name and formats."""
+    slug = re.sub(r"[^a-z0-9]+", "-", spec.name.lower()).strip("-")[:50].rstrip("-") or "unit"
+    return f"{slug}-{spec_hash(spec)[:12]}"
+
+
+def spec_hash(spec: Spec) -> str:
+    """SHA-256 of the effective spec without name and formats."""
+    output = spec.output.model_copy(update={"formats": ()})
+    return hashlib.sha256(to_toml(spec.model_copy(update={"name": "", "output": output})).encode()).hexdigest()
+
+
+def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:
+    """The formats that an existing result has, to be kept.
+
+    Raises UnitcadError for a folder that holds something else: no spec.toml of ours, or another spec.
+    """
+    if not folder.exists():
+        return ()
+    file = folder / "spec.toml"
+    if not file.is_file():
+        raise UnitcadError(f"{folder}: is not a result of unitcad (no spec.toml); choose another folder with -o")
+    try:
+        from unitcad.spec import from_data
+
+        there = from_data(read_toml(file))
+    except UnitcadError as error:
+        raise UnitcadError(f"{folder}: its spec.toml can't be read ({error}); move the folder away") from None
+    if spec_hash(there) != spec_hash(spec):
+        raise UnitcadError(f"{folder}: holds the result of another spec (spec.toml differs); move it away or use -o")
+    return tuple(there.output.formats)
+
+
+@contextlib.contextmanager
+def replacing(folder: Path) -> Iterator[Path]:
+    """A fresh temporary folder that takes `folder`'s place when the block ends well, and goes when it does not.
+
+    Files of the old result that the new one lacks are kept. An interruption at any point leaves the old result whole:
+    at its place, or beside it under a temporary name from which the next run takes it back.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    fresh = folder.parent / f"{TEMPORARY}{folder.name}-{os.getpid()}"
+    aside = folder.parent / f"{TEMPORARY}{folder.name}-old"
+    restore(folder)
+    for left in folder.parent.glob(f"{TEMPORARY}{folder.name}-*"):
+        if left != aside and not _alive(left.name.rpartition("-")[2]):
+            shutil.rmtree(left, ignore_errors=True)
+    shutil.rmtree(fresh, ignore_errors=True)
+    fresh.mkdir()
+    try:
+        yield fresh
+        if folder.exists():
+            _keep_others(folder, fresh)
+            folder.rename(aside)
+        fresh.rename(folder)
+    except BaseException:
+        shutil.rmtree(fresh, ignore_errors=True)
+        restore(folder)
+        raise
+    shutil.rmtree(aside, ignore_errors=True)
+
+
+def restore(folder: Path) -> None:
+    """Put back an old result that an interrupted swap left aside."""
+    aside = folder.parent / f"{TEMPORARY}{folder.name}-old"
+    if aside.exists() and not folder.exists():
+        aside.rename(folder)
+
+
+def _keep_others(old: Path, new: Path) -> None:
+    for file in sorted(old.rglob("*")):
+        copy = new / file.relative_to(old)
+        if file.is_file() and not copy.exists():
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(file, copy)
+
+
+def _alive(pid: str) -> bool:
+    if not pid.isdigit():
+        return False
+    try:
+        os.kill(int(pid), 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True

@@ -1,0 +1,111 @@
+"""The files of bodies: one content per body and format, keyed by what it depends on and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from unitcad import __version__
+from unitcad.errors import UnitcadError
+from unitcad.export import stl, threemf
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays, bounds
+from unitcad.shape import content_hash
+from unitcad.shape.body import Body
+
+if TYPE_CHECKING:
+    from unitcad.pipeline.variant import Variant
+
+MESH_FORMATS = ("stl", "3mf")
+
+
+@dataclass(frozen=True)
+class Group:
+    """Bodies that share a 3MF and a STEP file, and the folder of their own files."""
+
+    name: str  # unit | moulds
+    bodies: tuple[Body, ...]
+    folder: str
+    together: str
+
+
+def groups(variant: Variant, only: Sequence[str]) -> list[Group]:
+    """The groups of bodies that `only` asks for."""
+    found = []
+    if "unit" in only:
+        found.append(Group("unit", variant.unit, "unit", "unit"))
+    if "moulds" in only:
+        found.append(Group("moulds", variant.plan.tools, "moulds", "moulds/moulds"))
+    return found
+
+
+def file_stem(body: Body) -> str:
+    """A body's file name without suffix: cups begin with their step, so that a folder lists them in order."""
+    return f"step{body.step}-cup" if body.name.startswith("cup") else body.name
+
+
+def printed(body: Body) -> bool:
+    """Whether a body has mesh files: what is cut from film or filament has none."""
+    return body.role == "unit" or body.made == "printed"
+
+
+def key(variant: Variant, body: Body, form: str) -> str:
+    """What a body's file depends on: tree, name, colour, attitude, resolution, format, version of this package."""
+    return content_hash(
+        body.shape, body.name, body.colour, body.upside_down, variant.segments, form, __version__, kernel_version()
+    )
+
+
+def kernel_version() -> str:
+    """The mesh kernel's version."""
+    from importlib.metadata import version
+
+    return f"manifold3d {version('manifold3d')}"
+
+
+def stl_content(variant: Variant, body: Body) -> bytes:
+    """A body's STL."""
+    return stl.content(*_ready(variant, body), body.name)
+
+
+def threemf_content(variant: Variant, bodies: Sequence[Body]) -> bytes:
+    """The 3MF of several bodies, side by side on the spec's bed."""
+    bed = variant.spec.moulds.bed_x_mm or 0.0, variant.spec.moulds.bed_y_mm or 0.0
+    parts = [threemf.MeshPart(b.name, b.colour, *_ready(variant, b)) for b in bodies if printed(b)]
+    return threemf.content(parts, bed)
+
+
+def step_file(path: Path, bodies: Sequence[Body], name: str) -> None:
+    """The STEP file of an assembly. Raises UnitcadError without a B-rep extra."""
+    try:
+        from unitcad.export import step
+    except ImportError as error:
+        raise UnitcadError(f"STEP needs a B-rep kernel: pip install 'unitcad[build123d]' ({error})") from None
+    step.write(path, bodies, name)
+
+
+def record(variant: Variant, body: Body, material: str | None) -> dict[str, Any]:
+    """A body's entry in the manifest, without its files."""
+    solid = variant.mesh(body)
+    return {
+        "name": body.name,
+        "role": body.role,
+        "step": body.step,
+        "made": body.made,
+        "material": material,
+        "volume_mm3": _round(solid.volume()),
+        "bbox_mm": [_round(v) for v in bounds(solid)],
+        "triangles": int(solid.num_tri()),
+        "files": {},
+    }
+
+
+def _ready(variant: Variant, body: Body) -> Any:
+    return print_ready(*arrays(variant.mesh(body)), body.upside_down)
+
+
+def _round(value: float) -> float:
+    """Twelve significant digits: what a summation's order leaves does not reach the file."""
+    return float(f"{value:.12g}") + 0.0
