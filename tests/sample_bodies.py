@@ -1,4 +1,4 @@
-"""Bodies much like a unit and its tooling, drawn by hand: kernels and exports are tried on them beside the templates."""
+"""Bodies much like a unit and its tooling, drawn by hand: kernels and exports are tried on them, and on templates."""
 
 from __future__ import annotations
 

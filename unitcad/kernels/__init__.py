@@ -1,1 +1,1 @@
-"""Three realisations of one tree: manifold3d for meshes, build123d and CadQuery (both OCCT) for boundary representations."""
+"""Realisations of one tree: manifold3d for meshes; OCCT, build123d and CadQuery for boundary representations."""

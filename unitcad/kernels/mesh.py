@@ -18,8 +18,8 @@ FINEST, COARSEST = 4096, 24
 def segment_count(radius: float, tolerance: float) -> int:
     """Sides of an area-true polygon whose distance from a circle of `radius` nowhere exceeds `tolerance` (both mm).
 
-    With x = 2 pi / n its corners stand radius (sqrt(x / sin x) - 1), about radius x^2 / 12, outside the circle, and its
-    sides half as much inside. A multiple of 8, so that the axes and the diagonals are vertices.
+    Its corners stand r (a - 1) outside, a = sqrt(x / sin x) with x = 2 pi / n; the middles of its sides
+    half as far inside. A multiple of 8, so that the axes and diagonals are vertices.
     """
     n = COARSEST
     while n < FINEST and radius * (area_true(n) - 1) > tolerance:
@@ -58,8 +58,7 @@ def _realise(shape: Shape, segments: int) -> Manifold:
         case Common(parts):
             return Manifold.batch_boolean([_realise(part, segments) for part in parts], manifold3d.OpType.Intersect)
         case Place(inner, turn, move):
-            rows = [[*(float(v) for v in row), shift] for row, shift in zip(turn, move, strict=True)]
-            return _realise(inner, segments).transform(rows)
+            return _realise(inner, segments).transform(np.column_stack([turn, move]))
     raise TypeError(f"not a shape: {shape!r}")
 
 

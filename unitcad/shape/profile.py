@@ -26,7 +26,8 @@ class ProfileError(ValueError):
 @dataclass(frozen=True)
 class Profile:
     """A closed curve, counter-clockwise. Each vertex is (x, y, bulge): bulge = tan(angle / 4) of the arc to the next
-    vertex, 0 for a line, positive for an arc that turns left (the DXF polyline's convention). x and y in mm on the grid.
+    vertex, 0 for a line, positive for an arc that turns left (the DXF polyline's convention).
+    x and y in mm on the grid.
 
     Raises ProfileError where the curve crosses or touches itself, runs clockwise, or has fewer than three sides.
     """
@@ -48,7 +49,7 @@ class Profile:
     def area(self) -> float:
         """Enclosed area in mm2, exact for lines and arcs (Green's theorem)."""
         total = 0.0
-        for (x0, y0, bulge), (x1, y1, _) in _sides(self.vertices):
+        for (x0, y0, bulge), (x1, y1, _) in sides(self.vertices):
             total += (x0 * y1 - x1 * y0) / 2
             if bulge:
                 angle = 4 * math.atan(bulge)
@@ -60,11 +61,11 @@ class Profile:
     def first_moment(self) -> float:
         """Integral of x over the area in mm3: 2 pi times it is the volume revolved about x = 0 (Pappus)."""
         total = 0.0
-        for (x0, y0, bulge), (x1, y1, _) in _sides(self.vertices):
+        for (x0, y0, bulge), (x1, y1, _) in sides(self.vertices):
             total += (x0 * y1 - x1 * y0) * (x0 + x1) / 6
             if bulge:
                 angle = 4 * math.atan(bulge)
-                cx, _, radius = _arc_centre((x0, y0), (x1, y1), bulge)
+                cx, _, radius = arc_centre((x0, y0), (x1, y1), bulge)
                 area = math.copysign(radius**2 * (abs(angle) - math.sin(abs(angle))) / 2, bulge)
                 # A segment's centroid lies 4 R sin^3(t/2) / (3 (t - sin t)) from the centre, towards the arc's middle.
                 half = abs(angle) / 2
@@ -78,9 +79,9 @@ class Profile:
         """(x_min, y_min, x_max, y_max) in mm; arcs by their quarter points, so exact for them too."""
         xs = [x for x, _, _ in self.vertices]
         ys = [y for _, y, _ in self.vertices]
-        for (x0, y0, bulge), (x1, y1, _) in _sides(self.vertices):
+        for (x0, y0, bulge), (x1, y1, _) in sides(self.vertices):
             if bulge:
-                cx, cy, radius = _arc_centre((x0, y0), (x1, y1), bulge)
+                cx, cy, radius = arc_centre((x0, y0), (x1, y1), bulge)
                 start, angle = math.atan2(y0 - cy, x0 - cx), 4 * math.atan(bulge)
                 for quarter in range(4):
                     along = (quarter * math.pi / 2 - start) % (2 * math.pi)
@@ -122,10 +123,10 @@ def rounded_rectangle(half_x: float, half_y: float, radius: float, key: float = 
 def points(profile: Profile, segments: int) -> np.ndarray:
     """The profile as a polygon, (n, 2) in mm: an arc gets its share of `segments` a turn, at least one side."""
     found: list[tuple[float, float]] = []
-    for (x0, y0, bulge), (x1, y1, _) in _sides(profile.vertices):
+    for (x0, y0, bulge), (x1, y1, _) in sides(profile.vertices):
         found.append((x0, y0))
         if bulge:
-            cx, cy, radius = _arc_centre((x0, y0), (x1, y1), bulge)
+            cx, cy, radius = arc_centre((x0, y0), (x1, y1), bulge)
             angle = 4 * math.atan(bulge)
             start = math.atan2(y0 - cy, x0 - cx)
             count = max(1, math.ceil(abs(angle) / (2 * math.pi) * segments - 1e-9))
@@ -145,11 +146,12 @@ def arc_middle(start: Vertex, end: Vertex) -> tuple[float, float]:
     return (x0 + x1) / 2 + bulge * (y1 - y0) / 2, (y0 + y1) / 2 - bulge * (x1 - x0) / 2
 
 
-def _sides(vertices: Sequence[Vertex]) -> Iterable[tuple[Vertex, Vertex]]:
+def sides(vertices: Sequence[Vertex]) -> Iterable[tuple[Vertex, Vertex]]:
+    """Start and end of each side; the start's bulge is the side's."""
     return zip(vertices, (*vertices[1:], vertices[0]), strict=True)
 
 
-def _arc_centre(p: tuple[float, float], q: tuple[float, float], bulge: float) -> tuple[float, float, float]:
+def arc_centre(p: tuple[float, float], q: tuple[float, float], bulge: float) -> tuple[float, float, float]:
     """Centre and radius of the arc from p to q."""
     dx, dy = q[0] - p[0], q[1] - p[1]
     away = (1 - bulge**2) / (4 * bulge)

@@ -23,7 +23,7 @@ class Revolve:
     profile: Profile
 
     def __post_init__(self) -> None:
-        if self.profile.bounds[0] < 0:
+        if self.profile.bounds[0] < -1e-9:  # an arc's computed extreme may miss the axis by a rounding
             raise ProfileError(f"crosses the axis: r = {self.profile.bounds[0]}")
 
 
@@ -44,6 +44,10 @@ class Extrude:
             raise ProfileError(f"has no height: z0 = {self.z0}, z1 = {self.z1}")
         if self.top is not None and (self.holes or len(self.top.vertices) != len(self.profile.vertices)):
             raise ProfileError("a taper has no holes and as many vertices above as below")
+        if self.top is not None and any(
+            below[2] != above[2] for below, above in zip(self.profile.vertices, self.top.vertices, strict=True)
+        ):
+            raise ProfileError("a taper's arcs turn by the same angle above and below")
 
 
 @dataclass(frozen=True)
@@ -68,12 +72,16 @@ class Common:
     parts: tuple[Shape, ...]
 
 
+Turn = tuple[tuple[int, int, int], ...]
+"""A proper rotation as a signed axis permutation, by rows."""
+
+
 @dataclass(frozen=True)
 class Place:
-    """`shape` turned by a signed axis permutation (rows of `turn`, a proper rotation), then moved by `move` (mm)."""
+    """`shape` turned by `turn`, then moved by `move` (mm)."""
 
     shape: Shape
-    turn: tuple[tuple[int, int, int], ...] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    turn: Turn = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
     move: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:

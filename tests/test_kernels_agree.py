@@ -1,0 +1,177 @@
+"""Four realisations of one tree: manifold3d and OCCT share no code, so that these two agree is evidence."""
+
+import math
+
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from sample_bodies import LAYER1, QUARTER, all_bodies
+
+from unitcad.kernels import bounds, mesh
+from unitcad.shape import (
+    Common,
+    Cut,
+    Extrude,
+    Place,
+    Profile,
+    Revolve,
+    Union,
+    box,
+    cylinder,
+    exact_volume,
+    polygon,
+    rounded_rectangle,
+    turned,
+)
+from unitcad.shape.profile import ProfileError
+
+occt = pytest.importorskip("unitcad.kernels.occt", exc_type=Exception)
+BODIES = {body.name: body for body in all_bodies()}
+LEAVES = {
+    "tube": Revolve(polygon((3, 0), (5, 0), (5, 10), (3, 10))),
+    "stepped": Revolve(LAYER1),
+    "ball": Revolve(Profile(((0, -3, math.tan(math.pi / 4)), (0, 3, 0), (0, 1, 0)))),
+    "torus": Revolve(Profile(((4, 0, 1.0), (6, 0, QUARTER), (5, 1, QUARTER)))),
+    "key": Extrude(rounded_rectangle(8, 6, 2, key=3), -1, 1),
+    "letter": Extrude(rounded_rectangle(3, 2, 1), 0, 1, holes=(rounded_rectangle(1, 1, 0.5),)),
+    "taper": Extrude(rounded_rectangle(8, 6, 2, key=3), 0, 3, top=rounded_rectangle(7, 5, 2, key=3)),
+    "cone": Extrude(rounded_rectangle(8, 8, 4), 0, 3, top=rounded_rectangle(6, 6, 3)),
+    "turned": Place(turned(box(0, 1, 0, 2, 0, 3), "y", 3), move=(1, 2, 3)),
+}
+
+
+def solids_of(shape):
+    """The shape by every B-rep library that is installed."""
+    found = {"occt": occt.solids([shape])[0]}
+    for name in ("build123d", "cadquery"):
+        library = pytest.importorskip(f"unitcad.kernels.{name}", exc_type=Exception)
+        found[name] = library.solid(shape).wrapped
+    return found
+
+
+def assert_breps_agree(shape):
+    measured = {name: occt.measure(solid) for name, solid in solids_of(shape).items()}
+    reference = measured.pop("occt")
+    for other in measured.values():
+        assert other.solids == reference.solids
+        assert other.volume == pytest.approx(reference.volume, rel=1e-9)
+        assert other.box == pytest.approx(reference.box, abs=1e-6)
+    return reference
+
+
+def assert_mesh_within_bound(shape, segments, reference):
+    solid = mesh.realise(shape, segments)
+    allowed = bounds.deviation(shape, segments)
+    assert len(solid.decompose()) == reference.solids
+    assert abs(solid.volume() - reference.volume) <= bounds.volume_bound(shape, segments) + 1e-9 * reference.volume
+    for side, (found, true) in enumerate(zip(solid.bounding_box(), reference.box, strict=True)):
+        assert abs(found - true) <= allowed + 1e-6, side
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_kernels_agree_on_bodies(name):
+    shape = BODIES[name].shape
+    reference = assert_breps_agree(shape)
+    assert reference.solids == 1
+    for tolerance in (0.1, 0.01):
+        assert_mesh_within_bound(shape, mesh.segment_count(20, tolerance), reference)
+
+
+@pytest.mark.parametrize("name", LEAVES)
+def test_leaves_have_their_closed_form_volume(name):
+    reference = assert_breps_agree(LEAVES[name])
+    assert reference.volume == pytest.approx(exact_volume(LEAVES[name]), rel=1e-9)
+    assert_mesh_within_bound(LEAVES[name], 64, reference)
+
+
+@pytest.mark.parametrize("name", ["tube", "stepped"])
+@pytest.mark.parametrize("segments", [24, 96])
+def test_revolved_meshes_keep_the_volume_exactly(name, segments):
+    solid = mesh.realise(LEAVES[name], segments)
+    assert solid.volume() == pytest.approx(exact_volume(LEAVES[name]), rel=1e-12)
+
+
+def test_the_bound_shrinks_as_the_tolerance_does_and_is_not_idle():
+    """It falls with the square of the segments, and is within 60 times of what is really off: it can fail."""
+    shape = LEAVES["torus"]
+    coarse, fine = (bounds.volume_bound(shape, n) for n in (32, 128))
+    assert coarse / fine == pytest.approx(16, rel=0.02)
+    off = abs(mesh.realise(shape, 32).volume() - exact_volume(shape))
+    assert coarse / 60 < off < coarse
+
+
+@pytest.mark.parametrize("radius", [0.5, 4.5, 30])
+@pytest.mark.parametrize("tolerance", [0.1, 0.01, 0.002])
+def test_segment_count_keeps_the_tolerance(radius, tolerance):
+    """Distance measured on the mesh: its corners outside, the middles of its sides inside."""
+    n = mesh.segment_count(radius, tolerance)
+    vertices, _ = mesh.arrays(mesh.realise(cylinder(radius, 0, 1), n))
+    corner = max(math.hypot(x, y) for x, y, _ in vertices)
+    assert corner - radius <= tolerance + 1e-9
+    assert radius - corner * math.cos(math.pi / n) <= tolerance + 1e-9
+
+
+def numbers(low, high):
+    """Quarters of a mm: coincident faces come up often."""
+    return st.integers(4 * low, 4 * high).map(lambda value: value / 4)
+
+
+@st.composite
+def leaves(draw):
+    kind = draw(st.sampled_from(["ring", "cone", "dome", "block", "slab", "taper"]))
+    z0, height, r0, width = draw(numbers(-4, 4)), draw(numbers(1, 4)), draw(numbers(0, 3)), draw(numbers(1, 4))
+    if kind == "ring":
+        return Revolve(polygon((r0, z0), (r0 + width, z0), (r0 + width, z0 + height), (r0, z0 + height)))
+    if kind == "cone":
+        return Revolve(polygon((r0, z0), (r0 + width, z0), (r0, z0 + height)))
+    if kind == "dome":
+        return Revolve(Profile(((r0, z0, 0), (r0 + width, z0, QUARTER), (r0, z0 + width, 0))))
+    if kind == "block":
+        x0, y0 = draw(numbers(-4, 4)), draw(numbers(-4, 4))
+        return box(x0, x0 + width, y0, y0 + draw(numbers(1, 4)), z0, z0 + height)
+    half = 2 + width
+    if kind == "slab":
+        return Extrude(rounded_rectangle(half, half + 1, 1), z0, z0 + height, holes=(rounded_rectangle(1, 1, 0.5),))
+    return Extrude(rounded_rectangle(half, half, 1), z0, z0 + height, top=rounded_rectangle(half - 0.5, half - 0.5, 1))
+
+
+def trees():
+    def grown(children):
+        return st.one_of(
+            st.tuples(children, children, children).map(Union),
+            st.tuples(children, st.tuples(children, children)).map(lambda pair: Cut(*pair)),
+            st.tuples(children, children).map(Common),
+            st.tuples(children, st.sampled_from("xyz"), st.integers(0, 3)).map(lambda t: turned(*t)),
+            # Moved off the grid of quarters, so that surfaces cross instead of touching along a line.
+            st.tuples(children, *[st.integers(-2000, 2000)] * 3).map(
+                lambda t: Place(t[0], move=(t[1] / 1024, t[2] / 1024, t[3] / 1024))
+            ),
+        )
+
+    return st.recursive(leaves(), grown, max_leaves=6)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@given(trees())
+def test_kernels_agree_on_random_trees(shape):
+    solid = mesh.realise(shape, 64)
+    assume(solid.volume() > 1)
+    reference = assert_breps_agree(shape)
+    allowed = bounds.volume_bound(shape, 64)
+    assert abs(solid.volume() - reference.volume) <= allowed + 1e-9 * reference.volume
+
+
+def test_planted_faults_are_seen():
+    """A tool left out, and a body moved by 0.01 mm."""
+    shape = BODIES["cup2"].shape
+    reference = occt.measure(occt.solids([shape])[0])
+    segments = mesh.segment_count(20, 0.01)
+    with pytest.raises(AssertionError):
+        assert_mesh_within_bound(Cut(shape.body, shape.tools[:-1]), segments, reference)
+    with pytest.raises(AssertionError):
+        assert_mesh_within_bound(Place(shape, move=(0.0107, 0, 0)), segments, reference)
+
+
+def test_a_taper_has_the_same_arcs_above_and_below():
+    with pytest.raises(ProfileError, match="same angle"):
+        Extrude(rounded_rectangle(4, 4, 1), 0, 1, top=rounded_rectangle(3, 3, 1, key=1))

@@ -1,0 +1,84 @@
+"""Shape to boundary representation, in the terms of whichever library is handed in. No library is loaded here.
+
+Exact where the mesh is not: arcs are arcs, and every volume is OCCT's to about 1e-12. One boolean a node with all its
+tools in one list, which OCCT's general fuse does several times faster than one after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Protocol
+
+from unitcad.shape import Common, Cut, Extrude, Place, Revolve, Shape, Union
+from unitcad.shape.profile import Profile, arc_middle, sides
+from unitcad.shape.tree import Turn
+
+Point = tuple[float, float, float]
+
+
+class Library(Protocol):
+    """What a B-rep library has to offer; a module with these functions is one. Lengths in mm."""
+
+    def line(self, start: Point, end: Point, /) -> Any: ...
+    def arc(self, start: Point, middle: Point, end: Point, /) -> Any: ...
+    def wire(self, edges: Sequence[Any], /) -> Any: ...
+    def face(self, outer: Any, holes: Sequence[Any], /) -> Any: ...
+    def revolve(self, face: Any, /) -> Any: ...
+    def extrude(self, face: Any, height: float, /) -> Any: ...
+    def loft(self, below: Any, above: Any, /) -> Any: ...
+    def fuse(self, parts: Sequence[Any], /) -> Any: ...
+    def cut(self, body: Any, tools: Sequence[Any], /) -> Any: ...
+    def common(self, one: Any, other: Any, /) -> Any: ...
+    def place(self, solid: Any, turn: Turn, move: Point, /) -> Any: ...
+
+
+def realise(shapes: Iterable[Shape], library: Library) -> list[Any]:
+    """The solids of `shapes` in `library`; what they have in common is built once."""
+    known: dict[Shape, Any] = {}
+    return [_solid(shape, library, known) for shape in shapes]
+
+
+def _solid(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
+    if shape not in known:
+        known[shape] = _built(shape, library, known)
+    return known[shape]
+
+
+def _built(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
+    match shape:
+        case Revolve(profile):
+            return library.revolve(library.face(_upright(profile, library), []))
+        case Extrude(profile, z0, z1, holes, None):
+            face = library.face(_level(profile, z0, library), [_level(hole, z0, library) for hole in holes])
+            return library.extrude(face, z1 - z0)
+        case Extrude(profile, z0, z1, _, Profile() as top):
+            return library.loft(_level(profile, z0, library), _level(top, z1, library))
+        case Union(parts):
+            return library.fuse([_solid(part, library, known) for part in parts])
+        case Cut(body, tools):
+            return library.cut(_solid(body, library, known), [_solid(tool, library, known) for tool in tools])
+        case Common(parts):
+            # Several tools in one list would mean their union, so one after the other.
+            first, *rest = (_solid(part, library, known) for part in parts)
+            for other in rest:
+                first = library.common(first, other)
+            return first
+        case Place(inner, turn, move):
+            return library.place(_solid(inner, library, known), turn, move)
+    raise TypeError(f"not a shape: {shape!r}")
+
+
+def _upright(profile: Profile, library: Library) -> Any:
+    return _wire(profile, lambda r, z: (r, 0.0, z), library)
+
+
+def _level(profile: Profile, z: float, library: Library) -> Any:
+    return _wire(profile, lambda x, y: (x, y, z), library)
+
+
+def _wire(profile: Profile, lift: Any, library: Library) -> Any:
+    edges = []
+    for start, end in sides(profile.vertices):
+        ends = lift(*start[:2]), lift(*end[:2])
+        edges.append(library.arc(ends[0], lift(*arc_middle(start, end)), ends[1]) if start[2] else library.line(*ends))
+    return library.wire(edges)

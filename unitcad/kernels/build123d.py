@@ -1,0 +1,83 @@
+"""Shape to build123d, in its own terms: what `Variant.to_build123d()` hands over."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from unitcad.kernels import brep
+from unitcad.kernels.ocp import loading
+from unitcad.shape import Shape
+from unitcad.shape.body import Body
+from unitcad.shape.tree import Turn
+
+with loading("build123d"):
+    import build123d as b3d
+    from build123d.topology import Shape as B3dShape
+    from build123d.topology import SkipClean
+
+
+def solid(shape: Shape) -> B3dShape:
+    """The Solid of `shape`, or a Compound where it has several; faces that continue each other are one."""
+    return _solids([shape])[0]
+
+
+def compound(bodies: Sequence[Body], name: str) -> b3d.Compound:
+    """An assembly called `name`, as assembled (mm): one child a body, with its label and colour."""
+    children = _solids([body.shape for body in bodies])
+    for child, body in zip(children, bodies, strict=True):
+        child.label = body.name
+        child.color = b3d.Color(*body.colour)
+    return b3d.Compound(label=name, children=children)
+
+
+def line(start: brep.Point, end: brep.Point) -> b3d.Edge:
+    return b3d.Edge.make_line(start, end)
+
+
+def arc(start: brep.Point, middle: brep.Point, end: brep.Point) -> b3d.Edge:
+    return b3d.Edge.make_three_point_arc(start, middle, end)
+
+
+def wire(edges: Sequence[b3d.Edge]) -> b3d.Wire:
+    return b3d.Wire(edges)
+
+
+def face(outer: b3d.Wire, holes: Sequence[b3d.Wire]) -> b3d.Face:
+    return b3d.Face(outer, holes)
+
+
+def revolve(profile: b3d.Face) -> b3d.Solid:
+    return b3d.Solid.revolve(profile, 360, b3d.Axis.Z)
+
+
+def extrude(profile: b3d.Face, height: float) -> b3d.Solid:
+    return b3d.Solid.extrude(profile, (0, 0, height))
+
+
+def loft(below: b3d.Wire, above: b3d.Wire) -> b3d.Solid:
+    return b3d.Solid.make_loft([below, above], ruled=True)
+
+
+def fuse(parts: Sequence[B3dShape]) -> B3dShape:
+    return parts[0].fuse(*parts[1:])
+
+
+def cut(body: B3dShape, tools: Sequence[B3dShape]) -> B3dShape:
+    return body.cut(*tools)
+
+
+def common(one: B3dShape, other: B3dShape) -> B3dShape:
+    return b3d.Compound(one.intersect(other) or [])
+
+
+def place(shape: B3dShape, turn: Turn, move: brep.Point) -> B3dShape:
+    x_axis, _, z_axis = zip(*turn, strict=True)
+    return shape.moved(b3d.Location(b3d.Plane(move, x_dir=x_axis, z_dir=z_axis)))
+
+
+def _solids(shapes: Sequence[Shape]) -> list[B3dShape]:
+    # Cleaned once at the end instead of after each boolean.
+    with SkipClean():
+        found = brep.realise(shapes, sys.modules[__name__])  # type: ignore[arg-type]
+    return [shape.clean() for shape in found]

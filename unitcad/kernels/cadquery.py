@@ -1,0 +1,78 @@
+"""Shape to CadQuery, in its own terms: what `Variant.to_cadquery()` hands over."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from unitcad.kernels import brep
+from unitcad.kernels.ocp import loading
+from unitcad.shape import Shape
+from unitcad.shape.body import Body
+from unitcad.shape.tree import Turn
+
+with loading("cadquery"):
+    import cadquery as cq
+
+
+def solid(shape: Shape) -> cq.Shape:
+    """The Solid of `shape`, or a Compound where it has several; faces that continue each other are one."""
+    return _solids([shape])[0]
+
+
+def assembly(bodies: Sequence[Body], name: str) -> cq.Assembly:
+    """An assembly called `name`, as assembled (mm): one child a body, with its name and colour."""
+    whole = cq.Assembly(name=name)
+    for body, shape in zip(bodies, _solids([body.shape for body in bodies]), strict=True):
+        whole.add(shape, name=body.name, color=cq.Color(*body.colour))
+    return whole
+
+
+def line(start: brep.Point, end: brep.Point) -> cq.Edge:
+    return cq.Edge.makeLine(start, end)
+
+
+def arc(start: brep.Point, middle: brep.Point, end: brep.Point) -> cq.Edge:
+    return cq.Edge.makeThreePointArc(start, middle, end)
+
+
+def wire(edges: Sequence[cq.Edge]) -> cq.Wire:
+    return cq.Wire.assembleEdges(edges)
+
+
+def face(outer: cq.Wire, holes: Sequence[cq.Wire]) -> cq.Face:
+    return cq.Face.makeFromWires(outer, list(holes))
+
+
+def revolve(profile: cq.Face) -> cq.Solid:
+    return cq.Solid.revolve(profile, 360, (0, 0, 0), (0, 0, 1))
+
+
+def extrude(profile: cq.Face, height: float) -> cq.Solid:
+    return cq.Solid.extrudeLinear(profile, (0, 0, height))
+
+
+def loft(below: cq.Wire, above: cq.Wire) -> cq.Solid:
+    return cq.Solid.makeLoft([below, above], True)
+
+
+def fuse(parts: Sequence[cq.Shape]) -> cq.Shape:
+    return parts[0].fuse(*parts[1:])
+
+
+def cut(body: cq.Shape, tools: Sequence[cq.Shape]) -> cq.Shape:
+    return body.cut(*tools)
+
+
+def common(one: cq.Shape, other: cq.Shape) -> cq.Shape:
+    return one.intersect(other)
+
+
+def place(shape: cq.Shape, turn: Turn, move: brep.Point) -> cq.Shape:
+    x_axis, _, z_axis = zip(*turn, strict=True)
+    return shape.moved(cq.Location(cq.Plane(move, xDir=x_axis, normal=z_axis)))
+
+
+def _solids(shapes: Sequence[Shape]) -> list[cq.Shape]:
+    found = [shape.clean() for shape in brep.realise(shapes, sys.modules[__name__])]  # type: ignore[arg-type]
+    return [shape.Solids()[0] if len(shape.Solids()) == 1 else shape for shape in found]

@@ -1,0 +1,57 @@
+"""The door to OCP, the Python binding of OCCT: whatever is wrong with it becomes one error that tells how to mend it.
+
+Two wheels fill the same folder OCP: cadquery-ocp (with VTK, what cadquery wants) and cadquery-ocp-novtk (what build123d
+wants). The one unpacked last wins; removing either breaks both; both of the one version below, installed in one go,
+serve both libraries.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from unitcad.errors import UnitcadError
+
+WHEEL_VERSION = "7.9.3.1.1"
+WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")
+
+
+@contextmanager
+def loading(library: str) -> Iterator[None]:
+    """Round the imports of `library` (OCP, build123d or cadquery): raises UnitcadError where they fail."""
+    try:
+        yield
+    except (ImportError, AttributeError) as error:
+        raise UnitcadError(advice(library, error, installed_wheels())) from error
+
+
+def installed_wheels() -> dict[str, str]:
+    """Version by name of every installed wheel that fills the folder OCP."""
+    found = {}
+    for name in WHEELS:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
+    """What to tell a person whose import of `library` failed with `error`, given the installed OCP wheels."""
+    missing = isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] == library
+    extra = "cadquery" if library == "cadquery" else "build123d"
+    if missing and (not wheels or library != "OCP"):
+        return f"{library} is not installed: pip install 'unitcad[{extra}]'"
+    if ".so" in str(error) and "cannot open shared object" in str(error):
+        return f"{library} lacks a library of the system: {error}. On Debian: apt-get install libgl1"
+    have = ", ".join(f"{name} {version}" for name, version in sorted(wheels.items())) or "no wheel of it"
+    wanted = sorted(wheels) or ["cadquery-ocp" if library == "cadquery" else "cadquery-ocp-novtk"]
+    if library == "cadquery" and "cadquery-ocp" not in wanted:
+        wanted = ["cadquery-ocp", *wanted]
+    # cadquery needs the wheel with VTK, which serves build123d as well: it is unpacked last.
+    mend = "; ".join(f"pip install --force-reinstall --no-deps {name}=={WHEEL_VERSION}" for name in reversed(wanted))
+    return (
+        f"{library} does not load ({type(error).__name__}: {error}). The folder OCP is broken or of another version:"
+        f" found {have}. Mend it with: {mend}"
+    )
