@@ -1,0 +1,56 @@
+"""Every example in README.md and docs/ runs."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from unitcad.spec import from_data
+
+ROOT = Path(__file__).parent.parent
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def _blocks(language: str) -> list:
+    return [
+        pytest.param(text, id=f"{page.stem}-{i}")
+        for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+        for i, (found, text) in enumerate(BLOCK.findall(page.read_text("utf-8")))
+        if found == language
+    ]
+
+
+@pytest.mark.parametrize("text", _blocks("toml"))
+def test_toml_examples_are_specs(text: str) -> None:
+    data = tomllib.loads(text)
+    if data.get("design") in ("embedded", "encapsulating"):
+        from_data(data)
+
+
+@pytest.mark.parametrize("text", _blocks("python"))
+def test_python_examples_run(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(text, "example", "exec"), {"__name__": "__main__"})
+
+
+@pytest.mark.parametrize("text", _blocks("console"))
+def test_console_examples_run(text: str, tmp_path: Path) -> None:
+    for line in text.splitlines():
+        if not line.startswith(("$ unitcad", "$ python")) or "# not run:" in line:
+            continue
+        command, _, code = line[2:].partition("# exit ")
+        words = shlex.split(command, comments=True)
+        if words[0] == "unitcad":
+            words[0] = shutil.which("unitcad", path=str(Path(sys.executable).parent)) or "unitcad"
+        else:
+            words[0] = sys.executable
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+        assert done.returncode == int(code or 0), f"{line}\n{done.stdout}{done.stderr}"
+        assert "Traceback" not in done.stderr

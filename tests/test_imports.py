@@ -1,0 +1,115 @@
+"""The house: imports run downward only, without a circle, and nothing heavy is loaded by what does not need it."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import unitcad
+
+PACKAGE = Path(unitcad.__file__).parent
+FLOORS = [
+    {"cli"},
+    {"batch", "report", "accuracy"},
+    {"pipeline"},
+    {"moulds"},
+    {"designs"},
+    {"export"},
+    {"attenuation"},
+    {"kernels", "cache"},
+    {"spec"},
+    {"shape"},
+    {"check"},
+    {"catalogue"},
+    {"errors"},
+]
+LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
+CAD = ("OCP", "build123d", "cadquery")
+
+
+def _edges() -> set[tuple[str, str, str]]:
+    found = set()
+    for file in sorted(PACKAGE.rglob("*.py")):
+        room = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
+        if room == "__init__":
+            continue
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names = [node.module] if node.module != "unitcad" else [f"unitcad.{a.name}" for a in node.names]
+            for name in names:
+                parts = name.split(".")
+                if parts[0] == "unitcad" and len(parts) > 1 and parts[1] != room and parts[1] != "__version__":
+                    found.add((room, parts[1], str(file.relative_to(PACKAGE))))
+    return found
+
+
+def test_every_room_has_a_floor() -> None:
+    rooms = {
+        p.name.removesuffix(".py") for p in PACKAGE.iterdir() if p.suffix == ".py" or (p / "__init__.py").is_file()
+    }
+    assert rooms - {"__init__", "__main__"} <= set(LEVEL)
+
+
+def test_imports_run_downward_only() -> None:
+    upward = [edge for edge in _edges() if LEVEL[edge[0]] >= LEVEL[edge[1]]]
+    assert upward == []
+
+
+def test_attenuation_and_check_know_nothing_of_cad() -> None:
+    for room, below, file in _edges():
+        if room in ("attenuation", "check"):
+            assert below in ("catalogue", "errors"), f"{file} imports {below}"
+
+
+def test_no_file_is_past_400_lines() -> None:
+    long = {str(f.relative_to(PACKAGE)): n for f in PACKAGE.rglob("*.py") if (n := f.read_text().count("\n")) > 410}
+    assert long == {}
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        ["-c", "import unitcad"],
+        ["--help"],
+        ["list", "materials"],
+        ["build", "encapsulating", "--formats", "stl"],
+        ["estimate", "encapsulating"],
+        ["check", "unit.stl"],
+    ],
+    ids=lambda run: run[0],
+)
+def test_no_brep_library_is_loaded(run: list[str], tmp_path: Path) -> None:
+    code = (
+        "import unitcad"
+        if run[0] == "-c"
+        else "from unitcad.cli import main\ntry:\n    main()\nexcept SystemExit:\n    pass"
+    )
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            f"import sys\n{code}\nprint([n for n in {CAD} if n in sys.modules], file=sys.stderr)",
+            *run,
+        ],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr.splitlines()[-1] == "[]", done.stderr
+
+
+def test_importing_reads_no_file_of_ours() -> None:
+    code = (
+        "import sys, builtins, io\n"
+        "opened = []\n"
+        "sys.addaudithook(lambda e, a: opened.append(str(a[0])) if e == 'open' else None)\n"
+        "import unitcad, unitcad.catalogue, unitcad.spec\n"
+        "print([f for f in opened if f.endswith('.toml')])"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

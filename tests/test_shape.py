@@ -1,0 +1,142 @@
+"""Profiles and trees: refusals, closed forms, hashes."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from unitcad.kernels.mesh import area_true, realise, segment_count
+from unitcad.shape import (
+    Extrude,
+    Profile,
+    ProfileError,
+    Revolve,
+    box,
+    content_hash,
+    cut,
+    cylinder,
+    exact_volume,
+    mm,
+    moved,
+    polygon,
+    rectangle,
+    ring,
+    rounded_rectangle,
+    turned,
+    union,
+)
+from unitcad.shape.lettering import CHARACTERS, engraving
+from unitcad.shape.profile import points
+
+lengths = st.floats(0.25, 50).map(mm)
+
+
+@pytest.mark.parametrize(
+    "corners",
+    [
+        ((0, 0), (2, 2), (2, 0), (0, 2)),  # a bow tie
+        ((0, 0), (0, 1), (1, 0)),  # clockwise
+        ((0, 0), (1, 0)),  # no area
+        ((0, 0), (2, 0), (2, 2), (1, 0), (0, 2)),  # touches itself
+        ((0, 0), (3, 0), (1, 0), (3, 3)),  # folds back
+    ],
+)
+def test_a_profile_that_bounds_no_area_is_refused(corners: tuple) -> None:
+    with pytest.raises(ProfileError):
+        polygon(*corners)
+
+
+def test_a_revolved_profile_stays_off_the_far_side_of_the_axis() -> None:
+    with pytest.raises(ProfileError, match="axis"):
+        Revolve(rectangle(-1, 0, 2, 1))
+
+
+def test_lengths_lie_on_the_grid_and_sums_are_exact() -> None:
+    assert mm(0.1) * 1024 == round(0.1 * 1024)
+    assert mm(1.25) + mm(2.11) == mm(mm(1.25) + mm(2.11))
+    assert rectangle(0, 0, 0.1, 1).vertices[1][0] == mm(0.1)
+
+
+@given(lengths, lengths, lengths)
+def test_revolved_volumes_have_a_closed_form(r: float, width: float, height: float) -> None:
+    assert exact_volume(ring(r, r + width, 0, height)) == pytest.approx(
+        math.pi * ((r + width) ** 2 - r**2) * height, rel=1e-12
+    )
+
+
+@given(st.floats(0.2, 20), st.integers(24, 200).map(lambda n: 8 * (n // 8)))
+def test_area_true_polygons_keep_a_cylinders_volume(radius: float, segments: int) -> None:
+    body = cylinder(radius, 0, 2)
+    assert realise(body, segments).volume() == pytest.approx(exact_volume(body), rel=1e-9)
+
+
+def test_an_arc_revolved_is_a_sphere_and_a_torus() -> None:
+    quarter = math.tan(math.pi / 8)
+    ball = Revolve(Profile(((0, -2, quarter), (2, 0, quarter), (0, 2, 0))))
+    assert exact_volume(ball) == pytest.approx(4 / 3 * math.pi * 8, rel=1e-12)
+    torus = Revolve(Profile(((4, 0, quarter), (5, -1, quarter), (6, 0, quarter), (5, 1, quarter))))
+    assert exact_volume(torus) == pytest.approx(2 * math.pi**2 * 5, rel=1e-12)
+    assert torus.profile.bounds == pytest.approx((4, -1, 6, 1))
+
+
+def test_a_taper_has_the_volume_of_its_frustum() -> None:
+    below, above = rectangle(-2, -2, 2, 2), rectangle(-1, -1, 1, 1)
+    frustum = Extrude(below, 0, 3, top=above)
+    assert exact_volume(frustum) == pytest.approx(3 / 3 * (16 + 4 + 8), rel=1e-12)
+    assert realise(frustum, 32).volume() == pytest.approx(28, rel=1e-12)
+
+
+@given(st.floats(0.5, 100), st.sampled_from([0.2, 0.05, 0.01, 0.002]))
+def test_a_meshed_circle_stays_within_the_tolerance(radius: float, tolerance: float) -> None:
+    n = segment_count(radius, tolerance)
+    corner = radius * area_true(n)
+    side = corner * math.cos(math.pi / n)
+    assert max(corner - radius, radius - side) <= tolerance
+
+
+def test_equal_trees_hash_equal_in_another_process_and_unequal_ones_do_not() -> None:
+    tree = cut(union((ring(1, 2, 0, 1), moved(box(0, 1, 0, 1, 0, 1), x=3))), [turned(cylinder(0.5, 0, 2), "x", 1)])
+    code = (
+        "from unitcad.shape import *;"
+        "print(content_hash(cut(union((ring(1, 2, 0, 1), moved(box(0, 1, 0, 1, 0, 1), x=3))),"
+        "[turned(cylinder(0.5, 0, 2), 'x', 1)])))"
+    )
+    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+    assert content_hash(tree) == other
+    assert content_hash(pickle.loads(pickle.dumps(tree))) == other
+    assert content_hash(cylinder(1, 0, 1)) != content_hash(cylinder(1, 0, 1 + 1 / 1024))
+    assert content_hash(union((tree,))) == content_hash(tree)
+
+
+def test_quarter_turns_are_exact() -> None:
+    body = box(0, 1, 0, 2, 0, 3)
+    assert realise(turned(body, "z", 1), 32).bounding_box() == pytest.approx((-2, 0, 0, 0, 1, 3), abs=0)
+    assert turned(body, "y", 4) is body
+
+
+@pytest.mark.parametrize("character", sorted(CHARACTERS))
+def test_every_character_is_one_piece_of_sound_outline(character: str) -> None:
+    solid = realise(engraving(character, 0.8, 0, 0.4), 32)
+    assert len(solid.decompose()) == 1
+    cells = solid.volume() / 0.4 / 0.64
+    assert cells == pytest.approx(round(cells), abs=0.05)
+    assert solid.genus() == {"0": 1, "6": 1, "8": 2, "9": 1, "A": 1, "B": 1, "D": 1}.get(character, 0)
+
+
+def test_characters_differ() -> None:
+    shapes = {content_hash(engraving(c, 0.8, 0, 1)) for c in CHARACTERS}
+    assert len(shapes) == len(CHARACTERS) == 16
+
+
+def test_arcs_get_their_share_of_a_turn() -> None:
+    section = points(rounded_rectangle(10, 8, 2), 64)
+    assert len(section) == 4 * 17
+    assert rounded_rectangle(10, 8, 2, key=5).area == pytest.approx(
+        20 * 16 - 3 * 4 * (1 - math.pi / 4) - 12.5, rel=1e-9
+    )

@@ -1,0 +1,159 @@
+"""The door: what is refused, with field, value, limit and a nearest value that is accepted."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.spec import from_data, load, override, read, templates, to_toml, warnings
+
+NAMES = sorted(templates())
+
+
+def test_the_templates_are_all_there() -> None:
+    assert set(NAMES) >= {
+        "chain",
+        "embedded",
+        "encapsulating",
+        "motor-10mm",
+        "no-fpcb",
+        "single-embedded",
+        "single-encapsulating",
+        "three-layer",
+    }
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_effective_spec_reads_back_as_itself(name: str) -> None:
+    spec = load(name)
+    assert from_data(tomllib.loads(to_toml(spec))) == spec
+    assert spec.name == name
+
+
+def test_a_path_and_a_name_find_the_same_template(tmp_path: Path) -> None:
+    copy = tmp_path / "mine.toml"
+    copy.write_bytes(templates()["embedded"].read_bytes())
+    assert load(str(copy)) == load("embedded")
+
+
+def test_odd_names_survive_the_file() -> None:
+    spec = load("embedded", [r'name="<script>\"é\"\u007f\\ \n"'])
+    assert from_data(tomllib.loads(to_toml(spec))).name == spec.name
+
+
+@pytest.mark.parametrize(
+    ("template", "setting", "field", "nearest"),
+    [
+        ("encapsulating", "diameter_mm=12.0", "diameter_mm", 12.2),
+        ("encapsulating", "layers.0.wall_mm=0.3", "layers.0.wall_mm", 0.5),
+        ("encapsulating", "layers.0.wall_mm=-1.0", "layers.0.wall_mm", 0.001),
+        ("encapsulating", "layers.0.cap_mm=1.0", "layers.0.cap_mm", 1.095),
+        ("no-fpcb", "layers.0.cap_mm=0.4", "layers.0.cap_mm", 0.5),
+        ("encapsulating", "fpcb.tail_width_mm=7.0", "fpcb.tail_width_mm", 6.3),
+        ("encapsulating", "fpcb.pad_diameter_mm=9.5", "fpcb.pad_diameter_mm", 9.0),
+        ("encapsulating", "fpcb.pad_diameter_mm=2.0", "fpcb.pad_diameter_mm", 3.0),
+        ("embedded", "fpcb.pad_diameter_mm=11.0", "fpcb.pad_diameter_mm", 11.7),
+        ("embedded", "fpcb.pad_diameter_mm=15.0", "fpcb.pad_diameter_mm", 14.0),
+        ("encapsulating", "moulds.slot_height_mm=0.2", "moulds.slot_height_mm", 0.31),
+        ("encapsulating", "moulds.least_wall_mm=0.4", "moulds.least_wall_mm", 0.8),
+        ("encapsulating", "moulds.skirt_wall_mm=0.5", "moulds.skirt_wall_mm", 0.8),
+        ("encapsulating", "moulds.seat_relief_mm=1.8", "moulds.seat_relief_mm", 1.5),
+        ("encapsulating", "moulds.plate_mm=2.5", "moulds.plate_mm", 3.05),
+        ("encapsulating", "moulds.filament_hole_mm=1.5", "moulds.filament_hole_mm", 1.75),
+        ("encapsulating", "motor.thickness_mm=0.8", "motor.thickness_mm", 1.095),
+        ("encapsulating", "motor.part='LCM0720'", "motor.part", "LCM0720A3463F"),
+        ("encapsulating", "layers.1.material='dragonskin-30'", "layers.1.material", "dragon-skin-30"),
+        ("encapsulating", "design='encapsulated'", "design", "encapsulating"),
+        ("encapsulating", "output.tolerance_mm=0.5", "output.tolerance_mm", 0.2),
+        ("encapsulating", "moulds.printer='fdm-04'", "moulds.printer", "fdm-0.4"),
+        ("encapsulating", "layers.0.wal_mm=1.0", "layers.0.wal_mm", "layers.0.wall_mm"),
+        ("encapsulating", "estimate.tissue='forarm'", "estimate.tissue", "forearm"),
+    ],
+)
+def test_refused_with_a_nearest_value_that_is_accepted(
+    template: str, setting: str, field: str, nearest: object
+) -> None:
+    with pytest.raises(Refusal) as refused:
+        load(template, [setting])
+    assert refused.value.field == field
+    assert refused.value.nearest == nearest
+    if isinstance(nearest, int | float):
+        try:
+            load(template, [f"{field}={nearest}"])
+        except Refusal as other:  # another limit may come next
+            assert str(other) != str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("diameter_mm=nan", "finite"),
+        ("diameter_mm=inf", "finite"),
+        ("diameter_mm='14'", "number"),
+        ("diameter_mm=true", "number"),
+        ("layers=[]", "at least 1"),
+        ("layers.7.wall_mm=1.0", "index"),
+        ("name=''", "at least 1"),
+        ("nonsense", "path=value"),
+        ("name.x=1", "table"),
+    ],
+)
+def test_refused_in_plain_words(setting: str, words: str) -> None:
+    with pytest.raises(Refusal, match=words):
+        load("encapsulating", [setting])
+
+
+def test_embedded_layers_have_no_cap_and_encapsulating_ones_do() -> None:
+    with pytest.raises(Refusal, match="open ring"):
+        load("embedded", ["layers.0.cap_mm=1.0"])
+    data = read("encapsulating")
+    del data["layers"][1]["cap_mm"]
+    with pytest.raises(Refusal, match="every encapsulating layer"):
+        from_data(data)
+
+
+def test_toml_that_does_not_parse_names_line_and_column(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.toml"
+    bad.write_text('name = "x"\ndesign = \n')
+    with pytest.raises(UnitcadError, match=r"line 2, column"):
+        load(str(bad))
+    bad.write_bytes(b"\xff\xfe")
+    with pytest.raises(UnitcadError, match="UTF-8"):
+        load(str(bad))
+    with pytest.raises(UnitcadError, match="no such file"):
+        load(str(tmp_path / "none.toml"))
+    with pytest.raises(UnitcadError, match="directory"):
+        load(f"{tmp_path}/")
+
+
+def test_a_spec_brings_its_own_material_motor_and_printer() -> None:
+    spec = override(read("encapsulating"), [])
+    spec["materials"] = {"house": {"like": "ecoflex-00-30", "youngs_modulus_kpa": 40.0}}
+    spec["motors"] = {"mine": {"diameter_mm": 6.0, "thickness_mm": 2.2}}
+    spec["printers"] = {"old": {"like": "fdm-0.4", "plinth_clearance_mm": 0.25}}
+    spec["layers"][0]["material"] = "house"
+    spec["motor"] = {"part": "mine"}
+    spec["moulds"] = {"printer": "old"}
+    built = from_data(spec)
+    assert built.motor.diameter_mm == 6.0
+    assert built.moulds.plinth_clearance_mm == 0.25
+    assert from_data(tomllib.loads(to_toml(built))) == built
+    spec["materials"]["house"]["poison_ratio"] = 0.4
+    with pytest.raises(Refusal, match="poisson_ratio"):
+        from_data(spec)
+
+
+def test_a_layer_below_its_casting_floor_is_a_warning() -> None:
+    assert warnings(load("embedded")) == []
+    thin = warnings(load("embedded", ["layers.0.wall_mm=0.8"]))
+    assert len(thin) == 1
+    assert "layers.0.wall_mm" in thin[0]
+
+
+def test_overrides_do_not_touch_the_source() -> None:
+    data = read("embedded")
+    override(data, ["layers.0.wall_mm=2.0"])
+    assert data["layers"][0]["wall_mm"] == 1.25
