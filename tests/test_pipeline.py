@@ -1,0 +1,206 @@
+"""build: files, bytes, folders, interruption, what was left out."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import manifold3d
+import numpy as np
+import pytest
+import trimesh
+
+from unitcad.errors import UnitcadError
+from unitcad.pipeline import Variant, build
+from unitcad.pipeline.folder import folder_name, replacing
+from unitcad.spec import load, templates
+
+NAMES = sorted(templates())
+
+
+def _tree(folder: Path) -> dict[str, str]:
+    return {
+        str(f.relative_to(folder)): hashlib.sha256(f.read_bytes()).hexdigest()
+        for f in sorted(folder.rglob("*"))
+        if f.is_file() and f.name not in ("timings.json", "slicer.json", "report.html")
+    }
+
+
+def _mesh_only(name: str, *more: str):
+    return load(name, ['output.formats=["stl","3mf"]', *more])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_template_builds_with_all_laws_kept(name: str, tmp_path: Path) -> None:
+    built = build(_mesh_only(name), tmp_path)
+    assert built.ok
+    assert {law["code"] for law in built.manifest["laws"]} >= {"C000", "C100", "C200", "C210"}
+    on_disk = {str(f.relative_to(built.folder)) for f in built.folder.rglob("*") if f.is_file()}
+    assert {"spec.toml", "manifest.json", "timings.json", "section.svg", "unit.3mf", "moulds/moulds.3mf"} <= on_disk
+    for part in built.manifest["parts"]:
+        for entry in part["files"].values():
+            content = (built.folder / entry["path"]).read_bytes()
+            assert hashlib.sha256(content).hexdigest() == entry["sha256"]
+        if "stl" not in part["files"]:
+            assert part["made"] == "cut"
+            continue
+        mesh = trimesh.load_mesh(built.folder / part["files"]["stl"]["path"])
+        assert mesh.is_watertight
+        assert mesh.is_volume
+        assert mesh.body_count == 1
+        assert mesh.volume == pytest.approx(part["volume_mm3"], rel=1e-4)
+        solid = manifold3d.Manifold(
+            manifold3d.Mesh(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.uint32))
+        )
+        assert solid.status() == manifold3d.Error.NoError
+        assert mesh.bounds[0][2] == 0  # in print attitude, on the bed
+    for step in built.manifest["steps"]:
+        assert step["cavity_volume_mm3"] == pytest.approx(
+            step["layer_volume_mm3"] * np.prod(load(name).moulds.cavities), rel=1e-9
+        )
+
+
+def test_the_same_spec_gives_the_same_bytes(tmp_path: Path) -> None:
+    first = build(_mesh_only("chain"), tmp_path / "a")
+    code = (
+        "from unitcad.pipeline import build; from unitcad.spec import load; from pathlib import Path;"
+        f"build(load('chain', ['output.formats=[\"stl\",\"3mf\"]']), Path({str(tmp_path / 'b')!r}))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONHASHSEED": "7"})
+    second = tmp_path / "b" / first.folder.name
+    assert _tree(first.folder) == _tree(second)
+
+
+def test_further_formats_are_added_and_none_removed(tmp_path: Path) -> None:
+    spec = load("single-embedded", ['output.formats=["stl"]'])
+    first = build(spec, tmp_path, only=["unit"])
+    (first.folder / "note.txt").write_text("mine")
+    second = build(load("single-embedded", ['output.formats=["3mf"]']), tmp_path, only=["moulds"])
+    assert second.folder == first.folder
+    assert (first.folder / "unit" / "layer1.stl").exists()
+    assert (first.folder / "moulds" / "moulds.3mf").exists()
+    assert (first.folder / "note.txt").read_text() == "mine"
+    assert second.manifest["outputs"] == ["unit", "moulds"]
+
+
+def test_the_folder_name_ignores_name_and_formats_only() -> None:
+    spec = load("embedded")
+    digits = folder_name(spec)[-12:]
+    assert folder_name(load("embedded", ["name='An other: name'"])) == f"an-other-name-{digits}"
+    assert folder_name(load("embedded", ['output.formats=["stl"]']))[-12:] == digits
+    assert folder_name(load("embedded", ["casting.room_c=25.0"]))[-12:] != digits
+    assert len(folder_name(load("embedded", [f"name='{'x' * 120}'"]))) < 64
+    assert folder_name(load("embedded", ["name='é<>'"])).startswith(("e-", "unit-"))
+
+
+def test_a_folder_of_another_spec_is_an_error_and_stays(tmp_path: Path) -> None:
+    spec = load("single-embedded", ['output.formats=["stl"]'])
+    folder = build(spec, tmp_path, only=["unit"]).folder
+    other = load("single-embedded", ["layers.0.wall_mm=2.4"])
+    from unitcad.spec import to_toml
+
+    (folder / "spec.toml").write_text(to_toml(other))
+    before = _tree(folder)
+    with pytest.raises(UnitcadError, match=r"spec\.toml differs"):
+        build(spec, tmp_path, only=["unit"])
+    (folder / "spec.toml").unlink()
+    with pytest.raises(UnitcadError, match="not a result of unitcad"):
+        build(spec, tmp_path, only=["unit"])
+    del before["spec.toml"]
+    assert _tree(folder) == before
+
+
+def test_an_interrupted_build_leaves_the_old_result_whole(tmp_path: Path) -> None:
+    spec = load("single-embedded", ['output.formats=["stl"]'])
+    folder = build(spec, tmp_path, only=["unit"]).folder
+    before = _tree(folder)
+    with pytest.raises(KeyboardInterrupt), replacing(folder) as fresh:
+        (fresh / "spec.toml").write_text("half")
+        raise KeyboardInterrupt
+    assert _tree(folder) == before
+    # Killed between the two renames: the old result lies aside, and the next run takes it back.
+    folder.rename(tmp_path / f".tmp-{folder.name}-old")
+    assert _tree(build(spec, tmp_path, only=["unit"]).folder) == before
+    assert [p.name for p in tmp_path.iterdir()] == [folder.name]
+
+
+def test_a_killed_process_leaves_the_old_result_whole(tmp_path: Path) -> None:
+    spec = load("single-embedded", ['output.formats=["stl"]'])
+    folder = build(spec, tmp_path, only=["unit"]).folder
+    before = _tree(folder)
+    code = (
+        "import sys, time; from pathlib import Path; from unitcad.pipeline.folder import replacing\n"
+        f"with replacing(Path({str(folder)!r})) as fresh:\n"
+        "    (fresh / 'spec.toml').write_text('half'); print('in', flush=True); time.sleep(60)\n"
+    )
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    assert child.stdout is not None
+    assert child.stdout.readline()
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    child.stdout.close()
+    assert _tree(folder) == before
+    build(spec, tmp_path, only=["unit"])
+    assert [p.name for p in tmp_path.iterdir()] == [folder.name]
+
+
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [
+        ("single-embedded", "second pour"),
+        ("no-fpcb", "tongue and slot"),
+        ("embedded", "tongue and slot"),
+        ("embedded", "filament stub and hole"),
+        ("embedded", "laws"),
+        ("embedded", "boundary representation"),
+    ],
+)
+def test_what_a_variant_lacks_is_left_out_and_listed(name: str, what: str, tmp_path: Path) -> None:
+    built = build(load(name, ['output.formats=["stl"]']), tmp_path, only=["unit", "moulds"], check=False)
+    assert what in {entry["what"] for entry in built.manifest["left_out"]}
+    assert all(entry["why"] for entry in built.manifest["left_out"])
+
+
+def test_materials_share_geometry() -> None:
+    soft = Variant.of("encapsulating")
+    other = Variant.of("encapsulating", "layers.1.material='ecoflex-00-50'")
+    assert soft.plan.label == other.plan.label
+    assert [b.shape for b in soft.plan.tools] == [b.shape for b in other.plan.tools]
+    assert Variant.of("encapsulating", "diameter_mm=14.2").plan.label != soft.plan.label
+
+
+def test_json_is_one_object_and_the_last_line_is_the_folder(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "unitcad", "build", "single-embedded", "--formats", "stl", "--only", "unit"]
+    told = subprocess.run([*command, "-o", str(tmp_path)], capture_output=True, text=True, check=True)
+    assert Path(told.stdout.splitlines()[-1]).is_dir()
+    data = json.loads(
+        subprocess.run([*command, "-o", str(tmp_path), "--json"], capture_output=True, text=True, check=True).stdout
+    )
+    assert data["variants"][0]["ok"] is True
+    refused = subprocess.run(
+        [*command, "--set", "diameter_mm=3.0", "--json"], capture_output=True, text=True, check=False
+    )
+    assert refused.returncode == 2
+    assert json.loads(refused.stdout)["error"]["field"] == "diameter_mm"
+    assert "Traceback" not in refused.stderr
+
+
+def test_ctrl_c_stops_without_a_traceback(tmp_path: Path) -> None:
+    child = subprocess.Popen(
+        [sys.executable, "-m", "unitcad", "build", *NAMES, "--formats", "stl", "-o", str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(2.5)
+    child.send_signal(signal.SIGINT)
+    _, errors = child.communicate(timeout=60)
+    assert child.returncode in (130, 0)
+    assert "Traceback" not in errors
+    assert not [p for p in tmp_path.glob(".tmp-*")]

@@ -1,0 +1,5 @@
+"""python -m unitcad."""
+
+from unitcad.cli import main
+
+main()
