@@ -13,6 +13,7 @@ import typer
 
 from unitcad import __version__
 from unitcad.cli.build import build
+from unitcad.cli.check import check
 from unitcad.cli.list import list_
 from unitcad.cli.output import say_error
 from unitcad.errors import UnitcadError
@@ -34,6 +35,7 @@ def _version(wanted: bool) -> None:
 
 
 app.command("build")(build)
+app.command("check")(check)
 app.command("list")(list_)
 
 

@@ -43,9 +43,9 @@ def _entries(kind: str) -> dict[str, Any]:
     if kind == "designs":
         return dict.fromkeys(DESIGNS, "")
     if kind == "rules":
-        from unitcad.check import rules
+        from unitcad.check.rulebook import rules
 
-        return {code: rule.title for code, rule in rules.RULES.items()}
+        return {code: rule.title for code, rule in rules().items()}
     found = {"materials": catalogue.materials, "motors": catalogue.motors, "printers": catalogue.printers}[kind]()
     return {
         name: {

@@ -1,0 +1,11 @@
+"""Mesh files judged as they are, before any repair: STL, 3MF, OBJ, PLY, OFF and STEP, by named rules.
+
+`check_file(path, Options())` gives a `FileReport`. Needs numpy and scipy; knows nothing of CAD. Importing it is light:
+readers and rules are loaded by the first file that needs them.
+"""
+
+from unitcad.check.check import Options, check_file, check_mesh
+from unitcad.check.findings import Facts, FileReport, Finding, Location
+from unitcad.check.limits import Limits
+
+__all__ = ["Facts", "FileReport", "Finding", "Limits", "Location", "Options", "check_file", "check_mesh"]

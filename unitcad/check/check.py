@@ -1,0 +1,160 @@
+"""A file or a mesh in, a report out: the functions that the command line, `build` and other programs call.
+
+`check_file` never raises for what a file holds: whatever is wrong with it is a finding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from unitcad.catalogue import Printer
+from unitcad.check import sniff
+from unitcad.check.findings import Facts, FileReport, Finding, merge
+from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
+from unitcad.check.mesh import Floats, Ints, Mesh
+from unitcad.check.rulebook import finding
+from unitcad.check.rules_mesh import Judged, judge_mesh
+
+UNITS_MM = {
+    "micron": 1e-3,
+    "millimeter": 1.0,
+    "centimeter": 10.0,
+    "inch": 25.4,
+    "foot": 304.8,
+    "meter": 1000.0,
+}
+Reader = Callable[[memoryview, Limits, Deadline], tuple[list[Mesh], list[Finding]]]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to judge and against what.
+
+    `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all.
+    `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
+    `shells`: the number of shells expected (G005). `cross`: judge self-crossing.
+    """
+
+    select: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
+    unit: str | None = None
+    printer: Printer | None = None
+    shells: int | None = None
+    cross: bool = True
+    limits: Limits = field(default_factory=Limits)
+
+    def wants(self, code: str) -> bool:
+        """Whether findings of `code` are reported."""
+        chosen = max((len(p) for p in self.select if code.startswith(p)), default=-1 if self.select else 0)
+        dropped = max((len(p) for p in self.ignore if code.startswith(p)), default=-1)
+        return chosen >= 0 and chosen > dropped
+
+
+def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) -> FileReport:
+    """Judge a mesh in memory: vertices (n, 3) mm, faces (m, 3) indices. The report's path is empty."""
+    options = options or Options()
+    points = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
+    triangles = np.asarray(faces).reshape(-1, 3)
+    if triangles.size and (triangles.min() < 0 or triangles.max() >= len(points)):
+        return _report("", [finding("P011", "a face names a vertex that is not there")], Facts(), options)
+    mesh = Mesh(points, np.ascontiguousarray(triangles, dtype=np.int32))
+    try:
+        judged = _judge_all([mesh], options, Deadline(options.limits.seconds))
+    except Unreadable as stop:
+        return _report("", stop.findings, Facts(), options)
+    return _report("", judged.findings, judged.facts, options)
+
+
+def check_file(path: str | Path, options: Options | None = None) -> FileReport:
+    """Judge one file. Missing, unreadable and hostile files are findings of the report."""
+    options = options or Options()
+    shown = str(path)
+    deadline = Deadline(options.limits.seconds)
+    findings: list[Finding] = []
+    facts = Facts()
+    try:
+        findings, facts = _check(Path(path), options, deadline)
+    except Unreadable as stop:
+        findings = list(stop.findings)
+    except MemoryError:
+        findings = [finding("F011", "out of memory")]
+    except RecursionError:
+        findings = [finding("F011", "nested too deeply")]
+    return _report(shown, findings, facts, options)
+
+
+def _report(path: str, findings: Sequence[Finding], facts: Facts, options: Options) -> FileReport:
+    return FileReport(path, merge(item for item in findings if options.wants(item.code)), facts)
+
+
+def _check(path: Path, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
+    data = _bytes_of(path, options.limits)
+    kind = sniff.kind_of(path.name, data[:64])
+    if not kind:
+        known = ", ".join(sorted(sniff.SUFFIXES))
+        raise Unreadable(finding("F005", f"suffix {path.suffix!r} is no mesh's; known: {known}"))
+    if not data:
+        raise Unreadable(finding("F001", "the file is empty"))
+    strange = sniff.foreign(data[:2048])
+    if strange and (kind, strange) not in {("3mf", "zip"), ("step", "step")}:
+        raise Unreadable(finding("F005", f"named {path.suffix}, but the content is {strange}"))
+    view = memoryview(data)
+    if kind == "3mf":
+        from unitcad.check.threemf import check_3mf
+
+        return check_3mf(view, options, deadline)
+    if kind == "step":
+        from unitcad.check.read_step import check_step
+
+        return check_step(path, view, options.limits)
+    if kind == "stl":
+        from unitcad.check.read_stl import read_stl as read
+    else:
+        from unitcad.check.read_other import reader_for
+
+        read = reader_for(kind)
+    meshes, findings = read(view, options.limits, deadline)
+    del view, data
+    factor = UNITS_MM[options.unit] if options.unit else 1.0
+    if factor != 1.0:
+        meshes = [replace(mesh, vertices=mesh.vertices * factor) for mesh in meshes]
+    judged = _judge_all(meshes, options, deadline)
+    return findings + list(judged.findings), judged.facts
+
+
+def _bytes_of(path: Path, limits: Limits) -> bytes:
+    try:
+        if not path.is_file():
+            raise Unreadable(finding("F012", "a folder" if path.is_dir() else "no such file"))
+        with path.open("rb") as file:
+            data = file.read(limits.max_bytes + 1)
+    except OSError as error:
+        raise Unreadable(finding("F012", f"cannot be read: {error.strerror or error}")) from error
+    if len(data) > limits.max_bytes:
+        raise over_limit(f"more than {limits.max_bytes} bytes")
+    return data
+
+
+def _judge_all(meshes: Sequence[Mesh], options: Options, deadline: Deadline) -> Judged:
+    """Judge the meshes of a file that has no instances: each by itself, facts of the last one that has any."""
+    from unitcad.check import scale
+
+    findings: list[Finding] = []
+    facts, topology = Facts(), None
+    for mesh in meshes:
+        judged = judge_mesh(mesh, deadline, cross=options.cross)
+        findings += judged.findings
+        facts, topology = judged.facts, judged.topology
+        findings += scale.judge(judged.facts, options.unit is not None)
+        if options.printer is not None and topology is not None:
+            from unitcad.check import printing
+
+            findings += printing.judge(topology, options.printer, deadline)
+    if options.shells is not None and facts.shells is not None and facts.shells != options.shells:
+        text = f"{facts.shells} shells, {options.shells} expected"
+        findings.append(finding("G005", text, abs(facts.shells - options.shells)))
+    return Judged(tuple(findings), facts, topology)

@@ -1,0 +1,135 @@
+"""Edges of a mesh: which faces meet at each, and what follows from that: boundaries, shells, umbrellas.
+
+A half-edge is 3 * face + side; side k runs from corner k to corner k + 1. Everything is sorting and gathering.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from unitcad.check.mesh import Bools, Ints, sorted_with_order
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Half-edges sorted by their undirected edge. `first` and `size` describe the groups in `order`.
+
+    `closed` is true where every edge has exactly two faces that run along it in opposite directions.
+    """
+
+    order: Ints
+    first: Ints
+    size: Ints
+    low: Ints
+    high: Ints
+    closed: bool
+
+
+def half_edges(faces: Ints) -> tuple[Ints, Ints]:
+    """Start and end vertex of every half-edge, (3 m,) each."""
+    start = np.ascontiguousarray(faces).reshape(-1)
+    end = np.ascontiguousarray(faces[:, [1, 2, 0]]).reshape(-1)
+    return start, end
+
+
+def edges_of(faces: Ints, n_vertices: int) -> Edges:
+    """Group the half-edges of `faces` (no face may use a vertex twice)."""
+    start, end = half_edges(faces)
+    bits = max(n_vertices - 1, 1).bit_length()
+    key = np.minimum(start, end).astype(np.uint64)
+    key <<= np.uint64(bits)
+    key |= np.maximum(start, end).astype(np.uint64)
+    key, order = sorted_with_order(key, 2 * bits)
+    n = len(key)
+    if n % 2 == 0 and n and (key[0::2] == key[1::2]).all() and (key[1:-1:2] != key[2::2]).all():
+        one, other = order[0::2], order[1::2]
+        closed = not (start[one] == start[other]).any()
+        first = np.arange(0, n, 2, dtype=np.int32)
+        size = np.full(n // 2, 2, np.int32)
+    else:
+        closed = False
+        fresh = np.empty(n, bool)
+        fresh[:1] = True
+        np.not_equal(key[1:], key[:-1], out=fresh[1:])
+        first = np.flatnonzero(fresh).astype(np.int32)
+        size = np.diff(np.append(first, n)).astype(np.int32)
+    edge = key[first]
+    low = (edge >> np.uint64(bits)).astype(np.int32)
+    high = (edge & np.uint64((1 << bits) - 1)).astype(np.int32)
+    return Edges(order, first, size, low, high, closed)
+
+
+def opposite(edges: Edges, n_half: int) -> Ints:
+    """For each half-edge the one across its edge; itself where an edge has other than two faces."""
+    found = np.arange(n_half, dtype=np.int32)
+    pairs = edges.first[edges.size == 2]
+    one, other = edges.order[pairs], edges.order[pairs + 1]
+    found[one] = other
+    found[other] = one
+    return found
+
+
+def pinched_closed(faces: Ints, across: Ints, n_vertices: int) -> Ints:
+    """Vertices of a closed, consistently wound mesh whose faces form more than one fan.
+
+    The half-edges leaving a vertex are permuted by turning to the next face; a fan is one cycle. Cycles are counted
+    by pointer doubling, in as many rounds as the largest valence has binary digits.
+    """
+    n = 3 * len(faces)
+    start = faces.reshape(-1)
+    turn = across.reshape(-1, 3)[:, [2, 0, 1]].reshape(-1)
+    valence = np.bincount(start, minlength=n_vertices)
+    label = np.arange(n, dtype=np.int32)
+    rounds = int(valence.max(initial=1)).bit_length()
+    for i in range(rounds):
+        np.minimum(label, label[turn], out=label)
+        if i < rounds - 1:
+            turn = turn[turn]
+    roots = label == np.arange(n, dtype=np.int32)
+    if np.count_nonzero(roots) == np.count_nonzero(valence):
+        return np.empty(0, np.int32)
+    return np.flatnonzero(np.bincount(start[roots], minlength=n_vertices) > 1).astype(np.int32)
+
+
+def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
+    """The same for any mesh: fans are joined across edges of two faces; vertices of edges with more are left out."""
+    start, _ = half_edges(faces)
+    n = len(start)
+    pairs = edges.first[edges.size == 2]
+    one, other = edges.order[pairs], edges.order[pairs + 1]
+    ahead = np.arange(n, dtype=np.int32).reshape(-1, 3)[:, [1, 2, 0]].reshape(-1)
+    same = start[one] == start[other]
+    left = np.concatenate([one, ahead[one]])
+    right = np.concatenate([np.where(same, other, ahead[other]), np.where(same, ahead[other], other)])
+    fans = components(n, left, right)
+    _, where = np.unique(fans, return_index=True)
+    several = np.bincount(start[where], minlength=n_vertices) > 1
+    many = edges.size > 2
+    several[edges.low[many]] = False
+    several[edges.high[many]] = False
+    return np.flatnonzero(several).astype(np.int32)
+
+
+def shells_of(faces: Ints, edges: Edges) -> Ints:
+    """The shell of each face: faces are joined across edges of exactly two faces; numbered by their first face."""
+    pairs = edges.first[edges.size == 2]
+    return components(len(faces), edges.order[pairs] // 3, edges.order[pairs + 1] // 3)
+
+
+def components(n: int, left: Ints, right: Ints) -> Ints:
+    """The component of each of `n` nodes joined by pairs, numbered in the order of their first node."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(left), np.int8), (left, right)), shape=(n, n))
+    _, label = connected_components(graph, directed=False)
+    return label
+
+
+def consistent(faces: Ints, edges: Edges) -> Bools:
+    """Of the edges with two faces: whether the faces run along it in opposite directions, as a proper surface does."""
+    start = faces.reshape(-1)
+    pairs = edges.first[edges.size == 2]
+    return start[edges.order[pairs]] != start[edges.order[pairs + 1]]

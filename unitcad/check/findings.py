@@ -1,0 +1,135 @@
+"""What a check finds, as frozen data: a finding a rule, facts of the file, and the report that holds both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+SEVERITIES = ("info", "warning", "error")
+SHOWN = 5  # locations kept for a finding; the count says how many there are
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where: a face's index (0-based, file order), a point in the file's mm, a line or byte, a part or object."""
+
+    face: int | None = None
+    xyz: tuple[float, float, float] | None = None
+    line: int | None = None
+    part: str | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready, without what is not known."""
+        found: dict[str, Any] = {}
+        if self.part is not None:
+            found["part"] = self.part
+        if self.face is not None:
+            found["face"] = self.face
+        if self.xyz is not None:
+            found["xyz"] = [float(f"{v:.9g}") for v in self.xyz]
+        if self.line is not None:
+            found["line"] = self.line
+        return found
+
+    def __str__(self) -> str:
+        said = [self.part] if self.part else []
+        if self.line is not None:
+            said.append(f"line {self.line}")
+        if self.face is not None:
+            said.append(f"face {self.face}")
+        if self.xyz is not None:
+            said.append("({:.6g}, {:.6g}, {:.6g})".format(*self.xyz))
+        return " ".join(said)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One rule's verdict on one file: how often, and where first."""
+
+    code: str
+    severity: str
+    message: str
+    count: int = 1
+    locations: tuple[Location, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready."""
+        return {
+            "code": self.code,
+            "severity": self.severity,
+            "message": self.message,
+            "count": self.count,
+            "locations": [place.as_dict() for place in self.locations],
+        }
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the file holds, in mm; None where it could not be read or has no meaning."""
+
+    triangles: int | None = None
+    vertices: int | None = None
+    shells: int | None = None
+    volume_mm3: float | None = None
+    area_mm2: float | None = None
+    bbox_mm: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+    watertight: bool | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready; bbox_mm is [[x, y, z] low, [x, y, z] high]."""
+        return {
+            "triangles": self.triangles,
+            "vertices": self.vertices,
+            "shells": self.shells,
+            "volume_mm3": self.volume_mm3,
+            "area_mm2": self.area_mm2,
+            "bbox_mm": None if self.bbox_mm is None else [list(self.bbox_mm[0]), list(self.bbox_mm[1])],
+            "watertight": self.watertight,
+        }
+
+
+@dataclass(frozen=True)
+class FileReport:
+    """A file's findings, sorted by severity and code, and its facts."""
+
+    path: str
+    findings: tuple[Finding, ...] = ()
+    facts: Facts = field(default_factory=Facts)
+
+    @property
+    def verdict(self) -> str:
+        """`error`, `warning` or `pass`: the worst finding, infos aside."""
+        found = {finding.severity for finding in self.findings}
+        return "error" if "error" in found else "warning" if "warning" in found else "pass"
+
+    def has(self, code: str) -> bool:
+        """Whether a finding of that code is there."""
+        return any(finding.code == code for finding in self.findings)
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready."""
+        return {
+            "path": self.path,
+            "verdict": self.verdict,
+            "findings": [finding.as_dict() for finding in self.findings],
+            "facts": self.facts.as_dict(),
+        }
+
+
+def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """One finding a rule: counts added, first message and first places kept, worst severity; sorted, worst first."""
+    by_code: dict[str, Finding] = {}
+    for new in findings:
+        old = by_code.get(new.code)
+        if old is None:
+            by_code[new.code] = replace(new, locations=new.locations[:SHOWN])
+            continue
+        worst = max(old.severity, new.severity, key=SEVERITIES.index)
+        message = old.message
+        if new.message != message and "; and " not in message:
+            message = f"{message}; and {new.message}"
+        by_code[new.code] = Finding(
+            new.code, worst, message, old.count + new.count, (old.locations + new.locations)[:SHOWN]
+        )
+    return tuple(sorted(by_code.values(), key=lambda found: (-SEVERITIES.index(found.severity), found.code)))

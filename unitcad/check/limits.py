@@ -1,0 +1,48 @@
+"""What a check may spend, and how it stops: bytes, faces, seconds. Reaching a limit is finding F011, never a pass."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from unitcad.check.findings import Finding
+from unitcad.check.rulebook import finding
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds on one file. `seconds` is wall time; `ratio` is inflated over packed size of a zip entry."""
+
+    max_faces: int = 10_000_000
+    max_bytes: int = 4_000_000_000
+    max_package_bytes: int = 2_000_000_000
+    max_entries: int = 10_000
+    max_depth: int = 64
+    ratio: float = 1000.0
+    seconds: float = 600.0
+
+
+class Unreadable(Exception):
+    """A reader can go no further; the findings say why."""
+
+    def __init__(self, *findings: Finding) -> None:
+        self.findings = findings
+        super().__init__("; ".join(found.message for found in findings))
+
+
+def over_limit(what: str) -> Unreadable:
+    """The limit `what` is reached."""
+    return Unreadable(finding("F011", what))
+
+
+class Deadline:
+    """A clock that ends a check: `tick()` raises `Unreadable` once the time is up."""
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self._end = time.monotonic() + seconds
+
+    def tick(self) -> None:
+        """Raises `Unreadable` (F011) after the last second."""
+        if time.monotonic() > self._end:
+            raise over_limit(f"not finished within {self.seconds:g} s")

@@ -1,0 +1,281 @@
+"""STL, binary and text, as it is: what it holds and what is wrong with it, before any repair.
+
+Binary: 80 bytes of header, a little-endian uint32 count, records of 50 bytes. Text: the grammar of 3D Systems' 1989
+StereoLithography Interface Specification; keywords in either case.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from unitcad.check.findings import Finding, Location
+from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
+from unitcad.check.mesh import Floats, Mesh, weld_exact
+from unitcad.check.rulebook import finding
+
+RECORD = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_TOKENS = 21  # facet normal x y z outer loop (vertex x y z) x 3 endloop endfacet
+_WORDS = {0: b"facet", 1: b"normal", 5: b"outer", 6: b"loop", 7: b"vertex", 11: b"vertex", 15: b"vertex"}
+_WORDS |= {19: b"endloop", 20: b"endfacet"}
+_NUMBERS = [i for i in range(_TOKENS) if i not in _WORDS]
+_NAN_SPELLINGS = re.compile(rb"^[+-]?(nan(\(\w*\))?|inf(inity)?|1\.#(ind|inf|qnan|snan)\w*)$", re.IGNORECASE)
+_BLOCK = 8_000_000
+
+
+def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
+    """The mesh of an STL file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh remains."""
+    size = len(data)
+    if size == 0:
+        raise Unreadable(finding("F001", "the file is empty"))
+    head = bytes(data[: min(size, 2048)])
+    if _is_text(head, data):
+        return _read_text(data, limits, deadline)
+    if size < 84:
+        raise Unreadable(finding("F001", f"{size} bytes: shorter than a binary STL's header of 84"))
+    count = int.from_bytes(data[80:84], "little")
+    findings: list[Finding] = []
+    if head[:5].lower() == b"solid":
+        findings.append(finding("F007", "the binary header starts with 'solid'", places=[Location(line=None)]))
+    room, rest = divmod(size - 84, 50)
+    if count > room:
+        findings.append(
+            finding("F002", f"the header promises {count} facets, the file has room for {room}", count - room)
+        )
+    elif count < room and (rest == 0 and any(data[84 + 50 * count : 84 + 50 * count + 100])):
+        findings.append(finding("F002", f"the header promises {count} facets, the file holds {room}", room - count))
+    elif size > 84 + 50 * count:
+        extra = size - 84 - 50 * count
+        findings.append(finding("F006", f"{extra} bytes after the last facet", extra))
+    facets = min(count, room)
+    if facets > limits.max_faces:
+        raise Unreadable(*findings, over_limit(f"{facets} faces, more than --max-faces {limits.max_faces}").findings[0])
+    if facets == 0:
+        raise Unreadable(*findings, finding("F001", "the file has no facet"))
+    records = np.frombuffer(data, RECORD, facets, 84)
+    deadline.tick()
+    corners = records["corners"]
+    finite = np.isfinite(corners)
+    if not finite.all():
+        findings.append(_not_finite(finite.all(axis=(1, 2))))
+        return [], findings
+    vertices, faces = weld_exact(corners)
+    normals = np.ascontiguousarray(records["normal"])
+    return [Mesh(vertices, faces, normals, indexed=False, single=True)], findings
+
+
+def _is_text(head: bytes, data: memoryview) -> bool:
+    start = head.lstrip(b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n")[:5].lower()
+    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return True
+    if start != b"solid" and not head.lstrip().lower().startswith(b"facet"):
+        return False
+    size = len(data)
+    if size >= 84 and size == 84 + 50 * int.from_bytes(data[80:84], "little"):
+        return False
+    return b"\x00" not in head[:512]
+
+
+def _not_finite(good: Floats) -> Finding:
+    bad = np.flatnonzero(~good)
+    return finding(
+        "V001", f"{len(bad)} faces have a vertex that is not finite", len(bad), (Location(face=int(i)) for i in bad[:9])
+    )
+
+
+@dataclass
+class _Text:
+    """What has been read of a text STL."""
+
+    corners: list[Floats] = field(default_factory=list)
+    normals: list[Floats] = field(default_factory=list)
+    facets: int = 0
+    solids: int = 0
+    findings: list[Finding] = field(default_factory=list)
+
+
+def _read_text(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
+    found = _Text()
+    raw = _decoded(bytes(data), found.findings)
+    _walk(raw, found, limits, deadline)
+    if not found.facets:
+        raise Unreadable(*found.findings, finding("F001", "the file has no facet"))
+    if found.solids > 1:
+        found.findings.append(finding("F010", f"{found.solids} solids in one file", found.solids))
+    corners = np.concatenate(found.corners) if found.corners else np.empty((0, 3, 3))
+    normals = np.concatenate(found.normals) if found.normals else np.empty((0, 3))
+    if not len(corners):
+        return [], found.findings
+    with np.errstate(over="ignore"):
+        single = corners.astype(np.float32)
+    finite = np.isfinite(single)
+    if not finite.all():
+        found.findings.append(_not_finite(finite.all(axis=(1, 2))))
+        return [], found.findings
+    del single
+    vertices, faces = weld_exact(corners)
+    return [Mesh(vertices, faces, normals, indexed=False)], found.findings
+
+
+def _decoded(raw: bytes, findings: list[Finding]) -> bytes:
+    """The text as bytes with LF line ends, whatever it was stored as; oddities become findings."""
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        findings.append(finding("F009", "UTF-16 text with a byte order mark"))
+        raw = raw.decode("utf-16", "replace").encode("utf-8")
+    elif raw[:3] == b"\xef\xbb\xbf":
+        findings.append(finding("F009", "a UTF-8 byte order mark at the start"))
+        raw = raw[3:]
+    if not raw.isascii():
+        try:
+            raw.decode("utf-8")
+        except UnicodeDecodeError as error:
+            findings.append(finding("F009", f"bytes that are not UTF-8, first at {error.start}"))
+    if b"\r" in raw:
+        if b"\n" not in raw:
+            findings.append(finding("F009", "CR-only line ends"))
+        raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return raw
+
+
+def _walk(raw: bytes, found: _Text, limits: Limits, deadline: Deadline) -> None:
+    """Read solid after solid. Adds findings; never raises for what the text holds but for limits."""
+    at, end = 0, len(raw)
+    inside = False
+    while True:
+        at = _skip_blank(raw, at)
+        if at >= end:
+            break
+        deadline.tick()
+        line_end = raw.find(b"\n", at)
+        line_end = end if line_end < 0 else line_end
+        word = raw[at : at + 8].split(None, 1)[0].lower() if raw[at : at + 8].strip() else b""
+        if word.startswith(b"solid"):
+            if inside:
+                found.findings.append(_at("F003", "solid begins before the last one ended", raw, at))
+            inside, found.solids, at = True, found.solids + 1, line_end
+        elif word == b"endsolid":
+            inside, at = False, line_end
+        elif word == b"facet":
+            if not inside:
+                if not found.solids:
+                    found.findings.append(_at("F003", "facets without a solid line", raw, at))
+                    found.solids = 1
+                inside = True
+            at = _facets(raw, at, found, limits, deadline)
+            if at < 0:
+                return
+        else:
+            code, what = ("F003", "unexpected") if inside else ("F006", "after endsolid:")
+            if code == "F006" and found.facets:
+                found.findings.append(_at(code, f"{end - at} bytes after endsolid", raw, at))
+                return
+            shown = raw[at : min(line_end, at + 30)].decode("utf-8", "replace")
+            found.findings.append(_at("F003", f"{what} {shown!r}", raw, at))
+            return
+    if inside:
+        found.findings.append(_at("F003", "the text ends before endsolid", raw, end))
+
+
+def _skip_blank(raw: bytes, at: int) -> int:
+    match = _BLANK.match(raw, at)
+    return match.end() if match else at
+
+
+_BLANK = re.compile(rb"[\s\x00]*")
+_END = re.compile(rb"(?im)^[ \t]*(?:endsolid|solid)\b")
+
+
+def _facets(raw: bytes, at: int, found: _Text, limits: Limits, deadline: Deadline) -> int:
+    """Read facets from `at` to the next solid or endsolid, whole blocks at a time; the place after them, or -1."""
+    match = _END.search(raw, at)
+    stop = match.start() if match else len(raw)
+    while at < stop:
+        deadline.tick()
+        cut = min(at + _BLOCK, stop)
+        if cut < stop:
+            inner = raw.rfind(b"endfacet", at, cut)
+            inner = raw.rfind(b"ENDFACET", at, cut) if inner < 0 else inner
+            cut = inner + 8 if inner >= 0 else stop
+        tokens = raw[at:cut].lower().split()
+        blocks = len(tokens) // _TOKENS
+        if len(tokens) % _TOKENS or any(set(tokens[i::_TOKENS]) != {word} for i, word in _WORDS.items()):
+            return _explain(raw, at, cut, found, limits)
+        _take(raw, at, tokens, blocks, found, limits)
+        at = cut
+    return stop
+
+
+def _take(raw: bytes, at: int, tokens: list[bytes], blocks: int, found: _Text, limits: Limits) -> None:
+    if found.facets + blocks > limits.max_faces:
+        raise over_limit(f"more faces than --max-faces {limits.max_faces}")
+    columns = []
+    for column in _NUMBERS:
+        texts = tokens[column::_TOKENS]
+        try:
+            columns.append(np.array(texts).astype(np.float64))
+        except ValueError:
+            columns.append(_slow_numbers(texts, raw, at, found))
+    numbers = np.stack(columns, axis=1)
+    found.normals.append(numbers[:, :3])
+    found.corners.append(numbers[:, 3:].reshape(-1, 3, 3))
+    found.facets += blocks
+
+
+def _slow_numbers(texts: list[bytes], raw: bytes, at: int, found: _Text) -> Floats:
+    values = np.zeros(len(texts))
+    for i, text in enumerate(texts):
+        try:
+            values[i] = float(text) if b"_" not in text else float("x")
+        except ValueError:
+            if _NAN_SPELLINGS.match(text):
+                values[i] = np.nan
+                continue
+            shown = text[:30].decode("utf-8", "replace")
+            why = " (a decimal comma)" if b"," in text else ""
+            place = [Location(face=found.facets + i)]
+            found.findings.append(finding("F004", f"{shown!r} is not a number{why}", places=place))
+    return values
+
+
+def _explain(raw: bytes, at: int, cut: int, found: _Text, limits: Limits) -> int:
+    """Read one irregular block facet by facet, say what is wrong with it, and end the reading."""
+    for match in re.finditer(rb"(?is)\bfacet\b(.*?)(\bendfacet\b|\Z)", raw[at:cut]):
+        body = match.group(1).lower().split()
+        vertices = body.count(b"vertex")
+        numbers = [word for word in body if word not in _KEYWORDS]
+        place = at + match.start()
+        if not match.group(2):
+            found.findings.append(_at("F003", "the text ends inside a facet", raw, place))
+        elif vertices != 3:
+            found.findings.append(_at("F008", f"a facet with {vertices} vertices", raw, place))
+        elif len(numbers) != 12:
+            bad = [word for word in numbers if not _is_number(word)]
+            code, what = ("F004", "number that cannot be parsed") if bad else ("F003", "numbers missing or too many")
+            if bad:
+                what = f"{bad[0][:30].decode('utf-8', 'replace')!r} is not a number"
+            found.findings.append(_at(code, what, raw, place))
+        elif len(body) != _TOKENS - 2:
+            found.findings.append(_at("F003", "a facet's keywords are not in order", raw, place))
+        found.facets += 1
+        if len(found.findings) > 50 or found.facets > limits.max_faces:
+            break
+    if not any(item.severity == "error" for item in found.findings):
+        found.findings.append(_at("F003", "the text is not a list of facets", raw, at))
+    return -1
+
+
+_KEYWORDS = {b"normal", b"outer", b"loop", b"vertex", b"endloop", b"facet", b"endfacet"}
+
+
+def _is_number(word: bytes) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return bool(_NAN_SPELLINGS.match(word))
+    return True
+
+
+def _at(code: str, message: str, raw: bytes, place: int) -> Finding:
+    return finding(code, message, places=[Location(line=raw.count(b"\n", 0, place) + 1)])

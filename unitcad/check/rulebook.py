@@ -1,0 +1,99 @@
+"""The table of rules (rules.toml): severity, title, cause and mend of each code, and who may be selected."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+from unitcad.check.findings import SHOWN, Finding, Location
+from unitcad.errors import unknown_name
+
+FAMILIES = {
+    "F": "File",
+    "P": "3MF package",
+    "V": "Values",
+    "T": "Topology",
+    "G": "Geometry",
+    "S": "Scale",
+    "D": "Printability",
+    "M": "Manifest",
+}
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule: what it is called, how bad it is, where it comes from and how to mend it."""
+
+    code: str
+    severity: str
+    title: str
+    cause: str
+    mend: str
+
+
+@cache
+def rules() -> dict[str, Rule]:
+    """All rules by code, in the table's order."""
+    table = tomllib.loads((files(__package__) / "rules.toml").read_text("utf-8"))
+    return {code: Rule(code, **entry) for code, entry in table.items()}
+
+
+def finding(
+    code: str,
+    message: str,
+    count: int = 1,
+    places: Iterable[Location] = (),
+    severity: str | None = None,
+) -> Finding:
+    """A finding of rule `code`, with the rule's severity unless another one is given."""
+    kept = []
+    for place in places:
+        if len(kept) == SHOWN:
+            break
+        kept.append(place)
+    return Finding(code, severity or rules()[code].severity, message, int(count), tuple(kept))
+
+
+def explain(code: str) -> str:
+    """The rule in words. Raises `Refusal` for a code that is not in the table."""
+    known = rules()
+    if code.upper() not in known:
+        raise unknown_name("--explain", code, known)
+    rule = known[code.upper()]
+    return f"{rule.code} {rule.title} ({rule.severity})\n\nCause: {rule.cause}\nMend:  {rule.mend}"
+
+
+def markdown() -> str:
+    """docs/checks.md: every rule by family."""
+    lines = [
+        "# Rules of `unitcad check`",
+        "",
+        "Made from `unitcad/check/rules.toml` by `python -m unitcad.check.rulebook`; a test holds the two together.",
+        "Severity: an error fails a run, a warning does with `--fail-on warning`, an info never does.",
+        "",
+    ]
+    for letter, family in FAMILIES.items():
+        lines += [f"## {family}", "", "| code | severity | rule | cause | mend |", "| --- | --- | --- | --- | --- |"]
+        for rule in rules().values():
+            if rule.code.startswith(letter):
+                lines.append(f"| {rule.code} | {rule.severity} | {rule.title} | {rule.cause} | {rule.mend} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def check_prefixes(option: str, prefixes: Sequence[str]) -> tuple[str, ...]:
+    """The prefixes in capitals. Raises `Refusal` for one that begins no code."""
+    kept = []
+    for prefix in prefixes:
+        wanted = prefix.strip().upper()
+        if not wanted or not any(code.startswith(wanted) for code in rules()):
+            raise unknown_name(option, prefix, rules())
+        kept.append(wanted)
+    return tuple(kept)
+
+
+if __name__ == "__main__":
+    print(markdown(), end="")

@@ -1,0 +1,52 @@
+"""All geometry rules on one mesh: values, topology, crossing, shells, and the facts that fall out on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from unitcad.check import crossing, shells, topology
+from unitcad.check.findings import Facts, Finding, Location
+from unitcad.check.limits import Deadline
+from unitcad.check.mesh import Mesh
+from unitcad.check.rulebook import finding
+from unitcad.check.topology import Topology
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One mesh's findings and facts; `topology` is None where the mesh has no face left."""
+
+    findings: tuple[Finding, ...]
+    facts: Facts
+    topology: Topology | None
+
+
+def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
+    """Apply the V, T and G rules to one mesh; `cross=False` leaves self-crossing out."""
+    facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
+    finite = np.asarray(np.isfinite(mesh.vertices).all(axis=1))
+    if not finite.all():
+        bad = np.flatnonzero(~finite[mesh.faces].all(axis=1))
+        places = [Location(face=int(i), part=mesh.name) for i in bad[:9]]
+        text = f"{len(finite) - int(finite.sum())} vertices are not finite"
+        return Judged((finding("V001", text, len(bad) or 1, places),), facts, None)
+    if not len(mesh.faces):
+        return Judged((finding("F001", "the mesh has no face"),), facts, None)
+    found = topology.judge(mesh, deadline)
+    findings = list(found.findings)
+    crossings = crossing.judge(found, deadline) if cross and len(found.kept) else crossing.Crossings()
+    findings += crossings.findings
+    judged = shells.judge(found, crossings.crossed, crossings.touching, deadline)
+    findings += judged.findings
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    facts = replace(
+        facts,
+        shells=found.n_shells,
+        volume_mm3=float(judged.volumes.sum()) if found.watertight else None,
+        area_mm2=float(np.sqrt(np.einsum("ij,ij->i", found.areas, found.areas)).sum()) / 2,
+        bbox_mm=(tuple(low.tolist()), tuple(high.tolist())),
+        watertight=found.watertight,
+    )
+    return Judged(tuple(findings), facts, found)

@@ -1,0 +1,156 @@
+"""Many files: folders and globs expanded, judged one after the other or by several processes, within hard limits."""
+
+from __future__ import annotations
+
+import contextlib
+import glob
+import os
+import signal
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from pathlib import Path
+
+from unitcad.check.check import Options, check_file
+from unitcad.check.findings import FileReport
+from unitcad.check.rulebook import finding
+from unitcad.check.sniff import SUFFIXES
+
+
+def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
+    """Files for names that may be folders or globs, without repeats; a report for each name that gives none."""
+    files: dict[str, None] = {}
+    empty: list[FileReport] = []
+    for name in names:
+        path = Path(name)
+        if path.is_dir():
+            inside = sorted(str(p) for p in path.rglob("*") if p.suffix.lower() in SUFFIXES and p.is_file())
+            if not inside:
+                empty.append(FileReport(name, (finding("F012", "no mesh file in this folder"),)))
+            files.update(dict.fromkeys(inside))
+        elif not path.exists() and glob.has_magic(name):
+            inside = sorted(p for p in glob.glob(name, recursive=True) if os.path.isfile(p))
+            if not inside:
+                empty.append(FileReport(name, (finding("F012", "no file matches"),)))
+            files.update(dict.fromkeys(inside))
+        else:
+            files[name] = None
+    return list(files), empty
+
+
+def check_files(
+    work: Sequence[tuple[str, Options]], jobs: int = 1, memory_mb: int | None = None
+) -> Iterator[FileReport]:
+    """A report for each (path, options), in order. `memory_mb` bounds each process's address space (POSIX only)."""
+    if jobs <= 1 or len(work) <= 1:
+        with _bounded(memory_mb):
+            for path, options in work:
+                yield guarded(path, options)
+        return
+    yield from _in_processes(work, min(jobs, len(work)), memory_mb)
+
+
+def guarded(path: str, options: Options) -> FileReport:
+    """`check_file` with an alarm behind its clock and a net below it: an inner fault is a finding, not a crash."""
+    try:
+        with _alarm(options.limits.seconds * 1.5 + 5):
+            return check_file(path, options)
+    except _OutOfTime:
+        return _stopped(path, f"not finished within {options.limits.seconds:g} s")
+    except MemoryError:
+        return _stopped(path, "out of memory")
+    except Exception as error:
+        if os.environ.get("UNITCAD_TRACEBACK"):
+            raise
+        return _stopped(path, f"the check itself failed ({type(error).__name__}: {error}); please report the file")
+
+
+def _stopped(path: str, why: str) -> FileReport:
+    return FileReport(path, (finding("F011", why),))
+
+
+def _in_processes(work: Sequence[tuple[str, Options]], jobs: int, memory_mb: int | None) -> Iterator[FileReport]:
+    left = list(work)
+    while left:
+        pool = ProcessPoolExecutor(jobs, get_context("spawn"), _limit_memory, (memory_mb,))
+        futures = [pool.submit(guarded, path, options) for path, options in left]
+        done = 0
+        try:
+            for future in futures:
+                yield future.result()
+                done += 1
+        except BrokenProcessPool:
+            # A worker died (killed for its memory, or a crash in native code). Which file it was is found by
+            # judging the first unfinished one alone.
+            yield _alone(*left[done], memory_mb)
+            done += 1
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+        left = left[done:]
+
+
+def _alone(path: str, options: Options, memory_mb: int | None) -> FileReport:
+    with ProcessPoolExecutor(1, get_context("spawn"), _limit_memory, (memory_mb,)) as pool:
+        try:
+            return pool.submit(guarded, path, options).result()
+        except BrokenProcessPool:
+            return _stopped(path, "the process that judged it died (memory, or a fault in native code)")
+
+
+def _limit_memory(memory_mb: int | None) -> None:
+    if memory_mb is None or sys.platform == "win32":
+        return
+    import resource
+
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    wanted = memory_mb * 1_000_000
+    with contextlib.suppress(ValueError, OSError):
+        resource.setrlimit(resource.RLIMIT_AS, (wanted if hard < 0 else min(wanted, hard), hard))
+
+
+@contextlib.contextmanager
+def _bounded(memory_mb: int | None) -> Iterator[None]:
+    if memory_mb is None or sys.platform == "win32":
+        yield
+        return
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    _limit_memory(memory_mb)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+class _OutOfTime(Exception):
+    pass
+
+
+@contextlib.contextmanager
+def _alarm(seconds: float) -> Iterator[None]:
+    """Interrupts Python code that no deadline's tick reaches; does nothing outside the main thread or on Windows."""
+    import threading
+
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def ring(signum: int, frame: object) -> None:
+        raise _OutOfTime
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def worst(reports: Iterable[FileReport], fail_on: str) -> int:
+    """The exit code: 1 if any report has a finding at or above `fail_on` (error or warning), else 0."""
+    failing = {"error"} if fail_on == "error" else {"error", "warning"}
+    return int(any(report.verdict in failing for report in reports))

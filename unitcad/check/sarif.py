@@ -1,0 +1,75 @@
+"""SARIF 2.1.0, as OASIS defines it and GitHub code scanning reads it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any
+from urllib.parse import quote
+
+from unitcad import __version__
+from unitcad.check.findings import FileReport, Finding
+from unitcad.check.rulebook import Rule, rules
+
+SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+_LEVELS = {"error": "error", "warning": "warning", "info": "note"}
+
+
+def sarif(reports: Sequence[FileReport]) -> dict[str, Any]:
+    """One run with every rule and a result a finding. Fingerprints depend on path and rule only."""
+    index = {code: i for i, code in enumerate(rules())}
+    return {
+        "$schema": SCHEMA,
+        "version": "2.1.0",
+        "runs": [
+            {
+                "tool": {
+                    "driver": {
+                        "name": "unitcad check",
+                        "semanticVersion": __version__,
+                        "rules": [_rule(rule) for rule in rules().values()],
+                    }
+                },
+                "columnKind": "unicodeCodePoints",
+                "results": [_result(report, found, index) for report in reports for found in report.findings],
+            }
+        ],
+    }
+
+
+def _rule(rule: Rule) -> dict[str, Any]:
+    return {
+        "id": rule.code,
+        "name": "".join(word.capitalize() for word in rule.title.replace("-", " ").replace(",", "").split()),
+        "shortDescription": {"text": rule.title},
+        "fullDescription": {"text": rule.cause},
+        "help": {"text": f"{rule.cause} Mend: {rule.mend}"},
+        "defaultConfiguration": {"level": _LEVELS[rule.severity]},
+    }
+
+
+def _result(report: FileReport, found: Finding, index: dict[str, int]) -> dict[str, Any]:
+    uri = _uri(report.path)
+    physical: dict[str, Any] = {"artifactLocation": {"uri": uri}}
+    line = next((place.line for place in found.locations if place.line is not None), None)
+    if line is not None:
+        physical["region"] = {"startLine": max(line, 1)}
+    fingerprint = hashlib.sha256(f"{uri}\n{found.code}".encode()).hexdigest()
+    return {
+        "ruleId": found.code,
+        "ruleIndex": index[found.code],
+        "level": _LEVELS[found.severity],
+        "message": {"text": found.message},
+        "locations": [{"physicalLocation": physical}],
+        "partialFingerprints": {"pathAndRule/v1": fingerprint},
+        "properties": {"count": found.count, "places": [place.as_dict() for place in found.locations]},
+    }
+
+
+def _uri(path: str) -> str:
+    """A relative path as a URI reference; an absolute one as a file: URI."""
+    pure = PurePath(path)
+    if pure.is_absolute():
+        return pure.as_uri()
+    return quote(pure.as_posix().encode("utf-8", "surrogateescape"), safe="/")

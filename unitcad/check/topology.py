@@ -1,0 +1,254 @@
+"""Topology rules, T001 to T013, and V002: edges, winding, pinches, duplicates, degenerate faces, stored normals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from unitcad.check import edges as mesh_edges
+from unitcad.check import seams
+from unitcad.check.edges import Edges
+from unitcad.check.findings import Finding, Location
+from unitcad.check.limits import Deadline
+from unitcad.check.mesh import Bools, Floats, Ints, Mesh, area_vectors, diagonal, float32_step
+from unitcad.check.rulebook import finding
+
+FAR = 1e-4  # V002: float32 step over the bounding box's diagonal
+SLIVER = 1e-3  # T011: shortest length of a sliver, as part of the diagonal
+NORMAL_COS = float(np.cos(np.radians(15.0)))  # T013
+_EXACT = 2000  # faces looked at with exact arithmetic before the float verdict is taken
+
+
+@dataclass(frozen=True)
+class Topology:
+    """What the topology rules found out; `mesh` is without degenerate faces and, where that closed it, welded.
+
+    `kept` maps its faces to the file's; `areas` are twice the area vectors, mm2; `shells` labels faces.
+    """
+
+    mesh: Mesh
+    kept: Ints
+    edges: Edges
+    shells: Ints
+    n_shells: int
+    areas: Floats
+    watertight: bool
+    oriented: bool
+    findings: tuple[Finding, ...]
+
+
+def judge(mesh: Mesh, deadline: Deadline) -> Topology:
+    """Apply the topology rules to a mesh with finite vertices."""
+    found: list[Finding] = []
+    faces, vertices = mesh.faces, mesh.vertices
+    repeated = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
+    kept = np.arange(len(faces), dtype=np.int32)
+    if repeated.any():
+        kept = np.flatnonzero(~repeated).astype(np.int32)
+        faces = faces[kept]
+    if mesh.indexed:
+        found += _unreferenced(vertices, mesh.faces)
+    found += _too_far(mesh)
+    edges = mesh_edges.edges_of(faces, len(vertices))
+    deadline.tick()
+    if not edges.closed and (edges.size == 1).any():
+        faces, kept, edges, extra = _open_edges(mesh, faces, kept, edges)
+        found += extra
+    areas = area_vectors(vertices, faces)
+    found += _thin(mesh, faces, kept, areas, np.flatnonzero(repeated))
+    deadline.tick()
+    found += _many_faces(mesh, faces, kept, edges)
+    across = mesh_edges.opposite(edges, 3 * len(faces)) if edges.closed else None
+    if across is not None:
+        pinched = mesh_edges.pinched_closed(faces, across, len(vertices))
+        twice = np.flatnonzero(across[0::3] // 3 == across[1::3] // 3)
+    else:
+        pinched = mesh_edges.pinched_open(faces, edges, len(vertices))
+        twice = _duplicates(faces)
+    deadline.tick()
+    if len(pinched):
+        found.append(
+            finding("T004", f"{len(pinched)} pinch vertices", len(pinched), _points(mesh, vertices[pinched[:9]]))
+        )
+    if len(twice):
+        found.append(finding("T009", f"{len(twice)} duplicate faces", len(twice), _at_faces(mesh, kept, faces, twice)))
+    oriented = edges.closed or bool(mesh_edges.consistent(faces, edges).all())
+    if not oriented:
+        found += _winding(mesh, faces, kept, edges)
+    if mesh.normals is not None:
+        found += _stored_normals(mesh, kept, areas)
+    shells = mesh_edges.shells_of(faces, edges)
+    deadline.tick()
+    watertight = bool(len(faces)) and bool((edges.size % 2 == 0).all())
+    return Topology(
+        replace(mesh, faces=faces, normals=None),
+        kept,
+        edges,
+        shells,
+        int(shells.max(initial=-1)) + 1,
+        areas,
+        watertight,
+        oriented,
+        tuple(found),
+    )
+
+
+def _points(mesh: Mesh, points: Floats) -> Iterator[Location]:
+    for point in points:
+        yield Location(xyz=(float(point[0]), float(point[1]), float(point[2])), part=mesh.name)
+
+
+def _at_faces(mesh: Mesh, kept: Ints, faces: Ints, which: Ints) -> Iterator[Location]:
+    for i in which[:9]:
+        centre = mesh.vertices[faces[i]].mean(axis=0)
+        yield Location(face=int(kept[i]), xyz=tuple(float(v) for v in centre), part=mesh.name)  # type: ignore[arg-type]
+
+
+def _at_edges(mesh: Mesh, edges: Edges, kept: Ints, which: Ints) -> Iterator[Location]:
+    for i in which[:9]:
+        middle = (mesh.vertices[edges.low[i]] + mesh.vertices[edges.high[i]]) / 2
+        face = int(kept[edges.order[edges.first[i]] // 3])
+        yield Location(face=face, xyz=tuple(float(v) for v in middle), part=mesh.name)  # type: ignore[arg-type]
+
+
+def _unreferenced(vertices: Floats, faces: Ints) -> list[Finding]:
+    used = np.zeros(len(vertices), bool)
+    used[faces.reshape(-1)] = True
+    n = len(vertices) - int(np.count_nonzero(used))
+    return [finding("T012", f"{n} vertices that no face uses", n)] if n else []
+
+
+def _too_far(mesh: Mesh) -> list[Finding]:
+    size, step = diagonal(mesh.vertices), float32_step(mesh.vertices)
+    if step <= FAR * size or size == 0:
+        return []
+    return [finding("V002", f"coordinates are {step:.3g} mm apart in float32, the part is {size:.3g} mm across")]
+
+
+def _open_edges(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints, Ints, Edges, list[Finding]]:
+    """Boundary edges: closed by welding (T006), or T-junctions (T005) and boundaries (T001)."""
+    vertices = mesh.vertices
+    open_ = np.flatnonzero(edges.size == 1)
+    loose = np.unique(np.concatenate([edges.low[open_], edges.high[open_]]))
+    joined = seams.welded(vertices, faces, loose)
+    whole = (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 2] != joined[:, 0])
+    after = mesh_edges.edges_of(joined[whole], len(vertices))
+    left = np.flatnonzero(after.size == 1)
+    if not len(left):
+        n = len(open_)
+        places = _at_edges(mesh, edges, kept, open_)
+        said = finding("T006", f"{n} open edges close once vertices within the tolerance are welded", n, places)
+        return joined[whole], kept[whole], after, [said]
+    found = []
+    if len(left) < len(open_):
+        faces, kept, edges, open_ = joined[whole], kept[whole], after, left
+    split = seams.t_junctions(vertices, edges.low[open_], edges.high[open_], seams.tolerance(vertices))
+    if split.any():
+        which = open_[split]
+        found.append(
+            finding("T005", f"{len(which)} open edges with a vertex on them", len(which),
+                    _at_edges(mesh, edges, kept, which))
+        )  # fmt: skip
+    n = len(open_)
+    found.append(finding("T001", f"{n} boundary edges", n, _at_edges(mesh, edges, kept, open_)))
+    return faces, kept, edges, found
+
+
+def _many_faces(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> list[Finding]:
+    if edges.closed:
+        return []
+    found = []
+    for code, odd, word in (("T002", 1, "odd"), ("T003", 0, "even")):
+        which = np.flatnonzero((edges.size > 2) & (edges.size % 2 == odd))
+        if len(which):
+            text = f"{len(which)} edges with more than two faces, an {word} number"
+            found.append(finding(code, text, len(which), _at_edges(mesh, edges, kept, which)))
+    return found
+
+
+def _winding(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> list[Finding]:
+    wrong = np.flatnonzero(edges.size == 2)[~mesh_edges.consistent(faces, edges)]
+    text = f"{len(wrong)} edges whose two faces run the same way"
+    return [finding("T007", text, len(wrong), _at_edges(mesh, edges, kept, wrong))]
+
+
+def _duplicates(faces: Ints) -> Ints:
+    ordered = np.sort(faces, axis=1)
+    order = np.lexsort(ordered.T)
+    same = (ordered[order[1:]] == ordered[order[:-1]]).all(axis=1)
+    return np.sort(order[1:][same])
+
+
+def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints) -> list[Finding]:
+    """Degenerate faces (T010) and slivers (T011).
+
+    A sliver harms where it is long: its height is below the float32 step, so rounding alone decides where it faces,
+    and it is longer than SLIVER of the part. Short ones vanish in a slicer's own resolution.
+    """
+    found, vertices = [], mesh.vertices
+    double = np.abs(areas).sum(axis=1)
+    size, step = diagonal(vertices), float32_step(vertices)
+    suspect = np.flatnonzero(double < 8 * max(step, 1e-7 * size) * size)
+    corners = vertices[faces[suspect]]
+    longest = np.sqrt(max_side_squared(corners))
+    flat = _exactly_flat(corners, areas[suspect])
+    lines = suspect[flat]
+    n = len(repeated) + len(lines)
+    if n:
+        places = [Location(face=int(i), part=mesh.name) for i in repeated[:9]]
+        places += list(_at_faces(mesh, kept, faces, lines))
+        found.append(finding("T010", f"{n} faces without area", n, places))
+    height = np.sqrt(np.einsum("ij,ij->i", areas[suspect], areas[suspect])) / np.maximum(longest, 1e-300)
+    local = np.spacing(np.abs(corners).max(axis=(1, 2), initial=0).astype(np.float32)).astype(float)
+    thin = suspect[~flat & (height < local) & (longest > SLIVER * size)]
+    if len(thin):
+        found.append(finding("T011", f"{len(thin)} slivers", len(thin), _at_faces(mesh, kept, faces, thin)))
+    return found
+
+
+def max_side_squared(corners: Floats) -> Floats:
+    """The squared length of each triangle's longest side; corners (n, 3, 3)."""
+    sides = corners - corners[:, [1, 2, 0]]
+    return np.einsum("ijk,ijk->ij", sides, sides).max(axis=1, initial=0)
+
+
+def _exactly_flat(corners: Floats, double: Floats) -> Bools:
+    """Whether three points lie on one line: the float answer where its error bound decides, fractions on the rest."""
+    first = np.abs(corners[:, 1] - corners[:, 0])
+    second = np.abs(corners[:, 2] - corners[:, 0])
+    bound = 8 * np.finfo(float).eps * (_abs_cross(first, second) + np.abs(corners).max(axis=(1, 2), initial=0)[:, None]
+                                       * (first + second + second[:, [1, 2, 0]] + first[:, [1, 2, 0]]))  # fmt: skip
+    maybe = (np.abs(double) <= bound).all(axis=1)
+    for i in np.flatnonzero(maybe)[:_EXACT]:
+        a, b, c = ([Fraction(float(v)) for v in point] for point in corners[i])
+        u = [q - p for p, q in zip(a, b, strict=True)]
+        v = [q - p for p, q in zip(a, c, strict=True)]
+        maybe[i] = all(u[j] * v[k] == u[k] * v[j] for j, k in ((0, 1), (1, 2), (2, 0)))
+    return maybe
+
+
+def _abs_cross(a: Floats, b: Floats) -> Floats:
+    pairs = ((1, 2), (2, 0), (0, 1))
+    return np.stack([a[:, i] * b[:, j] + a[:, j] * b[:, i] for i, j in pairs], axis=1)
+
+
+def _stored_normals(mesh: Mesh, kept: Ints, areas: Floats) -> list[Finding]:
+    """T013; a stored normal of zeros means none, and a face lower than a thousandth of its length has none worth it."""
+    assert mesh.normals is not None
+    stored = mesh.normals[kept]
+    lengths = np.sqrt(np.einsum("ij,ij->i", stored, stored, dtype=np.float64))
+    dot = np.einsum("ij,ij->i", stored, areas)
+    real = np.sqrt(np.einsum("ij,ij->i", areas, areas))
+    off = np.flatnonzero(~(dot >= NORMAL_COS * lengths * real * (1 - 1e-6)))
+    if not len(off):
+        return []
+    corners = mesh.vertices[mesh.faces[kept[off]]]
+    sound = real[off] > 1e-3 * max_side_squared(corners)
+    wrong = off[(sound & (lengths[off] > 0)) | ~np.isfinite(lengths[off])]
+    if not len(wrong):
+        return []
+    text = f"{len(wrong)} stored normals differ from the face's own"
+    return [finding("T013", text, len(wrong), (Location(face=int(kept[i]), part=mesh.name) for i in wrong[:9]))]
