@@ -182,7 +182,7 @@ def _shipped(kind: type[_Entry]) -> dict[str, _Entry]:
 
 @cache
 def _raw(file: str) -> dict[str, Any]:
-    return tomllib.loads((files(__package__) / file).read_text("utf-8"))
+    return tomllib.loads((files("unitcad.catalogue") / file).read_text("utf-8"))
 
 
 def _entry(kind: type[_Entry], name: str, table: Mapping[str, Any], path: str, spec: set[str] | None = None) -> _Entry:

@@ -29,7 +29,7 @@ class MotorTable(Table):
     part: str | None = None
     diameter_mm: Positive | None = None
     thickness_mm: Positive | None = None
-    fill: bool = Field(False, description="Layer 1 reaches the motor: no ring of air between them")
+    fill: Annotated[bool, Field(description="Layer 1 reaches the motor: no ring of air between them")] = False
 
 
 class FpcbTable(Table):
@@ -38,7 +38,7 @@ class FpcbTable(Table):
     tail: Literal["one", "both"] = "one"
     thickness_mm: Positive = 0.11
     tail_width_mm: Positive = 3.0
-    tail_length_mm: Positive = Field(10.0, description="how far the tail stands out of the body")
+    tail_length_mm: Annotated[Positive, Field(description="how far the tail stands out of the body")] = 10.0
     pad_diameter_mm: Positive | None = None
 
 
@@ -84,12 +84,15 @@ class CastingTable(Table):
 
     scale_resolution_g: Positive = 0.01
     minimum_mix_g: Positive = 2.0
-    waste: NotNegative = Field(0.5, description="extra mix as a fraction of what the cavities take")
+    waste: Annotated[NotNegative, Field(description="extra mix as a fraction of what the cavities take")] = 0.5
     room_c: Annotated[float, Field(strict=True, ge=5, le=45)] = 23.0
     vacuum: bool = True
-    strain_margin: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
-        0.5, description="the part of a silicone's elongation at break that demoulding may use"
-    )
+    strain_margin: Annotated[
+        float,
+        Field(
+            strict=True, gt=0, le=1, description="the part of a silicone's elongation at break that demoulding may use"
+        ),
+    ] = 0.5
 
 
 class EstimateTable(Table):
