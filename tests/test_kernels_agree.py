@@ -7,6 +7,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from sample_bodies import LAYER1, QUARTER, all_bodies
 
+from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
 from unitcad.shape import (
     Common,
@@ -25,7 +26,7 @@ from unitcad.shape import (
 )
 from unitcad.shape.profile import ProfileError
 
-occt = pytest.importorskip("unitcad.kernels.occt", exc_type=Exception)
+occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
 BODIES = {body.name: body for body in all_bodies()}
 LEAVES = {
     "tube": Revolve(polygon((3, 0), (5, 0), (5, 10), (3, 10))),
@@ -44,7 +45,7 @@ def solids_of(shape):
     """The shape by every B-rep library that is installed."""
     found = {"occt": occt.solids([shape])[0]}
     for name in ("build123d", "cadquery"):
-        library = pytest.importorskip(f"unitcad.kernels.{name}", exc_type=Exception)
+        library = pytest.importorskip(f"unitcad.kernels.{name}", exc_type=UnitcadError)
         found[name] = library.solid(shape).wrapped
     return found
 

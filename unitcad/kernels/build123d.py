@@ -22,7 +22,7 @@ def solid(shape: Shape) -> B3dShape:
     return _solids([shape])[0]
 
 
-def compound(bodies: Sequence[Body], name: str) -> b3d.Compound:
+def compound(bodies: Sequence[Body], name: str = "unitcad") -> b3d.Compound:
     """An assembly called `name`, as assembled (mm): one child a body, with its label and colour."""
     children = _solids([body.shape for body in bodies])
     for child, body in zip(children, bodies, strict=True):

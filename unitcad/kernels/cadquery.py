@@ -20,7 +20,7 @@ def solid(shape: Shape) -> cq.Shape:
     return _solids([shape])[0]
 
 
-def assembly(bodies: Sequence[Body], name: str) -> cq.Assembly:
+def assembly(bodies: Sequence[Body], name: str = "unitcad") -> cq.Assembly:
     """An assembly called `name`, as assembled (mm): one child a body, with its name and colour."""
     whole = cq.Assembly(name=name)
     for body, shape in zip(bodies, _solids([body.shape for body in bodies]), strict=True):

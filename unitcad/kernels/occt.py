@@ -53,11 +53,7 @@ def measure(solid: TopoDS_Shape) -> Measures:
     BRepGProp.VolumeProperties_s(solid, properties, 1e-12)
     BRepBndLib.AddOptimal_s(solid, box, False, False)
     box.SetGap(0.0)
-    explorer, count = TopExp_Explorer(solid, TopAbs_SOLID), 0
-    while explorer.More():
-        count += 1
-        explorer.Next()
-    return Measures(count, properties.Mass(), tuple(box.Get()))
+    return Measures(len(_solids_in(solid)), properties.Mass(), tuple(box.Get()))
 
 
 def line(start: brep.Point, end: brep.Point) -> TopoDS_Edge:
@@ -142,4 +138,13 @@ def _unified(solid: TopoDS_Shape) -> TopoDS_Shape:
     upgrade = ShapeUpgrade_UnifySameDomain(solid, True, True, True)
     upgrade.AllowInternalEdges(False)
     upgrade.Build()
-    return upgrade.Shape()
+    found = _solids_in(upgrade.Shape())
+    return found[0] if len(found) == 1 else upgrade.Shape()
+
+
+def _solids_in(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+    explorer, found = TopExp_Explorer(shape, TopAbs_SOLID), []
+    while explorer.More():
+        found.append(explorer.Current())
+        explorer.Next()
+    return found

@@ -1,0 +1,112 @@
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from sample_bodies import all_bodies, cup, tongue, tube
+
+from unitcad.errors import UnitcadError
+from unitcad.shape import Cut, moved
+from unitcad.shape.body import Body
+
+occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
+step = pytest.importorskip("unitcad.export.step", exc_type=UnitcadError)
+BODIES = all_bodies()
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("step") / "moulds.step"
+    step.write(path, BODIES, "moulds")
+    return path
+
+
+def test_read_back_equals_written(written):
+    found = step.read(written)
+    solids = occt.solids(body.shape for body in BODIES)
+    assert [body.name for body in found] == [body.name for body in BODIES]
+    for back, body, solid in zip(found, BODIES, solids, strict=True):
+        true = occt.measure(solid)
+        assert back.colour == pytest.approx(body.colour, abs=1e-6)
+        assert back.measures.solids == true.solids == 1
+        assert back.measures.volume == pytest.approx(true.volume, rel=1e-9)
+        assert back.measures.box == pytest.approx(true.box, abs=1e-6)
+
+
+def test_a_fault_shows_when_read_back(tmp_path):
+    """A tool left out of the cut is a part in ten thousand of the volume, and seen."""
+    body = cup()
+    assert isinstance(body.shape, Cut)
+    step.write(tmp_path / "a.step", [Body("cup2", "tool", Cut(body.shape.body, body.shape.tools[:-1]), (0, 0, 0))], "a")
+    back = step.read(tmp_path / "a.step")[0]
+    assert back.measures.volume != pytest.approx(occt.measure(occt.solids([body.shape])[0]).volume, rel=1e-4)
+
+
+def test_other_readers_find_names_and_volumes(written):
+    """What build123d makes of the file: its own reader's labels, colours and solids."""
+    build123d = pytest.importorskip("build123d", exc_type=Exception)
+    whole = build123d.import_step(str(written))
+    assert [child.label for child in whole.children] == [body.name for body in BODIES]
+    for child, body, solid in zip(whole.children, BODIES, occt.solids(b.shape for b in BODIES), strict=True):
+        assert sum(part.volume for part in child.solids()) == pytest.approx(occt.measure(solid).volume, rel=1e-9)
+        assert tuple(child.color)[:3] == pytest.approx(body.colour, abs=1e-6)
+
+
+def test_same_bytes_in_one_process_and_in_another(written):
+    again = step.content(BODIES, "moulds")
+    assert again == written.read_bytes()
+    code = (
+        "import hashlib, sys; sys.path.insert(0, sys.argv[1]); from sample_bodies import all_bodies;"
+        "from unitcad.export import step; print(hashlib.sha256(step.content(all_bodies(), 'moulds')).hexdigest())"
+    )
+    here = str(Path(__file__).parent)
+    environment = {**os.environ, "PYTHONHASHSEED": "7"}
+    environment.pop("SOURCE_DATE_EPOCH", None)
+    other = subprocess.run(
+        [sys.executable, "-c", code, here], env=environment, capture_output=True, text=True, check=True
+    )
+    assert other.stdout.strip() == hashlib.sha256(again).hexdigest()
+
+
+def test_time_stamp_is_source_date_epoch(monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    assert b"'2023-11-14T22:13:20'" in step.content([tube()], "tube")
+    monkeypatch.delenv("SOURCE_DATE_EPOCH")
+    assert b"'1980-01-01T00:00:00'" in step.content([tube()], "tube")
+
+
+def test_schema_is_ap242_and_the_process_keeps_its_settings(capfd):
+    from OCP.Interface import Interface_Static
+
+    before = Interface_Static.IVal_s("write.step.schema"), Interface_Static.IVal_s("write.surfacecurve.mode")
+    data = step.content([tube()], "tube")
+    assert b"AP242_MANAGED_MODEL_BASED_3D_ENGINEERING_MIM_LF" in data
+    after = Interface_Static.IVal_s("write.step.schema"), Interface_Static.IVal_s("write.surfacecurve.mode")
+    assert before == after
+    assert capfd.readouterr().out == ""
+
+
+def test_bodies_of_one_shape_keep_their_own_names_colours_and_places(tmp_path):
+    shape = tongue().shape
+    pair = [
+        Body("tongue1", "tool", shape, (1, 0, 0)),
+        Body("tongue2", "tool", moved(shape, 0, 0, 5), (0, 1, 0)),
+        Body("tongue3", "tool", shape, (0, 0, 1)),
+    ]
+    step.write(tmp_path / "pair.step", pair, "pair")
+    found = step.read(tmp_path / "pair.step")
+    assert [(body.name, body.colour) for body in found] == [(body.name, body.colour) for body in pair]
+    assert found[1].measures.box[2] - found[0].measures.box[2] == pytest.approx(5, abs=1e-9)
+
+
+def test_names_are_escaped(tmp_path):
+    step.write(tmp_path / "a.step", [Body("o'ne", "tool", tube().shape, (0, 0, 0))], "it's; a")
+    assert step.read(tmp_path / "a.step")[0].name == "o'ne"
+
+
+def test_an_unreadable_file_is_refused(tmp_path):
+    (tmp_path / "a.step").write_text("<html>")
+    with pytest.raises(UnitcadError, match="could not read"):
+        step.read(tmp_path / "a.step")

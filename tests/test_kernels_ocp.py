@@ -1,0 +1,61 @@
+"""A missing or broken OCP: one message, and it tells how to mend it."""
+
+import subprocess
+import sys
+
+import pytest
+
+from unitcad.errors import UnitcadError
+from unitcad.kernels import ocp
+
+
+def test_nothing_installed():
+    error = ModuleNotFoundError("No module named 'OCP'", name="OCP")
+    assert ocp.advice("OCP", error, {}) == "OCP is not installed: pip install 'unitcad[build123d]'"
+    error = ModuleNotFoundError("No module named 'cadquery'", name="cadquery")
+    assert ocp.advice("cadquery", error, {"cadquery-ocp-novtk": "7.9.3.1.1"}).endswith("'unitcad[cadquery]'")
+
+
+def test_half_removed():
+    """One of the two wheels is uninstalled: the other's record is there, the files are not."""
+    error = ModuleNotFoundError("No module named 'OCP.gp'", name="OCP.gp")
+    text = ocp.advice("OCP", error, {"cadquery-ocp-novtk": "7.9.3.1.1"})
+    assert "found cadquery-ocp-novtk 7.9.3.1.1" in text
+    assert text.endswith("pip install --force-reinstall --no-deps cadquery-ocp-novtk==7.9.3.1.1")
+
+
+def test_cadquery_with_the_wheel_that_lacks_vtk():
+    error = ModuleNotFoundError("No module named 'OCP.IVtkOCC'", name="OCP.IVtkOCC")
+    text = ocp.advice("cadquery", error, {"cadquery-ocp-novtk": "7.9.3.1.1", "cadquery-ocp": "7.9.3.1.1"})
+    assert text.endswith("--no-deps cadquery-ocp==7.9.3.1.1")
+
+
+def test_wrong_version():
+    text = ocp.advice("build123d", ImportError("cannot import name 'X' from 'OCP'"), {"cadquery-ocp-novtk": "8.0.0"})
+    assert "found cadquery-ocp-novtk 8.0.0" in text
+    assert "cadquery-ocp-novtk==7.9.3.1.1" in text
+
+
+def test_a_library_of_the_system_is_missing():
+    error = ImportError("libGL.so.1: cannot open shared object file: No such file or directory")
+    assert "apt-get install libgl1" in ocp.advice("OCP", error, {"cadquery-ocp": "7.9.3.1.1"})
+
+
+@pytest.mark.parametrize("kernel", ["kernels.occt", "kernels.build123d", "kernels.cadquery", "export.step"])
+@pytest.mark.parametrize("fault", ["", "raise ImportError('another version')", "raise AttributeError('gone')"])
+def test_a_broken_folder_ocp_becomes_one_error(tmp_path, kernel, fault):
+    """An OCP in front of the real one: empty, or failing as it loads."""
+    (tmp_path / "OCP").mkdir()
+    (tmp_path / "OCP" / "__init__.py").write_text(fault)
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import unitcad.{kernel}"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    last = found.stderr.strip().splitlines()[-1]
+    assert last.startswith("unitcad.errors.UnitcadError: ")
+    assert "pip install" in last
+
+
+def test_loading_passes_other_errors_on():
+    with pytest.raises(ZeroDivisionError), ocp.loading("OCP"):
+        raise ZeroDivisionError
+    with pytest.raises(UnitcadError), ocp.loading("OCP"):
+        raise ImportError
