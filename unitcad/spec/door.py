@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from unitcad import catalogue
 from unitcad.errors import Refusal, unknown_name
@@ -53,6 +54,17 @@ def warnings(spec: Spec) -> list[str]:
                     f"about {floor:g} mm"
                 )
     return found
+
+
+def printer_of(spec: Spec) -> catalogue.Printer:
+    """The catalogue's printer with what the spec's moulds override."""
+    printer = catalogue.printers(spec.printers)[spec.moulds.printer]
+    own = {
+        name: catalogue.Value(value, "spec", "moulds")
+        for name, value in spec.moulds
+        if hasattr(printer, name) and value is not None and float(getattr(printer, name)) != value
+    }
+    return replace(printer, **own)
 
 
 def _with_defaults(spec: Spec) -> Spec:
