@@ -157,3 +157,11 @@ def test_overrides_do_not_touch_the_source() -> None:
     data = read("embedded")
     override(data, ["layers.0.wall_mm=2.0"])
     assert data["layers"][0]["wall_mm"] == 1.25
+
+
+def test_the_docs_name_every_key() -> None:
+    page = (Path(__file__).parent.parent / "docs" / "spec.md").read_text("utf-8")
+    for table, value in load("encapsulating"):
+        fields = type(value).model_fields if hasattr(type(value), "model_fields") else {table: None}
+        for field in fields:
+            assert f"{field}`" in page or f"[{field}." in page, f"{table}.{field} is not in docs/spec.md"
