@@ -5,6 +5,8 @@ One outline a character, with its islands as holes: a boolean costs a kernel far
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from unitcad.shape.profile import Profile, polygon
 from unitcad.shape.tree import Extrude, Shape, moved, union
 
@@ -58,6 +60,7 @@ def text_width(text: str, stroke: float) -> float:
     return (len(text) * PITCH - 1) * stroke
 
 
+@lru_cache
 def _outlines(character: str, stroke: float) -> tuple[Profile, tuple[Profile, ...]]:
     """The outer outline and the islands of a character: the border of its cells, walked with the ink on the left."""
     ink = {
