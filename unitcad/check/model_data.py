@@ -1,0 +1,74 @@
+"""What a 3MF model part says, as plain data: resources, objects, uses of objects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from unitcad.check.findings import Finding, Location
+from unitcad.check.mesh import Floats, Ints
+from unitcad.check.rulebook import finding
+
+_NOTED = 200  # findings kept of one part
+
+
+@dataclass
+class Resource:
+    """A resource by id: its element's name, how many members it has, its attributes, and its rank in the file."""
+
+    kind: str
+    id: int
+    rank: int
+    attributes: dict[str, str]
+    members: list[dict[str, str]] = field(default_factory=list)
+    count: int = 0
+
+
+@dataclass
+class Use:
+    """A component or build item: the object's id, its part ("" for this one) and its matrix (4 x 3, rows)."""
+
+    object: int
+    path: str
+    matrix: Floats
+    rank: int
+    uuid: bool
+
+
+@dataclass
+class Object(Resource):
+    """An object resource: a mesh (vertices (n, 3), triangles (m, 7): v1 v2 v3 p1 p2 p3 pid, -1 for none) or components."""
+
+    type: str = "model"
+    vertices: Floats | None = None
+    triangles: Ints | None = None
+    components: list[Use] = field(default_factory=list)
+    lattice: dict[str, str] | None = None
+    beams: list[dict[str, str]] = field(default_factory=list)
+    balls: list[dict[str, str]] = field(default_factory=list)
+    beam_refs: list[int] = field(default_factory=list)
+    other_shape: bool = False
+
+
+@dataclass
+class Model:
+    """What a model part says."""
+
+    part: str
+    unit: str = "millimeter"
+    namespaces: dict[str, str] = field(default_factory=dict)
+    required: list[str] = field(default_factory=list)
+    resources: dict[int, Resource] = field(default_factory=dict)
+    items: list[Use] = field(default_factory=list)
+    foreign: set[int] = field(default_factory=set)
+    findings: list[Finding] = field(default_factory=list)
+    has_build: bool = False
+    build_uuid: bool = False
+
+    def say(self, code: str, message: str, severity: str | None = None) -> None:
+        """Add a finding about this part."""
+        if len(self.findings) < _NOTED:
+            self.findings.append(finding(code, message, 1, [Location(part=self.part)], severity))
+
+    def objects(self) -> dict[int, Object]:
+        """The object resources by id."""
+        return {id_: found for id_, found in self.resources.items() if isinstance(found, Object)}

@@ -1,0 +1,362 @@
+"""A 3MF model part read element by element into plain data, against the schema, within the limits.
+
+Vertices and triangles go into arrays in batches; their text is never held as a whole.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from unitcad.check import schema
+from unitcad.check.findings import Location
+from unitcad.check.limits import Limits, Unreadable, over_limit
+from unitcad.check.mesh import Floats, Ints
+from unitcad.check.model_data import Model, Object, Resource, Use
+from unitcad.check.rulebook import finding
+from unitcad.check.xml_stream import forbidden, stream
+
+_BATCH = 50_000
+_DEPTH = 60
+_NAMES = {"nan", "inf", "infinity", "-nan", "+nan", "-inf", "+inf", "-infinity", "+infinity"}
+
+
+@dataclass
+class _Open:
+    """An element that is being read."""
+
+    space: str
+    name: str
+    rules: schema.Rules | None
+    counts: dict[str, int] = field(default_factory=dict)
+    last: int = -1
+
+
+# What programs write where a name is missing. Other unprefixed names pass: consumers ignore them (core, 3.4.1).
+_PLACEHOLDERS = {"undefined", "null"}
+
+
+class _Reader:
+    """Handlers for expat; its state is the stack of open elements and the object or resource being read."""
+
+    def __init__(self, model: Model, limits: Limits, spent_faces: int) -> None:
+        self.model, self.limits, self.faces = model, limits, spent_faces
+        self.stack: list[_Open] = [_Open("", "", None)]
+        self.skip = 0
+        self.rank = 0
+        self.resource: Resource | None = None
+        self.names: set[str] = set()
+        self.numbers: list[str] = []
+        self.vertices: list[Floats] = []
+        self.rows: list[tuple[int, ...]] = []
+        self.triangles: list[Ints] = []
+        self.text: dict[str, str] = {}
+
+    def namespace(self, prefix: str | None, uri: str) -> None:
+        self.model.namespaces[prefix or ""] = uri
+
+    def start(self, name: str, flat: list[str]) -> None:
+        if self.skip:
+            self.skip += 1
+            if self.skip > _DEPTH:
+                raise over_limit(f"elements nest deeper than {_DEPTH}")
+            return
+        if name == _VERTEX and len(flat) == 6 and flat[0] == "x" and flat[2] == "y" and flat[4] == "z":
+            if self.stack[-1].name == "vertices" and self.stack[-1].space == schema.CORE:
+                self.numbers += flat[1::2]
+                self.stack.append(_LEAF)
+                if len(self.numbers) >= 3 * _BATCH:
+                    self._flush_vertices()
+                return
+        if len(self.stack) > _DEPTH:
+            raise over_limit(f"elements nest deeper than {_DEPTH}")
+        space, _, local = name.rpartition(" ")
+        attributes = dict(zip(flat[::2], flat[1::2], strict=True))
+        rules = schema.ELEMENTS.get(space, {}).get(local)
+        self._child(space, local, rules)
+        if rules is None:
+            if space in (schema.BOOLEAN, schema.DISPLACEMENT, schema.OLD_DISPLACEMENT, schema.IMPLICIT):
+                if isinstance(self.resource, Object):
+                    self.resource.other_shape = True
+            if self.stack[-1].name == "resources" and attributes.get("id", "").isdecimal():
+                self._foreign(int(attributes["id"]))
+            for attribute in attributes:
+                if why := forbidden(attribute):
+                    self.model.say("P017", f"{why} in <{local}>")
+            self.skip = 1
+            return
+        good = self._attributes(local, rules, attributes)
+        self.stack.append(_Open(space, local, rules))
+        self.rank += 1
+        if good:
+            self._take(space, local, attributes)
+
+    def end(self, _: str) -> None:
+        if self.skip:
+            self.skip -= 1
+            return
+        done = self.stack.pop()
+        if done is _LEAF or done.rules is None:
+            return
+        for child, least, _most in done.rules.children:
+            if done.counts.get(child, 0) < least and not (child == "triangles" and self._lattice()):
+                self.model.say("P017", f"<{done.name}> lacks <{child}>")
+        if done.space == schema.CORE and done.name == "vertices":
+            self._flush_vertices()
+        elif done.space == schema.CORE and done.name == "triangles":
+            self._flush_triangles()
+        elif done.space == schema.CORE and done.name == "mesh":
+            self._close_mesh()
+        elif done.name == "object" and isinstance(self.resource, Object):
+            self._close_object(self.resource)
+        if self.stack[-1].name == "resources":
+            self.resource = None
+
+    def _lattice(self) -> bool:
+        return isinstance(self.resource, Object) and self.resource.lattice is not None
+
+    def _child(self, space: str, local: str, rules: schema.Rules | None) -> None:
+        """Whether this child may stand here, and in this order."""
+        parent = self.stack[-1]
+        if parent is _LEAF:
+            self.model.say("P017", f"<{local}> inside <vertex>")
+            return
+        if not parent.name:
+            if (space, local) != (schema.CORE, "model"):
+                raise Unreadable(
+                    finding("P017", f"the root is <{local}> in {space or 'no namespace'!r}, not the core's <model>",
+                            places=[Location(part=self.model.part)])
+                )  # fmt: skip
+            return
+        if space != parent.space:
+            if not space:
+                self.model.say("P017", f"<{local}> without a namespace")
+            elif space == schema.CORE:
+                self.model.say("P017", f"<{local}> inside <{parent.name}>")
+            return
+        assert parent.rules is not None
+        for place, (name, _, most) in enumerate(parent.rules.children):
+            if name != local:
+                continue
+            parent.counts[name] = parent.counts.get(name, 0) + 1
+            if parent.counts[name] == most + 1:
+                self.model.say("P017", f"<{parent.name}> has <{local}> more than once")
+            if parent.rules.ordered and place < parent.last:
+                self.model.say("P017", f"<{local}> is out of order in <{parent.name}>")
+            parent.last = max(parent.last, place)
+            return
+        if space in (schema.CORE, schema.MATERIAL, schema.SLICE, schema.BEAM) and not (
+            rules is not None and parent.name == "resources"
+        ):
+            self.model.say("P017", f"<{local}> inside <{parent.name}>")
+
+    def _attributes(self, local: str, rules: schema.Rules, attributes: dict[str, str]) -> bool:
+        """Check them; whether all required ones are there and well typed."""
+        good = True
+        for name in rules.required:
+            if name not in attributes:
+                self.model.say("P017", f"<{local}> lacks {name}")
+                good = False
+        for name, value in attributes.items():
+            test = rules.required.get(name) or rules.optional.get(name)
+            if test is not None:
+                if not test(value):
+                    self.model.say("P017", f'{name}="{value[:40]}" of <{local}> is not of its type')
+                    good = good and name not in rules.required
+            elif why := forbidden(name):
+                self.model.say("P017", f"{why} in <{local}>")
+            elif name.startswith("http://www.w3.org/XML/1998/namespace ") and local != "model":
+                self.model.say("P017", f"attribute xml:lang in <{local}>")
+            elif " " not in name:
+                self.model.say("P017", f"unknown attribute {name!r} of <{local}>")
+            elif not rules.open_ and " " in name:
+                self.model.say("P017", f"attribute {name.split()[-1]!r} of <{local}>, which takes none of others")
+        return good
+
+    def _foreign(self, id_: int) -> None:
+        if id_ in self.model.resources or id_ in self.model.foreign:
+            self.model.say("P018", f"id {id_} twice")
+        self.model.foreign.add(id_)
+
+    def _take(self, space: str, local: str, attributes: dict[str, str]) -> None:
+        """Keep what the element says."""
+        parent = self.stack[-2].name
+        if space == schema.CORE:
+            take = getattr(self, f"_take_{local}", None)
+            if take is not None:
+                take(attributes)
+                return
+        if "id" in attributes and parent == "resources":
+            self._resource(Resource(local, int(attributes["id"]), self.rank, attributes))
+        elif space == schema.BEAM or space == schema.BALLS:
+            self._take_lattice(local, attributes)
+        elif self.resource is not None and not isinstance(self.resource, Object):
+            self.resource.count += 1
+            self.resource.members.append({"": local, **attributes})
+            if len(self.resource.members) > self.limits.max_faces:
+                raise over_limit("more properties than --max-faces")
+
+    def _resource(self, resource: Resource) -> None:
+        if resource.id in self.model.resources or resource.id in self.model.foreign:
+            self.model.say("P018", f"id {resource.id} twice")
+        self.model.resources.setdefault(resource.id, resource)
+        self.resource = resource
+
+    def _take_model(self, attributes: dict[str, str]) -> None:
+        self.model.unit = attributes.get("unit", "millimeter")
+        if self.model.unit not in schema.UNITS:
+            self.model.say("P010", f"unit {self.model.unit[:40]!r}")
+        self.model.required = attributes.get("requiredextensions", "").split()
+        for prefix in self.model.required:
+            uri = self.model.namespaces.get(prefix)
+            if uri is None:
+                self.model.say("P016", f"required extension {prefix!r} has no namespace")
+            elif uri not in schema.KNOWN:
+                self.model.say("P016", f"required extension {uri!r} is not known")
+
+    def _take_metadata(self, attributes: dict[str, str]) -> None:
+        name = attributes["name"]
+        prefix, colon, _ = name.partition(":")
+        if not name.strip() or name.lower() in _PLACEHOLDERS:
+            self.model.say("P017", f"metadata without a name ({name!r})")
+        elif colon and prefix not in self.model.namespaces:
+            self.model.say("P017", f"metadata name {name!r} has no namespace")
+        if self.stack[-2].name == "model":
+            if name in self.names:
+                self.model.say("P017", f"metadata {name!r} twice")
+            self.names.add(name)
+
+    def _take_basematerials(self, attributes: dict[str, str]) -> None:
+        self._resource(Resource("basematerials", int(attributes["id"]), self.rank, attributes))
+
+    def _take_object(self, attributes: dict[str, str]) -> None:
+        found = Object("object", int(attributes["id"]), self.rank, attributes, type=attributes.get("type", "model"))
+        self._resource(found)
+
+    def _take_triangle(self, attributes: dict[str, str]) -> None:
+        row = tuple(int(attributes.get(name, -1)) for name in ("v1", "v2", "v3", "p1", "p2", "p3", "pid"))
+        self.rows.append(row)
+        self.faces += 1
+        if self.faces > self.limits.max_faces:
+            raise over_limit(f"more faces than --max-faces {self.limits.max_faces}")
+        if len(self.rows) >= _BATCH:
+            self._flush_triangles()
+
+    def _take_vertex(self, attributes: dict[str, str]) -> None:
+        self.numbers += [attributes["x"], attributes["y"], attributes["z"]]
+
+    def _take_component(self, attributes: dict[str, str]) -> None:
+        if isinstance(self.resource, Object):
+            self.resource.components.append(self._use(attributes))
+
+    def _take_item(self, attributes: dict[str, str]) -> None:
+        self.model.items.append(self._use(attributes))
+
+    def _take_build(self, attributes: dict[str, str]) -> None:
+        self.model.has_build = True
+        self.model.build_uuid = f"{schema.PRODUCTION} UUID" in attributes
+
+    def _use(self, attributes: dict[str, str]) -> Use:
+        if len(self.model.items) > 1_000_000:
+            raise over_limit("more than a million instances")
+        uuid = attributes.get(f"{schema.PRODUCTION} UUID")
+        if uuid is not None and not schema.uuid(uuid):
+            self.model.say("P017", f"UUID {uuid[:40]!r} is none")
+        path = attributes.get(f"{schema.PRODUCTION} path", "")
+        matrix = self._matrix(attributes.get("transform"))
+        return Use(int(attributes["objectid"]), path, matrix, self.rank, uuid is not None)
+
+    def _matrix(self, said: str | None) -> Floats:
+        """The transform (4, 3); the identity with a finding where it is none."""
+        identity = np.vstack([np.eye(3), np.zeros(3)])
+        if said is None:
+            return identity
+        parts = said.split()
+        if len(parts) == 12 and all(schema.number(part) for part in parts):
+            found = np.array([float(part) for part in parts]).reshape(4, 3)
+            if np.isfinite(found).all():
+                det = float(np.linalg.det(found[:3]))
+                scale = float(np.prod(np.linalg.norm(found[:3], axis=1)))
+                if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
+                    self.model.say("P013", "a transform has determinant zero")
+                elif det < 0:
+                    self.model.say("P015", "a transform mirrors")
+                return found
+        code = "P013" if len(parts) == 12 and any(part.lower() in _NAMES for part in parts) else "P017"
+        self.model.say(code, f'transform="{said[:60]}" is not twelve numbers')
+        return identity
+
+    def _take_lattice(self, local: str, attributes: dict[str, str]) -> None:
+        if not isinstance(self.resource, Object):
+            return
+        if local == "beamlattice":
+            self.resource.lattice = attributes
+        elif local == "beam":
+            self.resource.beams.append(attributes)
+        elif local == "ball":
+            self.resource.balls.append(attributes)
+        elif local == "ref":
+            self.resource.beam_refs.append(int(attributes["index"]))
+        if len(self.resource.beams) > self.limits.max_faces:
+            raise over_limit("more beams than --max-faces")
+
+    def _flush_vertices(self) -> None:
+        if not self.numbers:
+            return
+        try:
+            values = np.array(self.numbers, dtype=np.float64)
+        except ValueError:
+            values = np.array([self._number(said) for said in self.numbers])
+        if not np.isfinite(values).all() or (np.abs(values) > np.finfo(np.float32).max).any():
+            self.model.say("V001", "a vertex is not a finite float32 number")
+            values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+        self.vertices.append(values.reshape(-1, 3))
+        self.numbers = []
+        if sum(len(block) for block in self.vertices) > 3 * self.limits.max_faces + 3:
+            raise over_limit("more vertices than three times --max-faces")
+
+    def _number(self, said: str) -> float:
+        said = said.strip()
+        if schema.number(said):
+            return float(said)
+        if said.lower() in _NAMES:
+            return math.nan
+        why = " (a decimal comma)" if "," in said else ""
+        self.model.say("F004", f"{said[:40]!r} is not a number{why}")
+        return 0.0
+
+    def _flush_triangles(self) -> None:
+        if self.rows:
+            self.triangles.append(np.array(self.rows, dtype=np.int64))
+            self.rows = []
+
+    def _close_mesh(self) -> None:
+        vertices = np.concatenate(self.vertices) if self.vertices else np.empty((0, 3))
+        triangles = np.concatenate(self.triangles) if self.triangles else np.empty((0, 7), np.int64)
+        self.vertices, self.triangles = [], []
+        if isinstance(self.resource, Object):
+            self.resource.vertices, self.resource.triangles = vertices, triangles
+
+    def _close_object(self, found: Object) -> None:
+        if found.vertices is None and not found.components and not found.other_shape:
+            self.model.say("P017", f"object {found.id} has neither mesh nor components")
+        if found.vertices is not None and found.components:
+            self.model.say("P017", f"object {found.id} has a mesh and components")
+
+
+_LEAF = _Open(schema.CORE, "vertex", None)
+_VERTEX = f"{schema.CORE} vertex"
+
+
+def read_model(chunks: Iterable[bytes], part: str, limits: Limits, spent_faces: int = 0) -> Model:
+    """Read one model part. Schema faults are in the model's findings; raises `Unreadable` where XML or a limit ends it."""
+    model = Model(part)
+    reader = _Reader(model, limits, spent_faces)
+    try:
+        stream(chunks, part, reader.start, reader.end, reader.namespace)
+    except Unreadable as stop:
+        raise Unreadable(*model.findings, *stop.findings) from stop
+    return model

@@ -1,0 +1,229 @@
+"""A 3MF file as an OPC package: zip entries, part names, content types, relationships. Nothing is unpacked to disk.
+
+Rules from ECMA-376 part 2 (Open Packaging Conventions) and the 3MF core specification, chapter 2.
+"""
+
+from __future__ import annotations
+
+import io
+import posixpath
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from urllib.parse import unquote
+
+from unitcad.check.findings import Finding, Location
+from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
+from unitcad.check.rulebook import finding
+from unitcad.check.xml_stream import Element, read_small
+
+CONTENT_TYPES = "[Content_Types].xml"
+_PACKAGE = "http://schemas.openxmlformats.org/package/2006/"
+_MS = "http://schemas.microsoft.com/3dmanufacturing/2013/01/"
+START = _MS + "3dmodel"
+TEXTURE = _MS + "3dtexture"
+TICKET = _MS + "printticket"
+THUMBNAIL = _PACKAGE + "relationships/metadata/thumbnail"
+PROPERTIES = _PACKAGE + "relationships/metadata/core-properties"
+PRESERVE = _PACKAGE + "relationships/mustpreserve"
+KNOWN = {START, TEXTURE, TICKET, THUMBNAIL, PROPERTIES, PRESERVE}
+MODEL_TYPE = "application/vnd.ms-package.3dmanufacturing-3dmodel+xml"
+RELS_TYPE = "application/vnd.openxmlformats-package.relationships+xml"
+_CHUNK = 1 << 20
+_FREE = 1_000_000  # bytes that may inflate at any ratio
+_MEDIA = re.compile(r"^[!#$%&'*+\-.^_`|~\w]+/[!#$%&'*+\-.^_`|~\w]+(\s*;.*)?$", re.ASCII)
+_SCHEME = re.compile(r"^[A-Za-z][A-Za-z0-9+.\-]*:")
+
+
+@dataclass(frozen=True)
+class Relation:
+    """One relationship: `target` is a part name (lower case, no leading slash)."""
+
+    kind: str
+    target: str
+    shown: str
+
+
+@dataclass
+class Package:
+    """The parts of a package by lower-case name, and what is wrong with it so far."""
+
+    archive: zipfile.ZipFile
+    limits: Limits
+    deadline: Deadline
+    parts: dict[str, zipfile.ZipInfo] = field(default_factory=dict)
+    findings: list[Finding] = field(default_factory=list)
+    defaults: dict[str, str] = field(default_factory=dict)
+    overrides: dict[str, str] = field(default_factory=dict)
+    spent: int = 0
+
+    def say(self, code: str, message: str, part: str | None = None) -> None:
+        """Add a finding of rule `code` about a part."""
+        self.findings.append(finding(code, message, places=[Location(part=part)] if part else ()))
+
+    def chunks(self, name: str) -> Iterator[bytes]:
+        """A part's bytes, inflated piece by piece within the limits. Raises `Unreadable`."""
+        info = self.parts[name]
+        if info.flag_bits & 1 or info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            what = "encrypted" if info.flag_bits & 1 else f"packed with method {info.compress_type}"
+            raise Unreadable(finding("P008", f"{info.filename} is {what}", places=[Location(part=info.filename)]))
+        try:
+            with self.archive.open(info) as stream:
+                while piece := stream.read(_CHUNK):
+                    self.spent += len(piece)
+                    if self.spent > self.limits.max_package_bytes:
+                        raise over_limit(f"the package inflates beyond {self.limits.max_package_bytes} bytes")
+                    self.deadline.tick()
+                    yield piece
+        except (
+            zipfile.BadZipFile,
+            zlib.error,
+            EOFError,
+            OSError,
+            NotImplementedError,
+            RuntimeError,
+            ValueError,
+        ) as error:
+            text = f"{info.filename} cannot be unpacked: {error}"
+            raise Unreadable(finding("F003", text, places=[Location(part=info.filename)])) from error
+
+    def content_type(self, name: str) -> str | None:
+        """The part's content type by override or default, without parameters, in lower case."""
+        said = self.overrides.get(name) or self.defaults.get(posixpath.splitext(name)[1][1:])
+        return said.split(";")[0].strip().lower() if said else None
+
+    def relations(self, name: str) -> list[Relation]:
+        """The relationships of a part ("" for the package), their faults added to the findings."""
+        folder, base = posixpath.split(name)
+        rels = posixpath.join(folder, "_rels", f"{base}.rels")
+        if rels not in self.parts:
+            return []
+        root = self.xml(rels, "P002")
+        if root is None:
+            return []
+        if root.name != f"{_PACKAGE}relationships Relationships":
+            self.say("P002", "the root is not Relationships", rels)
+            return []
+        return list(self._read_relations(root, folder, rels))
+
+    def xml(self, name: str, code: str) -> Element | None:
+        """A small XML part as a tree, or None with a finding (rule `code`, or what the XML itself breaks)."""
+        try:
+            root, findings = read_small(self.chunks(name), name)
+        except Unreadable as stop:
+            self.findings += [
+                finding(code, item.message, places=item.locations) if item.code == "F003" else item
+                for item in stop.findings
+            ]
+            return None
+        self.findings += findings
+        return root
+
+    def _read_relations(self, root: Element, folder: str, rels: str) -> Iterator[Relation]:
+        ids: set[str] = set()
+        for child in root.children:
+            attributes = child.attributes
+            kind, target, id_ = (attributes.get(key, "") for key in ("Type", "Target", "Id"))
+            if child.name != f"{_PACKAGE}relationships Relationship" or not (kind and target and id_):
+                self.say("P002", "a relationship needs Id, Type and Target", rels)
+                continue
+            if id_ in ids:
+                self.say("P002", f"relationship Id {id_!r} twice", rels)
+            ids.add(id_)
+            if attributes.get("TargetMode", "Internal") != "Internal" or _SCHEME.match(target) or target[:2] == "//":
+                self.say("P007", f"target {target!r}", rels)
+                continue
+            path = target if target.startswith("/") else posixpath.join("/", folder, target)
+            part = posixpath.normpath(unquote(path)).lstrip("/").lower()
+            if kind in KNOWN and part not in self.parts:
+                code = "P003" if kind == START and rels == "_rels/.rels" else "P002"
+                self.say(code, f"target {target!r} is not in the package", rels)
+                continue
+            yield Relation(kind, part, target)
+
+
+def open_package(data: memoryview, limits: Limits, deadline: Deadline) -> Package:
+    """Open a package and check its entries, names and content types. Raises `Unreadable` if it is no zip."""
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+    except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError) as error:
+        raise Unreadable(finding("F003", f"the zip cannot be read: {error}")) from error
+    package = Package(archive, limits, deadline)
+    entries = archive.infolist()
+    if len(entries) > limits.max_entries:
+        raise over_limit(f"{len(entries)} zip entries, more than {limits.max_entries}")
+    bombs = []
+    for info in entries:
+        if why := _unsafe(info.filename):
+            package.say("P005", f"{info.filename!r} {why}", info.filename)
+        if info.is_dir():
+            continue
+        key = unquote(info.filename).lower().lstrip("/")
+        if key in package.parts:
+            package.say("P004", f"{info.filename!r} is there twice", info.filename)
+            continue
+        package.parts[key] = info
+        if info.file_size > _FREE and info.file_size > limits.ratio * max(info.compress_size, 1):
+            bombs.append(f"{info.filename} inflates {info.file_size / max(info.compress_size, 1):.0f} to one")
+    if bombs:
+        raise Unreadable(*package.findings, finding("P008", bombs[0], len(bombs)))
+    _content_types(package)
+    return package
+
+
+def _unsafe(name: str) -> str | None:
+    """Why a zip entry's name may not be a part's, or None."""
+    if name.startswith("/") or _SCHEME.match(name):
+        return "is absolute"
+    if "\\" in name:
+        return "has a backslash"
+    if any(ord(c) < 32 or ord(c) == 127 for c in name):
+        return "has a control character"
+    segments = (name[:-1] if name.endswith("/") else name).split("/")
+    decoded = [unquote(segment) for segment in segments]
+    if ".." in decoded:
+        return "climbs out of the package"
+    if any(not segment or segment.strip(".") == "" for segment in decoded):
+        return "has an empty segment"
+    if any(segment.endswith(".") for segment in decoded):
+        return "has a segment that ends with a dot"
+    if re.search(r"%(2f|5c)", name, re.IGNORECASE):
+        return "has an escaped slash"
+    return None
+
+
+def _content_types(package: Package) -> None:
+    key = CONTENT_TYPES.lower()
+    if key not in package.parts:
+        package.say("P001", f"{CONTENT_TYPES} is missing")
+        return
+    root = package.xml(key, "P001")
+    if root is None:
+        return
+    space = f"{_PACKAGE}content-types "
+    if root.name != f"{space}Types":
+        package.say("P001", "the root is not Types", CONTENT_TYPES)
+        return
+    for child in root.children:
+        kind = child.attributes.get("ContentType", "")
+        if not _MEDIA.match(kind):
+            package.say("P001", f"content type {kind!r} is none", CONTENT_TYPES)
+        if child.name == f"{space}Default":
+            name, table = child.attributes.get("Extension", "").lower(), package.defaults
+        elif child.name == f"{space}Override":
+            name, table = unquote(child.attributes.get("PartName", "")).lower(), package.overrides
+            if not name.startswith("/"):
+                package.say("P001", f"part name {name!r} does not begin with a slash", CONTENT_TYPES)
+            name = name.lstrip("/")
+        else:
+            package.say("P001", f"unknown element {child.name.split()[-1]!r}", CONTENT_TYPES)
+            continue
+        if not name:
+            package.say("P001", "an entry without Extension or PartName", CONTENT_TYPES)
+        elif name in table:
+            package.say("P001", f"{name!r} has a type twice", CONTENT_TYPES)
+        table[name] = kind
+    if "_rels/.rels" in package.parts and package.content_type("_rels/.rels") not in (RELS_TYPE, None):
+        package.say("P001", "the extension rels has another type than relationships", CONTENT_TYPES)

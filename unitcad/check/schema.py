@@ -1,0 +1,244 @@
+"""What the 3MF schemas ask of each element: attributes with their types, and children.
+
+Core 1.3, materials 1.2, production 1.1, slice 1.0, beam lattice 1.2, written from the consortium's specifications.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+MATERIAL = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
+PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
+SLICE = "http://schemas.microsoft.com/3dmanufacturing/slice/2015/07"
+BEAM = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02"
+BALLS = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/balls/2020/07"
+TRIANGLE_SETS = "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07"
+SECURE = "http://schemas.microsoft.com/3dmanufacturing/securecontent/2019/04"
+BOOLEAN = "http://schemas.3mf.io/3dmanufacturing/booleanoperations/2023/07"
+DISPLACEMENT = "http://schemas.3mf.io/3dmanufacturing/displacement/2023/10"
+OLD_DISPLACEMENT = "http://schemas.microsoft.com/3dmanufacturing/displacement/2022/07"
+ALTERNATIVES = "http://schemas.microsoft.com/3dmanufacturing/production/alternatives/2021/04"
+VOLUMETRIC = "http://schemas.3mf.io/3dmanufacturing/volumetric/2022/01"
+IMPLICIT = "http://schemas.3mf.io/3dmanufacturing/implicit/2023/12"
+# Extensions whose required use does not hinder judging the meshes of a file.
+KNOWN = {CORE, MATERIAL, PRODUCTION, SLICE, BEAM, BALLS, TRIANGLE_SETS, SECURE, BOOLEAN, DISPLACEMENT}
+KNOWN |= {OLD_DISPLACEMENT, ALTERNATIVES, VOLUMETRIC, IMPLICIT}
+
+UNITS = ("micron", "millimeter", "centimeter", "inch", "foot", "meter")
+_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_number = re.compile(_NUMBER, re.ASCII)
+_integer = re.compile(r"\+?\d{1,12}", re.ASCII)
+_color = re.compile(r"#(?:[0-9A-Fa-f]{6}|[0-9A-Fa-f]{8})", re.ASCII)
+_uuid = re.compile(r"[0-9a-fA-F]{8}(?:-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}", re.ASCII)
+_LIMIT = 2**31
+Test = Callable[[str], bool]
+
+
+def number(text: str) -> bool:
+    """ST_Number."""
+    return _number.fullmatch(text.strip()) is not None
+
+
+def positive(text: str) -> bool:
+    """ST_PositiveNumber."""
+    return number(text) and float(text) >= 0
+
+
+def resource_id(text: str) -> bool:
+    """ST_ResourceID: 1 to 2^31 - 1."""
+    return _integer.fullmatch(text.strip()) is not None and 0 < int(text) < _LIMIT
+
+
+def index(text: str) -> bool:
+    """ST_ResourceIndex: 0 to 2^31 - 1."""
+    return _integer.fullmatch(text.strip()) is not None and int(text) < _LIMIT
+
+
+def matrix(text: str) -> bool:
+    """ST_Matrix3D: twelve numbers."""
+    parts = text.split()
+    return len(parts) == 12 and all(number(part) for part in parts)
+
+
+def color(text: str) -> bool:
+    """ST_ColorValue."""
+    return _color.fullmatch(text) is not None
+
+
+def boolean(text: str) -> bool:
+    """xs:boolean."""
+    return text.strip() in ("true", "false", "0", "1")
+
+
+def part_name(text: str) -> bool:
+    """ST_UriReference: an absolute part name."""
+    return text.startswith("/")
+
+
+def uuid(text: str) -> bool:
+    """ST_UUID of the production extension."""
+    return _uuid.fullmatch(text.strip()) is not None
+
+
+def text(_: str) -> bool:
+    """xs:string."""
+    return True
+
+
+def one_of(*values: str) -> Test:
+    """An enumeration."""
+    return lambda text: text in values
+
+
+def many(test: Test) -> Test:
+    """A space-separated list, at least one."""
+    return lambda text: bool(text.split()) and all(test(part) for part in text.split())
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What one element must and may have; `children` are (name, least, most) in order; `open_`: foreign attributes."""
+
+    required: dict[str, Test] = field(default_factory=dict)
+    optional: dict[str, Test] = field(default_factory=dict)
+    children: tuple[tuple[str, int, int], ...] = ()
+    ordered: bool = True
+    open_: bool = True
+
+
+_MANY = _LIMIT
+_DISPLAY = {"displaypropertiesid": resource_id}
+_CAP = one_of("hemisphere", "sphere", "butt")
+_TILE = one_of("wrap", "mirror", "clamp", "none")
+_OBJECT_TYPE = one_of("model", "solidsupport", "support", "surface", "other")
+
+
+def _core() -> dict[str, Rules]:
+    shape = (("metadatagroup", 0, 1), ("mesh", 0, 1), ("components", 0, 1))
+    part = {"partnumber": text}
+    triangle = {"v1": index, "v2": index, "v3": index}
+    props = {"p1": index, "p2": index, "p3": index, "pid": resource_id}
+    return {
+        "model": Rules(
+            {},
+            {"unit": text, "requiredextensions": text, "recommendedextensions": text, "thumbnail": part_name},
+            (("metadata", 0, _MANY), ("resources", 1, 1), ("build", 1, 1)),
+        ),
+        "metadata": Rules({"name": text}, {"preserve": boolean, "type": text}),
+        "metadatagroup": Rules(children=(("metadata", 1, _MANY),), open_=False),
+        "resources": Rules(children=(("basematerials", 0, _MANY), ("object", 0, _MANY)), ordered=False),
+        "basematerials": Rules({"id": resource_id}, _DISPLAY, (("base", 1, _MANY),)),
+        "base": Rules({"name": text, "displaycolor": color}, _DISPLAY),
+        "object": Rules(
+            {"id": resource_id},
+            {"type": _OBJECT_TYPE, "thumbnail": part_name, "name": text, "pid": resource_id, "pindex": index} | part,
+            shape,
+        ),
+        "mesh": Rules(children=(("vertices", 1, 1), ("triangles", 0, 1)), open_=False),
+        "vertices": Rules(children=(("vertex", 0, _MANY),), open_=False),
+        "triangles": Rules(children=(("triangle", 0, _MANY),), open_=False),
+        "vertex": Rules({"x": text, "y": text, "z": text}),
+        "triangle": Rules(triangle, props),
+        "components": Rules(children=(("component", 1, _MANY),), open_=False),
+        "component": Rules({"objectid": resource_id}, {"transform": text}),
+        "build": Rules(children=(("item", 0, _MANY),)),
+        "item": Rules({"objectid": resource_id}, {"transform": text} | part, (("metadatagroup", 0, 1),)),
+    }
+
+
+def _material() -> dict[str, Rules]:
+    id_ = {"id": resource_id}
+    named = {"name": text}
+    return {
+        "colorgroup": Rules(id_, _DISPLAY, (("color", 1, _MANY),)),
+        "color": Rules({"color": color}),
+        "texture2d": Rules(
+            id_ | {"path": part_name, "contenttype": one_of("image/png", "image/jpeg")},
+            {"tilestyleu": _TILE, "tilestylev": _TILE, "filter": one_of("auto", "linear", "nearest")},
+        ),
+        "texture2dgroup": Rules(id_ | {"texid": resource_id}, _DISPLAY, (("tex2coord", 1, _MANY),)),
+        "tex2coord": Rules({"u": number, "v": number}),
+        "compositematerials": Rules(
+            id_ | {"matid": resource_id, "matindices": many(index)}, _DISPLAY, (("composite", 1, _MANY),)
+        ),
+        "composite": Rules({"values": many(number)}),
+        "multiproperties": Rules(
+            id_ | {"pids": many(resource_id)},
+            _DISPLAY | {"blendmethods": many(one_of("mix", "multiply", "none"))},
+            (("multi", 1, _MANY),),
+        ),
+        "multi": Rules({"pindices": many(index)}),
+        "pbspeculardisplayproperties": Rules(id_, {}, (("pbspecular", 1, _MANY),)),
+        "pbspecular": Rules(named, {"specularcolor": color, "glossiness": number}),
+        "pbmetallicdisplayproperties": Rules(id_, {}, (("pbmetallic", 1, _MANY),)),
+        "pbmetallic": Rules(named, {"metallicness": number, "roughness": number}),
+        "pbspeculartexturedisplayproperties": Rules(
+            id_ | named | {"speculartextureid": resource_id, "glossinesstextureid": resource_id},
+            {"diffusefactor": color, "specularfactor": color, "glossinessfactor": number},
+        ),
+        "pbmetallictexturedisplayproperties": Rules(
+            id_ | named | {"metallictextureid": resource_id, "roughnesstextureid": resource_id},
+            {"basecolorfactor": color, "metallicfactor": number, "roughnessfactor": number},
+        ),
+        "translucentdisplayproperties": Rules(id_, {}, (("translucent", 1, _MANY),)),
+        "translucent": Rules(
+            named | {"attenuation": many(number)}, {"refractiveindex": many(number), "roughness": number}
+        ),
+    }
+
+
+def _slice() -> dict[str, Rules]:
+    props = {"p1": index, "p2": index, "pid": resource_id}
+    return {
+        "slicestack": Rules(
+            {"id": resource_id}, {"zbottom": number}, (("slice", 0, _MANY), ("sliceref", 0, _MANY)), ordered=False
+        ),
+        "slice": Rules({"ztop": number}, {}, (("vertices", 0, 1), ("polygon", 0, _MANY))),
+        "sliceref": Rules({"slicestackid": resource_id, "slicepath": part_name}),
+        "vertices": Rules(children=(("vertex", 2, _MANY),)),
+        "vertex": Rules({"x": number, "y": number}),
+        "polygon": Rules({"startv": index}, {}, (("segment", 1, _MANY),)),
+        "segment": Rules({"v2": index}, props),
+    }
+
+
+def _beam() -> dict[str, Rules]:
+    props = {"p1": index, "p2": index, "pid": resource_id, "cap1": _CAP, "cap2": _CAP}
+    ball = {"vindex": index}
+    lattice = {
+        "clippingmode": one_of("none", "inside", "outside"),
+        "clippingmesh": resource_id,
+        "representationmesh": resource_id,
+        "pid": resource_id,
+        "pindex": index,
+        "cap": _CAP,
+        "ballmode": one_of("none", "mixed", "all"),
+        "ballradius": positive,
+    }
+    return {
+        "beamlattice": Rules(
+            {"minlength": positive, "radius": positive},
+            lattice,
+            (("beams", 1, 1), ("balls", 0, 1), ("beamsets", 0, 1)),
+        ),
+        "beams": Rules(children=(("beam", 0, _MANY),)),
+        "beam": Rules({"v1": index, "v2": index}, {"r1": positive, "r2": positive} | props),
+        "balls": Rules(children=(("ball", 0, _MANY),)),
+        "ball": Rules(ball, {"r": positive, "p": index, "pid": resource_id}),
+        "beamsets": Rules(children=(("beamset", 0, _MANY),)),
+        "beamset": Rules({}, {"name": text, "identifier": text}, (("ref", 0, _MANY), ("ballref", 0, _MANY))),
+        "ref": Rules({"index": index}),
+        "ballref": Rules({"index": index}),
+    }
+
+
+ELEMENTS: dict[str, dict[str, Rules]] = {
+    CORE: _core(),
+    MATERIAL: _material(),
+    SLICE: _slice(),
+    BEAM: _beam(),
+    BALLS: {name: rules for name, rules in _beam().items() if name in ("balls", "ball", "ballref")},
+}

@@ -1,0 +1,320 @@
+"""3MF: the package, its model parts, the instances of its build, and the geometry of each object that is built."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from unitcad.check import package as opc
+from unitcad.check import references, scale
+from unitcad.check.findings import Facts, Finding
+from unitcad.check.images import image_kind
+from unitcad.check.limits import Deadline, Limits, Unreadable
+from unitcad.check.mesh import Floats, Mesh
+from unitcad.check.model_data import Model, Object, Use
+from unitcad.check.model_part import read_model
+from unitcad.check.package import Package, Relation
+from unitcad.check.rulebook import finding
+from unitcad.check.rules_mesh import Judged, judge_mesh
+
+if TYPE_CHECKING:
+    from unitcad.check.check import Options
+
+UNITS_MM = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
+_IMAGES = {"image/png": "png", "image/jpeg": "jpeg"}
+_TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
+# The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
+_FILLED = {"G001", "G002"}
+Key = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class Instance:
+    """An object of the build with its whole transform (4, 3), in the model's unit."""
+
+    key: Key
+    matrix: Floats
+
+
+def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
+    """All findings about a 3MF file and the facts of what it builds."""
+    package = opc.open_package(data, options.limits, deadline)
+    models = _models(package, options.limits)
+    findings = package.findings
+    for model in models.values():
+        references.judge(model)
+        findings += model.findings
+    if not models:
+        return findings, Facts()
+    root = next(iter(models.values()))
+    if not root.items and root.has_build:
+        findings.append(finding("P014", "the build has no item"))
+    try:
+        instances = _expand(models, root, options.limits, findings)
+    except Unreadable as stop:
+        return findings + list(stop.findings), Facts()
+    return _geometry(models, instances, options, deadline, findings)
+
+
+def _models(package: Package, limits: Limits) -> dict[str, Model]:
+    """The start part's model first, then those that it reaches by path, each with its relationships checked."""
+    relations = package.relations("")
+    if "_rels/.rels" not in package.parts:
+        package.say("P002", "_rels/.rels is missing")
+    starts = [relation for relation in relations if relation.kind == opc.START]
+    _singletons(package, relations, "the package", (opc.THUMBNAIL, opc.PROPERTIES))
+    if len(starts) != 1:
+        if not any(item.code in ("P003", "F003", "P007") for item in package.findings):
+            package.say("P003", f"{len(starts)} start parts")
+        if not starts:
+            return {}
+    models: dict[str, Model] = {}
+    wanted, faces = [starts[0].target], 0
+    while wanted:
+        part = wanted.pop(0)
+        if part in models:
+            continue
+        if package.content_type(part) != opc.MODEL_TYPE:
+            package.say("P001", f"{part} has type {package.content_type(part)!r}, not the model's", part)
+        try:
+            model = read_model(package.chunks(part), part, limits, faces)
+        except Unreadable as stop:
+            package.findings += stop.findings
+            continue
+        faces += sum(len(o.triangles) for o in model.objects().values() if o.triangles is not None)
+        models[part] = model
+        related = package.relations(part)
+        _singletons(package, related, part, (opc.TICKET,))
+        _paths(package, model, related, is_root=len(models) == 1)
+        reached = {path for path in _reached(model) if path in package.parts}
+        wanted += sorted(reached)
+    return models
+
+
+def _reached(model: Model) -> set[str]:
+    uses = [*model.items, *(use for found in model.objects().values() for use in found.components)]
+    paths = {use.path for use in uses if use.path}
+    for found in model.resources.values():
+        paths |= {member["slicepath"] for member in found.members if "slicepath" in member}
+    return {path.lower().lstrip("/") for path in paths}
+
+
+def _singletons(package: Package, relations: list[Relation], who: str, kinds: tuple[str, ...]) -> None:
+    """P020: one thumbnail, ticket and set of properties at most, each of the type that it must have."""
+    for kind in kinds:
+        of = [relation for relation in relations if relation.kind == kind]
+        name = kind.rsplit("/", 1)[-1]
+        if len(of) > 1:
+            package.say("P020", f"{len(of)} parts of type {name} for {who}")
+        for relation in of:
+            said = package.content_type(relation.target)
+            if kind == opc.THUMBNAIL:
+                _image(package, relation.target, "P020")
+            elif kind == opc.TICKET and said != _TICKET_TYPE:
+                package.say("P020", f"{relation.target} has type {said!r}, not a print ticket's", relation.target)
+            elif kind == opc.PROPERTIES:
+                package.xml(relation.target, "F003")
+
+
+def _image(package: Package, part: str, code: str) -> None:
+    said = package.content_type(part)
+    if said is None:
+        package.say("P001", f"{part} has no content type", part)
+        return
+    if said not in _IMAGES and not (
+        code == "P019" and said == "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
+    ):
+        package.say(code, f"{part} has type {said!r}, not PNG's or JPEG's", part)
+        return
+    try:
+        kind, why = image_kind(package.chunks(part))
+    except Unreadable as stop:
+        package.findings += stop.findings
+        return
+    if why:
+        package.say(code, f"{part}: {why}", part)
+    elif said in _IMAGES and kind != _IMAGES[said]:
+        package.say(code, f"{part} is {kind or 'no image'}, its type says {said}", part)
+
+
+def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
+    """What a model part names by path exists, and is the target of a relationship of the right type."""
+    by_kind = {kind: {r.target for r in related if r.kind == kind} for kind in opc.KNOWN}
+    images = by_kind[opc.THUMBNAIL] | by_kind[opc.TEXTURE]
+    for found in model.resources.values():
+        path = found.attributes.get("path" if found.kind == "texture2d" else "thumbnail")
+        if path is None or found.kind not in ("texture2d", "object"):
+            continue
+        part = path.lower().lstrip("/")
+        if part not in package.parts:
+            code = "P019" if found.kind == "texture2d" else "P002"
+            package.say(code, f"{path} of {found.kind} {found.id} is not in the package", model.part)
+        elif part not in (by_kind[opc.TEXTURE] if found.kind == "texture2d" else images):
+            package.say("P002", f"{path} of {found.kind} {found.id} has no relationship", model.part)
+        else:
+            _image(package, part, "P019" if found.kind == "texture2d" else "P020")
+    for part in sorted(_reached(model)):
+        if part not in package.parts:
+            package.say("P012", f"{part} is not in the package", model.part)
+        elif part not in by_kind[opc.START]:
+            package.say("P002", f"{part} has no relationship of the model type", model.part)
+        elif not is_root and any(use.path for found in model.objects().values() for use in found.components):
+            package.say("P012", "a part other than the root one refers to objects by path", model.part)
+    if not is_root and model.items:
+        model.say("P017", "a part other than the root one has build items")
+
+
+def _expand(models: dict[str, Model], root: Model, limits: Limits, findings: list[Finding]) -> list[Instance]:
+    """The meshes of the build with their transforms; faces are counted before anything is expanded."""
+    counts: dict[Key, tuple[int, int]] = {}
+    objects = {(part, id_): found for part, model in models.items() for id_, found in model.objects().items()}
+
+    def key_of(part: str, use: Use) -> Key:
+        return (use.path.lower().lstrip("/") if use.path else part, use.object)
+
+    def size(key: Key, trail: tuple[Key, ...]) -> tuple[int, int]:
+        """Faces and nodes under an object; depth and recursion are bounded here."""
+        if key in counts:
+            return counts[key]
+        found = objects.get(key)
+        if found is None:
+            return 0, 0
+        if key in trail:
+            raise Unreadable(finding("P012", f"object {key[1]} contains itself"))
+        if len(trail) >= limits.max_depth:
+            raise Unreadable(finding("P009", f"components nest deeper than {limits.max_depth}"))
+        faces, nodes = (0 if found.triangles is None else len(found.triangles)), 1
+        for use in found.components:
+            more, below = size(key_of(key[0], use), (*trail, key))
+            faces, nodes = faces + more, nodes + below
+        counts[key] = faces, nodes
+        return counts[key]
+
+    total = nodes = 0
+    for item in root.items:
+        faces, below = size(key_of(root.part, item), ())
+        total, nodes = total + faces, nodes + below
+    if total > limits.max_faces or nodes > limits.max_faces:
+        raise Unreadable(finding("P009", f"{total} faces in {nodes} instances, more than {limits.max_faces}"))
+    instances: list[Instance] = []
+
+    def place(key: Key, matrix: Floats, depth: int) -> None:
+        found = objects.get(key)
+        if found is None or depth > limits.max_depth:
+            return
+        if found.type == "other" and not found.components:
+            findings.append(finding("P012", f"the build uses object {key[1]} of type other"))
+        if found.vertices is not None:
+            instances.append(Instance(key, matrix))
+        for use in found.components:
+            place(key_of(key[0], use), _times(use.matrix, matrix), depth + 1)
+
+    for item in root.items:
+        key = key_of(root.part, item)
+        if item.path and key not in objects and key[0] in models:
+            findings.append(finding("P012", f"a build item names object {key[1]} of {key[0]}, which is not there"))
+        place(key, item.matrix, 0)
+    return instances
+
+
+def _times(first: Floats, then: Floats) -> Floats:
+    """The transform `first` followed by `then`, rows as 3MF writes them."""
+    return np.vstack([first[:3] @ then[:3], first[3] @ then[:3] + then[3]])
+
+
+def _geometry(
+    models: dict[str, Model], instances: list[Instance], options: Options, deadline: Deadline, findings: list[Finding]
+) -> tuple[list[Finding], Facts]:
+    judged: dict[Key, Judged] = {}
+    broken = any(item.code in ("P011", "V001", "F004") for item in findings)
+    if broken:
+        return findings, Facts()
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    triangles = vertices = shells = 0
+    volume = area = 0.0
+    watertight = bool(instances)
+    for instance in instances:
+        found = models[instance.key[0]].resources[instance.key[1]]
+        assert isinstance(found, Object)
+        assert found.vertices is not None
+        assert found.triangles is not None
+        if not len(found.triangles):
+            continue
+        factor = UNITS_MM.get(models[instance.key[0]].unit, 1.0)
+        if instance.key not in judged:
+            judged[instance.key] = _judge(found, factor, options, deadline)
+            findings += judged[instance.key].findings
+        facts = judged[instance.key].facts
+        points = (found.vertices @ instance.matrix[:3] + instance.matrix[3]) * factor
+        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+        triangles += facts.triangles or 0
+        vertices += facts.vertices or 0
+        shells += facts.shells or 0
+        volume += (facts.volume_mm3 or 0.0) * abs(float(np.linalg.det(instance.matrix[:3])))
+        corners = points[found.triangles[:, :3]]
+        area += float(
+            np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+        )
+        watertight = watertight and bool(facts.watertight)
+        deadline.tick()
+    if not triangles:
+        return findings, Facts(triangles=0, vertices=vertices, shells=0)
+    facts = Facts(
+        triangles,
+        vertices,
+        shells,
+        volume if watertight else None,
+        area / 2,
+        (tuple(low.tolist()), tuple(high.tolist())),
+        watertight,
+    )
+    findings += scale.judge(facts, True)
+    if options.shells is not None and shells != options.shells:
+        findings.append(finding("G005", f"{shells} shells, {options.shells} expected", abs(shells - options.shells)))
+    if options.printer is not None:
+        findings += _printed(models, instances, options, deadline)
+    return findings, facts
+
+
+def _mesh_of(found: Object, factor: float, matrix: Floats | None = None) -> Mesh:
+    assert found.vertices is not None
+    assert found.triangles is not None
+    points = found.vertices if matrix is None else found.vertices @ matrix[:3] + matrix[3]
+    faces = found.triangles[:, :3].astype(np.int32)
+    if matrix is not None and np.linalg.det(matrix[:3]) < 0:
+        faces = faces[:, ::-1]
+    return Mesh(points * factor, np.ascontiguousarray(faces), name=f"object {found.id}")
+
+
+def _judge(found: Object, factor: float, options: Options, deadline: Deadline) -> Judged:
+    """The geometry rules for one object; only model and solidsupport objects must be solids."""
+    mesh = _mesh_of(found, factor)
+    if found.type not in ("model", "solidsupport"):
+        return Judged((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)), None)
+    judged = judge_mesh(mesh, deadline, cross=options.cross)
+    kept = tuple(
+        replace(item, severity="warning", message=f"{item.message} (3MF's fill rule says what is solid)")
+        if item.code in _FILLED
+        else item
+        for item in judged.findings
+    )
+    return replace(judged, findings=kept)
+
+
+def _printed(
+    models: dict[str, Model], instances: list[Instance], options: Options, deadline: Deadline
+) -> list[Finding]:
+    from unitcad.check import printing, topology
+
+    assert options.printer is not None
+    found: list[Finding] = []
+    for instance in instances:
+        thing = models[instance.key[0]].resources[instance.key[1]]
+        assert isinstance(thing, Object)
+        if thing.type != "model" or thing.triangles is None or not len(thing.triangles):
+            continue
+        mesh = _mesh_of(thing, UNITS_MM.get(models[instance.key[0]].unit, 1.0), instance.matrix)
+        found += printing.judge(topology.judge(mesh, deadline), options.printer, deadline)
+    return found

@@ -1,0 +1,131 @@
+"""XML as 3MF allows it, parsed by expat piece by piece: no DTD, UTF-8 only, no xml:space, no xsi attributes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+from xml.parsers import expat
+
+from unitcad.check.findings import Finding, Location
+from unitcad.check.limits import Unreadable, over_limit
+from unitcad.check.rulebook import finding
+
+XML_SPACE = "http://www.w3.org/XML/1998/namespace "
+XSI = "http://www.w3.org/2001/XMLSchema-instance "
+_DEPTH = 100
+_SMALL = 5_000_000  # bytes a small part may have
+_ENCODING = re.compile(rb"""^(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*["']([^"']*)["']""")
+
+
+@dataclass
+class Element:
+    """An element of a small part: "namespace local" and unprefixed attributes as written."""
+
+    name: str
+    attributes: dict[str, str]
+    children: list[Element] = field(default_factory=list)
+
+
+Start = Callable[[str, list[str]], Any]
+End = Callable[[str], Any]
+
+
+def stream(
+    chunks: Iterable[bytes],
+    part: str,
+    start: Start,
+    end: End,
+    namespace: Callable[[str | None, str], Any] | None = None,
+) -> None:
+    """Feed a part to `start` and `end`; names are "namespace local", attributes a flat list.
+
+    Raises `Unreadable`: P006 for a DTD, F009 (as an error) for another encoding than UTF-8, F003 for XML that is not
+    well formed.
+    """
+    place = [Location(part=part)]
+    parser = expat.ParserCreate(None, " ")
+    parser.ordered_attributes = True
+    parser.buffer_text = True
+
+    def refuse(*_: object) -> None:
+        raise Unreadable(finding("P006", "a document type declaration", places=place))
+
+    parser.StartDoctypeDeclHandler = refuse
+    parser.EntityDeclHandler = refuse
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    if namespace is not None:
+        parser.StartNamespaceDeclHandler = namespace
+    seen, chunk = 0, b""
+    try:
+        for chunk in _with_head(chunks):
+            if not seen:
+                _utf8_only(chunk, place)
+            parser.Parse(chunk, False)
+            seen += len(chunk)
+        parser.Parse(b"", True)
+    except expat.ExpatError as error:
+        line = [Location(part=part, line=error.lineno)]
+        said = expat.ErrorString(error.code)
+        at = parser.ErrorByteIndex - seen
+        if 0 <= at < len(chunk) and any(byte > 127 for byte in chunk[at : at + 4]):
+            raise Unreadable(finding("F009", "bytes that are not UTF-8", places=line, severity="error")) from error
+        raise Unreadable(finding("F003", f"XML not well formed: {said}", places=line)) from error
+
+
+def _with_head(chunks: Iterable[bytes]) -> Iterator[bytes]:
+    """The same bytes, the first piece at least 200 long where there are so many."""
+    head: bytes | None = b""
+    for chunk in chunks:
+        if head is None:
+            yield chunk
+        elif len(head) + len(chunk) >= 200:
+            yield head + chunk
+            head = None
+        else:
+            head += chunk
+    if head:
+        yield head
+
+
+def _utf8_only(head: bytes, place: list[Location]) -> None:
+    if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:8]:
+        raise Unreadable(finding("F009", "UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error"))
+    match = _ENCODING.match(head)
+    if match and match.group(1).lower() != b"utf-8":
+        named = match.group(1).decode("ascii", "replace")
+        raise Unreadable(finding("F009", f"encoding {named!r} instead of UTF-8", places=place, severity="error"))
+
+
+def forbidden(name: str) -> str | None:
+    """Why an attribute may stand nowhere in 3MF markup, or None: xml:space and all of xsi."""
+    if name.startswith(XML_SPACE) and name != XML_SPACE + "lang":
+        return f"attribute xml:{name[len(XML_SPACE) :]}"
+    if name.startswith(XSI):
+        return f"attribute xsi:{name[len(XSI) :]}"
+    return None
+
+
+def read_small(chunks: Iterable[bytes], part: str) -> tuple[Element, list[Finding]]:
+    """A whole small part as a tree. Raises `Unreadable` as `stream` does, and for parts over 5 MB."""
+    stack: list[Element] = [Element("", {})]
+
+    def start(name: str, attributes: list[str]) -> None:
+        if len(stack) > _DEPTH:
+            raise over_limit(f"{part}: elements nest deeper than {_DEPTH}")
+        element = Element(name, dict(zip(attributes[::2], attributes[1::2], strict=True)))
+        stack[-1].children.append(element)
+        stack.append(element)
+
+    def bounded() -> Iterable[bytes]:
+        size = 0
+        for chunk in chunks:
+            size += len(chunk)
+            if size > _SMALL:
+                raise over_limit(f"{part}: more than {_SMALL} bytes")
+            yield chunk
+
+    stream(bounded(), part, start, lambda _: stack.pop())
+    return stack[0].children[0], []
