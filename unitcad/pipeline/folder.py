@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -49,6 +50,14 @@ def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:
     return tuple(there.output.formats)
 
 
+def earlier_outputs(folder: Path) -> tuple[str, ...]:
+    """The outputs that an existing result has."""
+    try:
+        return tuple(json.loads((folder / "manifest.json").read_text("utf-8"))["outputs"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return ()
+
+
 @contextlib.contextmanager
 def replacing(folder: Path) -> Iterator[Path]:
     """A fresh temporary folder that takes `folder`'s place when the block ends well, and goes when it does not.
@@ -60,9 +69,6 @@ def replacing(folder: Path) -> Iterator[Path]:
     fresh = folder.parent / f"{TEMPORARY}{folder.name}-{os.getpid()}"
     aside = folder.parent / f"{TEMPORARY}{folder.name}-old"
     restore(folder)
-    for left in folder.parent.glob(f"{TEMPORARY}{folder.name}-*"):
-        if left != aside and not _alive(left.name.rpartition("-")[2]):
-            shutil.rmtree(left, ignore_errors=True)
     shutil.rmtree(fresh, ignore_errors=True)
     fresh.mkdir()
     try:
@@ -83,6 +89,17 @@ def restore(folder: Path) -> None:
     aside = folder.parent / f"{TEMPORARY}{folder.name}-old"
     if aside.exists() and not folder.exists():
         aside.rename(folder)
+
+
+def clear_leftovers(out: Path) -> None:
+    """Remove what processes that are gone left half written in `out`, and put back what they had moved aside."""
+    for left in out.glob(f"{TEMPORARY}*"):
+        name, _, owner = left.name.removeprefix(TEMPORARY).rpartition("-")
+        if owner == "old":
+            restore(out / name)
+            shutil.rmtree(left, ignore_errors=True)
+        elif owner.isdigit() and not _alive(owner):
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def _keep_others(old: Path, new: Path) -> None:

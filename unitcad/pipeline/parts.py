@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from unitcad import __version__
+from unitcad.cache import digest
 from unitcad.errors import UnitcadError
 from unitcad.export import stl, threemf
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, bounds
+from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.shape import content_hash
 from unitcad.shape.body import Body
 
@@ -52,17 +55,27 @@ def printed(body: Body) -> bool:
 
 
 def key(variant: Variant, body: Body, form: str) -> str:
-    """What a body's file depends on: tree, name, colour, attitude, resolution, format, version of this package."""
+    """What a body's file depends on: tree, name, colour, attitude, resolution, format, version of code and kernels."""
     return content_hash(
-        body.shape, body.name, body.colour, body.upside_down, variant.segments, form, __version__, kernel_version()
+        body.shape, body.name, body.role, body.step, body.made, body.colour, body.upside_down, variant.segments, form,
+        code_version(), sorted(kernel_versions(()).items()),
+    )  # fmt: skip
+
+
+def threemf_key(variant: Variant, bodies: Sequence[Body]) -> str:
+    """What the 3MF of several bodies depends on."""
+    return _joint_key(variant, bodies, "3mf", variant.spec.moulds.bed_x_mm, variant.spec.moulds.bed_y_mm)
+
+
+def step_key(variant: Variant, bodies: Sequence[Body], name: str) -> str:
+    """What the STEP of several bodies depends on, its date among it."""
+    return _joint_key(
+        variant, bodies, "step", name, os.environ.get("SOURCE_DATE_EPOCH"), sorted(kernel_versions(("step",)).items())
     )
 
 
-def kernel_version() -> str:
-    """The mesh kernel's version."""
-    from importlib.metadata import version
-
-    return f"manifold3d {version('manifold3d')}"
+def _joint_key(variant: Variant, bodies: Sequence[Body], *more: object) -> str:
+    return digest(repr(([key(variant, body, "") for body in bodies], more)).encode())
 
 
 def stl_content(variant: Variant, body: Body) -> bytes:
@@ -77,28 +90,29 @@ def threemf_content(variant: Variant, bodies: Sequence[Body]) -> bytes:
     return threemf.content(parts, bed)
 
 
-def step_file(path: Path, bodies: Sequence[Body], name: str) -> None:
-    """The STEP file of an assembly. Raises UnitcadError without a B-rep extra."""
+def step_content(bodies: Sequence[Body], name: str) -> bytes:
+    """The STEP of an assembly. Raises UnitcadError without a B-rep extra."""
     try:
         from unitcad.export import step
     except ImportError as error:
         raise UnitcadError(f"STEP needs a B-rep kernel: pip install 'unitcad[build123d]' ({error})") from None
-    step.write(path, bodies, name)
+    with tempfile.TemporaryDirectory(prefix="unitcad-") as scratch:
+        path = Path(scratch) / f"{name}.step"
+        step.write(path, bodies, name)
+        return path.read_bytes()
 
 
-def record(variant: Variant, body: Body, material: str | None) -> dict[str, Any]:
-    """A body's entry in the manifest, without its files."""
+def record(variant: Variant, body: Body) -> dict[str, Any]:
+    """A body's entry in the manifest, without material and files."""
     solid = variant.mesh(body)
     return {
         "name": body.name,
         "role": body.role,
         "step": body.step,
         "made": body.made,
-        "material": material,
         "volume_mm3": _round(solid.volume()),
         "bbox_mm": [_round(v) for v in bounds(solid)],
         "triangles": int(solid.num_tri()),
-        "files": {},
     }
 
 

@@ -1,0 +1,29 @@
+"""Content kept under a key, so that each distinct piece of work is done once.
+
+A key is a hash of all that the work reads. Under it lies either data (JSON) or the SHA-256 of a file's content; equal
+contents are kept once. `MemoryStore` keeps them for one build, `DiskStore` for everybody who shares a folder:
+
+    <root>/unitcad-cache          marks the folder as ours
+    <root>/data/ab/<key>          checksum, newline, JSON
+    <root>/files/ab/<key>         checksum, newline, JSON {"sha256", "size"}
+    <root>/content/ab/<sha256>    the bytes, read-only, since results are hard links to them
+    <root>/locks/<key>            held by the process that makes the entry
+    <root>/tmp/                   what is being written
+"""
+
+from unitcad.cache.collect import DEFAULT_LIMIT_MB, Usage, collect, usage
+from unitcad.cache.disk import DiskStore, default_root
+from unitcad.cache.store import MemoryStore, MissingContent, Store, digest
+
+__all__ = [
+    "DEFAULT_LIMIT_MB",
+    "DiskStore",
+    "MemoryStore",
+    "MissingContent",
+    "Store",
+    "Usage",
+    "collect",
+    "default_root",
+    "digest",
+    "usage",
+]

@@ -1,0 +1,107 @@
+"""What a cache on disk holds, and removing what was used longest ago."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from unitcad.cache.disk import MARK, flock
+from unitcad.errors import UnitcadError
+
+DEFAULT_LIMIT_MB = 4096
+GRACE_S = 600.0
+"""While somebody else has the cache open, what was used within this time is not collected."""
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a cache holds; `bytes` of contents and entries together."""
+
+    entries: int
+    contents: int
+    bytes: int
+
+
+def usage(root: Path) -> Usage:
+    """What the cache at `root` holds. Raises UnitcadError where there is none."""
+    _expect(root)
+    entries, contents = _scan(root, "data") + _scan(root, "files"), _scan(root, "content")
+    return Usage(len(entries), len(contents), sum(size for _, size, _ in entries + contents))
+
+
+def collect(root: Path, limit_bytes: int) -> Usage:
+    """Remove the entries used longest ago until at most `limit_bytes` are left; returns what was removed.
+
+    While another process has the cache open, what was used within GRACE_S stays. Raises UnitcadError where there is no
+    cache.
+    """
+    _expect(root)
+    with open(root / MARK, "rb") as mark:
+        alone = flock(mark.fileno(), exclusive=True, wait=False)
+        newest = time.time() - (0.0 if alone else GRACE_S)
+        if alone:
+            for left in (*(root / "tmp").iterdir(), *(root / "locks").iterdir()):
+                left.unlink(missing_ok=True)
+        return _collect(root, limit_bytes, newest)
+
+
+def _collect(root: Path, limit: int, newest: float) -> Usage:
+    contents = {path.name: (path, size, used) for path, size, used in _scan(root, "content")}
+    entries = sorted(_scan(root, "data") + _scan(root, "files"), key=lambda entry: (entry[2], entry[0]))
+    held: dict[Path, list[str]] = {path: _contents_of(path) for path, _, _ in entries}
+    holders = Counter(sha for shas in held.values() for sha in shas)
+    total = sum(size for _, size, _ in entries) + sum(size for _, size, _ in contents.values())
+    gone_entries = gone_contents = gone = 0
+
+    def drop(sha: str) -> int:
+        path, size, used = contents.get(sha, (None, 0, 0.0))
+        if path is None or used > newest:
+            return 0
+        path.unlink(missing_ok=True)
+        return size
+
+    for sha in [sha for sha in contents if sha not in holders]:
+        size = drop(sha)
+        gone_contents, gone = gone_contents + bool(size), gone + size
+    for path, size, used in entries:
+        if total - gone <= limit or used > newest:
+            break
+        path.unlink(missing_ok=True)
+        gone_entries, gone = gone_entries + 1, gone + size
+        for sha in held[path]:
+            holders[sha] -= 1
+            if not holders[sha]:
+                size = drop(sha)
+                gone_contents, gone = gone_contents + bool(size), gone + size
+    return Usage(gone_entries, gone_contents, gone)
+
+
+def _contents_of(entry: Path) -> list[str]:
+    """The contents that a file's entry keeps; data keep none: what they name is checked when they are read."""
+    if entry.parent.parent.name != "files":
+        return []
+    try:
+        return [json.loads(entry.read_bytes().partition(b"\n")[2])["sha256"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+
+
+def _scan(root: Path, kind: str) -> list[tuple[Path, int, float]]:
+    found = []
+    for folder, _, names in os.walk(root / kind):
+        for name in names:
+            path = Path(folder) / name
+            with contextlib.suppress(OSError):
+                stat = path.stat()
+                found.append((path, stat.st_size, stat.st_mtime))
+    return found
+
+
+def _expect(root: Path) -> None:
+    if not (root / MARK).is_file():
+        raise UnitcadError(f"{root}: there is no cache of unitcad here")

@@ -1,0 +1,94 @@
+"""What a build needs of a cache, and the store that lives as long as one build."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from unitcad.errors import UnitcadError
+
+Make = Callable[[], Any]
+Intact = Callable[[Any], bool]
+
+
+class MissingContent(UnitcadError):
+    """Content that was there is gone: collected, or damaged. Made again by whoever asks again."""
+
+    exit_code = 1
+
+
+class Store(Protocol):
+    """What a build needs of a cache."""
+
+    counts: Counter[str]
+    """"built" and "reused" entries, by kind ("data", "file")."""
+
+    def data(self, key: str, make: Make, intact: Intact = lambda data: True) -> Any:
+        """The JSON data under `key`; made if it is not there, damaged, or not `intact` any more."""
+        ...
+
+    def file(self, key: str, make: Callable[[], bytes]) -> str:
+        """The SHA-256 (hex) of the file under `key`, its content made if need be."""
+        ...
+
+    def has(self, sha256: str) -> bool:
+        """Whether that content is there and whole."""
+        ...
+
+    def content(self, sha256: str) -> bytes:
+        """Content by its SHA-256. Raises MissingContent."""
+        ...
+
+    def place(self, sha256: str, target: Path) -> None:
+        """Put content at `target`, which does not exist yet. Raises MissingContent or OSError."""
+        ...
+
+
+@dataclass
+class MemoryStore:
+    """A store that lives as long as one build; `seed` and `known` bring in what somebody else has already.
+
+    Content whose SHA-256 is in `known` is named but not held: it can't be placed here.
+    """
+
+    seed: dict[str, Any] = field(default_factory=dict)
+    known: frozenset[str] = frozenset()
+    contents: dict[str, bytes] = field(default_factory=dict)
+    counts: Counter[str] = field(default_factory=Counter)
+    _files: dict[str, str] = field(default_factory=dict)
+
+    def data(self, key: str, make: Make, intact: Intact = lambda data: True) -> Any:
+        there = key in self.seed and intact(self.seed[key])
+        self.counts["data reused" if there else "data built"] += 1
+        if not there:
+            self.seed[key] = make()
+        return self.seed[key]
+
+    def file(self, key: str, make: Callable[[], bytes]) -> str:
+        there = key in self._files
+        self.counts["file reused" if there else "file built"] += 1
+        if not there:
+            content = make()
+            self._files[key] = digest(content)
+            self.contents[self._files[key]] = content
+        return self._files[key]
+
+    def has(self, sha256: str) -> bool:
+        return sha256 in self.contents or sha256 in self.known
+
+    def content(self, sha256: str) -> bytes:
+        if sha256 not in self.contents:
+            raise MissingContent(f"content {sha256[:12]} is not here")
+        return self.contents[sha256]
+
+    def place(self, sha256: str, target: Path) -> None:
+        target.write_bytes(self.content(sha256))
+
+
+def digest(content: bytes) -> str:
+    """SHA-256 in hex digits."""
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,205 @@
+"""What of a variant follows from its geometry alone: made once, whatever silicones it is cast in.
+
+Everything here sees a spec whose materials, names and casting are blank (`geometric`), so that nothing can read
+them unnoticed: what it makes serves every variant of that geometry. Each piece is kept in a store under a hash of
+what it reads: a body's file by its tree, a verdict on a file by its bytes, the whole by the spec.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from unitcad.cache import Store, digest
+from unitcad.pipeline import parts
+from unitcad.pipeline.stages import Stages
+from unitcad.pipeline.variant import Variant
+from unitcad.pipeline.versions import code_version, kernel_versions
+from unitcad.spec import Spec, printer_of
+from unitcad.spec.models import CastingTable, EstimateTable
+
+GEOMETRIC = ("unit", "moulds")
+"""The outputs that are geometry."""
+
+
+def geometric(spec: Spec) -> Spec:
+    """The spec with everything blank that the geometry does not read."""
+    return spec.model_copy(
+        update={
+            "name": "unit",
+            "motor": spec.motor.model_copy(update={"part": None}),
+            "layers": tuple(layer.model_copy(update={"material": ""}) for layer in spec.layers),
+            "casting": CastingTable(),
+            "estimate": EstimateTable(),
+            "materials": {},
+            "motors": {},
+            "tissue": {},
+        }
+    )
+
+
+def geometry_key(spec: Spec, only: Sequence[str], check: bool) -> str:
+    """What `geometry` depends on; cheap, since no shape is drawn."""
+    return _key(geometric(spec), tuple(name for name in only if name in GEOMETRIC), check)
+
+
+def geometry(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> dict[str, Any]:
+    """Parts, steps, laws and mesh checks of a spec's geometry, and `files`: path -> SHA-256 of content in `store`."""
+    only = tuple(name for name in only if name in GEOMETRIC)
+    blank = geometric(spec)
+    return store.data(
+        _key(blank, only, check),
+        lambda: _Making(Variant(blank), only, check, store, stages).all(),
+        intact=lambda found: all(map(store.has, found["files"].values())),
+    )
+
+
+class _Making:
+    """One geometry, made into a store."""
+
+    def __init__(self, variant: Variant, only: Sequence[str], check: bool, store: Store, stages: Stages) -> None:
+        self.variant, self.only, self.check, self.store, self.stages = variant, only, check, store, stages
+        self.formats = variant.spec.output.formats
+        self.files: dict[str, str] = {}
+
+    def all(self) -> dict[str, Any]:
+        variant, stages = self.variant, self.stages
+        with stages("plan"):
+            groups = parts.groups(variant, self.only)
+        with stages("meshes"):
+            records = [record for group in groups for record in self._meshes(group)]
+        with stages("drawing"):
+            self._section()
+        if "step" in self.formats:
+            with stages("step"):
+                for group in groups:
+                    self._step(group, records)
+        moulds = "moulds" in self.only
+        with stages("laws"):
+            laws = self._laws() if self.check and moulds else []
+        with stages("check"):
+            check = self._check(records) if self.check else []
+        return {
+            "label": variant.plan.label if moulds else None,
+            "air_ring_mm": round(variant.dimensions.air_ring, 9),
+            "parts": records,
+            "steps": self._steps() if moulds else [],
+            "laws": laws,
+            "check": check,
+            "files": self.files,
+        }
+
+    def _meshes(self, group: parts.Group) -> list[dict[str, Any]]:
+        records = []
+        for body in group.bodies:
+            key = parts.key(self.variant, body, "record")
+            record = self.store.data(key, lambda body=body: parts.record(self.variant, body))
+            records.append({**record, "files": {}})
+            if "stl" in self.formats and parts.printed(body):
+                path = f"{group.folder}/{parts.file_stem(body)}.stl"
+                key = parts.key(self.variant, body, "stl")
+                entry = self._file(path, key, lambda body=body: parts.stl_content(self.variant, body))
+                records[-1]["files"]["stl"] = entry
+        if "3mf" in self.formats:
+            content = parts.threemf_key(self.variant, group.bodies)
+            entry = self._file(
+                f"{group.together}.3mf", content, lambda: parts.threemf_content(self.variant, group.bodies)
+            )
+            for record, body in zip(records, group.bodies, strict=True):
+                if parts.printed(body):
+                    record["files"]["3mf"] = entry
+        return records
+
+    def _step(self, group: parts.Group, records: list[dict[str, Any]]) -> None:
+        key = parts.step_key(self.variant, group.bodies, group.name)
+        entry = self._file(f"{group.together}.step", key, lambda: parts.step_content(group.bodies, group.name))
+        names = {body.name for body in group.bodies}
+        for record in records:
+            if record["name"] in names:
+                record["files"]["step"] = entry
+
+    def _section(self) -> None:
+        try:
+            from unitcad.export import svg
+        except ImportError:
+            return
+        if "unit" in self.only:
+            self._file("section.svg", self._own_key("section"), lambda: svg.unit_section(self.variant).encode())
+
+    def _laws(self) -> list[dict[str, Any]]:
+        from unitcad.moulds import laws
+
+        def judged() -> list[dict[str, Any]]:
+            variant = self.variant
+            solids = {body.name: variant.mesh(body) for body in (*variant.unit, *variant.plan.tools)}
+            found = laws.judge(variant.spec, variant.unit, variant.plan, solids, variant.segments)
+            return [{**asdict(finding), "value": float(f"{finding.value:.6g}")} for finding in found]
+
+        return self.store.data(self._own_key("laws"), judged)
+
+    def _check(self, records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """What the mesh rules find in every file: tools against the printer."""
+        from importlib.util import find_spec
+
+        if not (find_spec("unitcad.check.printing") and find_spec("unitcad.check.threemf")):  # TODO remove
+            return []
+        roles = {e["path"]: r["role"] for r in records for form, e in r["files"].items() if form in parts.MESH_FORMATS}
+        return [{"path": path, **finding} for path, role in roles.items() for finding in self._check_file(path, role)]
+
+    def _check_file(self, path: str, role: str) -> list[dict[str, Any]]:
+        from unitcad.check import Options, check_file
+
+        # A tool's STL is judged against the printer; its 3MF holds the same meshes.
+        printer = printer_of(self.variant.spec) if role == "tool" and path.endswith(".stl") else None
+
+        def judged() -> list[dict[str, Any]]:
+            with tempfile.TemporaryDirectory(prefix="unitcad-") as scratch:
+                file = Path(scratch) / Path(path).name
+                file.write_bytes(self.store.content(self.files[path]))
+                found = check_file(file, Options(printer=printer)).findings
+            return [finding.as_dict() for finding in found if finding.severity != "info"]
+
+        return self.store.data(digest(f"{self.files[path]} {printer!r} {code_version()}".encode()), judged)
+
+    def _steps(self) -> list[dict[str, Any]]:
+        variant = self.variant
+        solids = {body.name: variant.mesh(body) for body in variant.unit}
+        cells = len(variant.plan.layout.cells)
+        return [
+            {
+                "index": step.index,
+                "layer": step.name,
+                "tools": list(step.tools),
+                "cavity_volume_mm3": float(f"{cells * solids[step.name].volume():.9g}"),
+                "layer_volume_mm3": float(f"{solids[step.name].volume():.9g}"),
+            }
+            for step in variant.plan.steps
+        ]
+
+    def _own_key(self, what: str) -> str:
+        """The key of something that reads the whole geometry, but neither formats nor outputs."""
+        spec = self.variant.spec
+        return _key(spec.model_copy(update={"output": spec.output.model_copy(update={"formats": ()})}), what)
+
+    def _file(self, path: str, key: str, make: Any) -> dict[str, str]:
+        """One shared file: its content by `key` in the store, its place in the variant's folder by `path`."""
+        sha256 = self.store.file(key, make)
+        self.files[path] = sha256
+        return {"path": path, "sha256": sha256}
+
+
+def _key(spec: Spec, *more: object) -> str:
+    epoch = os.environ.get("SOURCE_DATE_EPOCH") if "step" in spec.output.formats else None
+    versions = sorted(kernel_versions(spec.output.formats).items())
+    return digest(repr((spec.model_dump_json(), more, code_version(), versions, epoch)).encode())
+
+
+def findings_count(findings: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Mesh findings with their number by severity."""
+    count = Counter(finding["severity"] for finding in findings)
+    return {"errors": count["error"], "warnings": count["warning"], "findings": list(findings)}

@@ -1,0 +1,40 @@
+"""What a result's bytes depend on besides its spec: this package and the kernels."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from pathlib import Path
+
+from unitcad import __version__
+
+MESH_KERNELS = ("manifold3d", "numpy")
+BREP_KERNELS = ("build123d", "cadquery", "cadquery-ocp", "cadquery-ocp-novtk")
+
+
+@cache
+def code_version() -> str:
+    """The version and twelve digits over the package's own files: a changed line makes nothing of before reusable."""
+    digest = hashlib.sha256()
+    root = Path(str(files("unitcad")))
+    for file in sorted(root.rglob("*")):
+        if file.suffix in (".py", ".toml"):
+            digest.update(f"{file.relative_to(root)}\n".encode() + file.read_bytes())
+    return f"{__version__}+{digest.hexdigest()[:12]}"
+
+
+def kernel_versions(formats: Sequence[str]) -> dict[str, str]:
+    """The versions of what takes part in making `formats`; what is not installed is left out."""
+    names = (*MESH_KERNELS, *(BREP_KERNELS if "step" in formats else ()))
+    return {name: found for name in names if (found := _version(name))}
+
+
+@cache
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
