@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from unitcad.pipeline.variant import Variant
 
-GAP = 5.0
+GAP = 7.0
 """Between two pieces taken apart, mm."""
 ASIDE = 12.0
 """How far a tongue is drawn out when taken apart, mm."""
@@ -25,32 +25,32 @@ Offset = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Stage:
+class Moment:
     """One moment of casting: what a person sees on the bench. `parts` are names of tools and of cured layers."""
 
     title: str
     parts: tuple[str, ...]
 
 
-def stages(variant: Variant) -> tuple[Stage, ...]:
+def moments(variant: Variant) -> tuple[Moment, ...]:
     """Casting from the bare base to the unit, in the person's order."""
     plan, found = variant.plan, []
     base = tuple(t.name for t in plan.tools if t.name == "base" or t.name.startswith("stub"))
-    found.append(Stage("Base, filament flush with the core" if len(base) > 1 else "Base", base))
+    found.append(Moment("Base, filament flush with the core" if len(base) > 1 else "Base", base))
     for step in plan.steps:
         cured = tuple(f"layer{i}" for i in range(1, step.index))
         cup = f"cup{step.index}"
         tongues = tuple(name for name in step.tools if name.startswith("tongue"))
-        found.append(Stage(f"Pour {step.index}: cup {step.index} on", (*base, *cured, cup)))
+        found.append(Moment(f"Pour {step.index}: cup {step.index} on", (*base, *cured, cup)))
         if tongues:
-            found.append(Stage(f"Pour {step.index}: tongue in, to the ledge", (*base, *cured, cup, *tongues)))
+            found.append(Moment(f"Pour {step.index}: tongue in, to the ledge", (*base, *cured, cup, *tongues)))
         full = (*base, *cured, step.name)
-        found.append(Stage(f"Pour {step.index}: {step.material}, struck off", (*full, cup, *tongues)))
+        found.append(Moment(f"Pour {step.index}: {step.material}, struck off", (*full, cup, *tongues)))
         if tongues:
-            found.append(Stage(f"Pour {step.index}: cured, tongue out first", (*full, cup)))
-        found.append(Stage(f"Pour {step.index}: cup up, layer {step.index} stays", full))
+            found.append(Moment(f"Pour {step.index}: cured, tongue out first", (*full, cup)))
+        found.append(Moment(f"Pour {step.index}: cup up, layer {step.index} stays", full))
     unit = tuple(body.name for body in variant.unit)
-    found.append(Stage("The unit: peeled off, motor and circuit in", unit))
+    found.append(Moment("The unit: peeled off, motor and circuit in", unit))
     return tuple(found)
 
 
@@ -90,10 +90,8 @@ def unit_apart(variant: Variant) -> dict[str, Offset]:
     layers = sorted((n for n in solids if n.startswith("layer")), key=lambda n: int(n[5:]))
     rest = [name for name in ("motor", "fpcb") if name in solids]
     others = [name for name in solids if name not in layers and name not in rest]
-    if variant.spec.design == "embedded":
-        order = [*reversed(layers), *rest, *others]
-    else:
-        order = [*rest, *others, *layers]
+    inside_out = [*rest, *others, *layers]
+    order = [*reversed(layers), *rest, *others] if variant.spec.design == "embedded" else inside_out
     offsets: dict[str, Offset] = {}
     top = 0.0
     for name in order:
@@ -137,7 +135,7 @@ def pictures(variant: Variant, only: tuple[str, ...] = ("unit", "moulds")) -> di
 def unit_cut_open(variant: Variant) -> Scene:
     """The unit, its nearer half taken away, seen from a little below: the skin's side is the open one."""
     parts = [_drawn(_far_half(variant.mesh(body)), body.colour) for body in variant.unit]
-    return Scene(tuple(p for p in parts if p), (0.45, -1.0, -0.38))
+    return Scene(tuple(p for p in parts if p), (0.45, -1.0, -0.38), (1200, 640))
 
 
 def step_in_section(variant: Variant, index: int) -> Scene:
@@ -146,26 +144,24 @@ def step_in_section(variant: Variant, index: int) -> Scene:
     colours = _colours(variant)
     y = min(cell.y for cell in variant.plan.layout.cells)
     names = (*(n for n in step.tools), *(f"layer{i}" for i in range(1, index + 1)))
-    parts = [
-        _drawn(_far_half(solid, y), colours[name])
-        for name in names
-        for solid in _solids(variant, name)
-    ]
-    return Scene(tuple(p for p in parts if p), (0.18, -1.0, 0.48))
+    parts = [_drawn(_far_half(solid, y), colours[name]) for name in names for solid in _solids(variant, name)]
+    return Scene(tuple(p for p in parts if p), (0.18, -1.0, 0.48), (1200, 640))
 
 
 def exploded(variant: Variant) -> Scene:
     """The whole set taken apart, with names."""
     colours, offsets = _colours(variant), taken_apart(variant)
+    numbered = [name for name in offsets if name.startswith(("tongue", "stub")) and name[-1].isdigit()]
+    told = {name for name in numbered if name.rstrip("0123456789") + "1" != name}
     parts = []
     for name, offset in offsets.items():
         for i, solid in enumerate(_solids(variant, name)):
-            label = _spoken(name) if i == 0 and name[-1] not in "23456789" or name[:3] in ("cup", "lay") and i == 0 else ""
+            label = "" if i or name in told else name.rstrip("1") if name in numbered else spoken(name)
             parts.append(_drawn(solid.translate(offset), colours[name], label))
-    return Scene(tuple(p for p in parts if p), (0.55, -1.0, 0.62), (1200, 1400))
+    return Scene(tuple(p for p in parts if p), (0.55, -1.0, 0.5), (1000, 1300))
 
 
-def _spoken(name: str) -> str:
+def spoken(name: str) -> str:
     """layer1 as "layer 1"."""
     stem = name.rstrip("0123456789")
     return f"{stem} {name[len(stem) :]}".strip()

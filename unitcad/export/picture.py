@@ -1,0 +1,88 @@
+"""Shaded pictures by VTK (CadQuery brings it), drawn in a child process.
+
+VTK without libEGL and without a display ends its process with a segmentation fault. So it is never loaded here: a child
+draws, a second one under a virtual display (Xvfb) if the first fell and Xvfb is installed, else there is a message.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from unitcad.errors import UnitcadError
+
+SECONDS = 300
+"""After which a child that draws is given up."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A closed mesh in a picture: vertices (n, 3) in mm, faces (m, 3), colour of three numbers 0 to 1; `label` is
+    written beside it.
+    """
+
+    colour: tuple[float, float, float]
+    vertices: np.ndarray
+    faces: np.ndarray
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A picture: what is in it, the direction from it to the eye, and its size in pixels. +z is up."""
+
+    parts: tuple[Drawn, ...]
+    towards_eye: tuple[float, float, float]
+    size: tuple[int, int] = (1200, 900)
+
+
+class NoPicture(UnitcadError):
+    """This machine can't draw: VTK is missing, or there is neither EGL nor Xvfb."""
+
+
+def draw(scenes: Sequence[Scene]) -> list[bytes]:
+    """The scenes as PNG files. Raises NoPicture, with what to install, where this machine can't draw."""
+    if importlib.util.find_spec("vtkmodules") is None:
+        raise NoPicture("pictures need VTK: pip install 'unitcad[cadquery]'")
+    request = pickle.dumps([(s.size, s.towards_eye, [vars(part) for part in s.parts]) for s in scenes])
+    answer = _ask(request, dict(os.environ))
+    if answer is None and shutil.which("Xvfb"):
+        with _virtual_display() as display:
+            answer = _ask(request, {**os.environ, "DISPLAY": display})
+    if answer is None:
+        raise NoPicture("VTK can't draw here: it needs libEGL (Debian: libegl1) or a virtual display (Debian: xvfb)")
+    return answer
+
+
+def _ask(request: bytes, environment: dict[str, str]) -> list[bytes] | None:
+    """The child's pictures; None where it fell."""
+    child = [sys.executable, "-m", "unitcad.export.picture_child"]
+    try:
+        done = subprocess.run(child, input=request, capture_output=True, timeout=SECONDS, env=environment)
+        return pickle.loads(done.stdout) if done.returncode == 0 else None
+    except (subprocess.TimeoutExpired, EOFError, pickle.UnpicklingError):
+        return None
+
+
+@contextlib.contextmanager
+def _virtual_display() -> Iterator[str]:
+    """An X server of our own for a while; yields its display. It picks a free number and says it through a pipe."""
+    reading, writing = os.pipe()
+    command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(command, pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    os.close(writing)
+    try:
+        with os.fdopen(reading) as pipe:
+            yield f":{pipe.readline().strip()}"
+    finally:
+        server.terminate()
+        server.wait()
