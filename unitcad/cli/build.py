@@ -56,6 +56,9 @@ def _tell(manifest: dict) -> None:
     """What a person should know of a result: warnings, broken laws, bad files."""
     for warning in manifest["warnings"]:
         typer.echo(f"warning: {warning}", err=True)
+    for entry in manifest["left_out"]:
+        if entry["what"] == "pictures":
+            typer.echo(f"warning: no pictures: {entry['why']}", err=True)
     for law in manifest["laws"]:
         if not law["ok"]:
             typer.echo(

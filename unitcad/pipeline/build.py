@@ -16,7 +16,7 @@ from unitcad import __version__
 from unitcad.cache import MemoryStore, Store
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.pipeline import folder as folders
-from unitcad.pipeline.geometry import findings_count, geometry
+from unitcad.pipeline.geometry import findings_count, geometry, pictures
 from unitcad.pipeline.stages import Say, Stages
 from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.versions import kernel_versions
@@ -127,6 +127,7 @@ class _Making:
     def all(self) -> Product:
         spec = self.spec
         shape = geometry(spec, self.only, self.check, self.store, self.stages)
+        files = {**shape["files"], **self._pictures()}
         self.own["spec.toml"] = to_toml(spec).encode()
         manifest: dict[str, Any] = {
             "name": spec.name,
@@ -140,11 +141,25 @@ class _Making:
             "steps": [self._step(step) for step in shape["steps"]],
             "laws": shape["laws"],
             "check": findings_count(shape["check"]),
+            "pictures": [path for path in files if path.endswith(".png")],
             "left_out": self._left_out(),
             "versions": {"unitcad": __version__, **kernel_versions(spec.output.formats)},
         }
         self.own["manifest.json"] = _json(manifest)
-        return Product(manifest, self.own, shape["files"])
+        return Product(manifest, self.own, files)
+
+    def _pictures(self) -> dict[str, str]:
+        """The shaded pictures; where this machine can't draw, what it lacks is told and the drawing stays."""
+        if "png" not in self.spec.output.formats:
+            return {}
+        from unitcad.export.picture import NoPicture
+
+        try:
+            with self.stages("pictures"):
+                return pictures(self.spec, self.only, self.store)
+        except NoPicture as error:
+            self.left_out.append(_left("pictures", str(error)))
+            return {}
 
     def _part(self, part: dict[str, Any]) -> dict[str, Any]:
         """A part of the geometry with this variant's material, after what it is made by."""

@@ -59,6 +59,30 @@ def geometry(spec: Spec, only: Sequence[str], check: bool, store: Store, stages:
     )
 
 
+def pictures(spec: Spec, only: Sequence[str], store: Store) -> dict[str, str]:
+    """The shaded pictures of a spec's geometry: path -> SHA-256 of content in `store`.
+
+    Raises NoPicture where this machine can't draw; that is not remembered, so another try may succeed.
+    """
+    only = tuple(name for name in only if name in GEOMETRIC)
+    blank = geometric(spec)
+    blank = blank.model_copy(update={"output": blank.output.model_copy(update={"formats": ("png",)})})
+    key = _key(blank, "pictures", only)
+
+    def drawn() -> dict[str, str]:
+        from unitcad.export.picture import draw
+        from unitcad.pipeline.scenes import pictures as scenes
+
+        wanted = scenes(Variant(blank), only)
+        images = draw(list(wanted.values()))
+        return {
+            path: store.file(digest(f"{key} {path}".encode()), lambda image=image: image)
+            for path, image in zip(wanted, images, strict=True)
+        }
+
+    return store.data(key, drawn, intact=lambda found: all(map(store.has, found.values())))
+
+
 class _Making:
     """One geometry, made into a store."""
 
@@ -113,6 +137,11 @@ class _Making:
             for record, body in zip(records, group.bodies, strict=True):
                 if parts.printed(body):
                     record["files"]["3mf"] = entry
+        if "glb" in self.formats:
+            key = parts.glb_key(self.variant, group.bodies)
+            entry = self._file(f"{group.together}.glb", key, lambda: parts.glb_content(self.variant, group.bodies))
+            for record in records:
+                record["files"]["glb"] = entry
         return records
 
     def _step(self, group: parts.Group, records: list[dict[str, Any]]) -> None:
@@ -129,7 +158,12 @@ class _Making:
         except ImportError:
             return
         if "unit" in self.only:
-            self._file("section.svg", self._own_key("section"), lambda: svg.unit_section(self.variant).encode())
+            v = self.variant
+            self._file(
+                "section.svg",
+                self._own_key("section"),
+                lambda: svg.unit_section(v.unit, v.dimensions, v.segments).encode(),
+            )
 
     def _laws(self) -> list[dict[str, Any]]:
         from unitcad.moulds import laws

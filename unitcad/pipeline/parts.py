@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from unitcad.cache import digest
 from unitcad.errors import UnitcadError
-from unitcad.export import stl, threemf
+from unitcad.export import glb, stl, threemf
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, bounds
 from unitcad.pipeline.versions import code_version, kernel_versions
@@ -67,6 +67,11 @@ def threemf_key(variant: Variant, bodies: Sequence[Body]) -> str:
     return _joint_key(variant, bodies, "3mf", variant.spec.moulds.bed_x_mm, variant.spec.moulds.bed_y_mm)
 
 
+def glb_key(variant: Variant, bodies: Sequence[Body]) -> str:
+    """What the GLB of several bodies depends on."""
+    return _joint_key(variant, bodies, "glb")
+
+
 def step_key(variant: Variant, bodies: Sequence[Body], name: str) -> str:
     """What the STEP of several bodies depends on, its date among it."""
     return _joint_key(
@@ -88,6 +93,16 @@ def threemf_content(variant: Variant, bodies: Sequence[Body]) -> bytes:
     bed = variant.spec.moulds.bed_x_mm or 0.0, variant.spec.moulds.bed_y_mm or 0.0
     parts = [threemf.MeshPart(b.name, b.colour, *_ready(variant, b)) for b in bodies if printed(b)]
     return threemf.content(parts, bed)
+
+
+def glb_content(variant: Variant, bodies: Sequence[Body]) -> bytes:
+    """The GLB of several bodies as assembled; what is cut or bought is in it too."""
+    return glb.content(
+        [
+            glb.GlbPart(b.name, b.colour, *arrays(variant.mesh(b)), {"role": b.role, "made": b.made, "step": b.step})
+            for b in bodies
+        ]
+    )
 
 
 def step_content(bodies: Sequence[Body], name: str) -> bytes:

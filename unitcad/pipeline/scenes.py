@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -45,7 +45,7 @@ def moments(variant: Variant) -> tuple[Moment, ...]:
         if tongues:
             found.append(Moment(f"Pour {step.index}: tongue in, to the ledge", (*base, *cured, cup, *tongues)))
         full = (*base, *cured, step.name)
-        found.append(Moment(f"Pour {step.index}: {step.material}, struck off", (*full, cup, *tongues)))
+        found.append(Moment(f"Pour {step.index}: layer {step.index} poured, struck off", (*full, cup, *tongues)))
         if tongues:
             found.append(Moment(f"Pour {step.index}: cured, tongue out first", (*full, cup)))
         found.append(Moment(f"Pour {step.index}: cup up, layer {step.index} stays", full))
@@ -118,7 +118,7 @@ def _top(variant: Variant, name: str) -> float:
     return _extent(variant, name)[1]
 
 
-def pictures(variant: Variant, only: tuple[str, ...] = ("unit", "moulds")) -> dict[str, Scene]:
+def pictures(variant: Variant, only: Sequence[str] = ("unit", "moulds")) -> dict[str, Scene]:
     """The pictures of a variant by the path of their file: the unit cut open, the set taken apart, each pour in
     section.
     """

@@ -13,6 +13,7 @@ from unitcad import __version__
 
 MESH_KERNELS = ("manifold3d", "numpy")
 BREP_KERNELS = ("build123d", "cadquery", "cadquery-ocp", "cadquery-ocp-novtk")
+PICTURE_KERNELS = ("vtk",)
 
 
 @cache
@@ -28,7 +29,11 @@ def code_version() -> str:
 
 def kernel_versions(formats: Sequence[str]) -> dict[str, str]:
     """The versions of what takes part in making `formats`; what is not installed is left out."""
-    names = (*MESH_KERNELS, *(BREP_KERNELS if "step" in formats else ()))
+    names = (
+        *MESH_KERNELS,
+        *(BREP_KERNELS if "step" in formats else ()),
+        *(PICTURE_KERNELS if "png" in formats else ()),
+    )
     return {name: found for name in names if (found := _version(name))}
 
 
