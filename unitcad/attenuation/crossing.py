@@ -1,0 +1,131 @@
+"""Carrying a stack's state through one layer, upwards, at many wavenumbers.
+
+A plane is a pair of (2, 2, n) blocks (U, T): all states u = U c, t = T c that the stack below can carry. In its chart U
+or T is the identity, so the plane's own equation is T u = U t.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from unitcad.attenuation import waves as w
+
+
+class Plane(NamedTuple):
+    """State (u, t) at an interface per parameter c; `bottom` the state at the layer's bottom per the same c, if asked."""
+
+    u: w.Array
+    t: w.Array
+    bottom: tuple[w.Array, w.Array] | None = None
+
+
+def underside(material: w.Material, k: w.Array) -> Plane:
+    """The plane at the top of a half-space (or of nothing, if its modulus is 0)."""
+    if material.shear == 0:
+        return Plane(_identity(k.size), np.zeros((2, 2, k.size), dtype=np.complex128))
+    found = w.waves(material, k)
+    return charted(Plane(found.displacement, found.traction))
+
+
+def raised(material: w.Material, h: float, k: w.Array, below: Plane, with_bottom: bool = False) -> Plane:
+    """The plane at a layer's top from the plane at its bottom, each wavenumber by the way that keeps its digits."""
+    below = Plane(below.u, below.t, (below.u, below.t) if with_bottom else None)
+    if h == 0.0:
+        return below
+    way = route(material, h, k)
+    ways = np.unique(way)
+    if ways.size == 1:
+        return _WAYS[int(ways[0])](material, h, k, below)
+    out = Plane(
+        np.empty_like(below.u),
+        np.empty_like(below.t),
+        (np.empty_like(below.u), np.empty_like(below.t)) if with_bottom else None,
+    )
+    for one in ways:
+        part = way == one
+        bottom = (below.u[..., part], below.t[..., part])
+        found = _WAYS[int(one)](material, h, k[part], Plane(*bottom, bottom if with_bottom else None))
+        out.u[..., part], out.t[..., part] = found.u, found.t
+        if out.bottom and found.bottom:
+            out.bottom[0][..., part], out.bottom[1][..., part] = found.bottom
+    return out
+
+
+def route(material: w.Material, h: float, k: w.Array) -> np.ndarray:
+    """Per wavenumber how a layer is crossed: 0 thin (series), 1 grazing (squared series), 2 thick (reflection).
+
+    Grazing: one of the two waves hardly changes over the layer (next to its branch point, or k h small where k_s h is
+    not), so that its way down and its way up look alike and reflection would lose digits.
+    """
+    thin = np.maximum(np.abs(k), abs(material.ks2) ** 0.5) * h < w.THIN
+    gp, gs = w.rates(material, k)
+    grazing = np.minimum(np.abs(gp), np.abs(gs)) * h < w.THIN
+    return np.where(thin, 0, np.where(grazing, 1, 2))
+
+
+def _thin(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
+    du, dt = w.thin_step(material, k, h, below.u, below.t)
+    return charted(Plane(below.u + du, below.t + dt, below.bottom))
+
+
+def _grazing(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
+    """In pieces across which nothing grows by more than e; the piece's propagator by squaring the series."""
+    growth = max(float(np.max(rate.real)) for rate in w.rates(material, k)) * h
+    pieces = max(1, int(np.ceil(growth)))
+    gained = w.squared_step(material, k, h / pieces)
+    for _ in range(pieces):
+        both = np.concatenate([below.u, below.t])
+        both = both + np.einsum("ijn,jkn->ikn", gained, both)
+        below = charted(Plane(both[:2], both[2:], below.bottom))
+    return below
+
+
+def _thick(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
+    """By reflection: amplitudes a down at the top and R E a up at the bottom, R from the plane's equation T u = U t."""
+    found = w.waves(material, k)
+    d, tr = found.displacement, found.traction
+    jd, jt = w.mirrored(d), -w.mirrored(tr)
+    system = w.product(below.t, jd) - w.product(below.u, jt)
+    given = w.product(below.u, tr) - w.product(below.t, d)
+    e = w.decay(material, found, h)
+    reflected = w.product(w.adjugate(system), w.product(given, e)) / w.determinant(system)
+    back = w.product(e, reflected)
+    bottom = None
+    if below.bottom is not None:
+        bottom = (
+            w.product(d, e) + w.product(jd, reflected),
+            w.product(tr, e) + w.product(jt, reflected),
+        )
+    return charted(Plane(d + w.product(jd, back), tr + w.product(jt, back), bottom))
+
+
+_WAYS = (_thin, _grazing, _thick)
+
+
+def charted(raw: Plane) -> Plane:
+    """The same plane with u or t the identity, whichever inverse is better conditioned."""
+    det_u, det_t = w.determinant(raw.u), w.determinant(raw.t)
+    by_u = _square(raw.u) * np.abs(det_t) <= _square(raw.t) * np.abs(det_u)
+    inverse = w.adjugate(np.where(by_u, raw.u, raw.t)) / np.where(by_u, det_u, det_t)
+    ratio = w.product(np.where(by_u, raw.t, raw.u), inverse)
+    one = _identity(by_u.size)
+    bottom = raw.bottom and (w.product(raw.bottom[0], inverse), w.product(raw.bottom[1], inverse))
+    return Plane(np.where(by_u, one, ratio), np.where(by_u, ratio, one), bottom)
+
+
+def parameter(plane: Plane, u: w.Array, t: w.Array) -> w.Array:
+    """The c, shape (2, m, n), of a state (u, t) that lies on a charted plane."""
+    by_u = (plane.u[0, 0] == 1) & (plane.u[1, 1] == 1) & (plane.u[0, 1] == 0) & (plane.u[1, 0] == 0)
+    return np.where(by_u, u, t)
+
+
+def _square(a: w.Array) -> np.ndarray:
+    return np.sum(a.real**2 + a.imag**2, axis=(0, 1))
+
+
+def _identity(count: int) -> w.Array:
+    one = np.zeros((2, 2, count), dtype=np.complex128)
+    one[0, 0] = one[1, 1] = 1.0
+    return one

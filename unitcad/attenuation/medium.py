@@ -1,0 +1,148 @@
+"""A layered half-space: its surface compliance per wavenumber, exact from statics to k h = 1e12.
+
+The state below an interface is the plane of all (u, t) that the stack can carry there. It is kept as a pair of 2x2
+blocks (U, T), u = U c, t = T c, one of which is the identity: the impedance T U^-1 or the compliance U T^-1, whichever
+is better conditioned, so that neither a clamped nor a free resonance of the lower layers costs digits. It is carried
+upwards through a thick layer by reflection, R -> E R E, with decaying exponentials only, and through a thin one by the
+series of exp(-A h) - 1. The Thomson-Haskell propagator, which multiplies growing exponentials, loses everything where
+k h is large or omega small.
+
+Time factor e^{+i omega t}; z into the body; u_z with J0(kr), u_r with J1(kr), both k dk; SI throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from unitcad.attenuation import waves as w
+from unitcad.attenuation.crossing import Plane, parameter, raised, underside
+from unitcad.attenuation.rheology import Damping, complex_shear_modulus, compressibility, finite
+from unitcad.errors import Refusal
+
+if TYPE_CHECKING:
+    from unitcad.attenuation.response import Load, Response
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A layer: thickness (m), density (kg/m3), Young's modulus (Pa), Poisson's ratio in (-1, 1/2], damping law."""
+
+    thickness: float
+    density: float
+    youngs_modulus: float
+    poisson_ratio: float
+    damping: Damping = None
+
+    def __post_init__(self) -> None:
+        finite("layer.thickness", self.thickness)
+        _check_material("layer", self, above=True)
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """What lies under all layers; units as `Layer`. A Young's modulus of 0: nothing does (a free underside)."""
+
+    density: float
+    youngs_modulus: float
+    poisson_ratio: float
+    damping: Damping = None
+
+    def __post_init__(self) -> None:
+        _check_material("half_space", self, above=False)
+
+
+def _check_material(what: str, body: Layer | HalfSpace, above: bool) -> None:
+    finite(f"{what}.density", body.density)
+    finite(f"{what}.youngs_modulus", body.youngs_modulus, 0.0, above)
+    nu = finite(f"{what}.poisson_ratio", body.poisson_ratio, None)
+    if nu > 0.5:
+        raise Refusal(f"{what}.poisson_ratio", nu, "must be at most 0.5", 0.5)
+    finite(f"{what}.poisson_ratio", nu, -1.0, above=True)
+
+
+class LayeredMedium:
+    """Layers, top first, on a half-space. Raises `Refusal` for values that no body has."""
+
+    def __init__(self, layers: Iterable[Layer], half_space: HalfSpace) -> None:
+        self.layers: tuple[Layer, ...] = tuple(layers)
+        self.half_space = half_space
+
+    def compliance(self, k: Any, omega: float) -> w.Array:
+        """Surface displacement (u_r, u_z) per surface traction (t_r, t_z), in m/Pa, shape k.shape + (2, 2).
+
+        k: wavenumbers (1/m) with positive real part, real or complex, any shape; omega >= 0 (rad/s). The traction
+        acts on the body in +r and +z, so a positive pressure pushes into it and counts as t_z. Symmetric. Raises
+        `Refusal` for k, for omega and for a body that nothing holds at omega = 0.
+        """
+        k = np.asarray(k, dtype=np.complex128)
+        if not (np.all(np.isfinite(k)) and np.all(k.real > 0)):
+            raise Refusal("k", "array", "wavenumbers must be finite, with a positive real part")
+        top = self.planes(k.ravel(), omega)[0]
+        block = w.product(top.u, w.adjugate(top.t)) / w.determinant(top.t)
+        return np.moveaxis(block, -1, 0).reshape(*k.shape, 2, 2)
+
+    def response(self, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
+        """Displacement at radii r (m) and depth z (m) under `load`; see `unitcad.attenuation.response.respond`."""
+        from unitcad.attenuation.response import respond
+
+        return respond(self, load, omega, r, z, rtol)
+
+    def materials(self, omega: float) -> tuple[w.Material, ...]:
+        """The layers' and the half-space's complex moduli at omega. Raises `Refusal` for a static free body."""
+        omega = finite("omega", omega)
+        if self.half_space.youngs_modulus == 0.0 and omega == 0.0:
+            raise Refusal("omega", omega, "nothing holds this body: static loads would carry it away")
+        return tuple(_material(body, omega) for body in (*self.layers, self.half_space))
+
+    def planes(self, k: w.Array, omega: float, depth: float = 0.0, keep: int | None = None) -> list[Plane]:
+        """The stack's planes, top first, down to the cut at `depth` (m), for k of shape (n,).
+
+        The cut (in a layer or in the half-space) changes no result. With `keep`, layer number `keep` is taken for the
+        half-space and what is under it is left out; the cut must then be above it or in it.
+        """
+        materials = self.materials(omega)
+        keep = len(self.layers) if keep is None else keep
+        planes = [underside(materials[keep], k)]
+        for kind, h, above in reversed(_cut([layer.thickness for layer in self.layers[:keep]], depth)):
+            planes.append(raised(materials[kind], h, k, planes[-1], with_bottom=above))
+        return planes[::-1]
+
+    def transfer(self, traction: w.Array, k: w.Array, omega: float, depth: float, keep: int | None = None) -> w.Array:
+        """(u_r, u_z) at `depth`, shape (2, n), for surface tractions of shape (2, n) at wavenumbers k (n,)."""
+        planes = self.planes(k, omega, depth, keep)
+        state = traction[:, None]
+        top = planes[0]
+        c = w.product(w.adjugate(top.t), state) / w.determinant(top.t)
+        u = w.product(top.u, c)
+        for plane, below in pairwise(planes):
+            if plane.bottom is None:
+                break
+            u, t = w.product(plane.bottom[0], c), w.product(plane.bottom[1], c)
+            c = parameter(below, u, t)
+        return u[:, 0]
+
+
+def _material(body: Layer | HalfSpace, omega: float) -> w.Material:
+    shear = complex_shear_modulus(body.youngs_modulus, body.poisson_ratio, body.damping, omega)
+    ks2 = body.density * omega * omega / shear if shear != 0 else 0.0
+    return w.Material(shear, compressibility(body.poisson_ratio), complex(ks2))
+
+
+def _cut(thicknesses: list[float], depth: float) -> list[tuple[int, float, bool]]:
+    """Pieces of the stack, top first: (index of the material, thickness, lies above `depth`)."""
+    pieces: list[tuple[int, float, bool]] = []
+    top = 0.0
+    for i, h in enumerate(thicknesses):
+        if top < depth < top + h:
+            pieces += [(i, depth - top, True), (i, top + h - depth, False)]
+        else:
+            pieces.append((i, h, top + h <= depth))
+        top += h
+    if depth > top:
+        pieces.append((len(thicknesses), depth - top, True))
+    return pieces
