@@ -1,4 +1,9 @@
-"""Self-crossing."""
+"""Self-crossing (G001), touching shells (G003) and coplanar overlap (G004), decided exactly.
+
+Three sieves, each a whole block of pairs at a time: boxes; faces round a vertex whose star is a height field, which can
+meet in that vertex only; planes, in floating point with an error bound. What is left is decided by exact signs.
+A crossing is one of: two faces pass through each other; an edge lies in a face and its two faces leave to both sides.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +11,260 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check.findings import Finding
+from unitcad.check import triangles
+from unitcad.check.findings import Finding, Location
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Ints
-from unitcad.check.topology import Topology
+from unitcad.check.mesh import Bools, Floats, Ints, area_vectors, float32_step
+from unitcad.check.pairs import boxes_of, meeting_pairs, morton_order
+from unitcad.check.rulebook import finding
+from unitcad.check.topology import Topology, max_side_squared
+
+_EPS = float(np.finfo(np.float64).eps)
+_BLOCK = 1 << 17
+_FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
 @dataclass(frozen=True)
 class Crossings:
+    """Findings, whether faces cross, and pairs of shells (k, 2) whose faces meet."""
+
     findings: tuple[Finding, ...] = ()
     crossed: bool = False
-    touching: Ints = field(default_factory=lambda: np.empty((0, 2), int))
+    touching: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
+
+
+@dataclass
+class _Found:
+    """Pairs collected over the blocks."""
+
+    crossing: list[Ints] = field(default_factory=list)
+    overlap: list[Ints] = field(default_factory=list)
+    contact: list[Ints] = field(default_factory=list)
+    leaning: list[Ints] = field(default_factory=list)
+    kept: int = 0
+
+
+@dataclass(frozen=True)
+class _Faces:
+    """Faces in Morton order and what the sieves need of them."""
+
+    vertices: Floats
+    corners: tuple[Ints, Ints, Ints]
+    normal: Floats
+    size: Floats
+    safe: tuple[Ints, Ints, Ints]
+    shell: Ints
+    original: Ints
+    several: bool
 
 
 def judge(topology: Topology, deadline: Deadline) -> Crossings:
-    return Crossings()
+    """Apply the rules to a mesh that went through the topology rules."""
+    mesh = topology.mesh
+    order = morton_order(mesh.vertices, mesh.faces)
+    ordered = np.ascontiguousarray(mesh.faces[order])
+    normal = topology.areas[order]
+    solid = normal.any(axis=1)
+    if not solid.all():
+        order, ordered, normal = order[solid], ordered[solid], normal[solid]
+    if len(order) < 2:
+        return Crossings()
+    deadline.tick()
+    faces = _prepared(topology, order, ordered, normal)
+    boxes = boxes_of(mesh.vertices, ordered)
+    del ordered
+    found = _Found()
+    waiting: list[tuple[Ints, Ints]] = []
+    count = 0
+    for i, j in meeting_pairs(boxes, deadline):
+        i, j = _strangers(faces, i, j)
+        i, j = _beside(faces, i, j)
+        waiting.append((i, j))
+        count += len(i)
+        if count > _BLOCK:
+            _decide(faces, waiting, found)
+            waiting, count = [], 0
+            deadline.tick()
+    _decide(faces, waiting, found)
+    _leaning(faces, found)
+    return _said(topology, faces, found)
+
+
+def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) -> _Faces:
+    vertices = topology.mesh.vertices
+    corners = tuple(np.ascontiguousarray(ordered[:, k]) for k in range(3))
+    smooth = _height_fields(topology) if topology.edges.closed else np.zeros(len(vertices), bool)
+    safe = tuple(np.where(smooth[corner], corner, -1) for corner in corners)
+    size = np.zeros(len(ordered))
+    for k in range(3):
+        side = vertices[corners[k]] - vertices[corners[k - 1]]
+        np.maximum(size, np.einsum("ij,ij->i", side, side), out=size)
+    return _Faces(
+        vertices,
+        corners,  # type: ignore[arg-type]
+        normal,
+        size,
+        safe,  # type: ignore[arg-type]
+        topology.shells[order],
+        topology.kept[order],
+        topology.n_shells > 1,
+    )
+
+
+def _height_fields(topology: Topology) -> Bools:
+    """Vertices whose faces, seen along their mean normal, all face up and go round once: such a star is embedded.
+
+    Needs a closed mesh; the count of turns is that of neighbours that pass a half-plane through the normal.
+    """
+    vertices, faces, areas = topology.mesh.vertices, topology.mesh.faces, topology.areas
+    n = len(vertices)
+    mean = np.stack([sum(np.bincount(faces[:, k], areas[:, axis], n) for k in range(3)) for axis in range(3)], axis=1)
+    flat = np.empty_like(mean)  # a direction across each mean normal: along the axis it has least of, made level
+    least = np.abs(mean).argmin(axis=1)
+    rows = np.arange(n)
+    flat[:, 0], flat[:, 1], flat[:, 2] = 0, 0, 0
+    flat[rows, (least + 1) % 3] = mean[rows, (least + 2) % 3]
+    flat[rows, (least + 2) % 3] = -mean[rows, (least + 1) % 3]
+    length = np.sqrt(np.einsum("ij,ij->i", mean, mean))
+    own = np.sqrt(np.einsum("ij,ij->i", areas, areas))
+    good = length > 0
+    turns = np.zeros(n)
+    for k in range(3):
+        corner, ahead, behind = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
+        up = np.einsum("ij,ij->i", areas, mean[corner])
+        low = ~(up > 1e-6 * own * length[corner])
+        good[corner[low]] = False
+        here, across = vertices[corner], flat[corner]
+        one = np.einsum("ij,ij->i", vertices[ahead] - here, across)
+        other = np.einsum("ij,ij->i", vertices[behind] - here, across)
+        turns += np.bincount(corner, (one > 0) & (other <= 0), n)
+    return good & (turns == 1)
+
+
+def _strangers(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
+    """Without pairs that share a vertex whose star is a height field."""
+    mine = [safe[i] for safe in faces.safe]
+    theirs = [corner[j] for corner in faces.corners]
+    shared = mine[0] == theirs[0]
+    part = np.empty(len(i), bool)
+    for a in range(3):
+        for b in range(3):
+            if a or b:
+                shared |= np.equal(mine[a], theirs[b], out=part)
+    keep = np.flatnonzero(~shared)
+    return i[keep], j[keep]
+
+
+def _beside(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
+    """Without pairs where one lies wholly on one side of the other's plane, farther than rounding can hide."""
+    for _ in range(2):
+        normal, size = faces.normal[i], faces.size[i]
+        origin = faces.vertices[faces.corners[0][i]]
+        above, below = np.ones(len(i), bool), np.ones(len(i), bool)
+        bound = 32 * _EPS * size
+        for corner in faces.corners:
+            offset = faces.vertices[corner[j]]
+            offset -= origin
+            height = np.einsum("ij,ij->i", offset, normal)
+            np.abs(offset, out=offset)
+            error = bound * (offset[:, 0] + offset[:, 1] + offset[:, 2])
+            above &= height > error
+            below &= height < -error
+        keep = np.flatnonzero(~(above | below))
+        i, j = j[keep], i[keep]
+    return i, j
+
+
+def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> None:
+    """Exact answers for the pairs that came through the sieves."""
+    i = np.concatenate([pair[0] for pair in waiting]) if waiting else np.empty(0, np.int32)
+    j = np.concatenate([pair[1] for pair in waiting]) if waiting else np.empty(0, np.int32)
+    if not len(i) or found.kept > _FEW:
+        return
+    a = np.stack([faces.vertices[corner[i]] for corner in faces.corners], axis=1)
+    b = np.stack([faces.vertices[corner[j]] for corner in faces.corners], axis=1)
+    ids_a = np.stack([corner[i] for corner in faces.corners], axis=1)
+    ids_b = np.stack([corner[j] for corner in faces.corners], axis=1)
+    shared = (ids_a[:, :, None] == ids_b[:, None, :]).sum(axis=(1, 2))
+    meeting = triangles.meet(a, b)
+    pair = np.stack([i, j], axis=1)
+    crossing = meeting.crosses & (shared < 2)
+    found.crossing.append(pair[crossing])
+    wide = np.flatnonzero(meeting.overlaps & (shared < 3))
+    step = float32_step(faces.vertices)
+    found.overlap.append(pair[wide[_wide(a[wide], b[wide], 4 * step)]])
+    if faces.several:
+        apart = faces.shell[i] != faces.shell[j]
+        meets = meeting.touches | meeting.crosses | (shared > 0)
+        found.contact.append(pair[apart & meets])
+    for one, other, ids, sides, flip in (
+        (a, b, ids_a, meeting.side_a, False),
+        (b, a, ids_b, meeting.side_b, True),
+    ):
+        lies = np.flatnonzero(((sides == 0).sum(axis=1) == 2) & (shared < 2))
+        if not len(lies):
+            continue
+        free = np.argmax(sides[lies] != 0, axis=1)
+        u, v = (free + 1) % 3, (free + 2) % 3
+        inside = triangles.segment_inside(one[lies, u], one[lies, v], other[lies])
+        kept, u, v, free = lies[inside], u[inside], v[inside], free[inside]
+        ends = np.sort(np.stack([ids[kept, u], ids[kept, v]], axis=1), axis=1)
+        face, holder = (j[kept], i[kept]) if flip else (i[kept], j[kept])
+        side = sides[kept, free]
+        found.leaning.append(np.column_stack([holder, ends, side, face]).astype(np.int64))
+    found.kept += int(crossing.sum()) + len(wide)
+
+
+def _wide(a: Floats, b: Floats, least: float) -> Bools:
+    """Of coplanar pairs that overlap: whether both are higher than `least`. Lower ones are rounding's, not the design's."""
+    high = np.ones(len(a), bool)
+    for corners in (a, b):
+        double = area_vectors(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+        height = np.sqrt(np.einsum("ij,ij->i", double, double)) / np.sqrt(max_side_squared(corners))
+        high &= height > least
+    return high
+
+
+def _leaning(faces: _Faces, found: _Found) -> None:
+    """Edges that lie in a face with their two faces on both sides of it: crossings through an edge."""
+    if not found.leaning:
+        return
+    rows = np.concatenate(found.leaning)
+    if not len(rows):
+        return
+    rows = rows[np.lexsort(rows.T[[3, 2, 1, 0]])]
+    same = (rows[1:, :3] == rows[:-1, :3]).all(axis=1) & (rows[1:, 3] != rows[:-1, 3])
+    through = np.flatnonzero(same)
+    found.crossing.append(rows[through][:, [4, 0]].astype(np.int32))
+
+
+def _said(topology: Topology, faces: _Faces, found: _Found) -> Crossings:
+    findings: list[Finding] = []
+    crossing, overlap = _joined(found.crossing), _joined(found.overlap)
+    name = topology.mesh.name
+
+    def places(pairs: Ints) -> list[Location]:
+        shown = []
+        for i in pairs[:9, 0]:
+            centre = sum(faces.vertices[corner[i]] for corner in faces.corners) / 3
+            xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
+            shown.append(Location(face=int(faces.original[i]), xyz=xyz, part=name))
+        return sorted(shown, key=lambda place: place.face or 0)
+
+    for code, pairs, what in (("G001", crossing, "cross"), ("G004", overlap, "overlap in one plane")):
+        if len(pairs):
+            findings.append(finding(code, f"{len(pairs)} pairs of faces {what}", len(pairs), places(pairs)))
+    touching = _joined(found.contact)
+    if not len(touching):
+        return Crossings(tuple(findings), bool(len(crossing)))
+    shells = np.unique(np.sort(faces.shell[touching], axis=1), axis=0).astype(np.int64)
+    through = {tuple(row) for row in np.sort(faces.shell[crossing], axis=1).tolist()}
+    only = np.array([tuple(row) not in through for row in shells.tolist()], bool)
+    if only.any():
+        n = int(only.sum())
+        findings.append(finding("G003", f"{n} pairs of shells touch", n, places(touching)))
+    return Crossings(tuple(findings), bool(len(crossing)), shells)
+
+
+def _joined(blocks: list[Ints]) -> Ints:
+    return np.concatenate(blocks) if blocks else np.empty((0, 2), np.int32)

@@ -1,0 +1,105 @@
+"""Signs of determinants that are never wrong: a float filter with an error bound, whole numbers for what it leaves.
+
+orient3d(a, b, c, d) is the sign of det(a - d, b - d, c - d): positive where d lies below the plane through a, b, c
+(seen so that a, b, c turn anticlockwise), zero where all four are coplanar. The bound is Shewchuk's (1997), for
+differences that are rounded themselves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from unitcad.check.mesh import Floats, Ints
+
+_EPS = np.finfo(np.float64).eps / 2
+_O3D = (7.0 + 56.0 * _EPS) * _EPS
+_O2D = (3.0 + 16.0 * _EPS) * _EPS
+
+
+def orient3d(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
+    """The sign of orient3d for each row of four (n, 3) arrays, int8."""
+    ad, bd, cd = a - d, b - d, c - d
+    one, two = bd[:, 0] * cd[:, 1], cd[:, 0] * bd[:, 1]
+    three, four = cd[:, 0] * ad[:, 1], ad[:, 0] * cd[:, 1]
+    five, six = ad[:, 0] * bd[:, 1], bd[:, 0] * ad[:, 1]
+    det = ad[:, 2] * (one - two) + bd[:, 2] * (three - four) + cd[:, 2] * (five - six)
+    permanent = np.abs(ad[:, 2]) * (np.abs(one) + np.abs(two))
+    permanent += np.abs(bd[:, 2]) * (np.abs(three) + np.abs(four))
+    permanent += np.abs(cd[:, 2]) * (np.abs(five) + np.abs(six))
+    sign = np.sign(det).astype(np.int8)
+    unsure = np.flatnonzero(np.abs(det) <= _O3D * permanent + 1e-290)
+    if len(unsure):
+        sign[unsure] = _exact3d(a[unsure], b[unsure], c[unsure], d[unsure])
+    return sign
+
+
+def orient2d(a: Floats, b: Floats, c: Floats) -> Ints:
+    """The sign of the area of each triangle a, b, c in the plane, (n, 2) arrays: positive anticlockwise."""
+    left = (a[:, 0] - c[:, 0]) * (b[:, 1] - c[:, 1])
+    right = (a[:, 1] - c[:, 1]) * (b[:, 0] - c[:, 0])
+    det = left - right
+    sign = np.sign(det).astype(np.int8)
+    unsure = np.flatnonzero(np.abs(det) <= _O2D * (np.abs(left) + np.abs(right)) + 1e-290)
+    if len(unsure):
+        whole = integers(np.stack([a[unsure], b[unsure], c[unsure]]))
+        if whole.dtype == np.int64:
+            u, v = whole[0] - whole[2], whole[1] - whole[2]
+            sign[unsure] = np.sign(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        else:
+            for place, (p, q, r) in zip(unsure, whole.transpose(1, 0, 2).tolist(), strict=True):
+                value = (p[0] - r[0]) * (q[1] - r[1]) - (p[1] - r[1]) * (q[0] - r[0])
+                sign[place] = (value > 0) - (value < 0)
+    return sign
+
+
+def _exact3d(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
+    """The same with whole numbers. Many coplanar faces lie on an axis: equal coordinates are seen without arithmetic."""
+    sign = np.zeros(len(a), np.int8)
+    flat = ((a == b) & (b == c) & (c == d)).any(axis=1)
+    rest = np.flatnonzero(~flat)
+    if not len(rest):
+        return sign
+    whole = integers(np.stack([a[rest], b[rest], c[rest], d[rest]]))
+    u, v, w = (whole[i] - whole[3] for i in range(3))
+    if whole.dtype == np.int64 and _bits(u, v, w) <= 61:
+        value = (
+            u[:, 2] * (v[:, 0] * w[:, 1] - w[:, 0] * v[:, 1])
+            + v[:, 2] * (w[:, 0] * u[:, 1] - u[:, 0] * w[:, 1])
+            + w[:, 2] * (u[:, 0] * v[:, 1] - v[:, 0] * u[:, 1])
+        )
+        sign[rest] = np.sign(value)
+        return sign
+    for place, (p, q, r) in zip(rest, zip(u.tolist(), v.tolist(), w.tolist(), strict=True), strict=True):
+        value = (
+            p[2] * (q[0] * r[1] - r[0] * q[1]) + q[2] * (r[0] * p[1] - p[0] * r[1]) + r[2] * (p[0] * q[1] - q[0] * p[1])
+        )
+        sign[place] = (value > 0) - (value < 0)
+    return sign
+
+
+def _bits(*arrays: Ints) -> int:
+    """Bits that a determinant of these differences needs."""
+    return 3 * max(int(np.abs(array).max(initial=1)).bit_length() for array in arrays) + 3
+
+
+def integers(values: Floats) -> np.ndarray:
+    """The floats times one power of two that makes them all whole: int64 where that fits 31 bits, else Python ints."""
+    mantissa, exponent = np.frexp(values)
+    lowest = np.where(values == 0, 10_000, exponent - 53)
+    least = int(lowest.min(initial=10_000))
+    if least == 10_000:
+        return np.zeros(values.shape, np.int64)
+    # Strip trailing zero bits that all values share, so that float32 coordinates stay small.
+    digits = np.ldexp(mantissa, 53).astype(np.int64)
+    nonzero = digits[digits != 0]
+    trailing = np.log2((nonzero & -nonzero).astype(np.float64)).astype(np.int64)
+    scale = int((exponent[digits != 0] - 53 + trailing).min())
+    scaled = np.ldexp(values, -scale)
+    if np.abs(scaled).max() < 2**30:
+        return scaled.astype(np.int64)
+    shift = (exponent - 53 - scale).tolist()
+    found = np.empty(values.shape, object)
+    flat, whole, shifts = found.reshape(-1), digits.reshape(-1).tolist(), np.asarray(shift).reshape(-1).tolist()
+    for i, (value, by) in enumerate(zip(whole, shifts, strict=True)):
+        flat[i] = 0 if value == 0 else (value << by if by >= 0 else value >> -by)
+    return found

@@ -1,0 +1,123 @@
+"""Pairs of faces whose boxes meet, found by a tree of boxes that is walked level by level, all nodes of it at once.
+
+Faces are put in Morton order of their centres; every four neighbours share a box, every four of those the next. A walk
+down keeps the pairs of boxes that meet. Each step gathers whole rows and compares 4 x 4 boxes by broadcasting.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from unitcad.check.limits import Deadline
+from unitcad.check.mesh import Floats, Ints, sorted_with_order
+
+_FAN = 4
+_STEP_BITS = 15
+_STEP = 1 << _STEP_BITS  # pairs of nodes looked at together: their rows stay in the processor's cache
+_BITS = 14
+
+
+def morton_order(vertices: Floats, faces: Ints) -> Ints:
+    """The order of faces along a space-filling curve through the middles of their boxes."""
+    low, size = vertices.min(axis=0), np.ptp(vertices, axis=0)
+    scale = (2**_BITS - 1) / max(float(size.max()), 1e-300)
+    key = np.zeros(len(faces), np.uint64)
+    for axis in range(3):
+        column = (vertices[:, axis] - low[axis]) * scale
+        middle = column[faces[:, 0]] + column[faces[:, 1]]
+        middle += column[faces[:, 2]]
+        middle /= 3
+        key |= _spread(middle.astype(np.uint64)) << np.uint64(axis)
+    return sorted_with_order(key, 3 * _BITS)[1]
+
+
+def _spread(value: np.ndarray) -> np.ndarray:
+    """Bits of `value` (up to 16) moved three apart."""
+    for shift, mask in ((16, 0xFF0000FF), (8, 0x0F00F00F00F), (4, 0xC30C30C30C3), (2, 0x249249249249)):
+        value = (value | (value << np.uint64(shift))) & np.uint64(mask)
+    return value
+
+
+def boxes_of(vertices: Floats, faces: Ints) -> np.ndarray:
+    """Boxes of the faces, (m, 6) float32, low corner then negated high corner, rounded outwards."""
+    boxes = np.empty((len(faces), 6), np.float32)
+    for axis in range(3):
+        column = vertices[:, axis]
+        a, b, c = (column[faces[:, side]] for side in range(3))
+        low = np.minimum(np.minimum(a, b), c).astype(np.float32)
+        high = np.maximum(np.maximum(a, b), c).astype(np.float32)
+        boxes[:, axis] = np.nextafter(low, np.float32(-np.inf))
+        boxes[:, axis + 3] = -np.nextafter(high, np.float32(np.inf))
+    return boxes
+
+
+def meeting_pairs(boxes: np.ndarray, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
+    """Blocks of pairs i < j of rows of `boxes` whose boxes meet. Rows near each other should be near in space."""
+    levels = [_padded(boxes)]
+    while len(levels[-1]) > _FAN:
+        levels.append(_padded(levels[-1].reshape(-1, _FAN, 6).min(axis=1)))
+    top = len(levels[-1])
+    first, second = (side.astype(np.int32) for side in np.triu_indices(top))
+    for level in range(len(levels) - 1, 0, -1):
+        rows = np.ascontiguousarray(levels[level - 1].reshape(-1, _FAN * 6).T)
+        keep = first < rows.shape[1]
+        keep &= second < rows.shape[1]
+        first, second = first[keep], second[keep]
+        if level > 1:
+            blocks = list(_walk(rows, first, second, deadline, same=True))
+            first = np.concatenate([block[0] for block in blocks])
+            second = np.concatenate([block[1] for block in blocks])
+        else:
+            yield from _walk(rows, first, second, deadline, same=False)
+    if len(levels) == 1:
+        apart = first != second
+        yield from _direct(levels[0], first[apart], second[apart])
+
+
+def _padded(boxes: np.ndarray) -> np.ndarray:
+    """Rows up to a multiple of the fan, the added ones empty: they meet nothing."""
+    more = -len(boxes) % _FAN
+    return np.concatenate([boxes, np.full((more, 6), np.inf, np.float32)]) if more else boxes
+
+
+def _direct(boxes: np.ndarray, first: Ints, second: Ints) -> Iterator[tuple[Ints, Ints]]:
+    meet = ((boxes[first, :3] <= -boxes[second, 3:]) & (boxes[second, :3] <= -boxes[first, 3:])).all(axis=1)
+    yield first[meet], second[meet]
+
+
+def _walk(
+    rows: np.ndarray, first: Ints, second: Ints, deadline: Deadline, *, same: bool
+) -> Iterator[tuple[Ints, Ints]]:
+    """Children of the node pairs whose boxes meet; a column of `rows` holds a node's children. `same` keeps a child paired with itself, for the next level."""
+    column = np.arange(_FAN, dtype=np.int32)
+    grid_i, grid_j = (side.reshape(-1) for side in np.meshgrid(column, column, indexing="ij"))
+    half = grid_i <= grid_j if same else grid_i < grid_j
+    empty = True
+    for start in range(0, len(first), _STEP):
+        deadline.tick()
+        i, j = first[start : start + _STEP], second[start : start + _STEP]
+        a = rows.take(i, axis=1).reshape(_FAN, 6, -1)
+        b = rows.take(j, axis=1).reshape(_FAN, 6, -1)
+        high_a, high_b = -a[:, 3:], -b[:, 3:]
+        meet = np.zeros((_FAN, _FAN, 1 << _STEP_BITS), bool)
+        hit = np.empty(len(i), bool)
+        part = np.empty(len(i), bool)
+        for p in range(_FAN):
+            for q in range(_FAN):
+                np.less_equal(a[p, 0], high_b[q, 0], out=hit)
+                for axis in range(3):
+                    if axis:
+                        hit &= np.less_equal(a[p, axis], high_b[q, axis], out=part)
+                    hit &= np.less_equal(b[q, axis], high_a[p, axis], out=part)
+                meet[p, q, : len(i)] = hit
+        own = np.flatnonzero(i == j)
+        if len(own):
+            meet.reshape(_FAN * _FAN, -1)[np.ix_(~half, own)] = False
+        found = np.flatnonzero(meet)
+        which, pair = found >> _STEP_BITS, found & (_STEP - 1)
+        empty = False
+        yield i[pair] * _FAN + grid_i[which], j[pair] * _FAN + grid_j[which]
+    if empty:
+        yield np.empty(0, np.int32), np.empty(0, np.int32)
