@@ -24,7 +24,7 @@ def layer_colour(index: int) -> tuple[float, float, float]:
 
 
 def unit_bodies(spec: Spec) -> tuple[Body, ...]:
-    """The bodies of the unit: layers from the inside out, then motor and circuit, as assembled on the skin z = 0."""
+    """The bodies of the unit as assembled on the skin z = 0: layers from the inside out, motor, circuit or wires."""
     dims = dimensions(spec)
     bodies = [
         Body(f"layer{i + 1}", "unit", shape, layer_colour(i), made="cast", step=i + 1)
@@ -33,4 +33,9 @@ def unit_bodies(spec: Spec) -> tuple[Body, ...]:
     bodies.append(Body("motor", "unit", common.motor(dims), _MOTOR_COLOUR, made="bought"))
     if spec.fpcb:
         bodies.append(Body("fpcb", "unit", common.circuit(spec, dims), _CIRCUIT_COLOUR, made="bought"))
+    if spec.wires:
+        bodies += [
+            Body(f"wire{i + 1}", "unit", shape, _CIRCUIT_COLOUR, made="bought")
+            for i, shape in enumerate(common.wires(spec, dims))
+        ]
     return tuple(bodies)

@@ -1,4 +1,4 @@
-"""What both designs share: motor, circuit, and the slot that lets the tail out.
+"""What both designs share: motor, circuit or wires, and the slot that lets the tail out.
 
 z
 |   .--------- pad, radius pad_radius ---------.========== tail ===  circuit_z
@@ -8,7 +8,7 @@ z
 
 from __future__ import annotations
 
-from unitcad.shape import Shape, box, cut, cylinder, union
+from unitcad.shape import Shape, box, cut, cylinder, moved, turned, union
 from unitcad.spec import Dimensions, Spec
 
 BEYOND = 1.0
@@ -31,13 +31,24 @@ def circuit(spec: Spec, dims: Dimensions) -> Shape:
     return union((cylinder(dims.pad_radius, low, high), *tails))
 
 
+def wires(spec: Spec, dims: Dimensions) -> list[Shape]:
+    """The wires, from the motor's side out along +x, side by side, their tops level with the core's."""
+    assert spec.wires is not None
+    radius = spec.wires.diameter_mm / 2
+    lying = turned(cylinder(radius, dims.motor_radius, dims.outer_radius + spec.wires.length_mm), "y", 1)
+    return [moved(lying, 0, y, dims.core_height - radius) for y in dims.wires_y]
+
+
 def strip(dims: Dimensions, side: int, reach: float, half_width: float, z0: float, z1: float) -> Shape:
     """A flat strip that leaves radially on one side, from the ledge's round riser outwards to x = `reach` (mm)."""
     flat = box(min(0, side * reach), max(0, side * reach), -half_width, half_width, z0, z1)
     return cut(flat, [cylinder(dims.ledge_radius, z0 - BEYOND, z1 + BEYOND)])
 
 
-def slot(dims: Dimensions, side: int) -> Shape:
-    """The passage of one tail through every layer, open outwards."""
-    assert dims.slot_z is not None
-    return strip(dims, side, dims.outer_radius + BEYOND, dims.slot_width / 2, *dims.slot_z)
+def slots(dims: Dimensions) -> list[Shape]:
+    """The passages of tails or wires through every layer, open outwards; one that ends at the top is open upwards."""
+    if not dims.slot_z:
+        return []
+    low, high = dims.slot_z
+    high += BEYOND if high >= dims.heights[0] else 0.0
+    return [strip(dims, side, dims.outer_radius + BEYOND, dims.slot_width / 2, low, high) for side in dims.sides]

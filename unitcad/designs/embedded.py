@@ -7,11 +7,15 @@
 
 from __future__ import annotations
 
-from unitcad.shape import Shape, ring
+from unitcad.designs.common import slots
+from unitcad.shape import Shape, cut, ring
 from unitcad.spec import Dimensions
 
 
 def layers(dims: Dimensions) -> tuple[Shape, ...]:
-    """Layer i: the tube from the radius of the one inside it to its own, as high as the motor."""
+    """Layer i: the tube from the radius of the one inside it to its own, as high as the motor, less the wires' way."""
     inner = (dims.cavity_radius, *dims.radii[:-1])
-    return tuple(ring(r0, r1, 0, height) for r0, r1, height in zip(inner, dims.radii, dims.heights, strict=True))
+    return tuple(
+        cut(ring(r0, r1, 0, height), slots(dims))
+        for r0, r1, height in zip(inner, dims.radii, dims.heights, strict=True)
+    )

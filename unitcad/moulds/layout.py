@@ -11,25 +11,32 @@ from unitcad.spec import Dimensions, Spec
 
 PLINTH_DRAFT_DEG = 5.0
 CORNER_RADIUS = 2.0
+BLADE_HEIGHT = 12.0
 KEY = 5.0
-"""Leg of the plinth's cut corner: the cup goes on in one attitude only."""
-TEXT_MARGIN = 1.0
+"""Leg of the plinth's cut corner: the cup goes on in one attitude only. Less on a plinth too small for it."""
+KEY_SHARE = 2 - math.sqrt(2)
+"""The leg over a cell's half side, at most: the cut then stays as far from the bore as the plinth's sides."""
+TEXT_MARGIN, TEXT_GAP = 1.0, 0.3
+MOST_CELLS = 255
+"""Cells are numbered by two hexadecimal digits."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One cavity: its centre, and the sides (+1, -1 along x) where its tails leave."""
+    """One cavity: its centre, the sides (+1, -1 along x) where its tails leave, and its number among several ("")."""
 
     x: float
     y: float
     sides: tuple[int, ...]
+    name: str = ""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Cells and half sizes along x and y (mm): `plinth` at z = 0, `cup` and `plate` outside."""
+    """Cells and half sizes along x and y (mm): `plinth` at z = 0, `cup` and `plate` outside; `key` is a leg."""
 
     cells: tuple[Cell, ...]
+    key: float
     pitch: float
     plinth: tuple[float, float]
     plinth_foot: tuple[float, float]
@@ -39,42 +46,86 @@ class Layout:
 
 
 def layout(spec: Spec, dims: Dimensions) -> Layout:
-    """The layout of a spec's moulds. Raises Refusal where the plate exceeds the bed or a tail reaches no edge."""
-    assert spec.moulds.cavities != "fill"
-    columns, rows = spec.moulds.cavities
-    limit = {0: None, 1: 2, 2: 1}[len(dims.sides)] if spec.design == "encapsulating" else None
-    if limit is not None and columns > limit:
+    """The layout of a spec's moulds; "fill" is as many cavities as the bed takes.
+
+    Raises Refusal where a plate or a piece's height exceeds the bed, or a tail reaches no edge.
+    """
+    most = most_columns(dims)
+    if spec.moulds.cavities == "fill":
+        columns, rows = _fill(spec, dims, most)
+    else:
+        columns, rows = spec.moulds.cavities
+    if columns > most:
         raise Refusal(
-            "moulds.cavities", [columns, rows], f"a tail must reach an edge: {limit} column(s) at most", [limit, rows]
+            "moulds.cavities", [columns, rows], f"a tail must reach an edge: {most} column(s) at most", [most, rows]
         )
+    if columns * rows > MOST_CELLS:
+        fits = [min(columns, MOST_CELLS), max(1, MOST_CELLS // columns)]
+        raise Refusal("moulds.cavities", [columns, rows], f"cells are numbered up to {MOST_CELLS}", fits)
     found = _layout(spec, dims, columns, rows)
-    bed = spec.moulds.bed_x_mm or 0.0, spec.moulds.bed_y_mm or 0.0
-    over = [2 * size - room for size, room in zip(found.plate, bed, strict=True)]
+    over = _excess(spec, found)
     if max(over) > 1e-9:
         raise _too_large(spec, found, columns, rows, over)
+    tallest = max(spec.moulds.plinth_height_mm + spec.moulds.plate_mm + dims.heights[-1], BLADE_HEIGHT)
+    if tallest > (spec.moulds.bed_z_mm or 0.0) + 1e-9:
+        nearest = math.ceil(tallest * 100) / 100
+        raise Refusal("moulds.bed_z_mm", spec.moulds.bed_z_mm, f"the tallest piece has {tallest:.4g} mm", nearest)
     return found
+
+
+def most_columns(dims: Dimensions) -> int:
+    """Columns of a gang: a tail, or the tongue for it, must reach an edge along x; without tails any number will do."""
+    return {0: MOST_CELLS, 1: 2, 2: 1}[len(dims.sides) if dims.slot_z else 0]
+
+
+def _fill(spec: Spec, dims: Dimensions, most: int) -> tuple[int, int]:
+    """As many columns and rows as the bed takes, or one. Found by trying: the pitch depends on the count."""
+    columns = rows = 1
+    while columns < most and _excess(spec, _layout(spec, dims, columns + 1, 1))[0] <= 1e-9:
+        columns += 1
+    while columns * (rows + 1) <= MOST_CELLS and max(_excess(spec, _layout(spec, dims, columns, rows + 1))) <= 1e-9:
+        rows += 1
+    return columns, rows
+
+
+def _excess(spec: Spec, found: Layout) -> list[float]:
+    """By how much the plate exceeds the bed along x and y (mm)."""
+    bed = spec.moulds.bed_x_mm or 0.0, spec.moulds.bed_y_mm or 0.0
+    return [2 * size - room for size, room in zip(found.plate, bed, strict=True)]
 
 
 def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
     moulds = spec.moulds
     land, groove, stroke = moulds.land_mm or 0, moulds.groove_width_mm or 0, moulds.engraving_stroke_mm or 0
-    pitch = float(math.ceil(2 * dims.outer_radius + 2 * land + groove - 1e-9))
     reach = dims.outer_radius + land + groove
+    count, label = columns * rows, HEIGHT * stroke
+    digits = 0 if count == 1 else 1 if count < 16 else 2
+    pitch = float(math.ceil(2 * dims.outer_radius + 2 * land + groove - 1e-9))
+    number = text_width("0" * digits, stroke) / 2 if digits else 0.0, label / 2
+    while digits and math.hypot(max(pitch / 2 - number[0], 0), max(pitch / 2 - number[1], 0)) < reach + TEXT_GAP:
+        pitch += 1.0
     half = (columns - 1) / 2 * pitch, (rows - 1) / 2 * pitch
     plinth = half[0] + reach, half[1] + reach
     splay = moulds.plinth_height_mm * math.tan(math.radians(PLINTH_DRAFT_DEG))
     foot = plinth[0] + splay, plinth[1] + splay
     skirt = (moulds.plinth_clearance_mm or 0) + (moulds.skirt_wall_mm or 0)
-    label = HEIGHT * stroke
     corner = _corner_for_label(reach + 0.6, text_width("00", stroke), label)
-    cup = max(foot[0] + skirt, half[0] + corner), max(foot[1] + skirt, half[1] + corner)
+    # The numbers of the last column and row lie outside its bores too.
+    beside = [pitch / 2 + size + TEXT_MARGIN if digits else 0.0 for size in number]
+    cup = max(foot[0] + skirt, half[0] + max(corner, beside[0])), max(foot[1] + skirt, half[1] + max(corner, beside[1]))
     margin = label + 2 * 0.6
     cells = tuple(
-        Cell((i - (columns - 1) / 2) * pitch, (j - (rows - 1) / 2) * pitch, _sides(dims, i, columns))
+        Cell(
+            (i - (columns - 1) / 2) * pitch,
+            (j - (rows - 1) / 2) * pitch,
+            _sides(dims, i, columns),
+            f"{j * columns + i + 1:0{digits}X}" if digits else "",
+        )
         for j in range(rows)
         for i in range(columns)
     )
-    return Layout(cells, pitch, plinth, foot, cup, (cup[0] + margin, cup[1] + margin), label)
+    key = min(KEY, KEY_SHARE * reach)
+    return Layout(cells, key, pitch, plinth, foot, cup, (cup[0] + margin, cup[1] + margin), label)
 
 
 def _sides(dims: Dimensions, column: int, columns: int) -> tuple[int, ...]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from unitcad.designs import unit_bodies
-from unitcad.moulds import tooling
+from unitcad.moulds import filament, lid, tooling
 from unitcad.moulds.layout import Cell, Layout, layout
 from unitcad.shape import Shape, Union, content_hash, moved, turned
 from unitcad.shape.body import Body
-from unitcad.spec import Dimensions, Spec, dimensions
+from unitcad.spec import Dimensions, Spec, dimensions, printer_of
 
 _BASE, _CUP, _CUP2, _TONGUE = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.73, 0.83, 0.93), (0.90, 0.30, 0.30)
-_BLADE, _STUB = (0.87, 0.87, 0.55), (0.22, 0.22, 0.22)
+_BLADE, _STUB, _LID = (0.87, 0.87, 0.55), (0.22, 0.22, 0.22), (0.80, 0.72, 0.90)
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,9 @@ class Step:
     """One pour: the layer it casts, the tools that stand around it (by name), and what is there already.
 
     `layer` is the cast layer in the frame of the tools, one solid a cell; `earlier` the cured ones; `seals` what
-    silicone is kept from though no tool fills it. `rim` is z of the plane that the blade runs on.
+    silicone is kept from though no tool fills it; `channels` the silicone in sprue and vents, as many a cell.
+    `rim` is z of the plane that the blade runs on, `top` where the silicone is open: the rim or the lid's upper face.
+    `windows` counts the cup's passages for tongues that are closed all round.
     """
 
     index: int
@@ -31,6 +33,19 @@ class Step:
     earlier: tuple[Shape, ...]
     seals: tuple[Shape, ...]
     rim: float
+    top: float
+    channels: tuple[Shape, ...] = ()
+    windows: int = 0
+
+    @property
+    def cup(self) -> str:
+        """The cup's name."""
+        return f"cup{self.index}"
+
+    @property
+    def lid(self) -> str | None:
+        """The lid's name; None for an open pour."""
+        return f"lid{self.index}" if self.channels else None
 
 
 @dataclass(frozen=True)
@@ -46,29 +61,42 @@ class Plan:
         """The tool of that name. Raises KeyError."""
         return {tool.name: tool for tool in self.tools}[name]
 
+    @property
+    def tongue_sides(self) -> dict[str, int]:
+        """The side (+1, -1 along x) that each tongue is pulled out to."""
+        sides = [side for cell in self.layout.cells for side in cell.sides]
+        names = [tool.name for tool in self.tools if tool.name.startswith("tongue")]
+        return dict(zip(names, sides, strict=True)) if names else {}
+
 
 def plan(spec: Spec) -> Plan:
-    """The plan of a spec. Raises Refusal where the moulds can't be: beyond the bed, a tail that reaches no edge."""
+    """The plan of a spec. Raises Refusal where the moulds can't be: beyond the bed, a tail that reaches no edge, a lid
+    whose vents can't clear.
+    """
     dims = dimensions(spec)
     lay = layout(spec, dims)
     blank = _tools(spec, dims, lay, "")
-    unit = unit_bodies(spec)
-    layers = tuple(body.shape for body in unit if body.made == "cast")
+    layers = tuple(body.shape for body in unit_bodies(spec) if body.made == "cast")
     # Material variants share pieces: the label is of geometry alone, drawn before there is a label on it.
     label = content_hash(Union((*(tool.shape for tool in blank), *layers)))[:4].upper()
     tools = _tools(spec, dims, lay, label)
     cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
     around = [t.name for t in tools if t.name.startswith(("tongue", "stub"))]
+    injected = spec.moulds.pour == "injected"
+    tails = sum(len(cell.sides) for cell in lay.cells) if dims.slot_z else 0
     steps = tuple(
         Step(
             index=i + 1,
             name=f"layer{i + 1}",
             material=layer.material,
-            tools=("base", f"cup{i + 1}", *around),
+            tools=("base", f"cup{i + 1}", *([f"lid{i + 1}"] if injected else []), *around),
             layer=cast[i],
             earlier=tuple(shape for earlier in cast[:i] for shape in earlier),
             seals=tuple(tooling.seals(spec, dims, lay, i)),
             rim=dims.heights[i],
+            top=lid.lid_top(dims, i) if injected else dims.heights[i],
+            channels=tuple(lid.channels(spec, dims, lay, i)) if injected else (),
+            windows=tails if dims.slot_z and dims.slot_z[1] < dims.heights[i] else 0,
         )
         for i, layer in enumerate(spec.layers)
     )
@@ -81,21 +109,30 @@ def placed(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
 
 
 def _tools(spec: Spec, dims: Dimensions, lay: Layout, label: str) -> tuple[Body, ...]:
+    """Every tool, in the order in which a person takes them up; without a label they are drawn blank."""
     found = [Body("base", "tool", tooling.base(spec, dims, lay, f"B{label}" if label else ""), _BASE)]
+    injected = spec.moulds.pour == "injected"
     for i in range(len(spec.layers)):
         text = (f"C{i + 1:X}", label[:2], label[2:]) if label else None
         shape = tooling.cup(spec, dims, lay, i, text)
         found.append(Body(f"cup{i + 1}", "tool", shape, _CUP2 if i % 2 else _CUP, step=i + 1, upside_down=True))
-    brittle = spec.moulds.slot_height_mm is not None and spec.moulds.printer.startswith("sla")
+        if injected:
+            text = (f"L{i + 1:X}", label[:2], label[2:]) if label else None
+            shape = lid.lid(spec, dims, lay, i, text)
+            found.append(Body(f"lid{i + 1}", "tool", shape, _LID, step=i + 1, upside_down=True))
+    # A printed resin is too brittle for a strip this thin: it is cut from film or steel.
+    brittle = printer_of(spec).technology.value == "sla"
     strips = tooling.tongues(spec, dims, lay)
     found += [
         Body(_numbered("tongue", i, strips), "tool", shape, _TONGUE, made="cut" if brittle else "printed")
         for i, shape in enumerate(strips)
     ]
     if spec.design == "encapsulating":
-        stubs = [tooling.stub(spec, dims, lay, cell) for cell in lay.cells]
+        bottom = tooling.plate_bottom(spec)
+        stubs = [filament.stub(spec, dims, lay, cell, bottom) for cell in lay.cells]
         found += [Body(_numbered("stub", i, stubs), "tool", s, _STUB, made="cut") for i, s in enumerate(stubs)]
-    found.append(Body("blade", "tool", tooling.blade(lay, dims.heights[-1]), _BLADE, upside_down=True))
+    if not injected:
+        found.append(Body("blade", "tool", tooling.blade(lay, dims.heights[-1]), _BLADE, upside_down=True))
     return tuple(found)
 
 

@@ -18,12 +18,12 @@ from __future__ import annotations
 import math
 
 from unitcad.designs.common import BEYOND, strip
-from unitcad.moulds.layout import CORNER_RADIUS, KEY, PLINTH_DRAFT_DEG, TEXT_MARGIN, Cell, Layout
+from unitcad.moulds import filament
+from unitcad.moulds.layout import BLADE_HEIGHT, CORNER_RADIUS, PLINTH_DRAFT_DEG, TEXT_MARGIN, Cell, Layout
 from unitcad.shape import (
     Common,
     Extrude,
     Profile,
-    Revolve,
     Shape,
     box,
     cut,
@@ -37,16 +37,10 @@ from unitcad.shape import (
 )
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
 from unitcad.spec import Dimensions, Spec
-from unitcad.spec.door import groove_depth
 
 PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER = 1.5, 4.0, 1.5
-GRIP_LENGTH, GRIP_WIDTH, GRIP_GAP = 8.0, 10.0, 3.0
-BLADE_THICKNESS, BLADE_HEIGHT, BLADE_EDGE = 3.0, 12.0, 0.8
-FLARE = 1.0
-"""Of the filament hole's lower end: the filament bends round it."""
-STUB_TAIL = 8.0
-SLACK = 0.125
-"""Of the lying filament under its groove's roof."""
+GRIP_LENGTH, GRIP_WIDTH, GRIP_GAP, GRIP_APART = 8.0, 10.0, 3.0, 0.5
+BLADE_THICKNESS, BLADE_EDGE = 3.0, 0.8
 
 
 def plate_top(spec: Spec) -> float:
@@ -66,7 +60,7 @@ def base(spec: Spec, dims: Dimensions, lay: Layout, label: str) -> Shape:
     body = union((plate, plinth(spec, lay), *(moved(core(dims), c.x, c.y) for c in lay.cells)))
     tools: list[Shape] = [_pry_slot(lay, top, side) for side in (1, -1)]
     if spec.design == "encapsulating":
-        tools += [moved(_filament_way(spec, dims, lay, c), c.x, c.y) for c in lay.cells]
+        tools += [filament.way(spec, dims, lay, c, bottom) for c in lay.cells]
     tools += [moved(notch(spec, dims, s), c.x, c.y) for c in lay.cells for s in c.sides if dims.slot_z]
     if label:
         stroke, depth = spec.moulds.engraving_stroke_mm or 0, spec.moulds.engraving_depth_mm or 0
@@ -102,7 +96,7 @@ def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int, label: tuple[str,
     tools += [groove(spec, dims, layer, c) for c in lay.cells]
     tools += windows(spec, dims, lay)
     if label:
-        tools += _corner_labels(spec, lay, rim, label)
+        tools += corner_labels(spec, lay, rim, label) + _cell_numbers(spec, lay, rim)
     return cut(cup_blank(spec, lay, rim), tools)
 
 
@@ -164,6 +158,8 @@ def tongue(spec: Spec, dims: Dimensions, lay: Layout) -> Shape:
     edge = max(lay.cup[0] - abs(c.x) for c in lay.cells)
     reach = edge + GRIP_GAP + GRIP_LENGTH
     half = max(GRIP_WIDTH, dims.slot_width + 4) / 2
+    if len(lay.cells) > 1:
+        half = max(min(half, lay.pitch / 2 - GRIP_APART), dims.slot_width / 2)
     grip = box(edge + GRIP_GAP, reach, -half, half, low, high)
     return union((strip(dims, 1, reach - 1, dims.slot_width / 2, low, high), grip))
 
@@ -177,24 +173,11 @@ def tongues(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:
 
 
 def blade(lay: Layout, rim: float) -> Shape:
-    """The strike-off blade, edge down on the rim: a bar longer than the cup, bevelled to a flat edge."""
-    half, t, e, h = lay.cup[1] + 5.0, BLADE_THICKNESS, BLADE_EDGE, BLADE_HEIGHT
+    """The strike-off blade, edge down on the rim: a bar as long as the plate, bevelled to a flat edge."""
+    half, t, e, h = lay.plate[1], BLADE_THICKNESS, BLADE_EDGE, BLADE_HEIGHT
     section = polygon((0, 0), (e, 0), (t, 2 * (t - e)), (t, h), (0, h))
     # Drawn in (x, z) and stood up: x to x, y to z, extrusion to -y.
     return moved(turned(Extrude(section, -half, half), "x", 1), 0, 0, rim)
-
-
-def stub(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell) -> Shape:
-    """The stub of printer filament: flush with the core's top, bent below into the plate's groove."""
-    radius = spec.moulds.filament_mm / 2
-    elbow = plate_bottom(spec) + groove_depth(spec) - radius - SLACK
-    ball = Revolve(Profile(((0, -radius, _QUARTER), (radius, 0, _QUARTER), (0, radius, 0.0))))
-    upright = cylinder(radius, elbow, dims.core_height)
-    length = _groove_length(spec, dims, lay, cell) - radius
-    outside = STUB_TAIL if _meets_edge(lay, cell) else 0.0
-    lying = turned(cylinder(radius, 0, length + outside), "x", 1)
-    bent = union((upright, moved(ball, z=elbow), moved(lying, z=elbow)))
-    return moved(bent, cell.x, cell.y)
 
 
 def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
@@ -216,12 +199,8 @@ def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
             for s in c.sides
         ]
     if spec.design == "encapsulating":
-        annulus = ring(spec.moulds.filament_mm / 2, (spec.moulds.filament_hole_mm or 0) / 2, -BEYOND, dims.core_height)
-        found += [moved(annulus, c.x, c.y) for c in lay.cells]
+        found += [filament.annulus(spec, dims, c) for c in lay.cells]
     return found
-
-
-_QUARTER = math.tan(math.pi / 8)
 
 
 def _tapered(lay: Layout, clearance: float, bottom: float) -> Shape:
@@ -230,7 +209,7 @@ def _tapered(lay: Layout, clearance: float, bottom: float) -> Shape:
     def section(z: float) -> Profile:
         grow = clearance - z * math.tan(math.radians(PLINTH_DRAFT_DEG))
         # A side moved out by g moves a 45 degree cut by g too, which shortens its leg by (2 - sqrt 2) g.
-        key = KEY + (2 - math.sqrt(2)) * grow
+        key = lay.key + (2 - math.sqrt(2)) * grow
         return rounded_rectangle(lay.plinth[0] + grow, lay.plinth[1] + grow, CORNER_RADIUS + grow, key)
 
     return Extrude(section(bottom), bottom, 0.0, top=section(0.0))
@@ -249,40 +228,8 @@ def _pry_slot(lay: Layout, top: float, side: int) -> Shape:
     return box(min(inner, outer), max(inner, outer), -PRY_HALF_WIDTH, PRY_HALF_WIDTH, top - PRY_DEPTH, top + BEYOND / 4)
 
 
-def _filament_way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell) -> Shape:
-    """The hole through a core, flared below, and the groove under the plate that takes the filament's bent end."""
-    radius, bottom = (spec.moulds.filament_hole_mm or 0) / 2, plate_bottom(spec)
-    depth = groove_depth(spec)
-    roof = bottom + depth
-    hole = Revolve(
-        polygon(
-            (0, roof - BEYOND / 2),
-            (radius + FLARE, roof - BEYOND / 2),
-            (radius + FLARE, roof),
-            (radius, roof + FLARE),
-            (radius, dims.core_height + BEYOND),
-            (0, dims.core_height + BEYOND),
-        )
-    )
-    length = _groove_length(spec, dims, lay, cell)
-    back = radius + FLARE
-    channel = box(-depth / 2, depth / 2, -length, back, bottom - BEYOND, roof)
-    return union((hole, channel))
-
-
-def _meets_edge(lay: Layout, cell: Cell) -> bool:
-    return cell.y == min(c.y for c in lay.cells)
-
-
-def _groove_length(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell) -> float:
-    """From the hole to the plate's edge at -y, or, behind another cell, a pocket as long as the pitch allows."""
-    if _meets_edge(lay, cell):
-        return cell.y + lay.plate[1] + BEYOND
-    return lay.pitch - (spec.moulds.filament_hole_mm or 0) / 2 - FLARE - 2 * (spec.moulds.least_wall_mm or 0)
-
-
-def _corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, str]) -> list[Shape]:
-    """Three pairs of characters in the rim's free corners; the fourth corner is the key's."""
+def corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, str]) -> list[Shape]:
+    """Three pairs of characters to engrave in a plate's corners, outside all bores; the fourth corner is the key's."""
     stroke, depth = spec.moulds.engraving_stroke_mm or 0, spec.moulds.engraving_depth_mm or 0
     width, height = text_width("00", stroke), HEIGHT * stroke
     x, y = lay.cup[0] - TEXT_MARGIN, lay.cup[1] - TEXT_MARGIN
@@ -290,4 +237,18 @@ def _corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, s
     return [
         moved(engraving(text, stroke, rim - depth, rim + BEYOND), *corner)
         for text, corner in zip(label, corners, strict=True)
+    ]
+
+
+def _cell_numbers(spec: Spec, lay: Layout, rim: float) -> list[Shape]:
+    """The number of each of several cells, in the space that the grooves leave at its upper right."""
+    stroke, depth = spec.moulds.engraving_stroke_mm or 0, spec.moulds.engraving_depth_mm or 0
+    return [
+        moved(
+            engraving(c.name, stroke, rim - depth, rim + BEYOND),
+            c.x + lay.pitch / 2 - text_width(c.name, stroke) / 2,
+            c.y + lay.pitch / 2 - HEIGHT * stroke / 2,
+        )
+        for c in lay.cells
+        if c.name
     ]

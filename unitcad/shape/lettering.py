@@ -1,4 +1,4 @@
-"""Engraved characters as polygons: seven-bar hexadecimal digits on a grid of 3 by 5 strokes.
+"""Engraved characters as polygons: seven-bar hexadecimal digits, and L, on a grid of 3 by 5 strokes.
 
 One outline a character, with its islands as holes: a boolean costs a kernel far more than a polygon's corners do.
 """
@@ -37,6 +37,7 @@ _GLYPHS = {
     "D": "bcdeg",
     "E": "adefg",
     "F": "aefg",
+    "L": "def",
 }
 CHARACTERS = frozenset(_GLYPHS)
 WIDTH, HEIGHT, PITCH = 3, 5, 4

@@ -9,6 +9,11 @@ from unitcad.spec.models import Spec
 MOTOR_CLEARANCE = 0.1
 """Least ring of air between the motor and Layer 1, mm, unless `motor.fill` closes it."""
 
+TIP_PROUD = 0.2
+"""How far a tongue for wires stands proud of the core, mm, so that Layer 1 clears them; for a circuit it is as much."""
+WIRE_GAP = 0.1
+"""Between wires side by side, mm."""
+
 
 @dataclass(frozen=True)
 class Dimensions:
@@ -18,7 +23,8 @@ class Dimensions:
     radii[i]        outer radius of layer i
     core_height     top of the core: motor, and in the encapsulating design the circuit on it
     heights[i]      top of layer i
-    slot_z          (bottom, top) of the tail's slot; None without one
+    slot_z          (bottom, top) of the slot or, in the embedded design, the notch of tail or wires; None without one
+    wires_y         where the wires' axes lie across the exit; their tops lie level with the core's
     slot_width      of the slot and the tongue in it
     ledge_radius    where the tongue's tip stops in the core
     sides           where the tail leaves: +1 along +x, -1 along -x
@@ -32,6 +38,7 @@ class Dimensions:
     motor_height: float
     pad_radius: float | None
     circuit_z: tuple[float, float] | None
+    wires_y: tuple[float, ...]
     slot_z: tuple[float, float] | None
     slot_width: float
     ledge_radius: float
@@ -50,7 +57,7 @@ class Dimensions:
 
 def dimensions(spec: Spec) -> Dimensions:
     """The dimensions of an effective spec (motor sizes and mould values filled in)."""
-    motor, fpcb, moulds = spec.motor, spec.fpcb, spec.moulds
+    motor, fpcb, wires, moulds = spec.motor, spec.fpcb, spec.wires, spec.moulds
     assert motor.diameter_mm is not None
     assert motor.thickness_mm is not None
     encapsulating = spec.design == "encapsulating"
@@ -61,11 +68,16 @@ def dimensions(spec: Spec) -> Dimensions:
     core = motor.thickness_mm + (fpcb.thickness_mm if fpcb and encapsulating else 0.0)
     caps = [layer.cap_mm or 0.0 for layer in spec.layers]
     heights = tuple(core + sum(caps[: i + 1]) for i in range(len(caps)))
-    slot = None
+    height, width = moulds.slot_height_mm or 0.0, moulds.slot_width_clearance_mm or 0.0
+    slot, wires_y = None, ()
     if fpcb and encapsulating:
-        assert moulds.slot_height_mm is not None
         middle = motor.thickness_mm + fpcb.thickness_mm / 2
-        slot = (middle - moulds.slot_height_mm / 2, middle + moulds.slot_height_mm / 2)
+        slot, width = (middle - height / 2, middle + height / 2), width + fpcb.tail_width_mm
+    if wires:
+        top = core + (TIP_PROUD if encapsulating else 0.0)
+        pitch = wires.diameter_mm + WIRE_GAP
+        wires_y = tuple((i - (wires.count - 1) / 2) * pitch for i in range(wires.count))
+        slot, width = (top - height, top), width + wires.count * pitch - WIRE_GAP
     cavity = motor_radius if motor.fill else inner
     return Dimensions(
         cavity_radius=cavity,
@@ -77,7 +89,8 @@ def dimensions(spec: Spec) -> Dimensions:
         pad_radius=fpcb.pad_diameter_mm / 2 if fpcb and fpcb.pad_diameter_mm else None,
         circuit_z=(motor.thickness_mm, motor.thickness_mm + fpcb.thickness_mm) if fpcb else None,
         slot_z=slot,
-        slot_width=(fpcb.tail_width_mm + (moulds.slot_width_clearance_mm or 0.0)) if fpcb else 0.0,
+        wires_y=wires_y,
+        slot_width=width if slot else 0.0,
         ledge_radius=cavity - moulds.ledge_mm,
-        sides=() if not fpcb else (1,) if fpcb.tail == "one" else (1, -1),
+        sides=(1, -1) if fpcb and fpcb.tail == "both" else (1,) if fpcb or wires else (),
     )

@@ -11,16 +11,19 @@ from dataclasses import replace
 
 from unitcad import catalogue
 from unitcad.errors import Refusal, unknown_name
-from unitcad.spec.dimensions import MOTOR_CLEARANCE, Dimensions, dimensions
+from unitcad.spec.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, dimensions
 from unitcad.spec.models import Spec
+from unitcad.spec.strain import allowed_strain, tail_strain, widest_tail_end
 
 DESIGNS = ("embedded", "encapsulating")
 LEAST_LAYER = 0.5
 """Least wall and cap of a layer, mm: thinner ones tear on demoulding and hide a printer's play."""
 TAIL_SHARE = 0.7
 """Half the tail's width over the core's radius, at most: beyond it the ledge has no shoulders."""
+LEDGE_SHARE = 0.95
+"""Half the notch's width over the ledge's radius, at most: beyond it the tongue's round tip has prongs."""
 SLOT_CLEARANCE = 0.2
-"""Least height of the slot over the circuit's thickness, mm."""
+"""Least height of the slot over the circuit's thickness, or a wire's on each side of it, mm."""
 UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
 """What is assumed of a motor whose entry does not say: the paper's motor."""
 _EPS = 1e-9
@@ -36,6 +39,10 @@ def checked(spec: Spec) -> Spec:
     _check_motor(spec, dims)
     if spec.fpcb:
         _check_circuit(spec, dims)
+    if spec.wires:
+        _check_wires(spec, dims)
+    if dims.slot_z:
+        _check_exit(spec, dims)
     _check_tooling(spec, dims)
     return spec
 
@@ -89,8 +96,8 @@ def _with_defaults(spec: Spec) -> Spec:
     filled = {
         name: float(getattr(printer, name)) for name, value in spec.moulds if value is None and hasattr(printer, name)
     }
-    if spec.fpcb and spec.moulds.slot_height_mm is None:
-        filled["slot_height_mm"] = max(filled["slot_height_mm"], spec.fpcb.thickness_mm + SLOT_CLEARANCE)
+    if spec.moulds.slot_height_mm is None:
+        filled["slot_height_mm"] = max(filled["slot_height_mm"], _least_slot(spec))
     moulds = spec.moulds.model_copy(update=filled)
     fpcb = spec.fpcb
     if fpcb and fpcb.pad_diameter_mm is None:
@@ -137,11 +144,8 @@ def _check_motor(spec: Spec, dims: Dimensions) -> None:
 
 
 def _check_circuit(spec: Spec, dims: Dimensions) -> None:
-    fpcb, moulds = spec.fpcb, spec.moulds
+    fpcb = spec.fpcb
     assert fpcb is not None
-    assert moulds.slot_height_mm is not None
-    assert moulds.window_clearance_mm is not None
-    assert moulds.least_wall_mm is not None
     assert dims.pad_radius is not None
     tail, pad = fpcb.tail_width_mm, fpcb.pad_diameter_mm or 0.0
     if spec.design == "embedded":
@@ -155,8 +159,8 @@ def _check_circuit(spec: Spec, dims: Dimensions) -> None:
     _at_most(
         "fpcb.tail_width_mm",
         tail,
-        2 * TAIL_SHARE * dims.cavity_radius,
-        "half the tail is at most 0.7 of the core's radius, so the tail at most",
+        widest_exit(spec, dims),
+        "half the tail is at most 0.7 of the core's radius and keeps off the ledge's ends, so the tail at most",
     )
     _at_most(
         "fpcb.pad_diameter_mm",
@@ -165,26 +169,76 @@ def _check_circuit(spec: Spec, dims: Dimensions) -> None:
         "the encapsulated pad touches Layer 1 only, so it stays in the cavity of",
     )
     _at_least("fpcb.pad_diameter_mm", pad, tail, "the pad is no narrower than the tail, which has")
+    if fpcb.tail_end_width_mm is not None:
+        _at_least("fpcb.tail_end_width_mm", fpcb.tail_end_width_mm, tail, "the tail's end is no narrower than it,")
+        allowed = allowed_strain(spec, catalogue.materials(spec.materials))
+        _at_most(
+            "fpcb.tail_end_width_mm",
+            fpcb.tail_end_width_mm,
+            widest_tail_end(spec, allowed),
+            f"passing the slot would stretch it by {tail_strain(spec) or 0:.0%}, and the silicone takes "
+            f"{allowed:.0%} with its margin: solder the end on after, widen moulds.slot_width_clearance_mm, "
+            "or make the end at most",
+        )
+
+
+def widest_exit(spec: Spec, dims: Dimensions) -> float:
+    """The widest tail, or bundle of wires, whose ledge keeps its shoulders, mm."""
+    moulds = spec.moulds
+    beside = (moulds.slot_width_clearance_mm or 0.0) + 2 * (moulds.window_clearance_mm or 0.0)
+    return min(2 * TAIL_SHARE * dims.cavity_radius, 2 * LEDGE_SHARE * dims.ledge_radius - beside)
+
+
+def _check_wires(spec: Spec, dims: Dimensions) -> None:
+    wires = spec.wires
+    assert wires is not None
+    if spec.fpcb:
+        raise Refusal("wires", "a table", "wires take the place of a circuit; leave out [fpcb] or [wires]")
+    _at_most("wires.diameter_mm", wires.diameter_mm, dims.motor_height / 2, "half the motor's thickness is")
+    bundle = wires.count * (wires.diameter_mm + WIRE_GAP) - WIRE_GAP
+    widest = widest_exit(spec, dims)
+    if bundle > widest + _EPS:
+        raise Refusal(
+            "wires.diameter_mm",
+            wires.diameter_mm,
+            f"{wires.count} side by side take {bundle:.4g} mm, and the ledge leaves {widest:.4g} mm",
+            _down((widest + WIRE_GAP) / wires.count - WIRE_GAP) if widest > wires.count * WIRE_GAP else None,
+        )
+
+
+def _check_exit(spec: Spec, dims: Dimensions) -> None:
+    """The slot's height, and a cup's walls over and under the window that its tongue goes through."""
+    moulds = spec.moulds
+    assert moulds.slot_height_mm is not None
+    assert dims.slot_z is not None
+    what = "circuit" if spec.fpcb else "wire"
     _at_least(
         "moulds.slot_height_mm",
         moulds.slot_height_mm,
-        fpcb.thickness_mm + SLOT_CLEARANCE,
-        "the slot is higher than the circuit by 0.2, so at least",
+        _least_slot(spec),
+        f"the slot takes the {what} with clearance, so at least",
     )
-    half_window = moulds.slot_height_mm / 2 + moulds.window_clearance_mm - fpcb.thickness_mm / 2
-    first = spec.layers[0].cap_mm or 0.0
-    _at_least(
-        "layers.0.cap_mm",
-        first,
-        moulds.least_wall_mm + half_window,
-        "with a tail, the cup's wall over the window needs a first cap of at least",
-    )
+    wall, clearance = moulds.least_wall_mm or 0.0, moulds.window_clearance_mm or 0.0
+    if spec.design == "encapsulating":
+        _at_least(
+            "layers.0.cap_mm",
+            spec.layers[0].cap_mm or 0.0,
+            wall + clearance + dims.slot_z[1] - dims.core_height,
+            f"with a {'tail' if spec.fpcb else 'wire'}, the cup's wall over the window needs a first cap of at least",
+        )
     _at_least(
         "motor.thickness_mm",
         dims.motor_height,
-        moulds.least_wall_mm + half_window,
-        "with a tail, the cup's wall under the window needs a motor of at least",
+        wall + clearance + dims.motor_height - dims.slot_z[0],
+        f"with a {'tail' if spec.fpcb else 'wire'}, the cup's wall under the window needs a motor of at least",
     )
+
+
+def _least_slot(spec: Spec) -> float:
+    """Least height of the slot, mm: wires under a cap have clearance on both sides; 0 where nothing leaves."""
+    if spec.wires:
+        return spec.wires.diameter_mm + SLOT_CLEARANCE * (2 if spec.design == "encapsulating" else 1)
+    return spec.fpcb.thickness_mm + SLOT_CLEARANCE if spec.fpcb else 0.0
 
 
 def _check_tooling(spec: Spec, dims: Dimensions) -> None:

@@ -40,6 +40,17 @@ class FpcbTable(Table):
     tail_width_mm: Positive = 3.0
     tail_length_mm: Annotated[Positive, Field(description="how far the tail stands out of the body")] = 10.0
     pad_diameter_mm: Positive | None = None
+    tail_end_width_mm: Positive | None = Field(
+        default=None, description="of a tail's free end, which must pass the slot"
+    )
+
+
+class WiresTable(Table):
+    """Wires instead of a circuit: side by side, from the motor's side out along +x, through one exit."""
+
+    diameter_mm: Positive
+    count: Annotated[int, Field(strict=True, ge=1, le=8)] = 2
+    length_mm: Positive = Field(default=10.0, description="how far the wires stand out of the body")
 
 
 class LayerTable(Table):
@@ -73,6 +84,13 @@ class MouldsTable(Table):
     filament_hole_mm: Positive | None = None
     engraving_depth_mm: Positive | None = None
     engraving_stroke_mm: Positive | None = None
+    pour: Literal["open", "injected"] = "open"
+    sprue_mm: Annotated[float, Field(strict=True, ge=3.0)] = Field(
+        default=3.0, description="3 by syringe, 4 by gravity"
+    )
+    vents: Count | None = Field(
+        default=None, description="of each cavity under a lid; None takes as many as clear the air"
+    )
     filament_mm: Positive = 1.75
     plinth_height_mm: Positive = 2.0
     plate_mm: Positive = 4.0
@@ -119,6 +137,7 @@ class Spec(Table):
     diameter_mm: Positive
     motor: MotorTable = MotorTable(part="LCM0720A3463F")
     fpcb: FpcbTable | None = None
+    wires: WiresTable | None = None
     layers: Annotated[tuple[LayerTable, ...], Field(min_length=1, max_length=15)]
     moulds: MouldsTable = MouldsTable()
     casting: CastingTable = CastingTable()

@@ -1,0 +1,148 @@
+"""Law C400: air finds its way out. Every high region of a cavity meets the rim or a vent, level and tilted.
+
+A high region is a peak of the cavity's height function that is a ceiling, not the top of something standing in it. Its
+depth is what separates the peak from the saddle over which it would empty; a dent shallower than a tenth of the layer's
+thinnest part thins it by less than the printer's play does, and counts as none.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from manifold3d import Manifold
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from unitcad.kernels.mesh import arrays
+from unitcad.moulds.finding import Finding, at_most
+from unitcad.moulds.lid import DENT, TILT_DEG
+from unitcad.moulds.plan import Step
+
+ATTITUDES = ((0.0, 0.0), (TILT_DEG, 0.0), (TILT_DEG, 90.0), (TILT_DEG, 180.0), (TILT_DEG, 270.0))
+"""(tilt, azimuth of the side that is raised) in degrees. Vents lie halfway between these azimuths: the worst case."""
+_SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Pocket:
+    """Air held back: depth (mm), volume (mm3) and attitude (degrees)."""
+
+    depth: float
+    volume: float
+    tilt: float
+    azimuth: float
+
+
+def air_law(step: Step, cells: list[Manifold], thinnest: float) -> list[Finding]:
+    """C400 for each cell of a pour: the deepest pocket over the five attitudes, in mm."""
+    found = []
+    for i, cavity in enumerate(cells):
+        pocket = deepest_pocket(cavity, step.top)
+        where = f"pour {step.index}" + (f" cell {i + 1}" if len(cells) > 1 else "")
+        advice = ""
+        if pocket.depth > DENT * thinnest:
+            volume = pocket_volume(cavity, step.top, pocket)
+            where += f", tilted by {pocket.tilt:g} degrees towards {pocket.azimuth:g}"
+            advice = f"{volume:.3g} mm3 of air find no way to the rim or a vent"
+        found.append(at_most("C400", where, pocket.depth, DENT * thinnest, "mm", advice))
+    return found
+
+
+def deepest_pocket(cavity: Manifold, top: float) -> Pocket:
+    """The deepest pocket of a cavity that is open at z = `top` (mm), over `ATTITUDES`; its volume is not worked out."""
+    surface = _Surface.of(cavity)
+    opening = surface.vertices[:, 2] >= top - _SAME
+    pockets = (
+        Pocket(depth, 0.0, tilt, azimuth)
+        for tilt, azimuth in ATTITUDES
+        for depth, _ in _pockets(surface, opening, upwards(tilt, azimuth))
+    )
+    return max(pockets, key=lambda p: p.depth, default=Pocket(0.0, 0.0, 0.0, 0.0))
+
+
+def pocket_volume(cavity: Manifold, top: float, pocket: Pocket) -> float:
+    """Volume of all air held back in the attitude of `pocket`, mm3."""
+    surface = _Surface.of(cavity)
+    opening = surface.vertices[:, 2] >= top - _SAME
+    up = upwards(pocket.tilt, pocket.azimuth)
+    total = 0.0
+    for depth, peak in _pockets(surface, opening, up):
+        above = cavity.trim_by_plane(tuple(up), float(peak @ up) - depth + _SAME)
+        for part in above.decompose():
+            corners = arrays(part)[0]
+            if np.min(np.linalg.norm(corners - peak, axis=1)) < 1e-3 and corners[:, 2].max() < top - _SAME:
+                total += part.volume()
+    return total
+
+
+def upwards(tilt: float, azimuth: float) -> np.ndarray:
+    """The unit vector that is up when the mould's side at `azimuth` is raised by `tilt` (degrees)."""
+    t, a = math.radians(tilt), math.radians(azimuth)
+    return np.array([math.sin(t) * math.cos(a), math.sin(t) * math.sin(a), math.cos(t)])
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """A cavity's boundary: vertices (n, 3), edges (m, 2), outward normals at the vertices weighted by angle (n, 3)."""
+
+    vertices: np.ndarray
+    edges: np.ndarray
+    normals: np.ndarray
+
+    @classmethod
+    def of(cls, solid: Manifold) -> _Surface:
+        vertices, faces = arrays(solid)
+        edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+        corners = vertices[faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+        normals = np.zeros_like(vertices)
+        for i in range(3):
+            a, b = corners[:, (i + 1) % 3] - corners[:, i], corners[:, (i + 2) % 3] - corners[:, i]
+            lengths = np.maximum(np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), 1e-300)
+            angle = np.arccos(np.clip(np.einsum("ij,ij->i", a, b) / lengths, -1, 1))
+            np.add.at(normals, faces[:, i], angle[:, None] * normal)
+        return cls(vertices, edges, normals)
+
+
+def _pockets(surface: _Surface, opening: np.ndarray, up: np.ndarray) -> list[tuple[float, np.ndarray]]:
+    """(depth, peak) of every ceiling peak that does not meet the opening."""
+    height = surface.vertices @ up
+    first, second = surface.edges.T
+    level = np.abs(height[first] - height[second]) <= _SAME
+    count, plateau = _components(surface.edges[level], len(height))
+    rises = np.zeros(count, dtype=bool)
+    step = height[second] - height[first]
+    rises[plateau[first[step > _SAME]]] = True
+    rises[plateau[second[step < -_SAME]]] = True
+    # A sum of angle-weighted normals points out of the cavity: up at a ceiling, down at the top of an obstacle.
+    facing = np.bincount(plateau, weights=surface.normals @ up, minlength=count)
+    opens = np.bincount(plateau, weights=opening, minlength=count) > 0
+    found = []
+    for peak in np.nonzero(~rises & ~opens & (facing > 0))[0]:
+        vertex = int(np.nonzero(plateau == peak)[0][0])
+        found.append((_depth(surface.edges, height, opening, vertex), surface.vertices[vertex]))
+    return found
+
+
+def _depth(edges: np.ndarray, height: np.ndarray, opening: np.ndarray, vertex: int) -> float:
+    """How far below a vertex the highest way from it to the opening leads, by bisection over the vertices' heights."""
+    levels = np.unique(height[height <= height[vertex]])
+    lowest = np.minimum(height[edges[:, 0]], height[edges[:, 1]])
+    low, high = 0, len(levels) - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        _, part = _components(edges[lowest >= levels[middle]], len(height))
+        if np.any(part[opening & (height >= levels[middle])] == part[vertex]):
+            low = middle
+        else:
+            high = middle - 1
+    return float(height[vertex] - levels[low])
+
+
+def _components(edges: np.ndarray, count: int) -> tuple[int, np.ndarray]:
+    graph = coo_matrix((np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    found, labels = connected_components(graph, directed=False)
+    return int(found), labels

@@ -1,0 +1,187 @@
+"""Law C300: every piece comes out, in the person's order, without passing through anything that stays.
+
+A piece that moves along +z meets what stays if, and only if, somewhere an upward face of the piece lies below (or
+against) a downward face of what stays, on one vertical line. So the test is exact for any polyhedron: project the faces
+along the way, clip each pair of triangles against each other and keep the part where the piece's lies below. No height
+is sampled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import manifold3d
+import numpy as np
+from manifold3d import Manifold
+
+from unitcad.kernels.mesh import arrays, realise
+from unitcad.moulds.finding import Finding, at_most
+from unitcad.moulds.fit import boxes_meet
+from unitcad.moulds.plan import Plan, Step
+
+BLOCKED = 1e-5
+"""Largest area of facing faces, mm2: what rounding leaves of faces that only touch along an edge."""
+LEVEL = 1e-9
+"""Heights nearer than this are equal, mm."""
+
+
+@dataclass(frozen=True)
+class Removal:
+    """One movement of the person's hands: which piece goes which way, past what stays, after which pour."""
+
+    step: int
+    piece: str
+    direction: tuple[int, int, int]
+    stays: tuple[str, ...]
+
+
+def removals(plan: Plan) -> Iterator[tuple[Step, Removal]]:
+    """Every movement in its order: lid up, tongues sideways, cup up, a pour at a time; at the end filaments down.
+
+    "cured" stands for all layers that are there. The peel off the core comes last and is `peel`'s.
+    """
+    for step in plan.steps:
+        there = [*step.tools, "cured"]
+        for piece in _in_order(step):
+            there.remove(piece)
+            way = _sideways(plan, piece) if piece.startswith("tongue") else (0, 0, 1)
+            yield step, Removal(step.index, piece, way, tuple(there))
+    last = plan.steps[-1]
+    there = [name for name in last.tools if name == "base" or name.startswith("stub")] + ["cured"]
+    for piece in [name for name in there if name.startswith("stub")]:
+        there.remove(piece)
+        yield last, Removal(last.index, piece, (0, 0, -1), tuple(there))
+
+
+def draw_law(plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[Finding]:
+    """C300 for every removal: the area of the piece that runs into what stays.
+
+    What is against the piece at the start is cut out of what stays first: silicone has taken the tool's real shape.
+    """
+    found = []
+    for step, removal in removals(plan):
+        staying = [(name, solids[name]) for name in removal.stays if name != "cured"]
+        staying += [("layer", realise(shape, segments)) for shape in (*step.layer, *step.earlier)]
+        piece = solids[removal.piece]
+        areas = [(blocked(piece, solid, removal.direction), name) for name, solid in staying]
+        worst = max(areas)
+        against = f" against {worst[1]}" if worst[0] > BLOCKED else ""
+        where = f"pour {removal.step}: {removal.piece} out{against}"
+        found.append(at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", _advice(worst[1])))
+    return found
+
+
+def blocked(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -> float:
+    """Area (mm2, seen along `direction`) of upward faces of `piece` that lie below downward faces of `stays`.
+
+    `direction` is a signed axis. A face that several others lie above counts once for each of them.
+    """
+    if boxes_meet(piece, stays):
+        stays = stays - piece
+    up = _facing(piece, direction, upwards=True)
+    down = _facing(stays, direction, upwards=False)
+    total = 0.0
+    for chunk in np.array_split(up, max(1, len(up) * len(down) // 2_000_000)):
+        first, second = _near(chunk, down)
+        if len(first):
+            total += float(_area_below(chunk[first], down[second]).sum())
+    return total
+
+
+def peel(plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[tuple[Manifold, Manifold]]:
+    """For each cell what is pulled off at the end (all layers, bonded) and the base that stays."""
+    last, cells = plan.steps[-1], len(plan.layout.cells)
+    shapes = (*last.earlier, *last.layer)
+    return [
+        (
+            Manifold.batch_boolean([realise(s, segments) for s in shapes[i::cells]], manifold3d.OpType.Add),
+            solids["base"],
+        )
+        for i in range(cells)
+    ]
+
+
+def _in_order(step: Step) -> list[str]:
+    tongues = [name for name in step.tools if name.startswith("tongue")]
+    return [*([step.lid] if step.lid else []), *tongues, step.cup]
+
+
+def _sideways(plan: Plan, tongue: str) -> tuple[int, int, int]:
+    return (plan.tongue_sides[tongue], 0, 0)
+
+
+def _advice(name: str) -> str:
+    return f"something of the piece lies under {name}: the two are drawn with an undercut"
+
+
+def _facing(solid: Manifold, direction: tuple[int, int, int], upwards: bool) -> np.ndarray:
+    """Triangles (n, 3, 3) that face along the direction (or against it), in a frame where it is +z."""
+    vertices, faces = arrays(solid)
+    axis = int(np.argmax(np.abs(direction)))
+    sign = float(np.sign(direction[axis]))
+    u, v = [(1, 2), (2, 0), (0, 1)][axis]
+    # A turn for +, a mirror for -: only the side that a face turns to matters, and `sign` keeps that.
+    corners = np.stack([vertices[:, u], vertices[:, v], sign * vertices[:, axis]], axis=1)[faces]
+    doubled = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * sign
+    return corners[doubled > 1e-9] if upwards else corners[doubled < -1e-9]
+
+
+def _near(up: np.ndarray, down: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs whose boxes overlap in plan and of which the second reaches up to the first or above it."""
+    low_u, high_u, low_d, high_d = up.min(1), up.max(1), down.min(1), down.max(1)
+    pairs = high_d[None, :, 2] >= low_u[:, None, 2] - LEVEL
+    for axis in (0, 1):
+        pairs &= (low_u[:, None, axis] < high_d[None, :, axis]) & (low_d[None, :, axis] < high_u[:, None, axis])
+    first, second = np.nonzero(pairs)
+    return first, second
+
+
+def _area_below(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Area in plan of the part of each triangle of `first` on or above which its partner of `second` lies."""
+    polygon = first[:, :, :2]
+    sense = np.sign(_cross(second[:, 1] - second[:, 0], second[:, 2] - second[:, 0]))
+    for i in range(3):
+        start, along = second[:, i, :2], second[:, (i + 1) % 3, :2] - second[:, i, :2]
+        side = sense[:, None] * _cross(along[:, None], polygon - start[:, None])
+        polygon = _clip(polygon, side)
+    gap = _height(second, polygon) - _height(first, polygon)
+    polygon = _clip(polygon, gap + LEVEL)
+    after = np.roll(polygon, -1, axis=1)
+    return np.abs(np.sum(_cross(polygon, after), axis=1)) / 2
+
+
+def _clip(polygon: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """The part of convex polygons (n, m, 2) where a function, linear on the plane and given at the corners, is >= 0.
+
+    Corners that are no longer needed repeat another one, which adds no area; a polygon wholly outside shrinks to one
+    point.
+    """
+    after, value_after = np.roll(polygon, -1, axis=1), np.roll(value, -1, axis=1)
+    inside, crosses = value >= 0, (value >= 0) != (value_after >= 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(crosses, value / (value - value_after), 0.0)
+    crossing = polygon + share[..., None] * (after - polygon)
+    n, m = value.shape
+    corners = np.stack([polygon, crossing], axis=2).reshape(n, 2 * m, 2)
+    kept = np.stack([inside, crosses], axis=2).reshape(n, 2 * m)
+    order = np.argsort(~kept, axis=1, kind="stable")
+    count = kept.sum(axis=1)
+    # The first kept corner stands in for those that fall away.
+    index = np.where(np.arange(2 * m) < count[:, None], order, order[:, :1])
+    corners = np.take_along_axis(corners, index[..., None], axis=1)
+    return corners[:, : max(1, int(count.max(initial=0)))]
+
+
+def _height(triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Height of each triangle's plane at its own points (n, m, 2)."""
+    a, ab, ac = triangle[:, 0], triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
+    doubled = _cross(ab, ac)
+    slope_x = (ab[:, 2] * ac[:, 1] - ac[:, 2] * ab[:, 1]) / doubled
+    slope_y = (ac[:, 2] * ab[:, 0] - ab[:, 2] * ac[:, 0]) / doubled
+    offset = points - a[:, None, :2]
+    return a[:, 2, None] + slope_x[:, None] * offset[..., 0] + slope_y[:, None] * offset[..., 1]
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

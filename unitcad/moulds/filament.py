@@ -1,0 +1,68 @@
+"""The stub of printer filament that lets air under a unit, and its way through core and plate.
+
+It stands in a hole through the core, flush with its top, and is bent below into a groove under the plate: it lies on
+the bench, so it can't sink while the pour stands on it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from unitcad.designs.common import BEYOND
+from unitcad.moulds.layout import Cell, Layout
+from unitcad.shape import Profile, Revolve, Shape, box, cylinder, moved, polygon, ring, turned, union
+from unitcad.spec import Dimensions, Spec
+from unitcad.spec.door import groove_depth
+
+FLARE = 1.0
+"""Of the filament hole's lower end: the filament bends round it."""
+STUB_TAIL = 8.0
+"""How far the bent end stands out of the plate, mm: what one pulls."""
+_QUARTER = math.tan(math.pi / 8)
+
+
+def way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
+    """The hole through a core, flared below, and the groove under the plate (whose lower face is z = `bottom`)."""
+    radius, depth = (spec.moulds.filament_hole_mm or 0) / 2, groove_depth(spec)
+    roof = bottom + depth
+    hole = Revolve(
+        polygon(
+            (0, roof - BEYOND / 2),
+            (radius + FLARE, roof - BEYOND / 2),
+            (radius + FLARE, roof),
+            (radius, roof + FLARE),
+            (radius, dims.core_height + BEYOND),
+            (0, dims.core_height + BEYOND),
+        )
+    )
+    channel = box(-depth / 2, depth / 2, -_length(spec, lay, cell), radius + FLARE, bottom - BEYOND, roof)
+    return moved(union((hole, channel)), cell.x, cell.y)
+
+
+def stub(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
+    """The stub itself: flush with the core's top, its bent end on the bench."""
+    radius = spec.moulds.filament_mm / 2
+    elbow = bottom + radius
+    ball = Revolve(Profile(((0, -radius, _QUARTER), (radius, 0, _QUARTER), (0, radius, 0.0))))
+    upright = cylinder(radius, elbow, dims.core_height)
+    outside = STUB_TAIL - BEYOND if _meets_edge(lay, cell) else 0.0
+    lying = turned(cylinder(radius, 0, _length(spec, lay, cell) - radius + outside), "x", 1)
+    bent = union((upright, moved(ball, z=elbow), moved(lying, z=elbow)))
+    return moved(bent, cell.x, cell.y)
+
+
+def annulus(spec: Spec, dims: Dimensions, cell: Cell) -> Shape:
+    """The ring between filament and hole: too narrow for silicone of these viscosities to matter, so a seal."""
+    inner, outer = spec.moulds.filament_mm / 2, (spec.moulds.filament_hole_mm or 0) / 2
+    return moved(ring(inner, outer, -BEYOND, dims.core_height), cell.x, cell.y)
+
+
+def _meets_edge(lay: Layout, cell: Cell) -> bool:
+    return cell.y == min(c.y for c in lay.cells)
+
+
+def _length(spec: Spec, lay: Layout, cell: Cell) -> float:
+    """From the hole to beyond the plate's edge at -y, or, behind another cell, a pocket as long as the pitch allows."""
+    if _meets_edge(lay, cell):
+        return cell.y + lay.plate[1] + BEYOND
+    return lay.pitch - (spec.moulds.filament_hole_mm or 0) / 2 - FLARE - 2 * (spec.moulds.least_wall_mm or 0)

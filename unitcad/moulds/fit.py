@@ -1,0 +1,151 @@
+"""Laws C000 to C210, on meshes: shape, balance and leak, overlap, gap.
+
+A law compares what was drawn as a unit with what was drawn as tools. Nothing here knows how either was drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from itertools import combinations
+
+import manifold3d
+from manifold3d import Manifold
+
+from unitcad.kernels.mesh import realise
+from unitcad.moulds.finding import Finding, at_least, at_most, exactly
+from unitcad.moulds.plan import Plan, Step
+from unitcad.shape import box
+from unitcad.shape.body import Body
+from unitcad.shape.profile import GRID_PER_MM
+from unitcad.spec import Spec
+
+BALANCE = 1e-6
+"""Largest share of a layer's volume by which cavity and layer may differ."""
+GRID = 2 / GRID_PER_MM
+"""What snapping two faces to the grid may take from the clearance between them, mm."""
+OVERLAP = 1e-6
+"""Largest volume two pieces may share, mm3: what rounding leaves where faces touch."""
+
+
+def shape_law(bodies: Iterable[Body], solids: Mapping[str, Manifold], genus: Mapping[str, int]) -> list[Finding]:
+    """C000: volume above zero, one component, and the genus that the drawing means, where `genus` names one."""
+    found = []
+    for body in bodies:
+        solid = solids[body.name]
+        found.append(exactly("C000", f"{body.name} components", len(solid.decompose()), 1, ""))
+        found.append(Finding("C000", f"{body.name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3"))
+        if body.name in genus:
+            found.append(exactly("C000", f"{body.name} genus", solid.genus(), genus[body.name], ""))
+    return found
+
+
+def expected_genus(plan: Plan) -> dict[str, int]:
+    """Through holes of each tool: a filament hole a core; a bore a cell and a closed window a tail in a cup; a sprue
+    and its vents in a lid.
+    """
+    cells = len(plan.layout.cells)
+    genus = {tool.name: 0 for tool in plan.tools}
+    genus["base"] = sum(tool.name.startswith("stub") for tool in plan.tools)
+    for step in plan.steps:
+        genus[step.cup] = cells + step.windows
+        if step.lid:
+            genus[step.lid] = len(step.channels)
+    return genus
+
+
+def cavity(step: Step, solids: Mapping[str, Manifold], segments: int) -> list[Manifold]:
+    """What silicone can reach, in components: block(0..top) - tools - earlier layers - seals.
+
+    The block is larger than the tools, so a leak joins the outside to the cavity; it ends at the rim plane, where the
+    pour is open and the blade runs, or at the lid's upper face, where sprue and vents are open.
+    """
+    around = [solids[name] for name in step.tools]
+    x0, y0, _, x1, y1, _ = _box_of(around)
+    block = realise(box(x0 - 5, x1 + 5, y0 - 5, y1 + 5, 0, step.top), segments)
+    filled = around + [realise(shape, segments) for shape in (*step.earlier, *step.seals)]
+    return Manifold.batch_boolean([block, *filled], manifold3d.OpType.Subtract).decompose()
+
+
+def held(step: Step, components: list[Manifold], segments: int) -> list[tuple[Manifold, Manifold]]:
+    """For each cell what was drawn (layer, and what stands in sprue and vents) and the component that holds it."""
+    channels = [realise(shape, segments) for shape in step.channels]
+    share = len(channels) // len(step.layer)
+    found = []
+    for i, shape in enumerate(step.layer):
+        layer = realise(shape, segments)
+        drawn = Manifold.batch_boolean([layer, *channels[i * share : (i + 1) * share]], manifold3d.OpType.Add)
+        near = [c for c in components if boxes_meet(c, layer)]
+        volumes = [(c ^ layer).volume() if len(near) > 1 else 1.0 for c in near]
+        found.append((drawn, near[volumes.index(max(volumes))] if near else Manifold()))
+    return found
+
+
+def balance_law(step: Step, cells: list[tuple[Manifold, Manifold]]) -> list[Finding]:
+    """C100: each component that holds a layer equals it."""
+    return [
+        at_most(
+            "C100",
+            f"pour {step.index}" + (f" cell {i + 1}" if len(cells) > 1 else ""),
+            ((holding - drawn).volume() + (drawn - holding).volume()) / drawn.volume(),
+            BALANCE,
+            "share of the layer",
+        )
+        for i, (drawn, holding) in enumerate(cells)
+    ]
+
+
+def overlap_law(step: Step, solids: Mapping[str, Manifold], segments: int) -> list[Finding]:
+    """C200: no two solids of an assembled step share volume: tools, cured layers and the one being cast."""
+    there = [(name, solids[name]) for name in step.tools]
+    there += [(f"{step.name}.{i + 1}", realise(shape, segments)) for i, shape in enumerate(step.layer)]
+    there += [(f"cured.{i + 1}", realise(shape, segments)) for i, shape in enumerate(step.earlier)]
+    return _overlaps(f"pour {step.index}", there)
+
+
+def unit_overlap_law(bodies: Iterable[Body], solids: Mapping[str, Manifold]) -> list[Finding]:
+    """C200 for the unit itself."""
+    return _overlaps("unit", [(body.name, solids[body.name]) for body in bodies])
+
+
+def gap_law(spec: Spec, plan: Plan, solids: Mapping[str, Manifold]) -> list[Finding]:
+    """C210: faces that must slide have the printer's clearance: skirt and plinth, tongue and window, lid and cup.
+
+    The skirt is measured below the seat, where cup and plinth touch on purpose; the lid's below the rim.
+    """
+    moulds = spec.moulds
+    skirt = min(moulds.plinth_clearance_mm or 0, moulds.seat_relief_mm or 0)
+    window = moulds.window_clearance_mm or 0
+    found = []
+    for step in plan.steps:
+        cup = solids[step.cup]
+        gap = cup.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
+        found.append(at_least("C210", f"{step.cup} skirt and plinth", gap, skirt - GRID, "mm"))
+        for tongue in (tool for tool in step.tools if tool.startswith("tongue")):
+            gap = cup.min_gap(solids[tongue], window + 1)
+            found.append(at_least("C210", f"{step.cup} window and {tongue}", gap, window - GRID, "mm"))
+        if step.lid:
+            play = moulds.plinth_clearance_mm or 0
+            gap = solids[step.lid].trim_by_plane((0, 0, -1), play - step.rim).min_gap(cup, play + 1)
+            found.append(at_least("C210", f"{step.lid} skirt and {step.cup}", gap, play - GRID, "mm"))
+    return found
+
+
+def boxes_meet(a: Manifold, b: Manifold) -> bool:
+    """Whether the bounding boxes of two solids touch."""
+    p, q = a.bounding_box(), b.bounding_box()
+    return all(p[i] <= q[i + 3] and q[i] <= p[i + 3] for i in range(3))
+
+
+def _overlaps(where: str, there: list[tuple[str, Manifold]]) -> list[Finding]:
+    """The pair that shares most, and every pair that shares too much."""
+    pairs = [
+        at_most("C200", f"{where}: {a} and {b}", (solid ^ other).volume(), OVERLAP, "mm3")
+        for (a, solid), (b, other) in combinations(there, 2)
+        if boxes_meet(solid, other)
+    ]
+    return [f for f in pairs if not f.ok] or sorted(pairs, key=lambda f: -f.value)[:1]
+
+
+def _box_of(solids: list[Manifold]) -> tuple[float, ...]:
+    boxes = [solid.bounding_box() for solid in solids]
+    return tuple(min(b[i] for b in boxes) for i in range(3)) + tuple(max(b[i] for b in boxes) for i in range(3, 6))

@@ -1,0 +1,140 @@
+"""The lid for injection: a flat plate on a cup's rim with sprue and vents to every cavity, and a skirt to centre it.
+
+    .---------. .----. .----------.   vents at the rim, halfway between the axes
+    |         | |sprue| |          |
+    '-.  .----'-'-----'-'-----.  .-'   z = rim
+      |  |       cavity       |  |   skirt round the cup, above the windows
+
+Over a ring, whose width no syringe's tip fits, the sprue narrows to a gate and stands in the place of the first vent.
+"""
+
+from __future__ import annotations
+
+import math
+
+from unitcad.designs.common import BEYOND
+from unitcad.errors import Refusal
+from unitcad.moulds.layout import CORNER_RADIUS, Layout
+from unitcad.moulds.tooling import corner_labels
+from unitcad.shape import Extrude, Profile, Revolve, Shape, box, cut, cylinder, moved, polygon, rounded_rectangle
+from unitcad.spec import Dimensions, Spec
+
+THICKNESS, SKIRT, SKIRT_WALL, SKIRT_OFF_WINDOW = 3.0, 1.5, 1.6, 0.2
+VENT, LEAST_VENT = 1.0, 0.8
+"""Diameter of a vent, mm, and what it may come down to over a narrow ring."""
+VENT_COUNTS = tuple(range(4, 65, 4))
+"""Multiples of four: the tilts of the air law then fall halfway between two vents, the worst case."""
+GATE = 0.8
+"""Diameter of what opens into a ring, over the ring's width."""
+TILT_DEG = 5.0
+"""The tilt that a mould must bear on the bench."""
+DENT = 0.1
+"""Depth of a pocket of air over the layer's thinnest part, up to which it is a dent that the printer's play exceeds."""
+
+
+def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int, label: tuple[str, str, str] | None) -> Shape:
+    """The lid of a layer's pour (from 0), lying on the cup's rim."""
+    rim, top, play = dims.heights[layer], lid_top(dims, layer), spec.moulds.plinth_clearance_mm or 0
+    low = rim - SKIRT
+    at_the_rim = dims.slot_z is not None and dims.slot_z[1] >= rim
+    clearance = spec.moulds.window_clearance_mm or 0
+    if dims.slot_z and not at_the_rim:
+        low = max(low, dims.slot_z[1] + clearance + SKIRT_OFF_WINDOW)
+    tools = [Extrude(_outline(lay, play), low - BEYOND, rim), *channels(spec, dims, lay, layer, beyond=BEYOND)]
+    if at_the_rim:
+        half, far = dims.slot_width / 2 + clearance, lay.cup[0] + play + SKIRT_WALL + BEYOND
+        tools += [
+            box(min(c.x, s * far), max(c.x, s * far), c.y - half, c.y + half, low - BEYOND, rim)
+            for c in lay.cells
+            for s in c.sides
+        ]
+    if label:
+        tools += corner_labels(spec, lay, top, label)
+    return cut(Extrude(_outline(lay, play + SKIRT_WALL), low, top), tools)
+
+
+def lid_top(dims: Dimensions, layer: int) -> float:
+    """z of the lid's upper face, where sprue and vents are open."""
+    return dims.heights[layer] + THICKNESS
+
+
+def channels(spec: Spec, dims: Dimensions, lay: Layout, layer: int, beyond: float = 0.0) -> list[Shape]:
+    """Sprue and vents, cell by cell, as they fill with silicone; `beyond` (mm) makes them longer at both ends."""
+    rim, top, sprue = dims.heights[layer], lid_top(dims, layer), spec.moulds.sprue_mm / 2
+    inner, outer = _ceiling(dims, layer)
+    vent, count = vent_diameter(dims, layer) / 2, vents(spec, dims, layer)
+    turns = [math.tau * (k + 0.5) / count for k in range(count)]
+    drawn = [
+        moved(cylinder(vent, rim - beyond, top + beyond), (outer - vent) * math.cos(a), (outer - vent) * math.sin(a))
+        for a in turns
+    ]
+    if inner:
+        gate, middle = min(sprue, GATE * (outer - inner) / 2), (inner + outer) / 2
+        below = [(0, rim - beyond), (gate, rim - beyond)] if beyond else [(0, rim)]
+        above = [(sprue, top + beyond), (0, top + beyond)] if beyond else [(0, top)]
+        cone = Revolve(polygon(*below, (gate, rim), (sprue, top), *above))
+        drawn[0] = moved(cone, middle * math.cos(turns[0]), middle * math.sin(turns[0]))
+    else:
+        drawn.insert(0, cylinder(sprue, rim - beyond, top + beyond))
+    return [moved(shape, c.x, c.y) for c in lay.cells for shape in drawn]
+
+
+def vent_diameter(dims: Dimensions, layer: int) -> float:
+    """Of each vent, mm: 1, or what a narrow ring leaves."""
+    inner, outer = _ceiling(dims, layer)
+    return min(VENT, GATE * (outer - inner)) if inner else VENT
+
+
+def vents(spec: Spec, dims: Dimensions, layer: int) -> int:
+    """How many vents a cavity has: as asked for, or the least number that clears the air.
+
+    Raises Refusal for a number that can't clear, naming one that would, and for a ring too narrow for a vent.
+    """
+    inner, outer = _ceiling(dims, layer)
+    width = GATE * (outer - inner)
+    if inner and width < LEAST_VENT - 1e-9:
+        raise Refusal(
+            f"layers.{layer}.wall_mm",
+            spec.layers[layer].wall_mm,
+            f"a ring under a lid takes a vent of {LEAST_VENT} mm from {LEAST_VENT / GATE:g} mm on",
+            LEAST_VENT / GATE,
+        )
+    wall = spec.layers[layer]
+    limit = DENT * min(wall.wall_mm, wall.cap_mm or wall.wall_mm)
+    enough = next((n for n in VENT_COUNTS if pocket_depth(dims, layer, n) <= limit), VENT_COUNTS[-1])
+    asked = spec.moulds.vents
+    if asked is None:
+        return enough
+    if asked % 4 or asked > VENT_COUNTS[-1]:
+        nearest = min(VENT_COUNTS, key=lambda n: (n < enough, abs(n - asked)))
+        raise Refusal("moulds.vents", asked, f"vents come in fours, up to {VENT_COUNTS[-1]}", nearest)
+    if asked < enough:
+        depth = pocket_depth(dims, layer, asked)
+        raise Refusal(
+            "moulds.vents",
+            asked,
+            f"tilted by {TILT_DEG:g} degrees, pour {layer + 1} keeps a pocket {depth:.3f} mm deep between two vents, "
+            f"more than {limit:.3f}; {enough} would clear it",
+            enough,
+        )
+    return asked
+
+
+def pocket_depth(dims: Dimensions, layer: int, count: int) -> float:
+    """Depth of the air that stays halfway between two of `count` vents when the lid is tilted towards there, mm.
+
+    The rim's highest point is at the outer radius r; a vent's at (r - v) cos(pi / n) + v, v being the vent's radius.
+    """
+    outer, vent = _ceiling(dims, layer)[1], vent_diameter(dims, layer) / 2
+    return (outer - vent) * (1 - math.cos(math.pi / count)) * math.sin(math.radians(TILT_DEG))
+
+
+def _ceiling(dims: Dimensions, layer: int) -> tuple[float, float]:
+    """Inner and outer radius of the flat top of a layer; the inner one is 0 for a cap."""
+    inside = (dims.cavity_radius, *dims.radii)[layer]
+    is_ring = (dims.core_height, *dims.heights)[layer] >= dims.heights[layer]
+    return (inside if is_ring else 0.0), dims.radii[layer]
+
+
+def _outline(lay: Layout, grow: float) -> Profile:
+    return rounded_rectangle(lay.cup[0] + grow, lay.cup[1] + grow, CORNER_RADIUS + grow)

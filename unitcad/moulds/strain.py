@@ -1,0 +1,98 @@
+"""Law C310: where silicone must stretch, the hoop strain against its elongation at break, with a margin.
+
+Strain is the perimeter that has to pass over the perimeter that is there, less one: of the convex hull, since stretched
+silicone spans a hollow. The least elongation among the layers is the limit's, though the innermost stretches most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+from manifold3d import CrossSection, Manifold
+
+from unitcad import catalogue
+from unitcad.kernels.mesh import arrays
+from unitcad.moulds.draw import peel
+from unitcad.moulds.finding import Finding, at_most
+from unitcad.moulds.plan import Plan
+from unitcad.spec import Spec
+from unitcad.spec.strain import allowed_strain, tail_strain
+
+TOUCHING = 1e-6
+"""Area of silicone over the core, mm2, up to which nothing has to stretch: rounding where walls mate."""
+CAPTIVE = 1e4
+"""The strain written where there is no hole at all for what has to pass."""
+
+
+@dataclass(frozen=True)
+class Strain:
+    """A strain that the geometry asks for, in percent, at height `z` with `room` mm of perimeter there (0: no height)."""
+
+    where: str
+    percent: float
+    z: float = 0.0
+    room: float = 0.0
+
+
+def strains(spec: Spec, plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[Strain]:
+    """The peel of each unit off its core along +z, and the tail's way out through the slot: geometry, no silicone yet."""
+    found = []
+    pulled = peel(plan, solids, segments)
+    for i, (body, base) in enumerate(pulled):
+        strain, z, room = peel_strain(body, base)
+        where = "peel off the core" + (f", cell {i + 1}" if len(pulled) > 1 else "")
+        if strain > 0:
+            where += f", at z = {z:.3g} mm"
+        found.append(Strain(where, 100 * strain, z, room))
+    way = tail_strain(spec)
+    if way is not None:
+        found.append(Strain("tail through the slot", 100 * way))
+    return found
+
+
+def strain_law(spec: Spec, found: Iterable[Strain]) -> list[Finding]:
+    """C310: every strain within the margin of the spec's silicones. Values in percent."""
+    limit = 100 * allowed_strain(spec, catalogue.materials(spec.materials))
+    return [at_most("C310", s.where, s.percent, limit, "%", _advice(s, limit)) for s in found]
+
+
+def _advice(strain: Strain, limit: float) -> str:
+    if not strain.room:
+        return ""
+    largest = strain.room * (1 + limit / 100)
+    return f"make what the core carries above z = {strain.z:.3g} mm no more than {largest:.3g} mm round (convex hull)"
+
+
+def peel_strain(body: Manifold, base: Manifold) -> tuple[float, float, float]:
+    """(largest hoop strain of `body` pulled up off `base`, the height where, the perimeter of its hole there in mm).
+
+    At each height the hole in the body must pass whatever the base carries above it, within the body's outline.
+    """
+    outline = body.project().hull()
+    heights = sorted({float(z) for solid in (body, base) for z in arrays(solid)[0][:, 2]})
+    low, high = body.bounding_box()[2], body.bounding_box()[5]
+    levels = [z for z in heights if low <= z <= high]
+    worst = (0.0, 0.0, 0.0)
+    for below, above in pairwise(levels):
+        if above - below < 1e-6:
+            continue
+        z = (below + above) / 2
+        silicone = body.slice(z)
+        passing = base.trim_by_plane((0, 0, 1), z).project() ^ outline
+        if silicone.is_empty() or (passing ^ silicone).area() <= TOUCHING:
+            continue
+        hole = outline - silicone
+        room = _perimeter(hole.hull())
+        needed = _perimeter(CrossSection.batch_hull([hole, passing]))
+        strain = needed / room - 1 if room * CAPTIVE > needed else CAPTIVE
+        worst = max(worst, (strain, z, room))
+    return worst
+
+
+def _perimeter(section: CrossSection) -> float:
+    total = 0.0
+    for loop in section.to_polygons():
+        total += float(sum(((loop - loop[[*range(1, len(loop)), 0]]) ** 2).sum(axis=1) ** 0.5))
+    return total
