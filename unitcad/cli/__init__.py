@@ -62,6 +62,10 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        say_error(UnitcadError(f"{place}{error.strerror or error}"), as_json)
+        sys.exit(2)
     except Exception as error:
         if os.environ.get("UNITCAD_TRACEBACK"):
             raise

@@ -28,7 +28,7 @@ CAPTIVE = 1e4
 
 @dataclass(frozen=True)
 class Strain:
-    """A strain that the geometry asks for, in percent, at height `z` with `room` mm of perimeter there (0: no height)."""
+    """A strain that the geometry asks for, in percent, at height `z` with `room` mm of perimeter there, or 0 and 0."""
 
     where: str
     percent: float
@@ -37,7 +37,7 @@ class Strain:
 
 
 def strains(spec: Spec, plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[Strain]:
-    """The peel of each unit off its core along +z, and the tail's way out through the slot: geometry, no silicone yet."""
+    """The peel of each unit off its core along +z, and the way of the tail through the slot: geometry, no silicone."""
     found = []
     pulled = peel(plan, solids, segments)
     for i, (body, base) in enumerate(pulled):

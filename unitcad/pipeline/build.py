@@ -7,6 +7,7 @@ shares with others by their SHA-256 in a store. `build` puts a product in its pl
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from unitcad.pipeline import folder as folders
 from unitcad.pipeline.geometry import findings_count, geometry, pictures
 from unitcad.pipeline.stages import Say, Stages
 from unitcad.pipeline.variant import Variant
-from unitcad.pipeline.versions import kernel_versions
+from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.spec import Spec, to_toml, warnings
 
 OUTPUTS = ("unit", "moulds", "estimate", "casting")
@@ -88,11 +89,12 @@ def build_into(
     folder: Path, spec: Spec, *, only: Sequence[str], check: bool, store: Store, say: Say = lambda message: None
 ) -> Built:
     """Build into a folder, in place of what it holds; files of the old result that the new one lacks stay."""
-    stages = Stages(say)
+    stages, before = Stages(say), Counter(store.counts)
     product = make(spec, only, check, store, stages)
     timings = {
+        "code": code_version(),
         "seconds": {stage: round(seconds, 4) for stage, seconds in stages.seconds.items()},
-        "store": dict(sorted(store.counts.items())),
+        "store": dict(sorted((store.counts - before).items())),
     }
     with folders.replacing(folder) as fresh:
         product.place(fresh, store)
@@ -139,7 +141,7 @@ class _Making:
             "air_ring_mm": shape["air_ring_mm"],
             "parts": [self._part(part) for part in shape["parts"]],
             "steps": [self._step(step) for step in shape["steps"]],
-            "laws": shape["laws"],
+            "laws": self._laws(shape),
             "check": findings_count(shape["check"]),
             "pictures": [path for path in files if path.endswith(".png")],
             "left_out": self._left_out(),
@@ -147,6 +149,15 @@ class _Making:
         }
         self.own["manifest.json"] = _json(manifest)
         return Product(manifest, self.own, files)
+
+    def _laws(self, shape: dict[str, Any]) -> list[dict[str, Any]]:
+        """The geometry's laws and its strains against this variant's silicones, by code."""
+        if not shape["strains"]:
+            return shape["laws"]
+        from unitcad.moulds import laws
+
+        strained = laws.strain_law(self.spec, [laws.Strain(**strain) for strain in shape["strains"]])
+        return sorted(shape["laws"] + [laws.as_dict(finding) for finding in strained], key=lambda law: law["code"])
 
     def _pictures(self) -> dict[str, str]:
         """The shaded pictures; where this machine can't draw, what it lacks is told and the drawing stays."""

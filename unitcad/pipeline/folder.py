@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from unitcad.errors import UnitcadError
-from unitcad.spec import Spec, read_toml, to_toml
+from unitcad.spec import Spec, read_toml
 
 TEMPORARY = ".tmp-"
 
@@ -26,7 +26,7 @@ def folder_name(spec: Spec) -> str:
 def spec_hash(spec: Spec) -> str:
     """SHA-256 of the effective spec without name and formats."""
     output = spec.output.model_copy(update={"formats": ()})
-    return hashlib.sha256(to_toml(spec.model_copy(update={"name": "", "output": output})).encode()).hexdigest()
+    return hashlib.sha256(spec.model_copy(update={"name": "", "output": output}).model_dump_json().encode()).hexdigest()
 
 
 def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:

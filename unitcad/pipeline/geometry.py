@@ -105,7 +105,7 @@ class _Making:
                     self._step(group, records)
         moulds = "moulds" in self.only
         with stages("laws"):
-            laws = self._laws() if self.check and moulds else []
+            laws = self._laws() if self.check and moulds else {"laws": [], "strains": []}
         with stages("check"):
             check = self._check(records) if self.check else []
         return {
@@ -113,7 +113,7 @@ class _Making:
             "air_ring_mm": round(variant.dimensions.air_ring, 9),
             "parts": records,
             "steps": self._steps() if moulds else [],
-            "laws": laws,
+            **laws,
             "check": check,
             "files": self.files,
         }
@@ -165,14 +165,19 @@ class _Making:
                 lambda: svg.unit_section(v.unit, v.dimensions, v.segments).encode(),
             )
 
-    def _laws(self) -> list[dict[str, Any]]:
+    def _laws(self) -> dict[str, list[dict[str, Any]]]:
+        """The laws that read no silicone, judged; and the strains that a silicone's limit is still to be put to."""
         from unitcad.moulds import laws
 
-        def judged() -> list[dict[str, Any]]:
+        def judged() -> dict[str, list[dict[str, Any]]]:
             variant = self.variant
             solids = {body.name: variant.mesh(body) for body in (*variant.unit, *variant.plan.tools)}
-            found = laws.judge(variant.spec, variant.unit, variant.plan, solids, variant.segments)
-            return [{**asdict(finding), "value": float(f"{finding.value:.6g}")} for finding in found]
+            drawn = variant.spec, variant.plan, solids, variant.segments
+            found = laws.geometric_laws(variant.spec, variant.unit, variant.plan, solids, variant.segments)
+            return {
+                "laws": [laws.as_dict(finding) for finding in found],
+                "strains": [asdict(strain) for strain in laws.strains(*drawn)],
+            }
 
         return self.store.data(self._own_key("laws"), judged)
 

@@ -1,0 +1,82 @@
+"""The command line: exit codes, one JSON object, no traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "unitcad", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=cwd,
+        env={**os.environ, **environment},
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize("kind", ["templates", "designs", "materials", "motors", "printers", "rules"])
+def test_list_names_what_is_shipped(kind: str) -> None:
+    told = _run("list", kind)
+    assert told.returncode == 0
+    data = json.loads(_run("list", kind, "--json").stdout)
+    assert list(data) == [kind]
+    for name in data[kind]:
+        assert name in told.stdout
+    if kind in ("materials", "motors", "printers"):
+        for entry in data[kind].values():
+            assert all(value["status"] and value["source"] for value in entry.values())
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["list", "motor"],
+        ["build", "encapsulatin"],
+        ["build", "./none.toml"],
+        ["build", "encapsulating", "--formats", "stp"],
+        ["build", "encapsulating", "--only", "mould"],
+        ["build", "encapsulating", "--only", ""],
+        ["build", "encapsulating", "--set", "diameter_mm"],
+        ["build"],
+        ["nothing"],
+    ],
+)
+def test_asked_wrongly_is_exit_2_and_writes_nothing(words: list[str], tmp_path: Path) -> None:
+    done = _run(*words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_output_that_is_a_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    done = _run("build", "embedded", "--formats", "stl", cwd=tmp_path)
+    assert done.returncode == 2
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_a_folder_that_can_not_be_written_is_one_line(tmp_path: Path) -> None:
+    if os.geteuid() == 0:
+        target = "/proc/none"
+    else:
+        (tmp_path / "locked").mkdir(mode=0o500)
+        target = str(tmp_path / "locked" / "out")
+    done = _run("build", "embedded", "--formats", "stl", "-o", target)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "Traceback" not in done.stderr
+
+
+def test_help_and_version() -> None:
+    assert "build" in _run("--help").stdout
+    assert _run("--version").stdout.startswith("unitcad 0.")
