@@ -1,0 +1,171 @@
+"""The paper's closed forms, as printed and mended, and the empirical divider, over arrays of variants. SI.
+
+Every function broadcasts: a `Units` holds any number of variants of N layers each. A path runs from the motor outwards
+through the walls of the layers, inside out, at the skin, and ends at the outer face, in air (equations 4 to 6).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Literal
+
+import numpy as np
+
+Wave = Literal["p", "s"]
+Reading = Literal["loss_modulus", "kelvin_voigt", "literal"]
+READINGS: dict[str, str] = {
+    "loss_modulus": "eta is a loss modulus E tan(delta) in Pa, which makes the exponent a number: the rate is twice the "
+    "amplitude's true decay",
+    "kelvin_voigt": "eta is a viscosity E tan(delta)/omega in Pa s and a factor omega/2 is missing: "
+    "omega^2 eta d/(2 E c), the true decay at low loss",
+    "literal": "eta is a viscosity in Pa s and the exponent is taken as printed: its unit is a second, not a number",
+}
+AIR_IMPEDANCE: dict[str, float] = {"p": 1.204 * 343.0, "s": 0.0}  # Pa s/m at 20 degC; air carries no shear wave
+_QUIET = {"divide": "ignore", "invalid": "ignore", "over": "ignore"}
+
+
+@dataclass(frozen=True)
+class Units:
+    """Variants of N layers: arrays whose last axis runs over the layers, inside out; omega and crossings lack it.
+
+    youngs_modulus Pa, density kg/m3, poisson_ratio, tan_delta, thickness m (of the walls), omega rad/s; crossings is the
+    divider's n: 1 embedded, 2 encapsulating, sqrt(2) for a single-layer control.
+    """
+
+    youngs_modulus: Any
+    density: Any
+    poisson_ratio: Any
+    tan_delta: Any
+    thickness: Any
+    omega: Any
+    crossings: Any
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            object.__setattr__(self, field.name, np.asarray(getattr(self, field.name), dtype=float))
+
+    def control(self, layer: int) -> Units:
+        """Own-material controls: one layer of all the walls' thickness, of the material of `layer`, the same omega."""
+        one = {name: getattr(self, name)[..., layer, None] for name in _MATERIAL}
+        total = np.sum(np.broadcast_to(self.thickness, np.broadcast_shapes(*self._layered)), -1, keepdims=True)
+        return Units(**one, thickness=total, omega=self.omega, crossings=np.sqrt(2.0))
+
+    @property
+    def _layered(self) -> list[tuple[int, ...]]:
+        return [getattr(self, name).shape for name in (*_MATERIAL, "thickness")]
+
+
+_MATERIAL = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
+
+
+def wave_speed(youngs_modulus: Any, density: Any, poisson_ratio: Any, wave: Wave) -> Any:
+    """v_p or v_s in m/s, equations 1c and 1d: sqrt((lambda + 2 mu)/rho), infinite at nu = 1/2, and sqrt(mu/rho)."""
+    shear = youngs_modulus / (2.0 * (1.0 + poisson_ratio))
+    if wave == "s":
+        return np.sqrt(shear / density)
+    with np.errstate(**_QUIET):
+        return np.sqrt(shear * 2.0 * (1.0 - poisson_ratio) / (1.0 - 2.0 * poisson_ratio) / density)
+
+
+def transmission(from_impedance: Any, to_impedance: Any) -> Any:
+    """k_t = 2 Z1/(Z1 + Z2), equation 4a: the displacement coefficient between two half-spaces."""
+    with np.errstate(**_QUIET):
+        return 2.0 * from_impedance / (from_impedance + to_impedance)
+
+
+def reflection(from_impedance: Any, to_impedance: Any) -> Any:
+    """k_r = (Z1 - Z2)/(Z1 + Z2), equation 4b."""
+    with np.errstate(**_QUIET):
+        return (from_impedance - to_impedance) / (from_impedance + to_impedance)
+
+
+def impedances(units: Units, wave: Wave) -> Any:
+    """rho v of each layer, shape (..., N), Pa s/m."""
+    return units.density * wave_speed(units.youngs_modulus, units.density, units.poisson_ratio, wave)
+
+
+def with_air(layered: Any, wave: Wave) -> Any:
+    """The layers' impedances and, after the last one, air's."""
+    layered = np.asarray(layered)
+    return np.concatenate([layered, np.full((*layered.shape[:-1], 1), AIR_IMPEDANCE[wave])], axis=-1)
+
+
+def paper_transmissions(units: Units, wave: Wave = "s") -> Any:
+    """k_t at each interface, shape (..., N): Layer 1 to 2, ..., the last layer to air."""
+    z = with_air(impedances(units, wave), wave)
+    return transmission(z[..., :-1], z[..., 1:])
+
+
+def paper_exponents(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
+    """omega eta d/(E v) of each layer, equation 5, shape (..., N), by one of the `READINGS` of eta."""
+    speed = wave_speed(units.youngs_modulus, units.density, units.poisson_ratio, wave)
+    omega = units.omega[..., None]
+    loss_rate = omega * units.tan_delta * units.thickness / speed
+    return loss_rate * {"loss_modulus": 1.0, "kelvin_voigt": 0.5, "literal": 1.0 / omega}[reading]
+
+
+def paper_path(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
+    """Equation 5's product of k_t and exponentials along the walls, shape (...); f1, f2 and the skin's part cancel."""
+    with np.errstate(**_QUIET):
+        decay = np.exp(-np.sum(paper_exponents(units, wave, reading), axis=-1))
+        return np.prod(paper_transmissions(units, wave), axis=-1) * decay
+
+
+def consistent_path(units: Units, wave: Wave = "s") -> Any:
+    """The same path with complex moduli: |product of 2 Z1/(Z1 + Z2)|, Z = sqrt(rho M*), exp(Im(omega sqrt(rho/M*)) d)."""
+    shear = units.youngs_modulus / (2.0 * (1.0 + units.poisson_ratio)) * (1.0 + 1j * units.tan_delta)
+    with np.errstate(**_QUIET):
+        factor = 2.0 * (1.0 - units.poisson_ratio) / (1.0 - 2.0 * units.poisson_ratio) if wave == "p" else 1.0
+        modulus = shear * factor
+        rate = -np.imag(units.omega[..., None] * np.sqrt(units.density / modulus))
+        z = with_air(np.sqrt(units.density * modulus), wave)
+        passed = np.abs(np.prod(transmission(z[..., :-1], z[..., 1:]), axis=-1))
+        return passed * np.exp(-np.sum(rate * units.thickness, axis=-1))
+
+
+def crossed_path(units: Units) -> Any:
+    """k_t of shear waves to the power of `crossings` and no exponential: a reading that the print does not have."""
+    inner = np.prod(paper_transmissions(units)[..., :-1], axis=-1)
+    return inner**units.crossings
+
+
+def divider(units: Units, kappa: Any) -> Any:
+    """1/(1 + kappa n E_outer/E_inner): the empirical divider without its constant s; N > 2 takes the outermost layer."""
+    e = units.youngs_modulus
+    return 1.0 / (1.0 + kappa * units.crossings * e[..., -1] / e[..., 0])
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """One of the paper's inequalities 6: `left` `relation` `right` for a unit against a control, as arrays."""
+
+    name: str
+    text: str
+    relation: Literal[">", "<"]
+    left: Any
+    right: Any
+    unit: str
+
+    @property
+    def margin(self) -> Any:
+        """By how much it holds, in the unit of both sides; negative where it does not."""
+        with np.errstate(**_QUIET):
+            return self.left - self.right if self.relation == ">" else self.right - self.left
+
+
+def constraints(units: Units, control: Units) -> list[Constraint]:
+    """Inequalities 6a to 6d with eta = E tan(delta)/omega in Pa s; 6c and 6d once for each neighbouring pair of layers.
+
+    6a and 6b compare the summed attenuation of unit and control (literal reading: seconds); another reading multiplies
+    both sides by the same number. 6c and 6d say that the impedance grows outwards; they need no control.
+    """
+    found = []
+    for name, wave, text in (("6a", "p", "attenuation of P waves"), ("6b", "s", "attenuation of S waves")):
+        sides = [np.sum(paper_exponents(u, wave, "literal"), axis=-1) for u in (units, control)]
+        found.append(Constraint(name, f"{text}: unit above control", ">", sides[0], sides[1], "s"))
+    for name, wave, text in (("6c", "p", "P impedance squared"), ("6d", "s", "S impedance squared")):
+        squared = impedances(units, wave) ** 2 * (2.0 if wave == "s" else 1.0)
+        for i in range(squared.shape[-1] - 1):
+            label = f"{text}: Layer {i + 1} below Layer {i + 2}"
+            found.append(Constraint(name, label, "<", squared[..., i], squared[..., i + 1], "Pa kg/m3"))
+    return found

@@ -1,0 +1,120 @@
+"""The three models of the edge level as functions of arrays, their fitted constants, and the null they must beat.
+
+`paper` and `consistent` leave the level at the motor open (f1, f2 are not printed): one constant, the geometric mean
+over the table. `fitted` has two constants. All are made from the catalogue's measured table when they are asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from unitcad.attenuation import closed_form as cf
+from unitcad.attenuation.closed_form import Units
+from unitcad.attenuation.table import Fit, Judgement, Predict, Table, judge, measured_table
+
+MODELS = ("paper", "consistent", "fitted")
+STORED_FIT = {"kappa": 0.282048, "s": 0.659429, "left_out_levels": 1.3351, "left_out_ratios": 1.3299}
+"""The divider's constants and its leave-one-unit-out errors (geometric-mean factors) over the catalogue's nine levels.
+
+Made by `fit_divider(measured_table(), everyone)`, least squares of the log, and `judgements()["fitted"]`; shown by
+`unitcad accuracy models`; a test makes them again.
+"""
+
+
+def scale_of(path: Predict, table: Table, chosen: np.ndarray) -> float:
+    """The one constant s of level = s path: geometric mean of measured / path over the chosen units."""
+    return float(np.exp(np.mean(np.log(table.levels / table.evaluate(path))[chosen])))
+
+
+def one_constant(path: Predict) -> Fit:
+    """level = s path."""
+
+    def fit(table: Table, chosen: np.ndarray) -> Callable[[Table], np.ndarray]:
+        s = scale_of(path, table, chosen)
+        return lambda other: s * other.evaluate(path)
+
+    return fit
+
+
+def fit_divider(table: Table, chosen: np.ndarray) -> tuple[float, float]:
+    """(kappa, s) of level = s / (1 + kappa n E_outer/E_inner): least squares of the log, golden section over log kappa."""
+
+    logs, contrast = np.log(table.levels[chosen]), table.contrast[chosen]
+
+    def parts(log_kappa: float) -> np.ndarray:
+        return logs + np.log1p(np.exp(log_kappa) * contrast)
+
+    def misfit(log_kappa: float) -> float:
+        return float(np.var(parts(log_kappa)))
+
+    low, high = np.log(1e-3), np.log(1e2)
+    golden = (np.sqrt(5.0) - 1.0) / 2.0
+    left, right = high - golden * (high - low), low + golden * (high - low)
+    at_left, at_right = misfit(left), misfit(right)
+    while high - low > 1e-9:
+        if at_left < at_right:
+            high, right, at_right = right, left, at_left
+            left = high - golden * (high - low)
+            at_left = misfit(left)
+        else:
+            low, left, at_left = left, right, at_right
+            right = low + golden * (high - low)
+            at_right = misfit(right)
+    best = (low + high) / 2.0
+    return float(np.exp(best)), float(np.exp(np.mean(parts(best))))
+
+
+def two_constants(table: Table, chosen: np.ndarray) -> Callable[[Table], np.ndarray]:
+    """The divider fitted to the chosen units."""
+    kappa, s = fit_divider(table, chosen)
+    return lambda other: s / (1.0 + kappa * other.contrast)
+
+
+def null(table: Table, chosen: np.ndarray) -> Callable[[Table], np.ndarray]:
+    """Two constants: one level where the inner layer is the softer one, one for all others."""
+    logs = np.log(table.levels)
+    soft = table.soft_inside
+    levels = [float(np.exp(np.mean(logs[chosen & (soft == side)]))) for side in (False, True)]
+    return lambda other: np.where(other.soft_inside, levels[1], levels[0])
+
+
+def paths() -> dict[str, Predict]:
+    """Of each model, and of the reading with crossings, what it makes of a unit before any constant."""
+    return {
+        "paper": cf.paper_path,
+        "consistent": cf.consistent_path,
+        "fitted": lambda units: cf.divider(units, STORED_FIT["kappa"]),
+        "crossings": cf.crossed_path,
+    }
+
+
+@cache
+def judgements() -> dict[str, Judgement]:
+    """Every model, the crossings reading and the null against the measured table; made on first use."""
+    found = paths()
+    fits: dict[str, tuple[Fit, bool]] = {
+        "paper": (one_constant(found["paper"]), False),
+        "consistent": (one_constant(found["consistent"]), False),
+        "fitted": (two_constants, True),
+        "crossings": (one_constant(found["crossings"]), False),
+        "null": (null, True),
+    }
+    return {name: judge(fit, in_ratios) for name, (fit, in_ratios) in fits.items()}
+
+
+@cache
+def scales() -> dict[str, float]:
+    """The constant s of every model, from all nine levels; the divider's is stored."""
+    table = measured_table()
+    everyone = np.ones(len(table.names), dtype=bool)
+    found = {name: scale_of(path, table, everyone) for name, path in paths().items() if name != "fitted"}
+    return {**found, "fitted": STORED_FIT["s"]}
+
+
+def edge_levels(units: Units, model: str) -> Any:
+    """Edge level (motor amplitude = 1) of arrays of variants by `paper`, `consistent` or `fitted`, shape (...)."""
+    return scales()[model] * paths()[model](units)
