@@ -13,10 +13,11 @@ contents are kept once. `MemoryStore` keeps them for one build, `DiskStore` for 
 
 from unitcad.cache.collect import DEFAULT_LIMIT_MB, Usage, collect, usage
 from unitcad.cache.disk import DiskStore, default_root
-from unitcad.cache.store import MemoryStore, MissingContent, Store, digest
+from unitcad.cache.store import Bundle, MemoryStore, MissingContent, Store, digest
 
 __all__ = [
     "DEFAULT_LIMIT_MB",
+    "Bundle",
     "DiskStore",
     "MemoryStore",
     "MissingContent",

@@ -118,6 +118,10 @@ class DiskStore:
                 self._write(source, target.read_bytes(), read_only=True)
                 self._verified[sha256] = _signature(source)
 
+    def peek(self, key: str) -> Any:
+        """The data under `key`, or None."""
+        return self._read(self._path("data", key), lambda data: True)
+
     def forget(self, key: str) -> None:
         """Remove the entry of a key."""
         for kind in ("data", "file"):

@@ -48,25 +48,36 @@ class Store(Protocol):
         ...
 
 
-@dataclass
-class MemoryStore:
-    """A store that lives as long as one build; `seed` and `known` bring in what somebody else has already.
+@dataclass(frozen=True)
+class Bundle:
+    """What a store holds, to be handed to another one: data by key, the SHA-256 of files by key, no content."""
 
-    Content whose SHA-256 is in `known` is named but not held: it can't be placed here.
+    data: dict[str, Any] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
+
+
+class MemoryStore:
+    """A store that lives as long as one build. What a bundle `known` to it names as a file is somebody else's to keep:
+    it counts as there, but can't be placed from here.
     """
 
-    seed: dict[str, Any] = field(default_factory=dict)
-    known: frozenset[str] = frozenset()
-    contents: dict[str, bytes] = field(default_factory=dict)
-    counts: Counter[str] = field(default_factory=Counter)
-    _files: dict[str, str] = field(default_factory=dict)
+    def __init__(self, known: Bundle | None = None) -> None:
+        self.counts: Counter[str] = Counter()
+        self.contents: dict[str, bytes] = {}
+        self._data: dict[str, Any] = dict(known.data) if known else {}
+        self._files: dict[str, str] = dict(known.files) if known else {}
+        self._elsewhere = frozenset(self._files.values())
+
+    def bundle(self) -> Bundle:
+        """What is here now."""
+        return Bundle(dict(self._data), dict(self._files))
 
     def data(self, key: str, make: Make, intact: Intact = lambda data: True) -> Any:
-        there = key in self.seed and intact(self.seed[key])
+        there = key in self._data and intact(self._data[key])
         self.counts["data reused" if there else "data built"] += 1
         if not there:
-            self.seed[key] = make()
-        return self.seed[key]
+            self._data[key] = make()
+        return self._data[key]
 
     def file(self, key: str, make: Callable[[], bytes]) -> str:
         there = key in self._files
@@ -78,7 +89,7 @@ class MemoryStore:
         return self._files[key]
 
     def has(self, sha256: str) -> bool:
-        return sha256 in self.contents or sha256 in self.known
+        return sha256 in self.contents or sha256 in self._elsewhere
 
     def content(self, sha256: str) -> bytes:
         if sha256 not in self.contents:
