@@ -8,8 +8,10 @@ import pytest
 from sample_bodies import all_bodies, cup, tongue, tube
 
 from unitcad.errors import UnitcadError
+from unitcad.pipeline.variant import Variant
 from unitcad.shape import Cut, moved
 from unitcad.shape.body import Body
+from unitcad.spec.load import templates
 
 occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
 step = pytest.importorskip("unitcad.export.step", exc_type=UnitcadError)
@@ -30,6 +32,23 @@ def test_read_back_equals_written(written):
     for back, body, solid in zip(found, BODIES, solids, strict=True):
         true = occt.measure(solid)
         assert back.colour == pytest.approx(body.colour, abs=1e-6)
+        assert back.measures.solids == true.solids == 1
+        assert back.measures.volume == pytest.approx(true.volume, rel=1e-9)
+        assert back.measures.box == pytest.approx(true.box, abs=1e-6)
+
+
+@pytest.mark.parametrize("template", sorted(templates()))
+def test_every_template_comes_back_as_written(template, tmp_path, monkeypatch):
+    made = []
+    build = occt.solids
+    monkeypatch.setattr(occt, "solids", lambda shapes: made.extend(build(shapes)) or made)
+    variant = Variant.of(template)
+    bodies = (*variant.unit, *variant.plan.tools)
+    step.write(tmp_path / "all.step", bodies, "all")
+    found = step.read(tmp_path / "all.step")
+    assert [(b.name, b.colour) for b in found] == [(b.name, pytest.approx(b.colour, abs=1e-6)) for b in bodies]
+    for back, solid in zip(found, made, strict=True):
+        true = occt.measure(solid)
         assert back.measures.solids == true.solids == 1
         assert back.measures.volume == pytest.approx(true.volume, rel=1e-9)
         assert back.measures.box == pytest.approx(true.box, abs=1e-6)

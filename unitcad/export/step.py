@@ -1,8 +1,8 @@
 """STEP AP242: an assembly of named, coloured bodies, exact surfaces, the same bytes for the same bodies.
 
 Written through OCCT's document (XCAF) directly, so that either B-rep extra will do. What OCCT writes differently each
-time is put right in the text: the time stamp, a counter of the process in the assembly's occurrences, and the styles,
-which it orders by address and whose colours it rounds to single precision; those are written here.
+time is put right in the text: the time stamp, a counter of the process, the last bits of coordinates, and the styles,
+which it orders by address and whose colours it rounds to single precision: those are written here.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ with loading("OCP"):
     from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 _SETTINGS = {"write.step.schema": 5, "write.surfacecurve.mode": 0}
-"""AP242; and no curves in the parameters of surfaces: readers work them out, and the file is 2.4 times smaller."""
+"""AP242; and no curves in the parameters of surfaces: OCCT's differ by 1e-16 from run to run, and readers need none."""
 
 _STYLE = (
     "FILL_AREA_STYLE_COLOUR('',{})",
@@ -79,7 +79,7 @@ def content(bodies: Sequence[Body], name: str) -> bytes:
         done = writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs)
         if not done or writer.WriteStream(stream) != IFSelect_ReturnStatus.IFSelect_RetDone:
             raise UnitcadError(f"OCCT could not write {name} as STEP")
-    text = _numbered_occurrences(_with_header(stream.getvalue().decode("ascii"), name))
+    text = _settled(_with_header(stream.getvalue().decode("ascii"), name))
     return _with_styles(text, [body.colour for body in bodies]).encode("ascii")
 
 
@@ -157,16 +157,16 @@ def _with_header(text: str, name: str) -> str:
     return text
 
 
-def _numbered_occurrences(text: str) -> str:
-    """The file with its assembly's occurrences counted from 1: OCCT counts on from the file before."""
+def _settled(text: str) -> str:
+    """The file with one record a line, reals to 1e-11, and its assembly's occurrences counted from 1.
+
+    OCCT merges vertices in the order of their addresses, which leaves 1e-17 here or there; it wraps lines by what that
+    takes to print; and it counts occurrences on from the file before.
+    """
+    text = re.sub(r"\n +", "", text)
+    text = re.sub(r"-0\.(?=[,)])|-?\d+\.\d*E-\d+|-?\d+\.\d{11,}", lambda found: _real(float(found[0])), text)
     number = itertools.count(1)
-
-    def counted(found: re.Match[str]) -> str:
-        # On one line: where OCCT breaks it depends on its count's digits.
-        rest = re.sub(r"\s*\n\s*", "", found[1])
-        return f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{next(number)}',{rest});"
-
-    return re.sub(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\(\s*'\d+',(.*?)\);", counted, text, flags=re.DOTALL)
+    return re.sub(r"(?<=NEXT_ASSEMBLY_USAGE_OCCURRENCE\(')\d+", lambda _: str(next(number)), text)
 
 
 def _with_styles(text: str, colours: Sequence[tuple[float, float, float]]) -> str:
@@ -199,7 +199,7 @@ def _with_styles(text: str, colours: Sequence[tuple[float, float, float]]) -> st
 
 def _real(value: float) -> str:
     """A number as the format wants it: with a point, always."""
-    return f"{value:.9f}".rstrip("0")
+    return f"{round(value, 11) + 0.0:.11f}".rstrip("0")
 
 
 @contextmanager

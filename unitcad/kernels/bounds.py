@@ -8,8 +8,9 @@ With n segments a turn, a = sqrt(x / sin x), x = 2 pi / n (see `mesh.area_true`)
 
 Volume: |V_mesh - V| <= sum over the leaves of d S, S the area of the leaf's curved faces. It holds through every
 boolean, since what two sums, differences or intersections disagree on lies where their operands disagree.
-Box: each face of the box moves by at most max d, where a leaf's own surface is what reaches out farthest; a mesh's box
-never lies farther out than that. `segment_count(r, t)` makes r (a - 1) <= t, so that d <= 1.5 t for any R <= r.
+Box: each face of the box moves by at most max d where a leaf's own face is what reaches out farthest, and by d / sin(w)
+where it is an edge at which two faces meet at an angle w: 2 max d for any w of 30 degrees or more.
+`segment_count(r, t)` makes r (a - 1) <= t, and so d <= 1.5 t for every extruded R <= r.
 """
 
 from __future__ import annotations
@@ -25,6 +26,11 @@ from unitcad.shape.profile import arc_centre, sides
 def deviation(shape: Shape, segments: int) -> float:
     """The farthest (mm) that any leaf's mesh of `segments` a turn lies from the leaf's surface."""
     return max(_deviation(leaf, segments) for leaf in _leaves(shape))
+
+
+def box_bound(shape: Shape, segments: int) -> float:
+    """The most (mm) by which a face of the mesh's box may lie off, its faces meeting at 30 degrees or more."""
+    return 2 * deviation(shape, segments)
 
 
 def volume_bound(shape: Shape, segments: int) -> float:

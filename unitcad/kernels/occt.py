@@ -23,7 +23,7 @@ with loading("OCP"):
     from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
     from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
     from OCP.GC import GC_MakeArcOfCircle
-    from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+    from OCP.gp import gp_Ax1, gp_Ax3, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
     from OCP.GProp import GProp_GProps
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
     from OCP.TopAbs import TopAbs_SOLID
@@ -66,8 +66,7 @@ def arc(start: brep.Point, middle: brep.Point, end: brep.Point) -> TopoDS_Edge:
 
 def wire(edges: Sequence[TopoDS_Edge]) -> TopoDS_Wire:
     builder = BRepBuilderAPI_MakeWire()
-    for edge in edges:
-        builder.Add(edge)
+    builder.Add(_list(edges))
     return builder.Wire()
 
 
@@ -89,7 +88,6 @@ def extrude(profile: TopoDS_Face, height: float) -> TopoDS_Shape:
 
 def loft(below: TopoDS_Wire, above: TopoDS_Wire) -> TopoDS_Shape:
     builder = BRepOffsetAPI_ThruSections(True, True)
-    builder.CheckCompatibility(False)
     builder.AddWire(below)
     builder.AddWire(above)
     return builder.Shape()
@@ -108,10 +106,10 @@ def common(one: TopoDS_Shape, other: TopoDS_Shape) -> TopoDS_Shape:
 
 
 def place(solid: TopoDS_Shape, turn: Turn, move: brep.Point) -> TopoDS_Shape:
+    x_axis, _, z_axis = zip(*turn, strict=True)
     transform = gp_Trsf()
-    rows = [value for row, shift in zip(turn, move, strict=True) for value in (*(float(v) for v in row), shift)]
-    transform.SetValues(*rows)
-    return solid.Moved(TopLoc_Location(transform))
+    transform.SetTransformation(gp_Ax3(gp_Pnt(*move), gp_Dir(*z_axis), gp_Dir(*x_axis)))
+    return solid.Moved(TopLoc_Location(transform.Inverted()))
 
 
 def _library() -> brep.Library:
@@ -124,14 +122,17 @@ def _boolean(
     operation: BRepAlgoAPI_BooleanOperation, bodies: Sequence[TopoDS_Shape], tools: Sequence[TopoDS_Shape]
 ) -> TopoDS_Shape:
     # Not in parallel: nothing is gained at this size, and a fork after a parallel run hangs.
-    lists = TopTools_ListOfShape(), TopTools_ListOfShape()
-    for found, shapes in zip(lists, (bodies, tools), strict=True):
-        for shape in shapes:
-            found.Append(shape)
-    operation.SetArguments(lists[0])
-    operation.SetTools(lists[1])
+    operation.SetArguments(_list(bodies))
+    operation.SetTools(_list(tools))
     operation.Build()
     return operation.Shape()
+
+
+def _list(shapes: Sequence[TopoDS_Shape]) -> TopTools_ListOfShape:
+    found = TopTools_ListOfShape()
+    for shape in shapes:
+        found.Append(shape)
+    return found
 
 
 def _unified(solid: TopoDS_Shape) -> TopoDS_Shape:

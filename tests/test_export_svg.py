@@ -1,0 +1,125 @@
+from itertools import combinations, pairwise
+from xml.etree import ElementTree
+
+import manifold3d
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sample_bodies import base, cup, layers, tube
+
+from unitcad.export import drawing, svg
+from unitcad.pipeline.variant import Variant
+from unitcad.shape import box
+from unitcad.shape.body import Body
+from unitcad.spec.load import templates
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def area(region: svg.Region) -> float:
+    """Area in mm2, by manifold3d's own even-odd filling."""
+    return manifold3d.CrossSection(region.loops, manifold3d.FillRule.EvenOdd).area()
+
+
+def texts(root: ElementTree.Element) -> dict[str, tuple[float, float, float, float]]:
+    """Text by what it says, with the box that it takes (px)."""
+    found = {}
+    for index, node in enumerate(root.iter(f"{SVG}text")):
+        width, x, y = drawing.text_width(node.text or ""), float(node.get("x", "")), float(node.get("y", ""))
+        left = x - {"start": 0.0, "middle": 0.5, "end": 1.0}[node.get("text-anchor", "start")] * width
+        found[f"{node.text}#{index}"] = (left, y - 0.75 * drawing.TEXT_PX, left + width, y + 0.25 * drawing.TEXT_PX)
+    return found
+
+
+def drawn(template: str) -> str:
+    variant = Variant.of(template)
+    names = {f"layer{i + 1}": f"layer {i + 1}: {layer.material}" for i, layer in enumerate(variant.spec.layers)}
+    return svg.unit_section(variant.unit, variant.dimensions, variant.segments, template, names)
+
+
+@pytest.mark.parametrize("template", sorted(templates()))
+def test_no_text_meets_another_or_leaves_the_page(template):
+    root = ElementTree.fromstring(drawn(template))
+    boxes = texts(root)
+    for (one, a), (other, b) in combinations(boxes.items(), 2):
+        apart = a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
+        assert apart, (one, other)
+    for name, (left, top, right, bottom) in boxes.items():
+        assert left >= 0, name
+        assert top >= 0, name
+        assert right <= float(root.get("width", "")), name
+        assert bottom <= float(root.get("height", "")), name
+
+
+@pytest.mark.parametrize("template", sorted(templates()))
+def test_main_dimensions_and_every_layer_are_there(template):
+    variant = Variant.of(template)
+    dims, spec = variant.dimensions, variant.spec
+    said = {name.split("#")[0] for name in texts(ElementTree.fromstring(drawn(template)))}
+    wanted = {f"Ø{spec.diameter_mm:g}", f"Ø{2 * dims.motor_radius:g}", f"R{dims.cavity_radius:g}", "motor", "skin"}
+    wanted |= {f"{layer.wall_mm:g}" for layer in spec.layers}
+    wanted |= {f"{layer.cap_mm:g}" for layer in spec.layers if layer.cap_mm}
+    wanted |= {f"layer {i + 1}: {layer.material}" for i, layer in enumerate(spec.layers)}
+    wanted |= {f"{dims.heights[-1]:g}"}
+    wanted |= {"air"} if dims.air_ring > 0 else set()
+    wanted |= {"fpcb"} if spec.fpcb else set()
+    if dims.slot_z:
+        wanted |= {f"slot {dims.slot_z[1] - dims.slot_z[0]:g} × {dims.slot_width:g}"}
+    assert wanted <= said
+
+
+def test_regions_are_the_profiles():
+    """Layer 1 of the sample: twice its half profile, less the slot through one wall and into the cap above the core."""
+    first, second = svg.cut(layers(), 96)
+    assert area(first) == pytest.approx(2 * (5.75 * 3.36 - 4.5 * 2.11) - 1.25 * 0.5 - 0.6 * 0.39, abs=0.02)
+    assert area(second) == pytest.approx(2 * (7 * 4.61 - 5.75 * 3.36) - 1.25 * 0.5, abs=0.02)
+
+
+def test_bodies_in_one_section_do_not_overlap_in_their_parting_planes():
+    """A section drawn exactly in a plane that vertices lie in shows false triangles: areas would not add up."""
+    bodies = [base(), cup()]
+    for y in (0.0, 1.6, 7.0, 17.0 - 1 / 1024):
+        found = [manifold3d.CrossSection(r.loops, manifold3d.FillRule.EvenOdd) for r in svg.cut(bodies, 96, y)]
+        both = manifold3d.CrossSection.batch_boolean(found, manifold3d.OpType.Add).area()
+        assert both == pytest.approx(sum(flat.area() for flat in found), abs=1e-3)
+
+
+def test_a_block_is_cut_where_it_is_asked_for():
+    block = Body("block", "tool", box(0, 4, -1, 3, 1, 2), (0, 0, 0))
+    assert area(svg.cut([block], 24, y=2.9)[0]) == pytest.approx(4, abs=1e-9)
+    assert svg.cut([block], 24, y=3.1) == []
+    assert area(svg.cut([block], 24, reach=2.5)[0]) == pytest.approx(2.5, abs=1e-9)
+
+
+def test_leaders_end_in_what_they_name():
+    regions = svg.cut([*layers(), tube()], 96)
+    for region, (x, z) in zip(regions, svg._anchors(regions, [60, 60, 40]), strict=True):
+        flat = manifold3d.CrossSection(region.loops, manifold3d.FillRule.EvenOdd)
+        dot = manifold3d.CrossSection.square((0.1, 0.1), True).translate((x, z))
+        assert (dot - flat).is_empty()
+
+
+def test_same_text_again_and_names_are_escaped():
+    assert drawn("encapsulating") == drawn("encapsulating")
+    odd = svg.section(svg.cut([tube()], 48), title="a<b>&", labels={"tube": "<i>"}, ground="seat")
+    said = {name.split("#")[0] for name in texts(ElementTree.fromstring(odd))}
+    assert {"a<b>&", "<i>", "seat"} <= said
+
+
+@given(st.lists(st.tuples(st.floats(-500, 500), st.floats(1, 90)), min_size=1, max_size=9))
+def test_spread_keeps_order_and_distance(items):
+    wanted, sizes = [w for w, _ in items], [s for _, s in items]
+    found = drawing.spread(wanted, sizes, 4)
+    order = sorted(range(len(items)), key=lambda i: found[i])
+    for left, right in pairwise(order):
+        assert wanted[left] <= wanted[right]
+        assert found[right] - found[left] >= (sizes[left] + sizes[right]) / 2 + 4 - 1e-6
+
+
+def test_spread_leaves_alone_what_has_room():
+    assert drawing.spread([100, 0, 50], [10, 10, 10]) == [100, 0, 50]
+
+
+@pytest.mark.parametrize(("value", "shown"), [(-0.001, "0"), (1.25, "1.25"), (12.0, "12"), (1 / 3, "0.33")])
+def test_numbers_have_one_form(value, shown):
+    assert drawing.number(value) == shown

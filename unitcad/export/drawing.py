@@ -1,0 +1,92 @@
+"""The marks of a technical drawing in SVG: dimension lines, leaders, text clear of other text. In px, y downwards."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from xml.sax.saxutils import escape, quoteattr
+
+TEXT_PX = 12.0
+CHARACTER_PX = 0.62 * TEXT_PX
+"""Width that a character is given room for: no common sans-serif is wider on average."""
+ARROW_PX = 7.0
+
+Point = tuple[float, float]
+
+
+def number(value: float) -> str:
+    """A coordinate: two decimals, no trailing zeros, no minus zero."""
+    return f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".")
+
+
+def millimetres(value: float) -> str:
+    """A length as a drawing shows it: three decimals at most."""
+    return f"{value + 0.0:.3f}".rstrip("0").rstrip(".")
+
+
+def text_width(text: str) -> float:
+    """Room (px) that `text` takes."""
+    return len(text) * CHARACTER_PX
+
+
+def spread(wanted: Sequence[float], sizes: Sequence[float], gap: float = 4.0) -> list[float]:
+    """Middles of items of `sizes` in a row, in the order of `wanted`, `gap` apart or more, close to what is wanted.
+
+    Items that would overlap are joined into a run about the mean of their wishes (pool adjacent violators).
+    """
+    order = sorted(range(len(wanted)), key=lambda i: (wanted[i], i))
+    before = [0.0]
+    for left, right in pairwise(order):
+        before.append(before[-1] + (sizes[left] + sizes[right]) / 2 + gap)
+    runs: list[list[float]] = []
+    for i, offset in zip(order, before, strict=True):
+        runs.append([wanted[i] - offset, 1])
+        while len(runs) > 1 and runs[-2][0] > runs[-1][0]:
+            mean, count = runs.pop()
+            runs[-1] = [(runs[-1][0] * runs[-1][1] + mean * count) / (runs[-1][1] + count), runs[-1][1] + count]
+    starts = [mean for mean, count in runs for _ in range(int(count))]
+    found = [0.0] * len(wanted)
+    for i, start, offset in zip(order, starts, before, strict=True):
+        found[i] = start + offset
+    return found
+
+
+def line(start: Point, end: Point, kind: str) -> str:
+    """A line of the style `kind`."""
+    (x1, y1), (x2, y2) = start, end
+    return f'<line class="{kind}" x1="{number(x1)}" y1="{number(y1)}" x2="{number(x2)}" y2="{number(y2)}"/>'
+
+
+def text(content: str, at: Point, anchor: str = "middle") -> str:
+    """A line of text, its middle at the height of `at`."""
+    x, y = at
+    return f'<text x="{number(x)}" y="{number(y + 0.35 * TEXT_PX)}" text-anchor="{anchor}">{escape(content)}</text>'
+
+
+def dot(at: Point) -> str:
+    """The end of a leader."""
+    return f'<circle class="dot" cx="{number(at[0])}" cy="{number(at[1])}" r="2.2"/>'
+
+
+def outline(loops: Sequence[Sequence[Point]], fill: str, name: str) -> str:
+    """A filled region with holes, titled."""
+    path = "".join("M" + "L".join(f"{number(x)} {number(y)}" for x, y in loop) + "Z" for loop in loops)
+    return f'<path d="{path}" fill={quoteattr(fill)} fill-rule="evenodd"><title>{escape(name)}</title></path>'
+
+
+def dimension(start: Point, end: Point) -> list[str]:
+    """A dimension line between two points on a level or upright line, its arrows outside if they don't fit inside."""
+    along = (end[0] - start[0], end[1] - start[1])
+    length = (along[0] ** 2 + along[1] ** 2) ** 0.5
+    unit = (along[0] / length, along[1] / length)
+    inside = 1.0 if length > 3 * ARROW_PX else -1.0
+    marks = [line(start, end, "dimension")]
+    for tip, sign in ((start, 1.0), (end, -1.0)):
+        way = sign * inside * ARROW_PX
+        back = (tip[0] + unit[0] * way, tip[1] + unit[1] * way)
+        if inside < 0:
+            marks.append(line(tip, (tip[0] + unit[0] * way * 2, tip[1] + unit[1] * way * 2), "dimension"))
+        across = (-unit[1] * ARROW_PX * 0.25, unit[0] * ARROW_PX * 0.25)
+        corners = (tip, (back[0] + across[0], back[1] + across[1]), (back[0] - across[0], back[1] - across[1]))
+        marks.append(f'<polygon class="arrow" points="{" ".join(f"{number(x)},{number(y)}" for x, y in corners)}"/>')
+    return marks

@@ -1,0 +1,288 @@
+"""A section drawing in SVG: what a plane of constant y cuts through bodies, coloured, named, with dimensions in mm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+from xml.sax.saxutils import escape
+
+import numpy as np
+from manifold3d import CrossSection
+
+from unitcad.export import drawing
+from unitcad.export.drawing import Point
+from unitcad.export.threemf import colour_hex
+from unitcad.kernels.mesh import realise
+from unitcad.shape.body import Body
+from unitcad.spec import Dimensions
+
+HAIR_MM = 1 / 3000
+"""The cut lies this far off its plane: a section in a plane that faces or vertices lie in shows false triangles."""
+TAIL_MM = 2.5
+"""Of a tail, this much is drawn."""
+WIDTH_PX = 520.0
+ROW_PX, COLUMN_PX = 26.0, 54.0
+_UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0]])
+"""Turns (x, y, z) to (x, z, -y): the plane of the section becomes the one that manifold3d slices in."""
+_STYLE = (
+    f"text{{font:{drawing.number(drawing.TEXT_PX)}px Helvetica,Arial,sans-serif;fill:#111}}"
+    "path{stroke:#111;stroke-width:.8;stroke-linejoin:round}"
+    ".dimension{stroke:#111;stroke-width:.7}.extension{stroke:#777;stroke-width:.5}.arrow{fill:#111}"
+    ".leader{stroke:#333;stroke-width:.6}.dot{fill:#111}.axis{stroke:#555;stroke-width:.6;stroke-dasharray:12 3 2 3}"
+    ".skin{stroke:#b04a3a;stroke-width:1.4}"
+)
+
+
+@dataclass(frozen=True)
+class Region:
+    """What the plane cuts of one body: closed loops in (x, z), mm, holes among them by the even-odd rule."""
+
+    name: str
+    colour: tuple[float, float, float]
+    loops: tuple[tuple[Point, ...], ...]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A dimension: `start` to `end` along x (drawn below) or z (drawn left or right), in a `row` counted outwards.
+
+    `reach`: where its extension lines begin, in the other coordinate. All in mm.
+    """
+
+    text: str
+    start: float
+    end: float
+    side: Literal["below", "left", "right"]
+    row: int
+    reach: float
+
+
+@dataclass(frozen=True)
+class Note:
+    """A label with a leader to a point (x, z) in mm."""
+
+    text: str
+    at: Point
+
+
+def cut(bodies: Sequence[Body], segments: int, y: float = 0.0, reach: float = math.inf) -> list[Region]:
+    """What the plane at `y` (mm) cuts of `bodies`, no farther from x = 0 than `reach`; what it misses is left out."""
+    window = CrossSection.square((2 * reach, 2e4), True) if math.isfinite(reach) else None
+    found = []
+    for body in bodies:
+        flat: CrossSection = realise(body.shape, segments).transform(_UPRIGHT).slice(HAIR_MM - y)
+        if window is not None:
+            flat = flat ^ window
+        loops = tuple(tuple((float(px), float(pz)) for px, pz in loop) for loop in flat.to_polygons())
+        if loops:
+            found.append(Region(body.name, body.colour, loops))
+    return found
+
+
+def section(
+    regions: Sequence[Region],
+    measures: Sequence[Measure] = (),
+    notes: Sequence[Note] = (),
+    title: str = "",
+    labels: Mapping[str, str] | None = None,
+    ground: str = "skin",
+) -> str:
+    """The drawing of `regions`: every one named (by `labels`, else its own name), the measures round about.
+
+    `ground` is what the line z = 0 is called. The same arguments give the same text.
+    """
+    page = _Page(regions, measures)
+    texts = [(labels or {}).get(region.name, region.name) for region in regions]
+    named = [*notes, *map(Note, texts, _anchors(regions, [drawing.text_width(text) for text in texts]))]
+    marks = [
+        drawing.outline([[page.at(point) for point in loop] for loop in region.loops], colour_hex(region.colour), text)
+        for region, text in zip(regions, texts, strict=True)
+    ]
+    marks += page.frame(ground)
+    for side in ("below", "left", "right"):
+        marks += page.measures([m for m in measures if m.side == side])
+    marks += page.labels(named)
+    if title:
+        marks.append(drawing.text(title, (page.width / 2, drawing.TEXT_PX)))
+    size = f"{drawing.number(page.width)} {drawing.number(page.height)}"
+    width, height = size.split()
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" width="{width}" height="{height}" viewBox="0 0 {size}">'
+        f"<title>{escape(title or 'section')}</title><style>{_STYLE}</style>"
+        f'<rect width="{width}" height="{height}" fill="#fff"/>'
+    )
+    return "\n".join([head, *marks, "</svg>", ""])
+
+
+def unit_section(
+    bodies: Sequence[Body],
+    dims: Dimensions,
+    segments: int,
+    title: str = "",
+    labels: Mapping[str, str] | None = None,
+) -> str:
+    """The unit cut along its tail, in the plane y = 0: main dimensions, layers and air named."""
+    regions = cut(bodies, segments, reach=dims.outer_radius + TAIL_MM)
+    notes = []
+    if dims.air_ring > 0:
+        notes.append(Note("air", ((dims.motor_radius + dims.cavity_radius) / 2, dims.motor_height / 3)))
+    return section(regions, _unit_measures(dims), notes, title, labels)
+
+
+def _unit_measures(dims: Dimensions) -> list[Measure]:
+    show = drawing.millimetres
+    inner, walls = [dims.cavity_radius, *dims.radii[:-1]], []
+    for low, high in zip(inner, dims.radii, strict=True):
+        walls.append(Measure(show(high - low), -high, -low, "below", 0, 0))
+    if dims.air_ring > 0:
+        walls.append(Measure(show(dims.air_ring), -dims.cavity_radius, -dims.motor_radius, "below", 0, 0))
+    found = [
+        *walls,
+        Measure(f"Ø{show(2 * dims.motor_radius)}", -dims.motor_radius, dims.motor_radius, "below", 0, 0),
+        Measure(f"R{show(dims.cavity_radius)}", 0, dims.cavity_radius, "below", 1, 0),
+        Measure(f"Ø{show(2 * dims.outer_radius)}", -dims.outer_radius, dims.outer_radius, "below", 2, 0),
+    ]
+    levels = sorted({0.0, dims.motor_height, dims.core_height, *dims.heights})
+    reach = -dims.outer_radius
+    inside = [level for level in levels if level != dims.motor_height or level == dims.core_height]
+    for low, high in pairwise(inside):
+        found.append(Measure(show(high - low), low, high, "left", 0, reach))
+    if len(inside) > 2:
+        found.append(Measure(show(levels[-1]), 0, levels[-1], "left", 1, reach))
+    if dims.slot_z:
+        low, high = dims.slot_z
+        found.append(
+            Measure(f"slot {show(high - low)} × {show(dims.slot_width)}", low, high, "right", 0, dims.outer_radius)
+        )
+    return found
+
+
+class _Page:
+    """The sheet: from mm in the plane to px, and what is drawn round the regions."""
+
+    def __init__(self, regions: Sequence[Region], measures: Sequence[Measure]) -> None:
+        points = np.array([p for region in regions for loop in region.loops for p in loop])
+        self.low, self.high = points.min(axis=0), points.max(axis=0)
+        self.scale = WIDTH_PX / max(self.high[0] - self.low[0], 1e-9)
+        rows = {s: 1 + max((m.row for m in measures if m.side == s), default=-1) for s in ("below", "left", "right")}
+        right = max((drawing.text_width(m.text) for m in measures if m.side == "right"), default=0.0)
+        self.left = 24 + COLUMN_PX * rows["left"]
+        self.top = 84.0
+        self.width = self.left + WIDTH_PX + 24 + (ROW_PX + right if rows["right"] else 0.0)
+        self.height = self.top + (self.high[1] - self.low[1]) * self.scale + 30 + ROW_PX * rows["below"]
+
+    def at(self, point: Point) -> Point:
+        """px of (x, z) in mm."""
+        x, z = point
+        return self.left + (x - self.low[0]) * self.scale, self.top + (self.high[1] - z) * self.scale
+
+    def frame(self, ground: str) -> list[str]:
+        """The line z = 0 and the axis."""
+        skin = self.at((self.low[0], 0.0)), self.at((self.high[0], 0.0))
+        top, bottom = self.at((0.0, self.high[1])), self.at((0.0, self.low[1]))
+        return [
+            drawing.line(skin[0], skin[1], "skin"),
+            drawing.text(ground, (skin[1][0], skin[1][1] + drawing.TEXT_PX * 0.8), "end"),
+            drawing.line((top[0], top[1] - 12), (bottom[0], bottom[1] + 12), "axis"),
+        ]
+
+    def measures(self, measures: Sequence[Measure]) -> list[str]:
+        """Dimension lines of one side, their extension lines and their texts."""
+        marks = []
+        for row in sorted({measure.row for measure in measures}):
+            there = [measure for measure in measures if measure.row == row]
+            ends = [self._ends(measure) for measure in there]
+            for measure, (start, end) in zip(there, ends, strict=True):
+                feet = [self._foot(measure, value) for value in (measure.start, measure.end)]
+                marks += [drawing.line(foot, tip, "extension") for foot, tip in zip(feet, (start, end), strict=True)]
+                marks += drawing.dimension(start, end)
+            marks += self._texts(there, ends)
+        return marks
+
+    def labels(self, notes: Sequence[Note]) -> list[str]:
+        """Names in a row above the drawing, each with a leader to its point."""
+        anchors = [self.at(note.at) for note in notes]
+        widths = [drawing.text_width(note.text) for note in notes]
+        middles = drawing.spread([x for x, _ in anchors], widths, 14.0)
+        # A row wider than the page is moved back onto it.
+        over = max((m + w / 2 for m, w in zip(middles, widths, strict=True)), default=0.0) - self.width + 6
+        under = 6 - min((m - w / 2 for m, w in zip(middles, widths, strict=True)), default=6.0)
+        shift = max(under, 0.0) - max(over, 0.0)
+        row = self.top - 38
+        marks = []
+        for note, anchor, middle in zip(notes, anchors, middles, strict=True):
+            marks.append(drawing.line((middle + shift, row + drawing.TEXT_PX * 0.7), anchor, "leader"))
+            marks += [drawing.dot(anchor), drawing.text(note.text, (middle + shift, row))]
+        return marks
+
+    def _ends(self, measure: Measure) -> tuple[Point, Point]:
+        """Where a dimension line runs (px)."""
+        start, end = (self.at(self._point(measure, value)) for value in (measure.start, measure.end))
+        if measure.side == "below":
+            y = self.at((0.0, self.low[1]))[1] + ROW_PX * (measure.row + 1)
+            return (start[0], y), (end[0], y)
+        if measure.side == "left":
+            x = self.left - 14 - COLUMN_PX * measure.row
+        else:
+            x = self.left + WIDTH_PX + 14 + ROW_PX * measure.row
+        return (x, start[1]), (x, end[1])
+
+    @staticmethod
+    def _point(measure: Measure, value: float) -> Point:
+        return (value, measure.reach) if measure.side == "below" else (measure.reach, value)
+
+    def _foot(self, measure: Measure, value: float) -> Point:
+        return self.at(self._point(measure, value))
+
+    @staticmethod
+    def _texts(measures: Sequence[Measure], ends: Sequence[tuple[Point, Point]]) -> list[str]:
+        """Texts of one row: under a level dimension line, beside an upright one."""
+        if measures[0].side == "below":
+            middles = [(start[0] + end[0]) / 2 for start, end in ends]
+            found = drawing.spread(middles, [drawing.text_width(m.text) for m in measures])
+            level = ends[0][0][1] + drawing.TEXT_PX * 0.8
+            return [drawing.text(m.text, (x, level)) for m, x in zip(measures, found, strict=True)]
+        middles = [(start[1] + end[1]) / 2 for start, end in ends]
+        found = drawing.spread(middles, [drawing.TEXT_PX] * len(measures), 2.0)
+        away, anchor = (-6.0, "end") if measures[0].side == "left" else (6.0, "start")
+        return [drawing.text(m.text, (ends[0][0][0] + away, y), anchor) for m, y in zip(measures, found, strict=True)]
+
+
+def _anchors(regions: Sequence[Region], widths: Sequence[float]) -> list[Point]:
+    """A point in each region for its leader: well inside, and below where a label of its width will find room."""
+    ends = [point[0] for region in regions for loop in region.loops for point in loop]
+    low, span = min(ends, default=0.0), max(ends, default=0.0) - min(ends, default=0.0)
+    room, total, found = 0.0, sum(widths) or 1.0, []
+    for region, width in zip(regions, widths, strict=True):
+        wish = low + span * (room + width / 2) / total
+        room += width
+        starts = np.array([point for loop in region.loops for point in loop])
+        stops = np.array([point for loop in region.loops for point in (*loop[1:], loop[0])])
+        best, least = region.loops[0][0], math.inf
+        for x in np.linspace(low, low + span, 241)[1:-1]:
+            for z in _middles(starts, stops, x):
+                # As much room as a dot needs counts; beyond that, nearness to the wish does.
+                clear = min(_distance(starts, stops, np.array([x, z])), 0.02 * span)
+                if abs(x - wish) - 20 * clear < least:
+                    best, least = (float(x), float(z)), abs(x - wish) - 20 * clear
+        found.append(best)
+    return found
+
+
+def _middles(starts: np.ndarray, stops: np.ndarray, x: float) -> np.ndarray:
+    """Middles of the stretches in which the upright line at `x` runs inside a region, mm."""
+    across = (starts[:, 0] > x) != (stops[:, 0] > x)
+    (x0, z0), (x1, z1) = starts[across].T, stops[across].T
+    crossings = np.sort(z0 + (z1 - z0) * (x - x0) / (x1 - x0))
+    return (crossings[::2] + crossings[1::2]) / 2
+
+
+def _distance(starts: np.ndarray, stops: np.ndarray, point: np.ndarray) -> float:
+    """From `point` to the nearest side of a region, mm."""
+    along = stops - starts
+    share = np.einsum("ij,ij->i", point - starts, along) / np.maximum(np.einsum("ij,ij->i", along, along), 1e-18)
+    nearest = starts + np.clip(share, 0, 1)[:, None] * along
+    return float(np.linalg.norm(point - nearest, axis=1).min())
