@@ -54,18 +54,32 @@ def removals(plan: Plan) -> Iterator[tuple[Step, Removal]]:
         yield last, Removal(last.index, piece, (0, 0, -1), tuple(there))
 
 
-def draw_law(plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[Finding]:
+def draw_law(plan: Plan, solids: Mapping[str, Manifold], segments: int, overlapping: bool = False) -> list[Finding]:
     """C300 for every removal: the area of the piece that runs into what stays.
 
-    What is against the piece at the start is cut out of what stays first: silicone has taken the tool's real shape.
+    Where pieces are `overlapping`, the piece is cut out of what stays first: silicone has taken the tool's real shape.
     """
     found = []
+    faces: dict[tuple[int, tuple[int, int, int], bool], np.ndarray] = {}
+
+    def facing(solid: Manifold, direction: tuple[int, int, int], upwards: bool) -> np.ndarray:
+        key = id(solid), direction, upwards
+        if key not in faces:
+            faces[key] = _facing(solid, direction, upwards)
+        return faces[key]
+
+    layers = {step.index: [realise(s, segments) for s in (*step.layer, *step.earlier)] for step in plan.steps}
     for step, removal in removals(plan):
         staying = [(name, solids[name]) for name in removal.stays if name != "cured"]
-        staying += [("layer", realise(shape, segments)) for shape in (*step.layer, *step.earlier)]
-        piece = solids[removal.piece]
-        areas = [(blocked(piece, solid, removal.direction), name) for name, solid in staying]
-        worst = max(areas)
+        staying += [("layer", solid) for solid in layers[step.index]]
+        piece, way = solids[removal.piece], removal.direction
+        areas = []
+        for name, solid in staying:
+            if overlapping and boxes_meet(piece, solid):
+                areas.append((blocked(piece, solid, way), name))
+            elif _in_the_way(piece, solid, way):
+                areas.append((_meeting(facing(piece, way, True), facing(solid, way, False)), name))
+        worst = max(areas, default=(0.0, ""))
         against = f" against {worst[1]}" if worst[0] > BLOCKED else ""
         where = f"pour {removal.step}: {removal.piece} out{against}"
         found.append(at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", _advice(worst[1])))
@@ -75,18 +89,31 @@ def draw_law(plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[
 def blocked(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -> float:
     """Area (mm2, seen along `direction`) of upward faces of `piece` that lie below downward faces of `stays`.
 
-    `direction` is a signed axis. A face that several others lie above counts once for each of them.
+    `direction` is a signed axis. A face that several others lie above counts once for each of them. Where the two
+    overlap at the start, the piece is cut out of what stays.
     """
-    if boxes_meet(piece, stays):
-        stays = stays - piece
-    up = _facing(piece, direction, upwards=True)
-    down = _facing(stays, direction, upwards=False)
+    return _meeting(_facing(piece, direction, True), _facing(stays - piece, direction, False))
+
+
+def _meeting(up: np.ndarray, down: np.ndarray) -> float:
+    """Area of the triangles `up` (n, 3, 3) that lie below, or against, the triangles `down`."""
     total = 0.0
     for chunk in np.array_split(up, max(1, len(up) * len(down) // 2_000_000)):
         first, second = _near(chunk, down)
         if len(first):
             total += float(_area_below(chunk[first], down[second]).sum())
     return total
+
+
+def _in_the_way(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -> bool:
+    """Whether the boxes let the piece meet what stays at all."""
+    p, q = piece.bounding_box(), stays.bounding_box()
+    for axis, way in enumerate(direction):
+        if way >= 0 and q[axis + 3] < p[axis] - LEVEL:
+            return False
+        if way <= 0 and q[axis] > p[axis + 3] + LEVEL:
+            return False
+    return True
 
 
 def peel(plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[tuple[Manifold, Manifold]]:

@@ -82,16 +82,13 @@ def held(step: Step, components: list[Manifold], segments: int) -> list[tuple[Ma
 
 def balance_law(step: Step, cells: list[tuple[Manifold, Manifold]]) -> list[Finding]:
     """C100: each component that holds a layer equals it."""
-    return [
-        at_most(
-            "C100",
-            f"pour {step.index}" + (f" cell {i + 1}" if len(cells) > 1 else ""),
-            ((holding - drawn).volume() + (drawn - holding).volume()) / drawn.volume(),
-            BALANCE,
-            "share of the layer",
-        )
-        for i, (drawn, holding) in enumerate(cells)
-    ]
+    found = []
+    for i, (drawn, holding) in enumerate(cells):
+        # What one has and the other lacks, both ways.
+        differ = abs(holding.volume() + drawn.volume() - 2 * (holding ^ drawn).volume())
+        where = f"pour {step.index}" + (f" cell {i + 1}" if len(cells) > 1 else "")
+        found.append(at_most("C100", where, differ / drawn.volume(), BALANCE, "share of the layer"))
+    return found
 
 
 def overlap_law(step: Step, solids: Mapping[str, Manifold], segments: int) -> list[Finding]:

@@ -52,4 +52,5 @@ def geometric_laws(
         thinnest = min(layer.wall_mm, layer.cap_mm or layer.wall_mm)
         found += air_law(step, [holding for _, holding in cells], thinnest)
     found += fit.gap_law(spec, plan, solids)
-    return found + draw_law(plan, solids, segments)
+    overlapping = any(finding.code == "C200" and not finding.ok for finding in found)
+    return found + draw_law(plan, solids, segments, overlapping)

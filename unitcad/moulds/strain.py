@@ -71,8 +71,9 @@ def peel_strain(body: Manifold, base: Manifold) -> tuple[float, float, float]:
     At each height the hole in the body must pass whatever the base carries above it, within the body's outline.
     """
     outline = body.project().hull()
+    x0, y0, low, x1, y1, high = body.bounding_box()
+    base = base ^ Manifold.cube((x1 - x0, y1 - y0, high - low)).translate((x0, y0, low))
     heights = sorted({float(z) for solid in (body, base) for z in arrays(solid)[0][:, 2]})
-    low, high = body.bounding_box()[2], body.bounding_box()[5]
     levels = [z for z in heights if low <= z <= high]
     worst = (0.0, 0.0, 0.0)
     for below, above in pairwise(levels):
