@@ -12,10 +12,13 @@ from typing import Annotated
 import typer
 
 from unitcad import __version__
+from unitcad.cli.batch import batch
 from unitcad.cli.build import build
+from unitcad.cli.cache import cache
 from unitcad.cli.check import check
 from unitcad.cli.list import list_
 from unitcad.cli.output import say_error
+from unitcad.cli.schema import schema
 from unitcad.errors import UnitcadError
 
 app = typer.Typer(
@@ -35,8 +38,11 @@ def _version(wanted: bool) -> None:
 
 
 app.command("build")(build)
+app.command("batch")(batch)
 app.command("check")(check)
 app.command("list")(list_)
+app.command("schema")(schema)
+app.add_typer(cache, name="cache")
 
 
 @app.callback()

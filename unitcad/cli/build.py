@@ -22,19 +22,13 @@ def build(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
     """Make a unit and its casting moulds. The last line printed is the folder."""
+    from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json, progress
-    from unitcad.errors import unknown_name
-    from unitcad.pipeline import FORMATS, OUTPUTS
+    from unitcad.pipeline import OUTPUTS
     from unitcad.pipeline import build as run
     from unitcad.spec import load
 
-    overrides = list(sets or [])
-    if formats is not None:
-        names = [name.strip() for name in formats.split(",") if name.strip()]
-        for name in names:
-            if name not in FORMATS:
-                raise unknown_name("--formats", name, FORMATS)
-        overrides.append(f"output.formats={names}")
+    overrides = [*(sets or []), *chosen_formats(formats)]
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
     # Every spec passes the door before the first one is built.
     wanted = [load(spec, overrides) for spec in specs]

@@ -1,0 +1,226 @@
+"""Where variants are made, as `concurrent.futures.Executor`: in this process, in worker processes, on a Dask cluster.
+
+The worker processes are our own and not ProcessPoolExecutor's for one reason: there a worker that dies takes the pool
+and every running task with it, and nobody can say whose fault it was. Here one task fails, and one worker is replaced.
+They are started by `python -c`, so neither fork after a kernel has run threads (it hangs) nor a guard in the caller's
+main module is needed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from typing import IO, Any
+
+from unitcad.batch.frames import receive, send
+from unitcad.errors import Refusal, UnitcadError
+
+_START = "import sys; sys.path[:] = {path!r}; from unitcad.batch.worker import serve; serve({preload!r})"
+WARM = ("unitcad.pipeline.build", "unitcad.moulds.laws", "unitcad.check", "unitcad.kernels.mesh")
+"""What a worker imports before its first task."""
+DASK_SECONDS = 8.0
+"""How long a scheduler may take to answer."""
+
+
+class WorkerDied(Exception):
+    """A worker process ended in the middle of a task."""
+
+
+class SerialExecutor(Executor):
+    """Runs each task at once, in the caller's thread: for debugging. A crash or a hang is the caller's own."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+class ProcessExecutor(Executor):
+    """`workers` processes, started at once and kept warm; one that dies fails its task with WorkerDied and is replaced.
+
+    Tasks and results are pickled; functions go by name, as with `multiprocessing`.
+    """
+
+    def __init__(self, workers: int, preload: tuple[str, ...] = WARM) -> None:
+        self._preload = preload
+        self._tasks: queue.SimpleQueue[tuple[Future[Any], Any] | None] = queue.SimpleQueue()
+        self._children: dict[int, subprocess.Popen[bytes]] = {}
+        self._closing = False
+        self._threads = [threading.Thread(target=self._serve, args=(i,), daemon=True) for i in range(workers)]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def pids(self) -> list[int]:
+        """The worker processes that live now."""
+        return [child.pid for child in list(self._children.values()) if child.poll() is None]
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        if self._closing:
+            raise RuntimeError("the executor is shut down")
+        future: Future[Any] = Future()
+        self._tasks.put((future, (fn, args, kwargs)))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        self._closing = True
+        while cancel_futures and not self._tasks.empty():
+            with contextlib.suppress(queue.Empty):
+                item = self._tasks.get_nowait()
+                if item:
+                    item[0].cancel()
+        for _ in self._threads:
+            self._tasks.put(None)
+        if wait:
+            for thread in self._threads:
+                thread.join()
+
+    def kill(self) -> None:
+        """End every worker now; what they were at is lost. Results are put in place whole, so nothing is left half."""
+        self._closing = True
+        for child in list(self._children.values()):
+            with contextlib.suppress(OSError):
+                child.kill()
+        self.shutdown(wait=True, cancel_futures=True)
+
+    def _serve(self, slot: int) -> None:
+        """One worker's keeper: gives it tasks one by one, notices its end."""
+        child, log = self._start(slot)
+        while (item := self._tasks.get()) is not None:
+            future, task = item
+            if not future.set_running_or_notify_cancel():
+                continue
+            try:
+                message = pickle.dumps(task)
+            except Exception as error:
+                future.set_exception(error)
+                continue
+            if child.poll() is not None and not self._closing:
+                child, log = self._start(slot)
+            try:
+                assert child.stdin is not None
+                assert child.stdout is not None
+                send(child.stdin, message)
+                ok, result = pickle.loads(receive(child.stdout))
+            except (OSError, EOFError, pickle.UnpicklingError):
+                future.set_exception(WorkerDied(_obituary(child, log)))
+                continue
+            if ok:
+                future.set_result(result)
+            else:
+                future.set_exception(result)
+        _end(child, log)
+
+    def _start(self, slot: int) -> tuple[subprocess.Popen[bytes], IO[bytes]]:
+        log = tempfile.TemporaryFile()  # noqa: SIM115  (closed when the worker has ended)
+        code = _START.format(path=[p for p in sys.path if p] or [""], preload=self._preload)
+        child = subprocess.Popen(
+            [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log
+        )
+        if before := self._children.pop(slot, None):
+            _close(before)
+        self._children[slot] = child
+        return child, log
+
+
+@contextlib.contextmanager
+def open_executor(
+    jobs: int | None, scheduler: str | None = None, timeout: float | None = None
+) -> Iterator[tuple[Executor, int]]:
+    """An executor and how many tasks it runs at once: Dask's with a `scheduler`, else `jobs` worker processes (one a
+    core by default), with 0 this process. Whatever ends the block ends the workers that were started for it.
+
+    Raises Refusal or UnitcadError for a combination that can't be, or a scheduler that does not answer.
+    """
+    if scheduler is not None:
+        if jobs is not None:
+            raise Refusal("--jobs", jobs, "the scheduler knows its workers; leave it out with --scheduler")
+        executor, workers = dask_executor(scheduler)
+        yield executor, workers
+        executor.shutdown(wait=False)
+        return
+    if jobs == 0:
+        if timeout is not None:
+            raise Refusal("--timeout", timeout, "only a worker process can be ended in time; with -j from 1 on")
+        yield SerialExecutor(), 1
+        return
+    workers = jobs or _cores()
+    processes = ProcessExecutor(workers)
+    try:
+        yield processes, workers
+    finally:
+        processes.kill()
+
+
+def _cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def dask_executor(address: str) -> tuple[Executor, int]:
+    """A Dask cluster's executor, and how many tasks it runs at once.
+
+    Raises UnitcadError without the extra, or where no scheduler answers in time.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise UnitcadError("--scheduler needs Dask: pip install 'unitcad[dask]'") from None
+    import logging
+
+    logging.getLogger("distributed").setLevel(logging.ERROR)
+    try:
+        client = Client(address, timeout=DASK_SECONDS, set_as_default=False)
+        workers = client.scheduler_info(n_workers=-1)["workers"]
+    except (OSError, TimeoutError, ValueError) as error:
+        raise UnitcadError(f"--scheduler {address}: no answer within {DASK_SECONDS:g} s ({error})") from None
+    if not workers:
+        client.close()
+        raise UnitcadError(f"--scheduler {address}: it has no workers")
+    return client.get_executor(pure=False), sum(int(worker["nthreads"]) for worker in workers.values())
+
+
+def _obituary(child: subprocess.Popen[bytes], log: IO[bytes]) -> str:
+    """How a worker ended, in a few words that don't change from run to run."""
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        child.wait(10)
+    code = child.returncode
+    log.seek(max(0, log.seek(0, os.SEEK_END) - 20_000))
+    if b"Timeout (" in log.read():
+        return "timed out"
+    if code is not None and code < 0:
+        return f"the worker died ({signal.Signals(-code).name})"
+    return f"the worker ended (exit code {code})"
+
+
+def _end(child: subprocess.Popen[bytes], log: IO[bytes]) -> None:
+    if child.stdin:
+        with contextlib.suppress(OSError):
+            child.stdin.close()  # the worker reads the end and goes
+    try:
+        child.wait(10)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        child.wait()
+    _close(child)
+    log.close()
+
+
+def _close(child: subprocess.Popen[bytes]) -> None:
+    for pipe in (child.stdin, child.stdout):
+        if pipe:
+            with contextlib.suppress(OSError):
+                pipe.close()

@@ -1,0 +1,80 @@
+"""What a batch would make, without making it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from unitcad.batch.run import Options, counted
+from unitcad.batch.sweep import Sweep
+from unitcad.cache import MemoryStore
+from unitcad.errors import UnitcadError
+from unitcad.pipeline import parts
+from unitcad.pipeline.build import checked_outputs, make
+from unitcad.pipeline.geometry import geometry_key
+from unitcad.pipeline.stages import Stages
+from unitcad.pipeline.variant import Variant
+from unitcad.spec import Spec
+
+LOOKED_AT = 20_000
+"""Variants whose geometry is worked out; of a larger sweep the rest is estimated in proportion."""
+DRAWN, BUILT = 24, 2
+"""Geometries whose parts are counted, and geometries that are really made to see what they weigh."""
+REFUSED_TOLD = 20
+
+
+def preview(sweep: Sweep, options: Options) -> dict[str, Any]:
+    """Variants, distinct geometries and parts, files and megabytes; `exact` tells whether the first three are counts.
+
+    Every variant that is looked at passes the door; `refused` tells the first ones that don't.
+    """
+    only = checked_outputs(options.only)
+    count = counted(sweep, options.limit)
+    looked = min(count, LOOKED_AT)
+    geometries: dict[str, Spec] = {}
+    refused: list[dict[str, Any]] = []
+    accepted = 0
+    for index in range(looked):
+        try:
+            spec = sweep.spec(index)
+        except UnitcadError as error:
+            refused.append({"index": index, "reason": str(error)})
+            continue
+        accepted += 1
+        geometries.setdefault(geometry_key(spec, only, options.check), spec)
+    share = count / looked
+    spread = list(geometries.values())
+    drawn = spread[:: max(1, len(spread) // DRAWN)][:DRAWN]
+    per_drawn = _distinct_parts(drawn, only)
+    weighed = [_weight(spec, only) for spec in drawn[:: max(1, len(drawn) // BUILT)][:BUILT]]
+    shared, own, files = (sum(w[i] for w in weighed) / max(1, len(weighed)) for i in range(3))
+    number, variants = len(geometries) * share, accepted * share
+    return {
+        "variants": count,
+        "geometries": round(number),
+        "parts": round(per_drawn * number / max(1, len(drawn))),
+        "exact": looked == count and len(drawn) == len(geometries),
+        "files": round(files * variants),
+        "stored_mb": round((shared * number + own * variants) / 1e6, 2),
+        "linked_mb": round((shared + own) * variants / 1e6, 2),
+        "refused_count": round(len(refused) * share),
+        "refused": refused[:REFUSED_TOLD],
+    }
+
+
+def _distinct_parts(specs: list[Spec], only: tuple[str, ...]) -> int:
+    """Bodies that differ, of all that these specs are made of."""
+    found = set()
+    for spec in specs:
+        variant = Variant(spec)
+        for group in parts.groups(variant, only):
+            found |= {parts.key(variant, body, "record") for body in group.bodies}
+    return len(found)
+
+
+def _weight(spec: Spec, only: tuple[str, ...]) -> tuple[int, int, int]:
+    """(bytes shared, bytes of its own, files) of one variant, made in memory without laws and checks."""
+    store = MemoryStore()
+    product = make(spec, only, False, store, Stages())
+    shared = {sha: len(store.content(sha)) for sha in product.shared.values()}
+    own = sum(map(len, product.own.values()))
+    return sum(shared.values()), own, len(product.shared) + len(product.own) + 1

@@ -1,0 +1,66 @@
+"""The batch's tables: variants.csv and batch.json, the same bytes however many workers made them."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from unitcad.batch.journal import Journal
+from unitcad.batch.sweep import Sweep
+
+FIRST = ("index", "status", "reason", "folder")
+
+
+def write_results(out: Path, sweep: Sweep, journal: Journal, head: dict[str, Any]) -> None:
+    """Write both tables, variants in the sweep's order, read from the journal one at a time. Raises OSError."""
+    columns = _columns(sweep, journal)
+    _write_csv(out / "variants.csv", columns, journal.entries())
+    _write_json(out / "batch.json", {**head, "columns": columns}, journal.entries())
+
+
+def _columns(sweep: Sweep, journal: Journal) -> list[str]:
+    """First what it is, then what was swept, then what came out, in the order in which rows name it."""
+    found: dict[str, None] = dict.fromkeys(FIRST)
+    found.update(dict.fromkeys(path for path in sweep.paths if path != "name"))
+    for entry in journal.entries():
+        found.update(dict.fromkeys(entry["row"]))
+    return list(found)
+
+
+def flat(entry: dict[str, Any]) -> dict[str, Any]:
+    """One variant's values by column."""
+    return {**{key: entry.get(key, "") for key in FIRST}, **entry["row"], **entry["values"]}
+
+
+def _write_csv(path: Path, columns: list[str], entries: Iterable[dict[str, Any]]) -> None:
+    fresh = path.with_name(f".tmp-{path.name}")
+    with open(fresh, "w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(columns)
+        for entry in entries:
+            values = flat(entry)
+            table.writerow([_cell(values.get(column)) for column in columns])
+    fresh.replace(path)
+
+
+def _write_json(path: Path, head: dict[str, Any], entries: Iterable[dict[str, Any]]) -> None:
+    fresh = path.with_name(f".tmp-{path.name}")
+    with open(fresh, "w", encoding="utf-8") as file:
+        text = json.dumps(head, indent=1, ensure_ascii=False, allow_nan=False)
+        file.write(text.removesuffix("\n}") + ',\n "variants": [')
+        for i, entry in enumerate(entries):
+            file.write((",\n  " if i else "\n  ") + json.dumps(flat(entry), ensure_ascii=False, allow_nan=False))
+        file.write("\n ]\n}\n")
+    fresh.replace(path)
+
+
+def _cell(value: Any) -> Any:
+    if value is None:
+        return ""
+    if isinstance(value, bool | list | dict):
+        return json.dumps(value, ensure_ascii=False)
+    # A cell that begins like a formula is one to a spreadsheet.
+    return f"'{value}" if isinstance(value, str) and value[:1] in "=+-@\t\r" and value else value

@@ -1,0 +1,331 @@
+"""Running a sweep: variants grouped by geometry, given out to an executor, noted one by one, taken up where it ended.
+
+The first task of a geometry makes its files; the others of that geometry wait for it and then cost a few milliseconds
+each. So no geometry is made twice, and at most WINDOW variants are held in memory, however many there are.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import CancelledError, Executor, Future, wait
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from unitcad import __version__
+from unitcad.batch import task as tasks
+from unitcad.batch.away import Receiver
+from unitcad.batch.executors import ProcessExecutor
+from unitcad.batch.journal import Journal
+from unitcad.batch.results import write_results
+from unitcad.batch.sweep import MOST, Sweep
+from unitcad.batch.task import Job, Outcome, Task
+from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.pipeline import OUTPUTS
+from unitcad.pipeline.build import checked_outputs
+from unitcad.pipeline.folder import clear_leftovers, folder_name
+from unitcad.pipeline.geometry import geometry_key
+from unitcad.pipeline.versions import code_version, kernel_versions
+
+WINDOW = 2048
+"""Variants held in memory: enough to find those that share a geometry."""
+FIRST, NEXT = 4, 16
+"""Variants in the task that makes a geometry, and in those after it."""
+COLLECT_EVERY = 500
+"""Geometries made between two looks at the cache's size."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a sweep is run. `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end."""
+
+    only: Sequence[str] = OUTPUTS
+    check: bool = True
+    keep_going: bool = False
+    timeout: float | None = None
+    limit: int | None = None
+    cache: Path | None = None
+    cache_mb: float = DEFAULT_LIMIT_MB
+
+
+@dataclass
+class Summary:
+    """How a batch ended: variants by what became of them, geometries, seconds; `stopped` says why it ended early."""
+
+    variants: int
+    done: int = 0
+    taken_up: int = 0
+    reused: int = 0
+    ok: int = 0
+    failed: int = 0
+    geometries: int = 0
+    retried: int = 0
+    seconds: float = 0.0
+    stopped: str = ""
+    failures: list[dict[str, Any]] = field(default_factory=list)
+
+
+Watch = Callable[[Summary, Outcome | None], None]
+MOST_FAILURES_TOLD = 20
+
+
+def run(
+    sweep: Sweep,
+    out: Path,
+    options: Options = Options(),
+    executor: Executor | None = None,
+    *,
+    workers: int = 2,
+    away: bool = False,
+    watch: Watch = lambda summary, outcome: None,
+) -> Summary:
+    """Make every variant of `sweep` in `out`, with `variants.csv`, `batch.json`, `timings.json`.
+
+    `executor`, of that many `workers`, is the caller's to shut down; without one, processes are started. `away`: its
+    workers don't share our disk, so results come back as messages. What an earlier run in `out` finished is not made
+    again. Raises UnitcadError where nothing can be run; whatever happens to a variant is in the summary.
+    """
+    only = checked_outputs(options.only)
+    count = counted(sweep, options.limit)
+    head = {
+        "batch": digest(repr((sweep.hash, only, options.check)).encode())[:16],
+        "name": sweep.name,
+        "mode": sweep.mode,
+        "bases": [base for base, _ in sweep.bases],
+        "outputs": list(only),
+        "versions": {"unitcad": __version__, **kernel_versions(("step",))},
+    }
+    journal = Journal(out, {**head, "code": code_version()})
+    own = executor is None
+    executor = executor or ProcessExecutor(workers)
+    store = DiskStore(options.cache or default_root())
+    batch = _Batch(sweep, out, only, options, executor, workers, away, watch, journal, store, Summary(count))
+    start = time.perf_counter()
+    try:
+        clear_leftovers(out)
+        summary = batch.all()
+        write_results(out, sweep, journal, head)
+    except OSError as error:
+        raise _no_room(tasks.failure(0, error), out, batch.summary) from error
+    except KeyboardInterrupt:
+        _end(executor)
+        raise
+    finally:
+        batch.summary.seconds = round(time.perf_counter() - start, 3)
+        journal.close()
+        store.close()
+        if own:
+            _end(executor)
+    collect(store.root, int(options.cache_mb * 1e6))
+    return summary
+
+
+def counted(sweep: Sweep, limit: int | None) -> int:
+    """How many variants to make. Raises Refusal for too many to be meant, and for a limit below one."""
+    if limit is not None and limit < 1:
+        raise Refusal("--limit", limit, "needs a number of variants from 1 on", 1)
+    if limit is None and sweep.count > MOST:
+        raise Refusal(
+            "sweep", sweep.count, f"variants are more than {MOST:,}: ask for the first ones with --limit", MOST
+        )
+    return min(sweep.count, limit or sweep.count)
+
+
+@dataclass
+class _Group:
+    """Variants of one geometry that wait."""
+
+    jobs: deque[Job] = field(default_factory=deque)
+    making: bool = False
+
+
+class _Batch:
+    """One run over one sweep."""
+
+    def __init__(
+        self, sweep: Sweep, out: Path, only: tuple[str, ...], options: Options, executor: Executor, workers: int,
+        away: bool, watch: Watch, journal: Journal, store: DiskStore, summary: Summary,
+    ) -> None:  # fmt: skip
+        self.sweep, self.out, self.only, self.options, self.executor = sweep, out, only, options, executor
+        self.watch, self.journal, self.store, self.summary = watch, journal, store, summary
+        self.receiver = Receiver(out, store) if away else None
+        self.room = 2 * workers
+        self.coming = iter(range(summary.variants))
+        self.groups: dict[str, _Group] = {}
+        self.waiting = 0
+        self.again: deque[tuple[str, Job]] = deque()
+        self.tried: dict[int, int] = {}
+        self.made: set[int] = set()
+        self.seen: dict[int, int] = {}
+        self.running: dict[Future[list[Outcome]], Task] = {}
+
+    def all(self) -> Summary:
+        while not self.summary.stopped:
+            self._fill()
+            self._give_out()
+            if not self.running:
+                break
+            self._take_in()
+        while self.running:  # what was begun is ended and kept
+            self._take_in()
+        return self.summary
+
+    def _fill(self) -> None:
+        """Bring variants into the window, those that are done or can't be noted at once."""
+        while self.waiting < WINDOW and not self.summary.stopped:
+            index = next(self.coming, None)
+            if index is None:
+                return
+            if self.journal.done(index):
+                self._finished(Outcome(index, (self.journal.entry(index) or {})["status"]), fresh=False)
+                continue
+            try:
+                spec = self.sweep.spec(index)
+            except UnitcadError as error:
+                self._finished(tasks.failure(index, error))
+                continue
+            identity = int(folder_name(spec)[-12:], 16)
+            first = self.seen.setdefault(identity, index)
+            if first != index:
+                self.journal.add({"index": index, "same_as": first, "values": self.sweep.values(index)[1]})
+                self._finished(Outcome(index, tasks.OK), fresh=False)
+                continue
+            key = geometry_key(spec, self.only, self.options.check)
+            self.groups.setdefault(key, _Group()).jobs.append(Job(index, spec.model_dump_json()))
+            self.waiting += 1
+
+    def _give_out(self) -> None:
+        """Keep every worker busy, and one task ahead for each."""
+        while len(self.running) < self.room and not self.summary.stopped:
+            chosen = self._next()
+            if chosen is None:
+                return
+            key, jobs = chosen
+            task = Task(
+                tuple(jobs),
+                key,
+                self.only,
+                self.options.check,
+                self.options.timeout,
+                None if self.receiver else self.out.absolute(),
+                None if self.receiver else self.store.root.absolute(),
+                self.receiver.known(key) if self.receiver else None,
+            )
+            self.running[self.executor.submit(tasks.work, task)] = task
+
+    def _next(self) -> tuple[str, list[Job]] | None:
+        """A variant to try again alone; else a geometry not yet made; else more of one that is."""
+        if self.again:
+            key, job = self.again.popleft()
+            return key, [job]
+        new = next((k for k, g in self.groups.items() if g.jobs and not g.making and _short(k) not in self.made), None)
+        key = new or next((k for k, g in self.groups.items() if g.jobs and not g.making), None)
+        if key is None:
+            return None
+        group = self.groups[key]
+        group.making = new is not None
+        jobs = [group.jobs.popleft() for _ in range(min(len(group.jobs), FIRST if new else NEXT))]
+        self.waiting -= len(jobs)
+        return key, jobs
+
+    def _take_in(self) -> None:
+        for future in wait(list(self.running), return_when="FIRST_COMPLETED").done:
+            task = self.running.pop(future)
+            group = self.groups.get(task.geometry)
+            try:
+                outcomes = future.result()
+            except UnitcadError:
+                raise
+            except (Exception, CancelledError) as error:
+                self._lost(task, error)
+            else:
+                if _short(task.geometry) not in self.made and any(o.status == tasks.OK for o in outcomes):
+                    self._made(task.geometry)
+                for outcome, job in zip(outcomes, task.jobs, strict=True):
+                    self._outcome(outcome, task.geometry, job)
+            if group:
+                group.making = False
+                if not group.jobs:
+                    del self.groups[task.geometry]
+
+    def _made(self, key: str) -> None:
+        self.made.add(_short(key))
+        self.summary.geometries = len(self.made)
+        if len(self.made) % COLLECT_EVERY == 0:
+            collect(self.store.root, int(self.options.cache_mb * 1e6))
+
+    def _lost(self, task: Task, error: BaseException) -> None:
+        """A task whose worker went: which of its variants did it is found out by trying each alone."""
+        if isinstance(error, CancelledError):
+            raise UnitcadError(f"lost the scheduler after {self.summary.done} variants; the next run takes up the rest")
+        job, *others = task.jobs
+        if others:
+            self.again.extend((task.geometry, job) for job in task.jobs)
+            return
+        reason = str(error) or type(error).__name__
+        if reason == "timed out" and self.options.timeout:
+            reason = f"timed out after {self.options.timeout:g} s"
+        self._outcome(Outcome(job.index, tasks.FAILED, reason=reason), task.geometry, job)
+
+    def _outcome(self, outcome: Outcome, key: str, job: Job) -> None:
+        if outcome.status == tasks.NO_SPACE:
+            self.summary.stopped = self.summary.stopped or outcome.reason
+            return
+        if outcome.status == tasks.FAILED and self.tried.setdefault(outcome.index, 0) == 0:
+            self.tried[outcome.index] = 1
+            self.summary.retried += 1
+            self.again.append((key, job))
+            return
+        self.tried.pop(outcome.index, None)
+        if self.receiver and outcome.product:
+            outcome = self.receiver.place(outcome, key)
+        self._finished(outcome)
+
+    def _finished(self, outcome: Outcome, fresh: bool = True) -> None:
+        summary = self.summary
+        if fresh:
+            self.journal.add(
+                {
+                    "index": outcome.index,
+                    "status": outcome.status,
+                    "reason": outcome.reason,
+                    "folder": outcome.folder,
+                    "values": self.sweep.values(outcome.index)[1],
+                    "row": outcome.row,
+                }
+            )
+        summary.done += 1
+        summary.taken_up += not fresh
+        summary.reused += bool(fresh and outcome.reused and not outcome.built)
+        if outcome.status == tasks.OK:
+            summary.ok += 1
+        else:
+            summary.failed += 1
+            if len(summary.failures) < MOST_FAILURES_TOLD:
+                entry = self.journal.entry(outcome.index) or {}
+                summary.failures.append({k: entry.get(k, "") for k in ("index", "status", "reason", "folder")})
+            if fresh and not self.options.keep_going:
+                summary.stopped = summary.stopped or f"variant {outcome.index}: {outcome.reason}"
+        self.watch(summary, outcome)
+
+
+def _short(key: str) -> int:
+    """A key in 8 bytes."""
+    return int(key[:16], 16)
+
+
+def _end(executor: Executor) -> None:
+    kill = getattr(executor, "kill", None)
+    if kill:
+        kill()
+    else:
+        executor.shutdown(wait=False, cancel_futures=True)
+
+
+def _no_room(outcome: Outcome, out: Path, summary: Summary) -> UnitcadError:
+    error = UnitcadError(f"{out}: {outcome.reason}; {summary.done} variants are done, the next run takes up the rest")
+    error.exit_code = 1
+    return error

@@ -1,0 +1,276 @@
+"""The sweep file: which specs, over which values. Variants are worked out one at a time, never all at once.
+
+base = "encapsulating"                    # a template, a spec file beside this one, or a list of them
+name = "walls"                            # else the file's name
+[set]                                     # the same for every variant
+"output.formats" = ["stl"]
+[sweep]
+mode = "product"                          # product | zip | cases
+"layers.0.material" = ["ecoflex-00-10", "ecoflex-00-50"]
+"layers.0.wall_mm" = { start = 1.0, stop = 2.0, num = 5 }
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from unitcad.batch.paths import check_path
+from unitcad.cache import digest
+from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
+from unitcad.spec import Spec, from_data, override, put, read, read_toml, templates
+
+MODES = ("product", "zip", "cases")
+MOST = 1_000_000
+"""Variants that a sweep may have without being asked for with --limit."""
+
+
+class Range(BaseModel):
+    """`num` values from `start` to `stop`, both among them."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    start: float
+    stop: float
+    num: Annotated[int, Field(strict=True, ge=1)]
+
+    def __len__(self) -> int:
+        return self.num
+
+    def __getitem__(self, index: int) -> float:
+        if self.num == 1:
+            return self.start
+        # Rounded, so that a step of a tenth reads as one and the same value has the same folder in every sweep.
+        return round(self.start + (self.stop - self.start) * index / (self.num - 1), 9)
+
+
+Value = bool | int | float | str | list[Any] | dict[str, Any]
+
+
+class Case(BaseModel):
+    """One variant: values by path, `base` where it is not the file's first one, and a `name` for its folder."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+    __pydantic_extra__: dict[str, Value]
+    base: str | None = None
+    name: str | None = None
+
+
+class SweepTable(BaseModel):
+    """`mode`, and for each spec path its values: a list, a range, or one value; `cases` in the mode of that name."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+    __pydantic_extra__: dict[str, Range | Value]
+    mode: Literal["product", "zip", "cases"] = "product"
+    cases: tuple[Case, ...] = ()
+
+
+class SweepFile(BaseModel):
+    """A sweep as typed."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+    base: str | Annotated[list[str], Field(min_length=1)]
+    name: Annotated[str, Field(min_length=1, max_length=60)] | None = None
+    fixed: dict[str, Value] = Field({}, alias="set", description="values by path, the same for every variant")
+    sweep: SweepTable
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One swept path and its values."""
+
+    path: str
+    values: Sequence[Any] | Range
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep that has passed the door: `bases` as (name, data); values by path for each case, or axes."""
+
+    name: str
+    bases: tuple[tuple[str, dict[str, Any]], ...]
+    mode: str
+    axes: tuple[Axis, ...]
+    cases: tuple[tuple[str, dict[str, Any]], ...] = ()
+
+    @property
+    def slug(self) -> str:
+        """The name as a folder's."""
+        return re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-") or "batch"
+
+    def overridden(self, overrides: Sequence[str]) -> Sweep:
+        """The sweep with each "path=value" put into every base; what is swept stays swept. Raises Refusal."""
+        if not overrides:
+            return self
+        for text in overrides:
+            for _, data in self.bases:
+                check_path(text.partition("=")[0].strip(), data)
+        return replace(self, bases=tuple((name, override(data, overrides)) for name, data in self.bases))
+
+    @cached_property
+    def count(self) -> int:
+        """Number of variants."""
+        if self.mode == "cases":
+            return len(self.cases)
+        per_base = 1
+        for axis in self.axes:
+            per_base = per_base * len(axis) if self.mode == "product" else max(per_base, len(axis))
+        return per_base * len(self.bases)
+
+    @cached_property
+    def paths(self) -> tuple[str, ...]:
+        """The swept paths, in the file's order."""
+        if self.mode == "cases":
+            return tuple(dict.fromkeys(path for _, values in self.cases for path in values))
+        return tuple(axis.path for axis in self.axes)
+
+    @property
+    def hash(self) -> str:
+        """Over everything that decides which variants there are."""
+        axes = [(a.path, a.values.model_dump() if isinstance(a.values, Range) else list(a.values)) for a in self.axes]
+        return digest(json.dumps([self.name, self.bases, self.mode, axes, self.cases], default=str).encode())
+
+    def values(self, index: int) -> tuple[str, dict[str, Any]]:
+        """(base, value by path) of variant `index`: the last axis runs fastest, the bases slowest."""
+        if self.mode == "cases":
+            return self.cases[index]
+        per_base = self.count // len(self.bases)
+        base, rest = divmod(index, per_base)
+        found: dict[str, Any] = {}
+        for axis in reversed(self.axes):
+            if self.mode == "product":
+                rest, here = divmod(rest, len(axis))
+            else:
+                here = rest if len(axis) > 1 else 0
+            found[axis.path] = axis.values[here]
+        return self.bases[base][0], {axis.path: found[axis.path] for axis in self.axes}
+
+    def spec(self, index: int) -> Spec:
+        """The effective spec of variant `index`. Raises Refusal where it can't be."""
+        base, values = self.values(index)
+        data = json.loads(self._texts[base])
+        for path, value in values.items():
+            put(data, path, value)
+        return from_data(data)
+
+    def __iter__(self) -> Iterator[tuple[int, dict[str, Any]]]:
+        return ((index, self.values(index)[1]) for index in range(self.count))
+
+    @cached_property
+    def _texts(self) -> dict[str, str]:
+        return {name: json.dumps(data, default=str) for name, data in self.bases}
+
+
+def shipped() -> dict[str, Path]:
+    """The shipped sweeps by name."""
+    folder = next(iter(templates().values())).parent / "sweeps"
+    return {file.stem: file for file in sorted(folder.glob("*.toml"))}
+
+
+def load_sweep(source: str | os.PathLike[str]) -> Sweep:
+    """The sweep of a file (a path separator or .toml in `source`) or a shipped one (a bare name).
+
+    Raises Refusal or UnitcadError for an unknown base or path, lists of unequal lengths in a zip, an empty sweep.
+    """
+    text = os.fspath(source)
+    if os.sep in text or "/" in text or text.endswith(".toml"):
+        path = Path(text)
+    else:
+        known = shipped()
+        if text not in known:
+            raise unknown_name("SWEEP", text, known)
+        path = known[text]
+    return from_file(read_toml(path), path.parent, path.stem)
+
+
+def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
+    """A checked sweep of a sweep file's data; `folder` is where its relative paths start."""
+    try:
+        file = SweepFile.model_validate(data)
+    except ValidationError as error:
+        raise _refusal(error) from None
+    named = [file.base] if isinstance(file.base, str) else list(file.base)
+    named += [case.base for case in file.sweep.cases if case.base is not None]
+    bases: dict[str, dict[str, Any]] = {}
+    for base in dict.fromkeys(named):
+        bases[base] = _read_base(base, folder)
+        for path, value in file.fixed.items():
+            check_path(path, bases[base])
+            put(bases[base], path, value)
+    axes = tuple(Axis(path, _values(path, given)) for path, given in (file.sweep.__pydantic_extra__ or {}).items())
+    cases = tuple((case.base or named[0], _case(case)) for case in file.sweep.cases)
+    _check_mode(file.sweep.mode, axes, cases)
+    for base, values in cases or [(base, {axis.path: None for axis in axes}) for base in bases]:
+        for path in values:
+            check_path(path, bases[base])
+    return Sweep(file.name or name, tuple(bases.items()), file.sweep.mode, axes, cases)
+
+
+def _read_base(base: str, folder: Path) -> dict[str, Any]:
+    if os.sep in base or "/" in base or base.endswith(".toml"):
+        return read(folder / base)
+    try:
+        return read(base)
+    except Refusal as refusal:
+        raise Refusal("base", base, refusal.limit, refusal.nearest) from None
+
+
+def _values(path: str, given: Any) -> Sequence[Any] | Range:
+    """The values of an axis: a scalar or a table counts as one."""
+    values = given if isinstance(given, list | Range) else [given]
+    if not len(values):
+        raise Refusal(f"sweep.{path}", [], "an axis needs a value: the sweep is empty")
+    if isinstance(values, Range):
+        if values.num > 1 and values.start == values.stop:
+            raise Refusal(f"sweep.{path}.num", values.num, "start and stop are the same value", 1)
+        return values
+    seen = [json.dumps(value, default=str) for value in values]
+    twice = next((value for value, text in zip(values, seen, strict=True) if seen.count(text) > 1), None)
+    if len(set(seen)) < len(seen) and len(seen) <= 10_000:
+        raise Refusal(f"sweep.{path}", twice, "is there twice")
+    return values
+
+
+def _case(case: Case) -> dict[str, Any]:
+    values = dict(case.__pydantic_extra__ or {})
+    return {"name": case.name, **values} if case.name else values
+
+
+def _check_mode(mode: str, axes: tuple[Axis, ...], cases: tuple[Any, ...]) -> None:
+    if mode == "cases":
+        if axes:
+            raise Refusal("sweep", axes[0].path, "mode = cases takes its values from [[sweep.cases]] only")
+        if not cases:
+            raise Refusal("sweep.cases", [], "the sweep is empty: it needs a [[sweep.cases]] table or more")
+        return
+    if cases:
+        raise Refusal("sweep.mode", mode, "[[sweep.cases]] goes with another mode", "cases")
+    if not axes:
+        raise Refusal("sweep", "nothing", 'the sweep is empty: it needs a path with values, such as "diameter_mm"')
+    lengths = {axis.path: len(axis) for axis in axes if len(axis) > 1}
+    if mode == "zip" and len(set(lengths.values())) > 1:
+        told = ", ".join(f"{path} has {count}" for path, count in lengths.items())
+        raise Refusal("sweep.mode", "zip", f"the lists are of unequal lengths: {told}")
+
+
+def _refusal(error: ValidationError) -> UnitcadError:
+    first = error.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in first["loc"] if not str(part).startswith(("list[", "Range", "function-")))
+    if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
+        return unknown_key(where, ["base", "name", "set", "sweep"])
+    if first["loc"][-1:] == ("mode",) and isinstance(first["input"], str):
+        return unknown_name("sweep.mode", first["input"], MODES)
+    if first["type"] == "missing":
+        return Refusal(where, "nothing", "is required")
+    value = first.get("input")
+    return Refusal(where, value if isinstance(value, int | float | str) else str(value)[:60], first["msg"].lower())

@@ -1,0 +1,192 @@
+"""The work of one task: some variants that share a geometry, one after the other. Runs where an executor puts it."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import faulthandler
+import json
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from unitcad.batch.row import row
+from unitcad.cache import Bundle, DiskStore, MemoryStore
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.pipeline import folder as folders
+from unitcad.pipeline.build import Product, build_into, make
+from unitcad.pipeline.stages import Stages
+from unitcad.pipeline.versions import code_version
+from unitcad.spec import Spec
+
+OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no space"
+"""broken: made, but a law or a mesh check says no. refused: the spec can't be. failed: did not get that far."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One variant: its number in the sweep and its effective spec as JSON (a tenth of the object's size)."""
+
+    index: int
+    spec: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """Variants of one geometry, and how to make them.
+
+    With `out` and `cache` (folders that the worker reaches) results go there. Without, they come back in the outcomes;
+    `known` is then what the caller has of this geometry already.
+    """
+
+    jobs: tuple[Job, ...]
+    geometry: str
+    only: tuple[str, ...]
+    check: bool
+    timeout: float | None = None
+    out: Path | None = None
+    cache: Path | None = None
+    known: Bundle | None = None
+    code: str = field(default_factory=code_version)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one variant. `product`, `contents` and `bundle` only where the caller is to place the files."""
+
+    index: int
+    status: str
+    folder: str = ""
+    row: dict[str, Any] = field(default_factory=dict)
+    reason: str = ""
+    seconds: float = 0.0
+    built: int = 0
+    reused: int = 0
+    product: Product | None = None
+    contents: dict[str, bytes] = field(default_factory=dict)
+    bundle: Bundle | None = None
+
+
+def work(task: Task) -> list[Outcome]:
+    """Make a task's variants. Whatever goes wrong with one of them is in its outcome."""
+    if task.code != code_version():
+        raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
+    outcomes = []
+    known = task.known
+    for job in task.jobs:
+        start = time.perf_counter()
+        try:
+            with _watch(task.timeout):
+                outcome = _here(job, task) if task.out else _away(job, task, known)
+        except Exception as error:
+            outcome = failure(job.index, error)
+        outcomes.append(_timed(outcome, time.perf_counter() - start))
+        known = outcome.bundle or known
+    return outcomes
+
+
+def failure(index: int, error: BaseException) -> Outcome:
+    """The outcome of a variant that raised."""
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return Outcome(index, NO_SPACE, reason=f"no space left ({error.filename or error.strerror})")
+    if isinstance(error, Refusal):
+        return Outcome(index, REFUSED, reason=str(error))
+    text = str(error) if isinstance(error, UnitcadError) else f"{type(error).__name__}: {error}"
+    return Outcome(index, FAILED, reason=" ".join(text.split()))
+
+
+def _here(job: Job, task: Task) -> Outcome:
+    """Make a variant into its folder, by way of the cache on this disk."""
+    assert task.out is not None
+    assert task.cache is not None
+    spec = Spec.model_validate_json(job.spec)
+    folder = task.out / folders.folder_name(spec)
+    manifest = _finished(folder, spec, task)
+    if manifest is not None:
+        return _outcome(job, spec, folder.name, manifest, Counter({"file reused": 1}))
+    store = _store(task.cache)
+    before = Counter(store.counts)
+    built = build_into(folder, spec, only=task.only, check=task.check, store=store)
+    return _outcome(job, spec, folder.name, built.manifest, store.counts - before)
+
+
+def _away(job: Job, task: Task, known: Bundle | None) -> Outcome:
+    """Make a variant in memory and hand it back: contents that the caller has are only named."""
+    spec = Spec.model_validate_json(job.spec)
+    store = MemoryStore(known)
+    product = make(spec, task.only, task.check, store, Stages())
+    outcome = _outcome(job, spec, folders.folder_name(spec), product.manifest, store.counts)
+    needed = set(product.shared.values()) & set(store.contents)
+    return Outcome(
+        **{
+            **vars(outcome),
+            "product": product,
+            "contents": {sha: store.contents[sha] for sha in sorted(needed)},
+            "bundle": store.bundle() if outcome.built else None,
+        }
+    )
+
+
+def _outcome(job: Job, spec: Spec, folder: str, manifest: dict[str, Any], counts: Counter[str]) -> Outcome:
+    holds = all(law["ok"] for law in manifest["laws"]) and manifest["check"]["errors"] == 0
+    codes = sorted({law["code"] for law in manifest["laws"] if not law["ok"]})
+    codes += sorted({finding["code"] for finding in manifest["check"]["findings"] if finding["severity"] == "error"})
+    return Outcome(
+        job.index,
+        OK if holds else BROKEN,
+        folder,
+        row(spec, manifest),
+        "" if holds else f"broken: {', '.join(codes)}",
+        built=counts["file built"] + counts["data built"],
+        reused=counts["file reused"] + counts["data reused"],
+    )
+
+
+def _timed(outcome: Outcome, seconds: float) -> Outcome:
+    return Outcome(**{**vars(outcome), "seconds": seconds})
+
+
+def _finished(folder: Path, spec: Spec, task: Task) -> dict[str, Any] | None:
+    """The manifest of a result that an earlier, interrupted run has completed, if it is what is asked for now.
+
+    Raises UnitcadError for a folder that holds something else.
+    """
+    if not folder.exists():
+        return None
+    formats = folders.earlier_formats(folder, spec)
+    try:
+        manifest = json.loads((folder / "manifest.json").read_bytes())
+        timings = json.loads((folder / "timings.json").read_bytes())
+        same = (
+            timings.get("code") == task.code
+            and set(manifest["outputs"]) == set(task.only)
+            and set(formats) == set(spec.output.formats)
+            and task.check != any(left["why"] == "--no-check" for left in manifest["left_out"])
+        )
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return manifest if same else None
+
+
+@cache
+def _store(root: Path) -> DiskStore:
+    """One store a process and cache: what it has verified once stays verified."""
+    return DiskStore(root)
+
+
+@contextlib.contextmanager
+def _watch(timeout: float | None) -> Iterator[None]:
+    """End this process if the block takes longer: a C thread does it, so no kernel shelters from it."""
+    if timeout is None:
+        yield
+        return
+    faulthandler.dump_traceback_later(timeout, exit=True, file=sys.__stderr__ or sys.stderr)
+    try:
+        yield
+    finally:
+        faulthandler.cancel_dump_traceback_later()

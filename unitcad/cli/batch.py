@@ -1,0 +1,96 @@
+"""unitcad batch."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from unitcad.batch import Summary
+
+
+def batch(
+    sweep: Annotated[str, typer.Argument(metavar="SWEEP", help="A sweep file, or the name of a shipped one.")],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="The batch's own folder; else out/<the sweep's name>.")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option("-j", "--jobs", min=0, help="Worker processes; else one a core. 0: in this process.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786.")
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there would be to make; make nothing.")] = False,
+    keep_going: Annotated[bool, typer.Option("--keep-going", help="Go on after a variant that fails.")] = False,
+    timeout: Annotated[float | None, typer.Option(metavar="S", min=0.001, help="Seconds that a variant may take.")] = (
+        None
+    ),
+    limit: Annotated[int | None, typer.Option(metavar="N", help="The first N variants only.")] = None,
+    cache: Annotated[Path | None, typer.Option(help="Where distinct parts are kept; else in the user's cache.")] = None,
+    cache_limit: Annotated[float, typer.Option(metavar="MB", min=0, help="What the cache keeps at the end.")] = 4096,
+    sets: Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="For every variant.")] = None,
+    formats: Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb; else the specs'.")] = None,
+    only: Annotated[
+        str | None, typer.Option(help="unit,moulds,estimate,casting; else all. estimate alone makes a table only.")
+    ] = None,
+    no_check: Annotated[bool, typer.Option("--no-check", help="Leave out the laws and the mesh checks.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    json_lines: Annotated[bool, typer.Option("--json-lines", help="One JSON object a line as variants end.")] = False,
+) -> None:
+    """Make every variant of a sweep, each distinct part once. The last line printed is the folder."""
+    from dataclasses import asdict
+
+    from unitcad.batch import Options, load_sweep, run
+    from unitcad.batch.executors import open_executor
+    from unitcad.batch.preview import preview
+    from unitcad.cli.batch_progress import watching
+    from unitcad.cli.formats import chosen_formats
+    from unitcad.cli.output import print_json
+    from unitcad.pipeline import OUTPUTS
+
+    chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
+    wanted = load_sweep(sweep).overridden([*(sets or []), *chosen_formats(formats)])
+    options = Options(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit)
+    if dry_run:
+        found = preview(wanted, options)
+        print_json(found) if as_json or json_lines else _tell_preview(found)
+        return
+    folder = out or Path("out") / wanted.slug
+    with open_executor(jobs, scheduler, timeout) as (executor, workers), watching(json_lines) as watch:
+        summary = run(wanted, folder, options, executor, workers=workers, away=scheduler is not None, watch=watch)
+    if as_json:
+        print_json({"folder": str(folder), **asdict(summary)})
+    elif not json_lines:
+        _tell(summary, folder)
+    if summary.failed or summary.stopped:
+        sys.exit(1)
+
+
+def _tell(summary: Summary, folder: Path) -> None:
+    for failure in summary.failures:
+        typer.echo(f"variant {failure['index']}: {failure['status']}: {failure['reason']}", err=True)
+    if summary.failed > len(summary.failures):
+        typer.echo(f"and {summary.failed - len(summary.failures)} more: see variants.csv", err=True)
+    if summary.stopped:
+        typer.echo(f"stopped: {summary.stopped}; the next run takes up the rest", err=True)
+    taken_up = f", {summary.taken_up} from before" if summary.taken_up else ""
+    typer.echo(
+        f"{summary.done} of {summary.variants} variants{taken_up}, {summary.geometries} geometries made, "
+        f"{summary.reused} reused, {summary.failed} failed, {summary.seconds:.1f} s"
+    )
+    typer.echo(str(folder))
+
+
+def _tell_preview(found: dict) -> None:
+    about = "" if found["exact"] else "about "
+    typer.echo(f"{found['variants']} variants of {about}{found['geometries']} geometries")
+    typer.echo(f"{about}{found['parts']} distinct parts")
+    sizes = f"{found['stored_mb']:.1f} MB stored, {found['linked_mb']:.1f} MB with every link counted"
+    typer.echo(f"about {found['files']} files, {sizes}")
+    for refused in found["refused"]:
+        typer.echo(f"variant {refused['index']} can't be: {refused['reason']}", err=True)
+    if found["refused_count"] > len(found["refused"]):
+        typer.echo(f"and {about}{found['refused_count'] - len(found['refused'])} more", err=True)

@@ -1,0 +1,69 @@
+"""What a batch shows while it runs: a bar on a terminal, lines for machines, nothing in a pipe."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+from collections.abc import Iterator
+
+from unitcad.batch.run import Summary, Watch
+from unitcad.batch.task import Outcome
+
+
+@contextlib.contextmanager
+def watching(json_lines: bool) -> Iterator[Watch]:
+    """The function that a batch calls after each variant."""
+    if json_lines:
+        yield _line
+    elif sys.stderr.isatty():
+        with _bar() as watch:
+            yield watch
+    else:
+        yield lambda summary, outcome: None
+
+
+def _line(summary: Summary, outcome: Outcome | None) -> None:
+    if outcome is None:
+        told = {"event": "end", **{k: v for k, v in vars(summary).items() if k != "failures"}}
+    else:
+        told = {
+            "event": "variant",
+            "index": outcome.index,
+            "status": outcome.status,
+            "folder": outcome.folder,
+            "reason": outcome.reason,
+            "seconds": round(outcome.seconds, 4),
+            "done": summary.done,
+            "variants": summary.variants,
+        }
+    sys.stdout.write(json.dumps(told, ensure_ascii=False) + "\n")
+    sys.stdout.flush()
+
+
+@contextlib.contextmanager
+def _bar() -> Iterator[Watch]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]:.1f}/s  reused {task.fields[reused]}  failed {task.fields[failed]}"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        shown = progress.add_task("", total=None, rate=0.0, reused=0, failed=0)
+
+        def watch(summary: Summary, outcome: Outcome | None) -> None:
+            speed = progress.tasks[0].speed or 0.0
+            progress.update(
+                shown,
+                total=summary.variants,
+                completed=summary.done,
+                rate=speed,
+                reused=summary.reused,
+                failed=summary.failed,
+            )
+
+        yield watch

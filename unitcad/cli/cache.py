@@ -1,0 +1,47 @@
+"""unitcad cache."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+cache = typer.Typer(help="The cache of distinct parts.", no_args_is_help=True)
+Where = Annotated[Path | None, typer.Option("--cache", help="The cache's folder; else the user's.")]
+Json = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
+
+
+@cache.command("ls")
+def ls(where: Where = None, as_json: Json = False) -> None:
+    """Say what the cache holds. The last line printed is its folder."""
+    from unitcad.cache import default_root, usage
+
+    root = where or default_root()
+    found = usage(root)
+    _tell(f"{found.entries} entries, {found.contents} files, {found.bytes / 1e6:.1f} MB", root, vars(found), as_json)
+
+
+@cache.command("gc")
+def gc(
+    where: Where = None,
+    limit: Annotated[float, typer.Option(metavar="MB", min=0, help="What may stay; 0 empties it.")] = 4096,
+    as_json: Json = False,
+) -> None:
+    """Remove what was used longest ago, down to a size. Results keep their files: they are links."""
+    from unitcad.cache import collect, default_root
+
+    root = where or default_root()
+    gone = collect(root, int(limit * 1e6))
+    text = f"{gone.entries} entries, {gone.contents} files, {gone.bytes / 1e6:.1f} MB removed"
+    _tell(text, root, vars(gone), as_json)
+
+
+def _tell(text: str, root: Path, data: dict, as_json: bool) -> None:
+    from unitcad.cli.output import print_json
+
+    if as_json:
+        print_json({"cache": str(root), **data})
+    else:
+        typer.echo(text)
+        typer.echo(str(root))

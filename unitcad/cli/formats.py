@@ -1,0 +1,17 @@
+"""The option --formats."""
+
+from __future__ import annotations
+
+
+def chosen_formats(formats: str | None) -> list[str]:
+    """What --formats overrides in a spec. Raises Refusal for a format that there is not."""
+    from unitcad.errors import unknown_name
+    from unitcad.pipeline import FORMATS
+
+    if formats is None:
+        return []
+    names = [name.strip() for name in formats.split(",") if name.strip()]
+    for name in names:
+        if name not in FORMATS:
+            raise unknown_name("--formats", name, FORMATS)
+    return [f"output.formats={names}"]
