@@ -18,6 +18,7 @@ from unitcad.cli.cache import cache
 from unitcad.cli.check import check
 from unitcad.cli.list import list_
 from unitcad.cli.output import say_error
+from unitcad.cli.report import report
 from unitcad.cli.schema import schema
 from unitcad.errors import UnitcadError
 
@@ -41,6 +42,7 @@ app.command("build")(build)
 app.command("batch")(batch)
 app.command("check")(check)
 app.command("list")(list_)
+app.command("report")(report)
 app.command("schema")(schema)
 app.add_typer(cache, name="cache")
 

@@ -1,0 +1,81 @@
+"""A plot over logarithmic axes as SVG: points, thin lines between them, a legend. The same data, the same bytes."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+
+from unitcad.accuracy.result import Plot
+
+WIDTH, HEIGHT = 720, 440
+LEFT, RIGHT, TOP, BOTTOM = 70, 190, 36, 52
+COLOURS = ("#1f6fb2", "#c8553d", "#3c8d5a", "#8059a8", "#b8860b", "#4d4d4d", "#d1478c", "#17868c")
+
+
+def svg(plot: Plot) -> str:
+    """The plot as an SVG document. Points that are not above zero, or infinite, are left out."""
+    series = {
+        name: sorted((x, y) for x, y in points if x > 0 and y > 0 and math.isfinite(x) and math.isfinite(y))
+        for name, points in plot.series.items()
+    }
+    x0, x1 = _decades([x for points in series.values() for x, _ in points])
+    y0, y1 = _decades([y for points in series.values() for _, y in points])
+
+    def at(x: float, y: float) -> tuple[float, float]:
+        across = (math.log10(x) - x0) / (x1 - x0)
+        up = (math.log10(y) - y0) / (y1 - y0)
+        return LEFT + across * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - up * (HEIGHT - TOP - BOTTOM)
+
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
+        'font-family="sans-serif" font-size="12">',
+        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
+        _text(LEFT, 20, plot.title, size=14),
+    ]
+    for decade in range(x0, x1 + 1, _every(x1 - x0)):
+        x, low = at(10.0**decade, 10.0**y0)
+        parts += [_line(x, low, x, TOP, "#e2e2e2"), _text(x, low + 16, _power(decade), "middle")]
+    for decade in range(y0, y1 + 1, _every(y1 - y0)):
+        left, y = at(10.0**x0, 10.0**decade)
+        parts += [_line(left, y, WIDTH - RIGHT, y, "#e2e2e2"), _text(left - 6, y + 4, _power(decade), "end")]
+    parts += [
+        _line(LEFT, HEIGHT - BOTTOM, WIDTH - RIGHT, HEIGHT - BOTTOM, "#444444"),
+        _line(LEFT, HEIGHT - BOTTOM, LEFT, TOP, "#444444"),
+        _text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 14, plot.x_label, "middle"),
+        f'<text transform="translate(16 {(TOP + HEIGHT - BOTTOM) / 2:.1f}) rotate(-90)" text-anchor="middle">'
+        f"{escape(plot.y_label)}</text>",
+    ]
+    for i, (name, points) in enumerate(series.items()):
+        colour = COLOURS[i % len(COLOURS)]
+        spots = [at(x, y) for x, y in points]
+        if len(spots) > 1:
+            path = " ".join(f"{x:.1f},{y:.1f}" for x, y in spots)
+            parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-opacity="0.5"/>')
+        parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.5" fill="{colour}"/>' for x, y in spots]
+        y = TOP + 12 + 18 * i
+        parts.append(f'<circle cx="{WIDTH - RIGHT + 16}" cy="{y - 4}" r="4" fill="{colour}"/>')
+        parts.append(_text(WIDTH - RIGHT + 26, y, name))
+    return "\n".join([*parts, "</svg>", ""])
+
+
+def _decades(values: list[float]) -> tuple[int, int]:
+    if not values:
+        return 0, 1
+    low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
+    return low, max(high, low + 1)
+
+
+def _every(decades: int) -> int:
+    return max(1, math.ceil(decades / 8))
+
+
+def _power(decade: int) -> str:
+    return f"{10.0**decade:g}" if -3 <= decade <= 4 else f"1e{decade}"
+
+
+def _line(x0: float, y0: float, x1: float, y1: float, colour: str) -> str:
+    return f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}" stroke="{colour}"/>'
+
+
+def _text(x: float, y: float, text: str, anchor: str = "start", size: int = 12) -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}">{escape(text)}</text>'

@@ -1,0 +1,144 @@
+"""What a suite hands back: tables, plots and promises, on what they were measured; as data and as Markdown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+Cell = str | float | int | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows under columns; a number is shown with three significant digits, None as a dash."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Series of (x, y) points over logarithmic axes."""
+
+    title: str
+    x_label: str
+    y_label: str
+    series: dict[str, tuple[tuple[float, float], ...]]
+
+
+@dataclass(frozen=True)
+class Promise:
+    """An error that may not exceed its limit: what CI fails on. A time is never one."""
+
+    what: str
+    value: float
+    limit: float
+
+    @property
+    def ok(self) -> bool:
+        """Within the limit; a value that is no number is not."""
+        return self.value <= self.limit
+
+
+@dataclass(frozen=True)
+class Result:
+    """One suite's findings. `measured` says on what: machine, versions, size of the run."""
+
+    suite: str
+    title: str
+    text: str
+    tables: tuple[Table, ...] = ()
+    plots: tuple[Plot, ...] = ()
+    promises: tuple[Promise, ...] = ()
+    measured: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def ok(self) -> bool:
+        """No promise broken."""
+        return all(promise.ok for promise in self.promises)
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready data; what is no number becomes null."""
+        data = asdict(self)
+        for promise, there in zip(data["promises"], self.promises, strict=True):
+            promise["ok"] = there.ok
+        return _finite(data)
+
+
+def from_dict(data: dict[str, Any]) -> Result:
+    """The result of what `as_dict` gave."""
+    return Result(
+        suite=data["suite"],
+        title=data["title"],
+        text=data["text"],
+        tables=tuple(
+            Table(t["title"], tuple(t["columns"]), tuple(map(tuple, t["rows"])), t["note"]) for t in data["tables"]
+        ),
+        plots=tuple(
+            Plot(p["title"], p["x_label"], p["y_label"], {k: tuple(map(tuple, v)) for k, v in p["series"].items()})
+            for p in data["plots"]
+        ),
+        promises=tuple(
+            Promise(p["what"], math.nan if p["value"] is None else p["value"], p["limit"]) for p in data["promises"]
+        ),
+        measured=data["measured"],
+    )
+
+
+def frontier(points: Sequence[tuple[float, float]]) -> list[bool]:
+    """Which (cost, error) no other point beats in both: what to pick for a given error."""
+    return [
+        math.isfinite(c) and math.isfinite(e) and not any((x <= c and y < e) or (x < c and y <= e) for x, y in points)
+        for c, e in points
+    ]
+
+
+def shown(value: Cell) -> str:
+    """A cell as text."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            return str(value)
+        return f"{value:.3g}" if value == 0 or 1e-3 <= abs(value) < 1e5 else f"{value:.1e}"
+    return str(value)
+
+
+def markdown(result: Result, picture: Sequence[str]) -> str:
+    """The suite's section; `picture[i]` is the file of plot i."""
+    lines = [f"## {result.title}", "", result.text, ""]
+    size = ", ".join(f"{k} {v}" for k, v in result.measured.items())
+    lines += [f"`unitcad accuracy {result.suite}`; measured on: {size}.", ""]
+    for table in result.tables:
+        lines += [f"**{table.title}**", "", *table_lines(table), ""]
+        if table.note:
+            lines += [table.note, ""]
+    for plot, file in zip(result.plots, picture, strict=True):
+        lines += [f"![{plot.title}]({file})", ""]
+    if result.promises:
+        rows = tuple((p.what, p.value, p.limit, "kept" if p.ok else "BROKEN") for p in result.promises)
+        lines += ["**Promises (CI fails when one is broken)**", ""]
+        lines += [*table_lines(Table("", ("what", "value", "limit", ""), rows)), ""]
+    return "\n".join(lines)
+
+
+def table_lines(table: Table) -> list[str]:
+    """A table in Markdown."""
+    rows = ["| " + " | ".join(shown(cell) for cell in row) + " |" for row in table.rows]
+    return ["| " + " | ".join(table.columns) + " |", "|" + " --- |" * len(table.columns), *rows]
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    if hasattr(data, "item"):
+        data = data.item()
+    return None if isinstance(data, float) and not math.isfinite(data) else data

@@ -1,0 +1,64 @@
+"""Runs suites, prints what they find, and writes docs/accuracy.md, its plots and accuracy.json from the same data."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+
+from unitcad.accuracy.plot import svg
+from unitcad.accuracy.result import Result, from_dict, markdown
+from unitcad.errors import UnitcadError, unknown_name
+
+SUITES = ("tessellation", "kernels", "moulds", "hankel", "stability", "models", "extremes", "left-out", "speed")
+"""In the order of the page; a suite is the module of that name, with one function `run(quick, say)`."""
+Say = Callable[[str], None]
+
+HEAD = """# Error against run time, and what holds at the extremes
+
+This page is written by `unitcad accuracy` from what it computed; `accuracy.json` holds the same numbers. Each section
+names the command that makes it again and says on what it was measured. Errors are against exact or independent
+references. Run times are medians with quartiles, taken in turn in one run: compare them within a table only, since
+seconds differ between machines. A star marks the frontier: nothing in the table is both faster and more exact.
+"""
+
+
+def chosen(names: Sequence[str]) -> tuple[str, ...]:
+    """The suites called `names`, or all of them. Raises Refusal for an unknown one."""
+    for name in names:
+        if name not in SUITES:
+            raise unknown_name("SUITE", name, SUITES)
+    return tuple(name for name in SUITES if not names or name in names)
+
+
+def run(name: str, quick: bool, say: Say) -> Result:
+    """One suite's result. Raises UnitcadError where an extra that it needs is missing."""
+    return import_module(f"unitcad.accuracy.{name.replace('-', '_')}").run(quick, say)
+
+
+def write(results: Sequence[Result], folder: Path) -> None:
+    """Put results into a folder's accuracy.json beside those that are there, and write the page and plots of all."""
+    folder.mkdir(parents=True, exist_ok=True)
+    known = {result.suite: result for result in (*read(folder), *results)}
+    ordered = [known[name] for name in SUITES if name in known]
+    text = json.dumps({"suites": [result.as_dict() for result in ordered]}, indent=1, allow_nan=False)
+    (folder / "accuracy.json").write_bytes((text + "\n").encode())
+    sections = [HEAD]
+    for result in ordered:
+        pictures = [f"accuracy-{result.suite}-{i + 1}.svg" for i in range(len(result.plots))]
+        for file, plot in zip(pictures, result.plots, strict=True):
+            (folder / file).write_bytes(svg(plot).encode())
+        sections.append(markdown(result, pictures))
+    (folder / "accuracy.md").write_bytes("\n".join(sections).encode())
+
+
+def read(folder: Path) -> list[Result]:
+    """The results in a folder's accuracy.json, none without such a file. Raises UnitcadError if it is not ours."""
+    file = folder / "accuracy.json"
+    if not file.exists():
+        return []
+    try:
+        return [from_dict(data) for data in json.loads(file.read_text("utf-8"))["suites"]]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise UnitcadError(f"{file}: is not a result of unitcad accuracy ({error}); write elsewhere with -o") from None

@@ -1,0 +1,82 @@
+"""Run times: interleaved, so that whatever else the machine does falls on all alike; medians with their spread."""
+
+from __future__ import annotations
+
+import gc
+import platform
+import statistics
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Seconds: median, and the lower and upper quartile (all one number for a single run)."""
+
+    median: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        spread = f" ({_seconds(self.low)} to {_seconds(self.high)})" if self.high > self.low else ""
+        return _seconds(self.median) + spread
+
+
+def interleaved(calls: Mapping[str, Callable[[], Any]], repeats: int, warm: bool = True) -> dict[str, Timing]:
+    """Time every call `repeats` times, one after the other in turn; a first round warms up and does not count."""
+    seconds: dict[str, list[float]] = {name: [] for name in calls}
+    for round_ in range(repeats + (1 if warm else 0)):
+        for name, call in calls.items():
+            gc.collect()
+            start = time.perf_counter()
+            call()
+            taken = time.perf_counter() - start
+            if round_ or not warm:
+                seconds[name].append(taken)
+    return {name: timing(values) for name, values in seconds.items()}
+
+
+def timing(seconds: list[float]) -> Timing:
+    """The median and quartiles of some runs."""
+    if len(seconds) < 2:
+        return Timing(seconds[0], seconds[0], seconds[0])
+    low, middle, high = statistics.quantiles(seconds, n=4, method="inclusive")
+    return Timing(middle, low, high)
+
+
+def machine(*packages: str) -> dict[str, Any]:
+    """What a measurement was made on: processor, cores, Python and the versions of `packages`."""
+    found: dict[str, Any] = {"processor": _processor(), "cores": _cores(), "Python": platform.python_version()}
+    for name in packages:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def _cores() -> int:
+    import os
+
+    return os.cpu_count() or 1
+
+
+def _seconds(value: float) -> str:
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value / 1e-9:.3g} ns"

@@ -1,0 +1,44 @@
+"""unitcad accuracy."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def accuracy(
+    suites: Annotated[list[str] | None, typer.Argument(metavar="[SUITE]...", help="Which suites; else all.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer cases: what CI runs.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="Where accuracy.md and accuracy.json go: docs; nowhere if quick."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Compute the tables of error against run time. Exit 1 when an error exceeds its promise."""
+    from unitcad.accuracy import runner
+    from unitcad.accuracy.result import markdown
+    from unitcad.cli.output import print_json, progress
+
+    results = []
+    for name in runner.chosen(suites or []):
+        with progress(name) as say:
+            result = runner.run(name, quick, say)
+        results.append(result)
+        if not as_json:
+            typer.echo(markdown(result, [f"({plot.title})" for plot in result.plots]))
+    folder = out if out is not None or quick else Path("docs")
+    if folder is not None:
+        runner.write(results, folder)
+    if as_json:
+        print_json({"suites": [result.as_dict() for result in results]})
+    broken = [
+        f"{r.suite}: {p.what}: {p.value:g}, promised {p.limit:g}" for r in results for p in r.promises if not p.ok
+    ]
+    for line in broken:
+        typer.echo(line, err=True)
+    if broken:
+        sys.exit(1)
