@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from unitcad import __version__
+from unitcad.cli.accuracy import accuracy
 from unitcad.cli.batch import batch
 from unitcad.cli.build import build
 from unitcad.cli.cache import cache
@@ -41,6 +42,7 @@ def _version(wanted: bool) -> None:
 app.command("build")(build)
 app.command("batch")(batch)
 app.command("check")(check)
+app.command("accuracy")(accuracy)
 app.command("list")(list_)
 app.command("report")(report)
 app.command("schema")(schema)

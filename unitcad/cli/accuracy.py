@@ -35,10 +35,8 @@ def accuracy(
         runner.write(results, folder)
     if as_json:
         print_json({"suites": [result.as_dict() for result in results]})
-    broken = [
-        f"{r.suite}: {p.what}: {p.value:g}, promised {p.limit:g}" for r in results for p in r.promises if not p.ok
-    ]
-    for line in broken:
-        typer.echo(line, err=True)
+    broken = [(result.suite, promise) for result in results for promise in result.promises if not promise.ok]
+    for suite, promise in broken:
+        typer.echo(f"{suite}: {promise.what}: {promise.value:g}, promised {promise.limit:g}", err=True)
     if broken:
         sys.exit(1)
