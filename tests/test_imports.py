@@ -16,7 +16,7 @@ FLOORS = [
     {"cli"},
     {"batch", "report", "accuracy"},
     {"pipeline"},
-    {"moulds"},
+    {"moulds", "estimating"},
     {"designs"},
     {"export"},
     {"attenuation"},
