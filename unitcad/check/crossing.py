@@ -64,15 +64,14 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
     order = morton_order(mesh.vertices, mesh.faces)
     ordered = np.ascontiguousarray(mesh.faces[order])
     normal = topology.areas[order]
-    solid = normal.any(axis=1)
+    solid = (normal[:, 0] != 0) | (normal[:, 1] != 0) | (normal[:, 2] != 0)
     if not solid.all():
         order, ordered, normal = order[solid], ordered[solid], normal[solid]
     if len(order) < 2:
         return Crossings()
     deadline.tick()
-    faces = _prepared(topology, order, ordered, normal)
-    boxes = boxes_of(mesh.vertices, ordered)
-    del ordered
+    faces, boxes = _prepared(topology, order, ordered, normal)
+    del ordered, normal
     found = _Found()
     waiting: list[tuple[Ints, Ints]] = []
     count = 0
@@ -90,16 +89,20 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
     return _said(topology, faces, found)
 
 
-def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) -> _Faces:
+def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) -> tuple[_Faces, np.ndarray]:
     vertices = topology.mesh.vertices
     corners = tuple(np.ascontiguousarray(ordered[:, k]) for k in range(3))
-    smooth = _height_fields(topology) if topology.edges.closed else np.zeros(len(vertices), bool)
-    safe = tuple(np.where(smooth[corner], corner, -1) for corner in corners)
+    points = [np.ascontiguousarray(vertices[:, axis]) for axis in range(3)]
+    at = [[column[corner] for column in points] for corner in corners]
+    if topology.edges.closed:
+        smooth = _height_fields(len(vertices), corners, at, normal)
+        safe = tuple(np.where(smooth[corner], corner, -1) for corner in corners)
+    else:
+        safe = tuple(np.full(len(order), -1, np.int32) for _ in corners)
     size = np.zeros(len(ordered))
     for k in range(3):
-        side = vertices[corners[k]] - vertices[corners[k - 1]]
-        np.maximum(size, np.einsum("ij,ij->i", side, side), out=size)
-    return _Faces(
+        np.maximum(size, sum((at[k][axis] - at[k - 1][axis]) ** 2 for axis in range(3)), out=size)
+    faces = _Faces(
         vertices,
         corners,  # type: ignore[arg-type]
         normal,
@@ -109,35 +112,37 @@ def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) ->
         topology.kept[order],
         topology.n_shells > 1,
     )
+    return faces, boxes_of(at)
 
 
-def _height_fields(topology: Topology) -> Bools:
+def _height_fields(n: int, corners: tuple[Ints, ...], at: list[list[Floats]], areas: Floats) -> Bools:
     """Vertices whose faces, seen along their mean normal, all face up and go round once: such a star is embedded.
 
     Needs a closed mesh; the count of turns is that of neighbours that pass a half-plane through the normal.
     """
-    vertices, faces, areas = topology.mesh.vertices, topology.mesh.faces, topology.areas
-    n = len(vertices)
-    mean = np.stack([sum(np.bincount(faces[:, k], areas[:, axis], n) for k in range(3)) for axis in range(3)], axis=1)
-    flat = np.empty_like(mean)  # a direction across each mean normal: along the axis it has least of, made level
-    least = np.abs(mean).argmin(axis=1)
-    rows = np.arange(n)
-    flat[:, 0], flat[:, 1], flat[:, 2] = 0, 0, 0
-    flat[rows, (least + 1) % 3] = mean[rows, (least + 2) % 3]
-    flat[rows, (least + 2) % 3] = -mean[rows, (least + 1) % 3]
-    length = np.sqrt(np.einsum("ij,ij->i", mean, mean))
-    own = np.sqrt(np.einsum("ij,ij->i", areas, areas))
+    area = [np.ascontiguousarray(areas[:, axis]) for axis in range(3)]
+    mean = [sum(np.bincount(corner, column, n) for corner in corners) for column in area]
+    length = np.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
+    own = 1e-6 * np.sqrt(area[0] ** 2 + area[1] ** 2 + area[2] ** 2)
+    # A half-plane through the normal and its cross product with one axis, the one that the normal has least of.
+    least = np.abs(np.stack(mean)).argmin(axis=0)
+    level = [np.zeros(n) for _ in range(3)]
+    for axis in range(3):
+        mine = least == axis
+        level[(axis + 1) % 3][mine] = mean[(axis + 2) % 3][mine]
+        level[(axis + 2) % 3][mine] = -mean[(axis + 1) % 3][mine]
     good = length > 0
     turns = np.zeros(n)
-    for k in range(3):
-        corner, ahead, behind = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
-        up = np.einsum("ij,ij->i", areas, mean[corner])
-        low = ~(up > 1e-6 * own * length[corner])
-        good[corner[low]] = False
-        here, across = vertices[corner], flat[corner]
-        one = np.einsum("ij,ij->i", vertices[ahead] - here, across)
-        other = np.einsum("ij,ij->i", vertices[behind] - here, across)
-        turns += np.bincount(corner, (one > 0) & (other <= 0), n)
+    for k, corner in enumerate(corners):
+        here, ahead, behind = at[k], at[(k + 1) % 3], at[(k + 2) % 3]
+        up, one, other = np.zeros(len(own)), np.zeros(len(own)), np.zeros(len(own))
+        for axis in range(3):
+            up += area[axis] * mean[axis][corner]
+            across = level[axis][corner]
+            one += (ahead[axis] - here[axis]) * across
+            other += (behind[axis] - here[axis]) * across
+        good[corner[~(up > own * length[corner])]] = False
+        turns += np.bincount(corner[(one > 0) & (other <= 0)], minlength=n)
     return good & (turns == 1)
 
 

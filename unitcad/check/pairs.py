@@ -11,26 +11,24 @@ from collections.abc import Iterator
 import numpy as np
 
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Floats, Ints, sorted_with_order
+from unitcad.check.mesh import Floats, Ints, extent, sorted_with_order
 
 _FAN = 4
-_STEP_BITS = 15
+_STEP_BITS = 12
 _STEP = 1 << _STEP_BITS  # pairs of nodes looked at together: their rows stay in the processor's cache
 _BITS = 14
 
 
 def morton_order(vertices: Floats, faces: Ints) -> Ints:
-    """The order of faces along a space-filling curve through the middles of their boxes."""
-    low, size = vertices.min(axis=0), np.ptp(vertices, axis=0)
-    scale = (2**_BITS - 1) / max(float(size.max()), 1e-300)
-    key = np.zeros(len(faces), np.uint64)
+    """The order of faces along a space-filling curve through their first corners."""
+    low, high = extent(vertices)
+    scale = (2**_BITS - 1) / max(float((high - low).max()), 1e-300)
+    key = np.zeros(len(vertices), np.uint64)
     for axis in range(3):
-        column = (vertices[:, axis] - low[axis]) * scale
-        middle = column[faces[:, 0]] + column[faces[:, 1]]
-        middle += column[faces[:, 2]]
-        middle /= 3
-        key |= _spread(middle.astype(np.uint64)) << np.uint64(axis)
-    return sorted_with_order(key, 3 * _BITS)[1]
+        column = ((vertices[:, axis] - low[axis]) * scale).astype(np.uint64)
+        key |= _spread(column) << np.uint64(axis)
+    middle = key[faces[:, 0]]
+    return sorted_with_order(middle, 3 * _BITS)[1]
 
 
 def _spread(value: np.ndarray) -> np.ndarray:
@@ -40,12 +38,12 @@ def _spread(value: np.ndarray) -> np.ndarray:
     return value
 
 
-def boxes_of(vertices: Floats, faces: Ints) -> np.ndarray:
-    """Boxes of the faces, (m, 6) float32, low corner then negated high corner, rounded outwards."""
-    boxes = np.empty((len(faces), 6), np.float32)
+def boxes_of(at: list[list[Floats]]) -> np.ndarray:
+    """Boxes of faces from their corners' coordinates at[corner][axis] (m,): low corner and negated high corner, (m, 6)
+    float32, rounded outwards."""
+    boxes = np.empty((len(at[0][0]), 6), np.float32)
     for axis in range(3):
-        column = vertices[:, axis]
-        a, b, c = (column[faces[:, side]] for side in range(3))
+        a, b, c = at[0][axis], at[1][axis], at[2][axis]
         low = np.minimum(np.minimum(a, b), c).astype(np.float32)
         high = np.maximum(np.maximum(a, b), c).astype(np.float32)
         boxes[:, axis] = np.nextafter(low, np.float32(-np.inf))
@@ -57,7 +55,7 @@ def meeting_pairs(boxes: np.ndarray, deadline: Deadline) -> Iterator[tuple[Ints,
     """Blocks of pairs i < j of rows of `boxes` whose boxes meet. Rows near each other should be near in space."""
     levels = [_padded(boxes)]
     while len(levels[-1]) > _FAN:
-        levels.append(_padded(levels[-1].reshape(-1, _FAN, 6).min(axis=1)))
+        levels.append(_padded(_parents(levels[-1])))
     top = len(levels[-1])
     first, second = (side.astype(np.int32) for side in np.triu_indices(top))
     for level in range(len(levels) - 1, 0, -1):
@@ -82,6 +80,12 @@ def _padded(boxes: np.ndarray) -> np.ndarray:
     return np.concatenate([boxes, np.full((more, 6), np.inf, np.float32)]) if more else boxes
 
 
+def _parents(boxes: np.ndarray) -> np.ndarray:
+    """The box round every four rows."""
+    pair = np.minimum(boxes[0::2], boxes[1::2])
+    return np.minimum(pair[0::2], pair[1::2])
+
+
 def _direct(boxes: np.ndarray, first: Ints, second: Ints) -> Iterator[tuple[Ints, Ints]]:
     meet = ((boxes[first, :3] <= -boxes[second, 3:]) & (boxes[second, :3] <= -boxes[first, 3:])).all(axis=1)
     yield first[meet], second[meet]
@@ -98,8 +102,8 @@ def _walk(
     for start in range(0, len(first), _STEP):
         deadline.tick()
         i, j = first[start : start + _STEP], second[start : start + _STEP]
-        a = rows.take(i, axis=1).reshape(_FAN, 6, -1)
-        b = rows.take(j, axis=1).reshape(_FAN, 6, -1)
+        a = rows.take(i, axis=1, mode="clip").reshape(_FAN, 6, -1)
+        b = rows.take(j, axis=1, mode="clip").reshape(_FAN, 6, -1)
         high_a, high_b = -a[:, 3:], -b[:, 3:]
         meet = np.zeros((_FAN, _FAN, 1 << _STEP_BITS), bool)
         hit = np.empty(len(i), bool)

@@ -9,7 +9,7 @@ import numpy as np
 from unitcad.check import crossing, shells, topology
 from unitcad.check.findings import Facts, Finding, Location
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Mesh
+from unitcad.check.mesh import Mesh, extent
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology
 
@@ -40,7 +40,7 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
     findings += crossings.findings
     judged = shells.judge(found, crossings.crossed, crossings.touching, deadline)
     findings += judged.findings
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    low, high = extent(mesh.vertices)
     facts = replace(
         facts,
         shells=found.n_shells,

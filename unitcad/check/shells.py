@@ -8,7 +8,7 @@ import numpy as np
 
 from unitcad.check.findings import Finding, Location
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Floats, Ints, diagonal
+from unitcad.check.mesh import Floats, Ints, diagonal, extent
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology
 
@@ -84,14 +84,16 @@ def measures(topology: Topology) -> tuple[Floats, Floats, Floats]:
     vertices, faces = mesh.vertices, mesh.faces
     if not n:
         return np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
-    origin = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    origin = sum(extent(vertices)) / 2
     corner = vertices[faces[:, 0]]
     corner -= origin
     tetra = np.einsum("ij,ij->i", corner, topology.areas)
     tetra /= 6
     if n == 1:
-        used = vertices if not mesh.indexed else vertices[np.unique(faces)]
-        return np.array([tetra.sum()]), used.min(axis=0)[None], used.max(axis=0)[None]
+        used = np.zeros(len(vertices), bool)
+        used[faces] = True
+        low, high = extent(vertices[used])
+        return np.array([tetra.sum()]), low[None], high[None]
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     for side in range(3):
         np.minimum.at(low, labels, vertices[faces[:, side]])

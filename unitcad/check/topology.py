@@ -189,7 +189,7 @@ def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints) ->
     and it is longer than SLIVER of the part. Short ones vanish in a slicer's own resolution.
     """
     found, vertices = [], mesh.vertices
-    double = np.abs(areas).sum(axis=1)
+    double = np.abs(areas[:, 0]) + np.abs(areas[:, 1]) + np.abs(areas[:, 2])
     size, step = diagonal(vertices), float32_step(vertices)
     suspect = np.flatnonzero(double < 8 * max(step, 1e-7 * size) * size)
     corners = vertices[faces[suspect]]
