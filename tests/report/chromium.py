@@ -1,0 +1,69 @@
+"""Debian's Chromium, driven by Playwright; pages come from file:// and may ask for nothing else."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+FLAGS = (
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
+
+
+def executable() -> str | None:
+    """Where Chromium is, or None."""
+    return shutil.which("chromium")
+
+
+@contextlib.contextmanager
+def browser() -> Iterator[Any]:
+    """A running browser."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=executable(), args=list(FLAGS))
+        try:
+            yield running
+        finally:
+            running.close()
+
+
+class Visit:
+    """A page opened from a file: what it said on the console, what it asked for, what it threw."""
+
+    def __init__(
+        self, running: Any, file: Path, width: int = 1280, height: int = 900, dark: bool = False, **more: Any
+    ) -> None:
+        scheme = "dark" if dark else "light"
+        self.context = running.new_context(
+            viewport={"width": width, "height": height}, color_scheme=scheme, reduced_motion="reduce", **more
+        )
+        self.page = self.context.new_page()
+        self.console: list[str] = []
+        self.requests: list[str] = []
+        self.errors: list[str] = []
+        self.page.on("console", lambda message: self.console.append(f"{message.type}: {message.text}"))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.goto(file.resolve().as_uri())
+        self.page.wait_for_selector("html[data-ready=yes]", timeout=60_000)
+
+    def drawn(self) -> None:
+        """Wait until the 3D view has drawn."""
+        self.page.wait_for_selector(".stage-host[data-shown]", timeout=60_000)
+        self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+    def close(self) -> None:
+        """End the visit."""
+        self.context.close()

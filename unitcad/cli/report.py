@@ -1,0 +1,25 @@
+"""unitcad report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A variant's folder, or one that holds variants.")],
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Write one offline page for what a folder holds. The last line printed is the page."""
+    from unitcad.cli.output import print_json, progress
+    from unitcad.report import write_report
+
+    with progress(str(folder)) as say:
+        say("page")
+        page = write_report(folder)
+    if as_json:
+        print_json({"page": str(page), "bytes": page.stat().st_size})
+    else:
+        typer.echo(str(page))

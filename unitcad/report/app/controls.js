@@ -1,0 +1,152 @@
+// The controls of the 3D view: what stands on the bench, which parts are hidden, the cut, how far things stand apart.
+(() => {
+  "use strict";
+  const { el, clear, createViewer, readGlb, spoken, views } = window.unitcad;
+  const AXES = { y: "along the tail", x: "across the tail", z: "level" };
+  let serial = 0;
+
+  // A name that a person reads: layer1 as layer 1.
+  function partName(name) {
+    return name.replace(/(\d+)$/, " $1");
+  }
+
+  function hex(colour) {
+    const channel = (c) => Math.round(255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055)).toString(16).padStart(2, "0");
+    return `#${colour.map(channel).join("")}`;
+  }
+
+  // The scenes of a model: the unit, the whole set of moulds with the layers, and each moment of casting.
+  function scenes(model, unit, tools) {
+    const layers = unit.filter((mesh) => mesh.extras.made === "cast");
+    const inMoulds = [
+      ...tools.map((mesh) => ({ name: mesh.name, mesh, offset: model.moulds_apart[mesh.name] })),
+      ...layers.flatMap((mesh) => model.cells.map((place) => ({ name: mesh.name, mesh, place, offset: model.moulds_apart[mesh.name] }))),
+    ];
+    const alone = unit.map((mesh) => ({ name: mesh.name, mesh, offset: model.unit_apart[mesh.name] }));
+    const names = (parts) => [...new Set(parts.map((part) => part.name))];
+    const moments = model.moments.map((moment) => {
+      const isUnit = moment.parts.some((name) => unit.some((mesh) => mesh.name === name && mesh.extras.made !== "cast"));
+      return { title: moment.title, parts: isUnit ? alone : inMoulds, names: moment.parts };
+    });
+    return {
+      unit: [{ title: "The unit", parts: alone, names: names(alone) }],
+      moulds: [{ title: "The whole set", parts: inMoulds, names: names(inMoulds) }, ...moments],
+    };
+  }
+
+  function range(label, attributes, oninput) {
+    const id = `control-${(serial += 1)}`;
+    const output = el("output", { for: id });
+    const input = el("input", { type: "range", id, ...attributes, oninput: () => oninput(Number(input.value), output) });
+    return { node: el("div", { className: "control" }, el("label", { for: id }, label), input, output), input, output };
+  }
+
+  async function createStage(host, model) {
+    const canvas = el("canvas", {
+      tabindex: "0", role: "img",
+      "aria-label": "3D view. Arrow keys turn it, plus and minus zoom, zero looks from the corner again.",
+    });
+    const panel = el("div", { className: "panel" });
+    const frame = el("div", { className: "view" }, canvas);
+    clear(host, el("div", { className: "stage" }, frame, panel));
+    const viewer = createViewer(canvas);
+    const [unit, tools] = await Promise.all([readGlb(model.unit), readGlb(model.moulds)]);
+    const kinds = scenes(model, unit, tools);
+    const state = { kind: "unit", step: 0, hidden: new Set(), parts: null };
+    const current = () => kinds[state.kind][Math.min(state.step, kinds[state.kind].length - 1)];
+
+    const list = el("ul", { className: "parts" });
+    const kindName = `kind-${(serial += 1)}`;
+    const radios = [["unit", "Unit"], ["moulds", "Moulds"]].map(([kind, label]) =>
+      el("label", {}, el("input", { type: "radio", name: kindName, value: kind, checked: kind === state.kind, onchange: () => choose(kind) }), label));
+
+    const step = range("Casting step", { min: 0, max: kinds.moulds.length - 1, step: 1, value: 0, name: "step" }, (value) => { state.step = value; update(true); });
+    const before = el("button", { type: "button", onclick: () => move(-1), "aria-label": "Step back" }, "‹");
+    const after = el("button", { type: "button", onclick: () => move(1), "aria-label": "Step on" }, "›");
+    const stepRow = el("div", { className: "step" }, step.node, el("div", { className: "buttons" }, before, after));
+
+    const apart = range("Taken apart", { min: 0, max: 100, step: 1, value: 0, name: "apart" }, (value, output) => {
+      output.textContent = `${value} %`;
+      viewer.apart(value / 100);
+    });
+    apart.input.addEventListener("change", () => viewer.look(state.view || "corner"));
+    const at = range("Cut at", { min: 0, max: 1, step: 0.05, value: 0, name: "cut-at" }, cut);
+    const cutOn = el("input", { type: "checkbox", name: "cut", checked: true, onchange: cut });
+    const axis = el("select", { name: "axis", "aria-label": "Direction of the cut", onchange: () => { limits(); cut(); } },
+      Object.entries(AXES).map(([value, label]) => el("option", { value }, label)));
+    const buttons = el("div", { className: "buttons" }, views.map((name) =>
+      el("button", { type: "button", onclick: () => { state.view = name; viewer.look(name); } }, spoken(name))));
+
+    panel.append(
+      el("fieldset", { className: "choice" }, el("legend", {}, "Show"), radios), stepRow,
+      el("fieldset", {}, el("legend", {}, "Parts"), list),
+      el("fieldset", {}, el("legend", {}, "Look"), apart.node,
+        el("div", { className: "control" }, el("label", {}, cutOn, "Cut open"), axis), at.node, buttons));
+
+    function cut() {
+      const value = Number(at.input.value);
+      at.output.textContent = `${value.toFixed(2)} mm`;
+      at.input.disabled = axis.disabled = !cutOn.checked;
+      // A hair off the middle: a cut exactly in a face's plane shows false triangles.
+      viewer.cut({ on: cutOn.checked, axis: axis.value, at: value + 1 / 1024 });
+    }
+
+    function limits() {
+      const [low, high] = viewer.bounds()[axis.value];
+      at.input.min = low.toFixed(2);
+      at.input.max = high.toFixed(2);
+      at.input.value = axis.value === "z" ? ((low + high) / 2).toFixed(2) : "0";
+    }
+
+    function choose(kind) {
+      state.kind = kind;
+      state.step = 0;
+      step.input.value = 0;
+      update(true);
+    }
+
+    function move(by) {
+      state.step = Math.min(kinds.moulds.length - 1, Math.max(0, state.step + by));
+      step.input.value = state.step;
+      update(true);
+    }
+
+    function update(lookAgain) {
+      const scene = current();
+      if (state.parts !== scene.parts) {
+        state.parts = scene.parts;
+        viewer.show(scene.parts.map((part) => ({ ...part, shown: true })));
+        limits();
+      }
+      stepRow.hidden = state.kind !== "moulds";
+      step.output.textContent = state.step ? `${state.step} of ${kinds.moulds.length - 1}: ${scene.title}` : scene.title;
+      step.input.setAttribute("aria-valuetext", scene.title);
+      clear(list, scene.names.map((name) => {
+        const mesh = scene.parts.find((part) => part.name === name).mesh;
+        const swatch = el("span", { className: "swatch", "aria-hidden": "true" });
+        swatch.style.background = hex(mesh.colour);
+        const box = el("input", { type: "checkbox", name: `part-${name}`, checked: !state.hidden.has(name), onchange: () => {
+          if (box.checked) state.hidden.delete(name);
+          else state.hidden.add(name);
+          shown();
+        } });
+        return el("li", {}, el("label", {}, box, swatch, partName(name)));
+      }));
+      shown();
+      cut();
+      if (lookAgain) viewer.look(state.view || "corner");
+    }
+
+    function shown() {
+      const names = current().names.filter((name) => !state.hidden.has(name));
+      viewer.visible((part) => names.includes(part.name));
+      host.dataset.shown = names.join(" ");
+    }
+
+    apart.output.textContent = "0 %";
+    update(true);
+    return { free: () => viewer.free() };
+  }
+
+  Object.assign(window.unitcad, { createStage, partName });
+})();

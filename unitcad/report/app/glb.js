@@ -1,0 +1,37 @@
+// Reads the GLB files that unitcad writes: meshes with positions (mm), normals and indices, a colour each.
+(() => {
+  "use strict";
+  const ARRAYS = { 5126: Float32Array, 5123: Uint16Array, 5125: Uint32Array };
+  const WIDTH = { SCALAR: 1, VEC3: 3 };
+
+  async function unpacked(text) {
+    const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+    return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+  }
+
+  // [{name, colour: [r, g, b] linear, extras, position, normal, index}]
+  function parsed(buffer) {
+    const view = new DataView(buffer);
+    const length = view.getUint32(12, true);
+    const document = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 20, length)));
+    const start = 20 + length + 8;
+    const array = (index) => {
+      const accessor = document.accessors[index];
+      const offset = start + document.bufferViews[accessor.bufferView].byteOffset;
+      return new ARRAYS[accessor.componentType](buffer.slice(offset), 0, accessor.count * WIDTH[accessor.type]);
+    };
+    return document.nodes.filter((node) => node.mesh !== undefined).map((node) => {
+      const primitive = document.meshes[node.mesh].primitives[0];
+      return {
+        name: node.name,
+        extras: node.extras || {},
+        colour: document.materials[primitive.material].pbrMetallicRoughness.baseColorFactor.slice(0, 3),
+        position: array(primitive.attributes.POSITION),
+        normal: array(primitive.attributes.NORMAL),
+        index: array(primitive.indices),
+      };
+    });
+  }
+
+  Object.assign(window.unitcad, { unpacked, readGlb: async (text) => parsed(await unpacked(text)) });
+})();

@@ -1,0 +1,133 @@
+// The page: a variant, or a batch with a table, a plot, and the variant that was opened.
+(() => {
+  "use strict";
+  const U = window.unitcad;
+  const { el, clear, section, theme } = U;
+  const page = document.getElementById("page");
+  let leave = () => {};
+
+  // References into the pool, undone. The key is one that no data of ours has.
+  function resolver(pool) {
+    const known = new Map();
+    const resolve = (node) => {
+      if (Array.isArray(node)) return node.map(resolve);
+      if (!node || typeof node !== "object") return node;
+      if ("\0" in node) {
+        const index = node["\0"];
+        if (!known.has(index)) known.set(index, resolve(pool[index]));
+        return known.get(index);
+      }
+      return Object.fromEntries(Object.entries(node).map(([key, value]) => [key, resolve(value)]));
+    };
+    return resolve;
+  }
+
+  function header(title, line, chips, back) {
+    return el("header", { className: "top" },
+      el("div", {}, back, el("h1", { tabindex: "-1" }, title), el("p", { className: "line" }, line)),
+      el("div", { className: "chips" }, chips, theme.button()));
+  }
+
+  function navigation(sections) {
+    const jump = (node) => (event) => {
+      event.preventDefault();
+      node.scrollIntoView();
+      node.querySelector("h2").setAttribute("tabindex", "-1");
+      node.querySelector("h2").focus({ preventScroll: true });
+    };
+    return el("nav", { "aria-label": "On this page" }, sections.map((node) => el("a", { href: `#${node.id}`, onclick: jump(node) }, node.querySelector("h2").textContent)));
+  }
+
+  function stage(variant, model) {
+    const host = el("div", { className: "stage-host" });
+    const node = section("view", "3D", host);
+    const instead = (reason) => clear(host, el("p", { className: "absent" }, reason), variant.drawings["section.svg"] && U.drawing(variant.drawings["section.svg"], "The unit in section"));
+    if (!model) {
+      instead(variant.no_model || "No geometry here.");
+      return { node, ready: Promise.resolve(null) };
+    }
+    const ready = new Promise((done) => requestAnimationFrame(done)).then(() => U.createStage(host, model)).catch((error) => {
+      instead(`This browser draws no 3D (${error.message}); the section stands in.`);
+      return null;
+    });
+    return { node, ready };
+  }
+
+  function showVariant(variant, data, back) {
+    const { manifest } = variant;
+    const view = stage(variant, variant.model && data.models[variant.model]);
+    const sections = [view.node, U.parts.sectionDrawing(variant), U.estimate(variant), U.parts.laws(variant), U.procedure(variant), U.parts.parts(variant), U.parts.files(variant), U.parts.spec(variant)];
+    const { state, text } = U.verdict(manifest);
+    const layers = ((variant.spec || {}).layers || []).map((layer) => layer.material).join(" / ");
+    const line = [manifest.design, layers, manifest.hash].filter(Boolean).join(" · ");
+    const chips = [el("span", { className: `chip ${state}` }, text), manifest.label && el("span", { className: "chip", title: "Engraved on the moulds" }, `label ${manifest.label}`)];
+    document.title = manifest.name;
+    clear(page, header(manifest.name, line, chips, back), navigation(sections), sections, footer(data));
+    leave = () => view.ready.then((made) => made && made.free());
+  }
+
+  function showBatch(data) {
+    const { table, batch } = data;
+    const nameColumn = table.columns.includes("name") ? "name" : table.columns[0];
+    const plotHost = el("div");
+    const selects = {};
+    let rows = [];
+    const at = (name) => table.columns.indexOf(name) + 1;
+    const plot = () => {
+      const [x, y, group] = ["x", "y", "group"].map((key) => selects[key].value);
+      const points = rows.map((row) => ({ x: row[at(x)], y: row[at(y)], group: group ? row[at(group)] : "", title: row[at(nameColumn)], open: row[0] && (() => { location.hash = encodeURIComponent(row[0]); }) }));
+      clear(plotHost, U.scatterPlot(points, { xLabel: x, yLabel: y, label: `${y} against ${x}, ${points.length} variants` }));
+    };
+    let ready = false;
+    const made = U.createTable(table, { nameColumn, changed: (shown) => { rows = shown; if (ready) plot(); } });
+    const varying = made.varying();
+    const numeric = varying.filter((name) => table.rows.some((row) => typeof row[at(name)] === "number"));
+    const choice = (key, label, names, value) => {
+      selects[key] = el("select", { name: `plot-${key}`, onchange: plot }, names.map((name) => el("option", { value: name, selected: name === value }, name || "nothing")));
+      return el("label", {}, `${label} `, selects[key]);
+    };
+    const names = varying.length ? varying : table.columns;
+    const texts = varying.filter((name) => !numeric.includes(name) && name !== nameColumn);
+    const preferred = (list, pattern) => list.find((name) => pattern.test(name));
+    const controls = el("div", { className: "tools" },
+      choice("x", "Across", names, preferred(numeric, /wall|thick|diameter/) || numeric[0] || names[0]),
+      choice("y", "Up", names, preferred(numeric, /fitted|edge|level/) || numeric[1] || numeric[0] || names[names.length - 1]),
+      choice("group", "Colour", ["", ...texts], preferred(texts, /design|material/) || ""));
+    const geometries = Object.keys(data.models).length;
+    const failed = table.rows.filter((row) => !row[0]).length;
+    const chips = [el("span", { className: "chip" }, `${geometries} geometries`), failed > 0 && el("span", { className: "chip bad" }, `${failed} failed`)];
+    const sections = [section("variants", "Variants", made.node), section("plot", "Two columns against each other", controls, plotHost)];
+    if (batch) sections.push(section("batch", "The batch", el("details", {}, el("summary", {}, "What the batch says of itself"), U.facts(batch))));
+    document.title = data.title;
+    clear(page, header(data.title, `unitcad ${data.version}`, chips), navigation(sections), sections, footer(data));
+    ready = true;
+    plot();
+    leave = () => {};
+  }
+
+  function footer(data) {
+    return el("footer", {}, el("p", {}, `Made by unitcad ${data.version}. This page contacts nothing.`),
+      el("details", {}, el("summary", {}, "Licences of what is in it"), el("pre", {}, document.getElementById("licences").textContent)));
+  }
+
+  async function start() {
+    const text = document.getElementById("data").textContent;
+    const data = JSON.parse(new TextDecoder().decode(await U.unpacked(text)));
+    const resolve = resolver(data.pool);
+    const variants = new Map(data.variants.map((entry) => [resolve(entry).folder, entry]));
+    const route = () => {
+      leave();
+      const wanted = decodeURIComponent(location.hash.slice(1));
+      const [only] = data.variants;
+      if (!data.table) showVariant(resolve(only), data);
+      else if (variants.has(wanted) && wanted) showVariant(resolve(variants.get(wanted)), data, el("a", { className: "back", href: "#" }, "‹ All variants"));
+      else showBatch(data);
+      window.scrollTo(0, 0);
+    };
+    if (data.table) window.addEventListener("hashchange", route);
+    route();
+    document.documentElement.dataset.ready = "yes";
+  }
+
+  start().catch((error) => clear(page, el("p", { className: "absent" }, `The page can't be drawn: ${error.message}`)));
+})();

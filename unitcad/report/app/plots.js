@@ -1,0 +1,157 @@
+// Two plots, by uPlot: curves with their spread, and any two columns of a table against each other.
+(() => {
+  "use strict";
+  const { el, number, theme } = window.unitcad;
+  const COLOURS = ["series-1", "series-2", "series-3", "series-4", "series-5", "series-6"];
+
+  const tick = (value) => (value === null || value === undefined ? "" : number(value, 4));
+
+  function axes(xLabel, yLabel, xValues, yValues) {
+    const look = { stroke: theme.colour("ink-2"), grid: { stroke: theme.colour("line"), width: 1 }, ticks: { stroke: theme.colour("line"), width: 1 }, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif" };
+    const plain = (u, splits) => splits.map(tick);
+    return [
+      { ...look, label: xLabel, values: xValues || plain, size: 36, labelSize: 20 },
+      { ...look, label: yLabel, values: yValues || plain, size: 58, labelSize: 20 },
+    ];
+  }
+
+  // A plot as wide as its host, made again when the width or the colours change.
+  function hosted(height, make) {
+    const host = el("div", { className: "plot" });
+    let plot = null;
+    let width = 0;
+    const paint = () => {
+      if (!width) return;
+      if (plot) plot.destroy();
+      plot = make(host, width, height);
+    };
+    new ResizeObserver(() => {
+      const now = Math.floor(host.clientWidth);
+      if (now === width) return;
+      width = now;
+      paint();
+    }).observe(host);
+    theme.watch(host, paint);
+    return { host, paint };
+  }
+
+  // curves: [{name, x: [], y: [], low: [], high: [], points: bool, dash: bool}]
+  function curvePlot(curves, { xLabel, yLabel, log = false, label }) {
+    const { host } = hosted(320, (node, width, height) => {
+      const tables = [];
+      const series = [{ label: xLabel, value: (u, v) => tick(v) }];
+      const bands = [];
+      const positive = (values) => (log ? values.map((v) => (v > 0 ? v : null)) : values);
+      curves.forEach((curve, i) => {
+        const colour = theme.colour(COLOURS[(curve.colour ?? i) % COLOURS.length]);
+        const columns = [curve.x, positive(curve.y)];
+        series.push({
+          label: curve.name, stroke: colour, width: curve.points ? 0 : 2, dash: curve.dash ? [6, 4] : undefined, spanGaps: !curve.points,
+          paths: curve.points ? () => null : undefined,
+          points: curve.points ? { show: true, size: 11, fill: colour, stroke: theme.colour("paper"), width: 2 } : { show: false },
+          value: (u, v) => tick(v),
+        });
+        if (curve.low && curve.high) {
+          const at = series.length;
+          columns.push(positive(curve.high), positive(curve.low));
+          for (const edge of ["high", "low"]) series.push({ label: `${curve.name}, ${edge}`, stroke: "transparent", width: 0, points: { show: false }, spanGaps: true, value: (u, v) => tick(v) });
+          bands.push({ series: [at, at + 1], fill: `${colour}33` });
+        }
+        tables.push(columns);
+      });
+      const options = {
+        width, height, series, bands, axes: axes(xLabel, yLabel),
+        scales: { x: { time: false }, y: log ? { distr: 3 } : {} }, legend: { live: true }, cursor: { drag: { x: false, y: false } },
+      };
+      return new uPlot(options, uPlot.join(tables), node);
+    });
+    host.setAttribute("role", "img");
+    host.setAttribute("aria-label", label);
+    return host;
+  }
+
+  // Numbers stay numbers; texts get places 0, 1, ... in their order.
+  function scaleOf(values) {
+    const known = values.filter((v) => v !== null && v !== undefined);
+    if (known.every((v) => typeof v === "number")) return { of: (v) => (typeof v === "number" ? v : null), names: null };
+    const names = [...new Set(known.map(String))].sort((a, b) => a.localeCompare(b, undefined, { numeric: true }));
+    const place = new Map(names.map((name, i) => [name, i]));
+    return { of: (v) => (v === null || v === undefined ? null : place.get(String(v))), names };
+  }
+
+  const short = (text) => (text.length > 14 ? `${text.slice(0, 13)}…` : text);
+
+  // points: [{x, y, group, title, open}]; a click or a tap opens the nearest one.
+  function scatterPlot(points, { xLabel, yLabel, label }) {
+    const xs = scaleOf(points.map((p) => p.x));
+    const ys = scaleOf(points.map((p) => p.y));
+    const drawn = points.map((p) => ({ ...p, px: xs.of(p.x), py: ys.of(p.y) })).filter((p) => p.px !== null && p.py !== null);
+    const groups = [...new Set(drawn.map((p) => String(p.group)))].sort();
+    const tip = el("p", { className: "tip", "aria-live": "polite" });
+    const { host } = hosted(360, (node, width, height) => {
+      const tables = groups.map((group) => {
+        const mine = drawn.filter((p) => String(p.group) === group).sort((a, b) => a.px - b.px);
+        return [mine.map((p) => p.px), mine.map((p) => p.py)];
+      });
+      const names = (scale) => scale.names && ((u, splits) => splits.map((v) => (Number.isInteger(v) && scale.names[v] !== undefined ? short(scale.names[v]) : "")));
+      const range = (scale) => (u, low, high) => {
+        if (scale.names) return [-0.5, scale.names.length - 0.5];
+        const pad = (high - low) * 0.06 || Math.abs(high) * 0.1 || 1;
+        return [low - pad, high + pad];
+      };
+      const nearest = (u) => {
+        const { left, top } = u.cursor;
+        let best = null;
+        let least = 24;
+        for (const p of drawn) {
+          const away = Math.hypot(u.valToPos(p.px, "x") - left, u.valToPos(p.py, "y") - top);
+          if (away < least) [best, least] = [p, away];
+        }
+        return best;
+      };
+      const dots = (u, index) => {
+        const colour = theme.colour(COLOURS[(index - 1) % COLOURS.length]);
+        const { ctx } = u;
+        const radius = 4.5 * devicePixelRatio;
+        ctx.save();
+        ctx.fillStyle = `${colour}c0`;
+        ctx.strokeStyle = theme.colour("paper");
+        ctx.lineWidth = devicePixelRatio;
+        u.data[index][0].forEach((x, i) => {
+          ctx.beginPath();
+          ctx.arc(u.valToPos(x, "x", true), u.valToPos(u.data[index][1][i], "y", true), radius, 0, 2 * Math.PI);
+          ctx.fill();
+          ctx.stroke();
+        });
+        ctx.restore();
+        return null;
+      };
+      const options = {
+        width, height, mode: 2, axes: axes(xLabel, yLabel, names(xs), names(ys)),
+        scales: { x: { time: false, range: range(xs) }, y: { range: range(ys) } },
+        series: [{}, ...groups.map((group, i) => ({ label: group, stroke: theme.colour(COLOURS[i % COLOURS.length]), paths: dots }))],
+        legend: { show: false }, cursor: { drag: { x: false, y: false }, points: { show: false } },
+        hooks: {
+          setCursor: [(u) => {
+            const p = u.cursor.left >= 0 ? nearest(u) : null;
+            u.over.classList.toggle("hit", Boolean(p));
+            if (p) tip.textContent = `${p.title}: ${xLabel} ${tick(p.x)}, ${yLabel} ${tick(p.y)}`;
+          }],
+          ready: [(u) => u.over.addEventListener("click", () => { const p = nearest(u); if (p && p.open) p.open(); })],
+        },
+      };
+      return new uPlot(options, [null, ...tables], node);
+    });
+    host.setAttribute("role", "img");
+    host.setAttribute("aria-label", label);
+    const key = el("ul", { className: "key" }, groups.length > 1 && groups.slice(0, 12).map((group, i) => {
+      const swatch = el("span", { className: "swatch round", "aria-hidden": "true" });
+      theme.watch(swatch, () => { swatch.style.background = theme.colour(COLOURS[i % COLOURS.length]); });
+      return el("li", {}, swatch, group);
+    }));
+    tip.textContent = `${drawn.length} of ${points.length} points. Point at one to read it, click to open it.`;
+    return el("div", {}, host, key, tip);
+  }
+
+  Object.assign(window.unitcad, { curvePlot, scatterPlot });
+})();

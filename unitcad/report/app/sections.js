@@ -1,0 +1,78 @@
+// The parts of a variant's page but for the 3D view, the estimate and the procedure.
+(() => {
+  "use strict";
+  const { el, number, bytes, section, table, facts, partName } = window.unitcad;
+
+  const drawing = (svg, alt) => el("img", { className: "drawing", src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`, alt });
+
+  const absent = (what, ask) => el("p", { className: "absent" }, `${what} `, el("code", {}, ask));
+
+  // Path parts are kept from being read as anything but a path.
+  const link = (folder, path) => [folder, path].filter(Boolean).join("/").split("/").map(encodeURIComponent).join("/");
+
+  function verdict(manifest) {
+    const laws = manifest.laws || [];
+    const held = laws.filter((law) => law.ok).length;
+    const errors = manifest.check ? manifest.check.errors : 0;
+    if (!laws.length) return { state: "unknown", text: "laws not judged" };
+    if (held < laws.length) return { state: "bad", text: `${laws.length - held} of ${laws.length} laws broken` };
+    if (errors) return { state: "bad", text: `${errors} errors in files` };
+    return { state: "good", text: `${held} laws hold` };
+  }
+
+  function sectionDrawing(variant) {
+    const svg = variant.drawings["section.svg"];
+    return section("section", "Section", svg ? el("figure", {}, drawing(svg, "The unit cut along its tail, with its main dimensions"),
+      el("figcaption", {}, "Cut along the tail; lengths in mm; z = 0 is the skin."))
+      : absent("No section drawing here. Ask for it with", "unitcad build SPEC --only unit"));
+  }
+
+  function laws(variant) {
+    const { manifest } = variant;
+    const found = manifest.laws || [];
+    const row = (law) => ({ className: law.ok ? undefined : "bad", cells: [law.code, law.where, law.value, law.limit, law.unit || "", law.ok ? "holds" : "broken"] });
+    const head = ["Law", "Where", "Value", "Limit", "Unit", ""];
+    const broken = found.filter((law) => !law.ok);
+    const findings = (manifest.check && manifest.check.findings) || [];
+    const content = [el("p", { className: `verdict ${verdict(manifest).state}` }, verdict(manifest).text)];
+    if (broken.length) content.push(table(head, broken.map(row), { caption: "Broken" }));
+    if (found.length) content.push(el("details", {}, el("summary", {}, `All ${found.length} laws`), table(head, found.map(row), { label: "All laws" })));
+    else content.push(absent("Laws were not judged. Ask for them with", "unitcad build SPEC --only unit,moulds"));
+    content.push(findings.length
+      ? table(["File", "Rule", "Severity", "Message"], findings.map((f) => ({ className: f.severity === "error" ? "bad" : undefined, cells: [f.path, f.code, f.severity, f.message] })), { caption: "Found in files" })
+      : el("p", {}, found.length ? "The rules for files found no fault." : ""));
+    const lines = (title, list) => list.length > 0 && [el("h3", {}, title), el("ul", {}, list.map((text) => el("li", {}, text)))];
+    content.push(lines("Warnings", manifest.warnings || []));
+    content.push(lines("Left out", (manifest.left_out || []).map((entry) => `${entry.what}: ${entry.why}`)));
+    return section("laws", "Laws and checks", content);
+  }
+
+  function parts(variant) {
+    const list = variant.manifest.parts || [];
+    const size = (box) => [0, 1, 2].map((i) => number(box[i + 3] - box[i], 4)).join(" × ");
+    const rows = list.map((part) => [partName(part.name), part.role, part.made || "", part.material || "", part.volume_mm3, size(part.bbox_mm), part.triangles]);
+    return section("parts", "Parts", list.length ? table(["Part", "Role", "Made", "Material", "Volume (mm³)", "Size (mm)", "Triangles"], rows, { label: "Parts" })
+      : absent("No parts here. Ask for them with", "unitcad build SPEC --only unit,moulds"));
+  }
+
+  function files(variant) {
+    const groups = new Map();
+    for (const [path, size] of variant.files) {
+      const folder = path.includes("/") ? path.slice(0, path.lastIndexOf("/")) : "";
+      if (!groups.has(folder)) groups.set(folder, []);
+      groups.get(folder).push([path, size]);
+    }
+    const item = ([path, size]) => el("li", {}, el("a", { href: link(variant.folder, path), download: true }, path.split("/").pop()), el("span", { className: "size" }, bytes(size)));
+    return section("files", "Files", el("div", { className: "folders" }, [...groups].map(([folder, entries]) =>
+      el("div", {}, el("h3", {}, folder || "This folder"), el("ul", { className: "files" }, entries.map(item))))));
+  }
+
+  function spec(variant) {
+    if (!variant.spec) return section("spec", "Spec", el("p", {}, variant.no_model));
+    const { layers, moulds, name, ...rest } = variant.spec;
+    return section("spec", "Spec", el("details", {}, el("summary", {}, "Every value, defaults written out"), facts({ name, ...rest, layers, moulds }),
+      el("h3", {}, "Made by"), facts(variant.manifest.versions)));
+  }
+
+  Object.assign(window.unitcad, { drawing, absent, verdict, link, parts: { sectionDrawing, laws, parts, files, spec } });
+})();

@@ -1,0 +1,115 @@
+// A sortable, filterable table of variants, a page at a time.
+(() => {
+  "use strict";
+  const { el, clear, number } = window.unitcad;
+  const PAGE = 100;
+
+  // A filter: text to find, or a comparison: > 1.2, <= 3, = 4, 1..2. Returns a test of a cell.
+  function filterOf(text) {
+    const wanted = text.trim();
+    if (!wanted) return null;
+    const between = wanted.match(/^(-?[\d.eE+-]+)\s*\.\.\s*(-?[\d.eE+-]+)$/);
+    if (between) {
+      const [low, high] = between.slice(1).map(Number);
+      return (value) => typeof value === "number" && value >= low && value <= high;
+    }
+    const compared = wanted.match(/^(<=|>=|<|>|=)\s*(.+)$/);
+    if (compared) {
+      const [, sign, right] = compared;
+      const limit = Number(right);
+      if (sign === "=") return (value) => (typeof value === "number" ? value === limit : String(value) === right);
+      const tests = { "<": (v) => v < limit, "<=": (v) => v <= limit, ">": (v) => v > limit, ">=": (v) => v >= limit };
+      return (value) => typeof value === "number" && tests[sign](value);
+    }
+    const lower = wanted.toLowerCase();
+    return (value) => value !== null && value !== undefined && String(value).toLowerCase().includes(lower);
+  }
+
+  // Numbers before texts, nothing last whichever way.
+  function compare(a, b, direction) {
+    const absent = (v) => v === null || v === undefined;
+    if (absent(a) || absent(b)) return absent(a) - absent(b);
+    if (typeof a === "number" && typeof b === "number") return direction * (a - b);
+    if (typeof a !== typeof b) return typeof a === "number" ? -1 : 1;
+    return direction * String(a).localeCompare(String(b), undefined, { numeric: true });
+  }
+
+  // Columns that say the same of every row.
+  function constants(columns, rows) {
+    return new Set(columns.filter((name, i) => rows.length > 1 && rows.every((row) => row[i + 1] === rows[0][i + 1])));
+  }
+
+  // table: {columns, rows: [[folder, ...cells]]}; open(row); changed(rows) is told whenever other rows are shown.
+  function createTable(table, { open, changed, nameColumn }) {
+    const same = constants(table.columns, table.rows);
+    const state = { sort: null, direction: 1, filters: new Map(), search: "", page: 0, all: false };
+    const columns = () => table.columns.map((name, i) => ({ name, at: i + 1 })).filter(({ name }) => state.all || !same.has(name) || name === nameColumn);
+    const body = el("tbody");
+    const heads = el("tr");
+    const filters = el("tr", { className: "filters" });
+    const count = el("p", { className: "count", "aria-live": "polite" });
+    const pager = el("div", { className: "buttons" });
+    const search = el("input", { type: "search", name: "search", placeholder: "Search all columns", "aria-label": "Search all columns", oninput: () => { state.search = search.value; state.page = 0; update(); } });
+    const all = el("input", { type: "checkbox", name: "all-columns", onchange: () => { state.all = all.checked; layout(); update(); } });
+
+    function chosen() {
+      const tests = [...state.filters].map(([at, text]) => [at, filterOf(text)]).filter(([, test]) => test);
+      const anywhere = filterOf(state.search);
+      const rows = table.rows.filter((row) => tests.every(([at, test]) => test(row[at])) && (!anywhere || row.some((cell, i) => i > 0 && anywhere(cell))));
+      if (state.sort === null) return rows;
+      return rows.map((row, i) => [row, i]).sort(([a, i], [b, j]) => compare(a[state.sort], b[state.sort], state.direction) || i - j).map(([row]) => row);
+    }
+
+    function sortBy(at) {
+      state.direction = state.sort === at ? -state.direction : 1;
+      state.sort = at;
+      state.page = 0;
+      update();
+    }
+
+    function layout() {
+      clear(heads, columns().map(({ name, at }) => el("th", { scope: "col", "data-at": at }, el("button", { type: "button", onclick: () => sortBy(at) },
+        name.split(/(?<=[._])/).flatMap((piece) => [piece, el("wbr")])))));
+      clear(filters, columns().map(({ name, at }) => {
+        const input = el("input", { type: "text", name: `filter-${name}`, placeholder: "filter", "aria-label": `Filter ${name}: text, > 1, < 2, 1..2`, oninput: () => { state.filters.set(at, input.value); state.page = 0; update(); } });
+        input.value = state.filters.get(at) || "";
+        return el("td", {}, input);
+      }));
+    }
+
+    function update() {
+      const rows = chosen();
+      const pages = Math.max(1, Math.ceil(rows.length / PAGE));
+      state.page = Math.min(state.page, pages - 1);
+      for (const head of heads.children) {
+        const mine = Number(head.dataset.at) === state.sort;
+        head.setAttribute("aria-sort", mine ? (state.direction > 0 ? "ascending" : "descending") : "none");
+      }
+      const first = state.page * PAGE;
+      clear(body, rows.slice(first, first + PAGE).map((row) => el("tr", {}, columns().map(({ name, at }) => {
+        const value = row[at];
+        if (name === nameColumn) return el("th", { scope: "row" }, row[0] ? el("a", { href: `#${encodeURIComponent(row[0])}` }, value ?? row[0]) : String(value ?? "–"));
+        return el("td", { className: typeof value === "number" ? "number" : undefined }, number(value, 6));
+      }))));
+      count.textContent = `${rows.length} of ${table.rows.length} variants`;
+      const step = (by, text) => el("button", { type: "button", disabled: state.page + by < 0 || state.page + by >= pages, onclick: () => { state.page += by; update(); } }, text);
+      clear(pager, pages > 1 && [step(-1, "‹ Before"), el("span", {}, `page ${state.page + 1} of ${pages}`), step(1, "Next ›")]);
+      changed(rows);
+    }
+
+    const known = [...same].filter((name) => name !== nameColumn).map((name) => {
+      const value = table.rows[0][table.columns.indexOf(name) + 1];
+      return value === null || value === undefined ? null : el("li", {}, `${name} = ${number(value, 6)}`);
+    }).filter(Boolean);
+    const node = el("div", { className: "variants" },
+      el("div", { className: "tools" }, search, el("label", {}, all, "columns that don't vary, too"), count),
+      known.length > 0 && el("details", {}, el("summary", {}, `The same everywhere: ${known.length} columns`), el("ul", { className: "chips" }, known)),
+      el("div", { className: "scroll tall", tabindex: "0", role: "group", "aria-label": "Variants" }, el("table", {}, el("thead", {}, heads, filters), body)),
+      pager);
+    layout();
+    update();
+    return { node, varying: () => table.columns.filter((name) => !same.has(name)) };
+  }
+
+  Object.assign(window.unitcad, { createTable });
+})();

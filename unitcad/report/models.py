@@ -1,0 +1,62 @@
+"""What the viewer shows of a geometry: meshes as assembled, the moments of casting, where parts go when taken apart."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from pathlib import Path
+from typing import Any
+
+from unitcad.errors import UnitcadError
+from unitcad.moulds.plan import Plan
+from unitcad.pipeline import Variant
+from unitcad.pipeline.geometry import GEOMETRIC, geometry_key
+from unitcad.pipeline.parts import glb_content
+from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
+from unitcad.spec import Spec, from_data, read_toml
+
+
+def spec_in(folder: Path) -> Spec:
+    """The effective spec of a result folder. Raises UnitcadError where it can't be read."""
+    return from_data(read_toml(folder / "spec.toml"))
+
+
+def model_key(spec: Spec) -> str:
+    """What a model depends on, whatever silicones and formats: sixteen hex digits."""
+    output = spec.output.model_copy(update={"formats": ()})
+    return geometry_key(spec.model_copy(update={"output": output}), GEOMETRIC, False)[:16]
+
+
+def model(spec: Spec) -> dict[str, Any]:
+    """A geometry for the page; GLB files compressed and in base 64. Lengths in mm.
+
+    Raises UnitcadError where the geometry can't be made any more.
+    """
+    variant = Variant(spec)
+    plan = variant.plan
+    return {
+        "unit": _embedded(glb_content(variant, variant.unit)),
+        "moulds": _embedded(glb_content(variant, plan.tools)),
+        "cells": cells(variant, plan),
+        "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(variant)],
+        "unit_apart": {name: list(offset) for name, offset in unit_apart(variant).items()},
+        "moulds_apart": {name: list(offset) for name, offset in taken_apart(variant).items()},
+    }
+
+
+def cells(variant: Variant, plan: Plan) -> list[list[float]]:
+    """Where the unit's layers stand in the moulds: x, y (mm) and quarter turns about z, a cell each."""
+    one_sided = variant.dimensions.sides == (1,)
+    return [[cell.x, cell.y, 2 if one_sided and cell.sides == (-1,) else 0] for cell in plan.layout.cells]
+
+
+def unpacked(text: str) -> bytes:
+    """The bytes of an embedded file."""
+    return gzip.decompress(base64.b64decode(text))
+
+
+def _embedded(content: bytes) -> str:
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+
+
+__all__ = ["UnitcadError", "cells", "model", "model_key", "spec_in", "unpacked"]

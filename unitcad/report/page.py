@@ -1,0 +1,150 @@
+"""The page: one HTML file with its data, its programs and their licences; nothing outside it is ever contacted.
+
+All text from specs and results travels as compressed JSON in base 64 and is set as text, never as markup. A policy in
+the page's head forbids every connection, and every script but those whose hashes it names.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+import json
+import os
+import tomllib
+from collections.abc import Iterable
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from unitcad import __version__
+from unitcad.errors import UnitcadError
+from unitcad.report import collect
+from unitcad.report.models import model
+from unitcad.report.pool import Pool
+from unitcad.spec import Spec
+
+VENDORED = ("three.min.js", "uplot.min.js")
+PROGRAMS = ("dom.js", "glb.js", "viewer.js", "controls.js", "plots.js", "estimate.js", "casting.js", "sections.js",
+            "table.js", "main.js")  # fmt: skip
+STYLES = ("vendor/uplot.min.css", "app/page.css", "app/print.css")
+
+
+def write_report(folder: Path) -> Path:
+    """Write `folder`/report.html for the variant or the batch in `folder`; returns its path.
+
+    Raises UnitcadError where the folder holds neither.
+    """
+    data, title = page_data(folder)
+    target = folder / collect.PAGE
+    fresh = folder / f"{collect.TEMPORARY}{collect.PAGE}-{os.getpid()}"
+    try:
+        fresh.write_bytes(page(data, title).encode())
+        fresh.replace(target)
+    finally:
+        fresh.unlink(missing_ok=True)
+    return target
+
+
+def page_data(folder: Path) -> tuple[dict[str, Any], str]:
+    """The page's data and title. Raises UnitcadError where the folder holds no result."""
+    if not folder.is_dir():
+        raise UnitcadError(f"{folder}: is not a folder")
+    if collect.is_variant(folder):
+        record, spec = collect.variant(folder, folder)
+        records, specs, table = [record], [spec], None
+        title = str(record["manifest"].get("name", folder.name))
+    else:
+        folders = collect.variant_folders(folder)
+        if not folders:
+            raise UnitcadError(f"{folder}: holds no result of unitcad (no manifest.json in it or right below it)")
+        pairs = [collect.variant(each, folder) for each in folders]
+        records, specs = [record for record, _ in pairs], [spec for _, spec in pairs]
+        table = collect.table(folder, records)
+        title = f"{folder.resolve().name}: {len(records)} variants"
+    models = _models(records, specs)
+    pool = Pool()
+    data = {
+        "title": title,
+        "version": __version__,
+        "variants": [pool.put(record) for record in records],
+        "table": table,
+        "batch": collect.batch(folder) if table else None,
+        "pool": pool.entries,
+        "models": models,
+    }
+    return data, title
+
+
+def _models(records: list[dict[str, Any]], specs: Iterable[Spec | None]) -> dict[str, Any]:
+    """Each geometry once, by its key; a record whose geometry can't be made any more says why."""
+    found: dict[str, Any] = {}
+    for record, spec in zip(records, specs, strict=True):
+        key = record["model"]
+        if spec is None or key in found:
+            continue
+        try:
+            found[key] = model(spec)
+        except UnitcadError as error:
+            record |= {"model": None, "no_model": str(error)}
+    return found
+
+
+def page(data: dict[str, Any], title: str) -> str:
+    """The HTML of a page with `data`."""
+    scripts = [*(_asset(f"vendor/{name}") for name in VENDORED), *(_asset(f"app/{name}") for name in PROGRAMS)]
+    styles = [_asset(name) for name in STYLES]
+    licences = "\n\n".join(
+        f"{name} {entry['version']}\n{_asset(f'vendor/{name}.LICENSE.txt')}" for name, entry in vendored().items()
+    )
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    packed = base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+    policy = "; ".join(
+        [
+            "default-src 'none'",
+            "script-src " + " ".join(_hash(script) for script in scripts),
+            "style-src " + " ".join(_hash(style) for style in styles),
+            "img-src data:",
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
+    )
+    lines = [
+        "<!doctype html>",
+        '<html lang="en">',
+        "<head>",
+        '<meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{html.escape(policy)}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f'<meta name="generator" content="unitcad {html.escape(__version__)}">',
+        f"<title>{html.escape(title)}</title>",
+        *(f"<style>{style}</style>" for style in styles),
+        "</head>",
+        "<body>",
+        '<main id="page"><p>Reading ...</p></main>',
+        "<noscript><p>This page draws itself with a script. Without one, read casting.md and section.svg.</p></noscript>",
+        f'<script type="text/plain" id="data">{packed}</script>',
+        f'<script type="text/plain" id="licences">{html.escape(licences, quote=False)}</script>',
+        *(f"<script>{script}</script>" for script in scripts),
+        "</body>",
+        "</html>",
+    ]
+    return "\n".join([*lines, ""])
+
+
+def vendored() -> dict[str, dict[str, Any]]:
+    """The libraries of others that every page carries, by name: version, licence, files, how they were made."""
+    return tomllib.loads(_asset("vendor/versions.toml"))
+
+
+@cache
+def _asset(name: str) -> str:
+    """A shipped file. Scripts and styles of ours hold no end tag of their element; a test sees to it."""
+    return (files("unitcad") / "report" / name).read_text("utf-8")
+
+
+@cache
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -1,0 +1,36 @@
+"""Data that says everything once: equal parts of a tree are kept in a pool, and referred to."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+REFERENCE = "\0"
+"""The key of a reference, {REFERENCE: index in the pool}: no spec or result has it, since TOML and JSON names of ours
+are text without a NUL."""
+LEAST = 160
+"""Characters of JSON below which a part is not worth a reference."""
+
+
+class Pool:
+    """Parts kept once. `entries[i]` is plain data whose larger parts are references to earlier entries."""
+
+    def __init__(self) -> None:
+        self.entries: list[Any] = []
+        self._index: dict[str, int] = {}
+
+    def put(self, data: Any) -> Any:
+        """`data` (what JSON can hold) with every larger part replaced by a reference."""
+        if isinstance(data, dict):
+            data = {key: self.put(value) for key, value in data.items()}
+        elif isinstance(data, list | tuple):
+            data = [self.put(value) for value in data]
+        elif not isinstance(data, str):
+            return data
+        text = json.dumps(data, allow_nan=False, ensure_ascii=False)
+        if len(text) < LEAST:
+            return data
+        if text not in self._index:
+            self._index[text] = len(self.entries)
+            self.entries.append(data)
+        return {REFERENCE: self._index[text]}
