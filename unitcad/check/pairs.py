@@ -6,12 +6,12 @@ down keeps the pairs of boxes that meet. Each step gathers whole rows and compar
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Floats, Ints, extent, sorted_with_order
+from unitcad.check.mesh import Bools, Floats, Ints, extent, sorted_with_order
 
 _FAN = 4
 _STEP_BITS = 12
@@ -53,25 +53,46 @@ def boxes_of(at: list[list[Floats]]) -> np.ndarray:
 
 def meeting_pairs(boxes: np.ndarray, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
     """Blocks of pairs i < j of rows of `boxes` whose boxes meet. Rows near each other should be near in space."""
+    levels = _levels(boxes, 0)
+    top = np.triu_indices(len(levels[-1]))
+    first, second = (side.astype(np.int32) for side in top)
+    yield from _descend(levels, levels, first, second, deadline, own=True)
+
+
+def meeting_between(boxes: np.ndarray, others: np.ndarray, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
+    """The same between the rows of two sets: row of `boxes`, row of `others`."""
+    here, there = _levels(boxes, len(others)), _levels(others, len(boxes))
+    top = np.indices((len(here[-1]), len(there[-1]))).reshape(2, -1).astype(np.int32)
+    yield from _descend(here, there, top[0], top[1], deadline, own=False)
+
+
+def _levels(boxes: np.ndarray, least: int) -> list[np.ndarray]:
+    """The tree's levels from the leaves up, for `least` leaves or more; the uppermost has one box or four."""
+    if len(boxes) < least:
+        boxes = np.concatenate([boxes, np.full((least - len(boxes), 6), np.inf, np.float32)])
     levels = [_padded(boxes)]
-    while len(levels[-1]) > _FAN:
+    while len(levels) == 1 or len(levels[-1]) > _FAN:
         levels.append(_padded(_parents(levels[-1])))
-    top = len(levels[-1])
-    first, second = (side.astype(np.int32) for side in np.triu_indices(top))
-    for level in range(len(levels) - 1, 0, -1):
-        rows = np.ascontiguousarray(levels[level - 1].reshape(-1, _FAN * 6).T)
+    return levels
+
+
+def _descend(
+    here: list[np.ndarray], there: list[np.ndarray], first: Ints, second: Ints, deadline: Deadline, *, own: bool
+) -> Iterator[tuple[Ints, Ints]]:
+    for level in range(len(here) - 1, 0, -1):
+        rows = np.ascontiguousarray(here[level - 1].reshape(-1, _FAN * 6).T)
+        others = rows if here is there else np.ascontiguousarray(there[level - 1].reshape(-1, _FAN * 6).T)
         keep = first < rows.shape[1]
-        keep &= second < rows.shape[1]
+        keep &= second < others.shape[1]
         first, second = first[keep], second[keep]
+        skip = None if not own else np.greater if level > 1 else np.greater_equal
+        walk = _walk(rows, others, first, second, skip, deadline)
         if level > 1:
-            blocks = list(_walk(rows, first, second, deadline, same=True))
+            blocks = list(walk)
             first = np.concatenate([block[0] for block in blocks])
             second = np.concatenate([block[1] for block in blocks])
         else:
-            yield from _walk(rows, first, second, deadline, same=False)
-    if len(levels) == 1:
-        apart = first != second
-        yield from _direct(levels[0], first[apart], second[apart])
+            yield from walk
 
 
 def _padded(boxes: np.ndarray) -> np.ndarray:
@@ -86,26 +107,30 @@ def _parents(boxes: np.ndarray) -> np.ndarray:
     return np.minimum(pair[0::2], pair[1::2])
 
 
-def _direct(boxes: np.ndarray, first: Ints, second: Ints) -> Iterator[tuple[Ints, Ints]]:
-    meet = ((boxes[first, :3] <= -boxes[second, 3:]) & (boxes[second, :3] <= -boxes[first, 3:])).all(axis=1)
-    yield first[meet], second[meet]
-
-
 def _walk(
-    rows: np.ndarray, first: Ints, second: Ints, deadline: Deadline, *, same: bool
+    rows: np.ndarray,
+    others: np.ndarray,
+    first: Ints,
+    second: Ints,
+    skip: Callable[[Ints, Ints], Bools] | None,
+    deadline: Deadline,
 ) -> Iterator[tuple[Ints, Ints]]:
-    """Children of the node pairs whose boxes meet; a column of `rows` holds a node's children. `same` keeps a child paired with itself, for the next level."""
+    """Children of the node pairs whose boxes meet; a column of `rows` holds a node's children.
+
+    Of a node with itself the pairs of children (p, q) for which `skip(p, q)` are left out.
+    """
     column = np.arange(_FAN, dtype=np.int32)
     grid_i, grid_j = (side.reshape(-1) for side in np.meshgrid(column, column, indexing="ij"))
-    half = grid_i <= grid_j if same else grid_i < grid_j
-    empty = True
+    left_out = np.zeros(_FAN * _FAN, bool) if skip is None else skip(grid_i, grid_j)
+    empty = np.empty(0, np.int32)
+    yield empty, empty
     for start in range(0, len(first), _STEP):
         deadline.tick()
         i, j = first[start : start + _STEP], second[start : start + _STEP]
         a = rows.take(i, axis=1, mode="clip").reshape(_FAN, 6, -1)
-        b = rows.take(j, axis=1, mode="clip").reshape(_FAN, 6, -1)
+        b = others.take(j, axis=1, mode="clip").reshape(_FAN, 6, -1)
         high_a, high_b = -a[:, 3:], -b[:, 3:]
-        meet = np.zeros((_FAN, _FAN, 1 << _STEP_BITS), bool)
+        meet = np.zeros((_FAN, _FAN, _STEP), bool)
         hit = np.empty(len(i), bool)
         part = np.empty(len(i), bool)
         for p in range(_FAN):
@@ -116,12 +141,8 @@ def _walk(
                         hit &= np.less_equal(a[p, axis], high_b[q, axis], out=part)
                     hit &= np.less_equal(b[q, axis], high_a[p, axis], out=part)
                 meet[p, q, : len(i)] = hit
-        own = np.flatnonzero(i == j)
-        if len(own):
-            meet.reshape(_FAN * _FAN, -1)[np.ix_(~half, own)] = False
+        if skip is not None and len(own := np.flatnonzero(i == j)):
+            meet.reshape(_FAN * _FAN, -1)[np.ix_(left_out, own)] = False
         found = np.flatnonzero(meet)
         which, pair = found >> _STEP_BITS, found & (_STEP - 1)
-        empty = False
         yield i[pair] * _FAN + grid_i[which], j[pair] * _FAN + grid_j[which]
-    if empty:
-        yield np.empty(0, np.int32), np.empty(0, np.int32)

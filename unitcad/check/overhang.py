@@ -1,0 +1,116 @@
+"""D003: faces that lean out too far, by region; a region that is bridged everywhere is left aside.
+
+A region's border is supported where the face beyond it goes down. A point of the region is bridged if a line through it
+meets supported borders on both sides within the printer's bridge; a free ledge may be as wide as one extrusion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from unitcad.catalogue import Printer
+from unitcad.check.edges import components
+from unitcad.check.findings import Finding, Location
+from unitcad.check.limits import Deadline
+from unitcad.check.mesh import Floats, Ints
+from unitcad.check.rulebook import finding
+from unitcad.check.topology import Topology
+
+_ANGLES = 16
+_POINTS = 300  # sample points a region
+_LEAST = 1.0  # mm2: smaller regions droop by less than shows
+_SLACK = 1.0  # degree beyond the printer's angle, for tessellated cones of just that angle
+_BORDER = 4000  # border edges a region may have; more is taken as not bridged
+
+
+def judge(topology: Topology, printer: Printer, deadline: Deadline, bed: float) -> list[Finding]:
+    """Apply D003 to a closed mesh that stands at z = `bed`."""
+    mesh, areas = topology.mesh, topology.areas
+    double = np.sqrt(np.einsum("ij,ij->i", areas, areas))
+    steep = -np.sin(np.radians(min(float(printer.overhang_deg) + _SLACK, 89.0)))
+    leaning = areas[:, 2] < steep * double
+    leaning &= mesh.vertices[mesh.faces, 2].min(axis=1) > bed + float(printer.layer_mm) / 2
+    if not leaning.any():
+        return []
+    edges = topology.edges
+    pairs = edges.first[edges.size == 2]
+    one, other = edges.order[pairs], edges.order[pairs + 1]
+    left, right = one // 3, other // 3
+    inner = leaning[left] & leaning[right]
+    region = components(len(leaning), left[inner], right[inner])
+    rim = leaning[left] != leaning[right]
+    beyond = np.where(leaning[left[rim]], other[rim], one[rim])
+    owner = region[np.where(leaning[left[rim]], left[rim], right[rim])]
+    segments, supported = _border(topology, beyond)
+    bad: list[tuple[float, Location]] = []
+    for label in np.unique(region[leaning]):
+        faces = np.flatnonzero(leaning & (region == label))
+        area = float(double[faces].sum()) / 2
+        deadline.tick()
+        if area < _LEAST:
+            continue
+        own = owner == label
+        if _bridged(topology, faces, segments[own], supported[own], printer):
+            continue
+        centre = mesh.vertices[mesh.faces[faces[0]]].mean(axis=0)
+        xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
+        bad.append((area, Location(face=int(topology.kept[faces[0]]), xyz=xyz)))
+    if not bad:
+        return []
+    bad.sort(key=lambda item: -item[0])
+    text = f"{sum(area for area, _ in bad):.3g} mm2 lean out beyond {float(printer.overhang_deg):g} degrees unsupported"
+    return [finding("D003", text, len(bad), [place for _, place in bad])]
+
+
+def _border(topology: Topology, beyond: Ints) -> tuple[Floats, Floats]:
+    """Border edges in plan (n, 2, 2), and whether the face beyond each goes down from it."""
+    faces, vertices = topology.mesh.faces, topology.mesh.vertices
+    face, side = beyond // 3, beyond % 3
+    a, b = vertices[faces[face, side]], vertices[faces[face, (side + 1) % 3]]
+    apex = vertices[faces[face, (side + 2) % 3]]
+    supported = apex[:, 2] < np.minimum(a[:, 2], b[:, 2]) + 1e-6
+    return np.stack([a[:, :2], b[:, :2]], axis=1), supported
+
+
+def _bridged(topology: Topology, faces: Ints, segments: Floats, supported: Floats, printer: Printer) -> bool:
+    if not len(segments) or len(segments) > _BORDER or not supported.any():
+        return False
+    corners = topology.mesh.vertices[topology.mesh.faces[faces]][:, :, :2]
+    weights = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 0.2], [2, 0.2, 2], [0.2, 2, 2]], float)
+    weights /= weights.sum(axis=1, keepdims=True)
+    points = np.einsum("wk,fkx->fwx", weights, corners).reshape(-1, 2)
+    points = points[:: max(1, len(points) // _POINTS)]
+    span, ledge = float(printer.bridge_mm), float(printer.least_feature_mm)
+    held = _distance(points, segments[supported]) <= ledge * 1.001
+    points = points[~held]
+    good = np.zeros(len(points), bool)
+    for angle in np.pi * np.arange(_ANGLES) / _ANGLES:
+        along = np.array([np.cos(angle), np.sin(angle)])
+        ahead, ahead_held = _first(points, along, segments, supported)
+        back, back_held = _first(points, -along, segments, supported)
+        good |= ahead_held & back_held & (ahead + back <= span * 1.001)
+    return bool(good.all())
+
+
+def _first(points: Floats, along: Floats, segments: Floats, supported: Floats) -> tuple[Floats, Floats]:
+    """Distance to the first border edge from each point along a direction, and whether that edge is supported."""
+    a, d = segments[:, 0], segments[:, 1] - segments[:, 0]
+    across = d[:, 0] * along[1] - d[:, 1] * along[0]
+    parallel = np.abs(across) < 1e-12
+    across = np.where(parallel, 1.0, across)
+    off = points[:, None, :] - a[None]
+    t = -(off[..., 0] * d[:, 1] - off[..., 1] * d[:, 0]) / -across
+    s = (off[..., 0] * along[1] - off[..., 1] * along[0]) / across
+    hit = (s >= -1e-9) & (s <= 1 + 1e-9) & (t > 1e-9) & ~parallel
+    t = np.where(hit, t, np.inf)
+    nearest = t.argmin(axis=1)
+    distance = t[np.arange(len(points)), nearest]
+    return distance, supported[nearest] & np.isfinite(distance)
+
+
+def _distance(points: Floats, segments: Floats) -> Floats:
+    """Distance in plan from each point to the nearest segment."""
+    a, d = segments[:, 0], segments[:, 1] - segments[:, 0]
+    off = points[:, None, :] - a[None]
+    s = np.clip((off * d).sum(axis=2) / np.maximum((d * d).sum(axis=1), 1e-300), 0, 1)
+    return np.sqrt(((off - s[..., None] * d) ** 2).sum(axis=2)).min(axis=1, initial=np.inf)

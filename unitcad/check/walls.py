@@ -1,0 +1,144 @@
+"""D001: thin walls, measured by short rays from points spread over the faces to the face behind them.
+
+A wall has two faces that are nearly parallel (PARALLEL), a thickness below the floor, and reaches farther than the floor
+in two directions; so bevels and wedges, tapered edges and the strips between engraved strokes are none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from unitcad.catalogue import Printer
+from unitcad.check.edges import components
+from unitcad.check.findings import Finding, Location
+from unitcad.check.limits import Deadline
+from unitcad.check.mesh import Bools, Floats, Ints
+from unitcad.check.pairs import meeting_between, morton_order
+from unitcad.check.rulebook import finding
+from unitcad.check.topology import Topology, max_side_squared
+
+PARALLEL = float(np.cos(np.radians(12.0)))  # two sides of a wall
+LEVEL = float(np.cos(np.radians(45.0)))  # normals steeper than this belong to a flat piece's wall
+_SLACK = 0.995  # of the floor: a wall drawn at the floor passes after rounding and tessellation
+_SAMPLES = 40_000
+_FINEST = 6  # a face has at most _FINEST (_FINEST + 1) / 2 points
+
+
+def judge(topology: Topology, printer: Printer, deadline: Deadline) -> list[Finding]:
+    """Apply D001 to a closed mesh."""
+    upright, level = float(printer.least_wall_mm), float(printer.least_flat_wall_mm)
+    mesh = topology.mesh
+    corners = mesh.vertices[mesh.faces]
+    double = np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas))
+    longest = np.sqrt(max_side_squared(corners))
+    sound = double > 1e-3 * longest  # a height of a micrometre: below it a face has no direction worth following
+    points, owner = _spread_points(corners, longest, sound, upright)
+    normal = topology.areas / np.maximum(double, 1e-300)[:, None]
+    floor = np.where(_lying(topology), level, upright) * _SLACK
+    thickness = _behind(corners, normal, sound, points, owner, floor[owner], deadline)
+    thin = np.flatnonzero(thickness < floor[owner])
+    if not len(thin):
+        return []
+    return _patches(topology, points, owner, thickness, thin, upright * _SLACK)
+
+
+def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float) -> tuple[Floats, Ints]:
+    """Points inside the faces, about `step` apart, and the face of each."""
+    count = np.clip(np.ceil(longest / step), 1, _FINEST).astype(int)
+    while (count * (count + 1) // 2)[sound].sum() > _SAMPLES and count.max() > 1:
+        count = np.maximum(count - 1, 1)
+    points, owner = [], []
+    for n in np.unique(count[sound]):
+        which = np.flatnonzero(sound & (count == n))
+        grid = [(i, j) for i in range(n) for j in range(n - i)]
+        weights = np.array([[3 * i + 1, 3 * j + 1, 3 * (n - 1 - i - j) + 1] for i, j in grid]) / (3 * n)
+        points.append(np.einsum("wk,fkx->fwx", weights, corners[which]).reshape(-1, 3))
+        owner.append(np.repeat(which, len(weights)))
+    if not points:
+        return np.empty((0, 3)), np.empty(0, int)
+    return np.concatenate(points), np.concatenate(owner)
+
+
+def _behind(
+    corners: Floats, normal: Floats, sound: Floats, points: Floats, owner: Ints, reach: Floats, deadline: Deadline
+) -> Floats:
+    """The distance from each point, against its face's normal, to the first nearly parallel face; inf beyond `reach`."""
+    thickness = np.full(len(points), np.inf)
+    ends = points - normal[owner] * reach[:, None]
+    order = morton_order(points, np.arange(len(points))[:, None].repeat(3, axis=1)) if len(points) else owner
+    rays = _boxes(np.minimum(points, ends)[order], np.maximum(points, ends)[order])
+    solid = np.flatnonzero(sound)
+    by_place = solid[morton_order(corners[solid].reshape(-1, 3), np.arange(3 * len(solid)).reshape(-1, 3))]
+    faces = _boxes(corners[by_place].min(axis=1), corners[by_place].max(axis=1))
+    for i, j in meeting_between(rays, faces, deadline):
+        ray, face = order[i], by_place[j]
+        facing = np.einsum("ij,ij->i", normal[owner[ray]], normal[face]) < -PARALLEL
+        ray, face = ray[facing], face[facing]
+        distance = _hit(points[ray], -normal[owner[ray]], corners[face], normal[face])
+        np.minimum.at(thickness, ray, distance)
+    return thickness
+
+
+def _boxes(low: Floats, high: Floats) -> np.ndarray:
+    return np.hstack([low, -high]).astype(np.float32) - np.float32(1e-4)
+
+
+def _hit(origin: Floats, along: Floats, corners: Floats, normal: Floats) -> Floats:
+    """Distances to the triangles' insides, inf where missed or behind."""
+    slope = np.einsum("ij,ij->i", along, normal)
+    distance = np.einsum("ij,ij->i", corners[:, 0] - origin, normal) / slope
+    place = origin + along * distance[:, None]
+    inside = distance > 1e-4
+    for k in range(3):
+        side = corners[:, (k + 1) % 3] - corners[:, k]
+        turn = np.cross(side, place - corners[:, k])
+        inside &= np.einsum("ij,ij->i", turn, normal) >= -1e-9
+    return np.where(inside, distance, np.inf)
+
+
+def _patches(
+    topology: Topology, points: Floats, owner: Ints, thickness: Floats, thin: Ints, upright: float
+) -> list[Finding]:
+    """Thin points grouped by faces that share edges; groups that reach farther than the floor both ways are walls."""
+    faces = topology.mesh.faces
+    edges = topology.edges
+    pairs = edges.first[edges.size == 2]
+    left, right = edges.order[pairs] // 3, edges.order[pairs + 1] // 3
+    n = len(faces)
+    marked = np.zeros(n, bool)
+    marked[owner[thin]] = True
+    whole = np.bincount(owner[thin], minlength=n) > 0.6 * np.maximum(np.bincount(owner, minlength=n), 1)
+    lying = _lying(topology)
+    both = marked[left] & marked[right] & (lying[left] == lying[right])
+    group = components(n, left[both], right[both])[owner[thin]]
+    found: list[tuple[float, Location]] = []
+    for label in np.unique(group):
+        mine = thin[group == label]
+        of = owner[mine]
+        cloud = np.concatenate([points[mine], topology.mesh.vertices[faces[of[whole[of]]]].reshape(-1, 3)])
+        if _reach(cloud, bool(lying[of[0]])) < upright:
+            continue
+        worst = mine[np.argmin(thickness[mine])]
+        xyz = tuple(float(v) for v in points[worst])
+        place = Location(face=int(topology.kept[owner[worst]]), xyz=xyz)  # type: ignore[arg-type]
+        found.append((float(thickness[worst]), place))
+    if not found:
+        return []
+    found.sort(key=lambda item: item[0])
+    text = f"{len(found)} walls below the floor, the thinnest {found[0][0]:.3g} mm"
+    return [finding("D001", text, len(found), [place for _, place in found])]
+
+
+def _lying(topology: Topology) -> Bools:
+    """Faces that belong to flat walls: their normals are nearer to the vertical than to the level."""
+    areas = topology.areas
+    return np.abs(areas[:, 2]) > LEVEL * np.sqrt(np.einsum("ij,ij->i", areas, areas))
+
+
+def _reach(cloud: Floats, lying: bool) -> float:
+    """How far a thin patch reaches across its longest direction, mm: its height, or its lesser extent in plan."""
+    if not lying:
+        return float(np.ptp(cloud[:, 2]))
+    plan = cloud[:, :2] - cloud[:, :2].mean(axis=0)
+    _, _, axes = np.linalg.svd(plan, full_matrices=False)
+    return float(np.ptp(plan @ axes.T, axis=0).min())
