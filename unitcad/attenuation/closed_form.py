@@ -14,22 +14,26 @@ import numpy as np
 Wave = Literal["p", "s"]
 Reading = Literal["loss_modulus", "kelvin_voigt", "literal"]
 READINGS: dict[str, str] = {
-    "loss_modulus": "eta is a loss modulus E tan(delta) in Pa, which makes the exponent a number: the rate is twice the "
-    "amplitude's true decay",
+    "loss_modulus": "eta is a loss modulus E tan(delta) in Pa, which makes the exponent a number: the rate is twice "
+    "the amplitude's true decay",
     "kelvin_voigt": "eta is a viscosity E tan(delta)/omega in Pa s and a factor omega/2 is missing: "
     "omega^2 eta d/(2 E c), the true decay at low loss",
     "literal": "eta is a viscosity in Pa s and the exponent is taken as printed: its unit is a second, not a number",
 }
 AIR_IMPEDANCE: dict[str, float] = {"p": 1.204 * 343.0, "s": 0.0}  # Pa s/m at 20 degC; air carries no shear wave
-_QUIET = {"divide": "ignore", "invalid": "ignore", "over": "ignore"}
+
+
+def _quiet() -> np.errstate:
+    """At nu = 1/2 the pressure wave's speed is infinite: NaN says so, a warning would say it twice."""
+    return np.errstate(divide="ignore", invalid="ignore", over="ignore")
 
 
 @dataclass(frozen=True)
 class Units:
     """Variants of N layers: arrays whose last axis runs over the layers, inside out; omega and crossings lack it.
 
-    youngs_modulus Pa, density kg/m3, poisson_ratio, tan_delta, thickness m (of the walls), omega rad/s; crossings is the
-    divider's n: 1 embedded, 2 encapsulating, sqrt(2) for a single-layer control.
+    youngs_modulus Pa, density kg/m3, poisson_ratio, tan_delta, thickness m (of the walls), omega rad/s; crossings is
+    the divider's n: 1 embedded, 2 encapsulating, sqrt(2) for a single-layer control.
     """
 
     youngs_modulus: Any
@@ -63,19 +67,19 @@ def wave_speed(youngs_modulus: Any, density: Any, poisson_ratio: Any, wave: Wave
     shear = youngs_modulus / (2.0 * (1.0 + poisson_ratio))
     if wave == "s":
         return np.sqrt(shear / density)
-    with np.errstate(**_QUIET):
+    with _quiet():
         return np.sqrt(shear * 2.0 * (1.0 - poisson_ratio) / (1.0 - 2.0 * poisson_ratio) / density)
 
 
 def transmission(from_impedance: Any, to_impedance: Any) -> Any:
     """k_t = 2 Z1/(Z1 + Z2), equation 4a: the displacement coefficient between two half-spaces."""
-    with np.errstate(**_QUIET):
+    with _quiet():
         return 2.0 * from_impedance / (from_impedance + to_impedance)
 
 
 def reflection(from_impedance: Any, to_impedance: Any) -> Any:
     """k_r = (Z1 - Z2)/(Z1 + Z2), equation 4b."""
-    with np.errstate(**_QUIET):
+    with _quiet():
         return (from_impedance - to_impedance) / (from_impedance + to_impedance)
 
 
@@ -106,15 +110,15 @@ def paper_exponents(units: Units, wave: Wave = "s", reading: Reading = "loss_mod
 
 def paper_path(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
     """Equation 5's product of k_t and exponentials along the walls, shape (...); f1, f2 and the skin's part cancel."""
-    with np.errstate(**_QUIET):
+    with _quiet():
         decay = np.exp(-np.sum(paper_exponents(units, wave, reading), axis=-1))
         return np.prod(paper_transmissions(units, wave), axis=-1) * decay
 
 
 def consistent_path(units: Units, wave: Wave = "s") -> Any:
-    """The same path with complex moduli: |product of 2 Z1/(Z1 + Z2)|, Z = sqrt(rho M*), exp(Im(omega sqrt(rho/M*)) d)."""
+    """The path with complex moduli: |product of 2 Z1/(Z1 + Z2)|, Z = sqrt(rho M*), exp(Im(omega sqrt(rho/M*)) d)."""
     shear = units.youngs_modulus / (2.0 * (1.0 + units.poisson_ratio)) * (1.0 + 1j * units.tan_delta)
-    with np.errstate(**_QUIET):
+    with _quiet():
         factor = 2.0 * (1.0 - units.poisson_ratio) / (1.0 - 2.0 * units.poisson_ratio) if wave == "p" else 1.0
         modulus = shear * factor
         rate = -np.imag(units.omega[..., None] * np.sqrt(units.density / modulus))
@@ -130,7 +134,7 @@ def crossed_path(units: Units) -> Any:
 
 
 def divider(units: Units, kappa: Any) -> Any:
-    """1/(1 + kappa n E_outer/E_inner): the empirical divider without its constant s; N > 2 takes the outermost layer."""
+    """1/(1 + kappa n E_outer/E_inner): the empirical divider without its constant s; outermost and innermost layer."""
     e = units.youngs_modulus
     return 1.0 / (1.0 + kappa * units.crossings * e[..., -1] / e[..., 0])
 
@@ -149,23 +153,27 @@ class Constraint:
     @property
     def margin(self) -> Any:
         """By how much it holds, in the unit of both sides; negative where it does not."""
-        with np.errstate(**_QUIET):
+        with _quiet():
             return self.left - self.right if self.relation == ">" else self.right - self.left
 
 
 def constraints(units: Units, control: Units) -> list[Constraint]:
     """Inequalities 6a to 6d with eta = E tan(delta)/omega in Pa s; 6c and 6d once for each neighbouring pair of layers.
 
-    6a and 6b compare the summed attenuation of unit and control (literal reading: seconds); another reading multiplies
-    both sides by the same number. 6c and 6d say that the impedance grows outwards; they need no control.
+    6a and 6b compare sums of eta d/(E v), whose unit is s2; another reading of eta multiplies both sides by the same
+    number. 6c and 6d say that the impedance grows outwards; they need no control.
     """
     found = []
-    for name, wave, text in (("6a", "p", "attenuation of P waves"), ("6b", "s", "attenuation of S waves")):
-        sides = [np.sum(paper_exponents(u, wave, "literal"), axis=-1) for u in (units, control)]
-        found.append(Constraint(name, f"{text}: unit above control", ">", sides[0], sides[1], "s"))
-    for name, wave, text in (("6c", "p", "P impedance squared"), ("6d", "s", "S impedance squared")):
+    attenuation: list[tuple[str, Wave]] = [("6a", "p"), ("6b", "s")]
+    for name, wave in attenuation:
+        sides = [np.sum(paper_exponents(u, wave, "literal"), axis=-1) / u.omega for u in (units, control)]
+        found.append(
+            Constraint(name, f"attenuation of {wave.upper()} waves: unit above control", ">", sides[0], sides[1], "s2")
+        )
+    growth: list[tuple[str, Wave]] = [("6c", "p"), ("6d", "s")]
+    for name, wave in growth:
         squared = impedances(units, wave) ** 2 * (2.0 if wave == "s" else 1.0)
         for i in range(squared.shape[-1] - 1):
-            label = f"{text}: Layer {i + 1} below Layer {i + 2}"
+            label = f"{wave.upper()} impedance squared: Layer {i + 1} below Layer {i + 2}"
             found.append(Constraint(name, label, "<", squared[..., i], squared[..., i + 1], "Pa kg/m3"))
     return found

@@ -14,7 +14,7 @@ from unitcad.attenuation import waves as w
 
 
 class Plane(NamedTuple):
-    """State (u, t) at an interface per parameter c; `bottom` the state at the layer's bottom per the same c, if asked."""
+    """State (u, t) at an interface per parameter c; `bottom`, if asked, that at the layer's bottom per the same c."""
 
     u: w.Array
     t: w.Array

@@ -7,6 +7,7 @@ A normal load (F1 of the paper's equation 2a) is a pressure, positive into the b
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -26,7 +27,7 @@ def _check(direction: str) -> None:
 
 @dataclass(frozen=True)
 class Point:
-    """One newton at the origin. Radial: the traction whose transform is as constant as the normal one's, 1 / (2 pi r^2).
+    """One newton at the origin. Radial: the traction 1 / (2 pi r^2), its transform as constant as the normal one's.
 
     (A radial traction that vanishes outside a point has no resultant and no effect; this one is what the paper's F2
     means once its F1 is a point.)
@@ -146,7 +147,7 @@ def _legendre_integral(low: float, high: float, power: int) -> float:
     edges += [e for j in range(1, 50) for e in (2.0**-j, 1.0 - 2.0**-j) if low < e < high]
     edges.sort()
     total = 0.0
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         x = (a + b) / 2.0 + (b - a) / 2.0 * nodes
         near_one = np.maximum((1.0 - x) * (1.0 + x), 1e-300)
         k_minus_e = special.ellipkm1(near_one) - special.ellipe(x * x)

@@ -10,6 +10,7 @@ does not reach within the tolerance are left out, per wavenumber and, where that
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -137,7 +138,7 @@ def _panels(corners: list[complex], stop: float, span: float) -> np.ndarray:
     """Panels (n, 2) along the corners and on along the real axis to `stop`; span: phase per unit wavenumber (m)."""
     longest = _PHASE / span if span > 0 else np.inf
     edges: list[np.ndarray] = []
-    for a, b in zip(corners[:-1], corners[1:], strict=True):
+    for a, b in pairwise(corners):
         count = max(2, int(np.ceil(abs(b - a) / longest)))
         edges.append(a + (b - a) * np.linspace(0.0, 1.0, count + 1))
     at = corners[-1].real
@@ -210,7 +211,7 @@ def _integrate(
 
 
 def _evaluate(
-    problem: _Problem, panels: np.ndarray, keep: int, materials: tuple[w.Material, ...], rtol: float
+    problem: _Problem, panels: w.Array, keep: int, materials: tuple[w.Material, ...], rtol: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Per panel: its integral (panels, 2, radii), the estimate of its error, its absolute size; and the layers used."""
     step = max(1, _CHUNK // (_NODES.size * problem.r.size * 2))
@@ -236,9 +237,9 @@ def _evaluate(
 
 
 def _panel_errors(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Per panel an estimate of the error, from how far the last Legendre coefficients have died, and the absolute size.
+    """Per panel an estimate of the error, from how far its last Legendre coefficients have died, and its absolute size.
 
-    Coefficients that fall like q^j leave Gauss-Legendre an error of q^2n; the last ones, to the power 3/2, are above it.
+    Coefficients that fall like q^j leave Gauss-Legendre an error of q^2n; the last ones, to the power 3/2, lie above.
     """
     last = np.abs(np.einsum("jn,cpnr->jcpr", _LAST, values)).max(axis=0)
     magnitude = np.abs(values)
@@ -274,7 +275,7 @@ def _layered_kernel(
 def _reached(
     problem: _Problem, corners: list[complex], materials: tuple[w.Material, ...], rtol: float
 ) -> tuple[int, float]:
-    """How many layers (from the top) matter within rtol on the lifted path, and a bound of what the others would add."""
+    """How many layers (from the top) matter within rtol on the lifted path, and a bound of what the others add."""
     full = len(problem.medium.layers)
     bottom = np.cumsum([layer.thickness for layer in problem.medium.layers])
     if full == 0 or len(corners) == 1:

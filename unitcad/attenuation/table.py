@@ -1,4 +1,4 @@
-"""The paper's measured table, and how far a model is from it: factors, ratios to controls, directions, leave-one-out."""
+"""The paper's measured table, and how far a model is from it: levels, ratios to controls, directions, leave-one-out."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Score:
 class Judgement:
     """A model against the table. `directions`: of how many ratios the side of 1 is right.
 
-    `left_out` and `left_out_ratios`: each unit predicted by constants fitted without it (None: nothing is fitted in it).
+    `left_out` and `left_out_ratios`: each unit predicted by constants fitted without it (None: none in it).
     """
 
     levels: Score

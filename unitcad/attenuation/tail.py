@@ -55,7 +55,8 @@ def measure_tail(
     column = 1 if load.direction == "normal" else 0
     raw = kernel(k.astype(complex), len(materials) - 1)
     if z > 0:
-        return Tail(k, _bounds(k, raw, load, r), None, 0.0)
+        bounds = _bounds(k, raw, load, r)
+        return Tail(k, bounds, None, float(bounds[0]))
     found = []
     for material in dict.fromkeys(reversed(materials)):
         if material.shear == 0:

@@ -12,11 +12,11 @@ remains of the Poisson's ratio. A wave going up is the mirror image: W and sigma
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.complex128]
+Array = Any  # a complex numpy array
 THIN = 0.4  # below max(|k|, |k_s|) h of this a layer goes by series: its stiffness blocks, like 1/h, lose digits
 _TERM = 1e-18
 

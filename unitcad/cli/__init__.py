@@ -17,6 +17,7 @@ from unitcad.cli.batch import batch
 from unitcad.cli.build import build
 from unitcad.cli.cache import cache
 from unitcad.cli.check import check
+from unitcad.cli.estimate import estimate
 from unitcad.cli.list import list_
 from unitcad.cli.output import say_error
 from unitcad.cli.report import report
@@ -42,6 +43,7 @@ def _version(wanted: bool) -> None:
 app.command("build")(build)
 app.command("batch")(batch)
 app.command("check")(check)
+app.command("estimate")(estimate)
 app.command("accuracy")(accuracy)
 app.command("list")(list_)
 app.command("report")(report)

@@ -1,0 +1,293 @@
+"""Each model's account of one variant: edge level, ratio to the controls, margins, spread from the inputs' ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from unitcad.attenuation import closed_form as cf
+from unitcad.attenuation.closed_form import Units
+from unitcad.attenuation.inputs import Quantity, SiliconeLayer, Variant
+from unitcad.attenuation.models import STORED_FIT, paths, scales
+from unitcad.attenuation.table import CROSSINGS, measured_table
+
+_MOST_CORNERS = 12
+_WAVES: tuple[cf.Wave, ...] = ("s", "p")
+_FIELDS = ("youngs_modulus", "poisson_ratio", "tan_delta")
+KINDS = {
+    "paper": "the paper's closed form as printed: transmission coefficients and exponentials along the walls, one "
+    "constant s from the table (f1 and f2 are not printed)",
+    "consistent": "the same path with complex moduli, complex impedances and the exact attenuation; one constant s",
+    "fitted": "empirical: a divider with two constants fitted to the measured table, no mechanics in it",
+}
+ASSUMPTIONS = {
+    "paper": [
+        "Plane waves cross each interface at right angles as if both sides were half-spaces; a layer is 1/14 to 1/67 "
+        "of a shear wavelength thick.",
+        "u_z decays and transmits as a shear wave, u_r as a pressure wave, though both components carry both.",
+        "The path back into the skin has no coefficient; embedded and encapsulating units give the same number.",
+        "The pressure wave depends on how Poisson's ratio is fixed just below 1/2; at 1/2 it has no answer.",
+    ],
+    "consistent": [
+        "The same single path as the paper's: half-spaces, no reflections that come back, no path into the skin.",
+        "One loss factor for each material at all frequencies, Poisson's ratio real.",
+    ],
+    "fitted": [
+        "Fitted to nine levels of units with 1.25 mm walls at 100 to 150 Hz: thickness, density, damping and frequency "
+        "do not enter it.",
+        "More than two layers: the outermost against the innermost one, which nobody has measured.",
+    ],
+}
+
+
+def nominal(variant: Variant) -> Units:
+    """The variant's middle values as closed-form input."""
+    return _units(variant, np.array([[q.middle for _, q in _inputs(variant)]]), [0])
+
+
+def corners(variant: Variant) -> Units:
+    """The variant with its inputs at the ends of their ranges: all corners, or one input at a time if there are many.
+
+    Layers of one material move together.
+    """
+    quantities = [q for _, q in _inputs(variant)]
+    ends = np.array([q.ends for q in quantities])
+    middle = np.array([q.middle for q in quantities])
+    moving = [i for i, (low, high) in enumerate(ends) if low < high]
+    if len(moving) <= _MOST_CORNERS:
+        count = 2 ** len(moving)
+        rows = np.repeat(middle[None], count, axis=0)
+        for bit, i in enumerate(moving):
+            rows[:, i] = ends[i][(np.arange(count) >> bit) & 1]
+    else:
+        rows = np.repeat(middle[None], 2 * len(moving), axis=0)
+        for row, i in enumerate(moving):
+            rows[2 * row : 2 * row + 2, i] = ends[i]
+    return _units(variant, np.concatenate([middle[None], rows]), None)
+
+
+def _inputs(variant: Variant) -> Iterator[tuple[tuple[str, str], Quantity]]:
+    """((material, field), quantity) of every distinct input, the frequency last."""
+    seen: dict[str, SiliconeLayer] = {}
+    for layer in variant.layers:
+        seen.setdefault(layer.material, layer)
+    for name, layer in seen.items():
+        for field in _FIELDS:
+            yield (name, field), getattr(layer, field)
+    yield ("", "frequency"), variant.frequency
+
+
+def _units(variant: Variant, rows: np.ndarray, only: list[int] | None) -> Units:
+    at = {key: i for i, (key, _) in enumerate(_inputs(variant))}
+    if only is not None:
+        rows = rows[only]
+    columns = {field: rows[:, [at[layer.material, field] for layer in variant.layers]] for field in _FIELDS}
+    count = len(variant.layers)
+    return Units(
+        **columns,
+        density=np.tile([layer.density for layer in variant.layers], (len(rows), 1)),
+        thickness=np.tile([layer.thickness for layer in variant.layers], (len(rows), 1)),
+        omega=2.0 * np.pi * rows[:, -1],
+        crossings=CROSSINGS["single"] if count == 1 else CROSSINGS[variant.design],
+    )
+
+
+def unknown(variant: Variant) -> str:
+    """Why there can be no number: the first input that is not known; empty if all are."""
+    for (name, field), quantity in _inputs(variant):
+        if not quantity.known:
+            return f"{name} {field}: {quantity.note}"
+    return ""
+
+
+def ranged(variant: Variant) -> list[str]:
+    """Assumptions of the inputs that are known as a range only: their result is a range, without a value."""
+    return [
+        f"{name} {field}: {quantity.note}"
+        for (name, field), quantity in _inputs(variant)
+        if quantity.value is None and quantity.known
+    ]
+
+
+def spread(variant: Variant, predict: Callable[[Units], Any]) -> dict[str, Any]:
+    """{value, low, high} of `predict`; value null if an input has a range only, all null if it can't be, and why."""
+    reason = unknown(variant)
+    if reason:
+        return {"value": None, "low": None, "high": None, "reason": reason}
+    values = np.atleast_1d(predict(corners(variant)))
+    if not np.all(np.isfinite(values)):
+        reason = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"
+        middle = float(values[0]) if np.isfinite(values[0]) else None
+        return {"value": middle, "low": None, "high": None, "reason": reason}
+    value = None if ranged(variant) else float(values[0])
+    found: dict[str, Any] = {"value": value, "low": float(values.min()), "high": float(values.max())}
+    if ranged(variant):
+        found["reason"] = "; ".join(ranged(variant))
+    return found
+
+
+def model_block(variant: Variant, model: str) -> dict[str, Any]:
+    """One entry of the estimate's `models`, without its error against the table."""
+    path, scale = paths()[model], scales()[model]
+    block: dict[str, Any] = {
+        "kind": KINDS[model],
+        "edge_level": {
+            **spread(variant, lambda units: scale * path(units)),
+            "unit": "of the motor's amplitude",
+        },
+    }
+    if variant.amplitude is not None:
+        factor = scale * variant.amplitude * 1e6
+        block["edge_amplitude_um"] = spread(variant, lambda units: factor * path(units))
+    block["constants"] = (
+        {"s": scale, "kappa": STORED_FIT["kappa"], "made_by": "least squares of the log of nine measured levels"}
+        if model == "fitted"
+        else {"s": scale, "made_by": "geometric mean of measured level over path, nine levels"}
+    )
+    controls = _controls(variant)
+    block["hierarchical_over_control"] = [_ratio(variant, model, index) for index in controls] or None
+    if not controls:
+        block["hierarchical_over_control_reason"] = "a single layer is its own control"
+    if model == "paper":
+        block |= _paper_details(variant, controls)
+    if model == "consistent":
+        block["wave_of_the_level"] = "s"
+    block["assumptions"] = ASSUMPTIONS[model]
+    return block
+
+
+def _controls(variant: Variant) -> list[int]:
+    """A layer's index for each distinct material, if the unit has more than one layer."""
+    if len(variant.layers) == 1:
+        return []
+    names = [layer.material for layer in variant.layers]
+    return [names.index(name) for name in dict.fromkeys(names)]
+
+
+def _ratio(variant: Variant, model: str, index: int) -> dict[str, Any]:
+    """hierarchical/control against the control of layer `index`: by wave where the model has waves."""
+    name = variant.layers[index].material
+    if model == "fitted":
+        path = paths()["fitted"]
+        return {"control": name, **spread(variant, lambda u: path(u) / path(u.control(index)))}
+    path_of = cf.paper_path if model == "paper" else cf.consistent_path
+    by_wave = {
+        wave: spread(variant, lambda u, wave=wave: path_of(u, wave) / path_of(u.control(index), wave))
+        for wave in _WAVES
+    }
+    return {"control": name, **by_wave["s"], "wave": "s", "p": by_wave["p"]}
+
+
+def _paper_details(variant: Variant, controls: list[int]) -> dict[str, Any]:
+    if unknown(variant):
+        return {"wave_of_the_level": "s", "reading_of_eta": "loss_modulus", "constraints": None, "readings": None}
+    units = nominal(variant)
+    coefficients = {}
+    for wave in _WAVES:
+        z = cf.with_air(cf.impedances(units, wave), wave)
+        coefficients[wave] = {
+            "k_t": [_number(v) for v in cf.transmission(z[..., :-1], z[..., 1:])[0]],
+            "k_r": [_number(v) for v in cf.reflection(z[..., :-1], z[..., 1:])[0]],
+        }
+    return {
+        "wave_of_the_level": "s",
+        "reading_of_eta": "loss_modulus",
+        "poisson_ratio_used": [layer.poisson_ratio.middle for layer in variant.layers],
+        "interfaces": [f"Layer {i + 1} to {i + 2}" for i in range(len(variant.layers) - 1)] + ["last layer to air"],
+        "coefficients": coefficients,
+        "readings": [_reading(variant, units, reading, controls) for reading in cf.READINGS],
+        "constraints": _constraints(variant, units, controls),
+    }
+
+
+def _constraints(variant: Variant, units: Units, controls: list[int]) -> list[dict[str, Any]]:
+    """6a and 6b for each control, 6c and 6d, which need none, once."""
+    return [
+        _constraint(found, variant.layers[index].material if found.name in ("6a", "6b") else None)
+        for index in controls
+        for found in cf.constraints(units, units.control(index))
+        if index == controls[0] or found.name in ("6a", "6b")
+    ]
+
+
+def _reading(variant: Variant, units: Units, reading: str, controls: list[int]) -> dict[str, Any]:
+    def ratio(index: int, wave: cf.Wave) -> float | None:
+        control = cf.paper_path(units.control(index), wave, reading)  # type: ignore[arg-type]
+        return _number((cf.paper_path(units, wave, reading) / control)[0])  # type: ignore[arg-type]
+
+    return {
+        "eta": reading,
+        "meaning": cf.READINGS[reading],
+        "unit_of_exponent": "s, which no exponent may have" if reading == "literal" else "1",
+        "exponents_s_wave": [_number(v) for v in cf.paper_exponents(units, "s", reading)[0]],  # type: ignore[arg-type]
+        "hierarchical_over_control": [
+            {"control": variant.layers[i].material, "s": ratio(i, "s"), "p": ratio(i, "p")} for i in controls
+        ],
+    }
+
+
+def _constraint(found: cf.Constraint, control: str | None) -> dict[str, Any]:
+    margin = _number(found.margin[0])
+    return {
+        "equation": found.name,
+        "text": found.text,
+        "control": control,
+        "left": _number(found.left[0]),
+        "relation": found.relation,
+        "right": _number(found.right[0]),
+        "margin": margin,
+        "holds": None if margin is None else margin > 0,
+        "unit": found.unit,
+    }
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def measured_block(variant: Variant) -> dict[str, Any] | None:
+    """What the paper measured for this unit's design and materials, in both prints; None if it measured none."""
+    table, layers = measured_table(), tuple(layer.material for layer in variant.layers)
+    design = "single" if len(layers) == 1 else variant.design
+    found = [i for i in range(len(table.names)) if table.designs[i] == design and table.layers[i] == layers]
+    extra = printed_besides(design, layers)
+    if not found:
+        return extra and {"level": None, **extra}
+    index = found[0]
+    wall = sum(layer.thickness for layer in variant.layers)
+    same = abs(wall - 2.5e-3) < 1e-6 and abs(variant.diameter - 14e-3) < 1e-6
+    return {
+        "level": float(table.levels[index]),
+        **(extra or {}),
+        "hierarchical_over_control": [
+            {"control": table.layers[c][0], "value": float(table.levels[i] / table.levels[c])}
+            for i, c in table.pairs
+            if i == index
+        ]
+        or None,
+        "same_size": same,
+        "note": "measured at 0 mm by laser vibrometer on a skin phantom; axis and phantom are not given"
+        + ("" if same else "; this variant has another size than the measured unit")
+        + ("; the paper does not say which shape its controls had" if design == "single" else ""),
+    }
+
+
+def printed_besides(design: str, layers: tuple[str, ...]) -> dict[str, Any] | None:
+    """The second print of a level, a ratio to an unnamed control, and directions stated without a figure."""
+    from unitcad.catalogue import measurements
+
+    data = measurements()
+    short = {full: name for name, full in data["names"].items()}
+    if any(layer not in short for layer in layers):
+        return None
+    pair = "/".join(short[layer] for layer in layers)
+    found: dict[str, Any] = {}
+    if f"{design} {pair}" in data["also_printed"]:
+        found["also_printed"] = float(data["also_printed"][f"{design} {pair}"])
+    if design == "embedded" and pair in data["amplified"]:
+        found["over_a_control_not_named"] = float(data["amplified"][pair])
+    if f"{design} {pair}" in data["directions"]:
+        found["direction_stated"] = data["directions"][f"{design} {pair}"]
+    return found or None

@@ -1,0 +1,131 @@
+"""The estimate of one variant as JSON-ready data: models, layered curve, measured values, errors, assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+from unitcad.attenuation.curve import decay_at, layered_block
+from unitcad.attenuation.edge import measured_block, model_block, ranged, unknown
+from unitcad.attenuation.inputs import Quantity, Variant
+from unitcad.attenuation.models import MODELS, judgements
+from unitcad.attenuation.table import Judgement
+
+SIGNIFICANT_DIGITS = 9
+ASSUMPTIONS = [
+    "A flat ERM's sideways force is left out: every load and path here is axisymmetric. It is the largest omission.",
+    "Amplitude at the edge is |u_z| of the skin at r = D/2, z = 0, over the motor's amplitude; the paper does not say "
+    "which axis it measured.",
+    "Poisson's ratio and loss factor of the silicones are assumed, with ranges; nobody has measured them for this.",
+    "The cavity's air, the circuit, the bond and the motor's mass are in none of the models.",
+]
+TABLE_NOTE = (
+    "nine measured levels; twelve ratios of six units to the controls of their own materials (eight of them "
+    "independent); geometric-mean factor, 1 is exact; left out: each unit predicted by constants fitted without it; "
+    "null: two constants, the softer layer inside or not; computed when this was made"
+)
+DECAY_AT_MM = (5.0, 10.0, 20.0, 30.0)
+
+
+def estimate(variant: Variant, models: Sequence[str] = MODELS) -> dict[str, Any]:
+    """{variant, models, layered, measured, table_error, assumptions}; numbers to nine significant digits.
+
+    A quantity that can't be given is null beside a `reason`. Raises `Refusal` for values that no body has.
+    """
+    errors = table_error()
+    blocks = {}
+    for model in models:
+        block = model_block(variant, model)
+        block["table_error"] = errors[model]
+        blocks[model] = block
+    notes = ranged(variant)
+    data = {
+        "variant": variant_block(variant),
+        "models": blocks,
+        "layered": layered_block(variant),
+        "measured": measured_block(variant),
+        "table_error": errors,
+        "assumptions": [*ASSUMPTIONS, *([f"A range, not a value: {note}" for note in notes])],
+    }
+    return rounded(data)
+
+
+def frequency_table(variant: Variant, frequencies: Sequence[float], models: Sequence[str] = MODELS) -> dict[str, Any]:
+    """{variant, frequencies}: per frequency (Hz) each model's edge level and the layered decay at some distances."""
+    rows = []
+    for hertz in frequencies:
+        at = replace(variant, frequency=Quantity(hertz))
+        rows.append(
+            {
+                "frequency_hz": hertz,
+                "edge_level": {model: model_block(at, model)["edge_level"] for model in models},
+                "u_z_over_edge": dict(
+                    zip([f"at_{d:g}_mm" for d in DECAY_AT_MM], decay_at(at, hertz, DECAY_AT_MM), strict=True)
+                ),
+            }
+        )
+    return rounded({"variant": variant_block(variant), "frequencies": rows, "assumptions": ASSUMPTIONS})
+
+
+def variant_block(variant: Variant) -> dict[str, Any]:
+    """The inputs as they were used, in the units of the spec."""
+    return {
+        "name": variant.name,
+        "design": variant.design,
+        "diameter_mm": variant.diameter * 1e3,
+        "motor_diameter_mm": variant.motor_diameter * 1e3,
+        "frequency_hz": _quantity(variant.frequency, 1.0),
+        "amplitude_um": None if variant.amplitude is None else variant.amplitude * 1e6,
+        "tissue": variant.tissue_name,
+        "layers": [
+            {
+                "material": layer.material,
+                "wall_mm": layer.thickness * 1e3,
+                "density_kg_m3": layer.density,
+                "youngs_modulus_kpa": _quantity(layer.youngs_modulus, 1e-3),
+                "poisson_ratio": _quantity(layer.poisson_ratio, 1.0),
+                "loss_factor": _quantity(layer.tan_delta, 1.0),
+            }
+            for layer in variant.layers
+        ],
+        "not_known": unknown(variant) or None,
+    }
+
+
+def table_error() -> dict[str, Any]:
+    """Every model's judgement against the measured table, the null's beside it."""
+    found: dict[str, Any] = {name: judgement_block(one) for name, one in judgements().items()}
+    return {**found, "what": TABLE_NOTE}
+
+
+def judgement_block(found: Judgement) -> dict[str, Any]:
+    """A judgement as data."""
+    return {
+        "levels": asdict(found.levels),
+        "ratios": asdict(found.ratios),
+        "directions": {"right": found.directions, "of": found.ratios.count},
+        "leave_one_unit_out": {
+            "levels": asdict(found.left_out),
+            "ratios": asdict(found.left_out_ratios) if found.left_out_ratios else None,
+        },
+    }
+
+
+def _quantity(quantity: Quantity, factor: float) -> dict[str, Any]:
+    scaled = {
+        name: None if value is None else value * factor
+        for name, value in (("value", quantity.value), ("low", quantity.low), ("high", quantity.high))
+    }
+    return {**scaled, **({"note": quantity.note} if quantity.note else {})}
+
+
+def rounded(data: Any) -> Any:
+    """`data` with its floats to nine significant digits, so that the last bits of a platform do not show."""
+    if isinstance(data, float):
+        return float(f"{data:.{SIGNIFICANT_DIGITS}g}")
+    if isinstance(data, dict):
+        return {key: rounded(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [rounded(value) for value in data]
+    return data

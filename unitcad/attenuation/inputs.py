@@ -1,0 +1,105 @@
+"""What an estimate is made from: a variant in SI units, each uncertain number with its range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.rheology import KelvinVoigt, LossFactor
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number and the range that it may lie in. No value but a range: nobody measured it, `note` says where from.
+
+    Neither value nor range: not known, `note` is the reason.
+    """
+
+    value: float | None
+    low: float | None = None
+    high: float | None = None
+    note: str = ""
+
+    @property
+    def known(self) -> bool:
+        return self.value is not None or self.low is not None
+
+    @property
+    def middle(self) -> float:
+        """The value, or the geometric middle of the range; NaN if neither is known."""
+        if self.value is not None:
+            return self.value
+        return float(np.sqrt(self.low * self.high)) if self.low is not None and self.high is not None else np.nan
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """(low, high); the value where no range is given."""
+        return (
+            self.middle if self.low is None else self.low,
+            self.middle if self.high is None else self.high,
+        )
+
+
+@dataclass(frozen=True)
+class SiliconeLayer:
+    """A layer of the unit: wall thickness (m), density (kg/m3), Young's modulus (Pa), Poisson's ratio, tan delta."""
+
+    material: str
+    thickness: float
+    density: float
+    youngs_modulus: Quantity
+    poisson_ratio: Quantity
+    tan_delta: Quantity
+
+
+@dataclass(frozen=True)
+class TissueLayer:
+    """A layer of the body: thickness (m, None for the half-space), density (kg/m3), shear modulus (Pa), damping.
+
+    damping is tan delta if `damping_law` is "loss_factor", a viscosity in Pa s if it is "kelvin_voigt".
+    """
+
+    name: str
+    thickness: Quantity | None
+    density: float
+    shear_modulus: Quantity
+    poisson_ratio: float
+    damping_law: Literal["loss_factor", "kelvin_voigt"] | None
+    damping: Quantity
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A unit on a body: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known)."""
+
+    name: str
+    design: Literal["embedded", "encapsulating"]
+    diameter: float
+    motor_diameter: float
+    layers: tuple[SiliconeLayer, ...]
+    tissue_name: str
+    tissue: tuple[TissueLayer, ...]
+    frequency: Quantity
+    amplitude: float | None = None
+
+
+def body(tissue: tuple[TissueLayer, ...], end: dict[str, int] | None = None) -> LayeredMedium:
+    """The body as a layered medium; `end` takes "moduli", "damping" or "thicknesses" to their low (0), high (1) end."""
+    end = end or {}
+
+    def of(kind: str, quantity: Quantity) -> float:
+        return quantity.ends[end[kind]] if kind in end else quantity.middle
+
+    made = []
+    for layer in tissue:
+        modulus = of("moduli", layer.shear_modulus) * 2.0 * (1.0 + layer.poisson_ratio)
+        law = {"loss_factor": LossFactor, "kelvin_voigt": KelvinVoigt}.get(layer.damping_law or "")
+        damping = law(of("damping", layer.damping)) if law else None
+        material = (layer.density, modulus, layer.poisson_ratio, damping)
+        if layer.thickness is None:
+            return LayeredMedium(made, HalfSpace(*material))
+        made.append(Layer(of("thicknesses", layer.thickness), *material))
+    raise ValueError("a body ends with a half-space: a layer without a thickness")

@@ -1,0 +1,84 @@
+"""`unitcad estimate`: the attenuation estimate of one or more specs, as tables for a person or as JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import typer
+
+from unitcad.cli.output import print_json
+from unitcad.errors import Refusal, unknown_name
+
+_MOST_FREQUENCIES = 1000
+
+
+def estimate(
+    specs: Annotated[list[str], typer.Argument(metavar="SPEC...", help="a template's name or a path to a TOML file")],
+    model: Annotated[
+        str, typer.Option(help="paper, consistent, fitted or all; the spec's own models if not given")
+    ] = "",
+    frequency: Annotated[
+        str, typer.Option(metavar="HZ|FROM:TO:STEP", help="one frequency, or a table over frequencies")
+    ] = "",
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="override a value of the spec")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on standard output")] = False,
+) -> None:
+    """How much of the motor's vibration reaches the unit's edge and the skin beyond, by each model, with its error."""
+    from unitcad.attenuation.models import MODELS
+    from unitcad.estimating import estimate_spec, frequency_table_of_spec
+    from unitcad.spec import load
+
+    if model not in ("", "all", *MODELS):
+        raise unknown_name("--model", model, (*MODELS, "all"))
+    models = None if not model else MODELS if model == "all" else (model,)
+    hertz = frequencies(frequency) if frequency else []
+    loaded = [load(name, set_ or []) for name in specs]
+    if ":" in frequency:
+        found = [frequency_table_of_spec(spec, hertz, models) for spec in loaded]
+    else:
+        found = [estimate_spec(spec, models, hertz[0] if hertz else None) for spec in loaded]
+    if as_json:
+        print_json(found[0] if len(found) == 1 else {"estimates": found})
+        return
+    from unitcad.cli.estimate_tables import print_estimate, print_frequencies
+
+    for one in found:
+        (print_frequencies if ":" in frequency else print_estimate)(one)
+
+
+def frequencies(text: str) -> list[float]:
+    """HZ, or FROM:TO:STEP with both ends, as a list in Hz. Raises `Refusal`."""
+    parts = text.split(":")
+    try:
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 3) or not all(math.isfinite(n) and n > 0 for n in numbers):
+        raise Refusal("--frequency", text, "must be HZ or FROM:TO:STEP, numbers above 0", "100:150:10")
+    if len(numbers) == 1:
+        return numbers
+    low, high, step = numbers
+    if high < low:
+        raise Refusal("--frequency", text, "TO must not be below FROM", f"{high:g}:{low:g}:{step:g}")
+    count = math.floor((high - low) / step * (1 + 1e-12) + 1e-9) + 1
+    if count > _MOST_FREQUENCIES:
+        limit = f"asks for {count} frequencies; the most is {_MOST_FREQUENCIES}"
+        raise Refusal("--frequency", text, limit, f"{low:g}:{high:g}:{(high - low) / (_MOST_FREQUENCIES - 1):.6g}")
+    return [low + i * step for i in range(count)]
+
+
+def level(found: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) -> str:
+    """A value with its spread, or what there is of it, for a person."""
+    if not found:
+        return "-"
+    value, low, high = (None if found.get(k) is None else f"{found[k] * factor:.{digits}g}" for k in _PARTS)
+    spread = f"{low} to {high}" if low and high and low != high else ""
+    if value:
+        return f"{value} ({spread})" if spread else value
+    return spread or "null"
+
+
+_PARTS = ("value", "low", "high")

@@ -1,0 +1,110 @@
+"""The estimate as tables for a person."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from unitcad.cli.estimate import level
+
+
+def print_estimate(data: dict[str, Any]) -> None:
+    """Models against each other, the paper's constraints, the layered curve, what is assumed."""
+    console = Console(highlight=False)
+    variant = data["variant"]
+    layers = " / ".join(layer["material"] for layer in variant["layers"])
+    console.print(
+        f"[bold]{escape(variant['name'])}[/bold]: {variant['design']}, {layers}, "
+        f"{level(variant['frequency_hz'], digits=4)} Hz"
+    )
+    console.print(_models(data))
+    console.print(_errors(data))
+    for reason in _reasons(data):
+        console.print(f"  {reason}", soft_wrap=True)
+    constraints = data["models"].get("paper", {}).get("constraints")
+    if constraints:
+        console.print(_constraints(constraints))
+    console.print(_curve(data["layered"]))
+    console.print(
+        f"  no hierarchical / control from the layers: {data['layered']['hierarchical_over_control_reason']}",
+        soft_wrap=True,
+    )
+    for line in data["assumptions"]:
+        console.print(f"  {escape(line)}", soft_wrap=True)
+
+
+def print_frequencies(data: dict[str, Any]) -> None:
+    """A row per frequency: edge level by model, decay of the skin's motion by distance."""
+    rows = data["frequencies"]
+    table = Table(
+        "Hz", title=f"{escape(data['variant']['name'])}: edge level (motor = 1); |u_z| over its value at the edge"
+    )
+    for model in rows[0]["edge_level"]:
+        table.add_column(model)
+    for name in rows[0]["u_z_over_edge"]:
+        table.add_column(name.removeprefix("at_").replace("_", " "))
+    for row in rows:
+        decay = [f"{value:.3g}" for value in row["u_z_over_edge"].values()]
+        table.add_row(f"{row['frequency_hz']:g}", *[level(one) for one in row["edge_level"].values()], *decay)
+    Console(highlight=False).print(table)
+
+
+def _models(data: dict[str, Any]) -> Table:
+    """Edge level and, against the control of each of the unit's materials, hierarchical / control."""
+    blocks, measured = data["models"], data["measured"] or {}
+    controls = [one["control"] for one in next(iter(blocks.values()))["hierarchical_over_control"] or []]
+    table = Table("model", "edge level %", *[f"over {name}" for name in controls])
+    for name, block in blocks.items():
+        ratios = [level(one) for one in block["hierarchical_over_control"] or []]
+        table.add_row(name, level(block["edge_level"], 100), *ratios)
+    if measured:
+        levels = [measured[key] for key in ("level", "also_printed") if measured.get(key) is not None]
+        ratios = {one["control"]: f"{one['value']:.3g}" for one in measured.get("hierarchical_over_control") or []}
+        text = " and ".join(f"{100 * value:.4g}" for value in levels) or "-"
+        table.add_row("measured", text, *[ratios.get(name, "-") for name in controls])
+    return table
+
+
+def _errors(data: dict[str, Any]) -> Table:
+    """Each model against the measured table, beside the null of two constants."""
+    table = Table("model", "levels", "unit left out", "ratios", "worst", "directions", title="error against the table")
+    for name in (*data["models"], "null"):
+        found = data["table_error"][name]
+        table.add_row(
+            name,
+            f"x {found['levels']['geometric_mean']:.2f}",
+            f"x {found['leave_one_unit_out']['levels']['geometric_mean']:.2f}",
+            f"x {found['ratios']['geometric_mean']:.2f}",
+            f"x {found['ratios']['worst']:.2f}",
+            f"{found['directions']['right']} of {found['directions']['of']}",
+        )
+    return table
+
+
+def _reasons(data: dict[str, Any]) -> list[str]:
+    found = [block["edge_level"].get("reason") for block in data["models"].values()]
+    return [escape(reason) for reason in dict.fromkeys(found) if reason]
+
+
+def _constraints(rows: list[dict[str, Any]]) -> Table:
+    table = Table("6", "what", "left", "", "right", "margin", "holds", title="the paper's constraints, equation 6")
+    for row in rows:
+        numbers = ["null" if row[k] is None else f"{row[k]:.3g}" for k in ("left", "right", "margin")]
+        holds = {True: "yes", False: "no", None: "null"}[row["holds"]]
+        what = row["text"].replace("control", row["control"] or "")
+        table.add_row(row["equation"][-1], what, numbers[0], row["relation"], *numbers[1:], holds)
+    return table
+
+
+def _curve(layered: dict[str, Any]) -> Table:
+    table = Table("mm from the edge", title=f"|u_z| of the skin over its value at the edge, {layered['tissue']}")
+    picked = [i for i, r in enumerate(layered["r_mm"]) if r in (0, 2, 5, 10, 15, 20, 30)]
+    rows = [("layered", "value"), ("low", "low"), ("high", "high")]
+    for i in picked:
+        table.add_column(f"{layered['r_mm'][i]:g}")
+    for title, key in rows:
+        table.add_row(title, *[f"{layered['u_z'][key][i]:.3g}" for i in picked])
+    return table

@@ -1,0 +1,123 @@
+"""From a spec to an attenuation estimate: the catalogue's values, with their ranges, into the estimate's own inputs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Literal, cast
+
+from unitcad.attenuation.estimate import estimate, frequency_table
+from unitcad.attenuation.inputs import Quantity, SiliconeLayer, TissueLayer, Variant
+from unitcad.attenuation.rheology import FractionalKelvinVoigt
+from unitcad.catalogue import Material, Tissue, Value, choose, materials, motors, tissue
+from unitcad.errors import Refusal
+from unitcad.spec import Spec
+
+NO_MODULUS = "no small-strain modulus at the motor's frequency is known; the data sheet's 100 % modulus is static"
+
+
+def estimate_spec(spec: Spec, models: Sequence[str] | None = None, frequency_hz: float | None = None) -> dict[str, Any]:
+    """The estimate of a spec as JSON-ready data (`unitcad.attenuation.estimate`); the same spec gives the same data.
+
+    Raises `Refusal` where no frequency is known, for an unknown material or tissue, and for values no body has.
+    """
+    return estimate(variant_of(spec, frequency_hz), tuple(models or spec.estimate.models))
+
+
+def frequency_table_of_spec(
+    spec: Spec, frequencies_hz: Sequence[float], models: Sequence[str] | None = None
+) -> dict[str, Any]:
+    """A table over frequencies (Hz): edge level by model, and the layered decay; raises as `estimate_spec`."""
+    variant = variant_of(spec, frequencies_hz[0])
+    return frequency_table(variant, frequencies_hz, tuple(models or spec.estimate.models))
+
+
+def variant_of(spec: Spec, frequency_hz: float | None = None) -> Variant:
+    """A spec's unit on its body, in SI. `frequency_hz` overrides the spec's and the motor's."""
+    known = motors(spec.motors)
+    motor = choose("motor.part", spec.motor.part, known) if spec.motor.part else None
+    diameter = spec.motor.diameter_mm or (float(motor.diameter_mm) if motor else None)
+    if diameter is None:
+        raise Refusal("motor.diameter_mm", None, "must be given when the motor has no part name")
+    asked = frequency_hz if frequency_hz is not None else spec.estimate.frequency_hz
+    if motor and motor.frequency_hz and asked in (None, float(motor.frequency_hz)) and frequency_hz is None:
+        frequency = _quantity(motor.frequency_hz)  # an effective spec writes the motor's value out: keep its range
+    elif asked is not None:
+        frequency = Quantity(asked)
+    elif motor and motor.rpm:
+        frequency = Quantity(float(motor.rpm) / 60.0, note="the motor's rated speed")
+    else:
+        raise Refusal(
+            "estimate.frequency_hz", None, "must be given: the catalogue has no frequency for this motor", 125.0
+        )
+    amplitude = spec.estimate.amplitude_um or (float(motor.amplitude_um) if motor and motor.amplitude_um else None)
+    silicones = materials(spec.materials)
+    return Variant(
+        name=spec.name,
+        design=cast("Literal['embedded', 'encapsulating']", spec.design),
+        diameter=spec.diameter_mm * 1e-3,
+        motor_diameter=diameter * 1e-3,
+        layers=tuple(
+            _silicone(choose(f"layers.{i}.material", layer.material, silicones), layer.wall_mm * 1e-3, frequency)
+            for i, layer in enumerate(spec.layers)
+        ),
+        tissue_name=spec.estimate.tissue,
+        tissue=tuple(_tissue(layer) for layer in tissue(spec.estimate.tissue, spec.tissue)),
+        frequency=frequency,
+        amplitude=None if amplitude is None else amplitude * 1e-6,
+    )
+
+
+def _quantity(value: Value, factor: float = 1.0) -> Quantity:
+    low, high = (None if end is None else end * factor for end in (value.low, value.high))
+    return Quantity(float(value) * factor, low, high)
+
+
+def _silicone(material: Material, wall: float, frequency: Quantity) -> SiliconeLayer:
+    return SiliconeLayer(
+        material=material.name,
+        thickness=wall,
+        density=float(material.density_g_cm3) * 1e3,
+        youngs_modulus=_youngs_modulus(material, frequency),
+        poisson_ratio=_quantity(material.poisson_ratio),
+        tan_delta=_quantity(material.loss_factor),
+    )
+
+
+def _youngs_modulus(material: Material, frequency: Quantity) -> Quantity:
+    """The catalogue's small-strain modulus in Pa; else a range of a fractional law, static to dynamic; else none."""
+    if material.youngs_modulus_kpa:
+        return _quantity(material.youngs_modulus_kpa, 1e3)
+    mu0, tau, n = material.fractional_mu0_kpa, material.fractional_tau_us, material.fractional_n
+    if not (mu0 and tau and n):
+        return Quantity(None, note=NO_MODULUS)
+    static = float(mu0) * 1e3 * 2.0 * (1.0 + float(material.poisson_ratio))
+    law = FractionalKelvinVoigt(float(tau) * 1e-6, float(n))
+    dynamic = abs(law.complex_shear(static, 2.0 * math.pi * frequency.ends[1]))
+    note = f"{NO_MODULUS}; range from a fractional Kelvin-Voigt law, static to {frequency.ends[1]:g} Hz ({mu0.source})"
+    return Quantity(None, static, dynamic, note)
+
+
+def _tissue(layer: Tissue) -> TissueLayer:
+    nu = float(layer.poisson_ratio)
+    if layer.shear_modulus_kpa:
+        shear = _quantity(layer.shear_modulus_kpa, 1e3)
+    elif layer.youngs_modulus_kpa:
+        shear = _quantity(layer.youngs_modulus_kpa, 1e3 / (2.0 * (1.0 + nu)))
+    else:
+        raise Refusal(f"tissue.{layer.name}", layer.name, "lacks youngs_modulus_kpa or shear_modulus_kpa")
+    if layer.viscosity_pa_s:
+        law, damping = "kelvin_voigt", _quantity(layer.viscosity_pa_s)
+    elif layer.loss_factor:
+        law, damping = "loss_factor", _quantity(layer.loss_factor)
+    else:
+        law, damping = None, Quantity(0.0)
+    return TissueLayer(
+        name=layer.name,
+        thickness=_quantity(layer.thickness_mm, 1e-3) if layer.thickness_mm else None,
+        density=float(layer.density_kg_m3),
+        shear_modulus=shear,
+        poisson_ratio=nu,
+        damping_law=law,
+        damping=damping,
+    )
