@@ -19,7 +19,7 @@ from unitcad.batch.row import row
 from unitcad.cache import Bundle, DiskStore, MemoryStore
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import folder as folders
-from unitcad.pipeline.build import Product, build_into, make
+from unitcad.pipeline.build import Product, build_into, make, possible_outputs
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import code_version
 from unitcad.spec import Spec
@@ -164,7 +164,7 @@ def _finished(folder: Path, spec: Spec, task: Task) -> dict[str, Any] | None:
         timings = json.loads((folder / "timings.json").read_bytes())
         same = (
             timings.get("code") == task.code
-            and set(manifest["outputs"]) == set(task.only)
+            and set(manifest["outputs"]) == set(possible_outputs(spec, task.only))
             and set(formats) == set(spec.output.formats)
             and task.check != any(left["why"] == "--no-check" for left in manifest["left_out"])
         )

@@ -22,8 +22,10 @@ from unitcad.pipeline.stages import Say, Stages
 from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.spec import Spec, to_toml, warnings
+from unitcad.spec.own import is_own
 
 OUTPUTS = ("unit", "moulds", "estimate", "casting")
+OWN_DESIGN = "a design of one's own: tooling and estimate are known for the shipped designs only"
 FORMATS = ("step", "stl", "3mf", "svg", "png", "glb")
 
 
@@ -117,12 +119,24 @@ def checked_outputs(only: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in OUTPUTS if name in only)
 
 
+def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
+    """What of `only` there can be: a design of one's own is drawn, but nobody knows its tooling or its estimate.
+
+    Raises Refusal where nothing is left.
+    """
+    found = tuple(name for name in only if name == "unit" or not is_own(spec.design))
+    if not found:
+        raise Refusal("--only", ",".join(only), f"{spec.design} is a design of one's own and has only", "unit")
+    return found
+
+
 class _Making:
     """One variant, made into a product."""
 
     def __init__(self, variant: Variant, only: Sequence[str], check: bool, store: Store, stages: Stages) -> None:
-        self.variant, self.only, self.check, self.store, self.stages = variant, only, check, store, stages
+        self.variant, self.check, self.store, self.stages = variant, check, store, stages
         self.spec = variant.spec
+        self.asked, self.only = only, possible_outputs(variant.spec, only)
         self.own: dict[str, bytes] = {}
         self.left_out: list[dict[str, str]] = []
 
@@ -174,8 +188,8 @@ class _Making:
 
     def _part(self, part: dict[str, Any]) -> dict[str, Any]:
         """A part of the geometry with this variant's material, after what it is made by."""
-        cast = part["made"] == "cast" and part["step"] is not None
-        material = self.spec.layers[part["step"] - 1].material if cast else None
+        step = part["step"] if part["made"] == "cast" else None
+        material = self.spec.layers[step - 1].material if step else None
         found: dict[str, Any] = {}
         for key, value in part.items():
             found[key] = value
@@ -193,20 +207,28 @@ class _Making:
             found.append(_left("laws", "--no-check" if not self.check else "no moulds were asked for"))
         if not self.check:
             found.append(_left("mesh checks", "--no-check"))
-        if len(spec.layers) == 1:
-            found.append(_left("second pour", "one layer: one pour"))
-        if not spec.fpcb:
-            found.append(_left("tongue and slot", "no FPCB"))
-        elif spec.design == "embedded":
-            found.append(_left("tongue and slot", "embedded: the circuit lies on the rings"))
-        if spec.design == "embedded":
-            found.append(_left("filament stub and hole", "embedded: open rings hold no suction"))
+        if not is_own(spec.design):
+            found += _not_needed(spec)
         for name in OUTPUTS:
             if name not in self.only:
-                found.append(_left(name, "not asked for (--only)"))
+                found.append(_left(name, OWN_DESIGN if name in self.asked else "not asked for (--only)"))
         if "step" not in spec.output.formats:
             found.append(_left("boundary representation", "no STEP asked for"))
         return found
+
+
+def _not_needed(spec: Spec) -> list[dict[str, str]]:
+    """The tooling that this variant does without."""
+    found = []
+    if len(spec.layers) == 1:
+        found.append(_left("second pour", "one layer: one pour"))
+    if not spec.fpcb:
+        found.append(_left("tongue and slot", "no FPCB"))
+    elif spec.design == "embedded":
+        found.append(_left("tongue and slot", "embedded: the circuit lies on the rings"))
+    if spec.design == "embedded":
+        found.append(_left("filament stub and hole", "embedded: open rings hold no suction"))
+    return found
 
 
 def _with_formats(spec: Spec, wanted: Sequence[str]) -> Spec:

@@ -13,6 +13,7 @@ from unitcad import catalogue
 from unitcad.errors import Refusal, unknown_name
 from unitcad.spec.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, dimensions
 from unitcad.spec.models import Spec
+from unitcad.spec.own import is_own
 from unitcad.spec.strain import allowed_strain, tail_strain, widest_tail_end
 
 DESIGNS = ("embedded", "encapsulating")
@@ -31,8 +32,13 @@ _EPS = 1e-9
 
 def checked(spec: Spec) -> Spec:
     """The effective spec, or a Refusal for the first thing that can't be."""
+    if is_own(spec.design):
+        return _checked_own(spec)
     if spec.design not in DESIGNS:
         raise unknown_name("design", spec.design, DESIGNS)
+    for field in ("parameters", "design_source"):
+        if getattr(spec, field):
+            raise Refusal(field, "...", f"only a design of one's own takes it; {spec.design} does not")
     spec = _with_defaults(spec)
     dims = dimensions(spec)
     _check_layers(spec)
@@ -44,6 +50,18 @@ def checked(spec: Spec) -> Spec:
     if dims.slot_z:
         _check_exit(spec, dims)
     _check_tooling(spec, dims)
+    return spec
+
+
+def _checked_own(spec: Spec) -> Spec:
+    """A spec whose shapes a function of its own draws: what that function makes of its lengths is not for us to say."""
+    if spec.design_source is None:
+        raise Refusal("design_source", "nothing", f"is required with design = {spec.design!r}")
+    spec = _with_defaults(spec)
+    for i, layer in enumerate(spec.layers):
+        for field in ("wall_mm", "cap_mm"):
+            if getattr(layer, field) is not None:
+                _at_least(f"layers.{i}.{field}", getattr(layer, field), LEAST_LAYER, "a layer's least thickness is")
     return spec
 
 

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
 from unitcad.spec.door import checked
 from unitcad.spec.models import Spec
+from unitcad.spec.own import with_source
 
 
 def templates() -> dict[str, Path]:
@@ -43,7 +44,7 @@ def read(source: str | os.PathLike[str]) -> dict[str, Any]:
         if text not in known:
             raise unknown_name("SPEC", text, known)
         path = known[text]
-    return read_toml(path)
+    return with_source(read_toml(path), path.parent)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -93,7 +94,7 @@ def put(data: dict[str, Any], path: str, value: Any) -> None:
 def from_data(data: Mapping[str, Any]) -> Spec:
     """A checked, effective `Spec` of plain data. Raises Refusal for the first thing that can't be."""
     try:
-        spec = Spec.model_validate(data)
+        spec = Spec.model_validate(with_source(dict(data), Path()))
     except ValidationError as error:
         raise _refusal(error) from None
     return checked(spec)

@@ -147,3 +147,9 @@ class Spec(Table):
     motors: Entries = {}
     printers: Entries = {}
     tissue: dict[str, Entries] = {}
+    parameters: Annotated[
+        dict[str, bool | int | float | str], Field(description="what a design of one's own wants to know besides")
+    ] = {}
+    design_source: Annotated[
+        str | None, Field(description="the text of an own design's file; filled in when the spec is read")
+    ] = None

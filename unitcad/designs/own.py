@@ -1,0 +1,67 @@
+"""A design that a spec brings along: a function from a spec to a shape tree, or to several by name."""
+
+from __future__ import annotations
+
+import re
+import types
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any, get_args
+
+from unitcad.errors import UnitcadError
+from unitcad.shape import ProfileError, Shape
+from unitcad.spec import Spec
+from unitcad.spec.own import function_of
+
+_NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
+
+
+def shapes(spec: Spec) -> dict[str, Shape]:
+    """What the spec's function makes of it, by name: a single tree is "layer1".
+
+    Raises UnitcadError, with the line in the file, where the function raises or returns anything else.
+    """
+    assert spec.design_source is not None
+    function = _function(spec.design, spec.design_source)
+    try:
+        made = function(spec)
+    except Exception as error:
+        raise _failed(spec.design, error) from None
+    if isinstance(made, get_args(Shape)):
+        made = {"layer1": made}
+    if not isinstance(made, Mapping) or not made:
+        raise UnitcadError(f"design {spec.design}: returns a {type(made).__name__}, not a shape tree or shapes by name")
+    for name, shape in made.items():
+        if not isinstance(name, str) or not _NAME.fullmatch(name):
+            raise UnitcadError(f"design {spec.design}: {name!r} is no name for a body (a letter, then a-z 0-9 -)")
+        if not isinstance(shape, get_args(Shape)):
+            raise UnitcadError(f"design {spec.design}: {name} is a {type(shape).__name__}, not a shape tree")
+    return dict(made)
+
+
+@lru_cache(maxsize=16)
+def _function(design: str, source: str) -> Any:
+    module = types.ModuleType("unitcad_own_design")
+    try:
+        exec(compile(source, design.rpartition(":")[0], "exec"), module.__dict__)
+    except Exception as error:
+        raise _failed(design, error) from None
+    found = module.__dict__.get(function_of(design))
+    if not callable(found):
+        names = [name for name, value in vars(module).items() if isinstance(value, types.FunctionType)]
+        raise UnitcadError(
+            f"design {design}: the file has no such function; it has {', '.join(sorted(names)) or 'none'}"
+        )
+    return found
+
+
+def _failed(design: str, error: Exception) -> UnitcadError:
+    """What went wrong, in whose words, and where in the design's file."""
+    file, line, trace = design.rpartition(":")[0], getattr(error, "lineno", None), error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == file:
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    where = f" (line {line})" if line else ""
+    kind = "" if isinstance(error, ProfileError) else f"{type(error).__name__}: "
+    return UnitcadError(f"design {design}{where}: {kind}{error}")
