@@ -69,7 +69,7 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str]:
     data = {
         "title": title,
         "version": __version__,
-        "variants": [pool.put(record) for record in records],
+        "variants": [[record["folder"], pool.put(record)] for record in records],
         "table": table,
         "batch": collect.batch(folder) if table else None,
         "pool": pool.entries,
@@ -124,7 +124,7 @@ def page(data: dict[str, Any], title: str) -> str:
         "</head>",
         "<body>",
         '<main id="page"><p>Reading ...</p></main>',
-        "<noscript><p>This page draws itself with a script. Without one, read casting.md and section.svg.</p></noscript>",
+        "<noscript><p>A script draws this page. Without one, read casting.md and section.svg.</p></noscript>",
         f'<script type="text/plain" id="data">{packed}</script>',
         f'<script type="text/plain" id="licences">{html.escape(licences, quote=False)}</script>',
         *(f"<script>{script}</script>" for script in scripts),

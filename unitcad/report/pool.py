@@ -21,16 +21,16 @@ class Pool:
 
     def put(self, data: Any) -> Any:
         """`data` (what JSON can hold) with every larger part replaced by a reference."""
-        if isinstance(data, dict):
-            data = {key: self.put(value) for key, value in data.items()}
-        elif isinstance(data, list | tuple):
-            data = [self.put(value) for value in data]
-        elif not isinstance(data, str):
+        if not isinstance(data, dict | list | tuple | str):
             return data
         text = json.dumps(data, allow_nan=False, ensure_ascii=False)
         if len(text) < LEAST:
             return data
         if text not in self._index:
+            if isinstance(data, dict):
+                data = {key: self.put(value) for key, value in data.items()}
+            elif isinstance(data, list | tuple):
+                data = [self.put(value) for value in data]
             self._index[text] = len(self.entries)
             self.entries.append(data)
         return {REFERENCE: self._index[text]}

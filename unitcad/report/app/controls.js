@@ -93,9 +93,10 @@
 
     function limits() {
       const [low, high] = viewer.bounds()[axis.value];
-      at.input.min = low.toFixed(2);
-      at.input.max = high.toFixed(2);
-      at.input.value = axis.value === "z" ? ((low + high) / 2).toFixed(2) : "0";
+      const stop = (value, round) => (round(value * 20) / 20).toFixed(2);
+      at.input.min = stop(low, Math.floor);
+      at.input.max = stop(high, Math.ceil);
+      at.input.value = axis.value === "z" ? stop((low + high) / 2, Math.round) : "0";
     }
 
     function choose(kind) {

@@ -59,7 +59,10 @@ window.unitcad = {};
       el("tr", { className: row.className }, (row.cells || row).map((cell) =>
         el("td", { className: typeof cell === "number" ? "number" : undefined }, typeof cell === "number" ? number(cell) : cell))));
     const caption = options.caption && el("caption", {}, options.caption);
-    const names = el("tr", {}, head.map((name) => el("th", { scope: "col" }, name)));
+    const names = el("tr", {}, head.map((name, i) => {
+      const first = rows.length ? (rows[0].cells || rows[0])[i] : null;
+      return el("th", { scope: "col", className: typeof first === "number" ? "number" : undefined }, name);
+    }));
     return el("div", { className: "scroll", tabindex: "0", role: "group", "aria-label": options.label || options.caption || "table" },
       el("table", {}, caption, el("thead", {}, names), el("tbody", {}, body)));
   }

@@ -110,15 +110,24 @@
       el("details", {}, el("summary", {}, "Licences of what is in it"), el("pre", {}, document.getElementById("licences").textContent)));
   }
 
+  // The folder in the address, "" where there is none or no sense in it.
+  function variantAsked() {
+    try {
+      return decodeURIComponent(location.hash.slice(1));
+    } catch {
+      return "";
+    }
+  }
+
   async function start() {
     const text = document.getElementById("data").textContent;
     const data = JSON.parse(new TextDecoder().decode(await U.unpacked(text)));
     const resolve = resolver(data.pool);
-    const variants = new Map(data.variants.map((entry) => [resolve(entry).folder, entry]));
+    const variants = new Map(data.variants);
     const route = () => {
       leave();
-      const wanted = decodeURIComponent(location.hash.slice(1));
-      const [only] = data.variants;
+      const wanted = variantAsked();
+      const [[, only]] = data.variants;
       if (!data.table) showVariant(resolve(only), data);
       else if (variants.has(wanted) && wanted) showVariant(resolve(variants.get(wanted)), data, el("a", { className: "back", href: "#" }, "‹ All variants"));
       else showBatch(data);

@@ -22,7 +22,7 @@
 
   function sectionDrawing(variant) {
     const svg = variant.drawings["section.svg"];
-    return section("section", "Section", svg ? el("figure", {}, drawing(svg, "The unit cut along its tail, with its main dimensions"),
+    return section("section", "Section", svg ? el("figure", {}, el("div", { className: "scroll", tabindex: "0", role: "group", "aria-label": "Section drawing" }, drawing(svg, "The unit cut along its tail, with its main dimensions")),
       el("figcaption", {}, "Cut along the tail; lengths in mm; z = 0 is the skin."))
       : absent("No section drawing here. Ask for it with", "unitcad build SPEC --only unit"));
   }

@@ -126,17 +126,45 @@
       return all;
     }
 
+    // The corners of the boxes of what is shown.
+    function corners() {
+      const found = [];
+      for (const part of state.parts.filter((each) => each.shown)) {
+        const { min, max } = part.mesh.geometry.boundingBox;
+        part.group.updateMatrixWorld(true);
+        for (const x of [min.x, max.x]) for (const y of [min.y, max.y]) for (const z of [min.z, max.z]) {
+          found.push(new THREE.Vector3(x, y, z).applyMatrix4(part.group.matrixWorld));
+        }
+      }
+      return found;
+    }
+
+    // Look from a side at all that is shown, as near as it fits.
     function look(name) {
-      const all = box(true);
-      if (all.isEmpty()) return;
-      const sphere = all.getBoundingSphere(new THREE.Sphere());
-      const half = Math.min(camera.fov, camera.fov * camera.aspect) / 2;
-      const distance = (sphere.radius * 1.04) / Math.sin((half * Math.PI) / 180);
-      camera.position.copy(new THREE.Vector3(...VIEWS[name]).normalize().multiplyScalar(distance).add(sphere.center));
-      camera.near = distance / 50;
-      camera.far = distance * 20;
-      camera.updateProjectionMatrix();
-      controls.target.copy(sphere.center);
+      const points = corners();
+      if (!points.length) return;
+      const sphere = new THREE.Box3().setFromPoints(points).getBoundingSphere(new THREE.Sphere());
+      const side = new THREE.Vector3(...VIEWS[name]).normalize();
+      const target = sphere.center.clone();
+      let distance = sphere.radius * 6;
+      const tangent = Math.tan((camera.fov * Math.PI) / 360);
+      for (let round = 0; round < 6; round += 1) {
+        camera.position.copy(side).multiplyScalar(distance).add(target);
+        camera.near = distance / 50;
+        camera.far = distance * 20;
+        camera.lookAt(target);
+        camera.updateProjectionMatrix();
+        camera.updateMatrixWorld(true);
+        const seen = new THREE.Box3().setFromPoints(points.map((point) => point.clone().project(camera)));
+        const middle = seen.getCenter(new THREE.Vector3());
+        const size = seen.getSize(new THREE.Vector3());
+        const right = new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
+        const up = new THREE.Vector3().setFromMatrixColumn(camera.matrixWorld, 1);
+        target.addScaledVector(right, middle.x * distance * tangent * camera.aspect).addScaledVector(up, middle.y * distance * tangent);
+        distance *= Math.max(size.x, size.y) / 1.8;
+      }
+      camera.position.copy(side).multiplyScalar(distance).add(target);
+      controls.target.copy(target);
       controls.update();
       draw();
     }
