@@ -18,6 +18,7 @@ from unitcad.cli.build import build
 from unitcad.cli.cache import cache
 from unitcad.cli.check import check
 from unitcad.cli.estimate import estimate
+from unitcad.cli.init import init
 from unitcad.cli.list import list_
 from unitcad.cli.output import say_error
 from unitcad.cli.report import report
@@ -45,6 +46,7 @@ app.command("batch")(batch)
 app.command("check")(check)
 app.command("estimate")(estimate)
 app.command("accuracy")(accuracy)
+app.command("init")(init)
 app.command("list")(list_)
 app.command("report")(report)
 app.command("schema")(schema)

@@ -1,0 +1,38 @@
+"""unitcad init."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def init(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Of the variant and of the file, NAME.toml.")],
+    template: Annotated[str, typer.Option(help="What to start from: see `unitcad list templates`.")] = "encapsulating",
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Write a commented spec to start from. The last line printed is the file."""
+    from unitcad.cli.output import print_json
+    from unitcad.errors import Refusal, UnitcadError
+    from unitcad.spec.starter import starter
+
+    stem = name.removesuffix(".toml")
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,59}", stem):
+        near = re.sub(r"[^A-Za-z0-9._-]+", "-", stem).strip("-._")[:60] or "my-unit"
+        raise Refusal("NAME", name, "is a file's name of letters, digits, dots, dashes", near)
+    path = Path(f"{stem}.toml")
+    try:
+        with open(path, "x", encoding="utf-8", newline="\n") as file:
+            file.write(starter(stem, template))
+    except FileExistsError:
+        raise UnitcadError(f"{path}: is there already; choose another name") from None
+    except OSError as error:
+        raise UnitcadError(f"{path}: {(error.strerror or 'unwritable').lower()}") from None
+    if as_json:
+        print_json({"spec": str(path)})
+    else:
+        typer.echo(f"build it with: unitcad build {path}")
+        typer.echo(str(path))
