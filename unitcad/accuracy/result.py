@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 Cell = str | float | int | None
+Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)

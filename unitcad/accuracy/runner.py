@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
 from unitcad.accuracy.plot import svg
-from unitcad.accuracy.result import Result, from_dict, markdown
+from unitcad.accuracy.result import Result, Say, from_dict, markdown
 from unitcad.errors import UnitcadError, unknown_name
 
 SUITES = ("tessellation", "kernels", "moulds", "hankel", "stability", "models", "extremes", "left-out", "speed")
 """In the order of the page; a suite is the module of that name, with one function `run(quick, say)`."""
-Say = Callable[[str], None]
 
 HEAD = """# Error against run time, and what holds at the extremes
 

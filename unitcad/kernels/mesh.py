@@ -62,6 +62,11 @@ def _realise(shape: Shape, segments: int) -> Manifold:
     raise TypeError(f"not a shape: {shape!r}")
 
 
+def forget() -> None:
+    """Drop every mesh that is kept for the next call: what a measurement of times needs."""
+    _realise.cache_clear()
+
+
 def arrays(solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
     """(vertices (n, 3) in mm, double; faces (m, 3))."""
     mesh = solid.to_mesh64()

@@ -1,0 +1,114 @@
+"""Agreement of the kernels on every template and on random specs, with each one's time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from unitcad.accuracy.measures import Measures, makers, of_brep, of_mesh, timed
+from unitcad.accuracy.random_specs import seeded_spec
+from unitcad.accuracy.result import Promise, Result, Say, Table
+from unitcad.accuracy.timing import machine, timing
+from unitcad.errors import Refusal
+from unitcad.kernels import bounds, mesh
+from unitcad.pipeline import Variant
+from unitcad.shape.body import Body
+from unitcad.spec import from_data, templates
+
+_QUANTITIES = ("solids", "volume", "area", "box", "centre")
+
+
+def run(quick: bool, say: Say) -> Result:
+    """manifold3d against OCCT, and OCCT by three libraries against itself."""
+    random = 3 if quick else 100
+    chosen = ("encapsulating", "embedded", "chain") if quick else tuple(templates())
+    worst = {name: dict.fromkeys(_QUANTITIES, 0.0) for name in ("build123d", "CadQuery", "manifold3d")}
+    volume = box = 0.0
+    bodies = 0
+    seconds: dict[str, list[float]] = {}
+    for name, variant in _variants(chosen, random):
+        say(name)
+        parts: list[Body] = [*variant.unit, *variant.plan.tools]
+        shapes = [body.shape for body in parts]
+        bodies += len(parts)
+        found: dict[str, list[Measures]] = {}
+        for kernel, make in makers().items():
+            solids, taken = timed(lambda make=make, shapes=shapes: make(shapes))
+            seconds.setdefault(kernel, []).append(taken)
+            found[kernel] = [of_brep(solid) for solid in solids]
+        mesh.forget()
+        meshes, taken = timed(lambda shapes=shapes, n=variant.segments: [mesh.realise(s, n) for s in shapes])
+        seconds.setdefault("manifold3d", []).append(taken)
+        found["manifold3d"] = [of_mesh(solid) for solid in meshes]
+        for kernel in worst:
+            for exact, other in zip(found["OCCT"], found[kernel], strict=True):
+                for quantity, value in _differences(exact, other).items():
+                    worst[kernel][quantity] = max(worst[kernel][quantity], value)
+        for shape, exact, other in zip(shapes, found["OCCT"], found["manifold3d"], strict=True):
+            off = abs(other.volume - exact.volume)
+            volume = max(volume, off / (bounds.volume_bound(shape, variant.segments) + 1e-9 * exact.volume))
+            far = float(np.max(np.abs(np.subtract(other.box, exact.box))))
+            box = max(box, far / (1.5 * variant.spec.output.tolerance_mm))
+    rows = tuple((kernel, *(worst[kernel][q] for q in _QUANTITIES)) for kernel in worst)
+    base = timing(seconds["CadQuery"]).median
+    times = tuple((kernel, str(timing(values)), timing(values).median / base) for kernel, values in seconds.items())
+    promises = [
+        Promise("solid counts that differ, any kernel", sum(w["solids"] for w in worst.values()), 0),
+        *(Promise(f"{k}: volume against OCCT, relative", worst[k]["volume"], 1e-9) for k in ("build123d", "CadQuery")),
+        *(Promise(f"{k}: box against OCCT, mm", worst[k]["box"], 1e-6) for k in ("build123d", "CadQuery")),
+        Promise("manifold3d: volume over the bound that the segments imply", volume, 1.0),
+        Promise("manifold3d: box over 1.5 times the tolerance", box, 1.0),
+    ]
+    return Result(
+        suite="kernels",
+        title="Agreement of the kernels",
+        text=(
+            f"Every body of {len(chosen)} templates and {random} random specs ({bodies} bodies) from one tree. "
+            "build123d and CadQuery share OCCT, so they agree to rounding; manifold3d shares no code with it, and "
+            "differs "
+            "by what its polygons leave out: at most the bound of `unitcad.kernels.bounds`, written down there."
+        ),
+        tables=(
+            Table(
+                "Largest difference from OCCT",
+                ("kernel", "solid count", "volume, relative", "area, relative", "box, mm", "centre, mm"),
+                rows,
+                f"manifold3d uses {volume:.2g} of its bound on the volume and {box:.2g} of 1.5 times the tolerance.",
+            ),
+            Table("Time for all bodies of one spec, trees to solids, warm", ("kernel", "time", "over CadQuery"), times),
+        ),
+        promises=tuple(promises),
+        measured={
+            **machine("manifold3d", "build123d", "cadquery", "cadquery-ocp"),
+            "random specs": random,
+            "bodies": bodies,
+        },
+    )
+
+
+def _variants(chosen: tuple[str, ...], random: int) -> Iterator[tuple[str, Variant]]:
+    for name in chosen:
+        yield name, Variant.of(name)
+    seed = found = 0
+    while found < random:
+        try:
+            variant = Variant(from_data(seeded_spec(seed)))
+            _ = variant.plan
+        except Refusal:
+            variant = None
+        seed += 1
+        if variant:
+            found += 1
+            yield f"random {seed - 1}", variant
+
+
+def _differences(exact: Measures, other: Measures) -> dict[str, float]:
+    return {
+        "solids": abs(exact.solids - other.solids),
+        "volume": abs(other.volume / exact.volume - 1),
+        "area": abs(other.area / exact.area - 1),
+        "box": float(np.max(np.abs(np.subtract(exact.box, other.box)))),
+        "centre": math.dist(exact.centre, other.centre),
+    }
