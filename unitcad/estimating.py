@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any, Literal, cast
 
-from unitcad.attenuation.estimate import estimate, frequency_table
+from unitcad.attenuation.curve import layered_block
+from unitcad.attenuation.estimate import Layered, estimate, frequency_table
 from unitcad.attenuation.inputs import Quantity, SiliconeLayer, TissueLayer, Variant
 from unitcad.attenuation.rheology import FractionalKelvinVoigt
 from unitcad.catalogue import Material, Tissue, Value, choose, materials, motors, tissue
@@ -16,12 +17,17 @@ from unitcad.spec import Spec
 NO_MODULUS = "no small-strain modulus at the motor's frequency is known; the data sheet's 100 % modulus is static"
 
 
-def estimate_spec(spec: Spec, models: Sequence[str] | None = None, frequency_hz: float | None = None) -> dict[str, Any]:
+def estimate_spec(
+    spec: Spec,
+    models: Sequence[str] | None = None,
+    frequency_hz: float | None = None,
+    layered: Layered = layered_block,
+) -> dict[str, Any]:
     """The estimate of a spec as JSON-ready data (`unitcad.attenuation.estimate`); the same spec gives the same data.
 
     Raises `Refusal` where no frequency is known, for an unknown material or tissue, and for values no body has.
     """
-    return estimate(variant_of(spec, frequency_hz), tuple(models or spec.estimate.models))
+    return estimate(variant_of(spec, frequency_hz), tuple(models or spec.estimate.models), layered)
 
 
 def frequency_table_of_spec(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -28,9 +28,13 @@ TABLE_NOTE = (
 DECAY_AT_MM = (5.0, 10.0, 20.0, 30.0)
 
 
-def estimate(variant: Variant, models: Sequence[str] = MODELS) -> dict[str, Any]:
+Layered = Callable[[Variant], dict[str, Any]]
+
+
+def estimate(variant: Variant, models: Sequence[str] = MODELS, layered: Layered = layered_block) -> dict[str, Any]:
     """{variant, models, layered, measured, table_error, assumptions}; numbers to nine significant digits.
 
+    `layered` gives the layered solver's block, which reads no silicone: variants on one body share it.
     A quantity that can't be given is null beside a `reason`. Raises `Refusal` for values that no body has.
     """
     errors = table_error()
@@ -43,12 +47,28 @@ def estimate(variant: Variant, models: Sequence[str] = MODELS) -> dict[str, Any]
     data = {
         "variant": variant_block(variant),
         "models": blocks,
-        "layered": layered_block(variant),
+        "layered": layered(variant),
         "measured": measured_block(variant),
         "table_error": errors,
         "assumptions": [*ASSUMPTIONS, *([f"A range, not a value: {note}" for note in notes])],
     }
     return rounded(data)
+
+
+def summary(estimated: dict[str, Any]) -> dict[str, Any]:
+    """What a table or a manifest says of an estimate: edge level and its geometric-mean error by model, measured."""
+    models = {
+        name: {
+            "edge": block["edge_level"].get("value"),
+            "table_error": block["table_error"]["levels"]["geometric_mean"],
+        }
+        for name, block in estimated["models"].items()
+    }
+    return {
+        "models": models,
+        "measured": estimated["measured"].get("level"),
+        "frequency_hz": estimated["variant"]["frequency_hz"]["value"],
+    }
 
 
 def frequency_table(variant: Variant, frequencies: Sequence[float], models: Sequence[str] = MODELS) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad import __version__
-from unitcad.cache import MemoryStore, Store
+from unitcad.cache import MemoryStore, Store, digest
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.geometry import findings_count, geometry, pictures
@@ -156,6 +156,7 @@ class _Making:
             "parts": [self._part(part) for part in shape["parts"]],
             "steps": [self._step(step) for step in shape["steps"]],
             "laws": self._laws(shape),
+            "estimate": self._estimate(),
             "check": findings_count(shape["check"]),
             "pictures": [path for path in files if path.endswith(".png")],
             "left_out": self._left_out(),
@@ -172,6 +173,25 @@ class _Making:
 
         strained = laws.strain_law(self.spec, [laws.Strain(**strain) for strain in shape["strains"]])
         return sorted(shape["laws"] + [laws.as_dict(finding) for finding in strained], key=lambda law: law["code"])
+
+    def _estimate(self) -> dict[str, Any] | None:
+        """estimate.json and its summary. The layered solver's part reads no silicone: the store shares it."""
+        if "estimate" not in self.only:
+            return None
+        from unitcad.attenuation.curve import layered_block
+        from unitcad.attenuation.estimate import rounded, summary
+        from unitcad.attenuation.inputs import Variant as Asked
+        from unitcad.estimating import estimate_spec
+
+        def shared(asked: Asked) -> dict[str, Any]:
+            reads = (asked.tissue_name, asked.tissue, asked.frequency, asked.diameter, asked.motor_diameter)
+            key = digest(repr((reads, code_version())).encode())
+            return self.store.data(key, lambda: rounded(layered_block(asked)))
+
+        with self.stages("estimate"):
+            estimated = estimate_spec(self.spec, layered=shared)
+        self.own["estimate.json"] = _json(estimated)
+        return summary(estimated)
 
     def _pictures(self) -> dict[str, str]:
         """The shaded pictures; where this machine can't draw, what it lacks is told and the drawing stays."""

@@ -126,9 +126,12 @@ def _with_defaults(spec: Spec) -> Spec:
         )
         if radius > 0:
             fpcb = fpcb.model_copy(update={"pad_diameter_mm": round(2 * radius, 9)})
+    unknown = dict(UNKNOWN_MOTOR)
+    if catalogue_motor and catalogue_motor.rpm:
+        unknown["frequency_hz"] = round(float(catalogue_motor.rpm) / 60, 3)
     motor_values = {
         field: getattr(spec.estimate, field) or float(getattr(catalogue_motor, field, None) or default)
-        for field, default in UNKNOWN_MOTOR.items()
+        for field, default in unknown.items()
     }
     estimate = spec.estimate.model_copy(update=motor_values)
     catalogue.tissue(spec.estimate.tissue, spec.tissue)
