@@ -18,6 +18,9 @@ def build(
     sets: Sets = None,
     formats: Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb; else the spec's.")] = None,
     only: Annotated[str | None, typer.Option(help="unit,moulds,estimate,casting; else all.")] = None,
+    page: Annotated[
+        bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")
+    ] = False,
     no_check: Annotated[bool, typer.Option("--no-check", help="Leave out the laws and the mesh checks.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
@@ -26,6 +29,7 @@ def build(
     from unitcad.cli.output import print_json, progress
     from unitcad.pipeline import OUTPUTS
     from unitcad.pipeline import build as run
+    from unitcad.report import PAGE, write_report
     from unitcad.spec import load
 
     overrides = [*(sets or []), *chosen_formats(formats)]
@@ -36,6 +40,9 @@ def build(
     for spec in wanted:
         with progress(spec.name) as say:
             results.append(run(spec, out, only=chosen, check=not no_check, say=say))
+            if page or (results[-1].folder / PAGE).is_file():
+                say("page")
+                write_report(results[-1].folder)
     if as_json:
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
     else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -61,26 +60,28 @@ def variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]:
 def table(folder: Path, variants: list[dict[str, Any]]) -> dict[str, Any]:
     """A batch's table: `columns` and `rows`, each row with the folder of its variant first ("" for one that failed).
 
-    From variants.csv where the batch wrote one, else from the manifests.
+    As batch.json lists them where there is one, else from the manifests.
     """
-    file = folder / "variants.csv"
-    if file.is_file():
-        with file.open(newline="", encoding="utf-8") as lines:
-            rows = list(csv.DictReader(lines))
-        if rows and "folder" in rows[0]:
-            columns = [name for name in rows[0] if name != "folder"]
-            return {"columns": columns, "rows": [[r["folder"] or "", *(_value(r[c]) for c in columns)] for r in rows]}
-    rows = [_row(each) for each in variants]
-    columns = list(dict.fromkeys(name for row in rows for name in row))
+    said = _json(folder / "batch.json")
+    if isinstance(said, dict) and isinstance(said.get("variants"), list):
+        entries, columns = said["variants"], [name for name in said.get("columns", []) if name != "folder"]
+    else:
+        entries = [{"folder": each["folder"], **_row(each)} for each in variants]
+        columns = [name for name in dict.fromkeys(name for entry in entries for name in entry) if name != "folder"]
+    there = {each["folder"] for each in variants}
     return {
         "columns": columns,
-        "rows": [[each["folder"], *(row.get(c) for c in columns)] for each, row in zip(variants, rows, strict=True)],
+        "rows": [
+            [entry.get("folder") if entry.get("folder") in there else "", *(_cell(entry.get(c)) for c in columns)]
+            for entry in entries
+        ],
     }
 
 
 def batch(folder: Path) -> dict[str, Any] | None:
-    """What the batch says of itself: batch.json, or None."""
-    return _json(folder / "batch.json")
+    """What the batch says of itself: batch.json without its variants, or None."""
+    said = _json(folder / "batch.json")
+    return {key: value for key, value in said.items() if key != "variants"} if isinstance(said, dict) else None
 
 
 def _row(each: dict[str, Any]) -> dict[str, Any]:
@@ -98,15 +99,11 @@ def _row(each: dict[str, Any]) -> dict[str, Any]:
     return row
 
 
-def _value(text: str | None) -> Any:
-    """A cell of a CSV file: a finite number where it reads as one, None where it is empty."""
-    if text is None or text == "":
+def _cell(value: Any) -> Any:
+    """A cell that the page can sort: a number, a text, or None."""
+    if value is None or value == "":
         return None
-    try:
-        number = float(text)
-    except ValueError:
-        return text
-    return number if abs(number) < float("inf") else text
+    return value if isinstance(value, int | float | str) and not isinstance(value, bool) else json.dumps(value)
 
 
 def _json(path: Path) -> Any:

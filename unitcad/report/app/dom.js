@@ -55,14 +55,12 @@ window.unitcad = {};
   }
 
   function table(head, rows, options = {}) {
+    const numeric = head.map((name, i) => rows.some((row) => typeof (row.cells || row)[i] === "number") ? "number" : undefined);
     const body = rows.map((row) =>
-      el("tr", { className: row.className }, (row.cells || row).map((cell) =>
-        el("td", { className: typeof cell === "number" ? "number" : undefined }, typeof cell === "number" ? number(cell) : cell))));
+      el("tr", { className: row.className }, (row.cells || row).map((cell, i) =>
+        el("td", { className: numeric[i] }, typeof cell === "number" ? number(cell) : cell))));
     const caption = options.caption && el("caption", {}, options.caption);
-    const names = el("tr", {}, head.map((name, i) => {
-      const first = rows.length ? (rows[0].cells || rows[0])[i] : null;
-      return el("th", { scope: "col", className: typeof first === "number" ? "number" : undefined }, name);
-    }));
+    const names = el("tr", {}, head.map((name, i) => el("th", { scope: "col", className: numeric[i] }, name)));
     return el("div", { className: "scroll", tabindex: "0", role: "group", "aria-label": options.label || options.caption || "table" },
       el("table", {}, caption, el("thead", {}, names), el("tbody", {}, body)));
   }

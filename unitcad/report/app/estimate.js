@@ -1,6 +1,142 @@
+// The attenuation estimate: levels at the edge with spread and measured value, curves outwards, margins, errors.
 (() => {
   "use strict";
-  const { el, section, facts, absent } = window.unitcad;
-  window.unitcad.estimate = (variant) => section("estimate", "Attenuation estimate",
-    variant.estimate ? facts(variant.estimate) : el("p", { className: "absent" }, "No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")));
+  const { el, number, section, table, facts, theme, curvePlot } = window.unitcad;
+  const NAMES = { paper: "Paper, as printed", consistent: "Paper's path, mended", fitted: "Fitted divider", crossings: "Crossings alone", null: "Null: two constants" };
+  const nameOf = (model) => NAMES[model] || model;
+  const known = (value) => typeof value === "number" && Number.isFinite(value);
+
+  // Where a value lies on a logarithmic rule, in percent.
+  function rule(values) {
+    const from = Math.min(...values) / 1.5;
+    const to = Math.max(...values) * 1.5;
+    const at = (value) => (100 * Math.log(value / from)) / Math.log(to / from);
+    const ticks = [];
+    for (let decade = Math.floor(Math.log10(from)); decade <= Math.ceil(Math.log10(to)); decade += 1) {
+      for (const step of [1, 2, 5]) {
+        const value = step * 10 ** decade;
+        if (value >= from && value <= to) ticks.push(value);
+      }
+    }
+    return { at, ticks };
+  }
+
+  const spoken = (entry) => {
+    const spread = known(entry.low) && known(entry.high) && entry.low !== entry.high ? `${number(entry.low, 3)} to ${number(entry.high, 3)}` : "";
+    if (known(entry.value)) return spread ? `${number(entry.value, 3)} (${spread})` : number(entry.value, 3);
+    return spread || "not known";
+  };
+
+  // rows: [{name, entry: {value, low, high}, colour}]; marks: [{name, value}] stand as lines across all rows.
+  function rangeChart(rows, marks, caption) {
+    const values = [...rows.flatMap(({ entry }) => [entry.value, entry.low, entry.high]), ...marks.map((mark) => mark.value)].filter((v) => known(v) && v > 0);
+    if (!values.length) return null;
+    const { at, ticks } = rule(values);
+    const placed = (className, left, width) => {
+      const node = el("span", { className, "aria-hidden": "true" });
+      node.style.left = `${left}%`;
+      if (width !== undefined) node.style.width = `${width}%`;
+      return node;
+    };
+    const line = ({ name, entry, colour }) => {
+      const track = el("div", { className: "track" }, ticks.map((value) => placed("grid", at(value))), marks.map((mark) => placed("mark", at(mark.value))));
+      const bar = known(entry.low) && known(entry.high) && placed("bar", at(entry.low), Math.max(0.4, at(entry.high) - at(entry.low)));
+      const dot = known(entry.value) && placed("dot", at(entry.value));
+      for (const node of [bar, dot].filter(Boolean)) {
+        theme.watch(node, () => { node.style.background = theme.colour(colour); });
+        track.append(node);
+      }
+      return el("div", { className: "row" }, el("span", { className: "name" }, name), track, el("span", { className: "value" }, spoken(entry)));
+    };
+    const scale = el("div", { className: "row scale", "aria-hidden": "true" }, el("span"), el("div", { className: "track" }, ticks.map((value) => {
+      const label = placed("tick", at(value));
+      label.textContent = number(value);
+      return label;
+    })), el("span"));
+    const legend = marks.map((mark) => el("li", {}, el("span", { className: "swatch mark", "aria-hidden": "true" }), `${mark.name}: ${number(mark.value)}`));
+    return el("figure", { className: "ranges" }, el("figcaption", {}, caption), rows.map(line), scale, legend.length > 0 && el("ul", { className: "key" }, legend));
+  }
+
+  const COLOURS = { paper: "series-1", consistent: "series-3", fitted: "series-2" };
+
+  function levels(data) {
+    const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: block.edge_level || {}, colour: COLOURS[model] || "series-4" }));
+    const measured = data.measured || {};
+    const marks = [["Measured", measured.level], ["Also printed", measured.also_printed]].filter(([, value]) => known(value)).map(([name, value]) => ({ name, value }));
+    const reasons = [...new Set(rows.map(({ entry }) => entry.reason).filter(Boolean))];
+    return [
+      rangeChart(rows, marks, "Level at the unit's edge, of the motor's amplitude; a bar is the spread from the inputs' ranges."),
+      reasons.map((reason) => el("p", { className: "note" }, reason)),
+      marks.length > 0 ? el("p", { className: "note" }, measured.note, measured.same_size === false ? " It was measured at another size." : "") : el("p", { className: "note" }, "The paper measured no such unit."),
+    ];
+  }
+
+  function ratios(data) {
+    const controls = [...new Set(Object.values(data.models || {}).flatMap((block) => (block.hierarchical_over_control || []).map((entry) => entry.control)))];
+    return controls.map((control) => {
+      const rows = Object.entries(data.models).flatMap(([model, block]) => (block.hierarchical_over_control || []).filter((entry) => entry.control === control).map((entry) => ({ name: nameOf(model), entry, colour: COLOURS[model] || "series-4" })));
+      const marks = ((data.measured || {}).hierarchical_over_control || []).filter((entry) => entry.control === control && known(entry.value)).map((entry) => ({ name: "Measured", value: entry.value }));
+      return rangeChart(rows, marks, `Unit over a control all of ${control}: below 1 it attenuates.`);
+    });
+  }
+
+  function curves(layered) {
+    if (!layered || !layered.r_mm) return el("p", { className: "absent" }, (layered && layered.reason) || "No curve.");
+    const x = layered.r_mm;
+    const series = [];
+    const add = (name, block, more) => block && block.value && series.push({ name, x, y: block.value, low: block.low, high: block.high, ...more });
+    add("Layered skin, across it (u_z)", layered.u_z, { colour: 0 });
+    add("Layered skin, along it (u_r)", layered.u_r, { colour: 2 });
+    const print = layered.paper_beside;
+    if (print) {
+      if (print.j0) series.push({ name: "Paper: |J0(kr)|", x, y: print.j0.map(Math.abs), dash: true, colour: 1 });
+      for (const [reading, values] of Object.entries(print.exponential || {})) series.push({ name: `Paper: exp, eta as ${reading.replace("_", " ")}`, x, y: values, dash: true, colour: reading === "loss_modulus" ? 3 : 4 });
+    }
+    const every = Math.max(1, Math.floor(x.length / 7));
+    const rows = x.map((r, i) => [r, ...series.map((curve) => curve.y[i])]).filter((row, i) => i % every === 0);
+    return [
+      curvePlot(series, { xLabel: "distance from the edge (mm)", yLabel: "of |u_z| at the edge", log: true, label: "Decay from the unit's edge outwards" }),
+      el("p", { className: "note" }, `At ${number(layered.frequency_hz)} Hz on ${layered.tissue}. The band is the spread: ${layered.spread}. No ratio to a control: ${layered.hierarchical_over_control_reason}.`),
+      el("details", {}, el("summary", {}, "The curve as numbers"), table(["r (mm)", ...series.map((curve) => curve.name)], rows, { label: "The curve as numbers" })),
+    ];
+  }
+
+  function margins(models) {
+    const rows = (models.paper && models.paper.constraints) || [];
+    if (!rows.length) return null;
+    return [el("h3", {}, "The paper's constraints"), table(["Equation", "Says", "Control", "Left", "", "Right", "Margin", ""], rows.map((row) => ({
+      className: row.holds === false ? "bad" : undefined,
+      cells: [row.equation, row.text, row.control || "", row.left, row.relation, row.right, row.margin, row.holds === true ? "holds" : row.holds === false ? "fails" : row.reason || "not known"],
+    })), { label: "The paper's constraints" })];
+  }
+
+  function errors(data) {
+    const judged = Object.entries(data.table_error || {}).filter(([, entry]) => entry && entry.levels);
+    if (!judged.length) return null;
+    const factor = (entry) => (entry ? entry.geometric_mean : "–");
+    const out = (entry, key) => factor((entry.leave_one_unit_out || {})[key]);
+    return [el("h3", {}, "Error against the measured table"),
+      table(["Model", "Nine levels", "left out", "worst", "Twelve ratios", "left out", "Directions"], judged.map(([model, entry]) => [
+        nameOf(model), factor(entry.levels), out(entry, "levels"), entry.levels.worst, factor(entry.ratios), out(entry, "ratios"),
+        entry.directions ? `${entry.directions.right} of ${entry.directions.of}` : "–"]), { label: "Error against the measured table" }),
+      el("p", { className: "note" }, `Factors; 1 is exact. ${(data.table_error.what || "")}`)];
+  }
+
+  function assumptions(data) {
+    const own = Object.entries(data.models || {}).map(([model, block]) => [el("h4", {}, nameOf(model)), el("p", {}, block.kind), el("ul", {}, (block.assumptions || []).map((text) => el("li", {}, text)))]);
+    const layered = (data.layered && data.layered.assumptions) || [];
+    return el("details", {}, el("summary", {}, "What it assumes and leaves out"), el("ul", {}, (data.assumptions || []).map((text) => el("li", {}, text))),
+      own, layered.length > 0 && [el("h4", {}, "Layered skin"), el("ul", {}, layered.map((text) => el("li", {}, text)))]);
+  }
+
+  function estimate(variant) {
+    const data = variant.estimate;
+    if (!data) return section("estimate", "Attenuation estimate", el("p", { className: "absent" }, "No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")));
+    return section("estimate", "Attenuation estimate",
+      el("p", {}, "An estimate, not a measurement: how much of the motor's amplitude reaches the skin at the unit's edge, by each model, and how it decays from there."),
+      levels(data), ratios(data), el("h3", {}, "Outwards from the edge"), curves(data.layered), margins(data.models || {}), errors(data), assumptions(data),
+      el("details", {}, el("summary", {}, "All its numbers"), facts(data)));
+  }
+
+  Object.assign(window.unitcad, { estimate });
 })();

@@ -37,9 +37,10 @@
 
   // curves: [{name, x: [], y: [], low: [], high: [], points: bool, dash: bool}]
   function curvePlot(curves, { xLabel, yLabel, log = false, label }) {
+    const tip = el("p", { className: "tip", "aria-live": "polite" }, "Point at the curves to read them.");
     const { host } = hosted(320, (node, width, height) => {
       const tables = [];
-      const series = [{ label: xLabel, value: (u, v) => tick(v) }];
+      const series = [{ label: xLabel }];
       const bands = [];
       const positive = (values) => (log ? values.map((v) => (v > 0 ? v : null)) : values);
       curves.forEach((curve, i) => {
@@ -49,25 +50,39 @@
           label: curve.name, stroke: colour, width: curve.points ? 0 : 2, dash: curve.dash ? [6, 4] : undefined, spanGaps: !curve.points,
           paths: curve.points ? () => null : undefined,
           points: curve.points ? { show: true, size: 11, fill: colour, stroke: theme.colour("paper"), width: 2 } : { show: false },
-          value: (u, v) => tick(v),
         });
         if (curve.low && curve.high) {
           const at = series.length;
           columns.push(positive(curve.high), positive(curve.low));
-          for (const edge of ["high", "low"]) series.push({ label: `${curve.name}, ${edge}`, stroke: "transparent", width: 0, points: { show: false }, spanGaps: true, value: (u, v) => tick(v) });
+          for (const edge of ["high", "low"]) series.push({ label: `${curve.name}, ${edge}`, stroke: "transparent", width: 0, points: { show: false }, spanGaps: true });
           bands.push({ series: [at, at + 1], fill: `${colour}33` });
         }
         tables.push(columns);
       });
       const options = {
         width, height, series, bands, axes: axes(xLabel, yLabel),
-        scales: { x: { time: false }, y: log ? { distr: 3 } : {} }, legend: { live: true }, cursor: { drag: { x: false, y: false } },
+        scales: { x: { time: false }, y: log ? { distr: 3 } : {} }, legend: { show: false }, cursor: { drag: { x: false, y: false } },
+        hooks: { setCursor: [(u) => {
+          const i = u.cursor.idx;
+          if (i === null || i === undefined || u.cursor.left < 0) return;
+          const read = u.series.map((each, at) => [each, u.data[at][i]]).filter(([each, v], at) => at > 0 && each.stroke && !/, (high|low)$/.test(each.label) && v !== null && v !== undefined);
+          tip.textContent = `${xLabel} ${tick(u.data[0][i])} — ${read.map(([each, v]) => `${each.label} ${tick(v)}`).join("; ")}`;
+        }] },
       };
       return new uPlot(options, uPlot.join(tables), node);
     });
     host.setAttribute("role", "img");
     host.setAttribute("aria-label", label);
-    return host;
+    return el("div", {}, host, keyOf(curves.map((curve, i) => [curve.name, curve.colour ?? i, curve.dash ? "dash" : "line"])), tip);
+  }
+
+  // entries: [name, colour index, "round" | "line" | "dash"]
+  function keyOf(entries) {
+    return el("ul", { className: "key" }, entries.map(([name, colour, kind]) => {
+      const swatch = el("span", { className: `swatch ${kind}`, "aria-hidden": "true" });
+      theme.watch(swatch, () => { swatch.style.color = theme.colour(COLOURS[colour % COLOURS.length]); });
+      return el("li", {}, swatch, name);
+    }));
   }
 
   // Numbers stay numbers; texts get places 0, 1, ... in their order.
@@ -144,11 +159,7 @@
     });
     host.setAttribute("role", "img");
     host.setAttribute("aria-label", label);
-    const key = el("ul", { className: "key" }, groups.length > 1 && groups.slice(0, 12).map((group, i) => {
-      const swatch = el("span", { className: "swatch round", "aria-hidden": "true" });
-      theme.watch(swatch, () => { swatch.style.background = theme.colour(COLOURS[i % COLOURS.length]); });
-      return el("li", {}, swatch, group);
-    }));
+    const key = groups.length > 1 && keyOf(groups.slice(0, 12).map((group, i) => [group, i, "round"]));
     tip.textContent = `${drawn.length} of ${points.length} points. Point at one to read it, click to open it.`;
     return el("div", {}, host, key, tip);
   }
