@@ -110,7 +110,7 @@ def _check(path: Path, options: Options, deadline: Deadline) -> tuple[list[Findi
     if kind == "step":
         from unitcad.check.read_step import check_step
 
-        return check_step(path, view, options.limits)
+        return check_step(path, view, options)
     if kind == "stl":
         from unitcad.check.read_stl import read_stl as read
     else:

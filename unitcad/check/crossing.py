@@ -121,7 +121,7 @@ def _height_fields(n: int, corners: tuple[Ints, ...], at: list[list[Floats]], ar
     Needs a closed mesh; the count of turns is that of neighbours that pass a half-plane through the normal.
     """
     area = [np.ascontiguousarray(areas[:, axis]) for axis in range(3)]
-    mean = [sum(np.bincount(corner, column, n) for corner in corners) for column in area]
+    mean = [_summed(corners, column, n) for column in area]
     length = np.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
     own = 1e-6 * np.sqrt(area[0] ** 2 + area[1] ** 2 + area[2] ** 2)
     # A half-plane through the normal and its cross product with one axis, the one that the normal has least of.
@@ -144,6 +144,10 @@ def _height_fields(n: int, corners: tuple[Ints, ...], at: list[list[Floats]], ar
         good[corner[~(up > own * length[corner])]] = False
         turns += np.bincount(corner[(one > 0) & (other <= 0)], minlength=n)
     return good & (turns == 1)
+
+
+def _summed(corners: tuple[Ints, ...], column: Floats, n: int) -> Floats:
+    return np.sum([np.bincount(corner, column, n) for corner in corners], axis=0)
 
 
 def _strangers(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
@@ -186,11 +190,14 @@ def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> N
     j = np.concatenate([pair[1] for pair in waiting]) if waiting else np.empty(0, np.int32)
     if not len(i) or found.kept > _FEW:
         return
-    a = np.stack([faces.vertices[corner[i]] for corner in faces.corners], axis=1)
-    b = np.stack([faces.vertices[corner[j]] for corner in faces.corners], axis=1)
     ids_a = np.stack([corner[i] for corner in faces.corners], axis=1)
     ids_b = np.stack([corner[j] for corner in faces.corners], axis=1)
     shared = (ids_a[:, :, None] == ids_b[:, None, :]).sum(axis=(1, 2))
+    # Neighbours across an edge meet elsewhere only if one is folded flat onto the other.
+    open_ = (shared >= 2) & (np.einsum("ij,ij->i", faces.normal[i], faces.normal[j]) > 0)
+    if open_.any():
+        i, j, ids_a, ids_b, shared = (array[~open_] for array in (i, j, ids_a, ids_b, shared))
+    a, b = faces.vertices[ids_a], faces.vertices[ids_b]
     meeting = triangles.meet(a, b)
     pair = np.stack([i, j], axis=1)
     crossing = meeting.crosses & (shared < 2)
@@ -221,7 +228,7 @@ def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> N
 
 
 def _wide(a: Floats, b: Floats, least: float) -> Bools:
-    """Of coplanar pairs that overlap: whether both are higher than `least`. Lower ones are rounding's, not the design's."""
+    """Of coplanar pairs that overlap: whether both are higher than `least`. Lower ones are made by rounding."""
     high = np.ones(len(a), bool)
     for corners in (a, b):
         double = area_vectors(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
@@ -251,7 +258,7 @@ def _said(topology: Topology, faces: _Faces, found: _Found) -> Crossings:
     def places(pairs: Ints) -> list[Location]:
         shown = []
         for i in pairs[:9, 0]:
-            centre = sum(faces.vertices[corner[i]] for corner in faces.corners) / 3
+            centre = np.mean([faces.vertices[corner[i]] for corner in faces.corners], axis=0)
             xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
             shown.append(Location(face=int(faces.original[i]), xyz=xyz, part=name))
         return sorted(shown, key=lambda place: place.face or 0)

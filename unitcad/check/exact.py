@@ -53,7 +53,7 @@ def orient2d(a: Floats, b: Floats, c: Floats) -> Ints:
 
 
 def _exact3d(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
-    """The same with whole numbers. Many coplanar faces lie on an axis: equal coordinates are seen without arithmetic."""
+    """The same with whole numbers. Faces that lie on an axis have equal coordinates: no arithmetic is needed."""
     sign = np.zeros(len(a), np.int8)
     flat = ((a == b) & (b == c) & (c == d)).any(axis=1)
     rest = np.flatnonzero(~flat)

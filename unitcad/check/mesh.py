@@ -6,13 +6,15 @@ Readers give a triangle soup or an indexed mesh; `weld_exact` makes the one into
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.floating]
-Ints = NDArray[np.integer]
-Bools = NDArray[np.bool_]
+# What an array holds; numpy's own generic types make every sum and mask a union that a type checker cannot follow.
+Floats = NDArray[Any]
+Ints = NDArray[Any]
+Bools = NDArray[Any]
 
 
 @dataclass(frozen=True)

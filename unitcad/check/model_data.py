@@ -36,7 +36,7 @@ class Use:
 
 @dataclass
 class Object(Resource):
-    """An object resource: a mesh (vertices (n, 3), triangles (m, 7): v1 v2 v3 p1 p2 p3 pid, -1 for none) or components."""
+    """An object: a mesh (vertices (n, 3), triangles (m, 7): v1 v2 v3 p1 p2 p3 pid, -1 for none) or components."""
 
     type: str = "model"
     vertices: Floats | None = None

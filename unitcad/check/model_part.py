@@ -64,13 +64,13 @@ class _Reader:
             if self.skip > _DEPTH:
                 raise over_limit(f"elements nest deeper than {_DEPTH}")
             return
-        if name == _VERTEX and len(flat) == 6 and flat[0] == "x" and flat[2] == "y" and flat[4] == "z":
-            if self.stack[-1].name == "vertices" and self.stack[-1].space == schema.CORE:
-                self.numbers += flat[1::2]
-                self.stack.append(_LEAF)
-                if len(self.numbers) >= 3 * _BATCH:
-                    self._flush_vertices()
-                return
+        above = self.stack[-1]
+        if name == _VERTEX and flat[::2] == _XYZ and above.name == "vertices" and above.space == schema.CORE:
+            self.numbers += flat[1::2]
+            self.stack.append(_LEAF)
+            if len(self.numbers) >= 3 * _BATCH:
+                self._flush_vertices()
+            return
         if len(self.stack) > _DEPTH:
             raise over_limit(f"elements nest deeper than {_DEPTH}")
         space, _, local = name.rpartition(" ")
@@ -78,9 +78,8 @@ class _Reader:
         rules = schema.ELEMENTS.get(space, {}).get(local)
         self._child(space, local, rules)
         if rules is None:
-            if space in (schema.BOOLEAN, schema.DISPLACEMENT, schema.OLD_DISPLACEMENT, schema.IMPLICIT):
-                if isinstance(self.resource, Object):
-                    self.resource.other_shape = True
+            if space in _SHAPES and isinstance(self.resource, Object):
+                self.resource.other_shape = True
             if self.stack[-1].name == "resources" and attributes.get("id", "").isdecimal():
                 self._foreign(int(attributes["id"]))
             for attribute in attributes:
@@ -347,12 +346,15 @@ class _Reader:
             self.model.say("P017", f"object {found.id} has a mesh and components")
 
 
+# Extensions whose elements take the place of an object's mesh.
+_SHAPES = {schema.BOOLEAN, schema.DISPLACEMENT, schema.OLD_DISPLACEMENT, schema.IMPLICIT}
+_XYZ = ["x", "y", "z"]
 _LEAF = _Open(schema.CORE, "vertex", None)
 _VERTEX = f"{schema.CORE} vertex"
 
 
 def read_model(chunks: Iterable[bytes], part: str, limits: Limits, spent_faces: int = 0) -> Model:
-    """Read one model part. Schema faults are in the model's findings; raises `Unreadable` where XML or a limit ends it."""
+    """Read one model part. Schema faults are the model's findings; raises `Unreadable` where XML or a limit ends it."""
     model = Model(part)
     reader = _Reader(model, limits, spent_faces)
     try:

@@ -59,7 +59,7 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
     corners = records["corners"]
     finite = np.isfinite(corners)
     if not finite.all():
-        findings.append(_not_finite(finite.all(axis=(1, 2))))
+        findings.append(_not_finite(np.asarray(finite.all(axis=(1, 2)))))
         return [], findings
     vertices, faces = weld_exact(corners)
     normals = np.ascontiguousarray(records["normal"])
@@ -112,7 +112,7 @@ def _read_text(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[li
         single = corners.astype(np.float32)
     finite = np.isfinite(single)
     if not finite.all():
-        found.findings.append(_not_finite(finite.all(axis=(1, 2))))
+        found.findings.append(_not_finite(np.asarray(finite.all(axis=(1, 2)))))
         return [], found.findings
     del single
     vertices, faces = weld_exact(corners)

@@ -1,4 +1,4 @@
-"""References inside a 3MF model: objects (P012), properties (P019), indices (P011), and what extensions ask of theirs."""
+"""References inside a 3MF model: objects (P012), properties (P019), indices (P011), and those of extensions."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Rule:
 @cache
 def rules() -> dict[str, Rule]:
     """All rules by code, in the table's order."""
-    table = tomllib.loads((files(__package__) / "rules.toml").read_text("utf-8"))
+    table = tomllib.loads((files("unitcad.check") / "rules.toml").read_text("utf-8"))
     return {code: Rule(code, **entry) for code, entry in table.items()}
 
 
@@ -71,7 +71,7 @@ def markdown() -> str:
     lines = [
         "# Rules of `unitcad check`",
         "",
-        "Made from `unitcad/check/rules.toml` by `python -m unitcad.check.rulebook`; a test holds the two together.",
+        "Made from `unitcad/check/rules.toml` by `python docs/make_checks.py`; a test holds the two together.",
         "Severity: an error fails a run, a warning does with `--fail-on warning`, an info never does.",
         "",
     ]
@@ -93,7 +93,3 @@ def check_prefixes(option: str, prefixes: Sequence[str]) -> tuple[str, ...]:
             raise unknown_name(option, prefix, rules())
         kept.append(wanted)
     return tuple(kept)
-
-
-if __name__ == "__main__":
-    print(markdown(), end="")

@@ -29,7 +29,7 @@ class Meeting:
 
 
 def _table() -> tuple[Ints, Bools]:
-    """By the three signs (index 9 p + 3 q + r + 13): which corner stands alone, and whether the other one is flipped."""
+    """By three signs (index 9 p + 3 q + r + 13): which corner stands alone, and whether the other one is flipped."""
     alone, flip = np.zeros(27, np.int8), np.zeros(27, bool)
     for index in range(27):
         p, q, r = index // 9 - 1, index // 3 % 3 - 1, index % 3 - 1
@@ -71,11 +71,11 @@ def meet(a: Floats, b: Floats) -> Meeting:
 
 
 def _one_side(sides: Ints) -> Bools:
-    return (sides > 0).all(axis=1) | (sides < 0).all(axis=1)
+    return np.asarray((sides > 0).all(axis=1) | (sides < 0).all(axis=1))
 
 
 def _straddles(sides: Ints) -> Bools:
-    return (sides > 0).any(axis=1) & (sides < 0).any(axis=1)
+    return np.asarray((sides > 0).any(axis=1) & (sides < 0).any(axis=1))
 
 
 def _compared(a: Floats, b: Floats, side_a: Ints, side_b: Ints) -> tuple[Ints, Ints]:

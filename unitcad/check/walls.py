@@ -1,7 +1,7 @@
 """D001: thin walls, measured by short rays from points spread over the faces to the face behind them.
 
-A wall has two faces that are nearly parallel (PARALLEL), a thickness below the floor, and reaches farther than the floor
-in two directions; so bevels and wedges, tapered edges and the strips between engraved strokes are none.
+A wall has two faces that are nearly parallel (PARALLEL), a thickness below the floor, and reaches farther than the
+floor in two directions; so bevels and wedges, tapered edges and the strips between engraved strokes are none.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float)
 def _behind(
     corners: Floats, normal: Floats, sound: Floats, points: Floats, owner: Ints, reach: Floats, deadline: Deadline
 ) -> Floats:
-    """The distance from each point, against its face's normal, to the first nearly parallel face; inf beyond `reach`."""
+    """The distance from each point, against its normal, to the first nearly parallel face; inf beyond `reach`."""
     thickness = np.full(len(points), np.inf)
     ends = points - normal[owner] * reach[:, None]
     order = morton_order(points, np.arange(len(points))[:, None].repeat(3, axis=1)) if len(points) else owner

@@ -1,0 +1,8 @@
+"""Writes docs/checks.md from the table of rules that `unitcad check --explain` reads."""
+
+from pathlib import Path
+
+from unitcad.check.rulebook import markdown
+
+if __name__ == "__main__":
+    Path(__file__).with_name("checks.md").write_text(markdown(), "utf-8")

@@ -1,0 +1,117 @@
+"""A build's manifest.json against the files beside it: M001 to M004, and which parts are tools (D and S rules)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from unitcad import catalogue
+from unitcad.check.check import Options
+from unitcad.check.findings import FileReport, Finding, merge
+from unitcad.check.rulebook import finding
+from unitcad.errors import UnitcadError
+
+VOLUME = 1e-3  # M001: a mesh's share of a B-rep's volume that tessellation may cost
+_MESHES = ("stl", "3mf")
+
+
+@dataclass(frozen=True)
+class Part:
+    """What the manifest says of one file: the parts in it (several for an assembly file)."""
+
+    names: tuple[str, ...]
+    tool: bool
+    sha256: str | None
+    volume_mm3: float | None
+    solids: int
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Files of a manifest by absolute path, and the printer it names, if any."""
+
+    folder: Path
+    files: dict[str, Part]
+    printer: str | None
+
+
+def read(where: str) -> Listing:
+    """Read a manifest (its path or its folder). Raises `UnitcadError` if it is none."""
+    path = Path(where)
+    path = path / "manifest.json" if path.is_dir() else path
+    try:
+        data = json.loads(path.read_text("utf-8"))
+        return _listing(path.parent, data)
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise UnitcadError(f"--manifest {where}: cannot be read: {error}") from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise UnitcadError(f"--manifest {where}: not a manifest of `unitcad build`: {error!r}") from error
+
+
+def _listing(folder: Path, data: Any) -> Listing:
+    files: dict[str, Part] = {}
+    for part in data["parts"]:
+        for entry in part["files"].values():
+            path = os.path.abspath(folder / entry["path"])
+            volume = part.get("volume_mm3")
+            new = Part((part["name"],), part["role"] == "tool", entry.get("sha256"), volume, part.get("solids", 1))
+            old = files.get(path)
+            files[path] = new if old is None else _together(old, new)
+    printer = data.get("printer")
+    return Listing(folder, files, printer if isinstance(printer, str) else None)
+
+
+def _together(old: Part, new: Part) -> Part:
+    volume = None if old.volume_mm3 is None or new.volume_mm3 is None else old.volume_mm3 + new.volume_mm3
+    return Part(old.names + new.names, old.tool and new.tool, old.sha256, volume, old.solids + new.solids)
+
+
+def work(listing: Listing, paths: Sequence[str], options: Options, printer_named: bool) -> list[tuple[str, Options]]:
+    """What to judge: the named files, or all meshes of the manifest; tools with a printer, other parts without."""
+    chosen = list(paths) or [os.path.relpath(path) for path in listing.files if path.lower().endswith(_MESHES)]
+    known = catalogue.printers()
+    found = []
+    for path in chosen:
+        part = listing.files.get(os.path.abspath(path))
+        printer = options.printer
+        if part is not None and not printer_named:
+            printer = known.get(listing.printer or "fdm-0.4") if part.tool else None
+        elif part is not None and not part.tool:
+            printer = None
+        found.append((path, replace(options, printer=printer)))
+    return found
+
+
+def compare(listing: Listing, report: FileReport, options: Options) -> FileReport:
+    """The report with what the manifest adds to it."""
+    part = listing.files.get(os.path.abspath(report.path))
+    if part is None:
+        return report
+    added = [item for item in judge(part, report) if options.wants(item.code)]
+    return replace(report, findings=merge([*report.findings, *added]))
+
+
+def judge(part: Part, report: FileReport) -> list[Finding]:
+    """M001 to M004 for one file."""
+    path = Path(report.path)
+    if not path.is_file():
+        return [finding("M004", f"listed for {', '.join(part.names)}")]
+    found = []
+    if part.sha256 is not None:
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        if digest != part.sha256.lower():
+            found.append(finding("M003", f"{digest[:12]} instead of {part.sha256[:12]}"))
+    facts = report.facts
+    if facts.shells is not None and facts.shells != part.solids:
+        found.append(finding("M002", f"{facts.shells} solids, {part.solids} in the manifest"))
+    if facts.volume_mm3 is not None and part.volume_mm3:
+        off = facts.volume_mm3 / part.volume_mm3 - 1
+        if abs(off) > VOLUME:
+            text = f"{facts.volume_mm3:.6g} mm3, {part.volume_mm3:.6g} in the manifest ({off:+.2%})"
+            found.append(finding("M001", text))
+    return found
