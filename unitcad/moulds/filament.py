@@ -18,6 +18,8 @@ FLARE = 1.0
 """Of the filament hole's lower end: the filament bends round it."""
 STUB_TAIL = 8.0
 """How far the bent end stands out of the plate, mm: what one pulls."""
+BITE = 1 / 16
+"""How far the seal reaches into filament and core, mm."""
 _QUARTER = math.tan(math.pi / 8)
 
 
@@ -52,8 +54,12 @@ def stub(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -
 
 
 def annulus(spec: Spec, dims: Dimensions, cell: Cell) -> Shape:
-    """The ring between filament and hole: too narrow for silicone of these viscosities to matter, so a seal."""
-    inner, outer = spec.moulds.filament_mm / 2, (spec.moulds.filament_hole_mm or 0) / 2
+    """The ring between filament and hole: too narrow for silicone of these viscosities to matter, so a seal.
+
+    It reaches into both walls, or faces that coincide could leave a way of no width along them.
+    """
+    inner = spec.moulds.filament_mm / 2 - BITE
+    outer = (spec.moulds.filament_hole_mm or 0) / 2 + BITE
     return moved(ring(inner, outer, -BEYOND, dims.core_height), cell.x, cell.y)
 
 

@@ -54,14 +54,14 @@ def expected_genus(plan: Plan) -> dict[str, int]:
 
 
 def cavity(step: Step, solids: Mapping[str, Manifold], segments: int) -> list[Manifold]:
-    """What silicone can reach, in components: block(0..top) - tools - earlier layers - seals.
+    """What silicone can reach, in components: block - tools - earlier layers - seals.
 
-    The block is larger than the tools, so a leak joins the outside to the cavity; it ends at the rim plane, where the
-    pour is open and the blade runs, or at the lid's upper face, where sprue and vents are open.
+    The block is larger than the tools and reaches below the base, so a leak joins the outside to the cavity. It ends at
+    the rim plane, where the pour is open and the blade runs, or at the lid's upper face, where sprue and vents open.
     """
     around = [solids[name] for name in step.tools]
-    x0, y0, _, x1, y1, _ = _box_of(around)
-    block = realise(box(x0 - 5, x1 + 5, y0 - 5, y1 + 5, 0, step.top), segments)
+    x0, y0, z0, x1, y1, _ = _box_of(around)
+    block = realise(box(x0 - 5, x1 + 5, y0 - 5, y1 + 5, z0 - 5, step.top), segments)
     filled = around + [realise(shape, segments) for shape in (*step.earlier, *step.seals)]
     return Manifold.batch_boolean([block, *filled], manifold3d.OpType.Subtract).decompose()
 

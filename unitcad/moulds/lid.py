@@ -16,7 +16,7 @@ from unitcad.designs.common import BEYOND
 from unitcad.errors import Refusal
 from unitcad.moulds.layout import CORNER_RADIUS, Layout
 from unitcad.moulds.tooling import corner_labels
-from unitcad.shape import Extrude, Profile, Revolve, Shape, box, cut, cylinder, moved, polygon, rounded_rectangle
+from unitcad.shape import Extrude, Profile, Revolve, Shape, cut, cylinder, moved, polygon, rounded_rectangle
 from unitcad.spec import Dimensions, Spec
 
 THICKNESS, SKIRT, SKIRT_WALL, SKIRT_OFF_WINDOW = 3.0, 1.5, 1.6, 0.2
@@ -30,24 +30,17 @@ TILT_DEG = 5.0
 """The tilt that a mould must bear on the bench."""
 DENT = 0.1
 """Depth of a pocket of air over the layer's thinnest part, up to which it is a dent that the printer's play exceeds."""
+MESH_ROOM = 0.8
+"""The part of that depth that vents may use: a mesh's polygons, and a gate in a vent's place, add to it."""
 
 
 def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int, label: tuple[str, str, str] | None) -> Shape:
     """The lid of a layer's pour (from 0), lying on the cup's rim."""
     rim, top, play = dims.heights[layer], lid_top(dims, layer), spec.moulds.plinth_clearance_mm or 0
     low = rim - SKIRT
-    at_the_rim = dims.slot_z is not None and dims.slot_z[1] >= rim
-    clearance = spec.moulds.window_clearance_mm or 0
-    if dims.slot_z and not at_the_rim:
-        low = max(low, dims.slot_z[1] + clearance + SKIRT_OFF_WINDOW)
+    if dims.slot_z:
+        low = max(low, dims.slot_z[1] + (spec.moulds.window_clearance_mm or 0) + SKIRT_OFF_WINDOW)
     tools = [Extrude(_outline(lay, play), low - BEYOND, rim), *channels(spec, dims, lay, layer, beyond=BEYOND)]
-    if at_the_rim:
-        half, far = dims.slot_width / 2 + clearance, lay.cup[0] + play + SKIRT_WALL + BEYOND
-        tools += [
-            box(min(c.x, s * far), max(c.x, s * far), c.y - half, c.y + half, low - BEYOND, rim)
-            for c in lay.cells
-            for s in c.sides
-        ]
     if label:
         tools += corner_labels(spec, lay, top, label)
     return cut(Extrude(_outline(lay, play + SKIRT_WALL), low, top), tools)
@@ -92,6 +85,9 @@ def vents(spec: Spec, dims: Dimensions, layer: int) -> int:
     """
     inner, outer = _ceiling(dims, layer)
     width = GATE * (outer - inner)
+    if _at_the_rim(dims, layer):
+        # The tongue parts the ring: air would stay beside it, whatever the number of vents.
+        raise Refusal("moulds.pour", "injected", "wires that leave at the rim need an open pour", "open")
     if inner and width < LEAST_VENT - 1e-9:
         raise Refusal(
             f"layers.{layer}.wall_mm",
@@ -100,7 +96,7 @@ def vents(spec: Spec, dims: Dimensions, layer: int) -> int:
             LEAST_VENT / GATE,
         )
     wall = spec.layers[layer]
-    limit = DENT * min(wall.wall_mm, wall.cap_mm or wall.wall_mm)
+    limit = MESH_ROOM * DENT * min(wall.wall_mm, wall.cap_mm or wall.wall_mm)
     enough = next((n for n in VENT_COUNTS if pocket_depth(dims, layer, n) <= limit), VENT_COUNTS[-1])
     asked = spec.moulds.vents
     if asked is None:
@@ -134,6 +130,10 @@ def _ceiling(dims: Dimensions, layer: int) -> tuple[float, float]:
     inside = (dims.cavity_radius, *dims.radii)[layer]
     is_ring = (dims.core_height, *dims.heights)[layer] >= dims.heights[layer]
     return (inside if is_ring else 0.0), dims.radii[layer]
+
+
+def _at_the_rim(dims: Dimensions, layer: int) -> bool:
+    return dims.slot_z is not None and dims.slot_z[1] >= dims.heights[layer]
 
 
 def _outline(lay: Layout, grow: float) -> Profile:

@@ -22,6 +22,8 @@ from unitcad.spec.strain import allowed_strain, tail_strain
 
 TOUCHING = 1e-6
 """Area of silicone over the core, mm2, up to which nothing has to stretch: rounding where walls mate."""
+SLIVER = 1e-3
+"""Area between a section and its hull, mm2, that is no hole: where corners on one line are not quite on it."""
 CAPTIVE = 1e4
 """The strain written where there is no hole at all for what has to pass."""
 
@@ -84,7 +86,8 @@ def peel_strain(body: Manifold, base: Manifold) -> tuple[float, float, float]:
         passing = base.trim_by_plane((0, 0, 1), z).project() ^ outline
         if silicone.is_empty() or (passing ^ silicone).area() <= TOUCHING:
             continue
-        hole = outline - silicone
+        holes = [part for part in (silicone.hull() - silicone).decompose() if part.area() > SLIVER]
+        hole = CrossSection.compose(holes) if holes else CrossSection()
         room = _perimeter(hole.hull())
         needed = _perimeter(CrossSection.batch_hull([hole, passing]))
         strain = needed / room - 1 if room * CAPTIVE > needed else CAPTIVE

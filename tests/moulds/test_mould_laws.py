@@ -1,0 +1,144 @@
+"""Every law holds for every template, and each catches the faults planted in a tool's tree."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from mould_set import MouldSet
+
+from unitcad.moulds import laws
+from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, ring, union
+from unitcad.shape.tree import Common, Revolve
+from unitcad.spec import templates
+
+Fault = tuple[str, str, str, Callable[[Shape], Shape]]
+
+
+@pytest.mark.parametrize("name", sorted(templates()))
+def test_every_template_keeps_every_law(name: str) -> None:
+    found = MouldSet.of(name).judged()
+    assert [finding for finding in found if not finding.ok] == []
+    assert {finding.code for finding in found} == set(laws.CODES)
+    balance = [finding.value for finding in found if finding.code == "C100"]
+    assert max(balance) < 1e-12
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ["moulds.cavities=[2,3]"],
+        ["moulds.pour=injected"],
+        ["moulds.printer=sla"],
+        ["moulds.printer=fdm-0.25", "moulds.cavities=[2,1]"],
+        ["motor.fill=true"],
+    ],
+)
+@pytest.mark.parametrize("name", ["encapsulating", "embedded"])
+def test_variants_keep_every_law(name: str, overrides: list[str]) -> None:
+    assert MouldSet.of(name, *overrides).broken() == set()
+
+
+def less(*tools: Shape) -> Callable[[Shape], Shape]:
+    return lambda shape: cut(shape, tools)
+
+
+def more(*parts: Shape) -> Callable[[Shape], Shape]:
+    return lambda shape: union((shape, *parts))
+
+
+def shifted(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[[Shape], Shape]:
+    return lambda shape: moved(shape, x, y, z)
+
+
+# The encapsulating template: core of radius 4.5 up to 2.11, bores 5.75 and 7, rims 3.36 and 4.61, slot 1.805 to 2.305.
+FAULTS: list[Fault] = [
+    ("C000", "cup1", "empty", lambda shape: Common((box(0, 1, 0, 1, 0, 1), box(2, 3, 2, 3, 2, 3)))),
+    ("C000", "cup1", "in two pieces", less(box(-99, 99, 9, 9.5, -99, 99))),
+    ("C000", "cup2", "window closed", more(box(8, 10, -3, 3, 1.5, 2.6))),
+    ("C000", "cup2", "a hollow inside", less(box(9, 9.5, 4, 5, 1, 1.5))),
+    ("C100", "base", "a pit of 0.3 in the core", less(moved(cylinder(0.15, 1.81, 9), 2.5, 1.5))),
+    ("C100", "base", "a scratch under the seat", less(box(4, 20, 3, 3.2, -0.1, 0.5))),
+    ("C100", "cup1", "a scratch in the seat", less(box(-20, -4, 3, 3.2, -1, 0.1))),
+    ("C100", "stub", "filament 0.5 low", shifted(z=-0.5)),
+    ("C100", "cup1", "bore too small", more(ring(5.7, 6, 0, 3.36))),
+    ("C100", "cup2", "bore too large", less(cylinder(7.05, -1, 9))),
+    ("C100", "cup1", "a pinhole through the wall", less(box(-99, 0, -0.2, 0.2, 2.6, 2.8))),
+    ("C100", "cup1", "stands 0.1 high", shifted(z=0.1)),
+    ("C100", "base", "core 0.05 high", more(ring(2, 4.5, 2, 2.16))),
+    ("C100", "tongue", "0.5 out", shifted(x=0.5)),
+    ("C200", "tongue", "0.1 too deep", shifted(x=-0.1)),
+    ("C200", "cup2", "bore into Layer 1", more(moved(cylinder(0.5, 0, 3), -5.5, 0))),
+    ("C200", "base", "plinth too wide", more(box(-9.9, 9.9, -5, 5, -2, -0.5))),
+    ("C210", "base", "plinth 0.1 too wide", more(box(-9.6, 9.6, -5, 5, -2, -0.5))),
+    ("C210", "tongue", "0.08 too thick", more(box(6, 15, -1, 1, 1.7, 1.8))),
+    ("C300", "cup1", "a lip of 0.05 in the bore", more(ring(5.7, 5.8, 1.0, 1.2))),
+    ("C300", "cup1", "a lip of 0.01 in the bore", more(ring(5.74, 5.8, 1.0, 1.2))),
+    ("C300", "cup2", "a bore that narrows upwards", more(Revolve(polygon((7.1, 0.2), (7.1, 4), (6.95, 4))))),
+    ("C300", "cup2", "a hook under the plate", more(box(-25, -12, -1, 1, -7, -6.5), box(-25, -18.5, -1, 1, -7, 0.5))),
+    ("C300", "tongue", "a barb inside Layer 1", more(box(4.6, 5.2, -2.2, 2.2, 1.9, 2.2))),
+    ("C300", "base", "an arm over the rim", more(box(-16, -14, -1, 1, -2, 6), box(-16, -11, -1, 1, 5, 6))),
+    ("C300", "stub", "a knob in the core", more(cylinder(1.3, 1.2, 1.6))),
+    ("C400", "tongue", "a hollow under it", less(box(5.0, 5.5, -1, 1, 0, 2.0))),
+    (
+        "C400",
+        "cup1",
+        "a pocket in the wall",
+        less(box(-6.2, -5, -0.5, 0.5, 1.0, 2.0), box(-6.2, -5.9, -0.5, 0.5, 1.0, 2.5)),
+    ),
+]
+
+
+@pytest.mark.parametrize(("code", "tool", "what", "change"), FAULTS, ids=[f"{f[0]}-{f[1]}-{f[2]}" for f in FAULTS])
+def test_a_planted_fault_is_caught(code: str, tool: str, what: str, change: Callable[[Shape], Shape]) -> None:
+    assert code in MouldSet.of("encapsulating").with_fault(tool, change).broken(), what
+
+
+def test_a_forgotten_tongue_is_a_leak() -> None:
+    assert "C100" in MouldSet.of("encapsulating").without("tongue").broken()
+
+
+def test_an_unpulled_tongue_holds_the_cup() -> None:
+    """Out of the person's order: the cup can't go up while its tongue is in."""
+    from unitcad.moulds.draw import blocked
+
+    solids = MouldSet.of("encapsulating").solids()
+    assert blocked(solids["cup1"], solids["tongue"], (0, 0, 1)) > 10
+    assert blocked(solids["tongue"], solids["cup1"], (1, 0, 0)) == 0
+
+
+@pytest.mark.parametrize(("reach", "sides"), [(5.5, 1), (6.7, 1), (6.7, 2)])
+def test_the_peel_over_a_bar_printed_on_the_core(reach: float, sides: int) -> None:
+    """The hull of a circle and one or two bars in closed form: tangents, arcs and the bars' ends."""
+    radius, half = 4.5, 1.7
+    bars = [box(min(0, s * reach), max(0, s * reach), -half, half, 1.805, 2.0) for s in (1, -1)[:sides]]
+    bar_set = MouldSet.of("encapsulating", "casting.strain_margin=0.02").with_fault("base", more(*bars))
+    far = math.hypot(reach, half)
+    tangent, angle = math.sqrt(far**2 - radius**2), math.atan(half / reach) + math.acos(radius / far)
+    around = sides * (2 * tangent + 2 * half) + (2 * math.pi - 2 * sides * angle) * radius
+    expected = around / (2 * math.pi * radius) - 1
+    found = [f for f in bar_set.judged() if f.code == "C310" and f.where.startswith("peel")]
+    assert len(found) == 1
+    # An area-true polygon of n sides is longer than its circle by a share of (pi / n)^2 / 6.
+    assert found[0].value == pytest.approx(
+        100 * expected, abs=100 * (1 + expected) * (math.pi / bar_set.segments) ** 2 / 6
+    )
+    assert not found[0].ok
+    assert "no more than" in found[0].advice
+
+
+def test_strain_within_the_margin_is_kept() -> None:
+    bar = box(0, 5.75, -1.7, 1.7, 1.805, 2.0)
+    found = MouldSet.of("encapsulating").with_fault("base", more(bar)).judged()
+    assert all(f.ok for f in found if f.code == "C310")
+    assert max(f.value for f in found if f.code == "C310") > 5
+
+
+@pytest.mark.parametrize("name", ["encapsulating", "chain"])
+def test_chain_pad_through_the_slot_needs_118_percent(name: str) -> None:
+    """The circuit's pad of 8.4 through the slot of 3.4 by 0.5: 2 (8.4 + 0.11) over 2 (3.4 + 0.5), less one."""
+    found = MouldSet.of(name, "fpcb.tail_end_width_mm=8.4").judged()
+    value = next(f.value for f in found if f.where == "tail through the slot")
+    assert value == pytest.approx(100 * (2 * 8.51 / 7.8 - 1))
+    assert round(value) == 118
