@@ -21,6 +21,14 @@ def write_results(out: Path, sweep: Sweep, journal: Journal, head: dict[str, Any
     _write_json(out / "batch.json", {**head, "columns": columns}, journal.entries())
 
 
+def write_timings(out: Path, summary: Any, workers: int) -> None:
+    """What this run did and how fast: not part of what is the same from run to run."""
+    told = {key: value for key, value in vars(summary).items() if key != "failures"}
+    fresh = summary.done - summary.taken_up
+    told["variants_per_second"] = round(fresh / summary.seconds, 2) if summary.seconds else None
+    (out / "timings.json").write_text(json.dumps({"workers": workers, **told}, indent=1) + "\n", "utf-8")
+
+
 def _columns(sweep: Sweep, journal: Journal) -> list[str]:
     """First what it is, then what was swept, then what came out, in the order in which rows name it."""
     found: dict[str, None] = dict.fromkeys(FIRST)

@@ -19,7 +19,7 @@ from unitcad.batch import task as tasks
 from unitcad.batch.away import Receiver
 from unitcad.batch.executors import ProcessExecutor
 from unitcad.batch.journal import Journal
-from unitcad.batch.results import write_results
+from unitcad.batch.results import write_results, write_timings
 from unitcad.batch.sweep import MOST, Sweep
 from unitcad.batch.task import Job, Outcome, Task
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
@@ -108,13 +108,15 @@ def run(
         clear_leftovers(out)
         summary = batch.all()
         write_results(out, sweep, journal, head)
+        summary.seconds = round(time.perf_counter() - start, 3)
+        write_timings(out, summary, workers)
+        watch(summary, None)
     except OSError as error:
         raise _no_room(tasks.failure(0, error), out, batch.summary) from error
     except KeyboardInterrupt:
         _end(executor)
         raise
     finally:
-        batch.summary.seconds = round(time.perf_counter() - start, 3)
         journal.close()
         store.close()
         if own:

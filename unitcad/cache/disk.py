@@ -9,6 +9,7 @@ import os
 import shutil
 import threading
 import time
+import weakref
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -35,12 +36,14 @@ class DiskStore:
         self._touched: dict[Path, float] = {}
         self._held: dict[str, bytes] = {}
         _claim(self.root)
-        self._open = open(self.root / MARK, "rb")  # noqa: SIM115  (held while the store lives: see `collect`)
-        flock(self._open.fileno(), exclusive=False)
+        # Held open and locked while the store lives: see `collect`.
+        mark = os.open(self.root / MARK, os.O_RDONLY)
+        flock(mark, exclusive=False)
+        self._let_go = weakref.finalize(self, os.close, mark)
 
     def close(self) -> None:
         """Let go of the folder: others may collect everything."""
-        self._open.close()
+        self._let_go()
 
     def __reduce__(self) -> tuple[type[DiskStore], tuple[Path]]:
         return DiskStore, (self.root,)

@@ -59,8 +59,12 @@ def batch(
         print_json(found) if as_json or json_lines else _tell_preview(found)
         return
     folder = out or Path("out") / wanted.slug
-    with open_executor(jobs, scheduler, timeout) as (executor, workers), watching(json_lines) as watch:
-        summary = run(wanted, folder, options, executor, workers=workers, away=scheduler is not None, watch=watch)
+    try:
+        with open_executor(jobs, scheduler, timeout) as (executor, workers), watching(json_lines) as watch:
+            summary = run(wanted, folder, options, executor, workers=workers, away=scheduler is not None, watch=watch)
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted: what is done stays in {folder}; the next run takes up the rest", err=True)
+        sys.exit(130)
     if as_json:
         print_json({"folder": str(folder), **asdict(summary)})
     elif not json_lines:

@@ -1,0 +1,120 @@
+"""What the batch tests share: small sweeps, and a design whose function crashes, hangs or fails where it is told to."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+SPEC = """
+name = "ring"
+design = "ring.py:{function}"
+diameter_mm = 14.0
+[[layers]]
+material = "ecoflex-00-10"
+wall_mm = 1.25
+[parameters]
+height_mm = 2.0
+[output]
+formats = ["stl"]
+tolerance_mm = 0.1
+"""
+
+DESIGN = """
+import os, time, ctypes
+from unitcad.shape import ring
+
+HERE = {here!r}
+
+def unit(spec):
+    height = float(spec.parameters["height_mm"])
+    with open(os.path.join(HERE, "calls"), "a") as file:
+        file.write(f"{{height}} {{os.getpid()}}\\n")
+    return ring(4.5, 7.0, 0, height)
+
+def crashes(spec):
+    if spec.parameters["height_mm"] == 3.0:
+        os.abort()
+    return unit(spec)
+
+def hangs(spec):
+    if spec.parameters["height_mm"] == 3.0:
+        ctypes.pythonapi.sleep(600)  # with the GIL held, as a kernel would
+    return unit(spec)
+
+def fails_once(spec):
+    mark = os.path.join(HERE, "failed")
+    if spec.parameters["height_mm"] == 3.0 and not os.path.exists(mark):
+        open(mark, "w").close()
+        raise ValueError("not the first time")
+    return unit(spec)
+
+def fails(spec):
+    if spec.parameters["height_mm"] == 3.0:
+        raise ValueError("never")
+    return unit(spec)
+
+def slow(spec):
+    time.sleep(0.4)
+    return unit(spec)
+"""
+
+
+def ring_sweep(
+    folder: Path, function: str = "unit", heights: list[float] | None = None, materials: int = 1, more: str = ""
+) -> Path:
+    """A sweep file over rings of several heights and materials, each height a geometry; none takes the kernel long."""
+    silicones = ["ecoflex-00-10", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10-medium", "dragon-skin-30"]
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "ring.py").write_text(DESIGN.format(here=str(folder)))
+    (folder / "ring.toml").write_text(SPEC.format(function=function))
+    file = folder / f"sweep-{function}.toml"
+    file.write_text(
+        f'base = "./ring.toml"\nname = "rings"\n{more}\n[sweep]\n'
+        f'"parameters.height_mm" = {heights or [2.0, 3.0, 4.0, 5.0]}\n'
+        f'"layers.0.material" = {silicones[:materials]}\n'
+    )
+    return file
+
+
+def calls(folder: Path) -> list[str]:
+    """The heights that the design was drawn for, a line each time."""
+    file = folder / "calls"
+    return [line.split()[0] for line in file.read_text().splitlines()] if file.exists() else []
+
+
+def unitcad(*words: object, **more: Any) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a process of its own."""
+    return subprocess.run(
+        command(*words), capture_output=True, text=True, check=False, timeout=120, env=environment(), **more
+    )
+
+
+def command(*words: object) -> list[str]:
+    return [sys.executable, "-m", "unitcad", *map(str, words)]
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONUNBUFFERED": "1", "UNITCAD_TRACEBACK": ""}
+
+
+def bytes_of(out: Path) -> dict[str, str]:
+    """Everything in a batch's folder that is promised to be the same from run to run."""
+    apart = ("timings.json", "journal.jsonl", "batch.lock")
+    return {
+        str(file.relative_to(out)): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(out.rglob("*"))
+        if file.is_file() and file.name not in apart
+    }
+
+
+def rows(out: Path) -> list[dict[str, Any]]:
+    return json.loads((out / "batch.json").read_text())["variants"]
+
+
+def leftovers(out: Path) -> list[Path]:
+    return [path for path in out.iterdir() if path.name.startswith(".tmp-")]

@@ -1,0 +1,201 @@
+"""Nothing lost: each of these really kills, crashes, hangs, interrupts or fills."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from batching import bytes_of, calls, command, environment, leftovers, ring_sweep, rows, unitcad
+
+HEIGHTS = [float(h) for h in range(2, 9)]
+
+
+def _start(*words: object, **more) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        command(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(), **more
+    )
+
+
+def _wait_for(what, seconds: float = 30.0) -> None:
+    end = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
+def _whole(folder: Path) -> bool:
+    manifest = json.loads((folder / "manifest.json").read_text())
+    return all((folder / f["path"]).is_file() for part in manifest["parts"] for f in part["files"].values())
+
+
+def _results(out: Path) -> list[Path]:
+    if not out.exists():
+        return []
+    return [path for path in out.iterdir() if path.is_dir() and not path.name.startswith(".tmp-")]
+
+
+def test_a_killed_parent_loses_nothing(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out"
+    child = _start("batch", sweep, "-o", out, "-j", 2)
+    _wait_for(lambda: len(_results(out)) >= 3)
+    workers = psutil.Process(child.pid).children(recursive=True)
+    child.kill()
+    child.communicate()
+    psutil.wait_procs(workers, timeout=10)
+    assert not any(worker.is_running() and worker.status() != psutil.STATUS_ZOMBIE for worker in workers)
+    before = {folder.name: folder.stat().st_ino for folder in _results(out)}
+    assert all(map(_whole, _results(out)))
+    again = unitcad("batch", sweep, "-o", out, "-j", 2, "--json")
+    assert again.returncode == 0, again.stderr
+    summary = json.loads(again.stdout)
+    assert summary["ok"] == 7
+    # Whatever the first run finished is the same folder still, noted in the journal or not.
+    assert {folder.name: folder.stat().st_ino for folder in _results(out)}.items() >= before.items()
+    assert not leftovers(out)
+    whole = unitcad("batch", sweep, "-o", tmp_path / "whole", "-j", 0)
+    assert whole.returncode == 0
+    assert bytes_of(out) == bytes_of(tmp_path / "whole")
+
+
+def test_a_killed_worker_costs_its_variant_one_more_try(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out"
+    child = _start("batch", sweep, "-o", out, "-j", 2, "--json")
+    _wait_for(lambda: len(_results(out)) >= 2)
+    psutil.Process(child.pid).children()[0].kill()
+    told, errors = child.communicate(timeout=60)
+    assert child.returncode == 0, errors
+    summary = json.loads(told)
+    assert summary["ok"] == 7
+    assert summary["failed"] == 0
+    assert summary["retried"] <= 1
+    assert not leftovers(out)
+
+
+@pytest.mark.parametrize(
+    ("function", "more", "reason"),
+    [
+        ("crashes", [], "the worker died (SIGABRT)"),
+        ("hangs", ["--timeout", "1.5"], "timed out after 1.5 s"),
+        ("fails", [], "design ring.py:fails (line 32): ValueError: never"),
+    ],
+)
+def test_a_variant_that_can_not_be_made_is_named(function: str, more: list[str], reason: str, tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", function), tmp_path / "out"
+    done = unitcad("batch", sweep, "-o", out, "-j", 2, "--keep-going", "--json", *more)
+    assert done.returncode == 1, done.stderr
+    summary = json.loads(done.stdout)
+    assert (summary["ok"], summary["failed"], summary["retried"]) == (3, 1, 1)
+    assert [(f["index"], f["status"], f["reason"]) for f in summary["failures"]] == [(1, "failed", reason)]
+    assert [row["status"] for row in rows(out)] == ["ok", "failed", "ok", "ok"]
+    assert rows(out)[1]["reason"] == reason
+    assert len(_results(out)) == 3
+    assert not leftovers(out)
+    assert "Traceback" not in done.stderr
+
+
+def test_variants_of_one_crashing_geometry_are_named_each(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "crashes", [3.0, 4.0], materials=2), tmp_path / "out"
+    done = unitcad("batch", sweep, "-o", out, "-j", 1, "--keep-going")
+    assert done.returncode == 1
+    assert [row["status"] for row in rows(out)] == ["failed", "failed", "ok", "ok"]
+
+
+def test_without_keep_going_the_first_failure_stops_it(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "fails", [3.0, *HEIGHTS[3:]]), tmp_path / "out"
+    done = unitcad("batch", sweep, "-o", out, "-j", 1)
+    assert done.returncode == 1
+    assert "stopped: variant 0:" in done.stderr
+    assert len(_results(out)) < 5
+    assert rows(out)[0]["status"] == "failed"
+
+
+def test_what_failed_once_is_tried_again(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "fails_once"), tmp_path / "out"
+    done = unitcad("batch", sweep, "-o", out, "-j", 1, "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["retried"] == 1
+
+
+def test_a_failed_variant_is_made_by_the_next_run(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "fails_once"), tmp_path / "out"
+    (tmp_path / "s" / "failed").touch()
+    first = unitcad("batch", sweep, "-o", out, "--limit", 2)
+    assert first.returncode == 0, first.stderr
+    drawn = len(calls(tmp_path / "s"))
+    second = unitcad("batch", sweep, "-o", out, "--json")
+    assert json.loads(second.stdout)["taken_up"] == 2
+    assert len(calls(tmp_path / "s")) == drawn + 2
+
+
+def test_ctrl_c_stops_at_once_and_keeps_what_is_done(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out"
+    child = _start("batch", sweep, "-o", out, "-j", 2, start_new_session=True)
+    _wait_for(lambda: len(_results(out)) >= 2)
+    workers = psutil.Process(child.pid).children(recursive=True)
+    os.killpg(child.pid, signal.SIGINT)  # to the whole group, as a terminal does
+    _, errors = child.communicate(timeout=20)
+    assert child.returncode == 130
+    assert "interrupted: " in errors
+    assert "the next run takes up the rest" in errors
+    assert "Traceback" not in errors
+    psutil.wait_procs(workers, timeout=5)
+    assert not any(worker.is_running() for worker in workers)
+    assert all(map(_whole, _results(out)))
+    again = unitcad("batch", sweep, "-o", out, "--json")
+    assert json.loads(again.stdout)["ok"] == 7
+    assert not leftovers(out)
+
+
+def test_two_batches_in_one_folder(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "slow", HEIGHTS), tmp_path / "out"
+    first = _start("batch", sweep, "-o", out, "-j", 2)
+    _wait_for(lambda: (out / "journal.jsonl").exists())
+    second = unitcad("batch", sweep, "-o", out)
+    assert second.returncode == 2
+    assert "another batch is running" in second.stderr
+    _, errors = first.communicate(timeout=60)
+    assert first.returncode == 0, errors
+    assert [row["status"] for row in rows(out)] == ["ok"] * 7
+
+
+def test_no_space_left_stops_it_and_keeps_what_is_done(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "unit", HEIGHTS), tmp_path / "out"
+    full = _run_with_full_disk(sweep, out, tmp_path)
+    assert full.returncode == 1, full.stderr
+    assert "no space left" in full.stderr
+    assert "Traceback" not in full.stderr
+    done = _results(out)
+    assert 1 <= len(done) < 7
+    assert all(map(_whole, done))
+    again = unitcad("batch", sweep, "-o", out, "--json")
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["ok"] == 7
+    assert not leftovers(out)
+
+
+def _run_with_full_disk(sweep: Path, out: Path, tmp_path: Path) -> subprocess.CompletedProcess[str]:
+    """A run whose workers find the disk full from the fourth manifest on: by /dev/full."""
+    site = tmp_path / "site"
+    site.mkdir()
+    (site / "sitecustomize.py").write_text(
+        "import os, pathlib\n"
+        "write = pathlib.Path.write_bytes\n"
+        f"count = {str(tmp_path / 'count')!r}\n"
+        "def full(self, data):\n"
+        "    if self.name == 'manifest.json':\n"
+        "        with open(count, 'a') as file: file.write('x')\n"
+        "        if os.path.getsize(count) > 3:\n"
+        "            with open('/dev/full', 'wb') as file: file.write(data)\n"
+        "    return write(self, data)\n"
+        "pathlib.Path.write_bytes = full\n"
+    )
+    env = {**environment(), "PYTHONPATH": str(site)}
+    return subprocess.run(
+        command("batch", sweep, "-o", out, "-j", 2), capture_output=True, text=True, check=False, timeout=60, env=env
+    )

@@ -1,0 +1,233 @@
+"""The cache: once each, by many at once; damage found and mended; links, copies where links fail; collecting."""
+
+from __future__ import annotations
+
+import errno
+import json
+import multiprocessing
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from unitcad.cache import DiskStore, MemoryStore, MissingContent, collect, usage
+from unitcad.cache import disk as disk_module
+from unitcad.errors import UnitcadError
+
+
+class Made:
+    """A maker that counts."""
+
+    def __init__(self, content: bytes = b"content") -> None:
+        self.content, self.count = content, 0
+
+    def __call__(self) -> bytes:
+        self.count += 1
+        return self.content
+
+
+@pytest.mark.parametrize("kind", ["memory", "disk"])
+def test_each_key_is_made_once(kind: str, tmp_path: Path) -> None:
+    store = MemoryStore() if kind == "memory" else DiskStore(tmp_path / "c")
+    make = Made()
+    first, second = store.file("ab1", make), store.file("ab1", make)
+    assert first == second
+    assert make.count == 1
+    assert store.content(first) == b"content"
+    assert store.data("ab2", lambda: {"x": [1.5, None]}) == {"x": [1.5, None]}
+    assert store.data("ab2", lambda: pytest.fail("made twice")) == {"x": [1.5, None]}
+    assert store.data("ab2", lambda: {"y": 1}, intact=lambda data: "y" in data) == {"y": 1}
+    assert dict(store.counts) == {"file built": 1, "file reused": 1, "data built": 2, "data reused": 1}
+    with pytest.raises(MissingContent):
+        store.content("0" * 64)
+
+
+def test_equal_contents_are_stored_once_and_another_process_finds_them(tmp_path: Path) -> None:
+    store = DiskStore(tmp_path / "c")
+    assert store.file("a1", Made()) == store.file("a2", Made())
+    assert usage(tmp_path / "c").contents == 1
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(_reused, (tmp_path / "c", "a1"))
+
+
+def _reused(root: Path, key: str) -> bool:
+    store = DiskStore(root)
+    store.file(key, Made())
+    return store.counts["file reused"] == 1
+
+
+@pytest.mark.parametrize("damage", ["flipped", "cut", "emptied", "gone", "entry", "entry text"])
+def test_damage_is_found_and_mended(damage: str, tmp_path: Path) -> None:
+    sha = DiskStore(tmp_path / "c").file("ab1", Made())
+    content, entry = tmp_path / "c" / "content" / sha[:2] / sha, tmp_path / "c" / "files" / "ab" / "ab1"
+    content.chmod(0o644)
+    match damage:
+        case "flipped":
+            content.write_bytes(b"contend")
+        case "cut":
+            content.write_bytes(b"cont")
+        case "emptied":
+            content.write_bytes(b"")
+        case "gone":
+            content.unlink()
+        case "entry":
+            entry.write_bytes(entry.read_bytes()[:-4])
+        case "entry text":
+            entry.write_bytes(b"nonsense\n{}")
+    store, make = DiskStore(tmp_path / "c"), Made()
+    assert store.file("ab1", make) == sha
+    assert make.count == 1
+    assert content.read_bytes() == b"content"
+    assert store.counts["damaged"] == (0 if damage == "gone" else 1)
+    assert DiskStore(tmp_path / "c").file("ab1", lambda: pytest.fail("not mended")) == sha
+
+
+def test_damage_under_a_running_process_is_found_too(tmp_path: Path) -> None:
+    store, make = DiskStore(tmp_path / "c"), Made()
+    sha = store.file("ab1", make)
+    content = tmp_path / "c" / "content" / sha[:2] / sha
+    content.chmod(0o644)
+    content.write_bytes(b"c0ntent")
+    store.file("ab1", make)
+    assert make.count == 2
+    assert store.content(sha) == b"content"
+
+
+def test_results_are_links_that_can_not_be_written_through(tmp_path: Path) -> None:
+    store = DiskStore(tmp_path / "c")
+    sha = store.file("ab1", Made())
+    store.place(sha, tmp_path / "a")
+    assert (tmp_path / "a").stat().st_ino == (tmp_path / "c" / "content" / sha[:2] / sha).stat().st_ino
+    assert (tmp_path / "a").stat().st_mode & 0o222 == 0
+
+
+@pytest.mark.parametrize("number", [errno.EXDEV, errno.EPERM, errno.EMLINK, errno.EOPNOTSUPP])
+def test_copies_where_links_fail(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = DiskStore(tmp_path / "c")
+    sha = store.file("ab1", Made())
+    content = tmp_path / "c" / "content" / sha[:2] / sha
+    before = content.stat().st_ino
+
+    def refused(source: Path, target: Path) -> None:
+        raise OSError(number, os.strerror(number))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(disk_module.os, "link", refused)
+        store.place(sha, tmp_path / "a")
+    assert (tmp_path / "a").read_bytes() == b"content"
+    assert (tmp_path / "a").stat().st_nlink == 1
+    # A file with as many links as there may be makes way for a fresh one, to which links succeed again.
+    assert (content.stat().st_ino != before) == (number == errno.EMLINK)
+    store.place(sha, tmp_path / "b")
+    assert (tmp_path / "b").stat().st_ino == content.stat().st_ino
+
+
+def test_no_room_in_the_cache_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = DiskStore(tmp_path / "c")
+
+    def full(self: Path, data: bytes) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        sha = store.file("ab1", Made())
+        assert store.data("ab2", lambda: 5) == 5
+    assert store.content(sha) == b"content"
+    store.place(sha, tmp_path / "a")
+    assert (tmp_path / "a").read_bytes() == b"content"
+    assert not list((tmp_path / "c" / "tmp").iterdir())
+
+
+def test_many_processes_make_each_key_once(tmp_path: Path) -> None:
+    root, context = tmp_path / "c", multiprocessing.get_context("spawn")
+    with context.Pool(4) as pool:
+        found = pool.starmap(_make_all, [(root, tmp_path / "log")] * 8)
+    assert len({tuple(shas) for shas in found}) == 1
+    made = (tmp_path / "log").read_text().split()
+    assert sorted(made) == sorted(set(made))
+    assert not list((root / "locks").iterdir())
+    assert not list((root / "tmp").iterdir())
+
+
+def _make_all(root: Path, log: Path) -> list[str]:
+    store = DiskStore(root)
+
+    def make(i: int) -> bytes:
+        with open(log, "a") as file:
+            file.write(f"{i}\n")
+        time.sleep(0.01)
+        return f"content {i}".encode() * 1000
+
+    return [store.file(f"{i:02d}key", lambda i=i: make(i)) for i in range(20)]
+
+
+def test_a_lock_of_a_killed_process_is_no_obstacle(tmp_path: Path) -> None:
+    context = multiprocessing.get_context("spawn")
+    child = context.Process(target=_never_ends, args=(tmp_path / "c", tmp_path / "in"))
+    child.start()
+    while not (tmp_path / "in").exists():
+        time.sleep(0.01)
+    child.kill()
+    child.join()
+    assert DiskStore(tmp_path / "c").data("ab1", lambda: 7) == 7
+
+
+def _never_ends(root: Path, mark: Path) -> None:
+    def make() -> None:
+        mark.touch()
+        time.sleep(600)
+
+    DiskStore(root).data("ab1", make)
+
+
+def test_collecting_removes_what_was_used_longest_ago(tmp_path: Path) -> None:
+    root = tmp_path / "c"
+    store = DiskStore(root)
+    for i in range(10):
+        store.file(f"k{i}", Made(bytes([i]) * 1000))
+        os.utime(root / "files" / f"k{i}" / f"k{i}", (i, i))
+    store.file("k0", lambda: pytest.fail("there"))  # used again: the newest now
+    store.close()
+    entry = (root / "files" / "k1" / "k1").stat().st_size
+    gone = collect(root, 4 * (1000 + entry))
+    assert (gone.entries, gone.contents) == (6, 6)
+    left = sorted(path.name for path in (root / "files").rglob("k*") if path.is_file())
+    assert left == ["k0", "k7", "k8", "k9"]
+    assert collect(root, 0).entries == 4
+    assert usage(root).bytes == 0
+
+
+def test_collecting_spares_what_somebody_is_using(tmp_path: Path) -> None:
+    store = DiskStore(tmp_path / "c")
+    sha = store.file("ab1", Made())
+    assert collect(tmp_path / "c", 0).entries == 0
+    assert store.has(sha)
+    store.close()
+    assert collect(tmp_path / "c", 0).entries == 1
+
+
+def test_a_folder_of_others_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").write_text("keep")
+    (tmp_path / "file").write_text("keep")
+    for root in ("mine", "file"):
+        with pytest.raises(UnitcadError, match="--cache"):
+            DiskStore(tmp_path / root)
+    with pytest.raises(UnitcadError, match="no cache"):
+        collect(tmp_path / "mine", 0)
+    assert (tmp_path / "mine" / "letter.txt").read_text() == "keep"
+
+
+def test_a_bundle_spares_the_work_but_not_the_content(tmp_path: Path) -> None:
+    first = MemoryStore()
+    sha = first.file("ab1", Made())
+    first.data("ab2", lambda: {"files": [sha]})
+    bundle = first.bundle()
+    assert json.dumps(vars(bundle))
+    second = MemoryStore(bundle)
+    assert second.file("ab1", lambda: pytest.fail("known")) == sha
+    assert (
+        second.data("ab2", lambda: pytest.fail("known"), intact=lambda d: all(map(second.has, d["files"]))) is not None
+    )
+    assert second.contents == {}
