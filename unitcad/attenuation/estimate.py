@@ -66,7 +66,7 @@ def summary(estimated: dict[str, Any]) -> dict[str, Any]:
     }
     return {
         "models": models,
-        "measured": estimated["measured"].get("level"),
+        "measured": (estimated["measured"] or {}).get("level"),
         "frequency_hz": estimated["variant"]["frequency_hz"]["value"],
     }
 

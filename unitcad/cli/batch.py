@@ -36,6 +36,9 @@ def batch(
     only: Annotated[
         str | None, typer.Option(help="unit,moulds,estimate,casting; else all. estimate alone makes a table only.")
     ] = None,
+    page: Annotated[
+        bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")
+    ] = False,
     no_check: Annotated[bool, typer.Option("--no-check", help="Leave out the laws and the mesh checks.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     json_lines: Annotated[bool, typer.Option("--json-lines", help="One JSON object a line as variants end.")] = False,
@@ -50,6 +53,7 @@ def batch(
     from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json
     from unitcad.pipeline import OUTPUTS
+    from unitcad.report import PAGE, write_report
 
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
     wanted = load_sweep(sweep).overridden([*(sets or []), *chosen_formats(formats)])
@@ -65,6 +69,8 @@ def batch(
     except KeyboardInterrupt:
         typer.echo(f"interrupted: what is done stays in {folder}; the next run takes up the rest", err=True)
         sys.exit(130)
+    if page or (folder / PAGE).is_file():
+        write_report(folder)
     if as_json:
         print_json({"folder": str(folder), **asdict(summary)})
     elif not json_lines:

@@ -68,6 +68,7 @@ def table(folder: Path, variants: list[dict[str, Any]]) -> dict[str, Any]:
     else:
         entries = [{"folder": each["folder"], **_row(each)} for each in variants]
         columns = [name for name in dict.fromkeys(name for entry in entries for name in entry) if name != "folder"]
+    columns.sort(key=lambda name: name != "name")
     there = {each["folder"] for each in variants}
     return {
         "columns": columns,

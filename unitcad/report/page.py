@@ -54,16 +54,16 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str]:
         raise UnitcadError(f"{folder}: is not a folder")
     if collect.is_variant(folder):
         record, spec = collect.variant(folder, folder)
-        records, specs, table = [record], [spec], None
+        records, specs, table, batch = [record], [spec], None, None
         title = str(record["manifest"].get("name", folder.name))
     else:
-        folders = collect.variant_folders(folder)
-        if not folders:
+        folders, batch = collect.variant_folders(folder), collect.batch(folder)
+        if not folders and not batch:
             raise UnitcadError(f"{folder}: holds no result of unitcad (no manifest.json in it or right below it)")
         pairs = [collect.variant(each, folder) for each in folders]
         records, specs = [record for record, _ in pairs], [spec for _, spec in pairs]
         table = collect.table(folder, records)
-        title = f"{folder.resolve().name}: {len(records)} variants"
+        title = f"{(batch or {}).get('name') or folder.resolve().name}: {len(table['rows'])} variants"
     models = _models(records, specs)
     pool = Pool()
     data = {
@@ -71,7 +71,7 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str]:
         "version": __version__,
         "variants": [[record["folder"], pool.put(record)] for record in records],
         "table": table,
-        "batch": collect.batch(folder) if table else None,
+        "batch": batch,
         "pool": pool.entries,
         "models": models,
     }

@@ -1,0 +1,247 @@
+"""The page without a browser: what it holds, what it costs, what it refuses."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import gzip
+import json
+import re
+import shutil
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from unitcad.cache import MemoryStore
+from unitcad.cli import app
+from unitcad.errors import UnitcadError
+from unitcad.pipeline import build
+from unitcad.report import collect, page, write_report
+from unitcad.report.models import model, model_key
+from unitcad.report.pool import REFERENCE, Pool
+from unitcad.spec import load, templates
+
+NAMESPACE = "http://www.w3.org/1999/xhtml"
+"""Of HTML's elements: a name in three.js, which no browser opens."""
+
+
+def data_of(html: str) -> dict[str, Any]:
+    """A page's data, as the page reads it."""
+    packed = re.search(r'<script type="text/plain" id="data">([A-Za-z0-9+/=]*)</script>', html)
+    assert packed
+    return json.loads(gzip.decompress(base64.b64decode(packed[1])))
+
+
+def resolved(node: Any, pool: list[Any]) -> Any:
+    if isinstance(node, list):
+        return [resolved(item, pool) for item in node]
+    if isinstance(node, dict):
+        if REFERENCE in node:
+            return resolved(pool[node[REFERENCE]], pool)
+        return {key: resolved(value, pool) for key, value in node.items()}
+    return node
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One variant's folder, with everything that a build of STL makes."""
+    return build(load("encapsulating", ['output.formats=["stl"]']), tmp_path_factory.mktemp("one")).folder
+
+
+def test_pool_says_everything_once() -> None:
+    long = {"text": "x" * 500, "list": [list(range(200))] * 3}
+    pool = Pool()
+    first, again, other = pool.put({"a": long, "b": 1}), pool.put({"a": long, "b": 1}), pool.put({"a": long, "b": 2})
+    assert first == again
+    assert resolved(other, pool.entries) == {"a": long, "b": 2}
+    assert json.dumps([first, again, other, pool.entries]).count("x" * 500) == 1
+    assert pool.put("short") == "short"
+
+
+def test_a_page_holds_what_the_folder_holds(built: Path) -> None:
+    html = write_report(built).read_text("utf-8")
+    data = data_of(html)
+    ((_, entry),) = data["variants"]
+    record = resolved(entry, data["pool"])
+    assert record["manifest"] == json.loads((built / "manifest.json").read_text("utf-8"))
+    assert record["estimate"] == json.loads((built / "estimate.json").read_text("utf-8"))
+    assert record["drawings"]["section.svg"] == (built / "section.svg").read_text("utf-8")
+    there = {file.relative_to(built).as_posix() for file in built.rglob("*") if file.is_file()}
+    assert {path for path, _ in record["files"]} == there - {"report.html"}
+    assert data["models"].keys() == {record["model"]}
+    assert len(html.encode()) <= 3_000_000
+
+
+def test_no_address_but_a_name(built: Path) -> None:
+    html = write_report(built).read_text("utf-8")
+    assert set(re.findall(r"https?://[^\s\"'<>)]*", html)) <= {NAMESPACE}
+    for name in ("fetch(", "XMLHttpRequest(", "WebSocket(", "sendBeacon", "importScripts", "@import", "url("):
+        assert name not in html, name
+
+
+def test_policy_forbids_every_connection(built: Path) -> None:
+    html = write_report(built).read_text("utf-8")
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', html)
+    assert policy
+    assert "default-src &#x27;none&#x27;" in policy[1]
+    assert "unsafe" not in policy[1]
+
+
+def test_same_bytes(built: Path) -> None:
+    first = write_report(built).read_bytes()
+    assert write_report(built).read_bytes() == first
+    assert not list(built.glob(".tmp-*"))
+
+
+def test_licences_travel_with_the_libraries(built: Path) -> None:
+    html = write_report(built).read_text("utf-8")
+    for name, entry in page.vendored().items():
+        assert f"{name} {entry['version']}" in html
+        assert entry["licence"] == "MIT"
+        for file in entry["files"]:
+            assert (files("unitcad") / "report" / "vendor" / file).is_file()
+    assert html.count("The above copyright notice and this permission notice shall be included") == 2
+
+
+@pytest.mark.parametrize("name", [*page.PROGRAMS, *(f"../vendor/{n}" for n in page.VENDORED)])
+def test_no_program_ends_its_element(name: str) -> None:
+    text = (files("unitcad") / "report" / "app" / name).read_text("utf-8").lower()
+    assert "</script" not in text
+    assert "<!--" not in text
+
+
+@pytest.mark.parametrize("name", [n for n in page.PROGRAMS])
+def test_programs_set_text_and_never_markup(name: str) -> None:
+    text = (files("unitcad") / "report" / "app" / name).read_text("utf-8")
+    for way in ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "new Function"):
+        assert way not in text
+
+
+def test_a_name_in_markup_stays_text(tmp_path: Path) -> None:
+    name = "</title><script>alert(1)</script>\"'&<img src=x onerror=alert(2)>"
+    folder = build(load("embedded", [f"name={json.dumps(name)}", "output.formats=[]"]), tmp_path, only=["unit"]).folder
+    html = write_report(folder).read_text("utf-8")
+    assert "<script>alert" not in html
+    assert "<img src=x" not in html
+    assert "<title>&lt;/title&gt;" in html
+
+
+def test_folders_of_a_batch(built: Path, tmp_path: Path) -> None:
+    shutil.copytree(built, tmp_path / "a")
+    shutil.copytree(built, tmp_path / "b")
+    shutil.copytree(built, tmp_path / ".tmp-c")
+    data = data_of(write_report(tmp_path).read_text("utf-8"))
+    assert [folder for folder, _ in data["variants"]] == ["a", "b"]
+    assert len(data["models"]) == 1
+    assert data["table"]["columns"][0] == "name"
+    assert [row[0] for row in data["table"]["rows"]] == ["a", "b"]
+
+
+def test_a_batch_is_listed_as_it_lists_itself(built: Path, tmp_path: Path) -> None:
+    shutil.copytree(built, tmp_path / "good")
+    variants = [
+        {"index": 0, "status": "ok", "folder": "good", "name": "good", "edge": 0.5, "flag": True, "none": None},
+        {"index": 1, "status": "failed", "folder": "", "name": "bad"},
+        {"index": 2, "status": "ok", "folder": "gone", "name": "gone"},
+    ]
+    said = {"name": "sweep", "columns": ["index", "status", "folder", "name", "edge", "flag", "none"]}
+    (tmp_path / "batch.json").write_text(json.dumps({**said, "variants": variants}), "utf-8")
+    data = data_of(write_report(tmp_path).read_text("utf-8"))
+    assert data["title"] == "sweep: 3 variants"
+    assert data["table"]["columns"] == ["name", "index", "status", "edge", "flag", "none"]
+    assert data["table"]["rows"] == [
+        ["good", "good", 0, "ok", 0.5, "true", None],
+        ["", "bad", 1, "failed", None, None, None],
+        ["", "gone", 2, "ok", None, None, None],
+    ]
+    assert "variants" not in data["batch"]
+
+
+def test_what_is_no_result_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnitcadError, match="not a folder"):
+        write_report(tmp_path / "nothing")
+    with pytest.raises(UnitcadError, match="no result"):
+        write_report(tmp_path)
+    (tmp_path / "manifest.json").write_text("{", "utf-8")
+    with pytest.raises(UnitcadError, match=r"manifest.json: can't be read"):
+        write_report(tmp_path)
+    (tmp_path / "manifest.json").write_text("[]", "utf-8")
+    with pytest.raises(UnitcadError, match="not a manifest"):
+        write_report(tmp_path)
+
+
+def test_an_unreadable_spec_leaves_the_rest(built: Path, tmp_path: Path) -> None:
+    shutil.copytree(built, tmp_path / "a")
+    (tmp_path / "a" / "spec.toml").write_text("diameter_mm = ", "utf-8")
+    (tmp_path / "a" / "estimate.json").unlink()
+    record, spec = collect.variant(tmp_path / "a", tmp_path)
+    assert spec is None
+    assert record["model"] is None
+    assert "spec.toml" in record["no_model"]
+    assert record["estimate"] is None
+    write_report(tmp_path / "a")
+
+
+def test_materials_share_a_model_and_walls_do_not() -> None:
+    one = load("encapsulating")
+    other = load("encapsulating", ['layers.0.material="dragon-skin-30"', 'output.formats=["stl"]', 'name="x"'])
+    assert model_key(one) == model_key(other)
+    assert model(one) == model(other)
+    assert model_key(load("encapsulating", ["layers.0.wall_mm=1.3"])) != model_key(one)
+
+
+def test_budget_of_a_batch(built: Path) -> None:
+    """1,000 variants, each with numbers of its own, over 20 geometries."""
+    record, _ = collect.variant(built, built.parent)
+    pool, variants, models, rows = Pool(), [], {}, []
+    for i in range(1000):
+        mine = copy.deepcopy(record)
+        key = f"geometry{i % 20}"
+        mine |= {"folder": f"variant-{i}", "model": key}
+        mine["manifest"]["name"] = f"variant {i}"
+        mine["estimate"] = changed(mine["estimate"], 1 + i / 977)
+        mine["casting"] = changed(mine["casting"], 1 + i / 977)
+        variants.append([mine["folder"], pool.put(mine)])
+        rows.append([mine["folder"], *(f"value {i} of {c}" if c % 3 == 0 else i / (c + 1.7) for c in range(24))])
+    for i in range(20):
+        models[f"geometry{i}"] = model(load("three-layer", [f"layers.0.wall_mm={1.2 + i / 100}"]))
+    data = {
+        "title": "t", "version": "0", "variants": variants, "pool": pool.entries, "models": models, "batch": None,
+        "table": {"columns": [f"column {c}" for c in range(24)], "rows": rows},
+    }  # fmt: skip
+    assert len(page.page(data, "t").encode()) <= 25_000_000
+
+
+def changed(node: Any, factor: float) -> Any:
+    """The same data with every number another."""
+    if isinstance(node, dict):
+        return {key: changed(value, factor) for key, value in node.items()}
+    if isinstance(node, list):
+        return [changed(item, factor) for item in node]
+    return float(f"{node * factor:.9g}") if isinstance(node, float) else node
+
+
+@pytest.mark.parametrize("name", sorted(templates()))
+def test_every_template_has_a_page(name: str, tmp_path: Path) -> None:
+    store = MemoryStore()
+    folder = build(load(name, ['output.formats=["stl"]']), tmp_path, check=False, store=store).folder
+    assert write_report(folder).stat().st_size <= 3_000_000
+
+
+def test_command(built: Path, tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["report", str(built)])
+    assert done.exit_code == 0
+    assert done.output.splitlines()[-1] == str(built / "report.html")
+    done = CliRunner().invoke(app, ["report", str(built), "--json"])
+    assert json.loads(done.output) == {
+        "page": str(built / "report.html"),
+        "bytes": (built / "report.html").stat().st_size,
+    }
+    done = CliRunner().invoke(
+        app, ["build", "embedded", "-o", str(tmp_path), "--only", "unit", "--formats", "stl", "--report"]
+    )
+    assert done.exit_code == 0, done.output
+    assert (Path(done.output.splitlines()[-1]) / "report.html").is_file()
