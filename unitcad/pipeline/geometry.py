@@ -183,10 +183,6 @@ class _Making:
 
     def _check(self, records: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """What the mesh rules find in every file: tools against the printer."""
-        from importlib.util import find_spec
-
-        if not (find_spec("unitcad.check.printing") and find_spec("unitcad.check.threemf")):  # TODO remove
-            return []
         roles = {e["path"]: r["role"] for r in records for form, e in r["files"].items() if form in parts.MESH_FORMATS}
         return [{"path": path, **finding} for path, role in roles.items() for finding in self._check_file(path, role)]
 
