@@ -68,7 +68,7 @@ def wave_speed(youngs_modulus: Any, density: Any, poisson_ratio: Any, wave: Wave
     if wave == "s":
         return np.sqrt(shear / density)
     with _quiet():
-        return np.sqrt(shear * 2.0 * (1.0 - poisson_ratio) / (1.0 - 2.0 * poisson_ratio) / density)
+        return np.sqrt(shear * 2.0 * (1.0 - poisson_ratio) / np.subtract(1.0, 2.0 * poisson_ratio) / density)
 
 
 def transmission(from_impedance: Any, to_impedance: Any) -> Any:

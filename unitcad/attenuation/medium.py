@@ -83,7 +83,8 @@ class LayeredMedium:
         if not (np.all(np.isfinite(k)) and np.all(k.real > 0)):
             raise Refusal("k", "array", "wavenumbers must be finite, with a positive real part")
         top = self.planes(k.ravel(), omega)[0]
-        block = w.product(top.u, w.adjugate(top.t)) / w.determinant(top.t)
+        with np.errstate(divide="ignore", invalid="ignore"):  # infinite at an undamped mode, and meant so
+            block = w.product(top.u, w.adjugate(top.t)) / w.determinant(top.t)
         return np.moveaxis(block, -1, 0).reshape(*k.shape, 2, 2)
 
     def response(self, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:

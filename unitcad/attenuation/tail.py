@@ -75,15 +75,10 @@ def _bounds(k: np.ndarray, kernel: w.Array, load: Load, r: np.ndarray) -> np.nda
     by_envelope = _from_right(k, size[:, None] * wave)
     steps = np.abs(np.diff(kernel, axis=1)).max(axis=0)
     variation = fall + np.concatenate([np.cumsum(steps[::-1])[::-1], [0.0]])
-    distance = np.abs(r - load.reach)
-    with np.errstate(divide="ignore"):
-        by_parts = (variation * load.envelope(k))[:, None] * wave * 4.0 / distance
-    by_parts = (
-        np.where((k[:, None] * r > 3.0) & (k * max(load.reach, 0.0) > 3.0)[:, None], by_parts, np.inf)
-        if (load.reach)
-        else np.where(k[:, None] * r > 3.0, by_parts, np.inf)
-    )
-    return _MARGIN * np.minimum(by_envelope, by_parts).max(axis=1)
+    distance = np.maximum(np.abs(r - load.reach), 1e-12 * (r + load.reach) + 1e-300)
+    by_parts = (variation * load.envelope(k))[:, None] * wave * (4.0 / distance)
+    oscillating = (k[:, None] * r > 3.0) & ((k * load.reach > 3.0) | (load.reach == 0.0))[:, None]
+    return _MARGIN * np.minimum(by_envelope, np.where(oscillating, by_parts, np.inf)).max(axis=1)
 
 
 def _wave(x: np.ndarray) -> np.ndarray:

@@ -1,0 +1,279 @@
+"""Displacements against closed forms, independent solvers, published figures and exact identities."""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import optimize
+
+from unitcad.attenuation.loads import Point, UniformDisc
+from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.rheology import KelvinVoigt, LossFactor
+from unitcad.errors import Refusal
+
+REFERENCES = Path(__file__).parent / "references"
+A, OMEGA = 3.5e-3, 2 * np.pi * 125
+RADII = np.geomspace(1e-4, 50e-3, 13)
+
+
+def forearm(damped: bool = True) -> LayeredMedium:
+    def of(law):
+        return law if damped else None
+
+    return LayeredMedium(
+        [
+            Layer(1.5e-3, 1100, 130e3, 0.49, of(LossFactor(0.14))),
+            Layer(4e-3, 950, 8970.0, 0.495, of(KelvinVoigt(3.0))),
+            Layer(25e-3, 1050, 11960.0, 0.495, of(KelvinVoigt(4.5))),
+        ],
+        HalfSpace(1900, 15e9, 0.3, of(LossFactor(0.01))),
+    )
+
+
+def largest(response) -> float:
+    return float(max(np.max(np.abs(response.u_z)), np.max(np.abs(response.u_r))))
+
+
+def difference(one, other) -> float:
+    return float(max(np.max(np.abs(one.u_z - other.u_z)), np.max(np.abs(one.u_r - other.u_r))))
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
+def test_boussinesqs_disc(nu):
+    """Centre 2 (1 - nu^2) p a / E, edge 4 (1 - nu^2) p a / (pi E); u_r = -(1 - 2 nu)(1 + nu) p r / (2 E) inside."""
+    e = 3e4
+    found = LayeredMedium([], HalfSpace(1000, e, nu)).response(UniformDisc(A), 0.0, [0.0, A / 2, A])
+    assert found.u_z[0] == pytest.approx(2 * (1 - nu**2) * A / e, rel=1e-12)
+    assert found.u_z[2] == pytest.approx(4 * (1 - nu**2) * A / (np.pi * e), rel=1e-12)
+    assert found.u_r[1] == pytest.approx(-(1 - 2 * nu) * (1 + nu) * (A / 2) / (2 * e), rel=1e-12, abs=1e-22)
+    assert found.u_r[0] == 0
+
+
+def test_static_point_load_at_depth():
+    """Boussinesq: 4 pi mu R u_z = 2 (1 - nu) + z^2/R^2 and 4 pi mu R u_r = z r/R^2 - (1 - 2 nu) r/(R + z), per newton."""
+    e, nu, z, r = 3e4, 0.3, 2e-3, np.array([0.0, 1e-3, 5e-3, 20e-3])
+    mu, rr = e / (2 * (1 + nu)), np.hypot(r, z)
+    found = LayeredMedium([], HalfSpace(1000, e, nu)).response(Point(), 0.0, r, z=z, rtol=1e-11)
+    u_z = (2 * (1 - nu) + z**2 / rr**2) / (4 * np.pi * mu * rr)
+    u_r = (z * r / rr**2 - (1 - 2 * nu) * r / (rr + z)) / (4 * np.pi * mu * rr)
+    assert np.max(np.abs(found.u_z - u_z)) < 1e-10 * u_z[0]
+    assert np.max(np.abs(found.u_r - u_r)) < 1e-10 * u_z[0]
+    assert max(np.max(np.abs(found.u_z - u_z)), np.max(np.abs(found.u_r - u_r))) <= found.error
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.25, 0.45, 0.5])
+def test_rayleighs_cubic(nu):
+    """Surface wave: x^3 - 8 x^2 + (24 - 16 eps) x - 16 (1 - eps) = 0 for x = (c/c_s)^2, the root in (0, 1)."""
+    medium = LayeredMedium([], HalfSpace(1000, 3e4, nu))
+    ks = OMEGA / np.sqrt(3e4 / (2 * (1 + nu)) / 1000)
+    eps = (1 - 2 * nu) / (2 * (1 - nu))
+    cubic = [1, -8, 24 - 16 * eps, -16 * (1 - eps)]
+    x = optimize.brentq(lambda x: np.polyval(cubic, x), 0.3, 0.999, xtol=1e-15, rtol=1e-15)
+
+    def stiffness(k):
+        return 1 / medium.compliance(k, OMEGA)[1, 1].real
+
+    k = optimize.brentq(stiffness, 1.01 * ks, 1.5 * ks, xtol=1e-13 * ks, rtol=1e-15)
+    assert (ks / k) ** 2 == pytest.approx(x, rel=1e-12)
+
+
+@pytest.mark.parametrize("load", [UniformDisc(A), Point(), UniformDisc(A, "radial")])
+@pytest.mark.parametrize("z", [0.0, 2e-3])
+def test_cutting_a_layer_changes_nothing(load, z):
+    whole = forearm()
+    cut = LayeredMedium(
+        [
+            Layer(layer.thickness / 4, layer.density, layer.youngs_modulus, layer.poisson_ratio, layer.damping)
+            for layer in whole.layers
+            for _ in range(4)
+        ],
+        whole.half_space,
+    )
+    one, other = (m.response(load, OMEGA, RADII, z=z, rtol=1e-6) for m in (whole, cut))
+    assert difference(one, other) < 1e-7 * largest(one)
+
+
+def test_zero_thickness_changes_nothing_and_a_film_little():
+    base = forearm()
+    load = UniformDisc(A)
+    bare = base.response(load, OMEGA, RADII, rtol=2e-6)
+    changes = []
+    for thickness in (0.0, 2e-9, 4e-9):
+        coated = LayeredMedium([Layer(thickness, 1000, 1e7, 0.4), *base.layers], base.half_space)
+        found = coated.response(load, OMEGA, RADII, rtol=2e-6)
+        changes.append(difference(found, bare) / largest(bare))
+    assert changes[0] == 0
+    assert changes[2] == pytest.approx(2 * changes[1], rel=0.1)
+    assert changes[2] < 1e-3
+
+
+def test_far_field_without_damping():
+    data = json.loads((REFERENCES / "half_space.json").read_text())
+    a = data["radius"]
+    for case in data["cases"]:
+        medium = LayeredMedium([], HalfSpace(data["density"], data["youngs_modulus"], case["nu"]))
+        found = medium.response(UniformDisc(a), data["omega"], case["r_over_a"] * a, rtol=1e-8)
+        off = abs(found.u_z - complex(*case["u_z"]))
+        assert off <= 1e-8 * max(abs(found.u_z), abs(found.u_r)), case
+        assert off <= found.error
+    assert max(case["r_over_a"] for case in data["cases"]) == 150
+
+
+def _closing(radius: float, step: int) -> tuple[float, float]:
+    return radius * (1 - 4.0**-step), radius * (1 + 4.0**-step)
+
+
+def test_reciprocity_of_two_discs():
+    """Betti: the work of load b on the motion by load a is that of a on the motion by b; normal, and with radial."""
+    medium, b = forearm(damped=False), 2.2e-3
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+
+    def over(radius, load, part):
+        """Integral over a disc, in panels that close in on the edge of the load, where the slope is infinite."""
+        edges = sorted({0.0, radius, *(e for j in range(9) for e in _closing(load.radius, j) if e < radius)})
+        r = np.concatenate([(a + b) / 2 + (b - a) / 2 * nodes for a, b in pairwise(edges)])
+        weight = np.concatenate([(b - a) / 2 * weights for a, b in pairwise(edges)])
+        return np.sum(getattr(medium.response(load, OMEGA, r, rtol=1e-8), part) * r * weight)
+
+    normal = [over(b, UniformDisc(A), "u_z"), over(A, UniformDisc(b), "u_z")]
+    mixed = [over(b, UniformDisc(A), "u_r"), over(A, UniformDisc(b, "radial"), "u_z")]
+    for one, other in (normal, mixed):
+        assert abs(one - other) < 3e-6 * abs(one)
+
+
+@pytest.mark.parametrize("z", [0.0, 2e-3])
+def test_disc_is_a_superposition_of_points(z):
+    """The paper's motor: points spread evenly over the disc add up to it, each with its own direction of u_r."""
+    medium, r = forearm(), 7e-3
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    s = A * (nodes + 1) / 2
+    angle = 2 * np.pi * np.arange(24) / 24
+    x, y = r - s[:, None] * np.cos(angle), -s[:, None] * np.sin(angle)
+    distance = np.hypot(x, y)
+    point = medium.response(Point(), OMEGA, distance, z=z, rtol=1e-8)
+    area = (A / 2 * weights * s)[:, None] * (2 * np.pi / 24)
+    disc = medium.response(UniformDisc(A), OMEGA, r, z=z, rtol=1e-9)
+    assert abs(np.sum(point.u_z * area) - disc.u_z) < 1e-6 * abs(disc.u_z)
+    assert abs(np.sum(point.u_r * x / distance * area) - disc.u_r) < 1e-6 * abs(disc.u_r)
+
+
+def test_depth_tends_to_the_surface():
+    surface = forearm().response(UniformDisc(A), OMEGA, [2e-3, 10e-3])
+    near = forearm().response(UniformDisc(A), OMEGA, [2e-3, 10e-3], z=1e-6)
+    assert difference(surface, near) < 2e-3 * largest(surface)
+
+
+def test_pyprop8():
+    for case in json.loads((REFERENCES / "pyprop8.json").read_text()):
+        loss = LossFactor(case["tan_delta"])
+        *layers, last = case["bodies"]
+        medium = LayeredMedium([Layer(*body, loss) for body in layers], HalfSpace(*last[1:], loss))
+        found = medium.response(Point(), case["omega"], case["radii"], z=case["depth"], rtol=1e-9)
+        for part in ("u_z", "u_r"):
+            theirs = np.array([complex(*v) for v in case[part]])
+            limit = 1e-6 * np.max(np.abs(theirs)) + 2 * case[f"{part}_spread"]
+            assert np.max(np.abs(getattr(found, part) - theirs)) < limit, (case["name"], part)
+
+
+def test_published_static_layered_table():
+    """European Commission, AMADEUS project (Belgian Road Research Centre 2000): strains by BISAR, KENLAYER and GAMES.
+
+    Three layers bonded, 0.7 MPa on a disc of 150.8 mm; microstrain, compression positive: horizontal at the bottom of
+    the first layer, vertical at the top of the second and of the third, at the centre and at the edge of the load.
+    """
+    medium = LayeredMedium([Layer(0.26, 2000, 5e9, 0.35), Layer(0.5, 2000, 2e8, 0.40)], HalfSpace(2000, 5e7, 0.45))
+    a, step = 0.1508, 1e-3
+
+    def vertical(z, r):
+        top, lower = (medium.response(UniformDisc(a), 0.0, r, z=at, rtol=1e-11).u_z for at in (z, z + step))
+        return float(0.7e6 * (top - lower).real / step * 1e6)
+
+    def radial(z, r):
+        sides = medium.response(UniformDisc(a), 0.0, [max(r - step, 0.0), r + step], z=z, rtol=1e-11).u_r
+        return float(-0.7e6 * (sides[1] - sides[0]).real / (step + min(r, step)) * 1e6)
+
+    published = {"centre": (-100.5, 251.65, 185.1), "edge": (-61.9, 192.2, 177.3)}
+    for place, r in (("centre", 0.0), ("edge", a)):
+        found = (radial(0.26 - 1e-9, r), vertical(0.26, r), vertical(0.76, r))
+        assert found == pytest.approx(published[place], rel=4e-3), place
+
+
+def _random_medium(rng) -> LayeredMedium:
+    def material():
+        return (
+            rng.uniform(800, 1500),
+            10 ** rng.uniform(3.5, 6),
+            rng.choice([0.0, 0.3, 0.45, 0.4999, 0.5]),
+            rng.choice([None, LossFactor(0.1), KelvinVoigt(2.0)]),
+        )
+
+    layers = [Layer(10 ** rng.uniform(-4, -2), *material()) for _ in range(rng.integers(0, 4))]
+    return LayeredMedium(layers, HalfSpace(*material()))
+
+
+def test_error_estimate_is_at_least_the_true_error():
+    rng = np.random.default_rng(11)
+    loads = [UniformDisc(A), UniformDisc(A, "radial"), UniformDisc(0.5e-3), Point(), Point("radial")]
+    r = np.array([0.3e-3, 1e-3, 3.5e-3, 8e-3, 30e-3])
+    reached = []
+    for i in range(30):
+        medium, load = _random_medium(rng), loads[i % len(loads)]
+        omega, z = rng.choice([0.0, 60.0, 785.0, 3000.0]), rng.choice([0.0, 0.0, 1.5e-3])
+        truth = medium.response(load, omega, r, z=z, rtol=5e-8)
+        assert truth.error <= 1e-6 * largest(truth)
+        for rtol in (1e-2, 1e-4, 1e-5):
+            found = medium.response(load, omega, r, z=z, rtol=rtol)
+            assert difference(found, truth) <= found.error + truth.error
+            reached.append(found.error <= rtol * largest(found))
+    assert all(reached)
+
+
+def test_tolerance_is_reached_on_the_forearm():
+    for damped in (True, False):
+        truth = forearm(damped).response(UniformDisc(A), OMEGA, RADII, rtol=1e-9)
+        found = forearm(damped).response(UniformDisc(A), OMEGA, RADII, rtol=1e-6)
+        assert difference(found, truth) <= found.error <= 1e-6 * largest(found)
+
+
+def test_layers_out_of_reach_are_left_out_and_named():
+    deep = LayeredMedium(
+        [Layer(0.02, 1100, 1e5, 0.3, LossFactor(0.5)), Layer(0.5, 1000, 5e4, 0.3, LossFactor(0.5))],
+        HalfSpace(2000, 1e9, 0.3),
+    )
+    found = deep.response(UniformDisc(A), 3000.0, RADII)
+    assert found.layers_left_out == (2,)
+    kept = LayeredMedium(deep.layers, HalfSpace(1000, 5e4, 0.3, LossFactor(0.5)))
+    other = kept.response(UniformDisc(A), 3000.0, RADII)
+    assert difference(found, other) <= found.error + other.error
+    assert forearm().response(UniformDisc(A), 100.0, RADII).layers_left_out == ()
+
+
+def test_wavenumbers_follow_from_the_problem():
+    near = forearm().response(UniformDisc(A), OMEGA, [5e-3])
+    far = forearm().response(UniformDisc(A), OMEGA, [0.5])
+    assert far.wavenumbers > near.wavenumbers
+    assert forearm().response(UniformDisc(A), OMEGA, [5e-3], rtol=1e-3).wavenumbers < near.wavenumbers
+
+
+def test_shapes_and_refusals():
+    medium, load = forearm(), UniformDisc(A)
+    assert np.ndim(medium.response(load, OMEGA, 5e-3).u_z) == 0
+    assert medium.response(load, OMEGA, [[1e-3, 2e-3]]).u_r.shape == (1, 2)
+    for arguments, field in [
+        ((Point(), OMEGA, [0.0, 1e-3]), "r"),
+        ((load, OMEGA, [-1e-3]), "r"),
+        ((load, OMEGA, []), "r"),
+        ((load, OMEGA, [float("nan")]), "r"),
+        ((load, OMEGA, [1e-3], -1e-3), "z"),
+        ((load, OMEGA, [1e-3], 0.0, 1e-15), "rtol"),
+        ((load, -1.0, [1e-3]), "omega"),
+    ]:
+        with pytest.raises(Refusal) as refused:
+            medium.response(*arguments)
+        assert refused.value.field == field
+    with pytest.raises(Refusal):
+        UniformDisc(0.0)
+    with pytest.raises(Refusal):
+        Point("sideways")
