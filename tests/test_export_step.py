@@ -9,7 +9,7 @@ from sample_bodies import all_bodies, cup, tongue, tube
 
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.variant import Variant
-from unitcad.shape import Cut, moved
+from unitcad.shape import Cut, Revolve, Union, cylinder, moved, polygon, turned
 from unitcad.shape.body import Body
 from unitcad.spec.load import templates
 
@@ -118,6 +118,13 @@ def test_bodies_of_one_shape_keep_their_own_names_colours_and_places(tmp_path):
     found = step.read(tmp_path / "pair.step")
     assert [(body.name, body.colour) for body in found] == [(body.name, body.colour) for body in pair]
     assert found[1].measures.box[2] - found[0].measures.box[2] == pytest.approx(5, abs=1e-9)
+
+
+def test_a_body_that_occt_gets_wrong_is_not_written():
+    """A cylinder and a cone lying in it, edge on edge: OCCT loses a part and calls the rest valid."""
+    shape = Union((cylinder(1, 0, 1), turned(Revolve(polygon((0, 0), (1, 0), (0, 1))), "y", 3)))
+    with pytest.raises(UnitcadError, match=r"OCCT and manifold3d differ: 1 solids of 3\.6"):
+        step.content([Body("odd", "tool", shape, (0, 0, 0))], "odd")
 
 
 def test_names_are_escaped(tmp_path):

@@ -5,7 +5,7 @@ import importlib
 import math
 
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 from sample_bodies import LAYER1, QUARTER, all_bodies
 
@@ -24,6 +24,7 @@ from unitcad.shape import (
     cylinder,
     exact_volume,
     polygon,
+    rectangle,
     rounded_rectangle,
     turned,
 )
@@ -31,6 +32,8 @@ from unitcad.shape.profile import ProfileError
 from unitcad.spec.load import templates
 
 occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
+WITHOUT_SHRINKING = (Phase.explicit, Phase.reuse, Phase.generate)
+"""Making a failing tree smaller takes minutes of booleans."""
 BODIES = {body.name: body for body in all_bodies()}
 LEAVES = {
     "tube": Revolve(polygon((3, 0), (5, 0), (5, 10), (3, 10))),
@@ -55,12 +58,12 @@ def solids_of(shape):
     return found
 
 
-def assert_breps_agree(shape):
+def assert_breps_agree(shape, share=1e-9):
     measured = {name: occt.measure(solid) for name, solid in solids_of(shape).items()}
     reference = measured.pop("occt")
     for other in measured.values():
         assert other.solids == reference.solids
-        assert other.volume == pytest.approx(reference.volume, rel=1e-9)
+        assert other.volume == pytest.approx(reference.volume, rel=share)
         assert other.box == pytest.approx(reference.box, abs=1e-6)
     return reference
 
@@ -134,6 +137,7 @@ def numbers(low, high):
 
 @st.composite
 def leaves(draw):
+    """Round ones stand upright; straight ones lie any way."""
     kind = draw(st.sampled_from(["ring", "cone", "dome", "block", "slab", "taper"]))
     z0, height, r0, width = draw(numbers(-4, 4)), draw(numbers(1, 4)), draw(numbers(0, 3)), draw(numbers(1, 4))
     if kind == "ring":
@@ -142,39 +146,46 @@ def leaves(draw):
         return Revolve(polygon((r0, z0), (r0 + width, z0), (r0, z0 + height)))
     if kind == "dome":
         return Revolve(Profile(((r0, z0, 0), (r0 + width, z0, QUARTER), (r0, z0 + width, 0))))
-    if kind == "block":
-        x0, y0 = draw(numbers(-4, 4)), draw(numbers(-4, 4))
-        return box(x0, x0 + width, y0, y0 + draw(numbers(1, 4)), z0, z0 + height)
     half = 2 + width
     if kind == "slab":
         return Extrude(rounded_rectangle(half, half + 1, 1), z0, z0 + height, holes=(rounded_rectangle(1, 1, 0.5),))
-    return Extrude(rounded_rectangle(half, half, 1), z0, z0 + height, top=rounded_rectangle(half - 0.5, half - 0.5, 1))
+    x0, y0 = draw(numbers(-4, 4)), draw(numbers(-4, 4))
+    straight = box(x0, x0 + width, y0, y0 + draw(numbers(1, 4)), z0, z0 + height)
+    if kind == "taper":
+        straight = Extrude(rectangle(-half, -2, half, 2), z0, z0 + height, top=rectangle(-2, -1, 2, 1))
+    return turned(straight, draw(st.sampled_from("xyz")), draw(st.integers(0, 3)))
 
 
 def trees():
     def grown(children):
+        # Off the grid of quarters, so that round faces cross instead of touching along a line.
+        off = st.integers(-2000, 2000).map(lambda value: (value * 2 + 1) / 1024)
         return st.one_of(
             st.tuples(children, children, children).map(Union),
             st.tuples(children, st.tuples(children, children)).map(lambda pair: Cut(*pair)),
             st.tuples(children, children).map(Common),
-            st.tuples(children, st.sampled_from("xyz"), st.integers(0, 3)).map(lambda t: turned(*t)),
-            # Moved off the grid of quarters, so that surfaces cross instead of touching along a line.
-            st.tuples(children, *[st.integers(-2000, 2000)] * 3).map(
-                lambda t: Place(t[0], move=(t[1] / 1024, t[2] / 1024, t[3] / 1024))
-            ),
+            st.tuples(children, off, off, off).map(lambda t: Place(t[0], move=t[1:])),
         )
 
     return st.recursive(leaves(), grown, max_leaves=6)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), phases=WITHOUT_SHRINKING)
 @given(trees())
 def test_kernels_agree_on_random_trees(shape):
+    """Where curved faces cross off their axes OCCT approximates the curve to 1e-7 mm, so volumes to 1e-7."""
     solid = mesh.realise(shape, 64)
     assume(solid.volume() > 1)
-    reference = assert_breps_agree(shape)
+    reference = assert_breps_agree(shape, 1e-7)
     allowed = bounds.volume_bound(shape, 64)
-    assert abs(solid.volume() - reference.volume) <= allowed + 1e-9 * reference.volume
+    assert abs(solid.volume() - reference.volume) <= allowed + 1e-7 * reference.volume
+
+
+def test_what_occt_gets_wrong_is_seen_by_the_mesh():
+    """A cylinder and a cone lying in it, edge on edge: OCCT loses a part, says nothing, and calls the rest valid."""
+    shape = Union((cylinder(1, 0, 1), turned(Revolve(polygon((0, 0), (1, 0), (0, 1))), "y", 3)))
+    wrong = occt.measure(occt.solids([shape])[0]).volume
+    assert abs(mesh.realise(shape, 64).volume() - wrong) > bounds.volume_bound(shape, 64)
 
 
 def test_planted_faults_are_seen():

@@ -67,8 +67,13 @@ def write(path: Path, bodies: Sequence[Body], name: str) -> None:
 
 
 def content(bodies: Sequence[Body], name: str) -> bytes:
-    """The bytes of the file. Its time stamp is SOURCE_DATE_EPOCH, or 1980-01-01 without one. Raises UnitcadError."""
+    """The bytes of the file. Its time stamp is SOURCE_DATE_EPOCH, or 1980-01-01 without one.
+
+    Raises UnitcadError where OCCT fails, or makes a body that differs from its mesh.
+    """
     solids = occt.solids(body.shape for body in bodies)
+    for body, solid in zip(bodies, solids, strict=True):
+        occt.confirm(body.shape, solid)
     document = _document(bodies, solids, name)
     STEPCAFControl_Controller.Init_s()
     stream = io.BytesIO()

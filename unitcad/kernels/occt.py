@@ -9,7 +9,9 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from unitcad.kernels import brep
+from unitcad.errors import UnitcadError
+from unitcad.kernels import brep, mesh
+from unitcad.kernels.bounds import volume_bound
 from unitcad.kernels.ocp import loading
 from unitcad.shape import Shape
 from unitcad.shape.tree import Turn
@@ -45,6 +47,21 @@ class Measures:
 def solids(shapes: Iterable[Shape]) -> list[TopoDS_Shape]:
     """The bodies of `shapes`, faces that continue each other made one."""
     return [_unified(solid) for solid in brep.realise(shapes, _library())]
+
+
+def confirm(shape: Shape, solid: TopoDS_Shape, segments: int = 96) -> None:
+    """Raises UnitcadError where OCCT's `solid` differs from manifold3d's mesh of `shape` in count, or in volume by more
+    than `segments` a turn explain: OCCT can lose a part of a body, and calls the rest valid.
+    """
+    properties, other = GProp_GProps(), mesh.realise(shape, segments)
+    BRepGProp.VolumeProperties_s(solid, properties)
+    count, parts = len(_solids_in(solid)), len(other.decompose())
+    allowed = volume_bound(shape, segments) + 1e-6 * other.volume()
+    if count != parts or abs(properties.Mass() - other.volume()) > allowed:
+        raise UnitcadError(
+            f"OCCT and manifold3d differ: {count} solids of {properties.Mass():.6g} mm3 against {parts} of"
+            f" {other.volume():.6g}, more than the {allowed:.2g} that the mesh's facets explain"
+        )
 
 
 def measure(solid: TopoDS_Shape) -> Measures:
@@ -125,6 +142,8 @@ def _boolean(
     operation.SetArguments(_list(bodies))
     operation.SetTools(_list(tools))
     operation.Build()
+    if not operation.IsDone() or operation.Shape().IsNull():
+        raise UnitcadError(f"OCCT failed: {type(operation).__name__} of {len(bodies) + len(tools)} solids")
     return operation.Shape()
 
 
