@@ -20,8 +20,8 @@ from unitcad.shape.body import Body
 from unitcad.spec import Dimensions
 
 HAIR_MM = 1 / 3000
-"""The cut lies this far off its plane, and so in no plane of the length grid: what lies in the plane itself, a face that
-two bodies share, would be drawn for both or for neither."""
+"""The cut lies this far off its plane, and so in no plane of the length grid: a face in the plane
+itself, shared by two bodies, could be drawn for both or for neither."""
 TAIL_MM = 2.5
 """Of a tail, this much is drawn."""
 WIDTH_PX = 520.0
