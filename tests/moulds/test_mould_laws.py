@@ -113,7 +113,7 @@ def test_the_peel_over_a_bar_printed_on_the_core(reach: float, sides: int) -> No
     """The hull of a circle and one or two bars in closed form: tangents, arcs and the bars' ends."""
     radius, half = 4.5, 1.7
     bars = [box(min(0, s * reach), max(0, s * reach), -half, half, 1.805, 2.0) for s in (1, -1)[:sides]]
-    bar_set = MouldSet.of("encapsulating", "casting.strain_margin=0.02").with_fault("base", more(*bars))
+    bar_set = MouldSet.of("encapsulating", "casting.strain_margin=0.01").with_fault("base", more(*bars))
     far = math.hypot(reach, half)
     tangent, angle = math.sqrt(far**2 - radius**2), math.atan(half / reach) + math.acos(radius / far)
     around = sides * (2 * tangent + 2 * half) + (2 * math.pi - 2 * sides * angle) * radius

@@ -121,7 +121,7 @@ def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
     moulds, rim, radius = spec.moulds, dims.heights[layer], dims.radii[layer]
     inner = radius + (moulds.land_mm or 0)
     outer = inner + (moulds.groove_width_mm or 0)
-    depth = min(moulds.groove_depth_mm or 0, rim / 2)
+    depth = groove_depth_of(spec, rim)
     channel = ring(inner, outer, rim - depth, rim + BEYOND)
     if dims.slot_z:
         wall = moulds.least_wall_mm or 0
@@ -133,6 +133,11 @@ def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
             )
             channel = cut(channel, stops)
     return moved(channel, cell.x, cell.y)
+
+
+def groove_depth_of(spec: Spec, rim: float) -> float:
+    """Depth of an overflow groove: the printer's, or half a low rim's height."""
+    return min(spec.moulds.groove_depth_mm or 0, rim / 2)
 
 
 def windows(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:

@@ -25,6 +25,13 @@ def tail_strain(spec: Spec) -> float | None:
     return max(0.0, _round_end(spec) / _round_slot(spec) - 1)
 
 
+def pad_strain(spec: Spec) -> float | None:
+    """Strain of the slot's edge if the circuit's own pad had to pass: what a chain's next pad would need."""
+    if not spec.fpcb or not spec.fpcb.pad_diameter_mm or spec.design != "encapsulating":
+        return None
+    return max(0.0, 2 * (spec.fpcb.pad_diameter_mm + spec.fpcb.thickness_mm) / _round_slot(spec) - 1)
+
+
 def widest_tail_end(spec: Spec, strain: float) -> float:
     """The widest free end of a tail, mm, that stretches the slot by no more than `strain`."""
     assert spec.fpcb is not None

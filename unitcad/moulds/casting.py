@@ -1,0 +1,151 @@
+"""The casting procedure as data: what a person does, in order, with every figure's source; `casting_text` writes it.
+
+A procedure is made from a spec, its plan and the volumes of its layers; nothing here meshes or draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from unitcad import catalogue
+from unitcad.catalogue import Material
+from unitcad.moulds import figures as fig
+from unitcad.moulds.bom import Item, bill
+from unitcad.moulds.figures import Figure, Mix, sourced
+from unitcad.moulds.grid import OffGrid, off_grid
+from unitcad.moulds.plan import Plan, Step
+from unitcad.moulds.steps import assembly, measurements, pour_steps, preparation, release
+from unitcad.shape import exact_volume
+from unitcad.spec import Dimensions, Spec, dimensions, printer_of
+
+
+@dataclass(frozen=True)
+class Pour:
+    """One pour: its figures, the verdict on bubbles, what the person does, and the drawing of it assembled."""
+
+    index: int
+    layer: str
+    material: str
+    figures: tuple[Figure, ...]
+    verdict: str
+    steps: tuple[str, ...]
+    drawing: str
+
+
+@dataclass(frozen=True)
+class Procedure:
+    """A whole casting: numbered steps run on from `preparation` through the pours to `assembly`."""
+
+    name: str
+    label: str
+    cells: int
+    preparation: tuple[str, ...]
+    off_grid: tuple[OffGrid, ...]
+    pours: tuple[Pour, ...]
+    release: tuple[str, ...]
+    assembly: tuple[str, ...]
+    measure: tuple[str, ...]
+    walls: tuple[Figure, ...]
+    bill: tuple[Item, ...]
+
+
+def procedure(spec: Spec, plan: Plan, layer_volumes_mm3: Sequence[float]) -> Procedure:
+    """The procedure of a spec. `layer_volumes_mm3`: of each layer of one unit, from the inside out."""
+    dims, known = dimensions(spec), catalogue.materials(spec.materials)
+    silicones = [known[layer.material] for layer in spec.layers]
+    mixes = [
+        fig.mix(spec, silicone, len(plan.layout.cells) * volume + sum(map(exact_volume, step.channels)))
+        for silicone, volume, step in zip(silicones, layer_volumes_mm3, plan.steps, strict=True)
+    ]
+    resin = printer_of(spec).technology.value == "sla"
+    pours = []
+    for i, (step, silicone, mix, volume) in enumerate(
+        zip(plan.steps, silicones, mixes, layer_volumes_mm3, strict=True)
+    ):
+        numbers, verdict = _figures(spec, dims, plan, i, silicone, mix, volume), _verdict(spec, step, silicone)
+        steps = pour_steps(spec, plan, step, silicone, mix, verdict)
+        pours.append(
+            Pour(step.index, step.name, silicone.name, numbers, verdict, steps, f"step{step.index}-section.svg")
+        )
+    return Procedure(
+        name=spec.name,
+        label=plan.label,
+        cells=len(plan.layout.cells),
+        preparation=preparation(spec, plan, resin),
+        off_grid=tuple(off_grid(spec, dims)),
+        pours=tuple(pours),
+        release=release(spec, plan, silicones[0]),
+        assembly=assembly(spec, dims),
+        measure=measurements(spec, dims, plan),
+        walls=tuple(_walls(spec)),
+        bill=bill(spec, dims, plan, list(zip(silicones, mixes, strict=True))),
+    )
+
+
+def _figures(
+    spec: Spec, dims: Dimensions, plan: Plan, layer: int, silicone: Material, mix: Mix, volume: float
+) -> tuple[Figure, ...]:
+    casting, step = spec.casting, plan.steps[layer]
+    rule = "assumed: half the time for every 10 K more; at 23 degC " + sourced(silicone.pot_life_min)
+    depth = step.rim
+    weep = fig.weep_mm3(spec, dims, plan.layout, layer, silicone)
+    found = [
+        Figure("volume of one layer", volume, "mm3", "computed: the drawn layer's mesh"),
+        Figure("density", float(silicone.density_g_cm3), "g/cm3", sourced(silicone.density_g_cm3)),
+        Figure("in the cavities, net", mix.net_g, "g", "computed: volume x cavities x density"),
+        Figure("to mix", mix.mix_g, "g", f"assumed: {casting.waste:.0%} more, at least {casting.minimum_mix_g:g} g"),
+        Figure("part A", mix.part_a_g, "g", "mix ratio, " + sourced(silicone.mix_ratio)),
+        Figure("part B", mix.part_b_g, "g", "mix ratio, " + sourced(silicone.mix_ratio)),
+        Figure("scale's error on a part, net", mix.net_error_pct, "%", f"half of {casting.scale_resolution_g:g} g"),
+        Figure("scale's error on a part, mixed", mix.mix_error_pct, "%", f"half of {casting.scale_resolution_g:g} g"),
+        Figure("pot life in this room", fig.at_room(float(silicone.pot_life_min), casting.room_c), "min", rule),
+        Figure("viscosity, mixed", float(silicone.mixed_viscosity_cps), "cps", sourced(silicone.mixed_viscosity_cps)),
+        Figure("depth of this pour", depth, "mm", "computed: the rim over the seat"),
+        Figure(
+            f"rise of a {fig.BUBBLE_MM} mm bubble through it",
+            fig.bubble_rise_s(depth, silicone),
+            "s",
+            "computed: Stokes' law at constant viscosity, so optimistic; the bubble is assumed",
+        ),
+        Figure(
+            "degassing container, at least", fig.CONTAINER * mix.millilitres, "ml", "assumed: 4 x the mix, it foams up"
+        ),
+        Figure(
+            "vacuum", fig.VACUUM_INHG, "inHg", f"assumed: usual advice; {fig.VACUUM_INHG * fig.KPA_PER_INHG:.1f} kPa"
+        ),
+        Figure(
+            "cure in this room",
+            fig.at_room(float(silicone.cure_h), casting.room_c),
+            "h",
+            "assumed: half the time for every 10 K more; at 23 degC " + sourced(silicone.cure_h),
+        ),
+    ]
+    if weep:
+        share = 100 * weep / volume
+        found.append(Figure("weep by the windows, no grease", share, "% of a layer", "computed: flow in the clearance"))
+    return tuple(found)
+
+
+def _verdict(spec: Spec, step: Step, silicone: Material) -> str:
+    rise = fig.bubble_rise_s(step.rim, silicone)
+    pot = 60 * fig.at_room(float(silicone.pot_life_min), spec.casting.room_c)
+    if rise <= pot:
+        return f"Bubbles clear by themselves: {rise:.0f} s through {step.rim:.2f} mm, within a pot life of {pot:.0f} s."
+    if spec.casting.vacuum:
+        return f"Degas before pouring: a bubble needs {rise:.0f} s, the pot life is {pot:.0f} s."
+    return (
+        f"Bubbles stay: {rise:.0f} s against a pot life of {pot:.0f} s and no vacuum (casting.vacuum). Get one, or "
+        "brush a thin coat onto core and bore first and pour in a thread from one side."
+    )
+
+
+def _walls(spec: Spec) -> list[Figure]:
+    times = "1 x for Layer 1, 2 x beyond it" if len(spec.layers) > 1 else "1 x"
+    source = f"computed: play of {spec.moulds.plinth_clearance_mm:g} mm a side, {times}"
+    found = []
+    for i in range(len(spec.layers)):
+        thin, thick = fig.wall_range(spec, i)
+        found.append(Figure(f"layer {i + 1} wall, thinnest", thin, "mm", source))
+        found.append(Figure(f"layer {i + 1} wall, thickest", thick, "mm", source))
+    return found

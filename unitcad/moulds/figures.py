@@ -1,0 +1,104 @@
+"""The numbers of a casting procedure, each with its source: grams, times, strains, play. Pure arithmetic on a spec."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from unitcad.catalogue import Material, Value
+from unitcad.moulds.layout import Layout
+from unitcad.spec import Dimensions, Spec
+
+GRAVITY = 9.80665
+BUBBLE_MM = 0.2
+"""Diameter of the smallest bubble that a hand-poured layer should be rid of (assumed)."""
+CONTAINER = 4.0
+"""Volume of the degassing container over the mix: silicone foams up under vacuum (maker's advice: 3 to 4 times)."""
+VACUUM_INHG, KPA_PER_INHG = 29.0, 3.386389
+DATASHEET_C = 23.0
+DOUBLING_K = 10.0
+"""A cure runs twice as fast for every 10 K (assumed: the usual rule of thumb, no bulletin gives it)."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One number: what it is, its value and unit, and where it comes from (a source, a formula, or 'assumed: ...')."""
+
+    name: str
+    value: float
+    unit: str
+    source: str
+
+
+def sourced(value: Value) -> str:
+    """A catalogue value's origin in words: its status, then its source."""
+    return f"{value.status}: {value.source}"
+
+
+@dataclass(frozen=True)
+class Mix:
+    """Grams of one pour: in all cavities (and channels), to weigh in, of each part, and what half a digit does."""
+
+    net_g: float
+    mix_g: float
+    part_a_g: float
+    part_b_g: float
+    net_error_pct: float
+    mix_error_pct: float
+    millilitres: float
+
+
+def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
+    """What to weigh for `volume_mm3` of silicone. The error is half the scale's digit over the smaller part's grams."""
+    casting, ratio = spec.casting, float(material.mix_ratio)
+    net = volume_mm3 * float(material.density_g_cm3) / 1000
+    total = max(net * (1 + casting.waste), casting.minimum_mix_g)
+    share = ratio / (1 + ratio)
+    smaller = min(share, 1 - share)
+
+    def error(grams: float) -> float:
+        return 100 * casting.scale_resolution_g / 2 / (grams * smaller)
+
+    millilitres = total / float(material.density_g_cm3)
+    return Mix(net, total, total * share, total * (1 - share), error(net), error(total), millilitres)
+
+
+def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE_MM) -> float:
+    """Seconds for a bubble to rise through a depth by Stokes' law, at the viscosity just mixed, so optimistic.
+
+    v = 2/9 (density of silicone) g radius^2 / viscosity; the air's own density is left out.
+    """
+    density, viscosity = 1000 * float(material.density_g_cm3), float(material.mixed_viscosity_cps) / 1000
+    speed = 2 / 9 * density * GRAVITY * (bubble_mm / 2000) ** 2 / viscosity
+    return depth_mm / 1000 / speed
+
+
+def at_room(value: float, room_c: float) -> float:
+    """A time at 23 degC (pot life, cure) at the room's temperature, by the rule of thumb above."""
+    return value * 2 ** ((DATASHEET_C - room_c) / DOUBLING_K)
+
+
+def weep_mm3(spec: Spec, dims: Dimensions, lay: Layout, layer: int, material: Material) -> float:
+    """What flows out beside the tongues of one cell during the whole pot life without grease, mm3.
+
+    Plane Poiseuille flow through the window's clearance: clearance^3 perimeter pressure / (12 viscosity length).
+    """
+    if not dims.slot_z:
+        return 0.0
+    clearance = (spec.moulds.window_clearance_mm or 0.0) / 1000
+    around = 2 * (dims.slot_width + dims.slot_z[1] - dims.slot_z[0]) / 1000
+    length = (lay.cup[0] - max(abs(c.x) for c in lay.cells) - dims.radii[layer]) / 1000
+    head = max(dims.heights[layer] - sum(dims.slot_z) / 2, 0.0) / 1000
+    pressure = 1000 * float(material.density_g_cm3) * GRAVITY * head
+    flow = clearance**3 * around * pressure / (12 * float(material.mixed_viscosity_cps) / 1000 * length)
+    seconds = 60 * at_room(float(material.pot_life_min), spec.casting.room_c)
+    return len(dims.sides) * flow * seconds * 1e9
+
+
+def wall_range(spec: Spec, layer: int) -> tuple[float, float]:
+    """Thinnest and thickest wall of a layer (from 0) that the cups' play on the plinth allows, mm.
+
+    Layer 1 lies between the core and one cup position, each further layer between two.
+    """
+    play = (spec.moulds.plinth_clearance_mm or 0.0) * (1 if layer == 0 else 2)
+    wall = spec.layers[layer].wall_mm
+    return max(wall - play, 0.0), wall + play

@@ -1,0 +1,190 @@
+"""What a person does, in words: one function a stage of the procedure."""
+
+from __future__ import annotations
+
+import math
+
+from unitcad.catalogue import Material
+from unitcad.moulds.figures import Mix
+from unitcad.moulds.lid import SKIRT_WALL
+from unitcad.moulds.plan import Plan, Step
+from unitcad.spec import Dimensions, Spec
+from unitcad.spec.strain import pad_strain
+
+STRIKE_AGAIN_MIN = 10
+
+
+def preparation(spec: Spec, plan: Plan, resin: bool) -> tuple[str, ...]:
+    """From the printer to an empty mould."""
+    found = [
+        f"Print the pieces as they lie in their files: cups upside down, the rest as drawn. All are engraved "
+        f"{plan.label}.",
+        "Brush off strings and loose bits. Put each cup on the plinth once, dry: its cut corner lets it on one way "
+        "only, "
+        "and it must sit down until seat and plinth touch.",
+    ]
+    if resin:
+        found.append(
+            "Resin keeps many platinum silicones from curing: wash, post-cure, bake (60 degC for 8 h, assumed), "
+            "then cure a "
+            "drop of each silicone on a spot of the base that is no cavity. If it stays tacky, coat or reprint."
+        )
+    if any(tool.name.startswith("stub") for tool in plan.tools):
+        found.append(
+            "Push the filament stub up through the core from below until its end is flush with the core's top, its "
+            "bent end "
+            "lying in the groove under the plate and on the bench. Trim its tip flush with a blade: 0.5 mm low shows."
+        )
+    return tuple(found)
+
+
+def pour_steps(spec: Spec, plan: Plan, step: Step, silicone: Material, mix: Mix, verdict: str) -> tuple[str, ...]:
+    """One pour, from an empty mould to a cured layer on the core."""
+    first, tongues = step.index == 1, [name for name in step.tools if name.startswith("tongue")]
+    cells = len(plan.layout.cells)
+    found = []
+    if not first:
+        found.append(
+            f"Wipe Layer {step.index - 1} with isopropanol and let it dry. Its outside is the bond face: no release "
+            "agent on it, "
+            "ever, no grease, no fingers. No sourced window exists for when to pour the next layer; as soon as it "
+            "is firm "
+            "and no longer tacky is the usual practice (assumed), and silicone bonds to cured silicone of its kind."
+        )
+    found.append(
+        f"Release agent, if any, only on the bore of cup {step.index}"
+        + (" and on the core, sparingly." if first else ".")
+        + f" Put cup {step.index} on and push it towards the cut corner"
+        + (
+            ": the play is then on one side."
+            if first
+            else ", the same way as the cup before: Layer 2 lies between two cup positions."
+        )
+    )
+    if tongues:
+        found.append(
+            f"Grease {'the tongue' if len(tongues) == 1 else 'each tongue'} and the window thinly with petroleum "
+            f"jelly, the tip "
+            "not; wipe off what comes out into the bore. Push it in through the window"
+            + ("" if first else " and the slot that it left in the layer before")
+            + " until its round tip stops in the core and it lies on the ledge."
+        )
+    if step.lid:
+        found.append(
+            f"Put lid {step.index} on. Seal it with a thin line of petroleum jelly on the rim outside the groove, "
+            f"and hold it "
+            f"down with a rubber band or a clamp across its skirt ({SKIRT_WALL:g} mm)."
+        )
+    found.append(
+        f"Weigh {mix.part_a_g:.2f} g of {silicone.name} part A and {mix.part_b_g:.2f} g of part B ({mix.net_g:.3f} "
+        f"g go into "
+        f"{cells} cavit{'y' if cells == 1 else 'ies'}; so small a batch would be {mix.net_error_pct:.1f} % wrong in "
+        "the ratio, "
+        f"this one {mix.mix_error_pct:.2f} %). Mix for 2 to 3 min (assumed), scraping the walls; the pot life runs "
+        f"from now."
+    )
+    found.append(verdict)
+    if step.lid:
+        found.append(
+            f"Draw the silicone into a syringe, press its tip into the sprue ({spec.moulds.sprue_mm:g} mm) and "
+            f"inject slowly until "
+            "every vent shows a bead without bubbles. Leave sprue and vents filled."
+        )
+    else:
+        found.append(
+            "Pour in a thin thread at one place until the cavity stands over its rim. Wait for the bubbles, prick "
+            "what you see. "
+            "Strike off along the rim with the blade held upright; what it takes goes into the groove."
+        )
+        again = " The window weeps a little." if tongues else ""
+        found.append(f"Top up and strike again after {STRIKE_AGAIN_MIN} min (assumed).{again}")
+    found.append(
+        "Let it cure, level, for the time above. Touch the overflow, not the layer, to see whether it is done."
+    )
+    if step.lid:
+        found.append("Lift the lid: sprue and vents tear off at the layer. Trim them flush with a blade.")
+    if tongues:
+        found.append("Pull the tongue out FIRST, sideways. A cup lifted over a tongue tears the layer.")
+    found.append(
+        f"Lift cup {step.index} straight up, a screwdriver in each pry slot. Layer {step.index} stays on the core."
+    )
+    return tuple(found)
+
+
+def release(spec: Spec, plan: Plan, inner: Material) -> tuple[str, ...]:
+    """From the last cured layer to a unit in the hand; `inner` is Layer 1's silicone."""
+    tear = float(inner.tensile_mpa) * math.pi * (spec.moulds.filament_mm / 2) ** 2
+    found = []
+    if any(tool.name.startswith("stub") for tool in plan.tools):
+        found.append(
+            "Pull the filament out downwards: it lets air in under the unit. Never push it through: "
+            f"{tear:.1f} N on its end tear {inner.name} (computed: tensile strength, {inner.tensile_mpa.status}, x "
+            f"its area)."
+        )
+    found.append("Peel the unit off the core straight up, all round first. Trim the flash.")
+    return tuple(found)
+
+
+def assembly(spec: Spec, dims: Dimensions) -> tuple[str, ...]:
+    """Motor and circuit, or wires, into the body."""
+    held = (
+        "Layer 1 holds the motor all round."
+        if spec.motor.fill
+        else f"A ring of air of {dims.air_ring:.2f} mm stays round the motor: what it is fixed to holds it."
+    )
+    if spec.wires and spec.design == "encapsulating":
+        found = ["Feed the wires out through the slot from inside, then push the motor in, its back against the cap."]
+    elif spec.wires:
+        found = ["Push the motor into the ring from above, the wires lying in the notch."]
+    elif spec.fpcb and spec.design == "encapsulating":
+        found = [
+            "Solder the motor to the circuit's pad. Feed the tail out through the slot from inside, then push pad "
+            "and motor in "
+            "until the pad lies against the cap of Layer 1."
+        ]
+        strain = pad_strain(spec)
+        if spec.fpcb.tail == "both" and strain:
+            found.append(
+                f"In a chain the next pad does not go through the slot: that would stretch it by {strain:.0%}. "
+                f"Solder the next "
+                "unit on after this one is in its body."
+            )
+    elif spec.fpcb:
+        found = [
+            "Solder the motor to the circuit's pad. Set the motor into the ring, the pad on top of all layers, and "
+            "bond the pad "
+            "with a thin smear of the last layer's silicone (assumed); it is that bond which holds the motor."
+        ]
+    else:
+        found = ["Push the motor in from the skin's side."]
+    if spec.design == "encapsulating":
+        found.append(
+            "A smear of Layer 1's silicone between the back and the cap holds it (assumed: silicone bonds poorly to "
+            "bare "
+            "metal and polyimide; a primer or a silicone adhesive holds better)."
+        )
+    found.append(held)
+    return tuple(found)
+
+
+def measurements(spec: Spec, dims: Dimensions, plan: Plan) -> tuple[str, ...]:
+    """What to measure on the first part, and what it should be."""
+    play = spec.moulds.plinth_clearance_mm or 0.0
+    found = [
+        f"Height over all: {dims.heights[-1]:.2f} mm. A cup that did not seat shows here.",
+        f"Diameter at the skin: {2 * dims.outer_radius:.2f} mm, in two directions.",
+        "Walls at the skin, at four places: their spread is the cup's shift. Layer 1 may vary by "
+        f"{play:g} mm either way"
+        + (
+            f", each further layer by {2 * play:g} mm unless both cups were pushed the same way."
+            if len(spec.layers) > 1
+            else "."
+        ),
+    ]
+    if dims.slot_z:
+        found.append(
+            f"The {'notch' if spec.design == 'embedded' else 'slot'}: {dims.slot_width:.2f} wide, "
+            f"{dims.slot_z[1] - dims.slot_z[0]:.2f} high, open all the way."
+        )
+    found.append("Weigh it: the net grams above, added up. Less means air or a low strike.")
+    return tuple(found)
