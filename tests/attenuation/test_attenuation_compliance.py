@@ -82,14 +82,13 @@ def test_thomson_haskell_fails_where_the_solver_holds():
 
 
 @pytest.mark.parametrize("omega", [6e3, 785.0, 6e-8, 0.0])
-@pytest.mark.parametrize("k", [0.3, 80.0, 9e3])
-def test_ten_thousand_sublayers_change_nothing(k, omega):
-    count, h = 10_000, 0.02
+def test_ten_thousand_sublayers_change_nothing(omega):
+    count, h, k = 10_000, 0.02, np.array([0.3, 80.0, 9e3])
     body = (1040.0, 15e3, 0.4999, LossFactor(0.2))
     base = HalfSpace(1900.0, 15e9, 0.3)
     whole = LayeredMedium([Layer(h, *body)], base).compliance(k, omega)
     cut = LayeredMedium([Layer(h / count, *body)] * count, base).compliance(k, omega)
-    assert relative_error(cut, whole) < LIMIT
+    assert max(relative_error(one, other) for one, other in zip(cut, whole, strict=True)) < LIMIT
 
 
 def test_static_half_space_is_boussinesqs():

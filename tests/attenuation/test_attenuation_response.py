@@ -52,7 +52,7 @@ def test_boussinesqs_disc(nu):
 
 
 def test_static_point_load_at_depth():
-    """Boussinesq: 4 pi mu R u_z = 2 (1 - nu) + z^2/R^2 and 4 pi mu R u_r = z r/R^2 - (1 - 2 nu) r/(R + z), per newton."""
+    """Boussinesq, 4 pi mu R times: u_z 2 (1 - nu) + z^2/R^2, u_r z r/R^2 - (1 - 2 nu) r/(R + z), per newton."""
     e, nu, z, r = 3e4, 0.3, 2e-3, np.array([0.0, 1e-3, 5e-3, 20e-3])
     mu, rr = e / (2 * (1 + nu)), np.hypot(r, z)
     found = LayeredMedium([], HalfSpace(1000, e, nu)).response(Point(), 0.0, r, z=z, rtol=1e-11)

@@ -29,7 +29,7 @@ def displacement(nu: float, r: float) -> mp.mpc:
     def kernel(k):
         gp, gs = root(k * k - eps * ks2), root(k * k - ks2)
         rayleigh = (2 * k * k - ks2) ** 2 - 4 * k * k * gp * gs
-        return gp * ks2 / (mu * rayleigh) * A * mp.besselj(1, k * A)
+        return -gp * ks2 / (mu * rayleigh) * A * mp.besselj(1, k * A)
 
     stop = 2 * mp.sqrt(ks2)
     height = min(1 / mp.mpf(r), stop / 6)

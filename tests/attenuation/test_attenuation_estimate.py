@@ -1,0 +1,258 @@
+"""The estimate as data and as a command: the contract, nulls with reasons, measured values, spread, the same bytes."""
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from unitcad.attenuation.closed_form import Units
+from unitcad.attenuation.curve import NO_RATIO
+from unitcad.attenuation.edge import corners
+from unitcad.attenuation.models import edge_levels
+from unitcad.cli import app
+from unitcad.cli.estimate import frequencies
+from unitcad.errors import Refusal
+from unitcad.estimating import estimate_spec, frequency_table_of_spec, variant_of
+from unitcad.spec import load
+
+SOFT, MEDIUM, STIFF = "ecoflex-00-10", "dragon-skin-10-medium", "dragon-skin-30"
+
+
+def pair(design: str, inner: str, outer: str, *more: str):
+    return load(design, [f"layers.0.material={inner}", f"layers.1.material={outer}", *more])
+
+
+@pytest.fixture(scope="module")
+def encapsulating() -> dict:
+    return estimate_spec(load("encapsulating"))
+
+
+def test_contract(encapsulating):
+    assert list(encapsulating) == ["variant", "models", "layered", "measured", "table_error", "assumptions"]
+    assert list(encapsulating["models"]) == ["paper", "consistent", "fitted"]
+    for block in encapsulating["models"].values():
+        assert {"edge_level", "hierarchical_over_control", "table_error", "assumptions"} <= set(block)
+        assert {"levels", "ratios", "directions", "leave_one_unit_out"} <= set(block["table_error"])
+        level = block["edge_level"]
+        assert level["low"] <= level["value"] <= level["high"]
+        assert [one["control"] for one in block["hierarchical_over_control"]] == [SOFT, STIFF]
+    assert "null" in encapsulating["table_error"]
+    assert "sideways force" in encapsulating["assumptions"][0]
+    text = json.dumps(encapsulating, allow_nan=False)
+    assert "validated" not in text.lower()
+    assert json.loads(text) == encapsulating
+
+
+def test_level_is_the_array_function_at_nominal_values(encapsulating):
+    e, rho = [15e3, 355e3], [1040.0, 1080.0]
+    units = Units(e, rho, [0.4999] * 2, [0.2] * 2, [1.25e-3] * 2, 2 * math.pi * 125, 2.0)
+    for model, block in encapsulating["models"].items():
+        assert block["edge_level"]["value"] == pytest.approx(float(edge_levels(units, model)), rel=1e-8)
+        amplitude = block["edge_amplitude_um"]["value"]
+        assert amplitude == pytest.approx(300 * block["edge_level"]["value"], rel=1e-8)
+
+
+def test_layered_curve(encapsulating):
+    layered = encapsulating["layered"]
+    assert layered["hierarchical_over_control"] is None
+    assert layered["hierarchical_over_control_reason"] == NO_RATIO
+    assert layered["r_mm"] == list(range(31))
+    u_z = layered["u_z"]
+    assert u_z["value"][0] == u_z["low"][0] == u_z["high"][0] == 1
+    assert all(low <= value <= high for low, value, high in zip(u_z["low"], u_z["value"], u_z["high"], strict=True))
+    assert u_z["value"][30] < 0.1
+    assert layered["error_estimate"] < 1e-3
+    assert [depth["z_mm"] for depth in layered["depths"]] == [1.0, 3.0]
+    assert set(layered["paper_beside"]["exponential"]) == {"loss_modulus", "kelvin_voigt"}
+
+
+def test_readings_and_constraints(encapsulating):
+    paper = encapsulating["models"]["paper"]
+    readings = {one["eta"]: one for one in paper["readings"]}
+    assert set(readings) == {"loss_modulus", "kelvin_voigt", "literal"}
+    assert readings["literal"]["unit_of_exponent"].startswith("s")
+    exponents = [readings[name]["exponents_s_wave"][0] for name in ("loss_modulus", "kelvin_voigt")]
+    assert exponents[0] == pytest.approx(2 * exponents[1])
+    rows = [(row["equation"], row["control"]) for row in paper["constraints"]]
+    assert rows == [("6a", SOFT), ("6b", SOFT), ("6c", None), ("6d", None), ("6a", STIFF), ("6b", STIFF)]
+    assert [row["holds"] for row in paper["constraints"]] == [False, False, True, True, True, True]
+
+
+def test_measured_in_both_prints_and_one_unit_without_a_figure():
+    both = estimate_spec(load("encapsulating"))["measured"]
+    assert (both["level"], both["also_printed"], both["same_size"]) == (0.0517, 0.0458, True)
+    assert both["hierarchical_over_control"][0]["value"] == pytest.approx(0.0517 / 0.4518)
+    amplified = estimate_spec(pair("embedded", STIFF, MEDIUM))["measured"]
+    assert amplified["level"] is None
+    assert amplified["over_a_control_not_named"] == 1.877
+    assert estimate_spec(load("three-layer"))["measured"] is None
+    thick = estimate_spec(load("encapsulating", ["layers.0.wall_mm=1.5"]))["measured"]
+    assert thick["same_size"] is False
+
+
+def test_single_layer_is_its_own_control():
+    found = estimate_spec(load("single-embedded"))
+    for block in found["models"].values():
+        assert block["hierarchical_over_control"] is None
+        assert "own control" in block["hierarchical_over_control_reason"]
+    assert found["measured"]["level"] == 0.395
+
+
+def test_material_known_as_a_range_only():
+    found = estimate_spec(pair("embedded", "ecoflex-00-30", STIFF))
+    for block in found["models"].values():
+        level = block["edge_level"]
+        assert level["value"] is None
+        assert level["low"] < level["high"]
+        assert "fractional" in level["reason"]
+    assert any("range" in line for line in found["assumptions"])
+
+
+def test_material_not_known_is_null_with_the_reason():
+    found = estimate_spec(pair("encapsulating", "ecoflex-00-50", STIFF))
+    for block in found["models"].values():
+        level = block["edge_level"]
+        assert (level["value"], level["low"], level["high"]) == (None, None, None)
+        assert "100 % modulus is static" in level["reason"]
+    assert found["layered"]["u_z"]["value"]
+    json.dumps(found, allow_nan=False)
+
+
+def test_own_material_and_own_tissue_change_what_they_should(encapsulating):
+    own = load(
+        "encapsulating",
+        ["materials.mine.like=ecoflex-00-10", "materials.mine.youngs_modulus_kpa=150", "layers.0.material=mine"],
+    )
+    changed = estimate_spec(own)
+    assert changed["models"]["fitted"]["edge_level"]["value"] > encapsulating["models"]["fitted"]["edge_level"]["value"]
+    assert changed["layered"] == encapsulating["layered"]
+
+
+def test_poisson_at_one_half_gives_no_pressure_wave():
+    own = load(
+        "encapsulating",
+        ["materials.mine.like=ecoflex-00-10", "materials.mine.poisson_ratio=0.5", "layers.0.material=mine"],
+    )
+    block = estimate_spec(own)["models"]["paper"]
+    p = block["hierarchical_over_control"][0]["p"]
+    assert p["value"] is None
+    assert "1/2" in p["reason"]
+    assert block["edge_level"]["value"] is not None
+
+
+def test_spread_holds_every_corner(encapsulating):
+    levels = edge_levels(corners(variant_of(load("encapsulating"))), "paper")
+    assert levels.size == 1 + 2**5  # nu and tan delta of two silicones, and the frequency
+    found = encapsulating["models"]["paper"]["edge_level"]
+    assert found["low"] == pytest.approx(levels.min(), rel=1e-8)
+    assert found["high"] == pytest.approx(levels.max(), rel=1e-8)
+
+
+def test_many_ranges_are_taken_one_at_a_time():
+    names = [f"m{i}" for i in range(7)]
+    text = ["motor.diameter_mm=3"]
+    for name in names:
+        text += [f"materials.{name}.like=ecoflex-00-10"]
+    spec = load("encapsulating", [])
+    variant = variant_of(spec)
+    layers = tuple(type(variant.layers[0])(**{**vars(variant.layers[0]), "material": name}) for name in names)
+    many = type(variant)(**{**vars(variant), "layers": layers})
+    assert corners(many).omega.size == 1 + 2 * (7 * 2 + 1)
+
+
+def test_same_input_same_bytes(encapsulating):
+    assert json.dumps(estimate_spec(load("encapsulating"))) == json.dumps(encapsulating)
+    digits = [len(repr(v).replace("-", "").replace(".", "").split("e")[0].strip("0")) for v in _floats(encapsulating)]
+    assert max(digits) <= 9
+
+
+def _floats(data):
+    if isinstance(data, float):
+        yield data
+    for one in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
+        yield from _floats(one)
+
+
+def test_frequency_table():
+    found = frequency_table_of_spec(load("encapsulating"), [100.0, 150.0])
+    assert [row["frequency_hz"] for row in found["frequencies"]] == [100, 150]
+    first = found["frequencies"][0]
+    assert set(first["edge_level"]) == {"paper", "consistent", "fitted"}
+    assert first["u_z_over_edge"]["at_30_mm"] < first["u_z_over_edge"]["at_5_mm"] < 1
+
+
+def test_frequency_as_typed():
+    assert frequencies("120") == [120]
+    assert frequencies("100:150:25") == [100, 125, 150]
+    assert frequencies("0.1:0.3:0.1") == pytest.approx([0.1, 0.2, 0.3])
+    for text in ("", "0", "-1", "a", "1:2", "1:2:0", "2:1:1", "1:2:nan", "1:1e9:1"):
+        with pytest.raises(Refusal) as refused:
+            frequencies(text)
+        assert refused.value.field == "--frequency"
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["estimate", *arguments])
+
+
+def test_command_as_json():
+    one = run("encapsulating", "--json", "--model", "fitted", "--frequency", "110")
+    assert one.exit_code == 0
+    found = json.loads(one.stdout)
+    assert list(found["models"]) == ["fitted"]
+    assert found["variant"]["frequency_hz"]["value"] == 110
+    two = json.loads(run("encapsulating", "embedded", "--json", "--set", "layers.0.wall_mm=1.3").stdout)
+    assert [one["variant"]["layers"][0]["wall_mm"] for one in two["estimates"]] == [1.3, 1.3]
+    table = json.loads(run("embedded", "--frequency", "100:120:10", "--json").stdout)
+    assert [row["frequency_hz"] for row in table["frequencies"]] == [100, 110, 120]
+
+
+def test_command_for_a_person():
+    shown = run("encapsulating").stdout
+    for word in ("paper", "consistent", "fitted", "null", "measured", "5.17 and 4.58", "sideways"):
+        assert word in shown
+    assert "validated" not in shown
+    assert "30 mm" in run("encapsulating", "--frequency", "100:150:50").stdout
+    assert "null" in run("embedded", "--set", "layers.0.material=ecoflex-00-50").stdout
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["encapsulating", "--model", "papers"],
+        ["encapsulating", "--frequency", "x"],
+        ["no-such-template"],
+        ["encapsulating", "--set", "layers.0.material=butter"],
+        ["encapsulating", "--set", "estimate.tissue=elbow"],
+        ["encapsulating", "--set", "motor.part=VC9"],
+    ],
+)
+def test_refusals_exit_2_in_one_line(arguments):
+    done = subprocess.run([sys.executable, "-m", "unitcad", "estimate", *arguments], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("error: ")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_estimate_loads_no_cad_and_no_optimiser():
+    code = (
+        "import sys; from unitcad.spec import load; from unitcad.estimating import estimate_spec; "
+        "estimate_spec(load('encapsulating')); "
+        "print([m for m in ('OCP', 'build123d', 'cadquery', 'manifold3d', 'trimesh', 'scipy.optimize', 'matplotlib') "
+        "if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_layered_block_reads_no_silicone():
+    first, second = (
+        estimate_spec(pair("encapsulating", *materials))["layered"] for materials in ((SOFT, STIFF), (STIFF, SOFT))
+    )
+    assert first == second
+    assert np.isfinite(first["surface_m_per_pa"]["u_z_at_the_edge"])
