@@ -102,6 +102,8 @@ def _check(path: Path, options: Options, deadline: Deadline) -> tuple[list[Findi
     strange = sniff.foreign(data[:2048])
     if strange and (kind, strange) not in {("3mf", "zip"), ("step", "step")}:
         raise Unreadable(finding("F005", f"named {path.suffix}, but the content is {strange}"))
+    if kind == "3mf" and strange != "zip":
+        raise Unreadable(finding("F005", f"named {path.suffix}, but the content is no zip"))
     view = memoryview(data)
     if kind == "3mf":
         from unitcad.check.threemf import check_3mf

@@ -33,6 +33,9 @@ def _read(kind: str, raw: bytes, limits: Limits, deadline: Deadline) -> tuple[li
     deadline.tick()
     vertices, faces = _loaded(kind, raw)
     deadline.tick()
+    if vertices.ndim != 2 or vertices.shape[1] < 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        raise Unreadable(*findings, finding("F003", "vertices without three coordinates"))
+    vertices = vertices[:, :3]
     if len(faces) > limits.max_faces:
         raise over_limit(f"{len(faces)} faces, more than --max-faces {limits.max_faces}")
     if not len(faces):

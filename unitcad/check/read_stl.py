@@ -250,12 +250,13 @@ def _explain(raw: bytes, at: int, cut: int, found: _Text, limits: Limits) -> int
             found.findings.append(_at("F003", "the text ends inside a facet", raw, place))
         elif vertices != 3:
             found.findings.append(_at("F008", f"a facet with {vertices} vertices", raw, place))
+        elif len(body) == _TOKENS - 2 and all(_is_number(body[i - 1]) for i in _NUMBERS):
+            found.findings.append(_at("F003", "a facet's keywords are not those of STL", raw, place))
+        elif bad := [word for word in numbers if not _is_number(word)]:
+            shown = bad[0][:30].decode("utf-8", "replace")
+            found.findings.append(_at("F004", f"{shown!r} is not a number", raw, place))
         elif len(numbers) != 12:
-            bad = [word for word in numbers if not _is_number(word)]
-            code, what = ("F004", "number that cannot be parsed") if bad else ("F003", "numbers missing or too many")
-            if bad:
-                what = f"{bad[0][:30].decode('utf-8', 'replace')!r} is not a number"
-            found.findings.append(_at(code, what, raw, place))
+            found.findings.append(_at("F003", f"a facet with {len(numbers)} numbers instead of 12", raw, place))
         elif len(body) != _TOKENS - 2:
             found.findings.append(_at("F003", "a facet's keywords are not in order", raw, place))
         found.facets += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
@@ -41,7 +42,7 @@ def sarif(reports: Sequence[FileReport]) -> dict[str, Any]:
 def _rule(rule: Rule) -> dict[str, Any]:
     return {
         "id": rule.code,
-        "name": "".join(word.capitalize() for word in rule.title.replace("-", " ").replace(",", "").split()),
+        "name": "".join(word.capitalize() for word in re.findall(r"[A-Za-z0-9]+", rule.title.replace("'", ""))),
         "shortDescription": {"text": rule.title},
         "fullDescription": {"text": rule.cause},
         "help": {"text": f"{rule.cause} Mend: {rule.mend}"},

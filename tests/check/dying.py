@@ -1,0 +1,22 @@
+"""Options whose use ends the process, for the test of workers that die."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+from unitcad.check import Options
+
+
+@dataclass(frozen=True)
+class Deadly(Options):
+    """`fatal`: kill the process at the first look at it."""
+
+    def __init__(self, fatal: bool) -> None:
+        super().__init__(unit="die" if fatal else None)
+
+    def __getattribute__(self, name: str) -> object:
+        value = object.__getattribute__(self, name)
+        if name == "unit" and value == "die" and os.environ.get("PYTEST_CURRENT_TEST") is None:
+            os._exit(9)
+        return value

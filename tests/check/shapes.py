@@ -1,0 +1,132 @@
+"""Meshes and files for the tests of the checks: small solids, binary and text STL, 3MF packages."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zipfile
+from collections.abc import Sequence
+
+import numpy as np
+
+CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+MATERIAL = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
+PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
+SLICE = "http://schemas.microsoft.com/3dmanufacturing/slice/2015/07"
+BEAM = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02"
+RELS = "http://schemas.openxmlformats.org/package/2006/relationships"
+START = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+TEXTURE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dtexture"
+TICKET = "http://schemas.microsoft.com/3dmanufacturing/2013/01/printticket"
+THUMBNAIL = "http://schemas.openxmlformats.org/package/2006/relationships/metadata/thumbnail"
+PNG = b"\x89PNG\r\n\x1a\n" + b"\x00\x00\x00\rIHDR" + bytes(13) + b"\x00" * 4
+
+CUBE_CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+CUBE_FACES = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+     [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+)  # fmt: skip
+
+
+def box(size: Sequence[float] = (10, 10, 10), at: Sequence[float] = (0, 0, 0)) -> np.ndarray:
+    """The triangles of a box, (12, 3, 3), outwards."""
+    return (CUBE_CORNERS * np.asarray(size, float) + np.asarray(at, float))[CUBE_FACES]
+
+
+def prism(outline: Sequence[tuple[float, float]], low: float, high: float) -> np.ndarray:
+    """The triangles of an upright prism over a convex outline that turns anticlockwise."""
+    n = len(outline)
+    bottom = np.array([[x, y, low] for x, y in outline])
+    top = np.array([[x, y, high] for x, y in outline])
+    found = [[bottom[0], bottom[i + 1], bottom[i]] for i in range(1, n - 1)]
+    found += [[top[0], top[i], top[i + 1]] for i in range(1, n - 1)]
+    for i in range(n):
+        j = (i + 1) % n
+        found += [[bottom[i], bottom[j], top[j]], [bottom[i], top[j], top[i]]]
+    return np.array(found)
+
+
+def stl(
+    triangles: np.ndarray, *, header: bytes = b"a box", count: int | None = None, normals: np.ndarray | None = None
+) -> bytes:
+    """A binary STL; `normals` are zeros unless given."""
+    records = np.zeros(len(triangles), np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")]))
+    records["v"] = triangles
+    if normals is not None:
+        records["n"] = normals
+    return (
+        header.ljust(80, b"\0")[:80] + struct.pack("<I", len(triangles) if count is None else count) + records.tobytes()
+    )
+
+
+def text_stl(triangles: np.ndarray, name: str = "box") -> str:
+    """A text STL with zero normals."""
+    lines = [f"solid {name}"]
+    for corners in triangles:
+        lines += ["facet normal 0 0 0", " outer loop"]
+        lines += [f"  vertex {x:.9g} {y:.9g} {z:.9g}" for x, y, z in corners]
+        lines += [" endloop", "endfacet"]
+    return "\n".join([*lines, f"endsolid {name}", ""])
+
+
+def mesh_xml(corners: np.ndarray = CUBE_CORNERS * 10, faces: np.ndarray = CUBE_FACES, per_face: str = "") -> str:
+    """A <mesh> element."""
+    points = "".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in corners)
+    rows = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}" {per_face}/>' for a, b, c in faces)
+    return f"<mesh><vertices>{points}</vertices><triangles>{rows}</triangles></mesh>"
+
+
+def model_xml(
+    resources: str | None = None,
+    build: str | None = '<build><item objectid="1"/></build>',
+    attributes: str = 'unit="millimeter"',
+    before: str = "",
+) -> str:
+    """A model part: a cube unless `resources` says otherwise."""
+    if resources is None:
+        resources = f'<object id="1">{mesh_xml()}</object>'
+    return (
+        f'<?xml version="1.0" encoding="UTF-8"?>\n<model xmlns="{CORE}" xmlns:m="{MATERIAL}" xmlns:p="{PRODUCTION}" '
+        f'xmlns:s="{SLICE}" xmlns:b="{BEAM}" {attributes}>{before}<resources>{resources}</resources>'
+        f"{build or ''}</model>"
+    )
+
+
+def rels_xml(*relations: tuple[str, str], mode: str = "") -> str:
+    """A relationships part: (type, target) each."""
+    rows = "".join(
+        f'<Relationship Id="r{i}" Type="{kind}" Target="{target}"{mode}/>' for i, (kind, target) in enumerate(relations)
+    )
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n<Relationships xmlns="{RELS}">{rows}</Relationships>'
+
+
+TYPES = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+    '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+    '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>'
+    '<Default Extension="png" ContentType="image/png"/>'
+    '<Default Extension="xml" ContentType="application/vnd.ms-printing.printticket+xml"/></Types>'
+)
+ROOT_RELS = rels_xml((START, "/3D/3dmodel.model"))
+
+
+def package(
+    model: str | bytes | None = None,
+    *,
+    types: str | None = TYPES,
+    rels: str | None = ROOT_RELS,
+    more: Sequence[tuple[str, str | bytes]] = (),
+    compression: int = zipfile.ZIP_DEFLATED,
+) -> bytes:
+    """A 3MF package; `more` are further entries, written even if a name is there already."""
+    out = io.BytesIO()
+    entries: list[tuple[str, str | bytes]] = []
+    if types is not None:
+        entries.append(("[Content_Types].xml", types))
+    if rels is not None:
+        entries.append(("_rels/.rels", rels))
+    entries.append(("3D/3dmodel.model", model_xml() if model is None else model))
+    with zipfile.ZipFile(out, "w", compression) as archive:
+        for name, content in (*entries, *more):
+            archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), content, compression)
+    return out.getvalue()

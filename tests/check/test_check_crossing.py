@@ -1,0 +1,247 @@
+"""Self-crossing against an independent reference in fractions, and on solids whose answer is known."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from shapes import CUBE_CORNERS, CUBE_FACES
+
+from unitcad.check import check_mesh
+from unitcad.check.exact import orient2d, orient3d
+from unitcad.check.limits import Deadline
+from unitcad.check.pairs import boxes_of, meeting_between, meeting_pairs, morton_order
+from unitcad.check.triangles import coplanar, meet
+
+
+def _point(p) -> list[Fraction]:
+    return [Fraction(float(x)) for x in p]
+
+
+def _minus(a, b):
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
+def _cross(a, b):
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def _dot(a, b):
+    return sum(x * y for x, y in zip(a, b, strict=True))
+
+
+def _cut(triangle, other):
+    """Where a triangle's border meets the other's plane, and its corners' heights over it."""
+    normal = _cross(_minus(other[1], other[0]), _minus(other[2], other[0]))
+    height = [_dot(normal, _minus(p, other[0])) for p in triangle]
+    points = [triangle[k] for k in range(3) if height[k] == 0]
+    for k in range(3):
+        a, b = height[k], height[(k + 1) % 3]
+        if a * b < 0:
+            t = a / (a - b)
+            points.append([x + t * (y - x) for x, y in zip(triangle[k], triangle[(k + 1) % 3], strict=True)])
+    return points, height
+
+
+def reference(a, b) -> tuple[bool, bool] | None:
+    """(crosses, touches) by intersecting both triangles with the line of their planes; None if coplanar."""
+    a, b = [_point(p) for p in a], [_point(p) for p in b]
+    points_a, height_a = _cut(a, b)
+    points_b, height_b = _cut(b, a)
+    if all(h == 0 for h in height_a):
+        return None
+    if not points_a or not points_b:
+        return False, False
+    normals = [_cross(_minus(t[1], t[0]), _minus(t[2], t[0])) for t in (a, b)]
+    line = _cross(*normals)
+    on_a, on_b = [_dot(line, p) for p in points_a], [_dot(line, p) for p in points_b]
+    low, high = max(min(on_a), min(on_b)), min(max(on_a), max(on_b))
+    through = all(min(h) < 0 < max(h) for h in (height_a, height_b))
+    return low < high and through, low <= high
+
+
+@pytest.mark.parametrize("kind", ["grid", "grid sharing a corner", "random", "random sharing a corner"])
+def test_triangles_meet_as_fractions_say(kind: str) -> None:
+    rng = np.random.default_rng(7)
+    corners = rng.integers(-2, 3, (700, 2, 3, 3)).astype(float) if "grid" in kind else rng.normal(size=(700, 2, 3, 3))
+    if "corner" in kind:
+        corners[:, 1, 0] = corners[:, 0, 1]
+    normal = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
+    corners = corners[(np.abs(normal).sum(axis=-1) > 0).all(axis=1)]
+    found = meet(corners[:, 0], corners[:, 1])
+    compared = crossing = 0
+    for i, (a, b) in enumerate(corners):
+        expected = reference(a, b)
+        if expected is None:
+            continue
+        compared += 1
+        crossing += expected[0]
+        assert expected == (bool(found.crosses[i]), bool(found.touches[i])), (a, b)
+    assert compared > 500
+    assert 20 < crossing < compared - 20
+
+
+def _sign(value: Fraction) -> int:
+    return (value > 0) - (value < 0)
+
+
+@pytest.mark.parametrize("scale", ["float32 near a plane", "float64 near a plane", "eighths on a plane", "wide range"])
+def test_orientation_is_never_wrong(scale: str) -> None:
+    rng = np.random.default_rng(3)
+    p = rng.normal(size=(4, 400, 3)) * (10.0 ** rng.uniform(-6, 6, (4, 400, 1)) if scale == "wide range" else 1)
+    if "near" in scale:
+        weight = rng.dirichlet([1, 1, 1], 400)
+        p[3] = sum(weight[:, k : k + 1] * p[k] for k in range(3))
+    if scale == "eighths on a plane":
+        p = np.round(p * 8) / 8
+        p[3] = p[0] + 2 * (p[1] - p[0]) - 3 * (p[2] - p[0])
+    if "float32" in scale:
+        p = p.astype(np.float32).astype(float)
+    found = orient3d(*p)
+    flat = orient2d(p[0, :, :2], p[1, :, :2], p[3, :, :2])
+    for i in range(400):
+        a, b, c, d = (_point(p[k, i]) for k in range(4))
+        u, v, w = _minus(a, d), _minus(b, d), _minus(c, d)
+        assert found[i] == _sign(_dot(_cross(u, v), w))
+        s, t = _minus(a, d), _minus(b, d)
+        assert flat[i] == _sign(s[0] * t[1] - s[1] * t[0])
+    if scale == "eighths on a plane":
+        assert not found.any()
+
+
+def test_coplanar_overlap_by_counting_grid_points() -> None:
+    rng = np.random.default_rng(5)
+    corners = np.zeros((300, 2, 3, 3))
+    corners[..., :2] = rng.integers(0, 6, (300, 2, 3, 2))
+    area = _area(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
+    corners = corners[(area != 0).all(axis=1)]
+    share, _ = coplanar(corners[:, 0], corners[:, 1])
+    grid = np.stack(np.meshgrid(*[np.arange(0, 6, 0.02) + 0.0071] * 2), axis=-1).reshape(-1, 2)
+    inside = [[_inside(grid, triangle[:, :2]) for triangle in pair] for pair in corners]
+    counted = np.array([(a & b).any() for a, b in inside])
+    assert (share == counted).all()
+    assert 20 < share.sum() < len(share) - 20
+
+
+def _area(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _inside(points: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+    turn = [_area(triangle[(k + 1) % 3] - triangle[k], points - triangle[k]) for k in range(3)]
+    return (np.min(turn, axis=0) > 0) | (np.max(turn, axis=0) < 0)
+
+
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 3), (5, 40), (200, 77), (300, 4)])
+def test_box_pairs_are_all_that_meet(n: int, m: int) -> None:
+    rng = np.random.default_rng(0)
+    boxes, others = (np.hstack([low, -(low + 0.1)]).astype("f4") for low in (rng.random((n, 3)), rng.random((m, 3))))
+
+    def naive(a, b) -> bool:
+        return bool((a[:3] <= -b[3:]).all() and (b[:3] <= -a[3:]).all())
+
+    own = {
+        tuple(sorted(p))
+        for i, j in meeting_pairs(boxes, Deadline(60))
+        for p in zip(i.tolist(), j.tolist(), strict=True)
+    }
+    assert own == {(a, b) for a in range(n) for b in range(a + 1, n) if naive(boxes[a], boxes[b])}
+    both = {
+        p for i, j in meeting_between(boxes, others, Deadline(60)) for p in zip(i.tolist(), j.tolist(), strict=True)
+    }
+    assert both == {(a, b) for a in range(n) for b in range(m) if naive(boxes[a], others[b])}
+
+
+def _codes(*parts: tuple[np.ndarray, np.ndarray]) -> set[str]:
+    points, faces, start = [], [], 0
+    for corners, triangles in parts:
+        points.append(corners * 10)
+        faces.append(triangles + start)
+        start += len(corners)
+    return {found.code for found in check_mesh(np.concatenate(points), np.concatenate(faces)).findings}
+
+
+CUBE = (CUBE_CORNERS, CUBE_FACES)
+TURN = np.array([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2)
+
+
+@pytest.mark.parametrize(
+    ("corners", "expected"),
+    [
+        (CUBE_CORNERS + np.array([3, 0, 0]), set()),
+        (CUBE_CORNERS + np.array([0, 0, 1]), {"G003", "G004"}),
+        (CUBE_CORNERS + np.array([0.5, 0.25, 1]), {"G003", "G004"}),
+        (CUBE_CORNERS + np.array([1, 0, 1]), {"G003"}),
+        (CUBE_CORNERS + 1, {"G003"}),
+        (CUBE_CORNERS * [0.5, 0.5, 2] + [0.25, 0.25, -0.5], {"G001", "G002"}),
+        (CUBE_CORNERS + 0.5, {"G001", "G002"}),
+        (CUBE_CORNERS * 0.5 + 0.25, {"G002"}),
+        ((CUBE_CORNERS - 0.5) @ TURN.T * [0.5, 0.5, 2] + 0.5, {"G001", "G002"}),
+    ],
+    ids=["apart", "stacked", "stacked aside", "edge", "corner", "pierced", "half in", "inside", "through edges"],
+)
+def test_two_cubes(corners: np.ndarray, expected: set[str]) -> None:
+    assert _codes(CUBE, (corners, CUBE_FACES)) == expected
+    assert _codes((corners, CUBE_FACES), CUBE) == expected
+
+
+def test_cavity_and_inverted_shell() -> None:
+    inner = CUBE_CORNERS * 0.5 + 0.25
+    assert _codes(CUBE, (inner, CUBE_FACES[:, ::-1])) == {"G006"}
+    assert _codes((CUBE_CORNERS, CUBE_FACES[:, ::-1])) == {"T008"}
+    assert _codes(CUBE, (inner, CUBE_FACES[:, ::-1]), (CUBE_CORNERS * 0.2 + 0.4, CUBE_FACES)) == {"G006"}
+
+
+def _sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """A torus knot-free tube: a torus of n x n quads, wavy, so that nothing is coplanar."""
+    u, v = np.meshgrid(np.arange(n) * 2 * np.pi / n, np.arange(n) * 2 * np.pi / n, indexing="ij")
+    r = 8 + 0.3 * np.sin(9 * u) * np.sin(7 * v)
+    points = np.stack([(20 + r * np.cos(v)) * np.cos(u), (20 + r * np.cos(v)) * np.sin(u), r * np.sin(v)], axis=-1)
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    a, b, c, d = i * n + j, (i + 1) % n * n + j, (i + 1) % n * n + (j + 1) % n, i * n + (j + 1) % n
+    faces = np.concatenate([np.stack([a, b, c], axis=-1).reshape(-1, 3), np.stack([a, c, d], axis=-1).reshape(-1, 3)])
+    return points.reshape(-1, 3), faces
+
+
+def test_a_wavy_torus_does_not_cross_itself_until_it_is_pushed_through() -> None:
+    points, faces = _sphere(60)
+    assert check_mesh(points, faces).findings == ()
+    moved = points.copy()
+    moved[30 * 60 + 15] *= [-1.5, 1, 1]  # one vertex of the far side, pulled across the hole
+    found = {item.code for item in check_mesh(moved, faces).findings}
+    assert "G001" in found
+
+
+def test_crossing_count_equals_brute_force() -> None:
+    points, faces = _sphere(7)
+    rng = np.random.default_rng(2)
+    points = points + rng.normal(scale=4.0, size=points.shape)
+    report = check_mesh(points, faces)
+    counted = 0
+    for i in range(len(faces)):
+        for j in range(i + 1, len(faces)):
+            if len(set(faces[i]) & set(faces[j])) < 2:
+                answer = reference(points[faces[i]], points[faces[j]])
+                counted += answer is not None and answer[0]
+    crossing = next(found for found in report.findings if found.code == "G001")
+    assert crossing.count == counted > 0
+
+
+def test_order_of_faces_and_vertices_does_not_matter() -> None:
+    points, faces = _sphere(16)
+    points = points + np.random.default_rng(4).normal(scale=1.0, size=points.shape)
+    first = {found.code: found.count for found in check_mesh(points, faces).findings}
+    order = np.random.default_rng(5).permutation(len(faces))
+    again = {found.code: found.count for found in check_mesh(points, faces[order][:, [1, 2, 0]]).findings}
+    assert first == again
+
+
+def test_morton_order_is_a_permutation() -> None:
+    points, faces = _sphere(10)
+    order = morton_order(points, faces)
+    assert sorted(order.tolist()) == list(range(len(faces)))
+    at = [[points[faces[:, k], axis] for axis in range(3)] for k in range(3)]
+    boxes = boxes_of(at)
+    assert (boxes[:, :3] <= points[faces].min(axis=1)).all()
+    assert (-boxes[:, 3:] >= points[faces].max(axis=1)).all()

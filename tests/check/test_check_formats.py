@@ -1,0 +1,167 @@
+"""Output formats, the rule table and its page, select and ignore."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from shapes import box, stl, text_stl
+
+from unitcad.check import FileReport, Options, check_file, formats
+from unitcad.check.findings import SEVERITIES, Finding, Location, merge
+from unitcad.check.rulebook import FAMILIES, check_prefixes, explain, markdown, rules
+from unitcad.errors import Refusal
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture
+def reports(tmp_path: Path) -> list[FileReport]:
+    names = {"good.stl": stl(box()), "hole & <b>.stl": stl(box()[2:]), "text.stl": text_stl(box())[:-30].encode()}
+    names["warn, 100%.stl"] = stl(box(), header=b"solid")
+    found = []
+    for name, content in names.items():
+        (tmp_path / name).write_bytes(content)
+        found.append(check_file(tmp_path / name))
+    return [FileReport(Path(report.path).name, report.findings, report.facts) for report in found]
+
+
+def test_json_has_the_promised_shape(reports: list[FileReport]) -> None:
+    data = json.loads(formats.render(reports, "json"))
+    assert list(data) == ["files"]
+    for entry, report in zip(data["files"], reports, strict=True):
+        assert list(entry) == ["path", "verdict", "findings", "facts"]
+        assert entry["verdict"] == report.verdict
+        assert list(entry["facts"]) == [
+            "triangles", "vertices", "shells", "volume_mm3", "area_mm2", "bbox_mm", "watertight"
+        ]  # fmt: skip
+        for found in entry["findings"]:
+            assert list(found) == ["code", "severity", "message", "count", "locations"]
+    assert [entry["verdict"] for entry in data["files"]] == ["pass", "error", "error", "warning"]
+
+
+def test_sarif_is_valid_and_complete(reports: list[FileReport]) -> None:
+    data = json.loads(formats.render(reports, "sarif"))
+    schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(data, schema, jsonschema.Draft202012Validator)
+    run = data["runs"][0]
+    assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == list(rules())
+    assert len(run["results"]) == sum(len(report.findings) for report in reports)
+    for result in run["results"]:
+        assert run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"] == result["ruleId"]
+        assert " " not in result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
+
+
+def test_the_sarif_schema_refuses_what_sarif_does(reports: list[FileReport]) -> None:
+    schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
+    for spoil in (
+        lambda data: data.update(version="2.0.0"),
+        lambda data: data["runs"][0]["results"][0].update(level="info"),
+        lambda data: data["runs"][0]["results"][0].pop("message"),
+        lambda data: data["runs"][0]["results"][0].update(ruleIndex=-2),
+        lambda data: data["runs"][0]["tool"].pop("driver"),
+        lambda data: data["runs"][0]["results"][0].update(partialFingerprints={"a": 1}),
+    ):
+        data = json.loads(formats.render(reports, "sarif"))
+        spoil(data)
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(data, schema, jsonschema.Draft202012Validator)
+
+
+def test_fingerprints_stay_when_counts_and_places_change(tmp_path: Path) -> None:
+    def prints(content: bytes) -> set[str]:
+        path = tmp_path / "a.stl"
+        path.write_bytes(content)
+        data = json.loads(formats.render([check_file(path)], "sarif"))
+        return {result["partialFingerprints"]["pathAndRule/v1"] for result in data["runs"][0]["results"]}
+
+    assert prints(stl(box()[2:])) == prints(stl(box((20, 20, 20))[4:])) != set()
+
+
+def test_github_annotations_are_escaped(reports: list[FileReport]) -> None:
+    lines = formats.render(reports, "github").splitlines()
+    assert len(lines) == sum(len(report.findings) for report in reports)
+    assert lines[0].startswith("::error file=hole & <b>.stl,title=T001 boundary edge::4 boundary edges")
+    assert any("::warning file=warn%2C 100%25.stl,title=F007 " in line for line in lines)
+    assert any("::error file=text.stl,line=" in line for line in lines)
+
+
+def test_junit_parses_and_counts(reports: list[FileReport]) -> None:
+    suite = ET.fromstring(formats.render(reports, "junit"))[0]
+    assert (suite.get("tests"), suite.get("failures")) == ("4", "2")
+    strict = ET.fromstring(formats.render(reports, "junit", "warning"))[0]
+    assert strict.get("failures") == "3"
+    assert [case.get("name") for case in suite] == [report.path for report in reports]
+
+
+def test_text_is_one_line_a_finding_and_holds_no_control_characters() -> None:
+    odd = FileReport("a\x1b[31m\n.stl", (Finding("F003", "error", "bad \x07 text", 1, (Location(line=3),)),))
+    lines = formats.render([odd], "text").splitlines()
+    assert len(lines) == 2
+    assert lines[0] == "a\\x1b[31m\\n.stl: F003 error: bad \\x07 text (at line 3)"
+    assert lines[1] == "1 file: 1 failed, 0 passed"
+
+
+@pytest.mark.parametrize("format_", formats.FORMATS)
+def test_every_format_survives_odd_names(format_: str) -> None:
+    odd = FileReport("\udce4 \x00 <&>\"'.stl", (Finding("T001", "error", "x \ud800 \x01"),))
+    assert formats.render([odd], format_)
+
+
+def test_merge_adds_counts_and_keeps_the_worst() -> None:
+    one = Finding("P017", "warning", "a", 2, tuple(Location(face=i) for i in range(4)))
+    two = Finding("P017", "error", "b", 3, tuple(Location(face=i) for i in range(4, 9)))
+    (merged,) = merge([one, two])
+    assert (merged.severity, merged.count, len(merged.locations)) == ("error", 5, 5)
+    assert merged.message == "a; and b"
+
+
+def test_rules_are_whole() -> None:
+    for code, rule in rules().items():
+        assert rule.severity in SEVERITIES
+        assert code[0] in FAMILIES
+        assert rule.title
+        assert rule.cause.endswith(".")
+        assert rule.mend
+        assert rule.cause in explain(code)
+        assert rule.mend in explain(code.lower())
+
+
+def test_the_page_is_what_the_table_makes() -> None:
+    docs = HERE.parent.parent / "docs"
+    assert (docs / "checks.md").read_text("utf-8") == markdown()
+    for code in rules():
+        assert f"| {code} |" in markdown()
+
+
+def test_select_and_ignore_by_longest_prefix(tmp_path: Path) -> None:
+    path = tmp_path / "a.stl"
+    path.write_bytes(stl(box()[2:], header=b"solid", normals=np.tile([0.0, 0.0, 1.0], (10, 1))))
+
+    def codes(**given: tuple[str, ...]) -> list[str]:
+        return [found.code for found in check_file(path, Options(**given)).findings]
+
+    assert codes() == ["T001", "F007", "T013"]
+    assert codes(select=("T",)) == ["T001", "T013"]
+    assert codes(select=("T001", "F")) == ["T001", "F007"]
+    assert codes(ignore=("T",)) == ["F007"]
+    assert codes(select=("T001",), ignore=("T",)) == ["T001"]
+    assert codes(select=("T",), ignore=("T013",)) == ["T001"]
+    with pytest.raises(Refusal):
+        check_prefixes("--select", ["X9"])
+
+
+def test_importing_is_light() -> None:
+    code = (
+        "import sys, unitcad.check as c; c.Options(); "
+        "heavy = {'scipy', 'trimesh', 'manifold3d', 'OCP', 'pydantic'} & {m.split('.')[0] for m in sys.modules}; "
+        "sys.exit(repr(heavy) if heavy else 0)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,90 @@
+"""Every malformed file gives its code; every rule has a file that breaks it and one that keeps it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from malformed import Case, cases
+from shapes import box, package, prism, stl, text_stl
+
+from unitcad.check.rulebook import rules
+
+CASES = cases()
+# Rules whose files need more than bytes under a name: test_check_manifest.py and test_check_command.py have them.
+ELSEWHERE = {"F012", "M001", "M002", "M003", "M004"}
+UNREADABLE = {"F001", "F003", "F005", "F011", "F012"}
+
+
+@pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
+def test_malformed_file_gives_its_code(case: Case, judge) -> None:
+    report = judge(case.data(), case.name, **case.options)
+    assert report.has(case.code), [found.code for found in report.findings]
+    severity = next(found.severity for found in report.findings if found.code == case.code)
+    expected = rules()[case.code].severity
+    encoding_of_a_part = case.code == "F009" and case.name.endswith(".3mf")
+    filled = case.code in ("G001", "G002") and case.name.endswith(".3mf")
+    assert severity == ("error" if encoding_of_a_part else "warning" if filled else expected)
+
+
+def test_there_are_eighty_and_names_differ() -> None:
+    assert len(CASES) >= 80
+    assert len({case.name for case in CASES}) == len(CASES)
+
+
+def test_every_rule_has_a_failing_file() -> None:
+    assert {case.code for case in CASES} | ELSEWHERE == set(rules())
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("box.stl", stl(box())),
+        ("box-text.stl", text_stl(box())),
+        ("UPPER.STL", text_stl(box()).upper()),
+        ("crlf.stl", text_stl(box()).replace("\n", "\r\n")),
+        ("tabs.stl", text_stl(box()).replace("  ", "\t")),
+        ("utf8.stl", text_stl(box(), "K\u00e4se")),
+        ("two.stl", stl(np.concatenate([box(), box(at=(20, 0, 0))]))),
+        ("box.3mf", package()),
+        ("stored.3mf", package(compression=0)),
+    ],
+)
+def test_good_file_passes_every_rule(name: str, content: bytes | str, judge) -> None:
+    report = judge(content, name, printer="fdm-0.4")
+    assert report.findings == ()
+    assert report.verdict == "pass"
+    assert report.facts.watertight is True
+
+
+def test_facts_are_those_of_the_box(judge) -> None:
+    facts = judge(stl(box((10, 20, 30), (1, 2, 3)))).facts
+    assert (facts.triangles, facts.vertices, facts.shells) == (12, 8, 1)
+    assert facts.volume_mm3 == pytest.approx(6000, rel=1e-12)
+    assert facts.area_mm2 == pytest.approx(2200, rel=1e-12)
+    assert facts.bbox_mm == ((1, 2, 3), (11, 22, 33))
+
+
+def test_a_round_part_has_the_polygons_volume(judge) -> None:
+    n, r = 64, 5.0
+    circle = [(r * np.cos(2 * np.pi * i / n), r * np.sin(2 * np.pi * i / n)) for i in range(n)]
+    facts = judge(stl(prism(circle, 0, 7))).facts
+    assert facts.volume_mm3 == pytest.approx(7 * n / 2 * r**2 * np.sin(2 * np.pi / n), rel=1e-6)
+
+
+@pytest.mark.parametrize("cut", range(0, 684, 7))
+def test_a_binary_file_cut_anywhere_is_an_error(cut: int, judge) -> None:
+    assert judge(stl(box())[:cut]).verdict == "error"
+
+
+@pytest.mark.parametrize("share", np.linspace(0, 0.985, 40))
+def test_a_package_cut_anywhere_is_an_error(share: float, judge) -> None:
+    whole = package()
+    assert judge(whole[: int(share * len(whole))], "part.3mf").verdict == "error"
+
+
+def test_counts_and_first_places(judge) -> None:
+    report = judge(stl(box()[2:]))
+    hole = next(found for found in report.findings if found.code == "T001")
+    assert hole.count == 4
+    assert len(hole.locations) == 4
+    assert all(place.face is not None and place.xyz is not None for place in hole.locations)
