@@ -48,7 +48,7 @@ def svg(plot: Plot) -> str:
     for i, (name, points) in enumerate(series.items()):
         colour = COLOURS[i % len(COLOURS)]
         spots = [at(x, y) for x, y in points]
-        if len(spots) > 1:
+        if plot.lines and len(spots) > 1:
             path = " ".join(f"{x:.1f},{y:.1f}" for x, y in spots)
             parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-opacity="0.5"/>')
         parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.5" fill="{colour}"/>' for x, y in spots]

@@ -29,6 +29,7 @@ class Plot:
     x_label: str
     y_label: str
     series: dict[str, tuple[tuple[float, float], ...]]
+    lines: bool = True
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,13 @@ def from_dict(data: dict[str, Any]) -> Result:
             Table(t["title"], tuple(t["columns"]), tuple(map(tuple, t["rows"])), t["note"]) for t in data["tables"]
         ),
         plots=tuple(
-            Plot(p["title"], p["x_label"], p["y_label"], {k: tuple(map(tuple, v)) for k, v in p["series"].items()})
+            Plot(
+                p["title"],
+                p["x_label"],
+                p["y_label"],
+                {k: tuple(map(tuple, v)) for k, v in p["series"].items()},
+                p["lines"],
+            )
             for p in data["plots"]
         ),
         promises=tuple(
