@@ -17,6 +17,7 @@ from unitcad.cli.batch import batch
 from unitcad.cli.build import build
 from unitcad.cli.cache import cache
 from unitcad.cli.check import check
+from unitcad.cli.coupon import coupon
 from unitcad.cli.estimate import estimate
 from unitcad.cli.init import init
 from unitcad.cli.list import list_
@@ -46,6 +47,7 @@ app.command("batch")(batch)
 app.command("check")(check)
 app.command("estimate")(estimate)
 app.command("accuracy")(accuracy)
+app.command("coupon")(coupon)
 app.command("init")(init)
 app.command("list")(list_)
 app.command("report")(report)

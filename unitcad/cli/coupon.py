@@ -1,0 +1,32 @@
+"""unitcad coupon."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def coupon(
+    printer: Annotated[str, typer.Argument(help="A printer of the catalogue (unitcad list printers).")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Where the coupon's folder goes.")] = Path("out"),
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+) -> None:
+    """Write a fit coupon to print first, and how to judge it. The last line printed is the folder."""
+    from unitcad import catalogue
+    from unitcad.cli.output import print_json
+    from unitcad.moulds import coupon as drawn
+    from unitcad.moulds.coupon_files import write
+
+    chosen = catalogue.choose("PRINTER", printer, catalogue.printers())
+    folder = write(chosen, out)
+    if as_json:
+        found = {
+            fit.key: {"feature": fit.feature, "choose": fit.choose, "values_mm": list(fit.values_mm)}
+            for fit in drawn.fits(chosen)
+        }
+        print_json({"folder": str(folder), "printer": printer, "fits": found})
+    else:
+        typer.echo(drawn.to_markdown(chosen))
+        typer.echo(str(folder))

@@ -1,0 +1,154 @@
+"""A fit coupon: what a person prints first, to find the clearances that his printer needs.
+
+Five stations at 0.5 to 1.5 times the catalogue's value. At each: a recess for the plug (the plinth's fit), a window for
+the tongue, a hole for the filament, a wall, and the station's own number, engraved.
+
+      y
+      |  [1]  [2]  [3]  [4]  [5]   engraving
+      |   |    |    |    |    |    walls, standing
+      |   o    o    o    o    o    filament holes
+      |  [ ]  [ ]  [ ]  [ ]  [ ]   recesses
+      '==  ==   ==   ==   ==  ==   windows, in the front face
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from unitcad.catalogue import Printer
+from unitcad.moulds.layout import PLINTH_DRAFT_DEG
+from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, turned, union
+from unitcad.shape.body import Body
+from unitcad.shape.lettering import HEIGHT, engraving, text_width
+
+SHARES = (0.5, 0.75, 1.0, 1.25, 1.5)
+"""Of the catalogue's value, station by station."""
+PLUG, PLUG_HEIGHT, CORNER = 4.0, 2.0, 1.0
+"""Half side of the plug at its top, its height, the radius of its corners, mm."""
+RELIEF = 0.5
+"""Of a recess below the plug's top: the plug's handle bears, as a cup's seat does."""
+PLATE, PITCH, MARGIN = 6.0, 16.0, 4.0
+WINDOW_DEPTH, WINDOW_Z = 6.0, 2.0
+TAIL_WIDTH, WALL_LENGTH, WALL_HEIGHT, FILAMENT = 3.0, 8.0, 5.0, 1.75
+_COLOUR, _PLUG_COLOUR, _TONGUE_COLOUR = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.90, 0.30, 0.30)
+_ROWS = {"recess": 13.0, "hole": 22.0, "wall": 28.0, "number": 35.0}
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What one feature settles: the printer's key, how to judge, and the value that each station stands for."""
+
+    feature: str
+    key: str
+    choose: str
+    values_mm: tuple[float, ...]
+
+
+def fits(printer: Printer) -> tuple[Fit, ...]:
+    """What the coupon settles, with the five values of each."""
+
+    def values(key: str, least: float = 0.0) -> tuple[float, ...]:
+        nominal = float(getattr(printer, key))
+        return tuple(round(least + (nominal - least) * share, 4) for share in SHARES)
+
+    return (
+        Fit(
+            "recess",
+            "plinth_clearance_mm",
+            "least where the plug drops in",
+            values("plinth_clearance_mm"),
+        ),
+        Fit("window", "window_clearance_mm", "least where the greased tongue slides", values("window_clearance_mm")),
+        Fit("hole", "filament_hole_mm", "least that takes the filament by hand", values("filament_hole_mm", FILAMENT)),
+        Fit("wall", "least_wall_mm", "thinnest that stands closed and stiff", values("least_wall_mm")),
+        Fit("number", "engraving_stroke_mm", "narrowest that reads", values("engraving_stroke_mm")),
+    )
+
+
+def toml(printer: Printer, fit: Fit, station: int) -> str:
+    """The line of TOML for the result at a station (from 0), under [printers.NAME] with like = the printer."""
+    return f"{fit.key} = {fit.values_mm[station]:g}"
+
+
+def bodies(printer: Printer) -> tuple[Body, ...]:
+    """The coupon's pieces as they lie on the bed: the plate, the plug and the tongue."""
+    found = [Body("coupon-plate", "tool", _plate(printer), _COLOUR), Body("coupon-plug", "tool", _plug(), _PLUG_COLOUR)]
+    made = "cut" if printer.technology.value == "sla" else "printed"
+    return (*found, Body("coupon-tongue", "tool", _tongue(printer), _TONGUE_COLOUR, made=made))
+
+
+def to_markdown(printer: Printer) -> str:
+    """How to judge the coupon, and the line of TOML for every station."""
+    lines = [
+        f"# Fit coupon for {printer.name}",
+        "",
+        "Print plate, plug and tongue as they lie. At every feature choose one of the five stations and put its line",
+        "into your spec. Station 3 is the catalogue's value.",
+        "",
+        "```toml",
+        "[moulds]",
+        'printer = "mine"',
+        "",
+        "[printers.mine]",
+        f'like = "{printer.name}"',
+        *(toml(printer, fit, 2) for fit in fits(printer)),
+        "```",
+        "",
+        "| feature | choose the | 1 | 2 | 3 | 4 | 5 |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for fit in fits(printer):
+        cells = " | ".join(f"`{toml(printer, fit, i)}`" for i in range(len(SHARES)))
+        lines.append(f"| {fit.feature} | {fit.choose} | {cells} |")
+    return "\n".join(lines) + "\n"
+
+
+def _plate(printer: Printer) -> Shape:
+    stroke = float(printer.engraving_stroke_mm)
+    length = PITCH * len(SHARES) + 2 * MARGIN
+    depth = _ROWS["number"] + HEIGHT * stroke * SHARES[-1] / 2 + MARGIN
+    found: list[Shape] = [box(0, length, 0, depth, 0, PLATE)]
+    tools: list[Shape] = []
+    by_feature = {fit.feature: fit.values_mm for fit in fits(printer)}
+    for i in range(len(SHARES)):
+        x = MARGIN + PITCH * (i + 0.5)
+        tools.append(moved(_taper(by_feature["recess"][i], RELIEF, 0.25), x, _ROWS["recess"], PLATE - PLUG_HEIGHT))
+        tools.append(moved(cylinder(by_feature["hole"][i] / 2, -1, PLATE + 1), x, _ROWS["hole"]))
+        around, half, height = by_feature["window"][i], _tongue_width(printer) / 2, float(printer.slot_height_mm)
+        low, high = WINDOW_Z - around, WINDOW_Z + height + around
+        tools.append(box(x - half - around, x + half + around, -1, WINDOW_DEPTH, low, high))
+        wall = by_feature["wall"][i] / 2
+        y = _ROWS["wall"]
+        found.append(box(x - WALL_LENGTH / 2, x + WALL_LENGTH / 2, y - wall, y + wall, PLATE - 1, PLATE + WALL_HEIGHT))
+        own, text = by_feature["number"][i], str(i + 1)
+        number = engraving(text, own, PLATE - float(printer.engraving_depth_mm), PLATE + 1)
+        tools.append(moved(number, x - text_width(text, own) / 2, _ROWS["number"] - HEIGHT * own / 2))
+    return cut(union(found), tools)
+
+
+def _taper(clearance: float, relief: float = 0.0, beyond: float = 0.0) -> Shape:
+    """The plug's taper upside down, its top at z = 0, `clearance` wider on every side; longer by `relief` below."""
+    square, slope = clearance / math.cos(math.radians(PLINTH_DRAFT_DEG)), math.tan(math.radians(PLINTH_DRAFT_DEG))
+
+    def section(height: float) -> Profile:
+        grow = square + height * slope
+        return rounded_rectangle(PLUG + grow, PLUG + grow, CORNER + grow)
+
+    high = PLUG_HEIGHT + beyond
+    return Extrude(section(-relief), -relief, high, top=section(high))
+
+
+def _plug() -> Shape:
+    """A plinth on a handle, printed plinth up, as the base's is."""
+    handle = box(-6, 6, -6, 6, 0, 4)
+    return union((handle, moved(turned(_taper(0.0), "x", 2), 0, 0, 4 + PLUG_HEIGHT)))
+
+
+def _tongue(printer: Printer) -> Shape:
+    half, height = _tongue_width(printer) / 2, float(printer.slot_height_mm)
+    return union((box(-half, half, 0, 20, 0, height), box(-half - 3, half + 3, 19, 27, 0, height)))
+
+
+def _tongue_width(printer: Printer) -> float:
+    return TAIL_WIDTH + float(printer.slot_width_clearance_mm)

@@ -1,0 +1,34 @@
+"""The coupon's files: an STL a piece, one 3MF, and the page that says how to judge it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from unitcad.catalogue import Printer
+from unitcad.errors import UnitcadError
+from unitcad.export import stl, threemf
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays, realise
+from unitcad.moulds import coupon
+
+SEGMENTS = 64
+
+
+def write(printer: Printer, out: Path) -> Path:
+    """Write `out`/coupon-<printer>; returns that folder. Raises UnitcadError where it can't be written."""
+    folder = out / f"coupon-{printer.name}"
+    parts = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for body in coupon.bodies(printer):
+            if body.made != "printed":
+                continue
+            ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
+            (folder / f"{body.name}.stl").write_bytes(stl.content(*ready, body.name))
+            parts.append(threemf.MeshPart(body.name, body.colour, *ready))
+        bed = float(printer.bed_x_mm), float(printer.bed_y_mm)
+        (folder / "coupon.3mf").write_bytes(threemf.content(parts, bed))
+        (folder / "coupon.md").write_bytes(coupon.to_markdown(printer).encode())
+    except OSError as error:
+        raise UnitcadError(f"{folder}: {error.strerror}") from None
+    return folder
