@@ -159,6 +159,7 @@ class _Making:
             "estimate": self._estimate(),
             "check": findings_count(shape["check"]),
             "pictures": [path for path in files if path.endswith(".png")],
+            "casting": self._casting(shape),
             "left_out": self._left_out(),
             "versions": {"unitcad": __version__, **kernel_versions(spec.output.formats)},
         }
@@ -192,6 +193,19 @@ class _Making:
             estimated = estimate_spec(self.spec, layered=shared)
         self.own["estimate.json"] = _json(estimated)
         return summary(estimated)
+
+    def _casting(self, shape: dict[str, Any]) -> list[str] | None:
+        """The procedure's files; returns their names."""
+        if "casting" not in self.only:
+            return None
+        from unitcad.moulds.casting import procedure
+        from unitcad.moulds.casting_text import files
+
+        with self.stages("casting"):
+            volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
+            written = files(procedure(self.spec, self.variant.plan, volumes))
+        self.own.update({name: text.encode() for name, text in written.items()})
+        return sorted(written)
 
     def _pictures(self) -> dict[str, str]:
         """The shaded pictures; where this machine can't draw, what it lacks is told and the drawing stays."""

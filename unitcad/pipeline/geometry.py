@@ -23,8 +23,8 @@ from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.spec import Spec, printer_of
 from unitcad.spec.models import CastingTable, EstimateTable
 
-GEOMETRIC = ("unit", "moulds")
-"""The outputs that are geometry."""
+GEOMETRIC = ("unit", "moulds", "casting")
+"""The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
 
 
 def geometric(spec: Spec) -> Spec:
@@ -103,16 +103,16 @@ class _Making:
             with stages("step"):
                 for group in groups:
                     self._step(group, records)
-        moulds = "moulds" in self.only
+        moulds, pours = "moulds" in self.only, {"moulds", "casting"} & set(self.only)
         with stages("laws"):
             laws = self._laws() if self.check and moulds else {"laws": [], "strains": []}
         with stages("check"):
             check = self._check(records) if self.check else []
         return {
-            "label": variant.plan.label if moulds else None,
+            "label": variant.plan.label if pours else None,
             "air_ring_mm": round(variant.dimensions.air_ring, 9),
             "parts": records,
-            "steps": self._steps() if moulds else [],
+            "steps": self._steps() if pours else [],
             **laws,
             "check": check,
             "files": self.files,
@@ -164,6 +164,15 @@ class _Making:
                 self._own_key("section"),
                 lambda: svg.unit_section(v.unit, v.dimensions, v.segments).encode(),
             )
+        if "casting" in self.only:
+            from unitcad.moulds.casting_text import step_section
+
+            for step in self.variant.plan.steps:
+                self._file(
+                    f"step{step.index}-section.svg",
+                    self._own_key(f"section of pour {step.index}"),
+                    lambda step=step: step_section(self.variant.plan, step, self.variant.segments).encode(),
+                )
 
     def _laws(self) -> dict[str, list[dict[str, Any]]]:
         """The laws that read no silicone, judged; and the strains that a silicone's limit is still to be put to."""
@@ -202,19 +211,29 @@ class _Making:
         return self.store.data(digest(f"{self.files[path]} {printer!r} {code_version()}".encode()), judged)
 
     def _steps(self) -> list[dict[str, Any]]:
+        """The pours: volume of the cavities as the tools leave them, and of one layer as the unit has it."""
         variant = self.variant
-        solids = {body.name: variant.mesh(body) for body in variant.unit}
-        cells = len(variant.plan.layout.cells)
-        return [
-            {
-                "index": step.index,
-                "layer": step.name,
-                "tools": list(step.tools),
-                "cavity_volume_mm3": float(f"{cells * solids[step.name].volume():.9g}"),
-                "layer_volume_mm3": float(f"{solids[step.name].volume():.9g}"),
-            }
-            for step in variant.plan.steps
-        ]
+
+        def measured() -> list[dict[str, Any]]:
+            from unitcad.moulds import fit
+
+            solids = {body.name: variant.mesh(body) for body in (*variant.unit, *variant.plan.tools)}
+            found = []
+            for step in variant.plan.steps:
+                held = fit.held(step, fit.cavity(step, solids, variant.segments), variant.segments)
+                cavities = sum(cavity.volume() for _, cavity in held)
+                found.append(
+                    {
+                        "index": step.index,
+                        "layer": step.name,
+                        "tools": list(step.tools),
+                        "cavity_volume_mm3": float(f"{cavities:.9g}"),
+                        "layer_volume_mm3": float(f"{solids[step.name].volume():.9g}"),
+                    }
+                )
+            return found
+
+        return self.store.data(self._own_key("steps"), measured)
 
     def _own_key(self, what: str) -> str:
         """The key of something that reads the whole geometry, but neither formats nor outputs."""
