@@ -1,0 +1,89 @@
+"""PrusaSlicer as a real client: it takes every tool without a repair."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from mould_set import MouldSet
+
+from unitcad.catalogue import printers
+from unitcad.errors import UnitcadError
+from unitcad.export import slicer, stl
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays, realise
+from unitcad.moulds import coupon
+from unitcad.spec import templates
+
+pytestmark = [
+    pytest.mark.slicer,
+    pytest.mark.skipif(not slicer.installed(), reason="PrusaSlicer is not installed"),
+]
+SETS = [(name,) for name in sorted(templates())] + [
+    ("encapsulating", "moulds.cavities=[2,3]"),
+    ("encapsulating", "moulds.pour=injected"),
+]
+
+
+def written(folder: Path, *source: str) -> list[Path]:
+    moulds = MouldSet.of(*source)
+    files = []
+    for tool in moulds.plan.tools:
+        if tool.made == "printed":
+            ready = print_ready(*arrays(realise(tool.shape, moulds.segments)), tool.upside_down)
+            files.append(folder / f"{tool.name}.stl")
+            files[-1].write_bytes(stl.content(*ready, tool.name))
+    return files
+
+
+@pytest.mark.parametrize("source", SETS, ids=" ".join)
+def test_no_tool_needs_a_repair(source: tuple[str, ...], tmp_path: Path) -> None:
+    files = written(tmp_path, *source)
+    assert len(files) >= 3
+    assert [file.name for file in files if slicer.needs_repair(file)] == []
+
+
+def test_a_broken_mesh_needs_one(tmp_path: Path) -> None:
+    """A facet left out: the check sees what it should."""
+    content = written(tmp_path, "single-embedded")[0].read_bytes()
+    count = int.from_bytes(content[80:84], "little") - 1
+    broken = tmp_path / "broken.stl"
+    broken.write_bytes(content[:80] + count.to_bytes(4, "little") + content[84 : 84 + 50 * count])
+    assert slicer.needs_repair(broken)
+    (tmp_path / "text.stl").write_text("nothing")
+    with pytest.raises(UnitcadError, match="does not read"):
+        slicer.needs_repair(tmp_path / "text.stl")
+
+
+def test_print_time_and_filament(tmp_path: Path) -> None:
+    """Filament by volume lies between the walls alone and the solid piece."""
+    (tongue,) = (file for file in written(tmp_path, "encapsulating") if file.name == "tongue.stl")
+    found = slicer.report([tongue], printers()["fdm-0.4"])
+    assert found is not None
+    assert found["pieces"][0]["repaired"] is False
+    assert 10 < found["print_s"] < 3600
+    moulds = MouldSet.of("encapsulating")
+    solid = realise(moulds.plan.tool("tongue").shape, moulds.segments).volume() / 1000
+    # A skirt round the piece comes on top.
+    assert 0.5 * solid < found["filament_cm3"] < 5 * solid
+    assert slicer.report([tongue], printers()["sla"]) is None
+
+
+def test_durations() -> None:
+    assert slicer._seconds("1d 2h 3m 4s") == 93784
+    assert slicer._seconds("58s") == 58
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("source", SETS, ids=" ".join)
+def test_every_tool_slices(source: tuple[str, ...], tmp_path: Path) -> None:
+    found = slicer.report(written(tmp_path, *source), printers()["fdm-0.4"])
+    assert found is not None
+    assert all(piece["print_s"] > 0 and not piece["repaired"] for piece in found["pieces"])
+
+
+def test_coupon_needs_no_repair(tmp_path: Path) -> None:
+    for body in coupon.bodies(printers()["fdm-0.4"]):
+        file = tmp_path / f"{body.name}.stl"
+        file.write_bytes(stl.content(*print_ready(*arrays(realise(body.shape, 64))), body.name))
+        assert not slicer.needs_repair(file)

@@ -1,0 +1,115 @@
+"""PrusaSlicer, headless, where it is installed: whether it takes a file without a repair, print time and filament."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from unitcad.catalogue import Printer
+from unitcad.errors import UnitcadError
+
+PROGRAM = "prusa-slicer"
+NOZZLES_MM = {"fdm-0.25": 0.25}
+TIMEOUT_S = 300
+FILAMENT_MM = 1.75
+_REPAIRS = re.compile(r"^(?:degenerate_facets|edges_fixed|facets_removed|facets_reversed|backwards_edges)\s*=", re.M)
+
+
+@dataclass(frozen=True)
+class Sliced:
+    """One file as the slicer took it. `repaired`: it was not manifold, or something had to be mended."""
+
+    file: str
+    repaired: bool
+    print_s: int
+    filament_mm: float
+    filament_cm3: float
+
+
+def installed() -> bool:
+    """Whether PrusaSlicer is on the path."""
+    return shutil.which(PROGRAM) is not None
+
+
+def needs_repair(path: Path) -> bool:
+    """Whether PrusaSlicer finds anything to mend in a mesh file; fast, nothing is sliced.
+
+    Raises UnitcadError where the slicer is missing or does not read the file.
+    """
+    said = _run("--info", str(path))
+    if "manifold" not in said:
+        raise UnitcadError(f"{path}: PrusaSlicer does not read it: {said.strip()[-200:]}")
+    return "manifold = yes" not in said or bool(_REPAIRS.search(said))
+
+
+def slice_file(path: Path, printer: Printer) -> Sliced:
+    """Slice one STL with the slicer's own defaults and this printer's layers. Raises UnitcadError where that fails."""
+    with tempfile.TemporaryDirectory(prefix="unitcad-slice-") as scratch:
+        code = Path(scratch) / "out.gcode"
+        layer, nozzle = float(printer.layer_mm), NOZZLES_MM.get(printer.name, 0.4)
+        said = _run(
+            "--export-gcode",
+            *("--output", str(code)),
+            *("--nozzle-diameter", f"{nozzle:g}"),
+            *("--layer-height", f"{layer:g}"),
+            *("--first-layer-height", f"{layer:g}"),
+            *("--filament-diameter", f"{FILAMENT_MM:g}"),
+            str(path),
+        )
+        if not code.is_file():
+            raise UnitcadError(f"{path}: PrusaSlicer wrote nothing: {said.strip()[-200:]}")
+        text = code.read_text("utf-8", "replace")
+    return Sliced(
+        path.name,
+        needs_repair(path),
+        _seconds(_found(text, "estimated printing time (normal mode)")),
+        float(_found(text, "filament used [mm]")),
+        float(_found(text, "filament used [cm3]")),
+    )
+
+
+def report(files: Sequence[Path], printer: Printer) -> dict[str, Any] | None:
+    """What slicer.json holds of STL files; None without PrusaSlicer, or for a printer that it does not slice for."""
+    if not installed() or printer.technology.value != "fdm":
+        return None
+    pieces = [slice_file(path, printer) for path in files]
+    return {
+        "slicer": _run("--help").split("\n", 1)[0].strip(),
+        "printer": printer.name,
+        "layer_mm": float(printer.layer_mm),
+        "pieces": [asdict(piece) for piece in pieces],
+        "print_s": sum(piece.print_s for piece in pieces),
+        "filament_cm3": round(sum(piece.filament_cm3 for piece in pieces), 3),
+        "note": "the slicer's own defaults but for nozzle and layer height; each piece printed alone",
+    }
+
+
+def _run(*arguments: str) -> str:
+    try:
+        done = subprocess.run(
+            [PROGRAM, *arguments], capture_output=True, text=True, errors="replace", timeout=TIMEOUT_S, check=False
+        )
+    except FileNotFoundError:
+        raise UnitcadError(f"{PROGRAM} is not installed") from None
+    except subprocess.TimeoutExpired:
+        raise UnitcadError(f"{PROGRAM} took more than {TIMEOUT_S} s") from None
+    return done.stdout + done.stderr
+
+
+def _found(text: str, name: str) -> str:
+    match = re.search(rf"^; {re.escape(name)} = (.+)$", text, re.M)
+    if not match:
+        raise UnitcadError(f"PrusaSlicer's G-code does not say: {name}")
+    return match.group(1).strip()
+
+
+def _seconds(text: str) -> int:
+    """ "1d 2h 3m 4s" in seconds."""
+    units = {"d": 86400, "h": 3600, "m": 60, "s": 1}
+    return sum(int(number) * units[unit] for number, unit in re.findall(r"(\d+)([dhms])", text))
