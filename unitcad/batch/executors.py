@@ -8,7 +8,9 @@ main module is needed.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import logging
 import os
 import pickle
 import queue
@@ -177,20 +179,30 @@ def dask_executor(address: str) -> tuple[Executor, int]:
     """
     try:
         from distributed import Client
+        from distributed.comm.core import connect
     except ImportError:
         raise UnitcadError("--scheduler needs Dask: pip install 'unitcad[dask]'") from None
-    import logging
 
-    logging.getLogger("distributed").setLevel(logging.ERROR)
+    async def ask() -> None:
+        comm = await connect(address, timeout=DASK_SECONDS)
+        await comm.write({"op": "identity", "reply": True})
+        await comm.read()
+        await comm.close()
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    # Asked before there is a client, since one that finds nobody takes long to give up.
     try:
-        client = Client(address, timeout=DASK_SECONDS, set_as_default=False)
-        workers = client.scheduler_info(n_workers=-1)["workers"]
+        asyncio.run(asyncio.wait_for(ask(), DASK_SECONDS))
     except (OSError, TimeoutError, ValueError) as error:
-        raise UnitcadError(f"--scheduler {address}: no answer within {DASK_SECONDS:g} s ({error})") from None
-    if not workers:
+        why = f" ({error})" if str(error) else ""
+        raise UnitcadError(f"--scheduler {address}: no answer within {DASK_SECONDS:g} s{why}") from None
+    client = Client(address, timeout=DASK_SECONDS, set_as_default=False)
+    cores: Any = client.ncores()
+    threads = sum(cores.values())
+    if not threads:
         client.close()
         raise UnitcadError(f"--scheduler {address}: it has no workers")
-    return client.get_executor(pure=False), sum(int(worker["nthreads"]) for worker in workers.values())
+    return client.get_executor(pure=False), threads
 
 
 def _obituary(child: subprocess.Popen[bytes], log: IO[bytes]) -> str:

@@ -9,7 +9,7 @@ from unitcad.batch.sweep import Sweep
 from unitcad.cache import MemoryStore
 from unitcad.errors import UnitcadError
 from unitcad.pipeline import parts
-from unitcad.pipeline.build import checked_outputs, make
+from unitcad.pipeline.build import checked_outputs, make, possible_outputs
 from unitcad.pipeline.geometry import geometry_key
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.variant import Variant
@@ -54,8 +54,8 @@ def preview(sweep: Sweep, options: Options) -> dict[str, Any]:
         "parts": round(per_drawn * number / max(1, len(drawn))),
         "exact": looked == count and len(drawn) == len(geometries),
         "files": round(files * variants),
-        "stored_mb": round((shared * number + own * variants) / 1e6, 2),
-        "linked_mb": round((shared + own) * variants / 1e6, 2),
+        "stored_mb": round((shared * number + own * variants) / 1e6, 3),
+        "linked_mb": round((shared + own) * variants / 1e6, 3),
         "refused_count": round(len(refused) * share),
         "refused": refused[:REFUSED_TOLD],
     }
@@ -66,7 +66,7 @@ def _distinct_parts(specs: list[Spec], only: tuple[str, ...]) -> int:
     found = set()
     for spec in specs:
         variant = Variant(spec)
-        for group in parts.groups(variant, only):
+        for group in parts.groups(variant, possible_outputs(spec, only)):
             found |= {parts.key(variant, body, "record") for body in group.bodies}
     return len(found)
 

@@ -121,8 +121,13 @@ def run(
         store.close()
         if own:
             _end(executor)
-    collect(store.root, int(options.cache_mb * 1e6))
+            trim(options)
     return summary
+
+
+def trim(options: Options) -> None:
+    """Bring the cache down to its limit, when the workers are gone."""
+    collect(options.cache or default_root(), int(options.cache_mb * 1e6))
 
 
 def counted(sweep: Sweep, limit: int | None) -> int:

@@ -25,7 +25,7 @@ def shapes(spec: Spec) -> dict[str, Shape]:
     function = _function(spec.design, spec.design_source)
     try:
         made = function(spec)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise _failed(spec.design, error) from None
     if isinstance(made, get_args(Shape)):
         made = {"layer1": made}
@@ -44,7 +44,7 @@ def _function(design: str, source: str) -> Any:
     module = types.ModuleType("unitcad_own_design")
     try:
         exec(compile(source, design.rpartition(":")[0], "exec"), module.__dict__)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise _failed(design, error) from None
     found = module.__dict__.get(function_of(design))
     if not callable(found):
@@ -55,7 +55,7 @@ def _function(design: str, source: str) -> Any:
     return found
 
 
-def _failed(design: str, error: Exception) -> UnitcadError:
+def _failed(design: str, error: BaseException) -> UnitcadError:
     """What went wrong, in whose words, and where in the design's file."""
     file, line, trace = design.rpartition(":")[0], getattr(error, "lineno", None), error.__traceback__
     while trace is not None:

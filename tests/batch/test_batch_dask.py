@@ -1,0 +1,131 @@
+"""Dask: a real scheduler, two workers on loopback, one killed half way; a scheduler that does not answer."""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from batching import bytes_of, command, environment, ring_sweep, rows, unitcad
+
+pytest.importorskip("distributed")
+
+
+class Cluster:
+    """Processes of the `dask` command; workers keep nothing on this disk but their own scratch folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.workers = folder, []
+        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+        self.address = self._read(self.scheduler, r"Scheduler at:\s+(tcp://\S+)")
+        for _ in range(2):
+            self.workers.append(
+                self._start(
+                    "worker", self.address, "--no-nanny", "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1"
+                )
+            )
+            self._read(self.workers[-1], r"(Registered to)")
+
+    def _start(self, kind: str, *words: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "dask", kind, *words],
+            stderr=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            text=True,
+            cwd=self.folder,
+            env=environment(),
+        )
+
+    def _read(self, child: subprocess.Popen[str], pattern: str) -> str:
+        assert child.stderr is not None
+        for line in child.stderr:
+            if found := re.search(pattern, line):
+                return found[1]
+        raise AssertionError("dask did not start")
+
+    def close(self) -> None:
+        for child in (*self.workers, self.scheduler):
+            child.kill()
+            child.communicate()
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    (tmp_path / "cluster").mkdir()
+    found = Cluster(tmp_path / "cluster")
+    yield found
+    found.close()
+
+
+def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(cluster: Cluster, tmp_path: Path) -> None:
+    heights = [float(h) for h in range(2, 10)]
+    sweep, out = ring_sweep(tmp_path / "s", "slow", heights, materials=3), tmp_path / "out"
+    child = subprocess.Popen(
+        command("batch", sweep, "-o", out, "--scheduler", cluster.address, "--json"),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+    )
+    end = time.monotonic() + 60
+    while len(list(out.glob("ring-*"))) < 6 and time.monotonic() < end:
+        time.sleep(0.02)
+    cluster.workers[0].kill()
+    told, errors = child.communicate(timeout=90)
+    assert child.returncode == 0, errors
+    summary = json.loads(told)
+    assert summary["ok"] == 24
+    assert summary["failed"] == 0
+    assert "Traceback" not in errors
+    assert not list((tmp_path / "cluster").rglob("*.stl"))  # results came back over the wire
+    here = unitcad("batch", sweep, "-o", tmp_path / "here", "-j", 1, "--cache", tmp_path / "other")
+    assert here.returncode == 0, here.stderr
+    assert bytes_of(out) == bytes_of(tmp_path / "here")
+    # Each geometry crossed once: the other materials came back as a few small files.
+    assert summary["reused"] == 16
+
+
+def test_a_variant_that_fails_on_a_cluster_is_named(cluster: Cluster, tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "fails"), tmp_path / "out"
+    done = unitcad("batch", sweep, "-o", out, "--scheduler", cluster.address, "--keep-going")
+    assert done.returncode == 1
+    assert [row["status"] for row in rows(out)] == ["ok", "failed", "ok", "ok"]
+    assert rows(out)[1]["reason"] == "design ring.py:fails (line 32): ValueError: never"
+
+
+@pytest.mark.parametrize("listening", [False, True], ids=["nobody", "somebody-mute"])
+def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening: bool, tmp_path: Path) -> None:
+    with socket.socket() as mute:
+        mute.bind(("127.0.0.1", 0))
+        if listening:
+            mute.listen()
+        address = f"tcp://127.0.0.1:{mute.getsockname()[1]}"
+        sweep = ring_sweep(tmp_path / "s")
+        code = (
+            "import time, sys; import unitcad.batch.executors as e; from unitcad.errors import UnitcadError\n"
+            "import distributed; start = time.monotonic()\n"
+            f"try: e.dask_executor({address!r})\n"
+            "except UnitcadError as error: print(error, file=sys.stderr)\n"
+            "print(time.monotonic() - start)\n"
+        )
+        told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+        assert float(told.stdout) < 10
+        assert "no answer" in told.stderr
+        done = unitcad("batch", sweep, "-o", tmp_path / "out", "--scheduler", address)
+        assert done.returncode == 2
+        assert f"--scheduler {address}: no answer" in done.stderr
+        assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("address", ["tcp://nowhere.invalid:8786", "nonsense://x", "tcp://127.0.0.1:notaport"])
+def test_an_address_that_is_none(address: str, tmp_path: Path) -> None:
+    done = unitcad("batch", ring_sweep(tmp_path / "s"), "-o", tmp_path / "out", "--scheduler", address)
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.startswith("error: --scheduler")

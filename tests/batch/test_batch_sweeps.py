@@ -1,0 +1,213 @@
+"""Sweep files: what they expand to, and what is refused, with the closest that would do."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+
+import pytest
+from batching import ring_sweep, unitcad
+
+from unitcad.batch import load_sweep
+from unitcad.batch.paths import known_paths
+from unitcad.batch.run import counted
+from unitcad.batch.sweep import Range, from_file, shipped
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.pipeline.geometry import geometry_key
+from unitcad.spec import read
+
+SOFT, STIFF = "ecoflex-00-10", "dragon-skin-30"
+
+
+def _sweep(table: dict, base="encapsulating", **more):
+    return from_file({"base": base, "sweep": table, **more}, Path(), "test")
+
+
+def test_a_product_runs_over_every_combination_the_last_path_fastest() -> None:
+    table = {"layers.0.material": [SOFT, STIFF], "layers.0.wall_mm": {"start": 1.0, "stop": 1.5, "num": 3}, "name": "x"}
+    sweep = _sweep(table, base=["encapsulating", "no-fpcb"])
+    assert sweep.count == 12
+    expected = itertools.product(["encapsulating", "no-fpcb"], [SOFT, STIFF], [1.0, 1.25, 1.5])
+    for i, (base, material, wall) in enumerate(expected):
+        spec = sweep.spec(i)
+        assert sweep.values(i) == (base, {"layers.0.material": material, "layers.0.wall_mm": wall, "name": "x"})
+        assert (spec.layers[0].material, spec.layers[0].wall_mm, spec.name) == (material, wall, "x")
+        assert (spec.fpcb is None) == (base == "no-fpcb")
+
+
+def test_a_zip_walks_its_lists_together_and_repeats_what_is_one() -> None:
+    table = {"mode": "zip", "diameter_mm": [14.0, 15.0, 16.0], "estimate.frequency_hz": 90.0, "motor.fill": [False]}
+    sweep = _sweep({**table, "layers.0.material": [SOFT, STIFF, "ecoflex-00-50"]})
+    assert [sweep.spec(i).diameter_mm for i in range(sweep.count)] == [14.0, 15.0, 16.0]
+    assert {sweep.spec(i).estimate.frequency_hz for i in range(3)} == {90.0}
+    assert sweep.spec(2).layers[0].material == "ecoflex-00-50"
+
+
+def test_cases_name_their_base_and_values() -> None:
+    cases = [{"diameter_mm": 15.0}, {"base": "single-embedded", "name": "one", "layers.0.wall_mm": 2.4}]
+    sweep = _sweep({"mode": "cases", "cases": cases})
+    assert [sweep.spec(i).name for i in (0, 1)] == ["encapsulating", "one"]
+    assert [len(sweep.spec(i).layers) for i in (0, 1)] == [2, 1]
+    assert sweep.spec(1).layers[0].wall_mm == 2.4
+
+
+def test_whole_tables_and_fixed_values() -> None:
+    table = {"fpcb": [{"tail": "one"}, {"tail": "both"}], "moulds.cavities": [[1, 1], [1, 2]]}
+    sweep = _sweep(table, set={"output.formats": ["stl"]})
+    assert [sweep.spec(i).fpcb.tail for i in range(4)] == ["one", "one", "both", "both"]
+    assert [sweep.spec(i).moulds.cavities for i in range(2)] == [(1, 1), (1, 2)]
+    assert sweep.spec(3).output.formats == ("stl",)
+
+
+def test_a_range_has_both_its_ends_and_no_digits_of_rounding() -> None:
+    values = Range(start=1.0, stop=2.0, num=11)
+    assert [values[i] for i in range(len(values))] == [1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7, 1.8, 1.9, 2.0]
+    assert Range(start=3.0, stop=9.0, num=1)[0] == 3.0
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "geometries"), [("paper", 15, 4), ("thickness", 32, 32), ("all-materials", 50, 2)]
+)
+def test_shipped_sweeps_hold_what_they_say(name: str, count: int, geometries: int) -> None:
+    sweep = load_sweep(name)
+    assert sweep.count == count
+    specs = [sweep.spec(i) for i in range(count)]
+    assert len({geometry_key(spec, ("unit", "moulds"), True) for spec in specs}) == geometries
+    assert set(shipped()) == {"paper", "thickness", "all-materials"}
+
+
+def test_the_paper_sweep_has_every_measured_unit() -> None:
+    from unitcad import catalogue
+
+    table = catalogue.measurements()
+    names = table["names"]
+    sweep = load_sweep("paper")
+    there = {
+        (spec.design, "/".join(layer.material for layer in spec.layers))
+        for spec in (sweep.spec(i) for i in range(sweep.count))
+    }
+    for design in ("embedded", "encapsulating"):
+        for pair in table[design]:
+            assert (design, "/".join(names[short] for short in pair.split("/"))) in there
+        for short in table["single"]:
+            assert (design, names[short]) in there
+    for pair in table["amplified"]:
+        assert ("embedded", "/".join(names[short] for short in pair.split("/"))) in there
+    for told in table["directions"]:
+        design, _, pair = told.partition(" ")
+        if "/" in pair:
+            assert (design, "/".join(names[short] for short in pair.split("/"))) in there
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"layers.0.wal_mm": [1.0]}, ["sweep.layers.0.wal_mm", "nearest accepted: 'layers.0.wall_mm'"]),
+        ({"estimate.freq": [1.0]}, ["nearest accepted: 'estimate.frequency_hz'"]),
+        ({"diameter": [1.0]}, ["nearest accepted: 'diameter_mm'"]),
+        ({"layers.2.wall_mm": [1.0]}, ["layers.2.wall_mm = '2'", "has 0, 1"]),
+        ({"diameter_mm.x": [1.0]}, ["no such path"]),
+        ({}, ["the sweep is empty"]),
+        ({"diameter_mm": []}, ["sweep.diameter_mm", "the sweep is empty"]),
+        ({"mode": "cases"}, ["the sweep is empty"]),
+        ({"mode": "cases", "cases": [{"nme": 1}]}, ["there is no such path"]),
+        ({"mode": "cases", "cases": [{}], "diameter_mm": [1.0]}, ["[[sweep.cases]] only"]),
+        ({"cases": [{}]}, ["another mode", "cases"]),
+        ({"mode": "prodct", "diameter_mm": [14.0]}, ["sweep.mode", "closest: product"]),
+        (
+            {"mode": "zip", "diameter_mm": [14.0, 15.0], "motor.diameter_mm": [7.0, 7.1, 7.2]},
+            ["diameter_mm has 2", "has 3"],
+        ),
+        ({"diameter_mm": [14.0, 15.0, 14.0]}, ["14", "is there twice"]),
+        ({"diameter_mm": {"start": 1.0, "stop": 2.0, "num": 0}}, ["num"]),
+        ({"diameter_mm": {"start": 1.0, "stop": 2.0, "nmu": 3}}, ["diameter_mm"]),
+        ({"diameter_mm": {"start": 1.0, "stop": 1.0, "num": 3}}, ["same value"]),
+        ({"diameter_mm": [float("nan")]}, []),
+    ],
+)
+def test_what_can_not_be_is_refused(table: dict, words: list[str]) -> None:
+    with pytest.raises(UnitcadError) as refused:
+        sweep = _sweep(table)
+        sweep.spec(0)
+    for word in words:
+        assert word in str(refused.value)
+
+
+def test_a_path_is_checked_against_every_base() -> None:
+    with pytest.raises(Refusal, match=r"layers\.1"):
+        _sweep({"layers.1.material": [SOFT]}, base=["encapsulating", "single-embedded"])
+    with pytest.raises(Refusal, match="encapsulating"):
+        _sweep({"diameter_mm": [14.0]}, base="encapsulatin")
+
+
+def test_every_path_of_a_spec_may_be_swept() -> None:
+    data = read("encapsulating")
+    paths = known_paths(data)
+    assert {"layers.1.cap_mm", "motor.fill", "fpcb.tail", "estimate.frequency_hz", "output.formats"} <= set(paths)
+    _sweep({path: 1.0 for path in paths if path not in ("mode", "cases")})
+
+
+def test_a_thousand_million_variants_are_counted_and_limited(tmp_path: Path) -> None:
+    axis = {"start": 14.0, "stop": 20.0, "num": 1000}
+    sweep = _sweep({"diameter_mm": axis, "layers.0.wall_mm": axis, "layers.1.wall_mm": axis})
+    assert sweep.count == 10**9
+    with pytest.raises(Refusal, match=r"1000000000.*--limit"):
+        counted(sweep, None)
+    assert counted(sweep, 10) == 10
+    assert sweep.values(10**9 - 1)[1] == {"diameter_mm": 20.0, "layers.0.wall_mm": 20.0, "layers.1.wall_mm": 20.0}
+    file = tmp_path / "big.toml"
+    file.write_text(
+        'base = "embedded"\n[sweep]\n'
+        + "".join(f'"{path}" = {{ start = 14.0, stop = 20.0, num = 1000 }}\n' for path in sweep.paths)
+    )
+    done = unitcad("batch", file, "-o", tmp_path / "out")
+    assert done.returncode == 2
+    assert "1000000000" in done.stderr
+    assert "--limit" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_dry_run_counts_and_makes_nothing(tmp_path: Path) -> None:
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=5)
+    done = unitcad("batch", sweep, "-o", tmp_path / "out", "--dry-run", "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    # Three rings and one motor.
+    assert (told["variants"], told["geometries"], told["parts"], told["exact"]) == (15, 3, 4, True)
+    assert not (tmp_path / "out").exists()
+    made = unitcad("batch", sweep, "-o", tmp_path / "out", "-j", 0)
+    assert made.returncode == 0, made.stderr
+    files = [f for f in (tmp_path / "out").rglob("*") if f.is_file() and f.parent != tmp_path / "out"]
+    assert told["files"] == len(files)
+    linked = sum(f.stat().st_size for f in files)
+    assert told["linked_mb"] == pytest.approx(linked / 1e6, rel=0.2)
+    stored = sum({f.stat().st_ino: f.stat().st_size for f in files}.values())
+    assert told["stored_mb"] == pytest.approx(stored / 1e6, rel=0.2)
+
+
+def test_dry_run_tells_what_can_not_be() -> None:
+    done = unitcad("batch", "thickness", "--dry-run", "--set", "diameter_mm=13.0")
+    assert done.returncode == 0
+    assert "variant 0 can't be: " not in done.stderr
+    assert "variant 15 can't be: diameter_mm = 13" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["papr"], "closest: paper"),
+        (["paper", "--limit", "0"], "--limit"),
+        (["paper", "--only", "unitt"], "closest: unit"),
+        (["paper", "--formats", "stp"], "--formats"),
+        (["paper", "--set", "diametr_mm=3"], "diameter_mm"),
+        (["paper", "-j", "0", "--timeout", "3"], "--timeout"),
+        (["no/such.toml"], "no such file"),
+    ],
+)
+def test_asked_wrongly(words: list[str], said: str, tmp_path: Path) -> None:
+    done = unitcad("batch", *words, cwd=tmp_path)
+    assert done.returncode == 2, done.stdout
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.glob("out*"))
