@@ -31,23 +31,29 @@ def browser() -> Iterator[Any]:
     """A running browser."""
     from playwright.sync_api import sync_playwright
 
-    with sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=executable(), args=list(FLAGS))
-        try:
-            yield running
-        finally:
-            running.close()
+    with sync_playwright() as playwright, launched(playwright.chromium) as running:
+        yield running
+
+
+@contextlib.contextmanager
+def launched(kind: Any, *flags: str) -> Iterator[Any]:
+    """A browser of a kind (`running.browser_type` is one) with more flags."""
+    running = kind.launch(executable_path=executable(), args=[*FLAGS, *flags])
+    try:
+        yield running
+    finally:
+        running.close()
 
 
 class Visit:
     """A page opened from a file: what it said on the console, what it asked for, what it threw."""
 
     def __init__(
-        self, running: Any, file: Path, width: int = 1280, height: int = 900, dark: bool = False, **more: Any
+        self, running: Any, file: Path, width: int = 1280, height: int = 900, dark: bool = False, fragment: str = ""
     ) -> None:
         scheme = "dark" if dark else "light"
         self.context = running.new_context(
-            viewport={"width": width, "height": height}, color_scheme=scheme, reduced_motion="reduce", **more
+            viewport={"width": width, "height": height}, color_scheme=scheme, reduced_motion="reduce"
         )
         self.page = self.context.new_page()
         self.console: list[str] = []
@@ -56,7 +62,7 @@ class Visit:
         self.page.on("console", lambda message: self.console.append(f"{message.type}: {message.text}"))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.goto(file.resolve().as_uri())
+        self.page.goto(file.resolve().as_uri() + (f"#{fragment}" if fragment else ""))
         self.page.wait_for_selector("html[data-ready=yes]", timeout=60_000)
 
     def drawn(self) -> None:

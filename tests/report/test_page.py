@@ -45,12 +45,6 @@ def resolved(node: Any, pool: list[Any]) -> Any:
     return node
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One variant's folder, with everything that a build of STL makes."""
-    return build(load("encapsulating", ['output.formats=["stl"]']), tmp_path_factory.mktemp("one")).folder
-
-
 def test_pool_says_everything_once() -> None:
     long = {"text": "x" * 500, "list": [list(range(200))] * 3}
     pool = Pool()

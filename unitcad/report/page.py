@@ -27,8 +27,10 @@ from unitcad.report.pool import Pool
 from unitcad.spec import Spec
 
 VENDORED = ("three.min.js", "uplot.min.js")
-PROGRAMS = ("dom.js", "glb.js", "viewer.js", "controls.js", "plots.js", "estimate.js", "casting.js", "sections.js",
-            "table.js", "main.js")  # fmt: skip
+PROGRAMS = (
+    "dom.js", "glb.js", "viewer.js", "controls.js", "plots.js", "estimate.js", "sections.js", "casting.js", "table.js",
+    "main.js",
+)  # fmt: skip
 STYLES = ("vendor/uplot.min.css", "app/page.css", "app/print.css")
 
 

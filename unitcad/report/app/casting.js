@@ -1,6 +1,65 @@
+// The casting procedure: numbered steps, a drawing and the figures of each pour, ready to print.
 (() => {
   "use strict";
-  const { el, section, facts } = window.unitcad;
-  window.unitcad.procedure = (variant) => section("procedure", "Procedure",
-    variant.casting ? facts(variant.casting) : el("p", { className: "absent" }, "No procedure here. Ask for it with ", el("code", {}, "unitcad build SPEC --only casting")));
+  const { el, number, section, table, drawing, partName } = window.unitcad;
+  // What a person at the scale looks for first.
+  const FIRST = [/^part A$/, /^part B$/, /^pot life/, /^cure/, /^rise of/];
+
+  const quantity = (figure) => `${number(figure.value, 4)} ${figure.unit || ""}`.trim();
+
+  function figures(list, summary) {
+    if (!list || !list.length) return null;
+    const rows = list.map((figure) => [figure.name, quantity(figure), figure.source]);
+    const found = table(["Figure", "Value", "Source"], rows, { label: summary });
+    return el("details", {}, el("summary", {}, summary), found);
+  }
+
+  function cards(list) {
+    const chosen = FIRST.map((pattern) => (list || []).find((figure) => pattern.test(figure.name))).filter(Boolean);
+    return el("dl", { className: "cards" }, chosen.map((figure) => el("div", {}, el("dt", {}, figure.name), el("dd", {}, quantity(figure)))));
+  }
+
+  function procedure(variant) {
+    const data = variant.casting;
+    if (!data) return section("procedure", "Procedure", el("p", { className: "absent" }, "No procedure here. Ask for it with ", el("code", {}, "unitcad build SPEC --only casting")));
+    let next = 1;
+    const steps = (list) => {
+      if (!list || !list.length) return null;
+      const node = el("ol", { start: String(next) }, list.map((text) => el("li", {}, text)));
+      next += list.length;
+      return node;
+    };
+    const titled = (title, ...content) => content.some(Boolean) && [el("h3", {}, title), content];
+    const offGrid = data.off_grid || [];
+    const pour = (each) => {
+      const svg = variant.drawings[each.drawing];
+      return el("div", { className: "pour" }, el("h3", {}, `Pour ${each.index}: ${partName(each.layer)}, ${each.material}`),
+        svg && el("figure", { className: "scroll", tabindex: "0", "aria-label": `Pour ${each.index} in section` }, drawing(svg, `Pour ${each.index} in section`)),
+        cards(each.figures), each.verdict && el("p", { className: "verdict" }, each.verdict), steps(each.steps),
+        figures(each.figures, `All figures of pour ${each.index}, with their sources`));
+    };
+    const print = el("button", { type: "button", className: "main", onclick: () => window.print() }, "Print the procedure");
+    return section("procedure", "Procedure",
+      el("div", { className: "tools" }, print, el("span", {}, `${data.label ? `mould set ${data.label}, ` : ""}${data.cells} ${data.cells === 1 ? "cavity" : "cavities"}`)),
+      titled("Before the first pour", steps(data.preparation)),
+      offGrid.length > 0 && el("details", {}, el("summary", {}, `${offGrid.length} edges fall between two of the printer's layers`),
+        table(["Piece", "Edge", "Height as printed (mm)", "Nearest layer (mm)"], offGrid.map((row) => [partName(row.piece), row.edge, row.height_mm, row.nearest_mm]), { label: "Edges off the layer grid" })),
+      (data.pours || []).map(pour),
+      titled("Out of the mould", steps(data.release)),
+      titled("Motor in", steps(data.assembly)),
+      titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text))), figures(data.walls, "What the cups' play does to the walls")),
+      titled("Needed", data.bill && table(["Item", "Quantity", "Made", "Note"], data.bill.map((row) => [partName(row.item), `${number(row.quantity)} ${row.unit}`, row.made, row.note]), { label: "Bill of materials" })));
+  }
+
+  // A closed fold prints closed: the procedure's are opened for the printer, then put back.
+  let opened = [];
+  window.addEventListener("beforeprint", () => {
+    opened = [...document.querySelectorAll("#procedure details:not([open])")];
+    for (const fold of opened) fold.open = true;
+  });
+  window.addEventListener("afterprint", () => {
+    for (const fold of opened) fold.open = false;
+  });
+
+  Object.assign(window.unitcad, { procedure });
 })();

@@ -81,7 +81,8 @@
     let ready = false;
     const made = U.createTable(table, { nameColumn, changed: (shown) => { rows = shown; if (ready) plot(); } });
     const varying = made.varying();
-    const numeric = varying.filter((name) => table.rows.some((row) => typeof row[at(name)] === "number"));
+    const filled = (name) => table.rows.filter((row) => typeof row[at(name)] === "number").length;
+    const numeric = varying.filter((name) => filled(name) > 0).sort((a, b) => filled(b) - filled(a));
     const choice = (key, label, names, value) => {
       selects[key] = el("select", { name: `plot-${key}`, onchange: plot }, names.map((name) => el("option", { value: name, selected: name === value }, name || "nothing")));
       return el("label", {}, `${label} `, selects[key]);
@@ -127,8 +128,7 @@
     const route = () => {
       leave();
       const wanted = variantAsked();
-      const [[, only]] = data.variants;
-      if (!data.table) showVariant(resolve(only), data);
+      if (!data.table) showVariant(resolve(data.variants[0][1]), data);
       else if (variants.has(wanted) && wanted) showVariant(resolve(variants.get(wanted)), data, el("a", { className: "back", href: "#" }, "‹ All variants"));
       else showBatch(data);
       window.scrollTo(0, 0);

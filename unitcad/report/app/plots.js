@@ -101,6 +101,7 @@
     const xs = scaleOf(points.map((p) => p.x));
     const ys = scaleOf(points.map((p) => p.y));
     const drawn = points.map((p) => ({ ...p, px: xs.of(p.x), py: ys.of(p.y) })).filter((p) => p.px !== null && p.py !== null);
+    if (!drawn.length) return el("p", { className: "tip" }, `0 of ${points.length} points.`);
     const groups = [...new Set(drawn.map((p) => String(p.group)))].sort();
     const tip = el("p", { className: "tip", "aria-live": "polite" });
     const { host } = hosted(360, (node, width, height) => {

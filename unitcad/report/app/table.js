@@ -4,10 +4,15 @@
   const { el, clear, number } = window.unitcad;
   const PAGE = 100;
 
+  // A test of whether a cell holds a text; null for no text.
+  function containing(text) {
+    const wanted = text.trim().toLowerCase();
+    return wanted ? (value) => value !== null && value !== undefined && String(value).toLowerCase().includes(wanted) : null;
+  }
+
   // A filter: text to find, or a comparison: > 1.2, <= 3, = 4, 1..2. Returns a test of a cell.
   function filterOf(text) {
     const wanted = text.trim();
-    if (!wanted) return null;
     const between = wanted.match(/^(-?[\d.eE+-]+)\s*\.\.\s*(-?[\d.eE+-]+)$/);
     if (between) {
       const [low, high] = between.slice(1).map(Number);
@@ -19,10 +24,9 @@
       const limit = Number(right);
       if (sign === "=") return (value) => (typeof value === "number" ? value === limit : String(value) === right);
       const tests = { "<": (v) => v < limit, "<=": (v) => v <= limit, ">": (v) => v > limit, ">=": (v) => v >= limit };
-      return (value) => typeof value === "number" && tests[sign](value);
+      if (Number.isFinite(limit)) return (value) => typeof value === "number" && tests[sign](value);
     }
-    const lower = wanted.toLowerCase();
-    return (value) => value !== null && value !== undefined && String(value).toLowerCase().includes(lower);
+    return containing(text);
   }
 
   // Numbers before texts, nothing last whichever way.
@@ -54,7 +58,7 @@
 
     function chosen() {
       const tests = [...state.filters].map(([at, text]) => [at, filterOf(text)]).filter(([, test]) => test);
-      const anywhere = filterOf(state.search);
+      const anywhere = containing(state.search);
       const rows = table.rows.filter((row) => tests.every(([at, test]) => test(row[at])) && (!anywhere || row.some((cell, i) => i > 0 && anywhere(cell))));
       if (state.sort === null) return rows;
       return rows.map((row, i) => [row, i]).sort(([a, i], [b, j]) => compare(a[state.sort], b[state.sort], state.direction) || i - j).map(([row]) => row);

@@ -1,0 +1,57 @@
+"""Results that several tests look at, and the browser that they look with."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import chromium
+import pytest
+
+from unitcad.cache import MemoryStore
+from unitcad.pipeline import build
+from unitcad.report import write_report
+from unitcad.spec import load
+
+HOSTILE = "<script>alert('x')</script> \"quoted\" & <b>bold</b>"
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One variant's folder, with everything that a build of STL makes."""
+    return build(load("encapsulating", ['output.formats=["stl"]']), tmp_path_factory.mktemp("one")).folder
+
+
+@pytest.fixture(scope="session")
+def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of nine variants: two designs, three walls and three materials, one with markup for a name."""
+    out, store = tmp_path_factory.mktemp("sweep"), MemoryStore()
+    for wall in (1.0, 1.25, 1.5):
+        for material in ("ecoflex-00-10", "dragon-skin-10-medium"):
+            changes = [f"layers.0.wall_mm={wall}", f'layers.0.material="{material}"', "output.formats=[]"]
+            build(
+                load("embedded", [*changes, f'name="e {wall} {material}"']), out, only=["unit", "moulds"], store=store
+            )
+        changes = [f"layers.0.wall_mm={wall}", "output.formats=[]", f'name="c {wall}"']
+        build(load("encapsulating", changes), out, only=["unit"], check=False, store=store)
+    spec = load("single-embedded", ["output.formats=[]"]).model_copy(update={"name": HOSTILE})
+    build(spec, out, store=store)
+    write_report(out)
+    return out
+
+
+@pytest.fixture(scope="session")
+def page(built: Path) -> Path:
+    """The page of one variant."""
+    return write_report(built)
+
+
+@pytest.fixture(scope="session")
+def running() -> Iterator[Any]:
+    """Chromium. Its absence is a failure in CI and a reason to skip elsewhere."""
+    if chromium.executable() is None and not os.environ.get("CI"):
+        pytest.skip("no chromium on this machine (Debian's package of that name)")
+    with chromium.browser() as browser:
+        yield browser

@@ -1,0 +1,187 @@
+"""A batch's page in Chromium: sorting, filtering, paging, the plot, opening a variant; markup stays text."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from chromium import Visit
+from conftest import HOSTILE
+from test_browser_variant import overflowing
+
+from unitcad.report import page as pages
+
+Image = pytest.importorskip("PIL.Image", reason="reading the screenshots needs Pillow")
+
+
+@pytest.fixture
+def visit(running: Any, sweep: Path) -> Iterator[Visit]:
+    seen = Visit(running, sweep / "report.html")
+    yield seen
+    assert seen.errors == []
+    assert seen.console == []
+    assert {url.partition("#")[0] for url in seen.requests} == {(sweep / "report.html").resolve().as_uri()}
+    seen.close()
+
+
+def column(visit: Visit, name: str) -> list[str]:
+    """The cells of a column as shown."""
+    heads = [
+        text.replace("▲", "").replace("▼", "").strip()
+        for text in visit.page.locator(".variants thead tr:first-child th").all_inner_texts()
+    ]
+    at = heads.index(name) + 1
+    return visit.page.locator(f".variants tbody tr > :nth-child({at})").all_inner_texts()
+
+
+def head(visit: Visit, name: str) -> Any:
+    return visit.page.locator(".variants thead th button", has_text=name).first
+
+
+def test_markup_stays_text(visit: Visit) -> None:
+    asked: list[str] = []
+    visit.page.on("dialog", lambda dialog: asked.append(dialog.message))
+    assert HOSTILE in column(visit, "name")
+    visit.page.fill('input[name="search"]', "<script>alert('x')")
+    assert column(visit, "name") == [HOSTILE]
+    visit.page.click(".variants tbody a")
+    visit.drawn()
+    assert visit.page.inner_text("h1") == HOSTILE
+    assert visit.page.title() == HOSTILE
+    assert visit.page.locator("main script, main b").count() == 0
+    assert asked == []
+
+
+def test_sorting(visit: Visit) -> None:
+    head(visit, "layers.0.wall_mm").click()
+    values = [float(text) for text in column(visit, "layers.0.wall_mm")]
+    assert values == sorted(values)
+    assert len(values) == 10
+    head(visit, "layers.0.wall_mm").click()
+    values = [float(text) for text in column(visit, "layers.0.wall_mm")]
+    assert values == sorted(values, reverse=True)
+    assert visit.page.get_attribute('th:has-text("layers.0.wall_mm")', "aria-sort") == "descending"
+    # The sort is stable: equal walls keep the order of the folders.
+    names = column(visit, "name")
+    first = [name for name, value in zip(names, values, strict=True) if value == 1.5]
+    assert first == sorted(first)
+
+
+def test_a_column_with_gaps_sorts_them_last(visit: Visit) -> None:
+    for _ in range(2):
+        head(visit, "layers.1.wall_mm").click()
+        assert column(visit, "layers.1.wall_mm")[-1] == "–"
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "count"),
+    [
+        ("name", "e 1.5", 2),
+        ("layers.0.wall_mm", "> 1.25", 4),
+        ("layers.0.wall_mm", ">=1.25", 7),
+        ("layers.0.wall_mm", "1.1..1.3", 3),
+        ("layers.0.wall_mm", "= 1", 3),
+        ("layers.0.wall_mm", "<1", 0),
+        ("layers.0.material", "DRAGON", 4),
+        ("design", "= embedded", 7),
+    ],
+)
+def test_filtering(visit: Visit, field: str, text: str, count: int) -> None:
+    visit.page.fill(f'input[name="filter-{field}"]', text)
+    assert len(column(visit, "name")) == count
+    assert visit.page.inner_text(".count") == f"{count} of 10 variants"
+
+
+def test_filters_join(visit: Visit) -> None:
+    visit.page.fill('input[name="filter-layers.0.wall_mm"]', "<= 1.25")
+    visit.page.fill('input[name="filter-layers.0.material"]', "ecoflex")
+    visit.page.fill('input[name="search"]', "embedded")
+    assert column(visit, "name") == ["e 1.0 ecoflex-00-10", "e 1.25 ecoflex-00-10"]
+
+
+def test_columns_that_do_not_vary_are_one_click_away(visit: Visit) -> None:
+    assert "diameter_mm" not in visit.page.inner_text(".variants thead")
+    visit.page.check('input[name="all-columns"]')
+    assert set(column(visit, "diameter_mm")) == {"14"}
+
+
+def test_the_plot_shows_what_the_table_shows_and_opens_a_variant(visit: Visit) -> None:
+    assert "10 of 10 points" in visit.page.inner_text("#plot .tip")
+    visit.page.fill('input[name="filter-name"]', "e 1.5 ecoflex")
+    visit.page.select_option('select[name="plot-x"]', "layers.0.wall_mm")
+    visit.page.select_option('select[name="plot-y"]', "layer1_mm3")
+    assert "1 of 1 points" in visit.page.inner_text("#plot .tip")
+    over = visit.page.locator("#plot .u-over")
+    over.scroll_into_view_if_needed()
+    image = np.asarray(Image.open(io.BytesIO(over.screenshot())).convert("RGB")).astype(int)
+    accent = visit.page.evaluate("() => window.unitcad.theme.colour('series-1')")
+    rgb = np.array([int(accent[i : i + 2], 16) for i in (1, 3, 5)])
+    spots = np.argwhere(np.abs(image - rgb).max(axis=2) < 70)
+    y, x = spots.mean(axis=0)
+    over.hover(position={"x": float(x), "y": float(y)})
+    assert "e 1.5 ecoflex-00-10" in visit.page.inner_text("#plot .tip")
+    over.click(position={"x": float(x), "y": float(y)})
+    visit.drawn()
+    assert visit.page.inner_text("h1") == "e 1.5 ecoflex-00-10"
+
+
+def test_texts_can_be_plotted_too(visit: Visit) -> None:
+    visit.page.select_option('select[name="plot-x"]', "layers.0.material")
+    visit.page.select_option('select[name="plot-y"]', "design")
+    assert "10 of 10 points" in visit.page.inner_text("#plot .tip")
+
+
+def test_to_a_variant_and_back_by_keys(visit: Visit) -> None:
+    visit.page.fill('input[name="filter-name"]', "c 1.25")
+    visit.page.locator(".variants tbody a").focus()
+    visit.page.keyboard.press("Enter")
+    visit.drawn()
+    assert visit.page.inner_text("h1") == "c 1.25"
+    visit.page.locator("a.back").focus()
+    visit.page.keyboard.press("Enter")
+    visit.page.wait_for_selector(".variants")
+    assert visit.page.inner_text(".count") == "10 of 10 variants"
+    head(visit, "name").focus()
+    visit.page.keyboard.press("Enter")
+    assert visit.page.get_attribute('th:has(button:text-is("name"))', "aria-sort") == "ascending"
+    visit.page.go_back()
+    visit.drawn()
+    assert visit.page.inner_text("h1") == "c 1.25"
+
+
+def test_a_senseless_address_shows_the_table(running: Any, sweep: Path) -> None:
+    for part in ("%E0%A4%A", "nothing", "<script>"):
+        seen = Visit(running, sweep / "report.html", fragment=part)
+        assert seen.page.locator(".variants").is_visible()
+        assert seen.errors == []
+        seen.close()
+
+
+def test_nothing_overflows_at_390_pixels(running: Any, sweep: Path) -> None:
+    seen = Visit(running, sweep / "report.html", width=390, height=844)
+    assert overflowing(seen) == []
+    seen.close()
+
+
+def test_two_thousand_rows_come_in_pages(running: Any, tmp_path: Path) -> None:
+    rows = [["", f"v{i}", i * 7 % 2000, f"group {i % 3}", None] for i in range(2000)]
+    table = {"columns": ["name", "value", "group", "empty"], "rows": rows}
+    data = {"title": "many", "version": "0", "variants": [], "pool": [], "models": {}, "table": table, "batch": None}
+    (tmp_path / "many.html").write_text(pages.page(data, "many"), "utf-8")
+    seen = Visit(running, tmp_path / "many.html")
+    assert len(column(seen, "name")) == 100
+    head(seen, "value").click()
+    assert column(seen, "value") == [str(i) for i in range(100)]
+    seen.page.click("text=Next ›")
+    assert column(seen, "value") == [str(i) for i in range(100, 200)]
+    assert "page 2 of 20" in seen.page.inner_text(".variants")
+    seen.page.fill('input[name="filter-group"]', "group 1")
+    assert "667 of 2000" in seen.page.inner_text(".count")
+    assert "page 1 of 7" in seen.page.inner_text(".variants")
+    assert "2000 failed" in seen.page.inner_text("header")
+    assert seen.errors == []
+    seen.close()

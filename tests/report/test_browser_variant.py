@@ -1,0 +1,283 @@
+"""A variant's page in Chromium: it loads alone, draws, obeys its controls, by mouse and by keys, wide and narrow."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlparse
+
+import numpy as np
+import pytest
+from chromium import Visit, launched
+
+from unitcad.pipeline import build
+from unitcad.pipeline.scenes import moments
+from unitcad.pipeline.variant import Variant
+from unitcad.report import write_report
+from unitcad.spec import load
+
+Image = pytest.importorskip("PIL.Image", reason="reading the screenshots needs Pillow")
+
+
+@pytest.fixture
+def visit(running: Any, page: Path) -> Iterator[Visit]:
+    seen = Visit(running, page)
+    seen.drawn()
+    yield seen
+    assert seen.errors == []
+    assert seen.console == []
+    assert seen.requests == [page.resolve().as_uri()]
+    seen.close()
+
+
+def canvas(visit: Visit) -> np.ndarray:
+    """The 3D view's pixels, (height, width, 3), without its round corners."""
+    visit.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    picture = Image.open(io.BytesIO(visit.page.locator(".view canvas").screenshot())).convert("RGB")
+    return np.asarray(picture).astype(int)[12:-12, 12:-12]
+
+
+def drawn_share(image: np.ndarray) -> float:
+    """How much of the view is not its background."""
+    return float((np.abs(image - image[2, image.shape[1] // 2]).max(axis=2) > 12).mean())
+
+
+def changed(before: np.ndarray, after: np.ndarray) -> float:
+    """How much of the view changed."""
+    return float((np.abs(before - after).max(axis=2) > 12).mean())
+
+
+def shown(visit: Visit) -> list[str]:
+    return visit.page.get_attribute(".stage-host", "data-shown").split()
+
+
+def test_loads_from_a_file_and_asks_for_nothing(visit: Visit) -> None:
+    assert visit.page.inner_text("h1") == "encapsulating"
+    heads = visit.page.locator("section > h2").all_inner_texts()
+    assert heads == ["3D", "Section", "Attenuation estimate", "Laws and checks", "Procedure", "Parts", "Files", "Spec"]
+    assert visit.page.locator("img.drawing").first.evaluate("(image) => image.naturalWidth") > 200
+
+
+def test_the_view_draws_and_hiding_a_part_shows(visit: Visit) -> None:
+    before = canvas(visit)
+    assert drawn_share(before) > 0.1
+    visit.page.uncheck('input[name="part-layer2"]')
+    assert changed(before, canvas(visit)) > 0.02
+    assert shown(visit) == ["layer1", "motor", "fpcb"]
+    for name in ("layer1", "motor", "fpcb"):
+        visit.page.uncheck(f'input[name="part-{name}"]')
+    assert drawn_share(canvas(visit)) == 0
+    visit.page.check('input[name="part-motor"]')
+    assert 0.005 < drawn_share(canvas(visit)) < 0.2
+
+
+def test_a_cut_shows_solid_faces_in_the_parts_colour(visit: Visit) -> None:
+    visit.page.click("text=front")
+    cut = canvas(visit)
+    colours = [tuple(round(255 * c) for c in body.colour) for body in Variant.of("encapsulating").unit]
+    for colour in colours[:3]:  # the circuit is thinner than a few pixels
+        assert (np.abs(cut - colour).max(axis=2) <= 3).mean() > 0.01, colour
+    visit.page.uncheck('input[name="cut"]')
+    whole = canvas(visit)
+    assert changed(cut, whole) > 0.05
+    motor = colours[2]
+    assert (np.abs(whole - motor).max(axis=2) <= 3).mean() < 0.001
+    visit.page.check('input[name="cut"]')
+    visit.page.select_option('select[name="axis"]', "z")
+    assert changed(whole, canvas(visit)) > 0.02
+
+
+def test_taken_apart(visit: Visit) -> None:
+    before = canvas(visit)
+    visit.page.fill('input[name="apart"]', "100")
+    visit.page.dispatch_event('input[name="apart"]', "change")
+    assert changed(before, canvas(visit)) > 0.05
+
+
+def test_the_slider_goes_through_the_casting(visit: Visit) -> None:
+    visit.page.check('input[type="radio"][value="moulds"]')
+    tools = [tool.name for tool in Variant.of("encapsulating").plan.tools]
+    assert sorted(shown(visit)) == sorted([*tools, "layer1", "layer2"])
+    pictures = [canvas(visit)]
+    expected = moments(Variant.of("encapsulating"))
+    for i, moment in enumerate(expected, start=1):
+        visit.page.fill('input[name="step"]', str(i))
+        assert shown(visit) == list(moment.parts)
+        assert moment.title in visit.page.inner_text(".step output")
+        listed = visit.page.locator(".parts input").evaluate_all("(boxes) => boxes.map((box) => box.name)")
+        assert listed == [f"part-{name}" for name in moment.parts]
+        pictures.append(canvas(visit))
+        assert changed(*pictures[-2:]) > 0.002, moment.title
+    visit.page.click('button[aria-label="Step back"]')
+    assert shown(visit) == list(expected[-2].parts)
+    visit.page.uncheck('input[name="part-layer2"]')
+    visit.page.click('button[aria-label="Step back"]')
+    assert shown(visit) == [name for name in expected[-3].parts if name != "layer2"]
+
+
+def test_every_control_is_reached_and_worked_by_keys(visit: Visit) -> None:
+    visit.page.check('input[type="radio"][value="moulds"]')
+    visit.page.evaluate("() => { document.activeElement.blur(); window.scrollTo(0, 0); }")
+    wanted = visit.page.evaluate(
+        """() => {
+          const radios = new Set();
+          const all = document.querySelectorAll('a[href], button, input, select, summary, [tabindex="0"]');
+          return [...all].filter((e) => {
+            if (!e.checkVisibility() || e.disabled) return false;
+            if (e.type !== "radio") return true;
+            const first = !radios.has(e.name); radios.add(e.name); return first;  // arrows move within a group
+          }).length;
+        }"""
+    )
+    visit.page.evaluate("() => { window.reached = new Set(); }")
+    for _ in range(wanted + 5):
+        visit.page.keyboard.press("Tab")
+        visit.page.evaluate("() => window.reached.add(document.activeElement)")
+    reached = visit.page.evaluate("() => [...window.reached].filter((e) => e !== document.body).length")
+    assert reached >= wanted
+
+    view = visit.page.locator(".view canvas")
+    view.focus()
+    before = canvas(visit)
+    visit.page.keyboard.press("ArrowLeft")
+    turned = canvas(visit)
+    assert changed(before, turned) > 0.01
+    visit.page.keyboard.press("+")
+    assert changed(turned, canvas(visit)) > 0.01
+    visit.page.locator('input[name="step"]').focus()
+    visit.page.keyboard.press("ArrowRight")
+    assert shown(visit) == ["base", "stub"]
+    visit.page.locator('input[name="part-stub"]').focus()
+    visit.page.keyboard.press("Space")
+    assert shown(visit) == ["base"]
+    visit.page.locator('input[value="moulds"]').focus()
+    visit.page.keyboard.press("ArrowLeft")
+    assert "motor" in shown(visit)
+    visit.page.locator("summary", has_text="laws").focus()
+    visit.page.keyboard.press("Enter")
+    assert visit.page.locator("details[open] td", has_text="C100").count() > 0
+
+
+def test_focus_can_be_seen(visit: Visit) -> None:
+    for selector in (".view canvas", 'input[name="apart"]', "nav a", "summary"):
+        visit.page.locator(selector).first.focus()
+        visit.page.keyboard.press("Shift+Tab")
+        visit.page.keyboard.press("Tab")
+        width = visit.page.evaluate("() => getComputedStyle(document.activeElement).outlineWidth")
+        assert float(width.removesuffix("px")) >= 2, selector
+
+
+def test_links_lead_to_files_that_are_there(visit: Visit, built: Path) -> None:
+    links = visit.page.locator("#files a").evaluate_all("(links) => links.map((link) => link.href)")
+    assert len(links) > 10
+    for link in links:
+        assert Path(unquote(urlparse(link).path)).is_file(), link
+
+
+def test_the_estimate_shows_models_and_the_measured_value(visit: Visit) -> None:
+    text = visit.page.inner_text("#estimate")
+    for words in ("Paper, as printed", "Fitted divider", "Measured: 0.0517", "Also printed: 0.0458", "12 of 12"):
+        assert words in text
+    plot = visit.page.locator("#estimate .plot canvas")
+    image = np.asarray(Image.open(io.BytesIO(plot.screenshot())).convert("RGB")).astype(int)
+    accent = visit.page.evaluate("() => window.unitcad.theme.colour('series-1')")
+    rgb = [int(accent[i : i + 2], 16) for i in (1, 3, 5)]
+    assert (np.abs(image - rgb).max(axis=2) < 30).sum() > 150
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_nothing_overflows_at_390_pixels(running: Any, page: Path, dark: bool) -> None:
+    seen = Visit(running, page, width=390, height=844, dark=dark)
+    seen.drawn()
+    assert drawn_share(canvas(seen)) > 0.05
+    for summary in seen.page.locator("summary").all():
+        summary.click()
+    assert overflowing(seen) == []
+    seen.close()
+
+
+def overflowing(visit: Visit) -> list[str]:
+    """What reaches past the window's right edge and is in no part that scrolls by itself."""
+    return visit.page.evaluate(
+        """() => {
+          const found = document.documentElement.scrollWidth > innerWidth ? ["the page"] : [];
+          for (const node of document.body.querySelectorAll("*")) {
+            if (node.closest(".scroll, nav, .plot, script, style") || !node.checkVisibility()) continue;
+            if (node.getBoundingClientRect().right > innerWidth + 0.5) found.push(node.outerHTML.slice(0, 90));
+          }
+          return found;
+        }"""
+    )
+
+
+def test_light_and_dark(running: Any, page: Path) -> None:
+    def background(visit: Visit) -> list[int]:
+        text = visit.page.evaluate("() => getComputedStyle(document.body).backgroundColor")
+        return [int(part) for part in text.removeprefix("rgb(").removesuffix(")").split(",")]
+
+    for dark in (False, True):
+        seen = Visit(running, page, dark=dark)
+        assert (max(background(seen)) < 60) == dark
+        seen.page.click('button[aria-label="Switch between light and dark"]')
+        assert (max(background(seen)) < 60) != dark
+        seen.close()
+
+
+def test_the_procedure_is_all_there(visit: Visit, built: Path) -> None:
+    casting = json.loads((built / "casting.json").read_text("utf-8"))
+    items = visit.page.locator("#procedure ol > li").all_inner_texts()
+    pours = [step for pour in casting["pours"] for step in pour["steps"]]
+    assert items == [*casting["preparation"], *pours, *casting["release"], *casting["assembly"]]
+    starts = visit.page.locator("#procedure ol").evaluate_all("(lists) => lists.map((list) => list.start)")
+    lengths = visit.page.locator("#procedure ol").evaluate_all("(lists) => lists.map((list) => list.children.length)")
+    assert starts == [1 + sum(lengths[:i]) for i in range(len(lengths))]
+    for image in visit.page.locator("#procedure img").all():
+        assert image.evaluate("(node) => node.naturalWidth") > 200
+    assert visit.page.locator("#procedure img").count() == len(casting["pours"])
+
+
+def test_print_shows_the_procedure_and_not_the_controls(visit: Visit) -> None:
+    visit.page.emulate_media(media="print")
+    assert visit.page.locator("#procedure").is_visible()
+    assert visit.page.locator("#section img").is_visible()
+    visit.page.evaluate("() => window.dispatchEvent(new Event('beforeprint'))")
+    assert visit.page.locator("#procedure details:not([open])").count() == 0
+    assert visit.page.locator("#procedure td", has_text="pot life").first.is_visible()
+    for selector in ("nav", "#view", "#files", "#estimate", "button"):
+        assert not visit.page.locator(selector).first.is_visible(), selector
+
+
+def test_without_webgl_the_drawing_stands_in(running: Any, page: Path) -> None:
+    with launched(running.browser_type, "--disable-3d-apis") as blind:
+        seen = Visit(blind, page)
+        seen.page.wait_for_selector(".stage-host .absent")
+        assert "no 3D" in seen.page.inner_text(".stage-host")
+        assert seen.page.locator(".stage-host img").is_visible()
+        assert seen.errors == []
+        seen.close()
+
+
+def test_what_is_absent_says_what_to_ask_for(running: Any, tmp_path: Path) -> None:
+    folder = build(load("embedded", ["output.formats=[]"]), tmp_path, only=["moulds"], check=False).folder
+    seen = Visit(running, write_report(folder))
+    seen.drawn()
+    for where, ask in (
+        ("estimate", "estimate"),
+        ("procedure", "casting"),
+        ("section", "unit"),
+        ("laws", "unit,moulds"),
+    ):
+        assert f"--only {ask}" in seen.page.inner_text(f"#{where}")
+    assert seen.errors == seen.console == []
+    seen.close()
+
+
+def test_a_page_moved_elsewhere_still_works(running: Any, page: Path, tmp_path: Path) -> None:
+    seen = Visit(running, Path(shutil.copy(page, tmp_path / "mailed page.html")))
+    seen.drawn()
+    assert drawn_share(canvas(seen)) > 0.1
+    seen.close()
