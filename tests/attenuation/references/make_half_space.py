@@ -13,7 +13,7 @@ from pathlib import Path
 import mpmath as mp
 
 RHO, E, A, OMEGA = 1000, 3e4, 3.5e-3, 785.0
-RULE = {"method": "gauss-legendre", "maxdegree": 4}
+RULE = {"method": "gauss-legendre", "maxdegree": 6}
 RATIOS = (2, 10, 50, 150)
 
 
@@ -36,7 +36,7 @@ def displacement(nu: float, r: float) -> mp.mpc:
     corners = [mp.mpf(0), height * (1 + 1j), stop * mp.mpf("0.8") + 1j * height, stop]
     near = mp.mpf(0)
     for a, b in pairwise(corners):
-        count = 2 + int(abs(b - a) * r / 6)
+        count = 2 + int(abs(b - a) * r / 3)
         points = [a + (b - a) * i / count for i in range(count + 1)]
         near += mp.quad(lambda k: kernel(k) * mp.besselj(0, k * r), points, **RULE)
     scale = 1 / (mp.mpf(r) - A)
