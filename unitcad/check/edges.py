@@ -11,6 +11,8 @@ import numpy as np
 
 from unitcad.check.mesh import Bools, Ints, sorted_with_order
 
+_SMALL = 60_000  # nodes
+
 
 @dataclass(frozen=True)
 class Edges:
@@ -120,12 +122,27 @@ def shells_of(faces: Ints, edges: Edges) -> Ints:
 
 def components(n: int, left: Ints, right: Ints) -> Ints:
     """The component of each of `n` nodes joined by pairs, numbered in the order of their first node."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    if n > _SMALL:
+        # scipy's search is faster on large graphs, but loading it takes longer than judging a small mesh.
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
 
-    graph = coo_array((np.ones(len(left), np.int8), (left, right)), shape=(n, n))
-    _, label = connected_components(graph, directed=False)
-    return label
+        graph = coo_array((np.ones(len(left), np.int8), (left, right)), shape=(n, n))
+        return connected_components(graph, directed=False)[1]
+    root = np.arange(n)
+    while True:
+        a, b = root[left], root[right]
+        apart = a != b
+        if not apart.any():
+            break
+        left, right, a, b = left[apart], right[apart], a[apart], b[apart]
+        np.minimum.at(root, np.maximum(a, b), np.minimum(a, b))
+        while True:
+            above = root[root]
+            if np.array_equal(above, root):
+                break
+            root = above
+    return np.unique(root, return_inverse=True)[1].reshape(-1)
 
 
 def consistent(faces: Ints, edges: Edges) -> Bools:

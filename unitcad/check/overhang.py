@@ -29,7 +29,7 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline, bed: float) 
     double = np.sqrt(np.einsum("ij,ij->i", areas, areas))
     steep = -np.sin(np.radians(min(float(printer.overhang_deg) + _SLACK, 89.0)))
     leaning = areas[:, 2] < steep * double
-    leaning &= mesh.vertices[mesh.faces, 2].min(axis=1) > bed + float(printer.layer_mm) / 2
+    leaning &= mesh.vertices[mesh.faces, 2].max(axis=1) > bed + float(printer.layer_mm) / 2
     if not leaning.any():
         return []
     edges = topology.edges
@@ -41,7 +41,7 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline, bed: float) 
     rim = leaning[left] != leaning[right]
     beyond = np.where(leaning[left[rim]], other[rim], one[rim])
     owner = region[np.where(leaning[left[rim]], left[rim], right[rim])]
-    segments, supported = _border(topology, beyond)
+    segments, supported = _border(topology, beyond, bed + float(printer.layer_mm) / 2)
     bad: list[tuple[float, Location]] = []
     for label in np.unique(region[leaning]):
         faces = np.flatnonzero(leaning & (region == label))
@@ -62,13 +62,14 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline, bed: float) 
     return [finding("D003", text, len(bad), [place for _, place in bad])]
 
 
-def _border(topology: Topology, beyond: Ints) -> tuple[Floats, Floats]:
-    """Border edges in plan (n, 2, 2), and whether the face beyond each goes down from it."""
+def _border(topology: Topology, beyond: Ints, bed: float) -> tuple[Floats, Floats]:
+    """Border edges in plan (n, 2, 2), and whether each is held: it lies on the bed, or the face beyond goes down."""
     faces, vertices = topology.mesh.faces, topology.mesh.vertices
     face, side = beyond // 3, beyond % 3
     a, b = vertices[faces[face, side]], vertices[faces[face, (side + 1) % 3]]
     apex = vertices[faces[face, (side + 2) % 3]]
-    supported = apex[:, 2] < np.minimum(a[:, 2], b[:, 2]) + 1e-6
+    supported = apex[:, 2] < np.minimum(a[:, 2], b[:, 2]) - 1e-6
+    supported |= np.maximum(a[:, 2], b[:, 2]) <= bed
     return np.stack([a[:, :2], b[:, :2]], axis=1), supported
 
 

@@ -1,0 +1,152 @@
+"""`unitcad check` as a person or a CI job runs it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shapes import box, package, stl
+
+from unitcad.cli import main
+
+GOOD, HOLE, WARN = stl(box()), stl(box()[2:]), stl(box(), header=b"solid")
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run of the command left behind."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def run(*arguments: str | Path, cwd: Path | None = None) -> Result:
+    """`unitcad check` in this process."""
+    out, err = io.StringIO(), io.StringIO()
+    here, argv = Path.cwd(), sys.argv
+    sys.argv = ["unitcad", "check", *map(str, arguments)]
+    try:
+        os.chdir(cwd or here)
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as stop:
+            main()
+    finally:
+        os.chdir(here)
+        sys.argv = argv
+    code = stop.value.code
+    return Result(code if isinstance(code, int) else 0, out.getvalue(), err.getvalue())
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "good.stl").write_bytes(GOOD)
+    (tmp_path / "sub" / "hole.stl").write_bytes(HOLE)
+    (tmp_path / "sub" / "warn.STL").write_bytes(WARN)
+    (tmp_path / "sub" / "notes.txt").write_text("not a mesh")
+    return tmp_path
+
+
+def test_exit_codes(folder: Path) -> None:
+    assert run("good.stl", cwd=folder).returncode == 0
+    assert run("sub/hole.stl", cwd=folder).returncode == 1
+    assert run("sub/warn.STL", cwd=folder).returncode == 0
+    assert run("sub/warn.STL", "--fail-on", "warning", cwd=folder).returncode == 1
+    assert run("none.stl", cwd=folder).returncode == 1
+    assert run(cwd=folder).returncode == 2
+    for wrong in (["--fail-on", "x"], ["--select", "Q"], ["--printer", "x"], ["--unit", "x"], ["--output-format", "x"]):
+        result = run("good.stl", *wrong, cwd=folder)
+        assert result.returncode == 2
+        assert result.stderr.startswith("error: ")
+        assert "Traceback" not in result.stderr
+
+
+def test_folders_and_globs(folder: Path) -> None:
+    data = json.loads(run(".", "--json", cwd=folder).stdout)
+    assert [entry["path"] for entry in data["files"]] == ["good.stl", "sub/hole.stl", "sub/warn.STL"]
+    data = json.loads(run("**/*.stl", "--json", cwd=folder).stdout)
+    assert [entry["path"] for entry in data["files"]] == ["good.stl", "sub/hole.stl"]
+    (folder / "bare").mkdir()
+    for name in ("bare", "no*.stl"):
+        result = run(name, "--json", cwd=folder)
+        assert result.returncode == 1
+        assert json.loads(result.stdout)["files"][0]["findings"][0]["code"] == "F012"
+
+
+def test_jobs_give_the_same_answer(folder: Path) -> None:
+    one, two = run(".", "--json", cwd=folder), run(".", "--json", "--jobs", "2", cwd=folder)
+    assert one.stdout == two.stdout
+    assert one.returncode == two.returncode == 1
+
+
+def test_statistics_explain_and_select(folder: Path) -> None:
+    out = run(".", "--statistics", cwd=folder).stdout
+    assert "1 files         4 x  T001 boundary edge" in out
+    explained = run("--explain", "t001")
+    assert explained.returncode == 0
+    assert explained.stdout.startswith("T001 boundary edge (error)")
+    assert run("--explain", "T999").returncode == 2
+    assert run("sub/hole.stl", "--ignore", "T", cwd=folder).returncode == 0
+    assert run("sub/hole.stl", "--select", "F", cwd=folder).returncode == 0
+    assert run("sub/hole.stl", "--select", "F", "--extend-select", "T001", cwd=folder).returncode == 1
+
+
+def test_limits_unit_and_printer(folder: Path) -> None:
+    assert "F011" in run("good.stl", "--max-faces", "5", cwd=folder).stdout
+    assert "S001" in run("good.stl", "--unit", "meter", cwd=folder).stdout
+    (folder / "film.stl").write_bytes(stl(box((20, 20, 0.2))))
+    assert "D001" in run("film.stl", "--printer", "fdm-0.4", cwd=folder).stdout
+    assert "D001" not in run("film.stl", cwd=folder).stdout
+    assert "G005" in run("good.stl", "--shells", "2", cwd=folder).stdout
+
+
+def test_unit_scales_the_facts(folder: Path) -> None:
+    data = json.loads(run("good.stl", "--unit", "inch", "--json", cwd=folder).stdout)
+    assert data["files"][0]["facts"]["volume_mm3"] == pytest.approx(254.0**3, rel=1e-12)
+
+
+def test_manifest_of_a_folder(folder: Path) -> None:
+    part = {"name": "a", "role": "tool", "volume_mm3": 1000.0, "files": {"stl": {"path": "good.stl"}}}
+    gone = {"name": "b", "role": "unit", "volume_mm3": 1.0, "files": {"stl": {"path": "gone.stl"}}}
+    (folder / "manifest.json").write_text(json.dumps({"parts": [part, gone]}))
+    result = run("--manifest", ".", "--json", cwd=folder)
+    assert result.returncode == 1
+    files = {
+        entry["path"]: [found["code"] for found in entry["findings"]] for entry in json.loads(result.stdout)["files"]
+    }
+    assert files == {"good.stl": [], "gone.stl": ["F012", "M004"]}
+    assert run("--manifest", "nowhere", cwd=folder).returncode == 2
+
+
+def test_a_bomb_by_the_command_line(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.3mf", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("3D/3dmodel.model", bytes(30_000_000))
+    result = run("a.3mf", cwd=tmp_path)
+    assert result.returncode == 1
+    assert "P008" in result.stdout
+
+
+def test_a_package_of_two_objects(tmp_path: Path) -> None:
+    (tmp_path / "a.3mf").write_bytes(package())
+    data = json.loads(run("a.3mf", "--json", cwd=tmp_path).stdout)
+    assert data["files"][0]["facts"]["volume_mm3"] == pytest.approx(1000)
+
+
+def test_an_stl_is_judged_without_cad_trimesh_or_scipy(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(stl(np.concatenate([box(), box(at=(20, 0, 0)), box(at=(0, 20, 0))])))
+    code = (
+        "import sys\nfrom unitcad.cli import main\nsys.argv = ['unitcad', 'check', 'a.stl']\n"
+        "try:\n    main()\nexcept SystemExit as stop:\n    assert stop.code == 0\n"
+        "heavy = {'OCP', 'build123d', 'cadquery', 'trimesh', 'scipy'} & {m.split('.')[0] for m in sys.modules}\n"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path, timeout=60)

@@ -1,0 +1,91 @@
+"""Files against a manifest: volume, solids, hash, missing files; tools get the printer's rules, other parts do not."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from shapes import box, stl
+
+from unitcad.check import FileReport, Options
+from unitcad.check import manifest as listing
+from unitcad.check.run import check_files
+from unitcad.errors import UnitcadError
+
+BASE = stl(box((20, 20, 5)))
+FILM = stl(box((20, 3, 0.11)))
+
+
+def written(folder: Path, **change: Any) -> Path:
+    (folder / "unit").mkdir()
+    (folder / "base.stl").write_bytes(BASE)
+    (folder / "unit" / "film.stl").write_bytes(FILM)
+    parts = [
+        _part("base", "tool", "base.stl", BASE, 2000.0) | change,
+        _part("film", "unit", "unit/film.stl", FILM, 6.6),
+    ]
+    (folder / "manifest.json").write_text(json.dumps({"parts": parts}))
+    return folder
+
+
+def _part(name: str, role: str, path: str, content: bytes, volume: float) -> dict[str, Any]:
+    digest = hashlib.sha256(content).hexdigest()
+    return {"name": name, "role": role, "volume_mm3": volume, "files": {"stl": {"path": path, "sha256": digest}}}
+
+
+def judged(folder: Path) -> dict[str, FileReport]:
+    listed = listing.read(str(folder))
+    reports = list(check_files(listing.work(listed, [], Options(), False)))
+    compared = [listing.compare(listed, report, Options()) for report in reports]
+    return {Path(report.path).name: report for report in compared}
+
+
+def codes(report: FileReport) -> list[str]:
+    return [found.code for found in report.findings]
+
+
+def test_a_good_build_passes_and_only_tools_are_held_to_the_printer(tmp_path: Path) -> None:
+    reports = judged(written(tmp_path))
+    assert {name: codes(report) for name, report in reports.items()} == {"base.stl": [], "film.stl": []}
+
+
+def test_m001_volume(tmp_path: Path) -> None:
+    assert codes(judged(written(tmp_path, volume_mm3=2003.0))["base.stl"]) == ["M001"]
+
+
+def test_m002_solids(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    two = stl(np.concatenate([box((20, 20, 5)), box((1, 1, 1), (40, 0, 0))]))
+    (folder / "base.stl").write_bytes(two)
+    assert "M002" in codes(judged(folder)["base.stl"])
+
+
+def test_m003_hash(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    (folder / "base.stl").write_bytes(stl(box((20, 20, 5)), header=b"other"))
+    assert codes(judged(folder)["base.stl"]) == ["M003"]
+
+
+def test_m004_missing(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    (folder / "base.stl").unlink()
+    assert codes(judged(folder)["base.stl"]) == ["F012", "M004"]
+
+
+def test_a_tool_below_the_floor_is_warned_of(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    parts = json.loads((folder / "manifest.json").read_text())
+    parts["parts"][1]["role"] = "tool"
+    (folder / "manifest.json").write_text(json.dumps(parts))
+    assert "D001" in codes(judged(folder)["film.stl"])
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"parts": 3}', '{"parts": [{}]}', "\x00"])
+def test_what_is_no_manifest_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "manifest.json").write_text(text)
+    with pytest.raises(UnitcadError):
+        listing.read(str(tmp_path))

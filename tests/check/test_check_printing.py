@@ -1,0 +1,143 @@
+"""Walls, features, overhangs, bridges, hollows, bed: what must be found, and what must not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+from shapes import box, prism, stl
+
+FDM = {"printer": "fdm-0.4"}
+
+
+def triangles(solid: Manifold) -> np.ndarray:
+    """The triangles of a manifold3d solid as a float32 file holds them."""
+    mesh = solid.to_mesh()
+    return np.asarray(mesh.vert_properties)[:, :3][np.asarray(mesh.tri_verts)]
+
+
+def block(x: float, y: float, z: float, at=(0, 0, 0)) -> Manifold:
+    return Manifold.cube([x, y, z]).translate(list(at))
+
+
+def tube(outer: float, inner: float, height: float, n: int = 96) -> Manifold:
+    return Manifold.cylinder(height, outer, outer, n) - Manifold.cylinder(height, inner, inner, n)
+
+
+def codes(judge, solid: Manifold) -> set[str]:
+    return {found.code for found in judge(stl(triangles(solid)), **FDM).findings}
+
+
+def thinnest(report) -> float:
+    message = next(found.message for found in report.findings if found.code == "D001")
+    return float(message.split()[-2])
+
+
+@pytest.mark.parametrize(("wall", "found"), [(0.8, False), (0.79, True), (0.5, True), (2.0, False)])
+@pytest.mark.parametrize("shape", ["straight", "round", "leaning"])
+def test_upright_wall_at_the_floor(wall: float, found: bool, shape: str, judge) -> None:
+    if shape == "straight":
+        solid = block(20, wall, 10) + block(20, 20, 2)
+    elif shape == "round":
+        n = 96  # the polygon's flats are nearer than its corners: draw it so that they are `wall` apart
+        solid = tube(8 / np.cos(np.pi / n), (8 - wall) / np.cos(np.pi / n), 6, n)
+    else:
+        solid = block(20, wall, 10).rotate([0, 0, 30]) + block(30, 30, 2, (-8, -1, 0))
+    report = judge(stl(triangles(solid)), **FDM)
+    assert report.has("D001") == found
+    if found:
+        assert thinnest(report) == pytest.approx(wall, rel=0.02)
+
+
+@pytest.mark.parametrize(("height", "found"), [(0.4, False), (0.5, False), (0.35, True), (0.2, True)])
+def test_flat_piece_needs_two_layers(height: float, found: bool, judge) -> None:
+    assert judge(stl(box((20, 3.4, height))), **FDM).has("D001") == found
+
+
+@pytest.mark.parametrize("angle", [20, 30, 45])
+def test_a_bevel_is_no_wall(angle: float, judge) -> None:
+    """A scraper's blade: a plate whose long edge is ground to a line."""
+    run = 3 / np.tan(np.radians(angle))
+    outline = [(0, 0), (12, 0), (12 + run, 0), (12, 3)]
+    blade = prism([outline[0], outline[2], outline[3], (0, 3)], 0, 40)
+    turned = blade[:, :, [2, 0, 1]]
+    assert "D001" not in {found.code for found in judge(stl(turned), **FDM).findings}
+
+
+def test_tapered_plinth_is_no_wall(judge) -> None:
+    slope = 2 * np.tan(np.radians(5))
+    plinth = Manifold.hull_points(
+        [(x * s, y * s, z) for x in (-1, 1) for y in (-1, 1) for z, s in ((0, 10.0), (2, 10.0 - slope))]
+    )
+    assert codes(judge, plinth) == set()
+
+
+def test_strips_between_engraved_strokes_are_no_walls(judge) -> None:
+    plate = block(30, 20, 4)
+    for i in range(6):
+        plate -= block(0.8, 6, 0.5, (5 + 1.3 * i, 5, 3.6))  # strips 0.5 wide, 0.4 high
+    assert codes(judge, plate) == set()
+    deep = block(30, 20, 4)
+    for i in range(6):
+        deep -= block(0.8, 6, 3.0, (5 + 1.3 * i, 5, 1.6))
+    assert "D001" in codes(judge, deep)
+
+
+def test_a_thin_wall_in_one_part_of_a_large_solid_is_found(judge) -> None:
+    solid = block(40, 40, 10) - block(10, 10, 10, (0.6, 10, 2))
+    report = judge(stl(triangles(solid)), **FDM)
+    assert thinnest(report) == pytest.approx(0.6, rel=1e-3)
+    place = next(found for found in report.findings if found.code == "D001").locations[0].xyz
+    assert place is not None
+    assert -0.1 < place[0] < 0.7
+    assert 9 < place[1] < 21
+
+
+@pytest.mark.parametrize(("side", "found"), [(0.3, True), (0.39, True), (0.4, False), (1.0, False)])
+def test_pins(side: float, found: bool, judge) -> None:
+    solid = block(10, 10, 2) + block(side, side, 5, (5, 5, 0))
+    assert ("D002" in codes(judge, solid)) == found
+
+
+@pytest.mark.parametrize(("angle", "found"), [(40, False), (45, False), (50, True), (70, True)])
+def test_cone_upside_down(angle: float, found: bool, judge) -> None:
+    """The angle from the vertical at which the side leans out."""
+    reach = 8 * np.tan(np.radians(angle))
+    assert ("D003" in codes(judge, Manifold.cylinder(8, 4, 4 + reach, 64))) == found
+
+
+@pytest.mark.parametrize(("span", "found"), [(3.0, False), (5.0, False), (5.5, True), (12.0, True)])
+def test_bridges(span: float, found: bool, judge) -> None:
+    gate = block(span + 6, 8, 10) - block(span, 8, 6, (3, 0, 0))
+    assert ("D003" in codes(judge, gate)) == found
+
+
+def test_groove_ceiling_is_a_bridge_and_a_ledge_is_none(judge) -> None:
+    ring = Manifold.cylinder(8, 15, 15, 96) - tube(12, 9, 3)
+    assert codes(judge, ring) == set()
+    ledge = tube(15, 10, 8) + tube(18, 12, 3).translate([0, 0, 5])
+    assert "D003" in codes(judge, ledge)
+    lip = tube(15, 10, 8) + tube(15.3, 12, 3).translate([0, 0, 5])
+    assert "D003" not in codes(judge, lip)
+
+
+def test_window_through_a_wall_is_a_bridge(judge) -> None:
+    cup = tube(12, 9, 8) - block(10, 3.6, 2, (5, -1.8, 3))
+    assert codes(judge, cup) == set()
+
+
+def test_bed(judge) -> None:
+    assert judge(stl(box((219, 219, 219))), **FDM).findings == ()
+    assert judge(stl(box((100, 100, 221))), **FDM).has("S002")
+    assert judge(stl(box(at=(0, 0, -5))), **FDM).has("D005")
+    assert not judge(stl(box(at=(500, 500, 0))), **FDM).has("D005")
+    assert judge(stl(triangles(Manifold.sphere(5, 32).translate([0, 0, 5]))), **FDM).has("D005")
+
+
+def test_hollow(judge) -> None:
+    assert {"G006", "D004"} <= codes(judge, block(20, 20, 20) - block(5, 5, 3, (5, 5, 5)))
+    assert "D004" not in codes(judge, block(20, 20, 20) - block(5, 5, 15, (5, 5, 5)))
+
+
+def test_without_a_printer_none_of_these_rules_runs(judge) -> None:
+    assert judge(stl(box((300, 0.3, 10), (0, 0, 4)))).findings == ()

@@ -1,0 +1,126 @@
+"""Edges, shells and welds against plain Python on random meshes."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+
+import numpy as np
+import pytest
+from shapes import CUBE_CORNERS, CUBE_FACES, box, stl
+
+from unitcad.check import check_mesh
+from unitcad.check import edges as mesh_edges
+from unitcad.check.mesh import weld_exact
+from unitcad.check.shells import winding_number
+
+
+def _random_faces(seed: int, n_vertices: int, n_faces: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    faces = rng.integers(0, n_vertices, (n_faces * 2, 3)).astype(np.int32)
+    keep = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    return faces[keep][:n_faces]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_edges_are_counted_as_a_dictionary_counts_them(seed: int) -> None:
+    faces = _random_faces(seed, 12, 20)
+    counted: Counter[tuple[int, int]] = Counter()
+    for face in faces.tolist():
+        for k in range(3):
+            a, b = face[k], face[(k + 1) % 3]
+            counted[min(a, b), max(a, b)] += 1
+    edges = mesh_edges.edges_of(faces, 12)
+    found = {(int(a), int(b)): int(n) for a, b, n in zip(edges.low, edges.high, edges.size, strict=True)}
+    assert found == dict(counted)
+
+
+@pytest.mark.parametrize("n", [1, 5, 300, 70_000])
+def test_components_as_a_search_finds_them(n: int) -> None:
+    rng = np.random.default_rng(n)
+    left, right = rng.integers(0, n, (2, n // 2 + 1))
+    label = mesh_edges.components(n, left, right)
+    neighbours = defaultdict(list)
+    for a, b in zip(left.tolist(), right.tolist(), strict=True):
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    seen: dict[int, int] = {}
+    number = -1
+    for node in range(n):
+        if node in seen:
+            continue
+        number += 1
+        stack = [node]
+        while stack:
+            here = stack.pop()
+            if here not in seen:
+                seen[here] = number
+                stack += neighbours[here]
+    assert label.tolist() == [seen[node] for node in range(n)]
+
+
+def test_weld_joins_equal_corners_only() -> None:
+    rng = np.random.default_rng(0)
+    corners = rng.integers(-2, 3, (500, 3, 3)).astype(np.float32) * np.float32(0.1)
+    corners[corners == 0] = -0.0
+    vertices, faces = weld_exact(corners)
+    assert len(vertices) == len({tuple(row) for row in (corners.reshape(-1, 3) + 0.0).tolist()})
+    assert (vertices[faces] == corners).all()
+
+
+def test_weld_survives_a_hash_collision(monkeypatch: pytest.MonkeyPatch) -> None:
+    corners = np.random.default_rng(1).normal(size=(50, 3, 3))
+    expected = {tuple(row) for row in corners.reshape(-1, 3).tolist()}
+    monkeypatch.setattr("unitcad.check.mesh._mix", lambda bits: np.zeros(len(bits), np.uint64))
+    vertices, faces = weld_exact(corners)
+    assert {tuple(row) for row in vertices.tolist()} == expected
+    assert (vertices[faces] == corners).all()
+
+
+def test_pinch_by_both_ways() -> None:
+    faces = np.concatenate([CUBE_FACES, np.where(CUBE_FACES == 0, 7, CUBE_FACES + 8)]).astype(np.int32)
+    edges = mesh_edges.edges_of(faces, 16)
+    assert edges.closed
+    across = mesh_edges.opposite(edges, 3 * len(faces))
+    assert mesh_edges.pinched_closed(faces, across, 16).tolist() == [7]
+    assert mesh_edges.pinched_open(faces, edges, 16).tolist() == [7]
+    assert mesh_edges.shells_of(faces, edges).max() == 1
+
+
+@pytest.mark.parametrize(
+    ("point", "expected"), [((5, 5, 5), 1), ((0.1, 9.9, 5), 1), ((-1, 5, 5), 0), ((5, 5, 10.5), 0)]
+)
+def test_winding_number(point: tuple[float, float, float], expected: int) -> None:
+    corners = CUBE_CORNERS * 10
+    assert winding_number(corners, CUBE_FACES, np.array(point)) == expected
+    assert winding_number(corners, CUBE_FACES[:, ::-1], np.array(point)) == -expected
+
+
+def test_counts_of_a_cube_with_a_missing_face() -> None:
+    report = check_mesh(CUBE_CORNERS * 10, CUBE_FACES[1:])
+    assert [(found.code, found.count) for found in report.findings] == [("T001", 3)]
+    assert report.facts.watertight is False
+    assert report.facts.volume_mm3 is None
+
+
+def test_indices_out_of_range_and_empty() -> None:
+    assert check_mesh(CUBE_CORNERS, CUBE_FACES + 1).has("P011")
+    assert check_mesh(CUBE_CORNERS, np.empty((0, 3))).has("F001")
+    assert check_mesh(CUBE_CORNERS * np.nan, CUBE_FACES).has("V001")
+
+
+@pytest.mark.parametrize("gap", [0.0, 5e-5, 2e-3])
+def test_welding_has_a_tolerance(gap: float) -> None:
+    """1e-5 of the diagonal of 17.3 is 1.7e-4 mm."""
+    soup = (CUBE_CORNERS * 10)[CUBE_FACES]
+    soup[0] += gap
+    report = check_mesh(soup.reshape(-1, 3), np.arange(36).reshape(-1, 3))
+    assert report.has("T006") == (gap < 1.7e-4)
+    assert report.has("T001") == (gap > 1.7e-4)
+
+
+def test_ordinary_float32_rounding_raises_nothing(judge) -> None:
+    """A box turned by odd angles and rounded to float32 has faces that are not quite flat: no finding."""
+    angle = 0.3
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    for shift in (0, 37.7, 211.3):
+        assert judge(stl(box((13, 7, 3)) @ turn.T + shift)).findings == ()
