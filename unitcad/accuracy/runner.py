@@ -31,13 +31,17 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in SUITES if not names or name in names)
 
 
-def run(name: str, quick: bool, say: Say) -> Result:
-    """One suite's result. Raises UnitcadError where an extra that it needs is missing."""
+def run(name: str, quick: bool, say: Say, specs: int | None = None) -> Result:
+    """One suite's result; `specs`: how many of the extremes. Raises UnitcadError without an extra that it needs."""
+    if specs is not None and name == "extremes":
+        from unitcad.accuracy.extremes import study
+
+        return study(specs, say)
     return import_module(f"unitcad.accuracy.{name.replace('-', '_')}").run(quick, say)
 
 
 def write(results: Sequence[Result], folder: Path) -> None:
-    """Put results into a folder's accuracy.json beside those that are there, and write the page and plots of all."""
+    """Put results into a folder's accuracy.json beside those there, and write the page and plots of all."""
     folder.mkdir(parents=True, exist_ok=True)
     known = {result.suite: result for result in (*read(folder), *results)}
     ordered = [known[name] for name in SUITES if name in known]

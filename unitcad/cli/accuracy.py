@@ -12,6 +12,9 @@ import typer
 def accuracy(
     suites: Annotated[list[str] | None, typer.Argument(metavar="[SUITE]...", help="Which suites; else all.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer cases: what CI runs.")] = False,
+    specs: Annotated[
+        int | None, typer.Option(min=2, help="Random specs of the extremes, half in each of their ranges.")
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", help="Where accuracy.md and accuracy.json go: docs; nowhere if quick."),
@@ -26,7 +29,7 @@ def accuracy(
     results = []
     for name in runner.chosen(suites or []):
         with progress(name) as say:
-            result = runner.run(name, quick, say)
+            result = runner.run(name, quick, say, specs)
         results.append(result)
         if not as_json:
             typer.echo(markdown(result, [f"({plot.title})" for plot in result.plots]))

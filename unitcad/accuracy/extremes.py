@@ -1,0 +1,225 @@
+"""Extreme geometry and random specs: what becomes of each is a build with every law kept, or a refusal with a field."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, REFUSED, Outcome, outcome
+from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
+from unitcad.accuracy.result import Promise, Result, Say, Table
+from unitcad.accuracy.timing import Timing, machine, timing
+from unitcad.spec import override, read
+
+PATIENCE = 600.0
+"""Seconds after which a spec counts as hung."""
+LEAST_BUILT = 0.6
+"""Share of the documented ranges that builds, at least."""
+LONG = 10_000
+_SERIAL = 60
+
+Job = tuple[str, dict[str, Any]]
+
+
+def run(quick: bool, say: Say) -> Result:
+    """The sweeps and a sample of random specs; `study` takes any number."""
+    return study(10 if quick else 100, say, sweeps=1 if quick else None)
+
+
+def study(count: int, say: Say, sweeps: int | None = None) -> Result:
+    """All sweeps (`sweeps`: that many values of each) and `count` random specs, half in either range."""
+    half = count // 2
+    jobs: list[Job] = [(f"sweep {name}", data) for name, data in _sweeps(sweeps)]
+    jobs += [(ranges, seeded_spec(seed, ranges)) for ranges in ("documented", "extreme") for seed in range(half)]
+    found: dict[str, list[tuple[int, Outcome]]] = {}
+    for i, (group, result) in enumerate(_outcomes(jobs)):
+        say(f"{i + 1} of {len(jobs)}: {group} {result.kind}")
+        found.setdefault(group, []).append((len(found.get(group, [])), result))
+    random = {name: found.get(name, []) for name in ("documented", "extreme")}
+    everything = [outcome for rows in found.values() for _, outcome in rows]
+    faults = [
+        (group, index, o.kind, _plain(o.message))
+        for group, rows in found.items()
+        for index, o in rows
+        if o.kind not in GOOD
+    ]
+    built = {name: sum(o.kind == BUILT for _, o in rows) / max(1, len(rows)) for name, rows in random.items()}
+    refused = [o for o in everything if o.kind == REFUSED]
+    return Result(
+        suite="extremes",
+        title="Extreme geometry and random specs",
+        text=(
+            f"{len(jobs)} specs: sweeps of the encapsulating and embedded templates to each limit and past it, and "
+            f"{half} "
+            "random specs each from the documented and the extreme ranges below, every field drawn by itself. Each is "
+            "built (unit, moulds, STL, all laws, all mesh checks) or refused with a field; after a refusal its nearest "
+            "accepted value is put in until it builds or no value is offered. Anything else is a fault."
+        ),
+        tables=(
+            _outcome_table(found),
+            Table(
+                "Ranges of the random specs (mm; diameters and tolerances uniform in the logarithm)",
+                ("field", "documented, least", "largest", "extreme, least", "largest"),
+                tuple(_range_rows()),
+            ),
+            Table(
+                "Refusals by field",
+                ("field", "refusals", "builds once the nearest values are in", "no value offered"),
+                tuple(_refusal_rows(refused)),
+                "The rest meets a different limit and ends there without a value to offer.",
+            ),
+            Table("Faults", ("where", "number", "kind", "what"), tuple(faults[:50]) or (("none", None, None, None),)),
+        ),
+        promises=(
+            Promise("specs that end in anything but a build or a refusal", len(faults), 0),
+            Promise("refusals whose nearest value meets the same limit", sum(o.kind == CIRCLE for o in everything), 0),
+            Promise("documented ranges: share that does not build", 1 - built["documented"], 1 - LEAST_BUILT),
+        ),
+        measured={**machine("manifold3d"), "random specs": count},
+    )
+
+
+def judge(job: Job) -> tuple[str, Outcome]:
+    """What becomes of one spec; runs in a process of its own."""
+    return job[0], outcome(job[1])
+
+
+def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:
+    """In order. Many jobs go to worker processes: one that dies or hangs is a fault of its spec, not the end."""
+    if len(jobs) < _SERIAL:
+        yield from map(judge, jobs)
+        return
+    workers = os.cpu_count() or 1
+    context = multiprocessing.get_context("spawn")
+    waiting = deque(jobs)
+    while waiting:
+        with context.Pool(workers, maxtasksperchild=100) as pool:
+            running: deque[tuple[Job, Any]] = deque()
+            while waiting or running:
+                while waiting and len(running) < 2 * workers:
+                    job = waiting.popleft()
+                    running.append((job, pool.apply_async(judge, (job,))))
+                job, answer = running.popleft()
+                try:
+                    yield answer.get(PATIENCE)
+                except multiprocessing.TimeoutError:
+                    yield job[0], Outcome(HANG, f"no answer within {PATIENCE:g} s")
+                    waiting.extendleft(reversed([other for other, _ in running]))
+                    break
+
+
+def _sweeps(values: int | None) -> Iterator[Job]:
+    """Each extreme of the issue on a template, to the limit and past it."""
+
+    def some(of: Iterable[Any]) -> list[Any]:
+        chosen = list(of)
+        return chosen if values is None else [*chosen[: values - 1], chosen[-1]]
+
+    def each(name: str, base: str, change: Callable[[Any], list[str]], of: Iterable[Any]) -> Iterator[Job]:
+        for value in some(of):
+            yield name, override(read(base), change(value))
+
+    def layers(count: int, wall: float, cap: bool) -> str:
+        one = f'{{ material = "ecoflex-00-30", wall_mm = {wall}' + (f", cap_mm = {max(wall, 1.2)} }}" if cap else " }")
+        return f"layers=[{', '.join([one] * count)}]"
+
+    def room(*walls: float) -> str:
+        return f"diameter_mm={2 * (4.5 + sum(walls)):.3f}"
+
+    for base, cap in (("encapsulating", True), ("embedded", False)):
+        yield from each(
+            f"{base}: walls 0.4 to 12 mm",
+            base,
+            lambda w, cap=cap: [layers(2, w, cap), room(w, w)],
+            (0.4, 0.5, 0.7, 1, 3, 6, 10, 12),
+        )
+        yield from each(
+            f"{base}: diameter 8 to 250 mm",
+            base,
+            lambda d: [f"diameter_mm={d}"],
+            (8, 10, 12.2, 14, 30, 80, 150, 200, 250),
+        )
+        yield from each(
+            f"{base}: 1 to 16 layers",
+            base,
+            lambda n, cap=cap: [layers(n, 1.0, cap), room(*[1.0] * n)],
+            (1, 2, 5, 9, 12, 15, 16),
+        )
+        yield from each(
+            f"{base}: tolerance 0.0004 to 0.25 mm",
+            base,
+            lambda t: [f"output.tolerance_mm={t}"],
+            (0.25, 0.2, 0.1, 0.03, 0.003, 0.001, 0.0005, 0.0004),
+        )
+        yield from each(
+            f"{base}: plinth clearance 0.001 to 3 mm",
+            base,
+            lambda c: [f"moulds.plinth_clearance_mm={c}"],
+            (0.001, 0.01, 0.05, 0.5, 1.0, 3.0),
+        )
+    yield from each(
+        "tail 0.3 to 7 mm, one side and both",
+        "encapsulating",
+        lambda t: [f"fpcb.tail_width_mm={t[0]}", f"fpcb.tail={t[1]}"],
+        [(w, s) for w in (0.3, 0.5, 2.0, 5.0, 6.0, 6.29, 6.3, 7.0) for s in ("one", "both")],
+    )
+    yield from each(
+        "window clearance 0.001 to 0.6 mm",
+        "encapsulating",
+        lambda c: [f"moulds.window_clearance_mm={c}"],
+        (0.001, 0.01, 0.05, 0.2, 0.24, 0.3, 0.6),
+    )
+    yield from each(
+        "caps at the floor and below",
+        "encapsulating",
+        lambda c: [f"layers.0.cap_mm={c}", f"layers.1.cap_mm={c}"],
+        (0.49, 0.5, 0.8, 1.09, 1.094, 1.095, 1.1, 1.25),
+    )
+    yield from each(
+        "second cap at the floor and below",
+        "encapsulating",
+        lambda c: [f"layers.1.cap_mm={c}"],
+        (0.4, 0.5, 0.51, 0.6, 0.8),
+    )
+
+
+def _outcome_table(found: dict[str, list[tuple[int, Outcome]]]) -> Table:
+    rows = []
+    for group, outcomes in found.items():
+        kinds = Counter(o.kind for _, o in outcomes)
+        built = [o.seconds for _, o in outcomes if o.kind == BUILT]
+        time: Timing | None = timing(built) if built else None
+        rows.append(
+            (
+                group,
+                len(outcomes),
+                kinds[BUILT],
+                kinds[REFUSED],
+                len(outcomes) - kinds[BUILT] - kinds[REFUSED],
+                str(time) if time else None,
+                max(built, default=None),
+            )
+        )
+    columns = ("specs", "number", "built", "refused", "faults", "time of a build", "longest, s")
+    return Table("Outcomes", columns, tuple(rows))
+
+
+def _refusal_rows(refused: Sequence[Outcome]) -> Iterator[tuple]:
+    for name, count in Counter(o.field for o in refused).most_common():
+        ends = Counter(o.chain_end for o in refused if o.field == name)
+        yield name, count, ends[BUILT], ends["no value"]
+
+
+def _range_rows() -> Iterator[tuple]:
+    extreme = {name: ends for name, *ends in EXTREME.rows()}
+    for name, *ends in DOCUMENTED.rows():
+        yield (name, *ends, *extreme.pop(name))
+    for name, ends in extreme.items():
+        yield (name, None, None, *ends)
+
+
+def _plain(message: str) -> str:
+    return message.replace("|", "/").replace("\n", " ")[:200]
