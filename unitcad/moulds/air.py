@@ -19,10 +19,13 @@ from unitcad.kernels.mesh import arrays
 from unitcad.moulds.finding import Finding, at_most
 from unitcad.moulds.lid import DENT, TILT_DEG
 from unitcad.moulds.plan import Step
+from unitcad.shape.profile import GRID_PER_MM
 
 ATTITUDES = ((0.0, 0.0), (TILT_DEG, 0.0), (TILT_DEG, 90.0), (TILT_DEG, 180.0), (TILT_DEG, 270.0))
 """(tilt, azimuth of the side that is raised) in degrees. Vents lie halfway between these azimuths: the worst case."""
 _SAME = 1e-6
+_AT_TOP = 1 / GRID_PER_MM
+"""What snapping may take from the height of the opening, mm."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ def air_law(step: Step, cells: list[Manifold], thinnest: float) -> list[Finding]
 def deepest_pocket(cavity: Manifold, top: float) -> Pocket:
     """The deepest pocket of a cavity that is open at z = `top` (mm), over `ATTITUDES`; its volume is not worked out."""
     surface = _Surface.of(cavity)
-    opening = surface.vertices[:, 2] >= top - _SAME
+    opening = surface.vertices[:, 2] >= top - _AT_TOP
     pockets = (
         Pocket(depth, 0.0, tilt, azimuth)
         for tilt, azimuth in ATTITUDES
@@ -65,14 +68,14 @@ def deepest_pocket(cavity: Manifold, top: float) -> Pocket:
 def pocket_volume(cavity: Manifold, top: float, pocket: Pocket) -> float:
     """Volume of all air held back in the attitude of `pocket`, mm3."""
     surface = _Surface.of(cavity)
-    opening = surface.vertices[:, 2] >= top - _SAME
+    opening = surface.vertices[:, 2] >= top - _AT_TOP
     up = upwards(pocket.tilt, pocket.azimuth)
     total = 0.0
     for depth, peak in _pockets(surface, opening, up):
         above = cavity.trim_by_plane(tuple(up), float(peak @ up) - depth + _SAME)
         for part in above.decompose():
             corners = arrays(part)[0]
-            if np.min(np.linalg.norm(corners - peak, axis=1)) < 1e-3 and corners[:, 2].max() < top - _SAME:
+            if np.min(np.linalg.norm(corners - peak, axis=1)) < 1e-3 and corners[:, 2].max() < top - _AT_TOP:
                 total += part.volume()
     return total
 
