@@ -1,0 +1,147 @@
+"""Writes the computed tables of docs/model.md, between its markers, and its plots as SVG.
+
+python docs/make_model.py
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from unitcad.accuracy.plot import svg
+from unitcad.accuracy.result import Plot
+from unitcad.attenuation import closed_form as cf
+from unitcad.attenuation.closed_form import Units
+from unitcad.attenuation.models import STORED_FIT, edge_levels, judgements, one_constant, scales
+from unitcad.attenuation.table import judge, measured_table
+from unitcad.estimating import estimate_spec
+from unitcad.spec import load
+
+HERE = Path(__file__).parent
+TITLES = {
+    "paper": "paper, one constant",
+    "consistent": "consistent, one constant",
+    "crossings": "k_t once embedded, twice encapsulating, one constant",
+    "fitted": "fitted, the divider, two constants",
+    "null": "null: softer layer inside or not, two constants",
+}
+
+
+def table_of_models() -> str:
+    """Every model against the measured table."""
+    rows = [
+        "| model | levels, in-sample | a unit left out | ratios | worst ratio | a unit left out | directions |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, title in TITLES.items():
+        found = judgements()[name]
+        without = f"{found.left_out_ratios.geometric_mean:.2f}" if found.left_out_ratios else "no constant in it"
+        rows.append(
+            f"| {title} | {found.levels.geometric_mean:.2f} | {found.left_out.geometric_mean:.2f} "
+            f"| {found.ratios.geometric_mean:.2f} | {found.ratios.worst:.2f} | {without} "
+            f"| {found.directions} of {found.ratios.count} |"
+        )
+    return "\n".join(rows)
+
+
+def table_of_readings() -> str:
+    """The paper's model by each reading of eta and by each wave."""
+    rows = [
+        "| eta read as | wave | levels | a unit left out | ratios | directions |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for reading in cf.READINGS:
+        for wave in ("s", "p"):
+            path = one_constant(lambda u, wave=wave, reading=reading: cf.paper_path(u, wave, reading))
+            found = judge(path, fitted_ratios=False)
+            rows.append(
+                f"| {reading} | {wave.upper()} | {found.levels.geometric_mean:.2f} "
+                f"| {found.left_out.geometric_mean:.2f} | {found.ratios.geometric_mean:.2f}"
+                f" | {found.directions} of {found.ratios.count} |"
+            )
+    return "\n".join(rows)
+
+
+def table_of_units() -> str:
+    """Each measured unit beside the models."""
+    table = measured_table()
+    rows = ["| unit | measured % | paper | consistent | fitted |", "| --- | --- | --- | --- | --- |"]
+    for i, name in enumerate(table.names):
+        levels = [100 * float(edge_levels(table.units(i), model)) for model in ("paper", "consistent", "fitted")]
+        rows.append(f"| {name} | {100 * table.levels[i]:.4g} | " + " | ".join(f"{v:.1f}" for v in levels) + " |")
+    return "\n".join(rows)
+
+
+def constants() -> str:
+    """The fitted constants."""
+    found = scales()
+    return (
+        f"kappa = {STORED_FIT['kappa']:.3f}, s = {STORED_FIT['s']:.3f} for the divider; "
+        f"s = {found['paper']:.3f} for paper, {found['consistent']:.3f} for consistent."
+    )
+
+
+BLOCKS = {"models": table_of_models, "readings": table_of_readings, "units": table_of_units, "constants": constants}
+
+
+def filled(text: str) -> str:
+    """The page with each computed block made again."""
+    for name, make in BLOCKS.items():
+        pattern = rf"(<!-- computed: {name} -->\n)(?:(?!<!--).)*(<!-- end -->)"
+        text, count = re.subn(pattern, lambda m, make=make: f"{m[1]}{make()}\n{m[2]}", text, flags=re.DOTALL)
+        if count != 1:
+            raise ValueError(f"docs/model.md has {count} blocks named {name}")
+    return text
+
+
+def contrast_plot() -> Plot:
+    """Edge level against the outer over the inner modulus: models, and what was measured."""
+    contrast = np.geomspace(0.03, 30, 61)
+
+    def units(ratio: float, n: float) -> Units:
+        e = [60e3 / np.sqrt(ratio), 60e3 * np.sqrt(ratio)]
+        return Units(e, [1070.0] * 2, [0.4999] * 2, [0.2] * 2, [1.25e-3] * 2, 2 * np.pi * 125, n)
+
+    def line(model: str, n: float) -> tuple[tuple[float, float], ...]:
+        return tuple((float(x), float(edge_levels(units(x, n), model))) for x in contrast)
+
+    table = measured_table()
+
+    def points(design: str) -> tuple[tuple[float, float], ...]:
+        chosen = [i for i, name in enumerate(table.designs) if name == design]
+        ratio = [float(table.units(i).youngs_modulus[-1] / table.units(i).youngs_modulus[0]) for i in chosen]
+        return tuple(zip(ratio, [float(table.levels[i]) for i in chosen], strict=True))
+
+    series = {
+        "paper": line("paper", 1.0),
+        "fitted, embedded": line("fitted", 1.0),
+        "fitted, encaps.": line("fitted", 2.0),
+        **{f"measured {design}": points(design) for design in ("single", "embedded", "encapsulating")},
+    }
+    return Plot("Edge level, motor = 1", "modulus of Layer 2 over Layer 1", "edge level", series, lines=False)
+
+
+def decay_plot() -> Plot:
+    """The layered half-space's curve with its spread, and the paper's exponentials, against the radius."""
+    layered = estimate_spec(load("encapsulating"))["layered"]
+    r = [7.0 + x for x in layered["r_mm"]]
+    beside = layered["paper_beside"]["exponential"]
+    series = {
+        "layered u_z": layered["u_z"]["value"],
+        "its low end": layered["u_z"]["low"],
+        "its high end": layered["u_z"]["high"],
+        "layered u_r": layered["u_r"]["value"],
+        "print, eta a modulus": beside["loss_modulus"],
+        "print, half of it": beside["kelvin_voigt"],
+    }
+    pairs = {name: tuple(zip(r, values, strict=True)) for name, values in series.items()}
+    return Plot("Skin outside the unit, forearm, 125 Hz", "distance from the axis, mm", "over |u_z| at the edge", pairs)
+
+
+if __name__ == "__main__":
+    page = HERE / "model.md"
+    page.write_text(filled(page.read_text("utf-8")), "utf-8")
+    (HERE / "model-contrast.svg").write_text(svg(contrast_plot()), "utf-8")
+    (HERE / "model-decay.svg").write_text(svg(decay_plot()), "utf-8")
