@@ -52,7 +52,7 @@ def engraving(text: str, stroke: float, z0: float, z1: float) -> Shape:
     return union(
         moved(Extrude(outer, z0, z1, holes), x=i * PITCH * stroke)
         for i, character in enumerate(text)
-        for outer, holes in [_outlines(character, stroke)]
+        for outer, holes in [outlines(character, stroke)]
     )
 
 
@@ -62,7 +62,7 @@ def text_width(text: str, stroke: float) -> float:
 
 
 @lru_cache
-def _outlines(character: str, stroke: float) -> tuple[Profile, tuple[Profile, ...]]:
+def outlines(character: str, stroke: float) -> tuple[Profile, tuple[Profile, ...]]:
     """The outer outline and the islands of a character: the border of its cells, walked with the ink on the left."""
     ink = {
         (x, y)
