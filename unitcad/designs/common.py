@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from unitcad.shape import Shape, box, cut, cylinder, moved, turned, union
 from unitcad.spec import Dimensions, Spec
+from unitcad.spec.dimensions import WIRE_GAP
 
 BEYOND = 1.0
 """How far a cutting tool reaches past what it cuts, mm: never in one plane with it."""
@@ -32,11 +33,11 @@ def circuit(spec: Spec, dims: Dimensions) -> Shape:
 
 
 def wires(spec: Spec, dims: Dimensions) -> list[Shape]:
-    """The wires, from the motor's side out along +x, side by side, their tops level with the core's."""
+    """The wires, from just off the motor's side out along +x, side by side, a gap below the core's top."""
     assert spec.wires is not None
     radius = spec.wires.diameter_mm / 2
-    lying = turned(cylinder(radius, dims.motor_radius, dims.outer_radius + spec.wires.length_mm), "y", 1)
-    return [moved(lying, 0, y, dims.core_height - radius) for y in dims.wires_y]
+    lying = turned(cylinder(radius, dims.motor_radius + WIRE_GAP, dims.outer_radius + spec.wires.length_mm), "y", 1)
+    return [moved(lying, 0, y, dims.core_height - WIRE_GAP - radius) for y in dims.wires_y]
 
 
 def strip(dims: Dimensions, side: int, reach: float, half_width: float, z0: float, z1: float) -> Shape:

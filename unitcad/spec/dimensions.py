@@ -12,7 +12,7 @@ MOTOR_CLEARANCE = 0.1
 TIP_PROUD = 0.2
 """How far a tongue for wires stands proud of the core, mm, so that Layer 1 clears them; for a circuit it is as much."""
 WIRE_GAP = 0.1
-"""Between wires side by side, mm."""
+"""Between wires side by side, and between them and what is next to them, mm."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Dimensions:
     core_height     top of the core: motor, and in the encapsulating design the circuit on it
     heights[i]      top of layer i
     slot_z          (bottom, top) of the slot or, in the embedded design, the notch of tail or wires; None without one
-    wires_y         where the wires' axes lie across the exit; their tops lie level with the core's
+    wires_y         where the wires' axes lie across the exit; their tops lie a gap below the core's
     slot_width      of the slot and the tongue in it
     ledge_radius    where the tongue's tip stops in the core
     sides           where the tail leaves: +1 along +x, -1 along -x

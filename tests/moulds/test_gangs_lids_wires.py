@@ -1,0 +1,188 @@
+"""Gangs, lids and wires: what fits, what is refused and with which words, and that what is accepted keeps the laws."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from mould_set import MouldSet
+
+from unitcad.accuracy.outcomes import door, put_in
+from unitcad.accuracy.random_specs import DOCUMENTED, Seeded, random_spec
+from unitcad.errors import Refusal
+from unitcad.moulds import air, fit, lid
+from unitcad.spec import from_data, read
+
+WIRES = {"diameter_mm": 0.3, "count": 2}
+
+
+def wired(design: str) -> dict:
+    data = {key: value for key, value in read(design).items() if key != "fpcb"}
+    return {**data, "wires": WIRES}
+
+
+@pytest.mark.parametrize(("name", "size", "cells"), [("embedded", 73, 9), ("encapsulating", 73, 6), ("chain", 73, 3)])
+def test_fill_takes_what_the_bed_takes_and_no_more(name: str, size: int, cells: int) -> None:
+    bed = [f"moulds.bed_{axis}_mm={size}" for axis in "xy"]
+    lay = MouldSet.of(name, 'moulds.cavities="fill"', *bed).plan.layout
+    assert len(lay.cells) == cells
+    assert max(2 * half for half in lay.plate) <= size
+    columns = {cell.x for cell in lay.cells}
+    with pytest.raises(Refusal) as refused:
+        MouldSet.of(name, f"moulds.cavities=[{len(columns)},{cells // len(columns) + 1}]", *bed)
+    assert refused.value.nearest == [len(columns), cells // len(columns)]
+    assert "exceeds the bed by" in str(refused.value)
+
+
+def test_a_unit_larger_than_the_bed_fills_nothing() -> None:
+    with pytest.raises(Refusal, match="with one cavity"):
+        MouldSet.of("embedded", 'moulds.cavities="fill"', "moulds.bed_x_mm=30")
+
+
+@pytest.mark.parametrize(("name", "asked", "nearest"), [("encapsulating", "[3,2]", [2, 2]), ("chain", "[2,3]", [1, 3])])
+def test_a_tail_reaches_an_edge(name: str, asked: str, nearest: list[int]) -> None:
+    with pytest.raises(Refusal) as refused:
+        MouldSet.of(name, f"moulds.cavities={asked}")
+    assert refused.value.nearest == nearest
+    MouldSet.of(name, f"moulds.cavities={nearest}")
+
+
+def test_without_tails_any_number_of_columns() -> None:
+    assert len(MouldSet.of("no-fpcb", "moulds.cavities=[4,2]").plan.layout.cells) == 8
+
+
+def test_a_piece_higher_than_the_printer() -> None:
+    with pytest.raises(Refusal, match=r"moulds\.bed_z_mm") as refused:
+        MouldSet.of("encapsulating", "moulds.bed_z_mm=8")
+    MouldSet.of("encapsulating", f"moulds.bed_z_mm={refused.value.nearest}")
+
+
+def test_cells_are_numbered_and_numbers_keep_off_grooves_and_each_other() -> None:
+    moulds = MouldSet.of("no-fpcb", "moulds.cavities=[5,4]")
+    names = [cell.name for cell in moulds.plan.layout.cells]
+    assert names == [f"{i + 1:02X}" for i in range(20)]
+    # Each character is a pocket of its own: the cup's top has the drawn number of outlines, none merged or cut open.
+    rim = moulds.dims.heights[1]
+    top = moulds.solids()["cup2"].slice(rim - 0.2)
+    rings = sum(1 for part in top.decompose() if part.area() > 1)
+    assert top.area() < moulds.solids()["cup2"].slice(rim - 1.2).area()
+    assert rings >= 1 + 20  # the plate, and the land of each cell inside its groove
+
+
+def test_flat_lid_without_vents_traps_what_an_exact_integral_says() -> None:
+    """A disc of radius r with a sprue of radius a in the middle: tan(t) times the integral of (x - a) over x > a."""
+    moulds = MouldSet.of("encapsulating", "moulds.pour=injected")
+    step = moulds.plan.steps[1]
+    sprue = step.channels[:1]
+    cup = fit.held(step, fit.cavity(step, moulds.solids(), moulds.segments), moulds.segments)[0][1]
+    from manifold3d import Manifold, OpType
+
+    from unitcad.kernels.mesh import realise
+
+    vents = [realise(shape, moulds.segments) for shape in step.channels[len(sprue) :]]
+    above = Manifold.cube((60, 60, 30), True).translate((0, 0, step.rim + 15))
+    blind = cup - Manifold.batch_boolean([vent ^ above for vent in vents], OpType.Add)
+    pocket = air.deepest_pocket(blind, step.top)
+    r, a = 7.0, 1.5
+    segment = r**2 * math.acos(a / r) - a * math.sqrt(r**2 - a**2)
+    integral = 2 / 3 * (r**2 - a**2) ** 1.5 - a * segment
+    expected = math.tan(math.radians(5)) * integral
+    assert pocket.depth == pytest.approx((r - a) * math.sin(math.radians(5)), rel=5e-3)
+    assert air.pocket_volume(blind, step.top, pocket) == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("count", [8, 12, 16])
+def test_measured_pocket_between_vents_is_the_formula(count: int) -> None:
+    """Without a tongue, whose dent would be the deeper one; polygons stand for circles within 5 um."""
+    moulds = MouldSet.of("no-fpcb", "moulds.pour=injected", f"moulds.vents={count}", "output.tolerance_mm=0.001")
+    step = moulds.plan.steps[0]
+    cavity = fit.held(step, fit.cavity(step, moulds.solids(), moulds.segments), moulds.segments)[0][1]
+    expected = lid.pocket_depth(moulds.dims, 0, count)
+    assert air.deepest_pocket(cavity, step.top).depth == pytest.approx(
+        expected, abs=5e-3 * math.sin(math.radians(5)) + 2e-4
+    )
+
+
+def test_vents_that_cannot_clear_say_how_many_would() -> None:
+    with pytest.raises(Refusal) as refused:
+        MouldSet.of("encapsulating", "moulds.pour=injected", "moulds.vents=4")
+    assert refused.value.nearest == 8
+    assert "8 would clear it" in str(refused.value)
+
+
+def test_vents_come_in_fours() -> None:
+    with pytest.raises(Refusal) as refused:
+        MouldSet.of("encapsulating", "moulds.pour=injected", "moulds.vents=9")
+    assert refused.value.nearest == 8
+
+
+def test_a_ring_too_narrow_for_a_vent() -> None:
+    with pytest.raises(Refusal) as refused:
+        MouldSet.of("embedded", "moulds.pour=injected", "layers.0.wall_mm=0.7")
+    assert (refused.value.field, refused.value.nearest) == ("layers.0.wall_mm", 1.0)
+
+
+@pytest.mark.parametrize("design", ["encapsulating", "embedded"])
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_wires_keep_every_law(design: str, count: int) -> None:
+    data = wired(design)
+    moulds = MouldSet.of_spec(from_data({**data, "wires": {**WIRES, "count": count}}))
+    assert moulds.broken() == set()
+    assert [body.name for body in moulds.unit if body.name.startswith("wire")] == [f"wire{i + 1}" for i in range(count)]
+    assert sum(tool.name.startswith("tongue") for tool in moulds.plan.tools) == 1
+    solids = moulds.solids()
+    for i in range(count):
+        for layer in ("layer1", "layer2"):
+            assert solids[f"wire{i + 1}"].min_gap(solids[layer], 1) > 0.09
+
+
+def test_wires_that_cannot_be() -> None:
+    with pytest.raises(Refusal, match="leave out"):
+        from_data({**read("encapsulating"), "wires": WIRES})
+    with pytest.raises(Refusal, match="half the motor") as refused:
+        from_data({**wired("encapsulating"), "wires": {"diameter_mm": 1.2}})
+    assert refused.value.nearest == 1.0
+    with pytest.raises(Refusal, match="side by side"):
+        from_data({**wired("encapsulating"), "wires": {"diameter_mm": 0.9, "count": 8}})
+    with pytest.raises(Refusal) as refused:
+        MouldSet.of_spec(from_data({**wired("embedded"), "moulds": {"pour": "injected"}}))
+    assert refused.value.nearest == "open"
+
+
+def test_a_connector_that_would_tear_the_slot() -> None:
+    with pytest.raises(Refusal, match="would stretch it by") as refused:
+        from_data(put_in(read("encapsulating"), "fpcb.tail_end_width_mm", 14.0))
+    nearest = refused.value.nearest
+    assert isinstance(nearest, float)
+    # 2 (w + t) = 2 (3.4 + 0.5) (1 + 0.5 x 3.64), Dragon Skin 30's elongation being 364 %.
+    assert nearest == pytest.approx(3.9 * 2.82 - 0.11, abs=1e-3)
+    MouldSet.of_spec(from_data(put_in(read("encapsulating"), "fpcb.tail_end_width_mm", nearest)))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_specs_keep_the_laws_or_are_refused(seed: int) -> None:
+    """From the documented ranges, with lids, resin and wires added: the nearest accepted values lead to a good set."""
+    data, choose = random_spec(Seeded(seed), DOCUMENTED), Seeded(1000 + seed)
+    data.setdefault("moulds", {}).update(pour=choose.pick(("open", "injected")), cavities=[1, 1])
+    data["moulds"]["printer"] = choose.pick(("fdm-0.4", "fdm-0.25", "sla"))
+    data.setdefault("output", {})["tolerance_mm"] = 0.02
+    if choose.whole(0, 2) == 0:
+        data.pop("fpcb", None)
+        data["wires"] = {"diameter_mm": choose.whole(20, 80) / 100, "count": choose.whole(1, 3)}
+    seen = set()
+    while (refusal := door(data)) is not None:
+        assert (refusal.field, refusal.limit) not in seen
+        seen.add((refusal.field, refusal.limit))
+        if refusal.nearest is None:
+            return
+        data = put_in(data, refusal.field, refusal.nearest)
+    moulds = MouldSet.of_spec(from_data(data))
+    assert [finding for finding in moulds.judged() if not finding.ok] == []
+
+
+def test_docs_list_every_code() -> None:
+    from unitcad.moulds.laws import CODES
+
+    page = (Path(__file__).parents[2] / "docs" / "moulds.md").read_text("utf-8")
+    assert all(f"| {code} |" in page for code in CODES)
