@@ -1,0 +1,94 @@
+"""The lengths of the encapsulating set as plain JSON, for scripts that know nothing of unitcad.
+
+python benchmarks/encapsulating/lengths.py FILE
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+
+from unitcad.moulds.filament import FLARE, STUB_TAIL
+from unitcad.moulds.layout import CORNER_RADIUS, PLINTH_DRAFT_DEG, TEXT_MARGIN
+from unitcad.moulds.tooling import BLADE_EDGE, BLADE_THICKNESS, GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
+from unitcad.pipeline import Variant
+from unitcad.shape.lettering import HEIGHT, outlines, text_width
+from unitcad.spec.door import groove_depth
+
+
+def lengths() -> dict:
+    """Every length (mm) that the set is drawn from, and the outlines of its labels."""
+    variant = Variant.of("encapsulating")
+    dims, lay, moulds, spec = variant.dimensions, variant.plan.layout, variant.spec.moulds, variant.spec
+    label, stroke = variant.plan.label, moulds.engraving_stroke_mm
+    corner = lay.cup[0] - TEXT_MARGIN
+    width, height = text_width("00", stroke), HEIGHT * stroke
+    base_text = f"B{label}"
+    return {
+        "motor": [dims.motor_radius, dims.motor_height],
+        "cavity": dims.cavity_radius,
+        "radii": dims.radii,
+        "core_height": dims.core_height,
+        "heights": dims.heights,
+        "pad_radius": dims.pad_radius,
+        "circuit_z": dims.circuit_z,
+        "tail": [spec.fpcb.tail_width_mm, dims.outer_radius + spec.fpcb.tail_length_mm],
+        "slot_z": dims.slot_z,
+        "slot_width": dims.slot_width,
+        "ledge": dims.ledge_radius,
+        "plinth": lay.plinth[0],
+        "plinth_height": moulds.plinth_height_mm,
+        "splay": math.tan(math.radians(PLINTH_DRAFT_DEG)),
+        "key": lay.key,
+        "corner": CORNER_RADIUS,
+        "recess": moulds.plinth_clearance_mm / math.cos(math.radians(PLINTH_DRAFT_DEG)),
+        "skirt_end": -moulds.plinth_height_mm + moulds.seat_relief_mm,
+        "cup": lay.cup[0],
+        "plate": lay.plate[0],
+        "plate_thickness": moulds.plate_mm,
+        "land": moulds.land_mm,
+        "groove": [moulds.groove_width_mm, moulds.groove_depth_mm],
+        "least_wall": moulds.least_wall_mm,
+        "window": moulds.window_clearance_mm,
+        "hole": moulds.filament_hole_mm / 2,
+        "filament": moulds.filament_mm / 2,
+        "filament_groove": groove_depth(spec),
+        "flare": FLARE,
+        "stub_tail": STUB_TAIL,
+        "grip": [GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH],
+        "blade": [BLADE_THICKNESS, BLADE_EDGE, 12.0],
+        "engraving": moulds.engraving_depth_mm,
+        "base_text": _text(
+            base_text,
+            stroke,
+            -text_width(base_text, stroke) / 2,
+            (lay.cup[1] + lay.plate[1]) / 2 - lay.label_height / 2,
+        ),
+        "cup_texts": [
+            _text(f"C{i}", stroke, -corner, corner - height)
+            + _text(label[:2], stroke, -corner, -corner)
+            + _text(label[2:], stroke, corner - width, -corner)
+            for i in (1, 2)
+        ],
+    }
+
+
+def _text(text: str, stroke: float, x: float, y: float) -> list[dict]:
+    """Outline and islands of every character, moved to where it stands."""
+    found = []
+    for i, character in enumerate(text):
+        outer, islands = outlines(character, stroke)
+        dx = x + i * 4 * stroke
+        found.append(
+            {
+                "outer": [[px + dx, py + y] for px, py, _ in outer.vertices],
+                "islands": [[[px + dx, py + y] for px, py, _ in island.vertices] for island in islands],
+            }
+        )
+    return found
+
+
+if __name__ == "__main__":
+    Path(sys.argv[1]).write_text(json.dumps(lengths()))
