@@ -1,0 +1,43 @@
+"""gmsh as a real client of the STEP files: the same solids, the same volumes."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from unitcad.pipeline import Variant, build
+from unitcad.spec import load
+
+pytestmark = pytest.mark.skipif(shutil.which("gmsh") is None, reason="gmsh is not installed")
+pytest.importorskip("build123d")
+
+
+def read(path: Path) -> list[float]:
+    """Volumes of the solids of a STEP file in mm3, as gmsh finds them."""
+    script = path.with_suffix(".geo")
+    script.write_text(
+        'SetFactory("OpenCASCADE");\n'
+        f'v() = ShapeFromFile("{path}");\n'
+        "For i In {0:#v()-1}\n"
+        "  m = Mass Volume{v(i)};\n"
+        '  Printf("volume %.15g", m);\n'
+        "EndFor\n"
+    )
+    said = subprocess.run(
+        ["gmsh", str(script), "-", "-nopopup"], capture_output=True, text=True, timeout=120, check=True, cwd=path.parent
+    )
+    return [float(number) for number in re.findall(r"^volume (\S+)$", said.stdout + said.stderr, re.M)]
+
+
+@pytest.mark.parametrize("name", ["encapsulating", "embedded"])
+def test_same_solids_and_volumes(name: str, tmp_path: Path) -> None:
+    variant = Variant(load(name, ["output.formats=['step']"]))
+    folder = build(variant.spec, tmp_path, only=("unit", "moulds"), check=False).folder
+    there = [read((folder / file).resolve()) for file in ("unit.step", "moulds/moulds.step")]
+    assert [len(volumes) for volumes in there] == [len(variant.unit), len(variant.plan.tools)]
+    drawn = sorted(body.volume for body in variant.to_build123d().children)
+    assert sorted([*there[0], *there[1]]) == pytest.approx(drawn, rel=1e-9)
