@@ -8,6 +8,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 import thomson_haskell
+from scipy import optimize
 
 from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
@@ -66,6 +67,46 @@ def test_reference_made_again_in_more_digits():
         live = np.array(live.tolist(), dtype=complex)
         frozen = np.array([complex(*pair) for pair in case["compliance"]]).reshape(2, 2)
         assert relative_error(frozen, live) < 1e-15
+
+
+def _live(bodies, k, omega) -> tuple[np.ndarray, float]:
+    with mp.workdps(60):
+        bodies = [layered_mp.Body(*body) for body in bodies]
+        found = layered_mp.compliance(bodies, k, omega)
+        cond = layered_mp.condition(bodies, k, omega, found)
+        return np.array(found.tolist(), dtype=complex), float(cond)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.45, 0.5 - 1e-12, 0.5])
+@pytest.mark.parametrize("off", [0.0, 1e-14, -1e-9])
+def test_on_the_branch_points_of_a_thick_layer(nu, off):
+    """Up and down are one and the same wave there; a reflection would lose six digits and more."""
+    omega, mu = 6e3, 1e5 / (2 * (1 + nu))
+    ks = omega / np.sqrt(mu / 1000)
+    kp = ks * np.sqrt((1 - 2 * nu) / (2 * (1 - nu)))
+    bodies = [(1e-2, 1000, 1e5, nu), (None, 1000, 3e6, 0.3)]
+    for k in (ks * (1 + off), (kp or 1e-6 * ks) * (1 + off)):
+        reference, cond = _live(bodies, k, omega)
+        assert relative_error(medium_of([[*b, 0, 0] for b in bodies]).compliance(k, omega), reference) <= LIMIT * cond
+
+
+def test_at_a_clamped_resonance_of_the_lower_layers():
+    """There the impedance under the top layer is infinite, and the compliance at the surface nothing special."""
+    omega, lower = 6e3, [(4e-3, 1000, 2e4, 0.3), (None, 1000, 3e6, 0.3)]
+    ks = omega / np.sqrt(2e4 / 2.6 / 1000)
+
+    def determinant(k):
+        return np.linalg.det(medium_of([[*b, 0, 0] for b in lower]).compliance(k, omega)).real
+
+    grid = np.linspace(0.3 * ks, 0.97 * ks, 400)
+    signs = np.sign([determinant(k) for k in grid])
+    turns = [i for i in range(399) if signs[i] != signs[i + 1] and abs(determinant(grid[i])) < 1e-9]
+    assert turns
+    for i in turns[:4]:
+        k = optimize.brentq(determinant, grid[i], grid[i + 1], xtol=1e-13 * ks, rtol=1e-15)
+        bodies = [(3e-3, 1000, 6e4, 0.4), *lower]
+        reference, cond = _live(bodies, k, omega)
+        assert relative_error(medium_of([[*b, 0, 0] for b in bodies]).compliance(k, omega), reference) <= LIMIT * cond
 
 
 def test_thomson_haskell_fails_where_the_solver_holds():

@@ -145,7 +145,10 @@ def test_poisson_at_one_half_gives_no_pressure_wave():
 
 
 def test_spread_holds_every_corner(encapsulating):
-    levels = edge_levels(corners(variant_of(load("encapsulating"))), "paper")
+    units = corners(variant_of(load("encapsulating")))
+    columns = [units.poisson_ratio, units.tan_delta, units.omega[:, None]]
+    assert len(np.unique(np.concatenate(columns, axis=1)[1:], axis=0)) == 2**5
+    levels = edge_levels(units, "paper")
     assert levels.size == 1 + 2**5  # nu and tan delta of two silicones, and the frequency
     found = encapsulating["models"]["paper"]["edge_level"]
     assert found["low"] == pytest.approx(levels.min(), rel=1e-8)
