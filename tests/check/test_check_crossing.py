@@ -11,7 +11,7 @@ from shapes import CUBE_CORNERS, CUBE_FACES
 from unitcad.check import check_mesh
 from unitcad.check.exact import orient2d, orient3d
 from unitcad.check.limits import Deadline
-from unitcad.check.pairs import boxes_of, meeting_between, meeting_pairs, morton_order
+from unitcad.check.pairs import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
 from unitcad.check.triangles import coplanar, meet
 
 
@@ -136,21 +136,30 @@ def _inside(points: np.ndarray, triangle: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(("n", "m"), [(1, 1), (2, 3), (5, 40), (200, 77), (300, 4)])
 def test_box_pairs_are_all_that_meet(n: int, m: int) -> None:
     rng = np.random.default_rng(0)
-    boxes, others = (np.hstack([low, -(low + 0.1)]).astype("f4") for low in (rng.random((n, 3)), rng.random((m, 3))))
+    low = rng.random((n + m, 3))
+    places = np.concatenate([low, low + 0.1])
+    steps = frame_of(places).steps(places)
+    rows = np.arange(n + m)
+    both_sets = boxes_of(steps, rows, rows + n + m)
+    boxes, others = both_sets[:n].astype(int), both_sets[n:].astype(int)
 
     def naive(a, b) -> bool:
-        return bool((a[:3] <= -b[3:]).all() and (b[:3] <= -a[3:]).all())
+        return bool((a[:3] <= 65_535 - b[3:]).all() and (b[:3] <= 65_535 - a[3:]).all())
 
     own = {
         tuple(sorted(p))
-        for i, j in meeting_pairs(boxes, Deadline(60))
+        for i, j in meeting_pairs(both_sets[:n], Deadline(60))
         for p in zip(i.tolist(), j.tolist(), strict=True)
     }
     assert own == {(a, b) for a in range(n) for b in range(a + 1, n) if naive(boxes[a], boxes[b])}
     both = {
-        p for i, j in meeting_between(boxes, others, Deadline(60)) for p in zip(i.tolist(), j.tolist(), strict=True)
+        p
+        for i, j in meeting_between(both_sets[:n], both_sets[n:], Deadline(60))
+        for p in zip(i.tolist(), j.tolist(), strict=True)
     }
     assert both == {(a, b) for a in range(n) for b in range(m) if naive(boxes[a], others[b])}
+    apart = (low[:n, None] > low[None, n:] + 0.1).any(axis=2) | (low[None, n:] > low[:n, None] + 0.1).any(axis=2)
+    assert both >= {(int(a), int(b)) for a, b in np.argwhere(~apart)}  # steps lose no pair
 
 
 def _codes(*parts: tuple[np.ndarray, np.ndarray]) -> set[str]:
@@ -239,9 +248,5 @@ def test_order_of_faces_and_vertices_does_not_matter() -> None:
 
 def test_morton_order_is_a_permutation() -> None:
     points, faces = _sphere(10)
-    order = morton_order(points, faces)
+    order = morton_order(frame_of(points).steps(points), faces[:, 0])
     assert sorted(order.tolist()) == list(range(len(faces)))
-    at = [[points[faces[:, k], axis] for axis in range(3)] for k in range(3)]
-    boxes = boxes_of(at)
-    assert (boxes[:, :3] <= points[faces].min(axis=1)).all()
-    assert (-boxes[:, 3:] >= points[faces].max(axis=1)).all()

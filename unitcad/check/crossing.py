@@ -15,7 +15,7 @@ from unitcad.check import triangles
 from unitcad.check.findings import Finding, Location
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Bools, Floats, Ints, area_vectors, float32_step
-from unitcad.check.pairs import boxes_of, meeting_pairs, morton_order
+from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology, max_side_squared
 
@@ -61,7 +61,8 @@ class _Faces:
 def judge(topology: Topology, deadline: Deadline) -> Crossings:
     """Apply the rules to a mesh that went through the topology rules."""
     mesh = topology.mesh
-    order = morton_order(mesh.vertices, mesh.faces)
+    steps = frame_of(mesh.vertices).steps(mesh.vertices)
+    order = morton_order(steps, mesh.faces[:, 0])
     ordered = np.ascontiguousarray(mesh.faces[order])
     normal = topology.areas[order]
     solid = (normal[:, 0] != 0) | (normal[:, 1] != 0) | (normal[:, 2] != 0)
@@ -70,14 +71,14 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
     if len(order) < 2:
         return Crossings()
     deadline.tick()
-    faces, boxes = _prepared(topology, order, ordered, normal)
-    del ordered, normal
+    faces = _prepared(topology, order, ordered, normal)
+    boxes = boxes_of(steps, *faces.corners)
+    del ordered, normal, steps
     found = _Found()
     waiting: list[tuple[Ints, Ints]] = []
     count = 0
     for i, j in meeting_pairs(boxes, deadline):
         i, j = _strangers(faces, i, j)
-        i, j = _beside(faces, i, j)
         waiting.append((i, j))
         count += len(i)
         if count > _BLOCK:
@@ -89,7 +90,7 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
     return _said(topology, faces, found)
 
 
-def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) -> tuple[_Faces, np.ndarray]:
+def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) -> _Faces:
     vertices = topology.mesh.vertices
     corners = tuple(np.ascontiguousarray(ordered[:, k]) for k in range(3))
     points = [np.ascontiguousarray(vertices[:, axis]) for axis in range(3)]
@@ -102,7 +103,7 @@ def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) ->
     size = np.zeros(len(ordered))
     for k in range(3):
         np.maximum(size, sum((at[k][axis] - at[k - 1][axis]) ** 2 for axis in range(3)), out=size)
-    faces = _Faces(
+    return _Faces(
         vertices,
         corners,  # type: ignore[arg-type]
         normal,
@@ -112,42 +113,36 @@ def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) ->
         topology.kept[order],
         topology.n_shells > 1,
     )
-    return faces, boxes_of(at)
 
 
 def _height_fields(n: int, corners: tuple[Ints, ...], at: list[list[Floats]], areas: Floats) -> Bools:
-    """Vertices whose faces, seen along their mean normal, all face up and go round once: such a star is embedded.
+    """Vertices whose faces all face one way along some axis and go round once: such a star is a height field.
 
-    Needs a closed mesh; the count of turns is that of neighbours that pass a half-plane through the normal.
+    Needs a closed mesh. Seen along the axis each face then turns the same way by less than half a turn, so turns are
+    counted by the neighbours that pass the line of one coordinate: comparisons only, hence exact.
     """
-    area = [np.ascontiguousarray(areas[:, axis]) for axis in range(3)]
-    mean = [_summed(corners, column, n) for column in area]
-    length = np.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2)
-    own = 1e-6 * np.sqrt(area[0] ** 2 + area[1] ** 2 + area[2] ** 2)
-    # A half-plane through the normal and its cross product with one axis, the one that the normal has least of.
-    least = np.abs(np.stack(mean)).argmin(axis=0)
-    level = [np.zeros(n) for _ in range(3)]
+    least = 1e-9 * (np.abs(areas[:, 0]) + np.abs(areas[:, 1]) + np.abs(areas[:, 2]))
+    ways = np.zeros(len(areas), np.uint8)  # bits 0 to 2: faces up along x, y, z; 3 to 5: down
     for axis in range(3):
-        mine = least == axis
-        level[(axis + 1) % 3][mine] = mean[(axis + 2) % 3][mine]
-        level[(axis + 2) % 3][mine] = -mean[(axis + 1) % 3][mine]
-    good = length > 0
-    turns = np.zeros(n)
-    for k, corner in enumerate(corners):
-        here, ahead, behind = at[k], at[(k + 1) % 3], at[(k + 2) % 3]
-        up, one, other = np.zeros(len(own)), np.zeros(len(own)), np.zeros(len(own))
+        ways |= (areas[:, axis] > least).astype(np.uint8) << axis
+        ways |= (areas[:, axis] < -least).astype(np.uint8) << (axis + 3)
+    common = np.full(n, 63, np.uint8)
+    for corner in corners:
+        np.bitwise_and.at(common, corner, ways)
+    common = (common | (common >> 3)) & 7
+    axis_bit = common & (~common + np.uint8(1))
+    # The coordinate to count by is the one after the axis: bits move round by one.
+    line = ((axis_bit << 1) | (axis_bit >> 2)) & 7
+    ahead, behind = np.zeros((3, len(ways)), np.uint8), np.zeros((3, len(ways)), np.uint8)
+    for k in range(3):
         for axis in range(3):
-            up += area[axis] * mean[axis][corner]
-            across = level[axis][corner]
-            one += (ahead[axis] - here[axis]) * across
-            other += (behind[axis] - here[axis]) * across
-        good[corner[~(up > own * length[corner])]] = False
-        turns += np.bincount(corner[(one > 0) & (other <= 0)], minlength=n)
-    return good & (turns == 1)
-
-
-def _summed(corners: tuple[Ints, ...], column: Floats, n: int) -> Floats:
-    return np.sum([np.bincount(corner, column, n) for corner in corners], axis=0)
+            ahead[k] |= (at[(k + 1) % 3][axis] > at[k][axis]).astype(np.uint8) << axis
+            behind[k] |= (at[(k + 2) % 3][axis] > at[k][axis]).astype(np.uint8) << axis
+    turns = np.zeros(n, np.int64)
+    for k, corner in enumerate(corners):
+        passes = (ahead[k] & ~behind[k] & line[corner]) != 0
+        turns += np.bincount(corner[passes], minlength=n)
+    return (common != 0) & (turns == 1)
 
 
 def _strangers(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
@@ -188,6 +183,7 @@ def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> N
     """Exact answers for the pairs that came through the sieves."""
     i = np.concatenate([pair[0] for pair in waiting]) if waiting else np.empty(0, np.int32)
     j = np.concatenate([pair[1] for pair in waiting]) if waiting else np.empty(0, np.int32)
+    i, j = _beside(faces, i, j)
     if not len(i) or found.kept > _FEW:
         return
     ids_a = np.stack([corner[i] for corner in faces.corners], axis=1)

@@ -1,12 +1,14 @@
-"""Pairs of faces whose boxes meet, found by a tree of boxes that is walked level by level, all nodes of it at once.
+"""Pairs of boxes that meet, found by a tree of boxes that is walked level by level, all nodes of it at once.
 
-Faces are put in Morton order of their centres; every four neighbours share a box, every four of those the next. A walk
-down keeps the pairs of boxes that meet. Each step gathers whole rows and compares 4 x 4 boxes by broadcasting.
+Boxes are put in Morton order; every four neighbours share a box, every four of those the next. A walk down keeps the
+pairs of nodes that meet. Coordinates are 16-bit steps of a common frame: rounding keeps their order, so no pair is
+lost, four children's corners fit one 64-bit word, and a block of node pairs stays in the processor's cache.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,20 +17,39 @@ from unitcad.check.mesh import Bools, Floats, Ints, extent, sorted_with_order
 
 _FAN = 4
 _STEP_BITS = 12
-_STEP = 1 << _STEP_BITS  # pairs of nodes looked at together: their rows stay in the processor's cache
-_BITS = 14
+_STEP = 1 << _STEP_BITS  # pairs of nodes looked at together
+_TOP = 65_534  # largest step; 65,535 is an empty box's low corner
+_BITS = 14  # of each axis in a Morton key
 
 
-def morton_order(vertices: Floats, faces: Ints) -> Ints:
-    """The order of faces along a space-filling curve through their first corners."""
-    low, high = extent(vertices)
-    scale = (2**_BITS - 1) / max(float((high - low).max()), 1e-300)
-    key = np.zeros(len(vertices), np.uint64)
+@dataclass(frozen=True)
+class Frame:
+    """Where steps are counted from, and steps per mm of each axis."""
+
+    origin: Floats
+    scale: Floats
+
+    def steps(self, points: Floats) -> list[Ints]:
+        """The three coordinates of (n, 3) points in steps, 1 to 65,534; order is kept, what lies outside is clipped."""
+        found = []
+        for axis in range(3):
+            value = (points[:, axis] - self.origin[axis]) * self.scale[axis]
+            found.append(np.clip(value, 0, _TOP - 1).astype(np.uint16) + np.uint16(1))
+        return found
+
+
+def frame_of(points: Floats) -> Frame:
+    """A frame round (n, 3) points."""
+    low, high = extent(points)
+    return Frame(low, (_TOP - 1) / np.maximum(high - low, 1e-300))
+
+
+def morton_order(steps: list[Ints], corner: Ints | None = None) -> Ints:
+    """The order of points along a space-filling curve; with `corner`, of what has `corner[i]` as its first point."""
+    key = np.zeros(len(steps[0]), np.uint64)
     for axis in range(3):
-        column = ((vertices[:, axis] - low[axis]) * scale).astype(np.uint64)
-        key |= _spread(column) << np.uint64(axis)
-    middle = key[faces[:, 0]]
-    return sorted_with_order(middle, 3 * _BITS)[1]
+        key |= _spread((steps[axis] >> np.uint16(16 - _BITS)).astype(np.uint64)) << np.uint64(axis)
+    return sorted_with_order(key if corner is None else key[corner], 3 * _BITS)[1]
 
 
 def _spread(value: np.ndarray) -> np.ndarray:
@@ -38,50 +59,64 @@ def _spread(value: np.ndarray) -> np.ndarray:
     return value
 
 
-def boxes_of(at: list[list[Floats]]) -> np.ndarray:
-    """Boxes of faces from their corners' coordinates at[corner][axis] (m,): low corner and negated high corner, (m, 6)
-    float32, rounded outwards."""
-    boxes = np.empty((len(at[0][0]), 6), np.float32)
+def boxes_of(steps: list[Ints], *corners: Ints) -> Ints:
+    """Boxes round the points named by each row of the corner columns: low corner, 65,535 less high corner; (m, 6)."""
+    boxes = np.empty((len(corners[0]), 6), np.uint16)
     for axis in range(3):
-        a, b, c = at[0][axis], at[1][axis], at[2][axis]
-        low = np.minimum(np.minimum(a, b), c).astype(np.float32)
-        high = np.maximum(np.maximum(a, b), c).astype(np.float32)
-        boxes[:, axis] = np.nextafter(low, np.float32(-np.inf))
-        boxes[:, axis + 3] = -np.nextafter(high, np.float32(np.inf))
+        low = high = steps[axis][corners[0]]
+        for corner in corners[1:]:
+            column = steps[axis][corner]
+            low, high = np.minimum(low, column), np.maximum(high, column)
+        boxes[:, axis] = low
+        np.subtract(np.uint16(65_535), high, out=boxes[:, axis + 3])
     return boxes
 
 
-def meeting_pairs(boxes: np.ndarray, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
-    """Blocks of pairs i < j of rows of `boxes` whose boxes meet. Rows near each other should be near in space."""
+def meeting_pairs(boxes: Ints, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
+    """Blocks of pairs i, j of different rows of `boxes` whose boxes meet, each pair once.
+
+    Rows near each other should be near in space.
+    """
     levels = _levels(boxes, 0)
-    top = np.triu_indices(len(levels[-1]))
-    first, second = (side.astype(np.int32) for side in top)
+    first, second = (side.astype(np.int32) for side in np.triu_indices(len(levels[-1])))
     yield from _descend(levels, levels, first, second, deadline, own=True)
 
 
-def meeting_between(boxes: np.ndarray, others: np.ndarray, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
-    """The same between the rows of two sets: row of `boxes`, row of `others`."""
+def meeting_between(boxes: Ints, others: Ints, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
+    """The same between the rows of two sets in one frame: row of `boxes`, row of `others`."""
     here, there = _levels(boxes, len(others)), _levels(others, len(boxes))
     top = np.indices((len(here[-1]), len(there[-1]))).reshape(2, -1).astype(np.int32)
     yield from _descend(here, there, top[0], top[1], deadline, own=False)
 
 
-def _levels(boxes: np.ndarray, least: int) -> list[np.ndarray]:
-    """The tree's levels from the leaves up, for `least` leaves or more; the uppermost has one box or four."""
-    if len(boxes) < least:
-        boxes = np.concatenate([boxes, np.full((least - len(boxes), 6), np.inf, np.float32)])
-    levels = [_padded(boxes)]
+def _levels(boxes: Ints, least: int) -> list[Ints]:
+    """The tree's levels from the leaves up, for `least` leaves or more; the uppermost has four boxes at most."""
+    levels = [_padded(boxes, max(least - len(boxes), 0))]
     while len(levels) == 1 or len(levels[-1]) > _FAN:
-        levels.append(_padded(_parents(levels[-1])))
+        below = levels[-1]
+        pair = np.minimum(below[0::2], below[1::2])
+        levels.append(_padded(np.minimum(pair[0::2], pair[1::2]), 0))
     return levels
 
 
+def _padded(boxes: Ints, more: int) -> Ints:
+    """Rows up to a multiple of the fan, the added ones empty: they meet nothing."""
+    more += -(len(boxes) + more) % _FAN
+    return np.concatenate([boxes, np.full((more, 6), 65_535, np.uint16)]) if more else boxes
+
+
+def _packed(boxes: Ints) -> Ints:
+    """Every four rows in one column: six words of four coordinates each, (6, n / 4)."""
+    children = boxes.reshape(-1, _FAN, 6).transpose(2, 0, 1)
+    return np.ascontiguousarray(children).view(np.uint64).reshape(6, -1)
+
+
 def _descend(
-    here: list[np.ndarray], there: list[np.ndarray], first: Ints, second: Ints, deadline: Deadline, *, own: bool
+    here: list[Ints], there: list[Ints], first: Ints, second: Ints, deadline: Deadline, *, own: bool
 ) -> Iterator[tuple[Ints, Ints]]:
     for level in range(len(here) - 1, 0, -1):
-        rows = np.ascontiguousarray(here[level - 1].reshape(-1, _FAN * 6).T)
-        others = rows if here is there else np.ascontiguousarray(there[level - 1].reshape(-1, _FAN * 6).T)
+        rows = _packed(here[level - 1])
+        others = rows if here is there else _packed(there[level - 1])
         keep = first < rows.shape[1]
         keep &= second < others.shape[1]
         first, second = first[keep], second[keep]
@@ -95,27 +130,22 @@ def _descend(
             yield from walk
 
 
-def _padded(boxes: np.ndarray) -> np.ndarray:
-    """Rows up to a multiple of the fan, the added ones empty: they meet nothing."""
-    more = -len(boxes) % _FAN
-    return np.concatenate([boxes, np.full((more, 6), np.inf, np.float32)]) if more else boxes
-
-
-def _parents(boxes: np.ndarray) -> np.ndarray:
-    """The box round every four rows."""
-    pair = np.minimum(boxes[0::2], boxes[1::2])
-    return np.minimum(pair[0::2], pair[1::2])
+def _children(rows: Ints, which: Ints) -> tuple[Ints, Ints]:
+    """Low and high corners of the children of some nodes: (axis, child, node) each."""
+    words = rows.take(which, axis=1, mode="clip")
+    corners = np.ascontiguousarray(words.view(np.uint16).reshape(6, -1, _FAN).transpose(0, 2, 1))
+    return corners[:3], np.uint16(65_535) - corners[3:]
 
 
 def _walk(
-    rows: np.ndarray,
-    others: np.ndarray,
+    rows: Ints,
+    others: Ints,
     first: Ints,
     second: Ints,
     skip: Callable[[Ints, Ints], Bools] | None,
     deadline: Deadline,
 ) -> Iterator[tuple[Ints, Ints]]:
-    """Children of the node pairs whose boxes meet; a column of `rows` holds a node's children.
+    """Children of the node pairs whose boxes meet.
 
     Of a node with itself the pairs of children (p, q) for which `skip(p, q)` are left out.
     """
@@ -127,20 +157,18 @@ def _walk(
     for start in range(0, len(first), _STEP):
         deadline.tick()
         i, j = first[start : start + _STEP], second[start : start + _STEP]
-        a = rows.take(i, axis=1, mode="clip").reshape(_FAN, 6, -1)
-        b = others.take(j, axis=1, mode="clip").reshape(_FAN, 6, -1)
-        high_a, high_b = -a[:, 3:], -b[:, 3:]
+        low_a, high_a = _children(rows, i)
+        low_b, high_b = _children(others, j)
         meet = np.zeros((_FAN, _FAN, _STEP), bool)
-        hit = np.empty(len(i), bool)
-        part = np.empty(len(i), bool)
+        hit = np.empty((_FAN, len(i)), bool)
+        part = np.empty((_FAN, len(i)), bool)
         for p in range(_FAN):
-            for q in range(_FAN):
-                np.less_equal(a[p, 0], high_b[q, 0], out=hit)
-                for axis in range(3):
-                    if axis:
-                        hit &= np.less_equal(a[p, axis], high_b[q, axis], out=part)
-                    hit &= np.less_equal(b[q, axis], high_a[p, axis], out=part)
-                meet[p, q, : len(i)] = hit
+            np.less_equal(low_a[0, p], high_b[0], out=hit)
+            for axis in range(3):
+                if axis:
+                    hit &= np.less_equal(low_a[axis, p], high_b[axis], out=part)
+                hit &= np.less_equal(low_b[axis], high_a[axis, p], out=part)
+            meet[p, :, : len(i)] = hit
         if skip is not None and len(own := np.flatnonzero(i == j)):
             meet.reshape(_FAN * _FAN, -1)[np.ix_(left_out, own)] = False
         found = np.flatnonzero(meet)

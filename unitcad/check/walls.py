@@ -13,7 +13,7 @@ from unitcad.check.edges import components
 from unitcad.check.findings import Finding, Location
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Bools, Floats, Ints
-from unitcad.check.pairs import meeting_between, morton_order
+from unitcad.check.pairs import boxes_of, frame_of, meeting_between, morton_order
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology, max_side_squared
 
@@ -65,11 +65,18 @@ def _behind(
     """The distance from each point, against its normal, to the first nearly parallel face; inf beyond `reach`."""
     thickness = np.full(len(points), np.inf)
     ends = points - normal[owner] * reach[:, None]
-    order = morton_order(points, np.arange(len(points))[:, None].repeat(3, axis=1)) if len(points) else owner
-    rays = _boxes(np.minimum(points, ends)[order], np.maximum(points, ends)[order])
+    if not len(points):
+        return thickness
     solid = np.flatnonzero(sound)
-    by_place = solid[morton_order(corners[solid].reshape(-1, 3), np.arange(3 * len(solid)).reshape(-1, 3))]
-    faces = _boxes(corners[by_place].min(axis=1), corners[by_place].max(axis=1))
+    places = np.concatenate([points, ends, corners[solid].reshape(-1, 3)])
+    steps = frame_of(places).steps(places)
+    n, m = len(points), len(solid)
+    order = morton_order(steps, np.arange(n))
+    rays = boxes_of(steps, order, order + n)
+    first = 2 * n + 3 * np.arange(m)
+    order_faces = morton_order(steps, first)
+    first, by_place = first[order_faces], solid[order_faces]
+    faces = boxes_of(steps, first, first + 1, first + 2)
     for i, j in meeting_between(rays, faces, deadline):
         ray, face = order[i], by_place[j]
         facing = np.einsum("ij,ij->i", normal[owner[ray]], normal[face]) < -PARALLEL
@@ -77,10 +84,6 @@ def _behind(
         distance = _hit(points[ray], -normal[owner[ray]], corners[face], normal[face])
         np.minimum.at(thickness, ray, distance)
     return thickness
-
-
-def _boxes(low: Floats, high: Floats) -> np.ndarray:
-    return np.hstack([low, -high]).astype(np.float32) - np.float32(1e-4)
 
 
 def _hit(origin: Floats, along: Floats, corners: Floats, normal: Floats) -> Floats:

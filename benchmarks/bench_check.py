@@ -1,0 +1,113 @@
+"""Speed and memory of the mesh checks beside their peers, interleaved, medians of one run.
+
+    python benchmarks/bench_check.py [--peer /path/to/python-with-pymeshlab] [--sizes 10000,100000,1000000]
+
+Topology rules against trimesh's is_volume on the same arrays; all rules (topology, self-crossing, shells) against
+pymeshlab's compute_selection_by_self_intersections_per_face, which is GPL and runs in an environment of its own
+(`--peer`); a whole file by `check_file` against `admesh -n -u -f -d -v` style checks of the admesh command (`--topology`
+part only, it knows no crossing), and the peak memory of a process that judges it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+from meshes import torus, write_stl
+
+PEER = """
+import sys, time, json
+sys.path.insert(0, {here!r})
+import pymeshlab
+from meshes import torus
+v, f = torus({size})
+for line in sys.stdin:
+    mesh = pymeshlab.MeshSet()
+    mesh.add_mesh(pymeshlab.Mesh(v, f))
+    start = time.perf_counter()
+    mesh.compute_selection_by_self_intersections_per_face()
+    print(time.perf_counter() - start, flush=True)
+"""
+MEMORY = """
+import resource, sys
+from unitcad.check import check_file
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+report = check_file(sys.argv[1])
+print(before // 1024, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024, report.verdict)
+"""
+
+
+def timed(work: Callable[[], object]) -> float:
+    """Seconds of wall time."""
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def measure(size: int, peer: str | None, rounds: int, folder: Path) -> dict[str, object]:
+    """Medians in seconds and their ratios for one size."""
+    import trimesh
+
+    from unitcad.check import check_file, check_mesh, topology
+    from unitcad.check.limits import Deadline
+    from unitcad.check.mesh import Mesh
+
+    vertices, faces = torus(size)
+    path = folder / f"torus-{size}.stl"
+    write_stl(path, vertices, faces)
+    times: dict[str, list[float]] = {}
+    other = None
+    if peer:
+        code = PEER.format(here=str(Path(__file__).parent), size=size)
+        other = subprocess.Popen([peer, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def note(name: str, seconds: float) -> None:
+        times.setdefault(name, []).append(seconds)
+
+    for _ in range(rounds):
+        mesh = trimesh.Trimesh(vertices, faces, process=False)
+        note("trimesh is_volume", timed(lambda mesh=mesh: mesh.is_volume))
+        note("topology rules", timed(lambda: topology.judge(Mesh(vertices, faces), Deadline(600))))
+        note("all rules", timed(lambda: check_mesh(vertices, faces)))
+        if other and other.stdin and other.stdout:
+            other.stdin.write("go\n")
+            other.stdin.flush()
+            note("pymeshlab crossing", float(other.stdout.readline()))
+        note("check_file", timed(lambda: check_file(path)))
+        if shutil.which("admesh"):
+            note("admesh", timed(lambda: subprocess.run(["admesh", str(path)], capture_output=True, check=False)))
+    if other:
+        other.kill()
+    found: dict[str, object] = {"faces": len(faces)} | {name: round(median(of), 4) for name, of in times.items()}
+    found["topology x trimesh"] = round(median(times["trimesh is_volume"]) / median(times["topology rules"]), 2)
+    if "pymeshlab crossing" in times:
+        found["all x pymeshlab"] = round(median(times["pymeshlab crossing"]) / median(times["all rules"]), 2)
+    memory = subprocess.run([sys.executable, "-c", MEMORY, str(path)], capture_output=True, text=True, check=True)
+    before, peak, verdict = memory.stdout.split()
+    found |= {"peak MB": int(peak), "of it imports": int(before), "verdict": verdict}
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--peer", help="a python that has pymeshlab")
+    parser.add_argument("--sizes", default="10000,100000,1000000")
+    parser.add_argument("--rounds", type=int, default=5)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        for size in given.sizes.split(","):
+            print(json.dumps(measure(int(size), given.peer, given.rounds, Path(folder))), flush=True)
+    print(f"peak of this process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024} MB", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()
