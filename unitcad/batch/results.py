@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,12 @@ from unitcad.batch.sweep import Sweep
 FIRST = ("index", "status", "reason", "folder")
 
 
-def write_results(out: Path, sweep: Sweep, journal: Journal, head: dict[str, Any]) -> None:
-    """Write both tables, variants in the sweep's order, read from the journal one at a time. Raises OSError."""
-    columns = _columns(sweep, journal)
-    _write_csv(out / "variants.csv", columns, journal.entries())
-    _write_json(out / "batch.json", {**head, "columns": columns}, journal.entries())
+def write_results(
+    out: Path, columns: list[str], entries: Callable[[], Iterable[dict[str, Any]]], head: dict[str, Any]
+) -> None:
+    """Write both tables; `entries` gives the variants in the sweep's order, one at a time. Raises OSError."""
+    _write_csv(out / "variants.csv", columns, entries())
+    _write_json(out / "batch.json", {**head, "columns": columns}, entries())
 
 
 def write_timings(out: Path, summary: Any, workers: int) -> None:
@@ -29,7 +30,7 @@ def write_timings(out: Path, summary: Any, workers: int) -> None:
     (out / "timings.json").write_text(json.dumps({"workers": workers, **told}, indent=1) + "\n", "utf-8")
 
 
-def _columns(sweep: Sweep, journal: Journal) -> list[str]:
+def columns_of(sweep: Sweep, journal: Journal) -> list[str]:
     """First what it is, then what was swept, then what came out, in the order in which rows name it."""
     found: dict[str, None] = dict.fromkeys(FIRST)
     found.update(dict.fromkeys(path for path in sweep.paths if path != "name"))

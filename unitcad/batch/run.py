@@ -19,7 +19,7 @@ from unitcad.batch import task as tasks
 from unitcad.batch.away import Receiver
 from unitcad.batch.executors import ProcessExecutor
 from unitcad.batch.journal import Journal
-from unitcad.batch.results import write_results, write_timings
+from unitcad.batch.results import columns_of, write_results, write_timings
 from unitcad.batch.sweep import MOST, Sweep
 from unitcad.batch.task import Job, Outcome, Task
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
@@ -90,14 +90,7 @@ def run(
     """
     only = checked_outputs(options.only)
     count = counted(sweep, options.limit)
-    head = {
-        "batch": digest(repr((sweep.hash, only, options.check)).encode())[:16],
-        "name": sweep.name,
-        "mode": sweep.mode,
-        "bases": [base for base, _ in sweep.bases],
-        "outputs": list(only),
-        "versions": {"unitcad": __version__, **kernel_versions(("step",))},
-    }
+    head = batch_head(sweep, only, options)
     journal = Journal(out, {**head, "code": code_version()})
     own = executor is None
     executor = executor or ProcessExecutor(workers)
@@ -107,7 +100,7 @@ def run(
     try:
         clear_leftovers(out)
         summary = batch.all()
-        write_results(out, sweep, journal, head)
+        write_results(out, columns_of(sweep, journal), journal.entries, head)
         summary.seconds = round(time.perf_counter() - start, 3)
         write_timings(out, summary, workers)
         watch(summary, None)
@@ -128,6 +121,18 @@ def run(
 def trim(options: Options) -> None:
     """Bring the cache down to its limit, when the workers are gone."""
     collect(options.cache or default_root(), int(options.cache_mb * 1e6))
+
+
+def batch_head(sweep: Sweep, only: tuple[str, ...], options: Options) -> dict[str, Any]:
+    """What says which batch this is, in its journal and in its tables."""
+    return {
+        "batch": digest(repr((sweep.hash, only, options.check)).encode())[:16],
+        "name": sweep.name,
+        "mode": sweep.mode,
+        "bases": [base for base, _ in sweep.bases],
+        "outputs": list(only),
+        "versions": {"unitcad": __version__, **kernel_versions(("step",))},
+    }
 
 
 def counted(sweep: Sweep, limit: int | None) -> int:

@@ -158,10 +158,14 @@ class Sweep:
     def spec(self, index: int) -> Spec:
         """The effective spec of variant `index`. Raises Refusal where it can't be."""
         base, values = self.values(index)
-        data = json.loads(self._texts[base])
+        data = self.base_data(base)
         for path, value in values.items():
             put(data, path, value)
         return from_data(data)
+
+    def base_data(self, base: str) -> dict[str, Any]:
+        """A base's data, to be changed at will."""
+        return json.loads(self._texts[base])
 
     def __iter__(self) -> Iterator[tuple[int, dict[str, Any]]]:
         return ((index, self.values(index)[1]) for index in range(self.count))

@@ -50,6 +50,7 @@ def batch(
     from unitcad.batch.executors import open_executor
     from unitcad.batch.preview import preview
     from unitcad.batch.run import trim
+    from unitcad.batch.table import estimate_table
     from unitcad.cli.batch_progress import watching
     from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json
@@ -65,9 +66,13 @@ def batch(
         return
     folder = out or Path("out") / wanted.slug
     try:
-        with open_executor(jobs, scheduler, timeout) as (executor, workers), watching(json_lines) as watch:
-            summary = run(wanted, folder, options, executor, workers=workers, away=scheduler is not None, watch=watch)
-        trim(options)
+        if chosen == ("estimate",):
+            summary = estimate_table(wanted, folder, options)
+        else:
+            with open_executor(jobs, scheduler, timeout) as (executor, workers), watching(json_lines) as watch:
+                away = scheduler is not None
+                summary = run(wanted, folder, options, executor, workers=workers, away=away, watch=watch)
+            trim(options)
     except KeyboardInterrupt:
         typer.echo(f"interrupted: what is done stays in {folder}; the next run takes up the rest", err=True)
         sys.exit(130)

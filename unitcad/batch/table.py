@@ -1,0 +1,248 @@
+"""The estimate-only sweep: no folders, one table, the closed forms evaluated over arrays of variants.
+
+A variant's edge level reads its design, its walls, its silicones and the frequency. Silicones and the frequency are
+looked up value by value; everything else that is swept goes through the door once for each combination. Both are then
+put together as arrays, a block of variants at a time.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from unitcad.attenuation.closed_form import Units
+from unitcad.attenuation.models import edge_levels
+from unitcad.attenuation.table import CROSSINGS
+from unitcad.batch import task as tasks
+from unitcad.batch.journal import Journal
+from unitcad.batch.results import FIRST, write_results, write_timings
+from unitcad.batch.run import MOST_FAILURES_TOLD, Options, Summary, batch_head, counted
+from unitcad.batch.sweep import Sweep
+from unitcad.batch.task import OK
+from unitcad.errors import UnitcadError
+from unitcad.estimating import variant_of
+from unitcad.pipeline.versions import code_version
+from unitcad.spec import Spec, from_data, put
+
+BLOCK = 1 << 15
+FREE = re.compile(r"layers\.(\d+)\.material|estimate\.frequency_hz|name|casting\..+")
+"""Paths that the door looks at one by one: no other value decides whether theirs can be, if the tail's end is plain."""
+FIELDS = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What the models read of one combination: crossings, walls (m), omega, and (N, 4) of the layers' FIELDS.
+
+    A silicone that is known as a range only has NaN: no number can be given.
+    """
+
+    design: str
+    name: str
+    diameter_mm: float
+    crossings: float
+    omega: float
+    walls: tuple[float, ...]
+    silicones: np.ndarray
+    models: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Variants `start` and on: their edge levels by model (NaN: no number), what is known of each, why one can't be."""
+
+    start: int
+    levels: dict[str, np.ndarray]
+    known: list[_Known | UnitcadError]
+
+
+def estimate_table(sweep: Sweep, out: Path, options: Options) -> Summary:
+    """Write `variants.csv`, `batch.json` and `timings.json` of every variant's edge level by model into `out`.
+
+    Raises UnitcadError for a folder that isn't ours.
+    """
+    count = counted(sweep, options.limit)
+    head = batch_head(sweep, ("estimate",), options)
+    journal = Journal(out, {**head, "code": code_version()})
+    summary, start = Summary(count), time.perf_counter()
+    try:
+        blocks = list(evaluate(sweep, count))
+        models = list(dict.fromkeys(model for block in blocks for model in block.levels))
+        paths = [path for path in sweep.paths if path != "name"]
+        columns = list(dict.fromkeys([*FIRST, *paths, "name", "design", "diameter_mm", *(f"edge_{m}" for m in models)]))
+        write_results(out, columns, lambda: _entries(sweep, blocks), {**head, "versions": head["versions"]})
+        _count(summary, blocks)
+        summary.seconds = round(time.perf_counter() - start, 3)
+        write_timings(out, summary, 1)
+    finally:
+        journal.close()
+    return summary
+
+
+def evaluate(sweep: Sweep, count: int) -> Iterator[Block]:
+    """Edge levels of variants 0 to `count`, a block at a time."""
+    free = _free_axes(sweep)
+    combinations: dict[int, _Known | UnitcadError] = {}
+    values: dict[tuple[int | str, int, int], Any] = {}
+    shape = (len(sweep.bases), *(len(axis) for axis in sweep.axes)) if sweep.mode == "product" else (sweep.count,)
+    for start in range(0, count, BLOCK):
+        indices = np.arange(start, min(start + BLOCK, count))
+        digits = np.array(np.unravel_index(indices, shape))
+        plain = digits.copy()
+        plain[[position + 1 for position in free]] = 0
+        bound = np.asarray(np.ravel_multi_index(tuple(plain), shape))
+        for index in np.unique(bound).tolist():
+            if index not in combinations:
+                combinations[index] = _of(sweep, index, {sweep.axes[position].path for position in free})
+        known = [combinations[index] for index in bound.tolist()]
+        yield _block(sweep, start, digits, known, free, values)
+
+
+def _free_axes(sweep: Sweep) -> list[int]:
+    """The axes (by position) whose values don't meddle with each other."""
+    if sweep.mode != "product" or any("tail_end_width_mm" in repr(base) for base in (sweep.bases, sweep.paths)):
+        return []
+    return [i for i, axis in enumerate(sweep.axes) if FREE.fullmatch(axis.path)]
+
+
+def _of(sweep: Sweep, index: int, free: set[str]) -> _Known | UnitcadError:
+    """Variant `index`, but what is free as its base has it."""
+    base, values = sweep.values(index)
+    data = sweep.base_data(base)
+    try:
+        for path, value in values.items():
+            if path not in free:
+                put(data, path, value)
+        return _known(from_data(data))
+    except UnitcadError as error:
+        return error
+
+
+def _known(spec: Spec) -> _Known:
+    asked = variant_of(spec)
+    single = len(asked.layers) == 1
+    return _Known(
+        design=spec.design,
+        name=spec.name,
+        diameter_mm=spec.diameter_mm,
+        crossings=CROSSINGS["single" if single else asked.design],
+        omega=2.0 * np.pi * asked.frequency.middle,
+        walls=tuple(layer.thickness for layer in asked.layers),
+        silicones=np.array([_silicone(layer) for layer in asked.layers]),
+        models=tuple(spec.estimate.models),
+    )
+
+
+def _silicone(layer: Any) -> list[float]:
+    modulus, ratio, loss = layer.youngs_modulus, layer.poisson_ratio, layer.tan_delta
+    values = [q.value if q.value is not None else np.nan for q in (modulus, ratio, loss)]
+    return [values[0], layer.density, values[1], values[2]]
+
+
+def _block(
+    sweep: Sweep, start: int, digits: np.ndarray, known: list[_Known | UnitcadError], free: list[int], values: dict
+) -> Block:
+    """Levels of one block: what is known of the combinations, with the free axes' own values put in."""
+    levels: dict[str, np.ndarray] = {}
+    by_layers: dict[int, list[int]] = {}
+    for row, entry in enumerate(known):
+        if isinstance(entry, _Known):
+            by_layers.setdefault(len(entry.walls), []).append(row)
+    for rows in by_layers.values():
+        chosen = np.array(rows)
+        there = [entry for entry in (known[row] for row in rows) if isinstance(entry, _Known)]
+        silicones = np.array([entry.silicones for entry in there])
+        omega = np.array([entry.omega for entry in there])
+        for position in free:
+            path, at = sweep.axes[position].path, digits[position + 1][chosen]
+            if path == "estimate.frequency_hz" and (hertz := _frequencies(sweep, position, values)) is not None:
+                omega = 2.0 * np.pi * hertz[at]
+                continue
+            for base, digit in np.unique(np.array([digits[0][chosen], at]), axis=1).T.tolist():
+                here = (at == digit) & (digits[0][chosen] == base)
+                value = _free_value(sweep, base, position, digit, values)
+                if isinstance(value, UnitcadError):
+                    for row in chosen[here]:
+                        known[row] = value
+                elif path == "estimate.frequency_hz":
+                    omega[here] = value.omega
+                elif match := re.fullmatch(r"layers\.(\d+)\.material", path):
+                    silicones[here, int(match[1])] = value.silicones[int(match[1])]
+        units = Units(
+            **{field: silicones[..., i] for i, field in enumerate(FIELDS)},
+            thickness=np.array([entry.walls for entry in there]),
+            omega=omega,
+            crossings=np.array([entry.crossings for entry in there]),
+        )
+        unknown = np.isnan(silicones).any(axis=(1, 2))
+        for model in dict.fromkeys(model for entry in there for model in entry.models):
+            found = levels.setdefault(model, np.full(len(known), np.nan))
+            asked = np.array([model in entry.models for entry in there])
+            found[chosen] = np.where(asked & ~unknown, edge_levels(units, model), np.nan)
+    return Block(start, levels, known)
+
+
+def _frequencies(sweep: Sweep, position: int, values: dict) -> np.ndarray | None:
+    """The frequencies of an axis, Hz, if each is a positive number, which is all that the door asks of one."""
+    key = ("frequencies", position, 0)
+    if key not in values:
+        axis = sweep.axes[position]
+        found = [axis.values[i] for i in range(len(axis))]
+        plain = all(isinstance(v, int | float) and not isinstance(v, bool) and 0 < v < np.inf for v in found)
+        values[key] = np.array(found, dtype=float) if plain else None
+    return values[key]
+
+
+def _free_value(sweep: Sweep, base: int, position: int, digit: int, values: dict) -> _Known | UnitcadError:
+    """What one value of a free axis does to its base, all else as the base has it."""
+    key = (base, position, digit)
+    if key not in values:
+        axis = sweep.axes[position]
+        data = sweep.base_data(sweep.bases[base][0])
+        put(data, axis.path, axis.values[digit])
+        try:
+            values[key] = _known(from_data(data))
+        except UnitcadError as error:
+            values[key] = error
+    return values[key]
+
+
+def _entries(sweep: Sweep, blocks: list[Block]) -> Iterator[dict[str, Any]]:
+    for block in blocks:
+        levels = {f"edge_{model}": found.tolist() for model, found in block.levels.items()}
+        for row, known in enumerate(block.known):
+            index = block.start + row
+            _, values = sweep.values(index)
+            entry = {"index": index, "status": OK, "reason": "", "folder": "", "values": values}
+            if isinstance(known, UnitcadError):
+                failed = tasks.failure(index, known)
+                yield {**entry, "status": failed.status, "reason": failed.reason, "row": {}}
+                continue
+            edges = {name: _rounded(found[row]) for name, found in levels.items()}
+            name = values.get("name", known.name)
+            yield {**entry, "row": {"name": name, "design": known.design, "diameter_mm": known.diameter_mm, **edges}}
+
+
+def _rounded(level: float) -> float | None:
+    return None if level != level else float(f"{level:.6g}")
+
+
+def _count(summary: Summary, blocks: list[Block]) -> None:
+    summary.done = sum(len(block.known) for block in blocks)
+    failed = [
+        tasks.failure(block.start + row, entry)
+        for block in blocks
+        for row, entry in enumerate(block.known)
+        if isinstance(entry, UnitcadError)
+    ]
+    summary.failed, summary.ok = len(failed), summary.done - len(failed)
+    summary.failures = [
+        {"index": outcome.index, "status": outcome.status, "reason": outcome.reason, "folder": ""}
+        for outcome in failed[:MOST_FAILURES_TOLD]
+    ]
