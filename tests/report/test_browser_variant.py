@@ -110,8 +110,9 @@ def test_the_slider_goes_through_the_casting(visit: Visit) -> None:
         assert moment.title in visit.page.inner_text(".step output")
         listed = visit.page.locator(".parts input").evaluate_all("(boxes) => boxes.map((box) => box.name)")
         assert listed == [f"part-{name}" for name in moment.parts]
-        pictures.append(canvas(visit))
-        assert changed(*pictures[-2:]) > 0.002, moment.title
+        if i % 3 == 0 or i == len(expected):  # a screenshot costs most of the time
+            pictures.append(canvas(visit))
+            assert changed(*pictures[-2:]) > 0.002, moment.title
     visit.page.click('button[aria-label="Step back"]')
     assert shown(visit) == list(expected[-2].parts)
     visit.page.uncheck('input[name="part-layer2"]')

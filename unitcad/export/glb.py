@@ -16,7 +16,7 @@ import numpy as np
 
 from unitcad.export.printing import single_precision
 
-CREASE_DEG = 30.0
+CREASE_DEG = 20.0
 """Where two faces meet at more than this, their shading does not run together."""
 _FLOAT, _UINT16, _UINT32, _ARRAY, _ELEMENTS = 5126, 5123, 5125, 34962, 34963
 _HALF = math.sqrt(0.5)

@@ -24,7 +24,7 @@ from vtkmodules.vtkRenderingCore import (
     vtkWindowToImageFilter,
 )
 
-CREASE_DEG = 30.0
+CREASE_DEG = 20.0
 """Edges sharper than this are drawn as lines and not shaded over."""
 INK = (0.13, 0.15, 0.18)
 

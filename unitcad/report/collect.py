@@ -94,6 +94,8 @@ def _row(each: dict[str, Any]) -> dict[str, Any]:
     for part in manifest.get("parts", []):
         if part.get("made") == "cast":
             row[f"{part['name']}_mm3"] = part["volume_mm3"]
+    for model, said in ((manifest.get("estimate") or {}).get("models") or {}).items():
+        row[f"edge_{model}"] = said.get("edge")
     laws = manifest.get("laws", [])
     row["laws"] = ("hold" if all(law["ok"] for law in laws) else "broken") if laws else None
     row["warnings"] = len(manifest.get("warnings", []))

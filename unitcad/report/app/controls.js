@@ -96,7 +96,10 @@
       const stop = (value, round) => (round(value * 20) / 20).toFixed(2);
       at.input.min = stop(low, Math.floor);
       at.input.max = stop(high, Math.ceil);
-      at.input.value = axis.value === "z" ? stop((low + high) / 2, Math.round) : "0";
+      // Through the unit's axis; in a set of several, through the nearest row of cells.
+      const row = state.parts === kinds.moulds[0].parts ? Math.min(...model.cells.map((cell) => cell[1])) : 0;
+      const middle = { x: 0, y: row, z: (low + high) / 2 }[axis.value];
+      at.input.value = stop(middle, Math.round);
     }
 
     function choose(kind) {

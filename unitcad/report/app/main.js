@@ -89,10 +89,10 @@
     };
     const names = varying.length ? varying : table.columns;
     const texts = varying.filter((name) => !numeric.includes(name) && name !== nameColumn);
-    const preferred = (list, pattern) => list.find((name) => pattern.test(name));
+    const preferred = (list, pattern) => list.find((name) => pattern.test(name) && (list !== numeric || filled(name) * 2 > table.rows.length));
     const controls = el("div", { className: "tools" },
       choice("x", "Across", names, preferred(numeric, /wall|thick|diameter/) || numeric[0] || names[0]),
-      choice("y", "Up", names, preferred(numeric, /fitted|edge|level/) || numeric[1] || numeric[0] || names[names.length - 1]),
+      choice("y", "Up", names, preferred(numeric, /fitted/) || preferred(numeric, /edge|volume|mm3/) || numeric[1] || numeric[0] || names[names.length - 1]),
       choice("group", "Colour", ["", ...texts], preferred(texts, /design|material/) || ""));
     const geometries = Object.keys(data.models).length;
     const failed = table.rows.filter((row) => !row[0]).length;

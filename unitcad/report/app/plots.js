@@ -128,9 +128,10 @@
       const dots = (u, index) => {
         const colour = theme.colour(COLOURS[(index - 1) % COLOURS.length]);
         const { ctx } = u;
-        const radius = 4.5 * devicePixelRatio;
+        // Smaller from group to group: of points that coincide each is seen.
+        const radius = Math.max(3, 6 - 1.2 * (index - 1)) * devicePixelRatio;
         ctx.save();
-        ctx.fillStyle = `${colour}c0`;
+        ctx.fillStyle = colour;
         ctx.strokeStyle = theme.colour("paper");
         ctx.lineWidth = devicePixelRatio;
         u.data[index][0].forEach((x, i) => {

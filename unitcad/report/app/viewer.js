@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const { theme } = window.unitcad;
-  const CREASE_DEG = 30;
+  const CREASE_DEG = 20;
   const VIEWS = { corner: [0.55, -1, 0.55], front: [0, -1, 0.001], above: [0, -0.001, 1], below: [0.45, -1, -0.7], side: [1, 0, 0.001] };
   // What a cut takes away faces the first view: the near side, the right one, the top.
   const CUTS = { y: [0, 1, 0], x: [-1, 0, 0], z: [0, 0, -1] };

@@ -1,0 +1,129 @@
+"""Make the README's pictures, and with --look every screenshot of both pages for a person to look at.
+
+    python docs/pictures/make.py              unit, moulds and two pages, into this folder
+    python docs/pictures/make.py --look DIR   both pages in light, dark and 390 pixels wide, into DIR
+
+Needs the extras `cadquery` and `test`, and Chromium.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parents[1] / "tests" / "report"))
+
+import chromium  # noqa: E402
+from PIL import Image  # noqa: E402
+
+from unitcad.cache import MemoryStore  # noqa: E402
+from unitcad.export.picture import draw  # noqa: E402
+from unitcad.pipeline import Variant, build  # noqa: E402
+from unitcad.pipeline.scenes import exploded, step_in_section, unit_cut_open  # noqa: E402
+from unitcad.report import write_report  # noqa: E402
+from unitcad.spec import load  # noqa: E402
+
+MOST_BYTES = 250_000
+LOOKS = (("light", 1280, 900, False), ("dark", 1280, 900, True), ("narrow", 390, 844, False))
+
+
+def main() -> None:
+    """Make what was asked for; prints each file with its size."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--look", type=Path, metavar="DIR", help="screenshots of both pages, whole, into DIR")
+    look = parser.parse_args().look
+    with tempfile.TemporaryDirectory() as scratch:
+        made = screenshots(look, Path(scratch)) if look else {**pictures(), **pages(Path(scratch))}
+    for name, content in sorted(made.items()):
+        target = (look or HERE) / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+        print(f"{target}  {len(content) / 1000:.0f} kB")
+
+
+def pictures() -> dict[str, bytes]:
+    """Units cut open, the encapsulating set taken apart, and its second pour."""
+    variants = {name: Variant.of(name) for name in ("encapsulating", "embedded")}
+    scenes = {f"{name}-unit.png": unit_cut_open(variant) for name, variant in variants.items()}
+    scenes["encapsulating-moulds.png"] = exploded(variants["encapsulating"])
+    scenes["encapsulating-pour2.png"] = step_in_section(variants["encapsulating"], 2)
+    return {name: small(image) for name, image in zip(scenes, draw(list(scenes.values())), strict=True)}
+
+
+def pages(scratch: Path) -> dict[str, bytes]:
+    """The top of a variant's page and of a batch's."""
+    found = {}
+    with chromium.browser() as running:
+        for name, page in written(scratch):
+            seen = chromium.Visit(running, page)
+            if name == "variant":
+                seen.drawn()
+            found[f"page-{name}.png"] = small(seen.page.screenshot(full_page=name == "batch"))
+            seen.close()
+    return found
+
+
+def screenshots(look: Path, scratch: Path) -> dict[str, bytes]:
+    """Both pages whole, in every look; the variant's with the unit, the set taken apart, and as printed."""
+    found = {}
+    with chromium.browser() as running:
+        for name, page in written(scratch):
+            for scheme, width, height, dark in LOOKS:
+                seen = chromium.Visit(running, page, width, height, dark)
+                if name == "variant":
+                    seen.drawn()
+                    found[f"{name}-{scheme}-moulds.png"] = moulds(seen)
+                    seen.page.check('input[value="unit"]')
+                found[f"{name}-{scheme}.png"] = seen.page.screenshot(full_page=True)
+                if (name, scheme) == ("variant", "light"):
+                    seen.page.emulate_media(media="print")
+                    seen.page.evaluate("() => window.dispatchEvent(new Event('beforeprint'))")
+                    found["variant-printed.png"] = seen.page.screenshot(full_page=True)
+                seen.close()
+    return found
+
+
+def moulds(seen: Any) -> bytes:
+    """The 3D part with the moulds taken apart."""
+    seen.page.check('input[value="moulds"]')
+    seen.page.uncheck('input[name="cut"]')
+    seen.page.fill('input[name="apart"]', "100")
+    seen.page.dispatch_event('input[name="apart"]', "change")
+    seen.page.wait_for_timeout(300)
+    image = seen.page.locator("#view").screenshot()
+    seen.page.fill('input[name="apart"]', "0")
+    seen.page.check('input[name="cut"]')
+    return image
+
+
+def written(scratch: Path) -> Iterator[tuple[str, Path]]:
+    """The page of one variant, and of a small sweep over walls and silicones."""
+    yield "variant", write_report(build(load("encapsulating"), scratch / "one").folder)
+    store, out = MemoryStore(), scratch / "sweep"
+    for design in ("embedded", "encapsulating"):
+        for wall in (0.8, 1.0, 1.25, 1.5, 1.75, 2.0):
+            for inner, outer in (("ecoflex-00-10", "dragon-skin-10-medium"), ("ecoflex-00-10", "dragon-skin-30")):
+                changes = [f"layers.0.wall_mm={wall}", f'layers.0.material="{inner}"', f'layers.1.material="{outer}"']
+                name = f'name="{design} {wall} {outer}"'
+                spec = load(design, [*changes, name, "diameter_mm=16.0", 'output.formats=["stl"]'])
+                build(spec, out, only=["unit", "moulds", "estimate"], check=False, store=store)
+    yield "batch", write_report(out)
+
+
+def small(image: bytes) -> bytes:
+    """The picture with 256 colours, which a drawing needs no more than. Raises ValueError past MOST_BYTES."""
+    reduced = io.BytesIO()
+    Image.open(io.BytesIO(image)).convert("RGB").quantize(256).save(reduced, "PNG", optimize=True)
+    if len(reduced.getvalue()) >= MOST_BYTES:
+        raise ValueError(f"a picture of {len(reduced.getvalue())} bytes, {MOST_BYTES} at most")
+    return reduced.getvalue()
+
+
+if __name__ == "__main__":
+    main()
