@@ -1,7 +1,8 @@
 """Self-crossing (G001), touching shells (G003) and coplanar overlap (G004), decided exactly.
 
-Three sieves, each a whole block of pairs at a time: boxes; faces round a vertex whose star is a height field, which can
-meet in that vertex only; planes, in floating point with an error bound. What is left is decided by exact signs.
+Four sieves, each a whole block of pairs at a time: boxes; faces round a vertex whose star is a height field, which can
+meet in that vertex only; planes of the faces; planes through their edges, both in floating point with an error bound.
+What is left is decided by exact signs.
 A crossing is one of: two faces pass through each other; an edge lies in a face and its two faces leave to both sides.
 """
 
@@ -14,7 +15,7 @@ import numpy as np
 from unitcad.check import triangles
 from unitcad.check.findings import Finding, Location
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Bools, Floats, Ints, area_vectors, float32_step
+from unitcad.check.mesh import Bools, Floats, Ints, area_vectors, cross, float32_step
 from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology, max_side_squared
@@ -51,7 +52,6 @@ class _Faces:
     vertices: Floats
     corners: tuple[Ints, Ints, Ints]
     normal: Floats
-    size: Floats
     safe: tuple[Ints, Ints, Ints]
     shell: Ints
     original: Ints
@@ -94,20 +94,16 @@ def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) ->
     vertices = topology.mesh.vertices
     corners = tuple(np.ascontiguousarray(ordered[:, k]) for k in range(3))
     points = [np.ascontiguousarray(vertices[:, axis]) for axis in range(3)]
-    at = [[column[corner] for column in points] for corner in corners]
+    at = [[column.take(corner, mode="clip") for column in points] for corner in corners]
     if topology.edges.closed:
         smooth = _height_fields(len(vertices), corners, at, normal)
         safe = tuple(np.where(smooth[corner], corner, -1) for corner in corners)
     else:
         safe = tuple(np.full(len(order), -1, np.int32) for _ in corners)
-    size = np.zeros(len(ordered))
-    for k in range(3):
-        np.maximum(size, sum((at[k][axis] - at[k - 1][axis]) ** 2 for axis in range(3)), out=size)
     return _Faces(
         vertices,
         corners,  # type: ignore[arg-type]
         normal,
-        size,
         safe,  # type: ignore[arg-type]
         topology.shells[order],
         topology.kept[order],
@@ -147,8 +143,8 @@ def _height_fields(n: int, corners: tuple[Ints, ...], at: list[list[Floats]], ar
 
 def _strangers(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     """Without pairs that share a vertex whose star is a height field."""
-    mine = [safe[i] for safe in faces.safe]
-    theirs = [corner[j] for corner in faces.corners]
+    mine = [safe.take(i, mode="clip") for safe in faces.safe]
+    theirs = [corner.take(j, mode="clip") for corner in faces.corners]
     shared = mine[0] == theirs[0]
     part = np.empty(len(i), bool)
     for a in range(3):
@@ -159,10 +155,15 @@ def _strangers(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     return i[keep], j[keep]
 
 
+def _longest(faces: _Faces, which: Ints) -> Floats:
+    """The squared length of the longest side of some faces."""
+    return max_side_squared(np.stack([faces.vertices[corner[which]] for corner in faces.corners], axis=1))
+
+
 def _beside(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     """Without pairs where one lies wholly on one side of the other's plane, farther than rounding can hide."""
     for _ in range(2):
-        normal, size = faces.normal[i], faces.size[i]
+        normal, size = faces.normal[i], _longest(faces, i)
         origin = faces.vertices[faces.corners[0][i]]
         above, below = np.ones(len(i), bool), np.ones(len(i), bool)
         bound = 32 * _EPS * size
@@ -179,11 +180,32 @@ def _beside(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     return i, j
 
 
+def _aside(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
+    """Without pairs where one lies wholly beyond an edge of the other, seen along that one's normal."""
+    for _ in range(2):
+        first = [faces.vertices[corner[i]] for corner in faces.corners]
+        second = [faces.vertices[corner[j]] for corner in faces.corners]
+        normal, reach = faces.normal[i], np.sqrt(_longest(faces, i))
+        beyond = np.zeros(len(i), bool)
+        for k in range(3):
+            out = cross(first[(k + 1) % 3] - first[k], normal)
+            bound = 64 * _EPS * np.abs(out).sum(axis=1)
+            apart = np.ones(len(i), bool)
+            for point in second:
+                offset = point - first[k]
+                height = np.einsum("ij,ij->i", offset, out)
+                apart &= height > bound * (np.abs(offset).sum(axis=1) + reach)
+            beyond |= apart
+        keep = np.flatnonzero(~beyond)
+        i, j = j[keep], i[keep]
+    return i, j
+
+
 def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> None:
     """Exact answers for the pairs that came through the sieves."""
     i = np.concatenate([pair[0] for pair in waiting]) if waiting else np.empty(0, np.int32)
     j = np.concatenate([pair[1] for pair in waiting]) if waiting else np.empty(0, np.int32)
-    i, j = _beside(faces, i, j)
+    i, j = _aside(faces, *_beside(faces, i, j))
     if not len(i) or found.kept > _FEW:
         return
     ids_a = np.stack([corner[i] for corner in faces.corners], axis=1)

@@ -78,14 +78,14 @@ def meeting_pairs(boxes: Ints, deadline: Deadline) -> Iterator[tuple[Ints, Ints]
     Rows near each other should be near in space.
     """
     levels = _levels(boxes, 0)
-    first, second = (side.astype(np.int32) for side in np.triu_indices(len(levels[-1])))
+    first, second = np.triu_indices(len(levels[-1]))
     yield from _descend(levels, levels, first, second, deadline, own=True)
 
 
 def meeting_between(boxes: Ints, others: Ints, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
     """The same between the rows of two sets in one frame: row of `boxes`, row of `others`."""
     here, there = _levels(boxes, len(others)), _levels(others, len(boxes))
-    top = np.indices((len(here[-1]), len(there[-1]))).reshape(2, -1).astype(np.int32)
+    top = np.indices((len(here[-1]), len(there[-1]))).reshape(2, -1)
     yield from _descend(here, there, top[0], top[1], deadline, own=False)
 
 
@@ -149,10 +149,10 @@ def _walk(
 
     Of a node with itself the pairs of children (p, q) for which `skip(p, q)` are left out.
     """
-    column = np.arange(_FAN, dtype=np.int32)
+    column = np.arange(_FAN)
     grid_i, grid_j = (side.reshape(-1) for side in np.meshgrid(column, column, indexing="ij"))
     left_out = np.zeros(_FAN * _FAN, bool) if skip is None else skip(grid_i, grid_j)
-    empty = np.empty(0, np.int32)
+    empty = np.empty(0, np.intp)
     yield empty, empty
     for start in range(0, len(first), _STEP):
         deadline.tick()
@@ -173,4 +173,9 @@ def _walk(
             meet.reshape(_FAN * _FAN, -1)[np.ix_(left_out, own)] = False
         found = np.flatnonzero(meet)
         which, pair = found >> _STEP_BITS, found & (_STEP - 1)
-        yield i[pair] * _FAN + grid_i[which], j[pair] * _FAN + grid_j[which]
+        i, j = i.take(pair), j.take(pair)
+        i *= _FAN
+        j *= _FAN
+        i += grid_i.take(which)
+        j += grid_j.take(which)
+        yield i, j

@@ -211,8 +211,11 @@ def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints) ->
 
 def max_side_squared(corners: Floats) -> Floats:
     """The squared length of each triangle's longest side; corners (n, 3, 3)."""
-    sides = corners - corners[:, [1, 2, 0]]
-    return np.einsum("ijk,ijk->ij", sides, sides).max(axis=1, initial=0)
+    found = np.zeros(len(corners))
+    for k in range(3):
+        side = corners[:, k] - corners[:, k - 1]
+        np.maximum(found, np.einsum("ij,ij->i", side, side), out=found)
+    return found
 
 
 def _exactly_flat(corners: Floats, double: Floats) -> Bools:
