@@ -9,11 +9,13 @@ import json
 import math
 import sys
 from pathlib import Path
+from typing import Any
 
 from unitcad.moulds.filament import FLARE, STUB_TAIL
 from unitcad.moulds.layout import CORNER_RADIUS, PLINTH_DRAFT_DEG, TEXT_MARGIN
 from unitcad.moulds.tooling import BLADE_EDGE, BLADE_THICKNESS, GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
 from unitcad.pipeline import Variant
+from unitcad.shape import mm
 from unitcad.shape.lettering import HEIGHT, outlines, text_width
 from unitcad.spec.door import groove_depth
 
@@ -75,6 +77,13 @@ def lengths() -> dict:
     }
 
 
+def on_grid(value: Any) -> Any:
+    """Every length on unitcad's grid, so that volumes differ by tessellation alone."""
+    if isinstance(value, dict):
+        return {key: item if key == "splay" else on_grid(item) for key, item in value.items()}
+    return [on_grid(item) for item in value] if isinstance(value, list | tuple) else mm(value)
+
+
 def _text(text: str, stroke: float, x: float, y: float) -> list[dict]:
     """Outline and islands of every character, moved to where it stands."""
     found = []
@@ -91,4 +100,4 @@ def _text(text: str, stroke: float, x: float, y: float) -> list[dict]:
 
 
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(json.dumps(lengths()))
+    Path(sys.argv[1]).write_text(json.dumps(on_grid(lengths())))

@@ -87,9 +87,9 @@ def plinth(n: dict, grow: float, bottom: float) -> Any:
 def text(letters: list, z0: float, z1: float) -> list:
     found = []
     for letter in letters:
-        sketch = Polygon(*letter["outer"], align=None)
+        sketch = Polygon(*map(tuple, letter["outer"]), align=None)
         for island in letter["islands"]:
-            sketch -= Polygon(*island, align=None)
+            sketch -= Polygon(*map(tuple, island), align=None)
         found.append(extrude(Pos(0, 0, z0) * sketch, z1 - z0))
     return found
 

@@ -112,7 +112,7 @@ def solve(
             lambda x: (np.abs(x[1]) < _TINY) & (x[0] < pressure_radius), boundaries_only=True
         )
         side = skfem.FacetBasis(mesh, basis.elem, facets=pressed, intorder=5)
-        load = load - skfem.LinearForm(lambda v, w: v.value[1] * w.x[0]).assemble(side)
+        load = load - skfem.LinearForm(lambda v, w: v[1] * w.x[0]).assemble(side)
     return _surface(basis, _solve(basis, stiffness, load, blocks, levels[0], radius))
 
 
@@ -129,9 +129,9 @@ def _assemble(basis: Basis, materials: Sequence[Any], omega: float) -> csc_matri
 
     def energy(u: Any, v: Any, w: Any) -> Any:
         du, dv, r = u.grad, v.grad, w.x[0]
-        strain = du[0][0] * dv[0][0] + du[1][1] * dv[1][1] + u.value[0] * v.value[0] / r**2
+        strain = du[0][0] * dv[0][0] + du[1][1] * dv[1][1] + u[0] * v[0] / r**2
         shear = (du[0][1] + du[1][0]) * (dv[0][1] + dv[1][0])
-        kinetic = u.value[0] * v.value[0] + u.value[1] * v.value[1]
+        kinetic = u[0] * v[0] + u[1] * v[1]
         return (w.mu * (2 * strain + shear) - w.inertia * kinetic) * r
 
     matrix = skfem.BilinearForm(energy, dtype=np.complex128).assemble(basis, mu=mu, inertia=inertia)
@@ -145,11 +145,11 @@ def _assemble(basis: Basis, materials: Sequence[Any], omega: float) -> csc_matri
 
     def divergence(i: int) -> Any:
         form = skfem.BilinearForm(
-            lambda u, q, w: linear(w.x)[i] * q * (u.grad[0][0] + u.grad[1][1] + u.value[0] / w.x[0]) * w.x[0]
+            lambda u, q, w: linear(w.x)[i] * q * (u.grad[0][0] + u.grad[1][1] + u[0] / w.x[0]) * w.x[0]
         )
         return form.assemble(basis, constant)
 
-    x, weight = basis.global_coordinates().value, basis.dx
+    x, weight = np.asarray(basis.global_coordinates()), basis.dx
     functions = linear(x)
     gram = np.array([[np.sum(f * g * x[0] * weight, axis=1) for f in functions] for g in functions])
     bulk = np.linalg.inv(np.moveaxis(gram, -1, 0)) * lame[:, None, None]

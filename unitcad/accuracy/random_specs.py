@@ -60,10 +60,10 @@ class Ranges:
 
 DOCUMENTED = Ranges(
     diameter_mm=(12.0, 60.0),
-    motor_diameter_mm=(4.0, 12.0),
+    motor_diameter_mm=(4.0, 10.0),
     motor_thickness_mm=(1.8, 5.0),
-    layers=(1, 4),
-    wall_mm=(0.6, 3.0),
+    layers=(1, 3),
+    wall_mm=(0.6, 2.5),
     cap_mm=(1.1, 4.0),
     tail_width_mm=(0.6, 4.0),
     fpcb_thickness_mm=(0.05, 0.25),
@@ -136,6 +136,10 @@ def random_spec(choose: Choose, ranges: Ranges = DOCUMENTED, formats: Sequence[s
             layer["cap_mm"] = length(ranges.cap_mm)
         layers.append(layer)
     diameter = spread(ranges.diameter_mm, 3)
+    if ranges.edges and choose.whole(0, 3):
+        # Most sums of walls leave no room in a diameter drawn by itself: these are drawn round motor and walls.
+        walls = motor["diameter_mm"] / 2 + sum(layer["wall_mm"] for layer in layers)
+        diameter = round(min(ranges.diameter_mm[1], 2 * walls + length((0.0, 12.0))), 3)
     data: dict[str, Any] = {
         "name": "random",
         "design": design,

@@ -1,0 +1,100 @@
+"""Suites' results: promises, frontier, page, plots, timing; and the command's exit codes."""
+
+import json
+import math
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from unitcad.accuracy import runner
+from unitcad.accuracy.plot import svg
+from unitcad.accuracy.result import Plot, Promise, Result, Table, from_dict, frontier, markdown, shown
+from unitcad.accuracy.timing import interleaved, timing
+from unitcad.errors import Refusal, UnitcadError
+
+RESULT = Result(
+    "stability",
+    "Stability",
+    "Text.",
+    (Table("t", ("a", "b"), (("x", 1.5), ("y", None), ("z", math.inf))),),
+    (Plot("p", "s", "e", {"one": ((1e-3, 1e-2), (1e-1, 1e-4), (0.0, 1.0))}),),
+    (Promise("kept", 1e-14, 1e-13), Promise("broken", math.nan, 1.0)),
+    {"cores": 2},
+)
+
+
+def test_a_promise_is_kept_up_to_its_limit_and_never_by_what_is_no_number():
+    assert Promise("", 1.0, 1.0).ok
+    assert not Promise("", 1.1, 1.0).ok
+    assert not Promise("", math.nan, 1.0).ok
+    assert not RESULT.ok
+
+
+def test_frontier_is_what_no_other_point_beats():
+    assert frontier([(1, 1), (2, 0.5), (3, 0.6), (0.5, 2), (1, 1)]) == [True, True, False, True, True]
+    assert frontier([(1, math.nan), (1, 1)]) == [False, True]
+
+
+def test_the_page_says_what_was_measured_on_what():
+    text = markdown(RESULT, ["p.svg"])
+    assert "`unitcad accuracy stability`; measured on: cores 2." in text
+    assert "| y | - |" in text
+    assert "| broken | nan | 1 | BROKEN |" in text
+
+
+def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
+    runner.write([RESULT], tmp_path)
+    other = Result("moulds", "Laws", "More.")
+    runner.write([other], tmp_path)
+    there = runner.read(tmp_path)
+    assert [r.suite for r in there] == ["moulds", "stability"]
+    assert there[1].as_dict() == from_dict(json.loads(json.dumps(RESULT.as_dict()))).as_dict()
+    page = (tmp_path / "accuracy.md").read_text()
+    assert page.index("## Laws") < page.index("## Stability")
+    assert (tmp_path / "accuracy-stability-1.svg").is_file()
+    (tmp_path / "accuracy.json").write_text("{}")
+    with pytest.raises(UnitcadError, match="not a result"):
+        runner.read(tmp_path)
+
+
+def test_plots_repeat_and_leave_out_what_has_no_logarithm():
+    assert svg(RESULT.plots[0]) == svg(RESULT.plots[0])
+    assert svg(RESULT.plots[0]).count('r="3.5"') == 2
+    assert "&lt;b&gt;" in svg(Plot("<b>", "", "", {}))
+
+
+def test_timing_is_interleaved_and_shows_its_spread():
+    order = []
+    found = interleaved({"a": lambda: order.append("a"), "b": lambda: (order.append("b"), time.sleep(0.002))}, 3)
+    assert order == ["a", "b"] * 4
+    assert found["b"].median >= 0.002
+    assert str(timing([1.0, 2.0, 3.0])) == "2 s (1.5 s to 2.5 s)"
+    assert shown(1.23456e-7) == "1.2e-07"
+
+
+def test_unknown_suite_names_the_known():
+    with pytest.raises(Refusal, match="stability"):
+        runner.chosen(["stabilty"])
+
+
+def test_the_command_fails_on_a_broken_promise_alone(tmp_path: Path, monkeypatch, capsys):
+    from unitcad.cli.accuracy import accuracy
+
+    monkeypatch.setattr(runner, "run", lambda *_: RESULT)
+    with pytest.raises(SystemExit) as stopped:
+        accuracy(["stability"], quick=True, specs=None, out=tmp_path, as_json=True)
+    assert stopped.value.code == 1
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["suites"][0]["promises"][1]["value"] is None
+    assert "broken: nan, promised 1" in printed.err
+
+
+def test_stability_by_the_command_line():
+    command = [sys.executable, "-m", "unitcad", "accuracy", "stability", "--quick", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    (suite,) = json.loads(done.stdout)["suites"]
+    assert all(promise["ok"] for promise in suite["promises"])

@@ -1,0 +1,93 @@
+"""Random specs: exit 0 with every law kept, or a refusal that names a field and offers a value that leads on."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from unitcad.accuracy import extremes
+from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, LAW, REFUSED, build_outcome, door, outcome, put_in
+from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, random_spec, seeded_spec
+
+EXAMPLES = int(os.environ.get("UNITCAD_RANDOM_SPECS", "60"))
+
+
+class Drawn:
+    """Hypothesis chooses, and so shrinks."""
+
+    def __init__(self, draw):
+        self._draw = draw
+
+    def whole(self, low, high, /):
+        return self._draw(st.integers(low, high))
+
+    def pick(self, options, /):
+        return self._draw(st.sampled_from(list(options)))
+
+
+@st.composite
+def specs(draw, ranges: Ranges):
+    return random_spec(Drawn(draw), ranges)
+
+
+@settings(max_examples=EXAMPLES, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(st.one_of(specs(DOCUMENTED), specs(EXTREME)))
+def test_a_random_spec_builds_with_its_laws_kept_or_is_refused_with_a_field(data):
+    found = outcome(data)
+    assert found.kind in GOOD, found
+    assert found.kind == BUILT or found.field
+
+
+def test_most_of_the_documented_ranges_builds():
+    """The door and the plan decide; that what passes them keeps its laws is the test above."""
+    seeds = range(300)
+    passed = sum(door(seeded_spec(seed)) is None for seed in seeds)
+    assert passed >= extremes.LEAST_BUILT * len(seeds)
+
+
+def test_nearest_values_lead_to_a_build_or_another_limit():
+    for seed in range(150):
+        data = seeded_spec(seed, "extreme")
+        for _ in range(41):
+            refusal = door(data)
+            if refusal is None or refusal.nearest is None:
+                break
+            data = put_in(data, refusal.field, refusal.nearest)
+            after = door(data)
+            assert after is None or (after.field, after.limit) != (refusal.field, refusal.limit), (seed, str(after))
+        else:
+            pytest.fail(f"seed {seed}: the nearest values never end")
+
+
+def test_a_seed_is_a_spec():
+    assert seeded_spec(5) == seeded_spec(5) != seeded_spec(6)
+
+
+def test_faults_are_seen(monkeypatch):
+    """A refusal whose value changes nothing is a circle; a broken law is no build."""
+    import unitcad.accuracy.outcomes as outcomes
+    from unitcad.moulds import plan
+
+    monkeypatch.setattr(outcomes, "put_in", lambda data, where, value: data)
+    refused = next(data for data in map(seeded_spec, range(50)) if door(data) is not None)
+    assert outcomes.outcome(refused).kind == CIRCLE
+    monkeypatch.setattr(plan.tooling, "seals", lambda *_: [])
+    data = {
+        "name": "leaks",
+        "design": "encapsulating",
+        "diameter_mm": 14.0,
+        "fpcb": {},
+        "layers": [{"material": "ecoflex-00-30", "wall_mm": 2.5, "cap_mm": 2.5}],
+        "output": {"formats": ["stl"], "tolerance_mm": 0.1},
+    }
+    assert build_outcome(data).kind == LAW
+    assert REFUSED in GOOD
+
+
+@pytest.mark.long
+def test_ten_thousand_random_specs():
+    found = extremes.study(extremes.LONG, print)
+    assert found.ok, [promise for promise in found.promises if not promise.ok]

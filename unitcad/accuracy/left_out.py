@@ -1,0 +1,58 @@
+"""What the demand-driven pipeline leaves out per template and request, and the time that it saves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from unitcad.accuracy.result import Result, Say, Table
+from unitcad.accuracy.timing import interleaved, machine
+from unitcad.cache import MemoryStore
+from unitcad.kernels import mesh
+from unitcad.pipeline import OUTPUTS
+from unitcad.pipeline.build import make
+from unitcad.pipeline.stages import Stages
+from unitcad.spec import load, templates
+
+_ALL = ("step", "stl", "3mf", "svg", "glb")
+REQUESTS: dict[str, tuple[Sequence[str], Sequence[str], bool]] = {
+    "everything": (OUTPUTS, _ALL, True),
+    "default formats": (OUTPUTS, ("step", "stl", "3mf"), True),
+    "STL only": (OUTPUTS, ("stl",), True),
+    "STL, no checks": (("unit", "moulds"), ("stl",), False),
+    "unit only": (("unit",), ("stl",), True),
+    "estimate only": (("estimate",), ("stl",), True),
+}
+"""Outputs, formats, checks. Shaded pictures are left aside: their time is another process'."""
+
+
+def run(quick: bool, say: Say) -> Result:
+    """Every template and request, from an empty store each time."""
+    chosen = ("encapsulating",) if quick else tuple(templates())
+    rows: list[tuple[Any, ...]] = []
+    for name in chosen:
+        say(name)
+        manifests: dict[str, dict[str, Any]] = {}
+
+        def build(request: str, name: str = name, manifests: dict[str, Any] = manifests) -> None:
+            only, formats, check = REQUESTS[request]
+            mesh.forget()
+            spec = load(name, [f"output.formats={list(formats)}"])
+            manifests[request] = make(spec, only, check, MemoryStore(), Stages()).manifest
+
+        times = interleaved({request: lambda r=request: build(r) for request in REQUESTS}, 1 if quick else 3)
+        whole = times["everything"].median
+        for request, time in times.items():
+            left = "; ".join(f"{entry['what']} ({entry['why']})" for entry in manifests[request]["left_out"])
+            rows.append((name, request, str(time), time.median / whole, left or "nothing"))
+    return Result(
+        suite="left-out",
+        title="What is left out",
+        text=(
+            "A build computes what the outputs that were asked for need, and its manifest says what it left out and "
+            "why. "
+            "Here every request starts from an empty store in a warm process; the share is of the time for everything."
+        ),
+        tables=(Table("By template and request", ("template", "asked for", "time", "share", "left out"), tuple(rows)),),
+        measured=machine("manifold3d", "cadquery-ocp"),
+    )

@@ -1,0 +1,178 @@
+"""Speed as ratios inside one run: the encapsulating set against plain CadQuery, plain build123d and bare manifold3d.
+
+The scripts lie in benchmarks/, beside those of the other rooms, which are run too; so this suite needs a clone.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from unitcad.accuracy.measures import mesh_volume
+from unitcad.accuracy.result import Promise, Result, Say, Table
+from unitcad.accuracy.timing import Timing, interleaved, machine, timing
+from unitcad.errors import UnitcadError
+from unitcad.pipeline import Variant
+
+ROOT = Path(__file__).parents[2]
+SCRIPTS = {
+    "unitcad, geometry only": "unitcad_set.py",
+    "plain CadQuery": "plain_cadquery.py",
+    "plain build123d": "plain_build123d.py",
+    "bare manifold3d": "bare_manifold.py",
+}
+OURS, CADQUERY, BUILD123D, BARE = SCRIPTS
+FULL = "unitcad build, the whole command"
+OTHERS = ("bench_check.py", "bench_attenuation.py", "bench_batch.py")
+
+
+def run(quick: bool, say: Say) -> Result:
+    """Cold and warm, STL and STEP; then the other benchmarks as they print themselves."""
+    folder = ROOT / "benchmarks" / "encapsulating"
+    if not folder.is_dir():
+        raise UnitcadError("the speed suite needs benchmarks/: run it in a clone of the repository")
+    rounds, warm = (1, 1) if quick else (7, 5)
+    with tempfile.TemporaryDirectory() as scratch:
+        out = Path(scratch)
+        lengths = out / "lengths.json"
+        _call(folder / "lengths.py", lengths)
+        errors = {}
+        for name, script in SCRIPTS.items():
+            say(f"volumes of {name}")
+            _call(folder / script, lengths, out / name, "stl")
+            errors[name] = _volume_error(out / name)
+        tables = [_volume_table(errors)]
+        say("cold, STL")
+        cold = interleaved(
+            {
+                **{
+                    name: lambda s=script, n=name: _call(folder / s, lengths, out / n, "stl")
+                    for name, script in SCRIPTS.items()
+                },
+                FULL: lambda: _build(out / "build", "stl"),
+            },
+            rounds,
+        )
+        tables.append(_time_table("Encapsulating set, parameters to STL, cold processes", cold, CADQUERY))
+        say("cold, STL and STEP")
+        with_step = interleaved(
+            {
+                **{
+                    name: lambda s=script, n=name: _call(folder / s, lengths, out / n, "both")
+                    for name, script in SCRIPTS.items()
+                    if name != BARE
+                },
+                FULL: lambda: _build(out / "build-step", "step,stl"),
+            },
+            rounds,
+        )
+        tables.append(_time_table("The same with STEP, cold processes", with_step, CADQUERY))
+        say("warm")
+        for formats, title in (("stl", "STL"), ("both", "STL and STEP")):
+            names = [name for name in SCRIPTS if name != BARE or formats == "stl"]
+            times = {name: _warm(folder / SCRIPTS[name], lengths, out / name, formats, warm) for name in names}
+            tables.append(
+                _time_table(f"The same, {title}, warm: the library is loaded, geometry made anew", times, CADQUERY)
+            )
+    if not quick:
+        for script in OTHERS:
+            if (ROOT / "benchmarks" / script).is_file():
+                say(script)
+                tables.append(_printed(script))
+    worst = max(_matched(errors[name]) for name in (OURS, CADQUERY, BUILD123D))
+    return Result(
+        suite="speed",
+        title="Speed",
+        text=(
+            "Ten bodies of the encapsulating template with its moulds: two layers, motor, circuit, base, two cups, "
+            "tongue, "
+            "filament stub and blade. The plain scripts draw the same parts as a user would, from the same lengths, "
+            "with "
+            "one boolean after the other; the angle of their STL is chosen so that the largest volume error is that of "
+            "unitcad's meshes. Cold: a new process each, taken in turn. Aims: at least 8 x plain CadQuery, within 2 "
+            "x of "
+            "bare manifold3d; with STEP not slower than CadQuery cold and at least 2.5 x it warm. Warm times come from "
+            "one process a script, so they are not interleaved. A benchmark of another room prints its own table."
+        ),
+        tables=tuple(tables),
+        promises=(
+            Promise(
+                "largest relative volume difference of a plain script's part from the tree's exact part", worst, 5e-3
+            ),
+        ),
+        measured=machine("manifold3d", "cadquery", "build123d", "cadquery-ocp"),
+    )
+
+
+def _call(script: Path, *arguments: object) -> str:
+    """Run a script in a process of its own; its standard output. Raises UnitcadError if it fails."""
+    command = [sys.executable, str(script), *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise UnitcadError(f"{script.name} failed: {done.stderr.strip().splitlines()[-1:]}")
+    return done.stdout
+
+
+def _build(out: Path, formats: str) -> None:
+    command = [sys.executable, "-m", "unitcad", "build", "encapsulating", "--formats", formats, "-o", str(out)]
+    subprocess.run(command, capture_output=True, check=True)
+
+
+def _warm(script: Path, lengths: Path, out: Path, formats: str, runs: int) -> Timing:
+    return timing([float(line) for line in _call(script, lengths, out, formats, runs).split()])
+
+
+def _volume_error(folder: Path) -> dict[str, float]:
+    """Relative volume error of every STL in a folder against OCCT's volume of the same tree."""
+    from unitcad.kernels import occt
+
+    variant = Variant.of("encapsulating")
+    bodies = (*variant.unit, *variant.plan.tools)
+    found = {}
+    for body, solid in zip(bodies, occt.solids([body.shape for body in bodies]), strict=True):
+        corners = _read_stl(folder / f"{body.name}.stl")
+        volume = mesh_volume(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))[0]
+        found[body.name] = volume / occt.measure(solid).volume - 1
+    return found
+
+
+def _read_stl(file: Path) -> np.ndarray:
+    """Corners (n, 3, 3) in mm of a binary or ASCII STL."""
+    raw = file.read_bytes()
+    if raw[:5] == b"solid" and b"facet" in raw[:400]:
+        numbers = [line.split()[1:] for line in raw.decode().splitlines() if line.strip().startswith("vertex")]
+        return np.array(numbers, dtype=float).reshape(-1, 3, 3)
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")])
+    return np.frombuffer(raw, record, offset=84)["corners"].astype(float)
+
+
+def _matched(errors: dict[str, float]) -> float:
+    return max(map(abs, errors.values()))
+
+
+def _volume_table(errors: dict[str, dict[str, float]]) -> Table:
+    names = list(next(iter(errors.values())))
+    rows = tuple((name, *(errors[way][name] for way in errors)) for name in names)
+    return Table(
+        "Volume of each STL against OCCT's exact volume of unitcad's tree, relative",
+        ("part", *errors),
+        rows,
+        "All four work with lengths on the grid of 1/1024 mm: what differs is tessellation.",
+    )
+
+
+def _time_table(title: str, times: dict[str, Timing], base: str) -> Table:
+    rows = tuple((name, str(time), times[base].median / time.median) for name, time in times.items())
+    return Table(title, ("way", "time", f"times faster than {base}"), rows)
+
+
+def _printed(script: str) -> Table:
+    """What another benchmark prints, as it stands."""
+    lines: Sequence[Any] = [line.rstrip() for line in _call(ROOT / "benchmarks" / script).splitlines() if line.strip()]
+    return Table(f"python benchmarks/{script}", ("what it prints",), tuple((f"`{line}`",) for line in lines))
