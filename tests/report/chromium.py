@@ -70,6 +70,19 @@ class Visit:
         self.page.wait_for_selector(".stage-host[data-shown]", timeout=60_000)
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
+    def overflowing(self) -> list[str]:
+        """What reaches past the window's right edge and is in no part that scrolls by itself."""
+        return self.page.evaluate(
+            """() => {
+              const found = document.documentElement.scrollWidth > innerWidth ? ["the page"] : [];
+              for (const node of document.body.querySelectorAll("*")) {
+                if (node.closest(".scroll, nav, .plot, script, style") || !node.checkVisibility()) continue;
+                if (node.getBoundingClientRect().right > innerWidth + 0.5) found.push(node.outerHTML.slice(0, 90));
+              }
+              return found;
+            }"""
+        )
+
     def close(self) -> None:
         """End the visit."""
         self.context.close()

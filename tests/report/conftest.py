@@ -15,7 +15,11 @@ from unitcad.pipeline import build
 from unitcad.report import write_report
 from unitcad.spec import load
 
-HOSTILE = "<script>alert('x')</script> \"quoted\" & <b>bold</b>"
+
+@pytest.fixture(scope="session")
+def hostile() -> str:
+    """A name that would be markup if it were not kept text."""
+    return "<script>alert('x')</script> \"quoted\" & <b>bold</b>"
 
 
 @pytest.fixture(scope="session")
@@ -25,7 +29,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sweep(tmp_path_factory: pytest.TempPathFactory, hostile: str) -> Path:
     """A folder of nine variants: two designs, three walls and three materials, one with markup for a name."""
     out, store = tmp_path_factory.mktemp("sweep"), MemoryStore()
     for wall in (1.0, 1.25, 1.5):
@@ -36,7 +40,7 @@ def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
             )
         changes = [f"layers.0.wall_mm={wall}", "output.formats=[]", f'name="c {wall}"']
         build(load("encapsulating", changes), out, only=["unit"], check=False, store=store)
-    spec = load("single-embedded", ["output.formats=[]"]).model_copy(update={"name": HOSTILE})
+    spec = load("single-embedded", ["output.formats=[]"]).model_copy(update={"name": hostile})
     build(spec, out, store=store)
     write_report(out)
     return out

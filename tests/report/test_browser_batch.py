@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from chromium import Visit
-from conftest import HOSTILE
-from test_browser_variant import overflowing
 
 from unitcad.report import page as pages
 
@@ -42,16 +40,16 @@ def head(visit: Visit, name: str) -> Any:
     return visit.page.locator(".variants thead th button", has_text=name).first
 
 
-def test_markup_stays_text(visit: Visit) -> None:
+def test_markup_stays_text(visit: Visit, hostile: str) -> None:
     asked: list[str] = []
     visit.page.on("dialog", lambda dialog: asked.append(dialog.message))
-    assert HOSTILE in column(visit, "name")
+    assert hostile in column(visit, "name")
     visit.page.fill('input[name="search"]', "<script>alert('x')")
-    assert column(visit, "name") == [HOSTILE]
+    assert column(visit, "name") == [hostile]
     visit.page.click(".variants tbody a")
     visit.drawn()
-    assert visit.page.inner_text("h1") == HOSTILE
-    assert visit.page.title() == HOSTILE
+    assert visit.page.inner_text("h1") == hostile
+    assert visit.page.title() == hostile
     assert visit.page.locator("main script, main b").count() == 0
     assert asked == []
 
@@ -163,7 +161,7 @@ def test_a_senseless_address_shows_the_table(running: Any, sweep: Path) -> None:
 
 def test_nothing_overflows_at_390_pixels(running: Any, sweep: Path) -> None:
     seen = Visit(running, sweep / "report.html", width=390, height=844)
-    assert overflowing(seen) == []
+    assert seen.overflowing() == []
     seen.close()
 
 

@@ -197,22 +197,8 @@ def test_nothing_overflows_at_390_pixels(running: Any, page: Path, dark: bool) -
     assert drawn_share(canvas(seen)) > 0.05
     for summary in seen.page.locator("summary").all():
         summary.click()
-    assert overflowing(seen) == []
+    assert seen.overflowing() == []
     seen.close()
-
-
-def overflowing(visit: Visit) -> list[str]:
-    """What reaches past the window's right edge and is in no part that scrolls by itself."""
-    return visit.page.evaluate(
-        """() => {
-          const found = document.documentElement.scrollWidth > innerWidth ? ["the page"] : [];
-          for (const node of document.body.querySelectorAll("*")) {
-            if (node.closest(".scroll, nav, .plot, script, style") || !node.checkVisibility()) continue;
-            if (node.getBoundingClientRect().right > innerWidth + 0.5) found.push(node.outerHTML.slice(0, 90));
-          }
-          return found;
-        }"""
-    )
 
 
 def test_light_and_dark(running: Any, page: Path) -> None:
