@@ -4,15 +4,14 @@
 
 Topology rules against trimesh's is_volume on the same arrays; all rules (topology, self-crossing, shells) against
 pymeshlab's compute_selection_by_self_intersections_per_face, which is GPL and runs in an environment of its own
-(`--peer`); a whole file by `check_file` against `admesh -n -u -f -d -v` style checks of the admesh command (`--topology`
-part only, it knows no crossing), and the peak memory of a process that judges it.
+(`--peer`); a whole file by `check_file` beside the admesh command, which knows no crossing; and the peak memory of a
+process that judges the file.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import resource
 import shutil
 import subprocess
 import sys
@@ -38,11 +37,14 @@ for line in sys.stdin:
     print(time.perf_counter() - start, flush=True)
 """
 MEMORY = """
-import resource, sys
+import sys
 from unitcad.check import check_file
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+def peak():  # of this process alone: a child's ru_maxrss begins at its parent's
+    with open("/proc/self/status") as status:
+        return int(next(line.split()[1] for line in status if line.startswith("VmHWM"))) // 1024
+before = peak()
 report = check_file(sys.argv[1])
-print(before // 1024, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024, report.verdict)
+print(before, peak(), report.verdict)
 """
 
 
@@ -106,7 +108,6 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for size in given.sizes.split(","):
             print(json.dumps(measure(int(size), given.peer, given.rounds, Path(folder))), flush=True)
-    print(f"peak of this process {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024} MB", file=sys.stderr)
 
 
 if __name__ == "__main__":

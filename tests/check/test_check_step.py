@@ -1,0 +1,62 @@
+"""STEP: judged where a B-rep extra is installed, refused with a clear message where none is."""
+
+from __future__ import annotations
+
+import builtins
+from pathlib import Path
+
+import pytest
+
+from unitcad.check import Options, check_file
+
+
+def test_without_the_extra_the_message_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.step"
+    path.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n")
+    real = builtins.__import__
+
+    def refuse(name: str, *rest, **more):
+        if name.startswith("OCP"):
+            raise ImportError("No module named 'OCP'")
+        return real(name, *rest, **more)
+
+    monkeypatch.setattr(builtins, "__import__", refuse)
+    report = check_file(path)
+    assert report.verdict == "error"
+    assert "pip install 'unitcad[build123d]'" in report.findings[0].message
+
+
+@pytest.mark.parametrize(
+    ("text", "code"), [("", "F001"), ("solid a", "F005"), ("ISO-10303-21;\nHEADER;", "F003"), ("<html>", "F005")]
+)
+def test_what_is_no_step_file(text: str, code: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.step"
+    path.write_text(text)
+    assert [found.code for found in check_file(path).findings] == [code]
+
+
+def test_solids_volume_and_box(tmp_path: Path) -> None:
+    pytest.importorskip("OCP")
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+    from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
+    from OCP.TopoDS import TopoDS_Compound
+
+    compound, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(compound)
+    builder.Add(compound, BRepPrimAPI_MakeBox(10.0, 20.0, 30.0).Shape())
+    builder.Add(compound, BRepPrimAPI_MakeCylinder(5.0, 10.0).Shape())
+    writer = STEPControl_Writer()
+    writer.Transfer(compound, STEPControl_AsIs)
+    path = tmp_path / "two.step"
+    writer.Write(str(path))
+    report = check_file(path)
+    assert report.findings == ()
+    assert report.facts.shells == 2
+    assert report.facts.volume_mm3 == pytest.approx(6000 + 785.3981633974483, rel=1e-9)
+    assert report.facts.bbox_mm is not None
+    assert report.facts.bbox_mm[1] == pytest.approx((10, 20, 30), abs=1e-6)
+    assert check_file(path, Options(shells=1)).has("G005")
+    cut = tmp_path / "cut.step"
+    cut.write_bytes(path.read_bytes()[:-200])
+    assert check_file(cut).has("F003")
