@@ -256,9 +256,9 @@ def _not_needed(spec: Spec) -> list[dict[str, str]]:
     found = []
     if len(spec.layers) == 1:
         found.append(_left("second pour", "one layer: one pour"))
-    if not spec.fpcb:
+    if not spec.fpcb and not spec.wires:
         found.append(_left("tongue and slot", "no FPCB"))
-    elif spec.design == "embedded":
+    elif spec.design == "embedded" and not spec.wires:
         found.append(_left("tongue and slot", "embedded: the circuit lies on the rings"))
     if spec.design == "embedded":
         found.append(_left("filament stub and hole", "embedded: open rings hold no suction"))
