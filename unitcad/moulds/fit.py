@@ -5,6 +5,7 @@ A law compares what was drawn as a unit with what was drawn as tools. Nothing he
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from itertools import combinations
 
@@ -104,11 +105,13 @@ def unit_overlap_law(bodies: Iterable[Body], solids: Mapping[str, Manifold]) -> 
     return _overlaps("unit", [(body.name, solids[body.name]) for body in bodies])
 
 
-def gap_law(spec: Spec, plan: Plan, solids: Mapping[str, Manifold]) -> list[Finding]:
+def gap_law(spec: Spec, plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[Finding]:
     """C210: faces that must slide have the printer's clearance: skirt and plinth, tongue and window, lid and cup.
 
-    The skirt is measured below the seat, where cup and plinth touch on purpose; the lid's below the rim.
+    The skirt is measured below the seat, where cup and plinth touch on purpose; the lid's below the rim. Round corners
+    are polygons of `segments` a turn on both sides: midway along a facet their gap is the clearance's cosine of pi / n.
     """
+    chord = math.cos(math.pi / segments)
     moulds = spec.moulds
     skirt = min(moulds.plinth_clearance_mm or 0, moulds.seat_relief_mm or 0)
     window = moulds.window_clearance_mm or 0
@@ -116,14 +119,14 @@ def gap_law(spec: Spec, plan: Plan, solids: Mapping[str, Manifold]) -> list[Find
     for step in plan.steps:
         cup = solids[step.cup]
         gap = cup.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
-        found.append(at_least("C210", f"{step.cup} skirt and plinth", gap, skirt - GRID, "mm"))
+        found.append(at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm"))
         for tongue in (tool for tool in step.tools if tool.startswith("tongue")):
             gap = cup.min_gap(solids[tongue], window + 1)
             found.append(at_least("C210", f"{step.cup} window and {tongue}", gap, window - GRID, "mm"))
         if step.lid:
             play = moulds.plinth_clearance_mm or 0
             gap = solids[step.lid].trim_by_plane((0, 0, -1), play - step.rim).min_gap(cup, play + 1)
-            found.append(at_least("C210", f"{step.lid} skirt and {step.cup}", gap, play - GRID, "mm"))
+            found.append(at_least("C210", f"{step.lid} skirt and {step.cup}", gap, play * chord - GRID, "mm"))
     return found
 
 

@@ -51,6 +51,6 @@ def geometric_laws(
         found += fit.overlap_law(step, solids, segments)
         thinnest = min(layer.wall_mm, layer.cap_mm or layer.wall_mm)
         found += air_law(step, [holding for _, holding in cells], thinnest)
-    found += fit.gap_law(spec, plan, solids)
+    found += fit.gap_law(spec, plan, solids, segments)
     overlapping = any(finding.code == "C200" and not finding.ok for finding in found)
     return found + draw_law(plan, solids, segments, overlapping)
