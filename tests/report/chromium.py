@@ -21,6 +21,17 @@ FLAGS = (
 )
 
 
+LISTEN = """
+  window.clickable = [];
+  const listen = EventTarget.prototype.addEventListener;
+  EventTarget.prototype.addEventListener = function (type, ...rest) {
+    if (type === "click") window.clickable.push(this);
+    return listen.call(this, type, ...rest);
+  };
+"""
+"""Keeps a list of what listens to clicks."""
+
+
 def executable() -> str | None:
     """Where Chromium is, or None."""
     return shutil.which("chromium")
@@ -55,6 +66,7 @@ class Visit:
         self.context = running.new_context(
             viewport={"width": width, "height": height}, color_scheme=scheme, reduced_motion="reduce"
         )
+        self.context.add_init_script(LISTEN)
         self.page = self.context.new_page()
         self.console: list[str] = []
         self.requests: list[str] = []

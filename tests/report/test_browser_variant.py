@@ -140,6 +140,12 @@ def test_every_control_is_reached_and_worked_by_keys(visit: Visit) -> None:
         visit.page.evaluate("() => window.reached.add(document.activeElement)")
     reached = visit.page.evaluate("() => [...window.reached].filter((e) => e !== document.body).length")
     assert reached >= wanted
+    # What takes a click and no focus would be out of reach. (A plot's points are in the tables too.)
+    out_of_reach = visit.page.evaluate(
+        """() => window.clickable.filter((e) => e.isConnected && e.checkVisibility && e.checkVisibility() && e.tabIndex < 0
+          && !e.closest(".plot")).map((e) => e.outerHTML.slice(0, 80))"""
+    )
+    assert out_of_reach == []
 
     view = visit.page.locator(".view canvas")
     view.focus()
