@@ -32,7 +32,11 @@ class Journal:
         self._lines = array("q")
         self.counts: dict[str, int] = {}
         path = out / JOURNAL
-        fresh = not path.exists() or not _fits(path, head)
+        try:
+            fresh = not path.exists() or not _fits(path, head)
+        except BaseException:
+            self._lock.close()
+            raise
         self._file = open(path, "ab+" if not fresh else "wb+")  # noqa: SIM115
         if fresh:
             self._append(head)
