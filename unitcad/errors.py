@@ -1,4 +1,4 @@
-"""The errors that a person may meet. Each is one clear sentence; the command line prints it and exits with `exit_code`."""
+"""The errors that a person may meet: one clear sentence each; the command line prints it, exits with `exit_code`."""
 
 from __future__ import annotations
 

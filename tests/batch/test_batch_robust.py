@@ -22,7 +22,7 @@ def _start(*words: object, **more) -> subprocess.Popen[str]:
     )
 
 
-def _wait_for(what, seconds: float = 30.0) -> None:
+def _wait_for(what, seconds: float = 240.0) -> None:
     end = time.monotonic() + seconds
     while not what():
         assert time.monotonic() < end, "waited in vain"
@@ -47,7 +47,7 @@ def test_a_killed_parent_loses_nothing(tmp_path: Path) -> None:
     workers = psutil.Process(child.pid).children(recursive=True)
     child.kill()
     child.communicate()
-    psutil.wait_procs(workers, timeout=10)
+    psutil.wait_procs(workers, timeout=60)
     assert not any(worker.is_running() and worker.status() != psutil.STATUS_ZOMBIE for worker in workers)
     before = {folder.name: folder.stat().st_ino for folder in _results(out)}
     assert all(map(_whole, _results(out)))
@@ -68,7 +68,7 @@ def test_a_killed_worker_costs_its_variant_one_more_try(tmp_path: Path) -> None:
     child = _start("batch", sweep, "-o", out, "-j", 2, "--json")
     _wait_for(lambda: len(_results(out)) >= 2)
     psutil.Process(child.pid).children()[0].kill()
-    told, errors = child.communicate(timeout=60)
+    told, errors = child.communicate(timeout=240)
     assert child.returncode == 0, errors
     summary = json.loads(told)
     assert summary["ok"] == 7
@@ -81,7 +81,7 @@ def test_a_killed_worker_costs_its_variant_one_more_try(tmp_path: Path) -> None:
     ("function", "more", "reason"),
     [
         ("crashes", [], "the worker died (SIGABRT)"),
-        ("hangs", ["--timeout", "1.5"], "timed out after 1.5 s"),
+        ("hangs", ["--timeout", "10"], "timed out after 10 s"),
         ("fails", [], "design ring.py:fails (line 32): ValueError: never"),
     ],
 )
@@ -139,12 +139,12 @@ def test_ctrl_c_stops_at_once_and_keeps_what_is_done(tmp_path: Path) -> None:
     _wait_for(lambda: len(_results(out)) >= 2)
     workers = psutil.Process(child.pid).children(recursive=True)
     os.killpg(child.pid, signal.SIGINT)  # to the whole group, as a terminal does
-    _, errors = child.communicate(timeout=20)
+    _, errors = child.communicate(timeout=120)
     assert child.returncode == 130
     assert "interrupted: " in errors
     assert "the next run takes up the rest" in errors
     assert "Traceback" not in errors
-    psutil.wait_procs(workers, timeout=5)
+    psutil.wait_procs(workers, timeout=60)
     assert not any(worker.is_running() for worker in workers)
     assert all(map(_whole, _results(out)))
     again = unitcad("batch", sweep, "-o", out, "--json")
@@ -159,7 +159,7 @@ def test_two_batches_in_one_folder(tmp_path: Path) -> None:
     second = unitcad("batch", sweep, "-o", out)
     assert second.returncode == 2
     assert "another batch is running" in second.stderr
-    _, errors = first.communicate(timeout=60)
+    _, errors = first.communicate(timeout=240)
     assert first.returncode == 0, errors
     assert [row["status"] for row in rows(out)] == ["ok"] * 7
 
@@ -197,5 +197,5 @@ def _run_with_full_disk(sweep: Path, out: Path, tmp_path: Path) -> subprocess.Co
     )
     env = {**environment(), "PYTHONPATH": str(site)}
     return subprocess.run(
-        command("batch", sweep, "-o", out, "-j", 2), capture_output=True, text=True, check=False, timeout=60, env=env
+        command("batch", sweep, "-o", out, "-j", 2), capture_output=True, text=True, check=False, timeout=240, env=env
     )

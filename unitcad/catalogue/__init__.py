@@ -35,7 +35,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Material:
-    """A castable silicone. Units are in the names; `youngs_modulus_kpa` is at small strain and the motor's frequency."""
+    """A castable silicone. Units are in the names; `youngs_modulus_kpa`: small strain, the motor's frequency."""
 
     name: str
     density_g_cm3: Value
