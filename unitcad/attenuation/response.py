@@ -24,9 +24,10 @@ from unitcad.errors import Refusal
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _LAST = np.array([(2 * j + 1) / 2.0 * _WEIGHTS * np.polynomial.legendre.Legendre.basis(j)(_NODES) for j in (14, 15)])
-_PHASE = 2.0 * np.pi  # of the fastest Bessel product over one panel
+_PHASE = 4.0 * np.pi  # of the fastest Bessel product over one panel
 _MAX_PANELS = 60_000
 _MAX_ROUNDS = 40
+_WORTH_ASKING = 1e-3  # from this rtol on it costs more to find layers that may be left out than to keep them
 _CHUNK = 200_000  # integrand values held at once
 
 
@@ -278,7 +279,7 @@ def _reached(
     """How many layers (from the top) matter within rtol on the lifted path, and a bound of what the others add."""
     full = len(problem.medium.layers)
     bottom = np.cumsum([layer.thickness for layer in problem.medium.layers])
-    if full == 0 or len(corners) == 1:
+    if full == 0 or len(corners) == 1 or rtol >= _WORTH_ASKING:
         return full, 0.0
     panels = _panels(corners, 0.0, 0.0)
     half = (panels[:, 1] - panels[:, 0]) / 2.0
