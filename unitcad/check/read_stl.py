@@ -98,7 +98,7 @@ class _Text:
 
 def _read_text(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
     found = _Text()
-    raw = _decoded(bytes(data), found.findings)
+    raw = _decoded(data.obj if isinstance(data.obj, bytes) else bytes(data), found.findings)
     _walk(raw, found, limits, deadline)
     if not found.facets:
         raise Unreadable(*found.findings, finding("F001", "the file has no facet"))

@@ -14,6 +14,7 @@ _MATERIALS = ("basematerials", "compositematerials")
 _GROUPS = (*_MATERIALS, "colorgroup", "texture2dgroup", "multiproperties")
 _TEXTURED = ("speculartextureid", "glossinesstextureid", "metallictextureid", "roughnesstextureid")
 _SOLID = ("model", "solidsupport")
+_STACK = f"{schema.SLICE} slicestackid"
 
 
 def judge(model: Model) -> None:
@@ -143,7 +144,7 @@ def _property(model: Model, found: Resource) -> None:
     elif found.kind == "multiproperties":
         _multi(model, found)
     elif found.kind == "slicestack":
-        _slicestack(model, found)
+        _slicestack(model, found, found.id in _solid_stacks(model))
 
 
 def _earlier(model: Model, id_: int, rank: int, who: str, kind: str) -> Resource | None:
@@ -188,7 +189,13 @@ def _multi(model: Model, found: Resource) -> None:
                 _in_range(model, index, group.count, f"an index of {who}")
 
 
-def _slicestack(model: Model, found: Resource) -> None:
+def _solid_stacks(model: Model) -> set[int]:
+    """Slice stacks of objects that must be solids: their polygons must be closed."""
+    named = (thing.attributes.get(_STACK, "") for thing in model.objects().values() if thing.type in _SOLID)
+    return {int(said) for said in named if schema.resource_id(said)}
+
+
+def _slicestack(model: Model, found: Resource, solid: bool) -> None:
     """Slice 1.0: heights rise from zbottom; slices or references, not both; polygons name vertices that exist."""
     who = f"slicestack {found.id}"
     kinds = {member[""] for member in found.members}
@@ -198,7 +205,7 @@ def _slicestack(model: Model, found: Resource) -> None:
     count, start, last = 0, -1, -1
 
     def close_polygon() -> None:
-        if start >= 0 and last != start:
+        if solid and start >= 0 and last != start:
             model.say("P017", f"a polygon of {who} is open")
 
     for member in found.members:
@@ -228,7 +235,7 @@ def _slicestack(model: Model, found: Resource) -> None:
 
 
 def _sliced(model: Model, found: Object) -> None:
-    stack = found.attributes.get(f"{schema.SLICE} slicestackid")
+    stack = found.attributes.get(_STACK)
     resolution = found.attributes.get(f"{schema.SLICE} meshresolution", "fullres")
     who = f"object {found.id}"
     if resolution not in ("fullres", "lowres"):

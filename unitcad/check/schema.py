@@ -16,15 +16,15 @@ SLICE = "http://schemas.microsoft.com/3dmanufacturing/slice/2015/07"
 BEAM = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02"
 BALLS = "http://schemas.microsoft.com/3dmanufacturing/beamlattice/balls/2020/07"
 TRIANGLE_SETS = "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07"
-SECURE = "http://schemas.microsoft.com/3dmanufacturing/securecontent/2019/04"
 BOOLEAN = "http://schemas.3mf.io/3dmanufacturing/booleanoperations/2023/07"
 DISPLACEMENT = "http://schemas.3mf.io/3dmanufacturing/displacement/2023/10"
 OLD_DISPLACEMENT = "http://schemas.microsoft.com/3dmanufacturing/displacement/2022/07"
 ALTERNATIVES = "http://schemas.microsoft.com/3dmanufacturing/production/alternatives/2021/04"
 VOLUMETRIC = "http://schemas.3mf.io/3dmanufacturing/volumetric/2022/01"
 IMPLICIT = "http://schemas.3mf.io/3dmanufacturing/implicit/2023/12"
-# Extensions whose required use does not hinder judging the meshes of a file.
-KNOWN = {CORE, MATERIAL, PRODUCTION, SLICE, BEAM, BALLS, TRIANGLE_SETS, SECURE, BOOLEAN, DISPLACEMENT}
+# Extensions whose required use does not hinder judging the meshes of a file. Secure content is not among them: what
+# is encrypted cannot be judged.
+KNOWN = {CORE, MATERIAL, PRODUCTION, SLICE, BEAM, BALLS, TRIANGLE_SETS, BOOLEAN, DISPLACEMENT}
 KNOWN |= {OLD_DISPLACEMENT, ALTERNATIVES, VOLUMETRIC, IMPLICIT}
 
 UNITS = ("micron", "millimeter", "centimeter", "inch", "foot", "meter")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unitcad.check import package as opc
-from unitcad.check import references, scale
+from unitcad.check import references, scale, schema
 from unitcad.check.findings import Facts, Finding
 from unitcad.check.images import image_kind
 from unitcad.check.limits import Deadline, Limits, Unreadable
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from unitcad.check.check import Options
 
 UNITS_MM = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
-_IMAGES = {"image/png": "png", "image/jpeg": "jpeg"}
+_IMAGES = {"image/png": "png", "image/jpeg": "jpeg", "image/jpg": "jpeg"}
 _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
 _FILLED = {"G001", "G002"}
@@ -162,8 +162,6 @@ def _paths(package: Package, model: Model, related: list[Relation], *, is_root: 
             package.say("P002", f"{part} has no relationship of the model type", model.part)
         elif not is_root and any(use.path for found in model.objects().values() for use in found.components):
             package.say("P012", "a part other than the root one refers to objects by path", model.part)
-    if not is_root and model.items:
-        model.say("P017", "a part other than the root one has build items")
 
 
 def _expand(models: dict[str, Model], root: Model, limits: Limits, findings: list[Finding]) -> list[Instance]:
@@ -289,9 +287,10 @@ def _mesh_of(found: Object, factor: float, matrix: Floats | None = None) -> Mesh
 
 
 def _judge(found: Object, factor: float, options: Options, deadline: Deadline) -> Judged:
-    """The geometry rules for one object; only model and solidsupport objects must be solids."""
+    """The geometry rules for one object; only model and solidsupport objects must be solids, unless slices stand in."""
     mesh = _mesh_of(found, factor)
-    if found.type not in ("model", "solidsupport"):
+    stand_in = found.attributes.get(f"{schema.SLICE} meshresolution") == "lowres"
+    if found.type not in ("model", "solidsupport") or stand_in:
         return Judged((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)), None)
     judged = judge_mesh(mesh, deadline, cross=options.cross)
     kept = tuple(

@@ -1,4 +1,4 @@
-"""docs/check-peers.md: our verdicts, computed now, beside the frozen ones of verdicts.json. `python table.py` writes it."""
+"""docs/check-peers.md: our verdicts, computed now, beside the frozen ones. `python table.py` writes it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ WHY = {
     "stl_binary/Star.stl": ZEROS,
     "stl_binary/StarWithEmptyHeader.stl": ZEROS,
     "stl_binary/rear_case.stl": (
-        "Faces cross in 23 places, 0.005 mm deep at most; pymeshlab's own test selects 27 faces of it, none of the four looks."
+        "Faces cross in 23 places, 0.005 mm deep at most. pymeshlab selects 27 of its faces; these four do not look."
     ),
     "stl_tests/bwb.stl": f"Every stored normal is wrong by more than 15 degrees: a warning here. {ZEROS} {ASCII}",
     "stl_tests/dos.stl": f"{ZEROS} {ASCII}",
@@ -57,9 +57,9 @@ def page() -> str:
     lines = [
         "# Verdicts of `unitcad check` beside other programs",
         "",
-        "numpy-stl's files (`tests/corpus`). `altered`: read, but changed or found in need of repair. Ours is computed by the",
-        "test that holds this page to the facts; the others are frozen in `tests/check/peers/verdicts.json`, made by",
-        "`make_verdicts.py` with trimesh 5.2, admesh 0.98.4, lib3mf 2.5.0 and PrusaSlicer 2.5.0.",
+        "numpy-stl's files (`tests/corpus`). `altered`: read, but changed or found in need of repair. Ours is computed",
+        "by the test that holds this page to the facts; the others are frozen in `tests/check/peers/verdicts.json`,",
+        "made by `make_verdicts.py` with trimesh 5.2, admesh 0.98.4, lib3mf 2.5.0 and PrusaSlicer 2.5.0.",
         "",
         "| file | unitcad | " + " | ".join(PEERS) + " | why they differ |",
         "| --- " * (len(PEERS) + 3) + "|",
@@ -86,12 +86,12 @@ def page() -> str:
     lines += [
         "",
         "Two of these samples contradict each other: an unprefixed metadata name that the specification does not know",
-        "must pass as `MustIgnore` and fail as `Undefined`. Unknown names pass here; `undefined` and `null` count as none.",
+        "must pass as `MustIgnore` and fail as `Undefined`. Unknown names pass; `undefined` and `null` count as none.",
         "",
-        "Three choices where the samples, the specification and the table of rules pull apart. Self-crossing and shells that",
-        "overlap (G001, G002) are warnings in a 3MF file: the core specification (4.1) tells consumers to accept them and",
-        "says what is solid. A multiproperties group that names a texture itself is a warning, since MUSTPASS files do it.",
-        "Vertices that are listed apart and close the mesh by place (T006) are a warning too, as in any format.",
+        "Three choices where samples, specification and table of rules pull apart. Self-crossing and overlapping shells",
+        "(G001, G002) are warnings in a 3MF file: the core specification (4.1) tells consumers to accept them and says",
+        "what is solid. A multiproperties group that names a texture itself is a warning, since MUSTPASS files do it.",
+        "Vertices listed apart that close the mesh by place (T006) are a warning too, as in any format.",
         "",
     ]
     return "\n".join(lines)
