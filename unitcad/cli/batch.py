@@ -55,7 +55,7 @@ def batch(
     from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json
     from unitcad.pipeline import OUTPUTS
-    from unitcad.report import PAGE, write_report
+    from unitcad.pipeline.folder import PAGE
 
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
     wanted = load_sweep(sweep).overridden([*(sets or []), *chosen_formats(formats)])
@@ -77,6 +77,8 @@ def batch(
         typer.echo(f"interrupted: what is done stays in {folder}; the next run takes up the rest", err=True)
         sys.exit(130)
     if page or (folder / PAGE).is_file():
+        from unitcad.report import write_report
+
         write_report(folder)
     if as_json:
         print_json({"folder": str(folder), **asdict(summary)})

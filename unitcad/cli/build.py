@@ -29,7 +29,7 @@ def build(
     from unitcad.cli.output import print_json, progress
     from unitcad.pipeline import OUTPUTS
     from unitcad.pipeline import build as run
-    from unitcad.report import PAGE, write_report
+    from unitcad.pipeline.folder import PAGE
     from unitcad.spec import load
 
     overrides = [*(sets or []), *chosen_formats(formats)]
@@ -41,6 +41,8 @@ def build(
         with progress(spec.name) as say:
             results.append(run(spec, out, only=chosen, check=not no_check, say=say))
             if page or (results[-1].folder / PAGE).is_file():
+                from unitcad.report import write_report
+
                 say("page")
                 write_report(results[-1].folder)
     if as_json:

@@ -15,6 +15,8 @@ from unitcad.errors import UnitcadError
 from unitcad.spec import Spec, read_toml
 
 TEMPORARY = ".tmp-"
+PAGE = "report.html"
+"""The page of a folder, made on request and kept up by every later build into it."""
 
 
 def folder_name(spec: Spec) -> str:

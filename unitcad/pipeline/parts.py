@@ -19,6 +19,8 @@ from unitcad.shape import content_hash
 from unitcad.shape.body import Body
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from unitcad.pipeline.variant import Variant
 
 MESH_FORMATS = ("stl", "3mf")
@@ -131,7 +133,7 @@ def record(variant: Variant, body: Body) -> dict[str, Any]:
     }
 
 
-def _ready(variant: Variant, body: Body) -> Any:
+def _ready(variant: Variant, body: Body) -> tuple[np.ndarray, np.ndarray]:
     return print_ready(*arrays(variant.mesh(body)), body.upside_down)
 
 

@@ -1,6 +1,5 @@
 """One offline HTML page for what a folder holds: a variant, or a batch of them. It contacts nothing."""
 
-from unitcad.report.collect import PAGE
 from unitcad.report.page import write_report
 
-__all__ = ["PAGE", "write_report"]
+__all__ = ["write_report"]

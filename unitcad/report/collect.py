@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.errors import UnitcadError
+from unitcad.pipeline.folder import PAGE, TEMPORARY
 from unitcad.report.models import model_key, spec_in
 from unitcad.spec import Spec
 
-PAGE = "report.html"
-TEMPORARY = ".tmp-"
 MANIFEST = "manifest.json"
 
 

@@ -21,6 +21,7 @@ from typing import Any
 
 from unitcad import __version__
 from unitcad.errors import UnitcadError
+from unitcad.pipeline.folder import PAGE, TEMPORARY
 from unitcad.report import collect
 from unitcad.report.models import model
 from unitcad.report.pool import Pool
@@ -40,8 +41,8 @@ def write_report(folder: Path) -> Path:
     Raises UnitcadError where the folder holds neither.
     """
     data, title = page_data(folder)
-    target = folder / collect.PAGE
-    fresh = folder / f"{collect.TEMPORARY}{collect.PAGE}-{os.getpid()}"
+    target = folder / PAGE
+    fresh = folder / f"{TEMPORARY}{PAGE}-{os.getpid()}"
     try:
         fresh.write_bytes(page(data, title).encode())
         fresh.replace(target)
