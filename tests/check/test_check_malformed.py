@@ -7,6 +7,7 @@ import pytest
 from malformed import Case, cases
 from shapes import box, package, prism, stl, text_stl
 
+from unitcad.check import check_bytes
 from unitcad.check.rulebook import rules
 
 CASES = cases()
@@ -88,3 +89,12 @@ def test_counts_and_first_places(judge) -> None:
     assert hole.count == 4
     assert len(hole.locations) == 4
     assert all(place.face is not None and place.xyz is not None for place in hole.locations)
+
+
+@pytest.mark.parametrize("case", CASES[::9], ids=[case.name for case in CASES[::9]])
+def test_bytes_are_judged_as_the_file_is(case: Case, judge) -> None:
+    from conftest import options
+
+    of_file = judge(case.data(), case.name, **case.options)
+    of_bytes = check_bytes(case.data(), case.name, options(**case.options))
+    assert (of_bytes.findings, of_bytes.facts) == (of_file.findings, of_file.facts)

@@ -4,8 +4,8 @@
 readers and rules are loaded by the first file that needs them.
 """
 
-from unitcad.check.check import Options, check_file, check_mesh
+from unitcad.check.check import Options, check_bytes, check_file, check_mesh
 from unitcad.check.findings import Facts, FileReport, Finding, Location
 from unitcad.check.limits import Limits
 
-__all__ = ["Facts", "FileReport", "Finding", "Limits", "Location", "Options", "check_file", "check_mesh"]
+__all__ = ["Facts", "FileReport", "Finding", "Limits", "Location", "Options", "check_bytes", "check_file", "check_mesh"]

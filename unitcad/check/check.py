@@ -72,27 +72,37 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
 def check_file(path: str | Path, options: Options | None = None) -> FileReport:
     """Judge one file. Missing, unreadable and hostile files are findings of the report."""
     options = options or Options()
-    shown = str(path)
-    deadline = Deadline(options.limits.seconds)
+    place = Path(path)
+    return _guarded(
+        str(path), options, lambda deadline: _check(_bytes_of(place, options.limits), place, options, deadline)
+    )
+
+
+def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileReport:
+    """Judge a file's content without the file; `name` says by its suffix what it is. Not for STEP."""
+    options = options or Options()
+    return _guarded(name, options, lambda deadline: _check(data, Path(name), options, deadline))
+
+
+def _guarded(path: str, options: Options, work: Callable[[Deadline], tuple[list[Finding], Facts]]) -> FileReport:
     findings: list[Finding] = []
     facts = Facts()
     try:
-        findings, facts = _check(Path(path), options, deadline)
+        findings, facts = work(Deadline(options.limits.seconds))
     except Unreadable as stop:
         findings = list(stop.findings)
     except MemoryError:
         findings = [finding("F011", "out of memory")]
     except RecursionError:
         findings = [finding("F011", "nested too deeply")]
-    return _report(shown, findings, facts, options)
+    return _report(path, findings, facts, options)
 
 
 def _report(path: str, findings: Sequence[Finding], facts: Facts, options: Options) -> FileReport:
     return FileReport(path, merge(item for item in findings if options.wants(item.code)), facts)
 
 
-def _check(path: Path, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
-    data = _bytes_of(path, options.limits)
+def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
     kind = sniff.kind_of(path.name, data[:64])
     if not kind:
         known = ", ".join(sorted(sniff.SUFFIXES))

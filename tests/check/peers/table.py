@@ -88,7 +88,7 @@ def page() -> str:
         "Two of these samples contradict each other: an unprefixed metadata name that the specification does not know",
         "must pass as `MustIgnore` and fail as `Undefined`. Unknown names pass; `undefined` and `null` count as none.",
         "",
-        "Three choices where samples, specification and table of rules pull apart. Self-crossing and overlapping shells",
+        "Three choices where samples, specification and table of rules part. Self-crossing and overlapping shells",
         "(G001, G002) are warnings in a 3MF file: the core specification (4.1) tells consumers to accept them and says",
         "what is solid. A multiproperties group that names a texture itself is a warning, since MUSTPASS files do it.",
         "Vertices listed apart that close the mesh by place (T006) are a warning too, as in any format.",
