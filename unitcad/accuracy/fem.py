@@ -134,7 +134,7 @@ def _assemble(basis: Basis, materials: Sequence[Any], omega: float) -> csc_matri
         kinetic = u[0] * v[0] + u[1] * v[1]
         return (w.mu * (2 * strain + shear) - w.inertia * kinetic) * r
 
-    matrix = skfem.BilinearForm(energy, dtype=np.complex128).assemble(basis, mu=mu, inertia=inertia)
+    matrix = skfem.BilinearForm(energy, dtype=np.complex128).assemble(basis, mu=mu, inertia=inertia)  # type: ignore[arg-type]
     constant = basis.with_element(skfem.ElementQuad0())
     mesh = basis.mesh
     low, high = mesh.p[:, mesh.t].min(axis=1), mesh.p[:, mesh.t].max(axis=1)

@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import fft, integrate, special
@@ -227,9 +228,9 @@ def _logarithmic(case: Case, n: int) -> Found:
     offset = fft.fhtoffset(step, mu=0.0, initial=-math.log(k[n // 2] * 5e-3))
     r = math.exp(offset) / k[::-1]
     with np.errstate(all="ignore"):
-        sampled = case.remainder(k)
+        sampled: Any = case.remainder(k)
         # fht transforms a(k) k J(kr) dk into A(r) r: with a = k times what is integrated over k.
-        both = [fft.fht(part, step, mu=0.0, offset=offset) / r for part in (sampled.real, sampled.imag)]
+        both = [np.asarray(fft.fht(part, step, mu=0.0, offset=offset)) / r for part in (sampled.real, sampled.imag)]
     value = np.interp(np.log(RADII), np.log(r), both[0]) + 1j * np.interp(np.log(RADII), np.log(r), both[1])
     return case.known + value, None
 

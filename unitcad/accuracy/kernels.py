@@ -17,14 +17,16 @@ from unitcad.pipeline import Variant
 from unitcad.shape.body import Body
 from unitcad.spec import from_data, templates
 
-_QUANTITIES = ("solids", "volume", "area", "box", "centre")
+_QUANTITIES: tuple[str, ...] = ("solids", "volume", "area", "box", "centre")
 
 
 def run(quick: bool, say: Say) -> Result:
     """manifold3d against OCCT, and OCCT by three libraries against itself."""
     random = 3 if quick else 100
     chosen = ("encapsulating", "embedded", "chain") if quick else tuple(templates())
-    worst = {name: dict.fromkeys(_QUANTITIES, 0.0) for name in ("build123d", "CadQuery", "manifold3d")}
+    worst: dict[str, dict[str, float]] = {
+        name: dict.fromkeys(_QUANTITIES, 0.0) for name in ("build123d", "CadQuery", "manifold3d")
+    }
     volume = box = 0.0
     bodies = 0
     seconds: dict[str, list[float]] = {}

@@ -188,7 +188,7 @@ def _case(data: dict[str, Any]) -> Case:
     *layers, below = data["bodies"]
     medium = LayeredMedium(
         [Layer(h, rho, e, nu, _damping(*loss)) for h, rho, e, nu, *loss in layers],
-        HalfSpace(*below[1:4], _damping(*below[4:])),
+        HalfSpace(below[1], below[2], below[3], _damping(*below[4:])),
     )
     exact = np.array([complex(*pair) for pair in data["compliance"]]).reshape(2, 2)
     return Case(data["kind"], medium, data["k"], data["omega"], exact, data["condition"])
