@@ -96,7 +96,7 @@ def moulds(seen: Any) -> bytes:
     seen.page.fill('input[name="apart"]', "100")
     seen.page.dispatch_event('input[name="apart"]', "change")
     seen.page.wait_for_timeout(300)
-    image = seen.page.locator("#view").screenshot()
+    image = seen.page.locator(".stage").screenshot()
     seen.page.fill('input[name="apart"]', "0")
     seen.page.check('input[name="cut"]')
     return image
