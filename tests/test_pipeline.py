@@ -51,6 +51,7 @@ def test_every_template_builds_with_all_laws_kept(name: str, tmp_path: Path) -> 
             assert part["made"] == "cut"
             continue
         mesh = trimesh.load_mesh(built.folder / part["files"]["stl"]["path"])
+        assert len(mesh.faces) == part["triangles"]
         assert mesh.is_watertight
         assert mesh.is_volume
         assert mesh.body_count == 1

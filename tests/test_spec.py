@@ -49,7 +49,8 @@ def test_odd_names_survive_the_file() -> None:
     [
         ("encapsulating", "diameter_mm=12.0", "diameter_mm", 12.2),
         ("encapsulating", "layers.0.wall_mm=0.3", "layers.0.wall_mm", 0.5),
-        ("encapsulating", "layers.0.wall_mm=-1.0", "layers.0.wall_mm", 0.001),
+        ("encapsulating", "layers.0.wall_mm=-1.0", "layers.0.wall_mm", 0.5),
+        ("encapsulating", "diameter_mm=1e300", "diameter_mm", 1000),
         ("encapsulating", "layers.0.cap_mm=1.0", "layers.0.cap_mm", 1.095),
         ("no-fpcb", "layers.0.cap_mm=0.4", "layers.0.cap_mm", 0.5),
         ("encapsulating", "fpcb.tail_width_mm=7.0", "fpcb.tail_width_mm", 6.3),

@@ -46,12 +46,14 @@ def unknown_name(field: str, value: str, known: Iterable[str]) -> Refusal:
     return Refusal(field, value, f"not known; closest: {', '.join(close)}", close[0] if close else None)
 
 
-def unknown_key(field: str, known: Iterable[str]) -> Refusal:
+def unknown_key(field: str, value: object, known: Iterable[str]) -> Refusal:
     """A refusal of a key that no table has; `field` is its whole path, `known` the keys of that table."""
     table, _, key = field.rpartition(".")
-    close = difflib.get_close_matches(key, list(known), n=1, cutoff=0.4)
+    known = list(known)
+    close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
     nearest = f"{table}.{close[0]}" if table and close else close[0] if close else None
-    return Refusal(field, key, "unknown key", nearest)
+    shown = value if isinstance(value, int | float | str) else str(value)
+    return Refusal(field, shown, f"unknown key; known here: {', '.join(known)}", nearest)
 
 
 def _shown(value: object) -> str:

@@ -10,7 +10,7 @@ def chosen_formats(formats: str | None) -> list[str]:
 
     if formats is None:
         return []
-    names = [name.strip() for name in formats.split(",") if name.strip()]
+    names = [name.strip() for name in formats.split(",")]
     for name in names:
         if name not in FORMATS:
             raise unknown_name("--formats", name, FORMATS)

@@ -17,8 +17,8 @@ STRIKE_AGAIN_MIN = 10
 def preparation(spec: Spec, plan: Plan, resin: bool) -> tuple[str, ...]:
     """From the printer to an empty mould."""
     found = [
-        f"Print the pieces as they lie in their files: cups upside down, the rest as drawn. All are engraved "
-        f"{plan.label}.",
+        f"Print the pieces as they lie in their files: cups and blade upside down, the rest as drawn. Base "
+        f"and cups are engraved {plan.label}.",
         "Brush off strings and loose bits. Put each cup on the plinth once, dry: its cut corner lets it on one way "
         "only, "
         "and it must sit down until seat and plinth touch.",

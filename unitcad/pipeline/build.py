@@ -84,6 +84,7 @@ def build(
     folders.clear_leftovers(out)
     spec = _with_formats(spec, (*folders.earlier_formats(folder, spec), *spec.output.formats))
     only = checked_outputs((*only, *folders.earlier_outputs(folder)))
+    check = check or folders.earlier_checked(folder)
     return build_into(folder, spec, only=only, check=check, store=store or MemoryStore(), say=say)
 
 
@@ -153,6 +154,12 @@ class _Making:
             "label": shape["label"],
             "warnings": warnings(spec),
             "air_ring_mm": shape["air_ring_mm"],
+            "mesh": {
+                "kernel": "manifold3d",
+                "tolerance_mm": spec.output.tolerance_mm,
+                "segments": self.variant.segments,
+                "note": "volume_mm3 and bbox_mm are the mesh's: its corners may stand out by the tolerance",
+            },
             "parts": [self._part(part) for part in shape["parts"]],
             "steps": [self._step(step) for step in shape["steps"]],
             "laws": self._laws(shape),
@@ -238,9 +245,9 @@ class _Making:
     def _left_out(self) -> list[dict[str, str]]:
         spec, found = self.spec, list(self.left_out)
         if not self.check or "moulds" not in self.only:
-            found.append(_left("laws", "--no-check" if not self.check else "no moulds were asked for"))
+            found.append(_left("laws", folders.UNCHECKED if not self.check else "no moulds were asked for"))
         if not self.check:
-            found.append(_left("mesh checks", "--no-check"))
+            found.append(_left("mesh checks", folders.UNCHECKED))
         if not is_own(spec.design):
             found += _not_needed(spec)
         for name in OUTPUTS:

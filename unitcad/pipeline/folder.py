@@ -14,6 +14,7 @@ from pathlib import Path
 from unitcad.errors import UnitcadError
 from unitcad.spec import Spec, read_toml
 
+UNCHECKED = "--no-check"
 TEMPORARY = ".tmp-"
 PAGE = "report.html"
 """The page of a folder, made on request and kept up by every later build into it."""
@@ -50,6 +51,15 @@ def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:
     if spec_hash(there) != spec_hash(spec):
         raise UnitcadError(f"{folder}: holds the result of another spec (spec.toml differs); move it away or use -o")
     return tuple(there.output.formats)
+
+
+def earlier_checked(folder: Path) -> bool:
+    """Whether an existing result has laws judged and files checked: a later build keeps them up."""
+    try:
+        left_out = json.loads((folder / "manifest.json").read_text("utf-8"))["left_out"]
+        return all(entry["why"] != UNCHECKED for entry in left_out)
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
 
 
 def earlier_outputs(folder: Path) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ import os
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,9 @@ from unitcad.cache import digest
 from unitcad.errors import UnitcadError
 from unitcad.export import glb, stl, threemf
 from unitcad.export.printing import print_ready
-from unitcad.kernels.mesh import arrays, bounds
+from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.pipeline.versions import code_version, kernel_versions
-from unitcad.shape import content_hash
+from unitcad.shape import Shape, content_hash
 from unitcad.shape.body import Body
 
 if TYPE_CHECKING:
@@ -129,12 +130,18 @@ def record(variant: Variant, body: Body) -> dict[str, Any]:
         "made": body.made,
         "volume_mm3": _round(solid.volume()),
         "bbox_mm": [_round(v) for v in bounds(solid)],
-        "triangles": int(solid.num_tri()),
+        "triangles": len(_ready(variant, body)[1]) if printed(body) else int(solid.num_tri()),
     }
 
 
 def _ready(variant: Variant, body: Body) -> tuple[np.ndarray, np.ndarray]:
-    return print_ready(*arrays(variant.mesh(body)), body.upside_down)
+    """The mesh as it is written: its count of faces and both mesh formats come from one rounding."""
+    return _rounded(body.shape, variant.segments, body.upside_down)
+
+
+@lru_cache(maxsize=64)
+def _rounded(shape: Shape, segments: int, upside_down: bool) -> tuple[np.ndarray, np.ndarray]:
+    return print_ready(*arrays(realise(shape, segments)), upside_down)
 
 
 def _round(value: float) -> float:

@@ -27,6 +27,8 @@ SLOT_CLEARANCE = 0.2
 """Least height of the slot over the circuit's thickness, or a wire's on each side of it, mm."""
 UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
 """What is assumed of a motor whose entry does not say: the paper's motor."""
+CIRCUIT_STOCK = (0.05, 0.5)
+"""Usual finished thickness of a flexible circuit, mm."""
 _EPS = 1e-9
 
 
@@ -78,6 +80,21 @@ def warnings(spec: Spec) -> list[str]:
                     f"layers.{i}.{field} = {value:g} mm is below the casting floor of {layer.material}, "
                     f"about {floor:g} mm"
                 )
+    if spec.fpcb and not CIRCUIT_STOCK[0] <= spec.fpcb.thickness_mm <= CIRCUIT_STOCK[1]:
+        low, high = CIRCUIT_STOCK
+        found.append(
+            f"fpcb.thickness_mm = {spec.fpcb.thickness_mm:g} mm: flexible circuits are {low:g} to {high:g} mm thick"
+        )
+    dims = dimensions(spec)
+    if (
+        spec.design == "encapsulating"
+        and dims.pad_radius
+        and dims.pad_radius > dims.cavity_radius - MOTOR_CLEARANCE + _EPS
+    ):
+        found.append(
+            f"fpcb.pad_diameter_mm = {2 * dims.pad_radius:g} mm leaves no clearance in the cavity "
+            f"of {2 * dims.cavity_radius:g} mm"
+        )
     return found
 
 

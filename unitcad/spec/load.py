@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
-from unitcad.spec.door import checked
+from unitcad.spec.door import LEAST_LAYER, checked
 from unitcad.spec.models import Spec
 from unitcad.spec.own import with_source
 
@@ -161,13 +161,13 @@ def _refusal(error: ValidationError) -> Refusal:
     field = ".".join(map(str, where))
     value = first.get("input")
     if first["type"] == "extra_forbidden":
-        return unknown_key(field, _known_keys(where[:-1]))
+        return unknown_key(field, value, _known_keys(where[:-1]))
     if first["type"] == "missing":
         return Refusal(field, "nothing", "is required")
     context = first.get("ctx", {})
     nearest = context.get("ge", context.get("le"))
     if first["type"] == "greater_than":
-        nearest = 0.001
+        nearest = LEAST_LAYER if where[0] == "layers" else 0.001
     if first["type"] == "literal_error":
         names = [word.strip("'") for word in str(context.get("expected", "")).replace(" or ", ", ").split(", ")]
         if isinstance(value, str):

@@ -11,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Positive = Annotated[float, Field(strict=True, gt=0)]
 NotNegative = Annotated[float, Field(strict=True, ge=0)]
+Length = Annotated[float, Field(strict=True, gt=0, le=1000)]
+"""A length in mm: beyond a metre nothing here is printed or cast."""
 Count = Annotated[int, Field(strict=True, ge=1)]
 Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
 Model = Literal["paper", "consistent", "fitted"]
@@ -27,8 +29,8 @@ class MotorTable(Table):
     """The motor: a catalogue `part`, or its size; a size given beside a part overrides the catalogue's."""
 
     part: str | None = None
-    diameter_mm: Positive | None = None
-    thickness_mm: Positive | None = None
+    diameter_mm: Length | None = None
+    thickness_mm: Length | None = None
     fill: Annotated[bool, Field(description="Layer 1 reaches the motor: no ring of air between them")] = False
 
 
@@ -36,29 +38,27 @@ class FpcbTable(Table):
     """The flexible circuit: a round pad on the motor's back and a straight tail to one side or to both."""
 
     tail: Literal["one", "both"] = "one"
-    thickness_mm: Positive = 0.11
-    tail_width_mm: Positive = 3.0
-    tail_length_mm: Annotated[Positive, Field(description="how far the tail stands out of the body")] = 10.0
-    pad_diameter_mm: Positive | None = None
-    tail_end_width_mm: Positive | None = Field(
-        default=None, description="of a tail's free end, which must pass the slot"
-    )
+    thickness_mm: Length = 0.11
+    tail_width_mm: Length = 3.0
+    tail_length_mm: Annotated[Length, Field(description="how far the tail stands out of the body")] = 10.0
+    pad_diameter_mm: Length | None = None
+    tail_end_width_mm: Length | None = Field(default=None, description="of a tail's free end, which must pass the slot")
 
 
 class WiresTable(Table):
     """Wires instead of a circuit: side by side, from the motor's side out along +x, through one exit."""
 
-    diameter_mm: Positive
+    diameter_mm: Length
     count: Annotated[int, Field(strict=True, ge=1, le=8)] = 2
-    length_mm: Positive = Field(default=10.0, description="how far the wires stand out of the body")
+    length_mm: Length = Field(default=10.0, description="how far the wires stand out of the body")
 
 
 class LayerTable(Table):
     """One silicone layer: a wall and, in the encapsulating design, a cap."""
 
     material: str
-    wall_mm: Positive
-    cap_mm: Positive | None = None
+    wall_mm: Length
+    cap_mm: Length | None = None
 
 
 class MouldsTable(Table):
@@ -66,24 +66,24 @@ class MouldsTable(Table):
 
     printer: str = "fdm-0.4"
     cavities: tuple[Count, Count] | Literal["fill"] = (1, 1)
-    bed_x_mm: Positive | None = None
-    bed_y_mm: Positive | None = None
-    bed_z_mm: Positive | None = None
-    layer_mm: Positive | None = None
+    bed_x_mm: Length | None = None
+    bed_y_mm: Length | None = None
+    bed_z_mm: Length | None = None
+    layer_mm: Length | None = None
     xy_play_mm: NotNegative | None = None
-    plinth_clearance_mm: Positive | None = None
-    seat_relief_mm: Positive | None = None
-    slot_height_mm: Positive | None = None
-    slot_width_clearance_mm: Positive | None = None
-    window_clearance_mm: Positive | None = None
-    least_wall_mm: Positive | None = None
-    skirt_wall_mm: Positive | None = None
-    land_mm: Positive | None = None
-    groove_width_mm: Positive | None = None
-    groove_depth_mm: Positive | None = None
-    filament_hole_mm: Positive | None = None
-    engraving_depth_mm: Positive | None = None
-    engraving_stroke_mm: Positive | None = None
+    plinth_clearance_mm: Length | None = None
+    seat_relief_mm: Length | None = None
+    slot_height_mm: Length | None = None
+    slot_width_clearance_mm: Length | None = None
+    window_clearance_mm: Length | None = None
+    least_wall_mm: Length | None = None
+    skirt_wall_mm: Length | None = None
+    land_mm: Length | None = None
+    groove_width_mm: Length | None = None
+    groove_depth_mm: Length | None = None
+    filament_hole_mm: Length | None = None
+    engraving_depth_mm: Length | None = None
+    engraving_stroke_mm: Length | None = None
     pour: Literal["open", "injected"] = "open"
     sprue_mm: Annotated[float, Field(strict=True, ge=3.0)] = Field(
         default=3.0, description="3 by syringe, 4 by gravity"
@@ -91,10 +91,10 @@ class MouldsTable(Table):
     vents: Count | None = Field(
         default=None, description="of each cavity under a lid; None takes as many as clear the air"
     )
-    filament_mm: Positive = 1.75
-    plinth_height_mm: Positive = 2.0
-    plate_mm: Positive = 4.0
-    ledge_mm: Positive = 0.6
+    filament_mm: Length = 1.75
+    plinth_height_mm: Length = 2.0
+    plate_mm: Length = 4.0
+    ledge_mm: Length = 0.6
 
 
 class CastingTable(Table):
@@ -134,7 +134,7 @@ class Spec(Table):
 
     name: Annotated[str, Field(min_length=1, max_length=120)]
     design: str
-    diameter_mm: Positive
+    diameter_mm: Length
     motor: MotorTable = MotorTable(part="LCM0720A3463F")
     fpcb: FpcbTable | None = None
     wires: WiresTable | None = None
