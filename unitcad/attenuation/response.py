@@ -119,6 +119,20 @@ def _last_pole(medium: LayeredMedium, materials: tuple[w.Material, ...], omega: 
     return 1.5 * max(1.5 * shear, floor)
 
 
+def _graded(panels: np.ndarray, materials: tuple[w.Material, ...]) -> np.ndarray:
+    """`panels` with the one at k = 0 halved towards 0 until it is shorter than the least wavenumber of a material.
+
+    A stiff half-space's branch points and pole lie there, too small a feature for a long panel's last coefficients.
+    """
+    least = min(abs(m.ks2) ** 0.5 * (m.eps**0.5 or 1.0) for m in materials if m.shear != 0)
+    first = abs(panels[0, 1] - panels[0, 0])
+    if panels[0, 0] != 0 or least == 0.0 or least >= first:
+        return panels
+    halvings = min(int(np.ceil(np.log2(first / least))) + 1, _MAX_ROUNDS)
+    cuts = panels[0, 1] * np.concatenate([[0.0], 2.0 ** -np.arange(halvings, -1, -1)])
+    return np.concatenate([np.stack([cuts[:-1], cuts[1:]], axis=1), panels[1:]])
+
+
 @dataclass(frozen=True)
 class _Found:
     total: np.ndarray
@@ -174,7 +188,7 @@ def _integrate(
     quadrature = size = 0.0
     count = 0
     stop = tail.start(max(float(np.max(np.abs(known))), tail.scale), rtol)
-    pending = _panels(corners, stop, span)
+    pending = _graded(_panels(corners, stop, span), materials)
     done = 0
     used = 0
     for _ in range(_MAX_ROUNDS):
