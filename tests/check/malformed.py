@@ -335,7 +335,8 @@ def _geometry() -> list[tuple]:
                 )
             ),
         ),
-        ("through-edges.stl", "G001", stl(np.concatenate([cube, _ringed(2.5, 7.5)]))),
+        ("through-edges.stl", "G001", stl(np.concatenate([cube, _ringed(2.5, 7.5, -5)]))),
+        ("through-edges-only.stl", "G001", stl(np.concatenate([cube, _ringed(2.5, 7.5, 5)]))),
         ("twisted.stl", "G001", stl(crossed[CUBE_FACES])),
         ("half-in.stl", "G002", stl(np.concatenate([cube, box(at=(5, 5, 5))]))),
         ("nested.stl", "G002", stl(np.concatenate([cube, inner]))),
@@ -351,10 +352,10 @@ def _geometry() -> list[tuple]:
     ]
 
 
-def _ringed(low: float, high: float) -> np.ndarray:
-    """An upright tube through the cube's top at z = 10, with a ring of vertices in that plane."""
+def _ringed(low: float, high: float, start: float) -> np.ndarray:
+    """An upright tube from z = `start` through the cube's top at z = 10, with a ring of vertices in that plane."""
     ring = [(low, low), (high, low), (high, high), (low, high)]
-    lower, upper = prism(ring, -5, 10), prism(ring, 10, 20)
+    lower, upper = prism(ring, start, 10), prism(ring, 10, 20)
     cap = lower[:, :, 2].min(axis=1) == 10
     base = upper[:, :, 2].max(axis=1) == 10
     return np.concatenate([lower[~cap], upper[~base]])

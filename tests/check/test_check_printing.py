@@ -57,11 +57,11 @@ def test_flat_piece_needs_two_layers(height: float, found: bool, judge) -> None:
 @pytest.mark.parametrize("angle", [20, 30, 45])
 def test_a_bevel_is_no_wall(angle: float, judge) -> None:
     """A scraper's blade: a plate whose long edge is ground to a line."""
-    run = 3 / np.tan(np.radians(angle))
-    outline = [(0, 0), (12, 0), (12 + run, 0), (12, 3)]
-    blade = prism([outline[0], outline[2], outline[3], (0, 3)], 0, 40)
-    turned = blade[:, :, [2, 0, 1]]
-    assert "D001" not in {found.code for found in judge(stl(turned), **FDM).findings}
+    run = 1.5 / np.tan(np.radians(angle))
+    blade = prism([(0, 0), (2 + run, 0), (2, 1.5), (0, 1.5)], 0, 4)
+    lying, standing = blade[:, :, [2, 0, 1]], blade
+    for turned in (lying, standing):
+        assert "D001" not in {found.code for found in judge(stl(turned), **FDM).findings}
 
 
 def test_tapered_plinth_is_no_wall(judge) -> None:
