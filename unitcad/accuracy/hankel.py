@@ -215,7 +215,7 @@ def _filtered(case: Case, name: str) -> Found:
     try:
         import libdlf
     except ImportError as error:
-        raise UnitcadError("the digital filters need libdlf: pip install libdlf") from error
+        raise UnitcadError("the digital filters need libdlf: pip install 'unitcad[fem]'") from error
     base, j0, *_ = getattr(libdlf.hankel, name)()
     k = base[None] / RADII[:, None]
     with np.errstate(all="ignore"):
