@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import signal
 import socket
 import subprocess
 import sys
@@ -97,6 +98,23 @@ def test_a_variant_that_fails_on_a_cluster_is_named(cluster: Cluster, tmp_path: 
     assert done.returncode == 1
     assert [row["status"] for row in rows(out)] == ["ok", "failed", "ok", "ok"]
     assert rows(out)[1]["reason"] == "design ring.py:fails (line 32): ValueError: never"
+
+
+def test_ctrl_c_takes_the_work_back_and_leaves_the_cluster(cluster: Cluster, tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "slow", [float(h) for h in range(2, 9)]), tmp_path / "out"
+    words = ("batch", sweep, "-o", out, "--scheduler", cluster.address)
+    child = subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, env=environment())
+    end = time.monotonic() + 60
+    while len(list(out.glob("ring-*"))) < 2 and time.monotonic() < end:
+        time.sleep(0.02)
+    child.send_signal(signal.SIGINT)
+    _, errors = child.communicate(timeout=30)
+    assert child.returncode == 130
+    assert "Traceback" not in errors
+    again = unitcad(*words, "--json")
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["ok"] == 7
+    assert json.loads(again.stdout)["taken_up"] >= 2
 
 
 @pytest.mark.parametrize("listening", [False, True], ids=["nobody", "somebody-mute"])

@@ -141,6 +141,11 @@ def test_a_path_is_checked_against_every_base() -> None:
         _sweep({"diameter_mm": [14.0]}, base="encapsulatin")
 
 
+def test_a_key_that_no_sweep_file_has() -> None:
+    with pytest.raises(Refusal, match=r"unknown key.*nearest accepted: 'sweep'"):
+        from_file({"base": "embedded", "sweep": {"diameter_mm": [14.0]}, "sweeps": {}}, Path(), "test")
+
+
 def test_every_path_of_a_spec_may_be_swept() -> None:
     data = read("encapsulating")
     paths = known_paths(data)

@@ -150,8 +150,10 @@ def open_executor(
         if jobs is not None:
             raise Refusal("--jobs", jobs, "the scheduler knows its workers; leave it out with --scheduler")
         executor, workers = dask_executor(scheduler)
-        yield executor, workers
-        executor.shutdown(wait=False)
+        try:
+            yield executor, workers
+        finally:
+            executor.shutdown(wait=False)  # which takes back what is still with the scheduler
         return
     if jobs == 0:
         if timeout is not None:

@@ -91,10 +91,11 @@ def run(
     only = checked_outputs(options.only)
     count = counted(sweep, options.limit)
     head = batch_head(sweep, only, options)
-    journal = Journal(out, {**head, "code": code_version()})
-    own = executor is None
-    executor = executor or ProcessExecutor(workers)
     store = DiskStore(options.cache or default_root())
+    journal = Journal(out, {**head, "code": code_version()})
+    own = None
+    if executor is None:
+        executor = own = ProcessExecutor(workers)
     batch = _Batch(sweep, out, only, options, executor, workers, away, watch, journal, store, Summary(count))
     start = time.perf_counter()
     try:
@@ -107,13 +108,14 @@ def run(
     except OSError as error:
         raise _no_room(tasks.failure(0, error), out, batch.summary) from error
     except KeyboardInterrupt:
-        _end(executor)
+        for future in batch.running:
+            future.cancel()
         raise
     finally:
         journal.close()
         store.close()
         if own:
-            _end(executor)
+            own.kill()
             trim(options)
     return summary
 
@@ -327,14 +329,6 @@ class _Batch:
 def _short(key: str) -> int:
     """A key in 8 bytes."""
     return int(key[:16], 16)
-
-
-def _end(executor: Executor) -> None:
-    kill = getattr(executor, "kill", None)
-    if kill:
-        kill()
-    else:
-        executor.shutdown(wait=False, cancel_futures=True)
 
 
 def _no_room(outcome: Outcome, out: Path, summary: Summary) -> UnitcadError:

@@ -271,7 +271,7 @@ def _refusal(error: ValidationError) -> UnitcadError:
     first = error.errors(include_url=False)[0]
     where = ".".join(str(part) for part in first["loc"] if not str(part).startswith(("list[", "Range", "function-")))
     if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
-        return unknown_key(where, ["base", "name", "set", "sweep"])
+        return unknown_key(where, first["input"], ["base", "name", "set", "sweep"])
     if first["loc"][-1:] == ("mode",) and isinstance(first["input"], str):
         return unknown_name("sweep.mode", first["input"], MODES)
     if first["type"] == "missing":
