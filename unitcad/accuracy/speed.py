@@ -115,7 +115,8 @@ def _call(script: Path, *arguments: object) -> str:
     command = [sys.executable, str(script), *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        raise UnitcadError(f"{script.name} failed: {done.stderr.strip().splitlines()[-1:]}")
+        last = (done.stderr.strip().splitlines() or ["nothing on standard error"])[-1]
+        raise UnitcadError(f"{script.name} ended with {done.returncode}: {last}")
     return done.stdout
 
 
