@@ -11,8 +11,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from unitcad.catalogue import printers
-from unitcad.check import FileReport, Limits, Options, check_file
+from malformed import options
+
+from unitcad.check import FileReport, check_file
 
 Judge = Callable[..., FileReport]
 
@@ -27,9 +28,3 @@ def judge(tmp_path: Path) -> Judge:
         return check_file(path, options(**given))
 
     return run
-
-
-def options(max_faces: int | None = None, printer: str | None = None, **rest: Any) -> Options:
-    """Options from plain values, as a malformed case names them."""
-    limits = Limits() if max_faces is None else Limits(max_faces=max_faces)
-    return Options(limits=limits, printer=printers()[printer] if printer else None, **rest)

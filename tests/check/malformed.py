@@ -34,6 +34,9 @@ from shapes import (
     text_stl,
 )
 
+from unitcad.catalogue import printers
+from unitcad.check import Limits, Options
+
 Content = bytes | str
 
 
@@ -48,6 +51,12 @@ class Case:
 
     def data(self) -> bytes:
         return self.content.encode() if isinstance(self.content, str) else self.content
+
+
+def options(max_faces: int | None = None, printer: str | None = None, **rest: Any) -> Options:
+    """Options from plain values, as a malformed case names them."""
+    limits = Limits() if max_faces is None else Limits(max_faces=max_faces)
+    return Options(limits=limits, printer=printers()[printer] if printer else None, **rest)
 
 
 def cases() -> list[Case]:

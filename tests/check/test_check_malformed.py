@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from malformed import Case, cases
+from malformed import Case, cases, options
 from shapes import box, package, prism, stl, text_stl
 
 from unitcad.check import check_bytes
@@ -93,8 +93,6 @@ def test_counts_and_first_places(judge) -> None:
 
 @pytest.mark.parametrize("case", CASES[::9], ids=[case.name for case in CASES[::9]])
 def test_bytes_are_judged_as_the_file_is(case: Case, judge) -> None:
-    from conftest import options
-
     of_file = judge(case.data(), case.name, **case.options)
     of_bytes = check_bytes(case.data(), case.name, options(**case.options))
     assert (of_bytes.findings, of_bytes.facts) == (of_file.findings, of_file.facts)
