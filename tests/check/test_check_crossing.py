@@ -250,3 +250,20 @@ def test_morton_order_is_a_permutation() -> None:
     points, faces = _sphere(10)
     order = morton_order(frame_of(points).steps(points), faces[:, 0])
     assert sorted(order.tolist()) == list(range(len(faces)))
+
+
+@pytest.mark.parametrize("step", [1, 2, 3])
+@pytest.mark.parametrize("tilt", [0.0, 0.4, 0.8])
+def test_a_star_that_goes_round_twice_crosses_itself(step: int, tilt: float) -> None:
+    """Double pyramids over a polygon of seven; over the star polygons {7/2} and {7/3} their sides pass through."""
+    angle = 2 * np.pi * step * np.arange(7) / 7
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    points = np.vstack([ring, [[0, 0, 1.5], [0, 0, -1.5]]])
+    c, s = np.cos(tilt), np.sin(tilt)
+    points = points @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    k = np.arange(7)
+    faces = np.vstack(
+        [np.column_stack([k, (k + 1) % 7, np.full(7, 7)]), np.column_stack([(k + 1) % 7, k, np.full(7, 8)])]
+    )
+    codes = {found.code for found in check_mesh(points, faces).findings}
+    assert ("G001" in codes) == (step > 1)

@@ -97,6 +97,7 @@ def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) ->
     at = [[column.take(corner, mode="clip") for column in points] for corner in corners]
     if topology.edges.closed:
         smooth = _height_fields(len(vertices), corners, at, normal)
+        smooth |= _tilted_fields(vertices, corners, normal, ~smooth)
         safe = tuple(np.where(smooth[corner], corner, -1) for corner in corners)
     else:
         safe = tuple(np.full(len(order), -1, np.int32) for _ in corners)
@@ -139,6 +140,36 @@ def _height_fields(n: int, corners: tuple[Ints, ...], at: list[list[Floats]], ar
         passes = (ahead[k] & ~behind[k] & line[corner]) != 0
         turns += np.bincount(corner[passes], minlength=n)
     return (common != 0) & (turns == 1)
+
+
+def _tilted_fields(vertices: Floats, corners: tuple[Ints, ...], areas: Floats, asked: Bools) -> Bools:
+    """The same for the vertices `asked`, along the mean normal of each one's faces: rims and corners.
+
+    Rounding moves a turn by 1e-10 of itself; the faces must look along that direction by far more, and turns are whole.
+    """
+    some = np.flatnonzero(asked[corners[0]] | asked[corners[1]] | asked[corners[2]])
+    n = len(vertices)
+    if not len(some):
+        return np.zeros(n, bool)
+    ids = [corner[some] for corner in corners]
+    points = [vertices[corner] for corner in ids]
+    unit = areas[some]
+    unit /= np.sqrt(np.einsum("ij,ij->i", unit, unit))[:, None]
+    along = np.zeros((n, 3))
+    for axis in range(3):
+        for corner in ids:
+            along[:, axis] += np.bincount(corner, weights=unit[:, axis], minlength=n)
+    along /= np.maximum(np.sqrt(np.einsum("ij,ij->i", along, along)), 1e-300)[:, None]
+    turns, least = np.zeros(n), np.ones(n)
+    for k, corner in enumerate(ids):
+        one, two, up = points[(k + 1) % 3] - points[k], points[(k + 2) % 3] - points[k], along[corner]
+        facing = np.einsum("ij,ij->i", unit, up)
+        np.minimum.at(least, corner, facing)
+        flat = np.einsum("ij,ij->i", one, two)
+        flat -= np.einsum("ij,ij->i", one, up) * np.einsum("ij,ij->i", two, up)
+        double = np.einsum("ij,ij->i", cross(one, two), up)
+        turns += np.bincount(corner, weights=np.arctan2(double, flat), minlength=n)
+    return asked & (least > 0.01) & (np.abs(turns - 2 * np.pi) < 0.1)
 
 
 def _strangers(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
