@@ -16,6 +16,8 @@ KEY = 5.0
 """Leg of the plinth's cut corner: the cup goes on in one attitude only. Less on a plinth too small for it."""
 KEY_SHARE = 2 - math.sqrt(2)
 """The leg over a cell's half side, at most: the cut then stays as far from the bore as the plinth's sides."""
+MARK = 3.5
+"""Leg of the cut corner outside, above the plinth's: which way round a piece goes is seen before it is tried."""
 TEXT_MARGIN, TEXT_GAP = 1.0, 0.3
 MOST_CELLS = 255
 """Cells are numbered by two hexadecimal digits."""
@@ -110,8 +112,8 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
     foot = plinth[0] + splay, plinth[1] + splay
     skirt = (moulds.plinth_clearance_mm or 0) + (moulds.skirt_wall_mm or 0)
     corner = _corner_for_label(reach + 0.6, text_width("00", stroke), label)
-    # The numbers of the last column and row lie outside its bores too.
-    beside = [pitch / 2 + size + TEXT_MARGIN if digits else 0.0 for size in number]
+    # The numbers of the last column and row lie outside its bores too, and behind the cut corner.
+    beside = [pitch / 2 + size + MARK / 2 + 0.1 if digits else 0.0 for size in number]
     cup = max(foot[0] + skirt, half[0] + max(corner, beside[0])), max(foot[1] + skirt, half[1] + max(corner, beside[1]))
     margin = label + 2 * 0.6
     cells = tuple(

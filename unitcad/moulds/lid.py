@@ -14,9 +14,9 @@ import math
 
 from unitcad.designs.common import BEYOND
 from unitcad.errors import Refusal
-from unitcad.moulds.layout import CORNER_RADIUS, Layout
-from unitcad.moulds.tooling import corner_labels
-from unitcad.shape import Extrude, Profile, Revolve, Shape, cut, cylinder, moved, polygon, rounded_rectangle
+from unitcad.moulds.layout import MARK, Layout
+from unitcad.moulds.tooling import corner_labels, outline
+from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, moved, polygon
 from unitcad.spec import Dimensions, Spec
 
 THICKNESS, SKIRT, SKIRT_WALL, SKIRT_OFF_WINDOW = 3.0, 1.5, 1.6, 0.2
@@ -40,10 +40,10 @@ def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int, label: tuple[str,
     low = rim - SKIRT
     if dims.slot_z:
         low = max(low, dims.slot_z[1] + (spec.moulds.window_clearance_mm or 0) + SKIRT_OFF_WINDOW)
-    tools = [Extrude(_outline(lay, play), low - BEYOND, rim), *channels(spec, dims, lay, layer, beyond=BEYOND)]
+    tools = [Extrude(outline(lay.cup, MARK, play), low - BEYOND, rim), *channels(spec, dims, lay, layer, beyond=BEYOND)]
     if label:
         tools += corner_labels(spec, lay, top, label)
-    return cut(Extrude(_outline(lay, play + SKIRT_WALL), low, top), tools)
+    return cut(Extrude(outline(lay.cup, MARK, play + SKIRT_WALL), low, top), tools)
 
 
 def lid_top(dims: Dimensions, layer: int) -> float:
@@ -134,7 +134,3 @@ def _ceiling(dims: Dimensions, layer: int) -> tuple[float, float]:
 
 def _at_the_rim(dims: Dimensions, layer: int) -> bool:
     return dims.slot_z is not None and dims.slot_z[1] >= dims.heights[layer]
-
-
-def _outline(lay: Layout, grow: float) -> Profile:
-    return rounded_rectangle(lay.cup[0] + grow, lay.cup[1] + grow, CORNER_RADIUS + grow)

@@ -19,7 +19,7 @@ import math
 
 from unitcad.designs.common import BEYOND, strip
 from unitcad.moulds import filament
-from unitcad.moulds.layout import BLADE_HEIGHT, CORNER_RADIUS, PLINTH_DRAFT_DEG, TEXT_MARGIN, Cell, Layout
+from unitcad.moulds.layout import BLADE_HEIGHT, CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN, Cell, Layout
 from unitcad.shape import (
     Common,
     Extrude,
@@ -56,7 +56,7 @@ def plate_bottom(spec: Spec) -> float:
 def base(spec: Spec, dims: Dimensions, lay: Layout, label: str) -> Shape:
     """Plate, keyed plinth and cores in one piece, with pry slots, filament holes and grooves, ledges and a label."""
     top, bottom = plate_top(spec), plate_bottom(spec)
-    plate = Extrude(rounded_rectangle(*lay.plate, CORNER_RADIUS), bottom, top)
+    plate = Extrude(outline(lay.plate, MARK), bottom, top)
     body = union((plate, plinth(spec, lay), *(moved(core(dims), c.x, c.y) for c in lay.cells)))
     tools: list[Shape] = [_pry_slot(lay, top, side) for side in (1, -1)]
     if spec.design == "encapsulating":
@@ -102,7 +102,16 @@ def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int, label: tuple[str,
 
 def cup_blank(spec: Spec, lay: Layout, rim: float) -> Shape:
     """The block that a cup is cut from: the skirt ends above the plate, so that the seat bears."""
-    return Extrude(rounded_rectangle(*lay.cup, CORNER_RADIUS), skirt_end(spec), rim)
+    return Extrude(outline(lay.cup, MARK), skirt_end(spec), rim)
+
+
+def outline(size: tuple[float, float], key: float, grow: float = 0.0) -> Profile:
+    """A plate of half sizes `size` with its (+x, +y) corner cut by the leg `key`, then every side moved out by `grow`.
+
+    A 45 degree cut moves out by as much, which lengthens its leg by (2 - sqrt 2) `grow`.
+    """
+    leg = key + (2 - math.sqrt(2)) * grow
+    return rounded_rectangle(size[0] + grow, size[1] + grow, CORNER_RADIUS + grow, leg)
 
 
 def skirt_end(spec: Spec) -> float:
@@ -212,10 +221,7 @@ def _tapered(lay: Layout, clearance: float, bottom: float) -> Shape:
     """The plinth's taper from `bottom` up to the seat, grown by `clearance` on every side."""
 
     def section(z: float) -> Profile:
-        grow = clearance - z * math.tan(math.radians(PLINTH_DRAFT_DEG))
-        # A side moved out by g moves a 45 degree cut by g too, which shortens its leg by (2 - sqrt 2) g.
-        key = lay.key + (2 - math.sqrt(2)) * grow
-        return rounded_rectangle(lay.plinth[0] + grow, lay.plinth[1] + grow, CORNER_RADIUS + grow, key)
+        return outline(lay.plinth, lay.key, clearance - z * math.tan(math.radians(PLINTH_DRAFT_DEG)))
 
     return Extrude(section(bottom), bottom, 0.0, top=section(0.0))
 
