@@ -173,7 +173,7 @@ def trees():
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), phases=WITHOUT_SHRINKING)
 @given(trees())
 def test_kernels_agree_on_random_trees(shape):
-    """Where curved faces cross off their axes OCCT approximates the curve to 1e-7 mm: a volume to that times the area."""
+    """Where curved faces cross off their axes OCCT errs by 1e-7 mm: a volume by that times its area."""
     solid = mesh.realise(shape, 64)
     assume(solid.volume() > 1)
     rough = 1e-7 * solid.surface_area()
