@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,9 @@ from unitcad.export import slicer, stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds import coupon
-from unitcad.spec import templates
+from unitcad.pipeline import build
+from unitcad.pipeline.slicing import slice_tools
+from unitcad.spec import load, templates
 
 pytestmark = [
     pytest.mark.slicer,
@@ -87,3 +90,22 @@ def test_coupon_needs_no_repair(tmp_path: Path) -> None:
         file = tmp_path / f"{body.name}.stl"
         file.write_bytes(stl.content(*print_ready(*arrays(realise(body.shape, 64))), body.name))
         assert not slicer.needs_repair(file)
+
+
+def test_build_writes_print_times_once_a_piece(tmp_path: Path) -> None:
+    """A second call takes what it knows; a changed piece is sliced again."""
+    spec = load("single-embedded")
+    built = build(spec, tmp_path, only=("moulds",), check=False)
+    sliced: list[str] = []
+    assert slice_tools(built.folder, built.manifest, spec, sliced.append).startswith("prints in 0 h ")
+    found = json.loads((built.folder / "slicer.json").read_text())
+    assert {piece["file"] for piece in found["pieces"]} == {"base.stl", "step1-cup.stl", "blade.stl"}
+    assert len(sliced) == 3
+    slice_tools(built.folder, built.manifest, spec, sliced.append)
+    assert len(sliced) == 3
+    blade = built.folder / "moulds" / "blade.stl"
+    blade.write_bytes((built.folder / "moulds" / "base.stl").read_bytes())
+    slice_tools(built.folder, built.manifest, spec, sliced.append)
+    assert sliced[3:] == ["slicing blade.stl"]
+    blade.write_bytes(b"no mesh")
+    assert slice_tools(built.folder, built.manifest, spec).startswith("not sliced: ")

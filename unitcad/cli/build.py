@@ -22,6 +22,9 @@ def build(
         bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")
     ] = False,
     no_check: Annotated[bool, typer.Option("--no-check", help="Leave out the laws and the mesh checks.")] = False,
+    no_slice: Annotated[
+        bool, typer.Option("--no-slice", help="Leave out PrusaSlicer's print time and filament (slicer.json).")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
     """Make a unit and its casting moulds. The last line printed is the folder."""
@@ -30,16 +33,19 @@ def build(
     from unitcad.pipeline import OUTPUTS
     from unitcad.pipeline import build as run
     from unitcad.pipeline.folder import PAGE
+    from unitcad.pipeline.slicing import slice_tools
     from unitcad.spec import load
 
     overrides = [*(sets or []), *chosen_formats(formats)]
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
     # Every spec passes the door before the first one is built.
     wanted = [load(spec, overrides) for spec in specs]
-    results = []
+    results, printing = [], []
     for spec in wanted:
         with progress(spec.name) as say:
             results.append(run(spec, out, only=chosen, check=not no_check, say=say))
+            sliced = only is None and not no_slice
+            printing.append(slice_tools(results[-1].folder, results[-1].manifest, spec, say) if sliced else "")
             if page or (results[-1].folder / PAGE).is_file():
                 from unitcad.report import write_report
 
@@ -48,8 +54,10 @@ def build(
     if as_json:
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
     else:
-        for result in results:
+        for result, prints in zip(results, printing, strict=True):
             _tell(result.manifest)
+            if prints:
+                typer.echo(f"{result.manifest['name']}: {prints}")
             typer.echo(str(result.folder))
     if not all(result.ok for result in results):
         sys.exit(1)

@@ -149,6 +149,7 @@ class _Making:
         manifest: dict[str, Any] = {
             "name": spec.name,
             "design": spec.design,
+            "printer": spec.moulds.printer,
             "hash": folders.folder_name(spec)[-12:],
             "outputs": list(self.only),
             "label": shape["label"],

@@ -8,7 +8,6 @@ what it reads: a body's file by its tree, a verdict on a file by its bytes, the 
 from __future__ import annotations
 
 import os
-import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -179,16 +178,14 @@ class _Making:
         return [{"path": path, **finding} for path, role in roles.items() for finding in self._check_file(path, role)]
 
     def _check_file(self, path: str, role: str) -> list[dict[str, Any]]:
-        from unitcad.check import Options, check_file
+        from unitcad.check import Options, check_bytes
 
         # A tool's STL is judged against the printer; its 3MF holds the same meshes.
         printer = printer_of(self.variant.spec) if role == "tool" and path.endswith(".stl") else None
 
         def judged() -> list[dict[str, Any]]:
-            with tempfile.TemporaryDirectory(prefix="unitcad-") as scratch:
-                file = Path(scratch) / Path(path).name
-                file.write_bytes(self.store.content(self.files[path]))
-                found = check_file(file, Options(printer=printer)).findings
+            content = self.store.content(self.files[path])
+            found = check_bytes(content, Path(path).name, Options(printer=printer)).findings
             return [finding.as_dict() for finding in found if finding.severity != "info"]
 
         return self.store.data(digest(f"{self.files[path]} {printer!r} {code_version()}".encode()), judged)

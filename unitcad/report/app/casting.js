@@ -19,6 +19,14 @@
     return el("dl", { className: "cards" }, chosen.map((figure) => el("div", {}, el("dt", {}, figure.name), el("dd", {}, quantity(figure)))));
   }
 
+  function printing(sliced) {
+    if (!sliced) return null;
+    const minutes = (seconds) => number(seconds / 60, 2);
+    const rows = sliced.pieces.map((piece) => [partName(piece.file.replace(/\.stl$/, "")), minutes(piece.print_s), piece.filament_cm3]);
+    rows.push(["all", minutes(sliced.print_s), sliced.filament_cm3]);
+    return [table(["Piece", "Print time (min)", "Filament (cm³)"], rows, { label: "Print time and filament" }), el("p", {}, `${sliced.slicer}, ${sliced.printer}, layers of ${sliced.layer_mm} mm: ${sliced.note}`)];
+  }
+
   function procedure(variant) {
     const data = variant.casting;
     if (!data) return section("procedure", "Procedure", el("p", { className: "absent" }, "No procedure here. Ask for it with ", el("code", {}, "unitcad build SPEC --only casting")));
@@ -48,6 +56,7 @@
       titled("Out of the mould", steps(data.release)),
       titled("Motor in", steps(data.assembly)),
       titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text))), figures(data.walls, "What the cups' play does to the walls")),
+      titled("Printing", printing(variant.slicer)),
       titled("Needed", data.bill && table(["Item", "Quantity", "Made", "Note"], data.bill.map((row) => [partName(row.item), `${number(row.quantity)} ${row.unit}`, row.made, row.note]), { label: "Bill of materials" })));
   }
 
