@@ -25,6 +25,12 @@ def test_every_template_keeps_every_law(name: str) -> None:
     assert max(balance) < 1e-12
 
 
+def test_a_crevice_of_rounding_is_no_pocket() -> None:
+    """Two wide tongues: between a tip and the ledge's riser a film of 1e-16 mm stays, which holds no air."""
+    found = MouldSet.of("encapsulating", "fpcb.tail=both", "fpcb.tail_width_mm=6.0").judged()
+    assert [finding for finding in found if not finding.ok] == []
+
+
 @pytest.mark.parametrize(
     "overrides",
     [

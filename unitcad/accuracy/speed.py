@@ -121,7 +121,18 @@ def _call(script: Path, *arguments: object) -> str:
 
 
 def _build(out: Path, formats: str) -> None:
-    command = [sys.executable, "-m", "unitcad", "build", "encapsulating", "--formats", formats, "-o", str(out)]
+    command = [
+        sys.executable,
+        "-m",
+        "unitcad",
+        "build",
+        "encapsulating",
+        "--no-slice",
+        "--formats",
+        formats,
+        "-o",
+        str(out),
+    ]
     subprocess.run(command, capture_output=True, check=True)
 
 

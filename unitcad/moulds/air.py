@@ -28,55 +28,60 @@ _AT_TOP = 1 / GRID_PER_MM
 """What snapping may take from the height of the opening, mm."""
 
 
+CREVICE = 1e-6
+"""A pocket of a smaller share of the cavity is a crevice that rounding leaves between two pieces, as in law C100."""
+
+
 @dataclass(frozen=True)
 class Pocket:
-    """Air held back: depth (mm), volume (mm3) and attitude (degrees)."""
+    """Air held back under `peak` (mm): its depth (mm), in the attitude (degrees) in which it is."""
 
     depth: float
-    volume: float
     tilt: float
     azimuth: float
+    peak: tuple[float, float, float]
 
 
 def air_law(step: Step, cells: list[Manifold], thinnest: float) -> list[Finding]:
     """C400 for each cell of a pour: the deepest pocket over the five attitudes, in mm."""
-    found = []
+    found, limit = [], DENT * thinnest
     for i, cavity in enumerate(cells):
-        pocket = deepest_pocket(cavity, step.top)
         where = f"pour {step.index}" + (f" cell {i + 1}" if len(cells) > 1 else "")
-        advice = ""
-        if pocket.depth > DENT * thinnest:
-            volume = pocket_volume(cavity, step.top, pocket)
-            where += f", tilted by {pocket.tilt:g} degrees towards {pocket.azimuth:g}"
-            advice = f"{volume:.3g} mm3 of air find no way to the rim or a vent"
-        found.append(at_most("C400", where, pocket.depth, DENT * thinnest, "mm", advice))
+        depth, advice = 0.0, ""
+        for pocket in pockets(cavity, step.top):
+            volume = pocket_volume(cavity, step.top, pocket) if pocket.depth > limit else 0.0
+            if pocket.depth > limit and volume <= CREVICE * cavity.volume():
+                continue
+            depth = pocket.depth
+            if depth > limit:
+                where += f", tilted by {pocket.tilt:g} degrees towards {pocket.azimuth:g}"
+                advice = f"{volume:.3g} mm3 of air find no way to the rim or a vent"
+            break
+        found.append(at_most("C400", where, depth, limit, "mm", advice))
     return found
 
 
-def deepest_pocket(cavity: Manifold, top: float) -> Pocket:
-    """The deepest pocket of a cavity that is open at z = `top` (mm), over `ATTITUDES`; its volume is not worked out."""
+def pockets(cavity: Manifold, top: float) -> list[Pocket]:
+    """The pockets of a cavity that is open at z = `top` (mm), over `ATTITUDES`, the deepest first."""
     surface = _Surface.of(cavity)
     opening = surface.vertices[:, 2] >= top - _AT_TOP
-    pockets = (
-        Pocket(depth, 0.0, tilt, azimuth)
+    found = [
+        Pocket(depth, tilt, azimuth, tuple(peak.tolist()))
         for tilt, azimuth in ATTITUDES
-        for depth, _ in _pockets(surface, opening, upwards(tilt, azimuth))
-    )
-    return max(pockets, key=lambda p: p.depth, default=Pocket(0.0, 0.0, 0.0, 0.0))
+        for depth, peak in _pockets(surface, opening, upwards(tilt, azimuth))
+    ]
+    return sorted(found, key=lambda pocket: -pocket.depth)
 
 
 def pocket_volume(cavity: Manifold, top: float, pocket: Pocket) -> float:
-    """Volume of all air held back in the attitude of `pocket`, mm3."""
-    surface = _Surface.of(cavity)
-    opening = surface.vertices[:, 2] >= top - _AT_TOP
-    up = upwards(pocket.tilt, pocket.azimuth)
+    """Volume of the air that a pocket holds back, mm3."""
+    up, peak = upwards(pocket.tilt, pocket.azimuth), np.asarray(pocket.peak)
+    above = cavity.trim_by_plane(tuple(up), float(peak @ up) - pocket.depth + _SAME)
     total = 0.0
-    for depth, peak in _pockets(surface, opening, up):
-        above = cavity.trim_by_plane(tuple(up), float(peak @ up) - depth + _SAME)
-        for part in above.decompose():
-            corners = arrays(part)[0]
-            if np.min(np.linalg.norm(corners - peak, axis=1)) < 1e-3 and corners[:, 2].max() < top - _AT_TOP:
-                total += part.volume()
+    for part in above.decompose():
+        corners = arrays(part)[0]
+        if np.min(np.linalg.norm(corners - peak, axis=1)) < 1e-3 and corners[:, 2].max() < top - _AT_TOP:
+            total += part.volume()
     return total
 
 
