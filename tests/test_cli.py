@@ -29,6 +29,7 @@ def test_list_names_what_is_shipped(kind: str) -> None:
     assert told.returncode == 0
     data = json.loads(_run("list", kind, "--json").stdout)
     assert list(data) == [kind]
+    assert kind in _run("list").stdout.split()
     for name in data[kind]:
         assert name in told.stdout
     if kind in ("materials", "motors", "printers"):

@@ -40,6 +40,7 @@ def _mesh_only(name: str, *more: str):
 def test_every_template_builds_with_all_laws_kept(name: str, tmp_path: Path) -> None:
     built = build(_mesh_only(name), tmp_path)
     assert built.ok
+    assert built.manifest["check"]["findings"] == []
     assert {law["code"] for law in built.manifest["laws"]} >= {"C000", "C100", "C200", "C210"}
     on_disk = {str(f.relative_to(built.folder)) for f in built.folder.rglob("*") if f.is_file()}
     assert {"spec.toml", "manifest.json", "timings.json", "section.svg", "unit.3mf", "moulds/moulds.3mf"} <= on_disk

@@ -10,8 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from unitcad.accuracy import extremes
-from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, LAW, REFUSED, build_outcome, door, outcome, put_in
+from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, LAW, REFUSED, Outcome, build_outcome, door, outcome, put_in
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, random_spec, seeded_spec
+from unitcad.errors import UnitcadError
 
 EXAMPLES = int(os.environ.get("UNITCAD_RANDOM_SPECS", "60"))
 
@@ -98,3 +99,28 @@ def test_faults_are_seen(monkeypatch):
 def test_ten_thousand_random_specs():
     found = extremes.study(extremes.LONG, print)
     assert found.ok, [promise for promise in found.promises if not promise.ok]
+
+
+def test_an_interrupted_study_is_taken_up_again(tmp_path, monkeypatch):
+    """Twelve specs, stopped after five with a line cut short: seven are judged, and the result is that of one go."""
+    judged = []
+
+    def quick(job):
+        judged.append(job)
+        return job[0], Outcome(BUILT if len(judged) % 2 else REFUSED, field="x", chain=("a", "b"), seconds=0.5)
+
+    jobs = [("documented", seeded_spec(seed)) for seed in range(12)]
+    monkeypatch.setattr(extremes, "judge", quick)
+    journal = tmp_path / "out" / "study.jsonl"
+    going = extremes._journalled(jobs, journal)
+    first = [next(going) for _ in range(5)]
+    going.close()
+    with journal.open("ab") as file:
+        file.write(b'["cut')
+    again = list(extremes._journalled(jobs, journal))
+    assert again[:5] == first
+    assert judged == jobs
+    assert list(extremes._journalled(jobs, journal)) == again
+    journal.write_text("something else\n")
+    with pytest.raises(UnitcadError, match="not a journal"):
+        list(extremes._journalled(jobs, journal))

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import multiprocessing
 import os
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, REFUSED, Outcome, outcome
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
 from unitcad.accuracy.result import Promise, Result, Say, Table
 from unitcad.accuracy.timing import Timing, machine, timing
+from unitcad.errors import UnitcadError
+from unitcad.pipeline.versions import code_version
 from unitcad.spec import override, read
 
 PATIENCE = 600.0
@@ -29,13 +35,16 @@ def run(quick: bool, say: Say) -> Result:
     return study(10 if quick else 100, say, sweeps=1 if quick else None)
 
 
-def study(count: int, say: Say, sweeps: int | None = None) -> Result:
-    """All sweeps (`sweeps`: that many values of each) and `count` random specs, half in either range."""
+def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None = None) -> Result:
+    """All sweeps (`sweeps`: that many values of each) and `count` random specs, half in either range.
+
+    Outcomes that this code wrote into `journal` before are taken from there, new ones are appended.
+    """
     half = count // 2
     jobs: list[Job] = [(f"sweep {name}", data) for name, data in _sweeps(sweeps)]
     jobs += [(ranges, seeded_spec(seed, ranges)) for ranges in ("documented", "extreme") for seed in range(half)]
     found: dict[str, list[tuple[int, Outcome]]] = {}
-    for i, (group, result) in enumerate(_outcomes(jobs)):
+    for i, (group, result) in enumerate(_journalled(jobs, journal) if journal else _outcomes(jobs)):
         say(f"{i + 1} of {len(jobs)}: {group} {result.kind}")
         found.setdefault(group, []).append((len(found.get(group, [])), result))
     random = {name: found.get(name, []) for name in ("documented", "extreme")}
@@ -85,6 +94,39 @@ def study(count: int, say: Say, sweeps: int | None = None) -> Result:
 def judge(job: Job) -> tuple[str, Outcome]:
     """What becomes of one spec; runs in a process of its own."""
     return job[0], outcome(job[1])
+
+
+def _journalled(jobs: Sequence[Job], journal: Path) -> Iterator[tuple[str, Outcome]]:
+    """The same with a line of JSON a finished spec in `journal`, so that an interrupted study is taken up again.
+
+    Raises UnitcadError for a file that is no such journal.
+    """
+    names = [hashlib.sha256(f"{code_version()} {json.dumps(job)}".encode()).hexdigest()[:16] for job in jobs]
+    known: dict[str, Outcome] = {}
+    if journal.exists():
+        # A last line without its end was cut off by the interruption.
+        for line in journal.read_bytes().split(b"\n")[:-1]:
+            try:
+                name, data = json.loads(line)
+                known[name] = Outcome(**{**data, "chain": tuple(data["chain"])})
+            except (ValueError, TypeError, KeyError):
+                raise UnitcadError(f"{journal}: is not a journal of random specs; move it away") from None
+        journal.write_bytes(b"".join(_line(name, outcome) for name, outcome in known.items()))
+    journal.parent.mkdir(parents=True, exist_ok=True)
+    fresh = _outcomes([job for job, name in zip(jobs, names, strict=True) if name not in known])
+    with journal.open("ab") as file:
+        for job, name in zip(jobs, names, strict=True):
+            if name in known:
+                yield job[0], known[name]
+                continue
+            group, outcome = next(fresh)
+            file.write(_line(name, outcome))
+            file.flush()
+            yield group, outcome
+
+
+def _line(name: str, outcome: Outcome) -> bytes:
+    return (json.dumps([name, asdict(outcome)]) + "\n").encode()
 
 
 def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:

@@ -32,11 +32,14 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def run(name: str, quick: bool, say: Say, specs: int | None = None) -> Result:
-    """One suite's result; `specs`: how many of the extremes. Raises UnitcadError without an extra that it needs."""
+    """One suite's result. Raises UnitcadError without an extra that it needs.
+
+    `specs`: how many of the extremes; that study keeps a journal in out/ and is taken up again from it.
+    """
     if specs is not None and name == "extremes":
         from unitcad.accuracy.extremes import study
 
-        return study(specs, say)
+        return study(specs, say, journal=Path("out") / "extremes.jsonl")
     return import_module(f"unitcad.accuracy.{name.replace('-', '_')}").run(quick, say)
 
 

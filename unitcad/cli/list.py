@@ -10,13 +10,16 @@ KINDS = ("templates", "designs", "materials", "motors", "printers", "rules")
 
 
 def list_(
-    kind: Annotated[str, typer.Argument(help=", ".join(KINDS))],
+    kind: Annotated[str, typer.Argument(help=f"{', '.join(KINDS)}; none: these.", metavar="[KIND]")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
     """List what is shipped, each value with its source and status."""
     from unitcad.cli.output import print_json
     from unitcad.errors import unknown_name
 
+    if not kind:
+        print_json({"kinds": KINDS}) if as_json else typer.echo("\n".join(KINDS))
+        return
     if kind not in KINDS:
         raise unknown_name("list", kind, KINDS)
     entries = _entries(kind)
