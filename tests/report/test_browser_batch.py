@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,9 @@ from chromium import Visit
 from unitcad.report import page as pages
 
 Image = pytest.importorskip("PIL.Image", reason="reading the screenshots needs Pillow")
+
+A4_ACROSS = 1017
+"""CSS pixels between the margins of an A4 sheet that lies on its side."""
 
 
 @pytest.fixture
@@ -163,6 +167,40 @@ def test_nothing_overflows_at_390_pixels(running: Any, sweep: Path) -> None:
     seen = Visit(running, sweep / "report.html", width=390, height=844)
     assert seen.overflowing() == []
     seen.close()
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_table_prints_with_its_heads_on_white(running: Any, sweep: Path, dark: bool) -> None:
+    seen = Visit(running, sweep / "report.html", width=A4_ACROSS, dark=dark)
+    seen.page.check('input[name="all-columns"]')
+    light = ("#ffffff", "#0a6b62")
+    assert (colours(seen) == light) != dark
+    seen.page.emulate_media(media="print")
+    assert [head for head in seen.page.locator(".variants thead th button").all() if not head.is_visible()] == []
+    assert not seen.page.locator(".variants .filters").is_visible()
+    assert not seen.page.locator(".variants input").first.is_visible()
+    assert seen.page.inner_text(".count") == "10 of 10 variants"
+    assert seen.overflowing() == []
+    box = seen.page.locator(".variants table").bounding_box()
+    assert box["x"] + box["width"] <= A4_ACROSS
+    cut_off = "(cells) => cells.filter((e) => e.scrollWidth > e.clientWidth + 1).map((e) => e.textContent)"
+    assert seen.page.locator(".variants th, .variants tbody td").evaluate_all(cut_off) == []
+    assert seen.page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert seen.page.evaluate("() => getComputedStyle(document.body).color") == "rgb(0, 0, 0)"
+    # The plot is a picture: it must have been drawn again in the colours of paper.
+    image = np.asarray(Image.open(io.BytesIO(seen.page.locator("#plot canvas").screenshot())).convert("RGB"))
+    assert image.mean() > 230
+    assert (np.abs(image.astype(int) - (0x0A, 0x6B, 0x62)).max(axis=2) < 8).sum() > 30
+    for across, down in re.findall(rb"/MediaBox ?\[0 0 ([\d.]+) ([\d.]+)\]", seen.page.pdf(prefer_css_page_size=True)):
+        assert float(across) > float(down)
+    seen.page.emulate_media(media="screen")
+    assert (colours(seen) == light) != dark
+    seen.close()
+
+
+def colours(visit: Visit) -> tuple[str, str]:
+    """Of the ground under the table and of the first series."""
+    return tuple(visit.page.evaluate("() => ['paper', 'series-1'].map(window.unitcad.theme.colour)"))
 
 
 def test_two_thousand_rows_come_in_pages(running: Any, tmp_path: Path) -> None:

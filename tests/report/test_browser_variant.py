@@ -246,6 +246,19 @@ def test_print_shows_the_procedure_and_not_the_controls(visit: Visit) -> None:
         assert not visit.page.locator(selector).first.is_visible(), selector
 
 
+def test_print_is_black_on_white_on_a_dark_system(running: Any, page: Path) -> None:
+    for chosen in (False, True):
+        seen = Visit(running, page, dark=not chosen)
+        if chosen:
+            seen.page.click('button[aria-label="Switch between light and dark"]')
+        assert seen.page.evaluate("() => window.unitcad.theme.dark")
+        seen.page.emulate_media(media="print")
+        style = "(node) => { const s = getComputedStyle(node); return [s.backgroundColor, s.color, s.colorScheme]; }"
+        assert seen.page.eval_on_selector("body", style) == ["rgb(255, 255, 255)", "rgb(0, 0, 0)", "light"]
+        assert seen.page.eval_on_selector("#procedure", style)[:2] == ["rgb(255, 255, 255)", "rgb(0, 0, 0)"]
+        seen.close()
+
+
 def test_without_webgl_the_drawing_stands_in(running: Any, page: Path) -> None:
     with launched(running.browser_type, "--disable-3d-apis") as blind:
         seen = Visit(blind, page)

@@ -84,11 +84,13 @@ window.unitcad = {};
       el("div", {}, el("dt", {}, spoken(key)), el("dd", {}, facts(value)))));
   }
 
-  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const dark = matchMedia("screen and (prefers-color-scheme: dark)");
+  const printed = matchMedia("print");
   const watchers = new Set();
 
   const theme = {
     get dark() {
+      if (printed.matches) return false;
       const forced = document.documentElement.dataset.theme;
       return forced ? forced === "dark" : dark.matches;
     },
@@ -117,7 +119,7 @@ window.unitcad = {};
       else watchers.delete(watcher);
     }
   }
-  dark.addEventListener("change", repaint);
+  for (const query of [dark, printed]) query.addEventListener("change", repaint);
 
   Object.assign(window.unitcad, { el, clear, number, bytes, spoken, section, table, facts, theme });
 })();

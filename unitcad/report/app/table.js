@@ -51,6 +51,7 @@
     const body = el("tbody");
     const heads = el("tr");
     const filters = el("tr", { className: "filters" });
+    const grid = el("table", {}, el("thead", {}, heads, filters), body);
     const count = el("p", { className: "count", "aria-live": "polite" });
     const pager = el("div", { className: "buttons" });
     const search = el("input", { type: "search", name: "search", placeholder: "Search all columns", "aria-label": "Search all columns", oninput: () => { state.search = search.value; state.page = 0; update(); } });
@@ -72,6 +73,7 @@
     }
 
     function layout() {
+      grid.style.setProperty("--columns", columns().length);
       clear(heads, columns().map(({ name, at }) => el("th", { scope: "col", "data-at": at }, el("button", { type: "button", onclick: () => sortBy(at) },
         name.split(/(?<=[._])/).flatMap((piece) => [piece, el("wbr")])))));
       clear(filters, columns().map(({ name, at }) => {
@@ -108,7 +110,7 @@
     const node = el("div", { className: "variants" },
       el("div", { className: "tools" }, search, el("label", {}, all, "columns that don't vary, too"), count),
       known.length > 0 && el("details", {}, el("summary", {}, `The same everywhere: ${known.length} columns`), el("ul", { className: "chips" }, known)),
-      el("div", { className: "scroll tall", tabindex: "0", role: "group", "aria-label": "Variants" }, el("table", {}, el("thead", {}, heads, filters), body)),
+      el("div", { className: "scroll tall", tabindex: "0", role: "group", "aria-label": "Variants" }, grid),
       pager);
     layout();
     update();
