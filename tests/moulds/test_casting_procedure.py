@@ -166,3 +166,25 @@ def test_drawing_of_every_pour_names_its_pieces() -> None:
         assert drawing == casting_text.step_section(moulds.plan, step, moulds.segments)
         for word in ("base", f"cup {step.index}", "tongue 1", "stub 2", f"layer {step.index}"):
             assert word in drawing
+
+
+def test_pot_life_is_spent_on_mixing_and_pouring_too() -> None:
+    """1730 s of rise against 1800 s of pot life: too little once three minutes went into mixing, two into pouring."""
+    pour = procedure("embedded", "motor.thickness_mm=2.8").pours[0]
+    assert pour.verdict.startswith("Degas for 3 min")
+    assert "1730 s" in pour.verdict
+    assert procedure("embedded").pours[0].verdict.startswith("Bubbles clear")
+
+
+@pytest.mark.parametrize("more", [[], ["moulds.cavities=[2,3]"], ["moulds.pour=injected"]], ids=["one", "gang", "lid"])
+def test_a_unit_weighs_what_one_trimmed_unit_weighs(more: list[str]) -> None:
+    """Ecoflex 00-10 1.04, Dragon Skin 30 1.08 g/cm3: neither the gang's grams nor what stands in sprue and vents."""
+    weigh = procedure("encapsulating", *more).measure[-1]
+    assert "0.221 + 0.387 = 0.608 g" in weigh
+    assert ("strike" in weigh) == ("moulds.pour=injected" not in more)
+
+
+def test_a_motor_that_nothing_holds_is_fixed() -> None:
+    """An open ring without a pad: silicone round the motor, or motor.fill."""
+    ring = "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]"
+    assert "fill the ring of 1.00 mm" in procedure("no-fpcb", "design=embedded", ring).assembly[-1]

@@ -82,3 +82,20 @@ def test_resin_coupon_prints_no_tongue(tmp_path: Path) -> None:
     from unitcad.moulds.coupon_files import write
 
     assert not (write(printers()["sla"], tmp_path) / "coupon-tongue.stl").exists()
+
+
+def test_windows_are_as_high_as_the_slicer_makes_them() -> None:
+    """Layers counted in PrusaSlicer's G-code, where each is cut at its middle."""
+    heights = {
+        name: [coupon.window_height_as_printed(printers()[name], i) for i in range(5)]
+        for name in ("fdm-0.4", "fdm-0.25")
+    }
+    assert heights["fdm-0.4"] == pytest.approx([0.6, 0.6, 0.6, 0.8, 0.8])
+    assert heights["fdm-0.25"] == pytest.approx([0.4, 0.6, 0.6, 0.6, 0.6])
+    assert "differ in width only" in coupon.to_markdown(printers()["fdm-0.4"])
+
+
+def test_resin_coupon_says_how_to_cut_the_tongue() -> None:
+    text = coupon.to_markdown(printers()["sla"])
+    assert "cut a strip 3.4 wide" in text
+    assert "0.35 mm thick" in text

@@ -186,3 +186,26 @@ def test_docs_list_every_code() -> None:
 
     page = (Path(__file__).parents[2] / "docs" / "moulds.md").read_text("utf-8")
     assert all(f"| {code} |" in page for code in CODES)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "field", "nearest"),
+    [
+        (["moulds.cavities=[3,40]"], "moulds.cavities", [2, 10]),
+        (["moulds.cavities=[1000000,1000000]"], "moulds.cavities", [2, 10]),
+        (["moulds.cavities=full"], "moulds.cavities", "fill"),
+        (["moulds.pour=injected", "moulds.sprue_mm=30"], "moulds.sprue_mm", 9.3),
+        (["moulds.bed_x_mm=20"], "moulds.bed_x_mm", 36.3),
+        (["moulds.window_clearance_mm=5"], "moulds.window_clearance_mm", 2.005),
+    ],
+)
+def test_nearest_value_leads_out(overrides: list[str], field: str, nearest: object) -> None:
+    """What is offered is no nonsense: put in, it meets no limit of its own again."""
+    with pytest.raises(Refusal) as refused:
+        MouldSet.of("encapsulating", *overrides)
+    assert (refused.value.field, refused.value.nearest) == (field, nearest)
+    put_in = f"{field}={nearest}"
+    try:
+        MouldSet.of("encapsulating", *overrides[:-1], put_in)
+    except Refusal as further:
+        assert further.field != field

@@ -69,7 +69,7 @@ def _silicone(mixes: list[tuple[Material, Mix]]) -> list[Item]:
     found = []
     for material in dict.fromkeys(material for material, _ in mixes):
         own = [mix for other, mix in mixes if other == material]
-        note = f"{len(own)} pour(s), mix ratio {float(material.mix_ratio):g} A to 1 B"
+        note = f"{len(own)} pour{'' if len(own) == 1 else 's'}, mix ratio {float(material.mix_ratio):g} A to 1 B"
         found.append(Item(f"{material.name} part A", sum(m.part_a_g for m in own), "g", "bought", note))
         found.append(Item(f"{material.name} part B", sum(m.part_b_g for m in own), "g", "bought", note))
     return found

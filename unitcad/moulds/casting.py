@@ -58,6 +58,11 @@ def procedure(spec: Spec, plan: Plan, layer_volumes_mm3: Sequence[float]) -> Pro
         fig.mix(spec, silicone, len(plan.layout.cells) * volume + sum(map(exact_volume, step.channels)))
         for silicone, volume, step in zip(silicones, layer_volumes_mm3, plan.steps, strict=True)
     ]
+    edges = tuple(off_grid(spec, dims))
+    grams = [
+        volume * float(silicone.density_g_cm3) / 1000
+        for silicone, volume in zip(silicones, layer_volumes_mm3, strict=True)
+    ]
     resin = printer_of(spec).technology.value == "sla"
     pours = []
     for i, (step, silicone, mix, volume) in enumerate(
@@ -73,11 +78,11 @@ def procedure(spec: Spec, plan: Plan, layer_volumes_mm3: Sequence[float]) -> Pro
         label=plan.label,
         cells=len(plan.layout.cells),
         preparation=preparation(spec, plan, resin),
-        off_grid=tuple(off_grid(spec, dims)),
+        off_grid=edges,
         pours=tuple(pours),
         release=release(spec, plan, silicones[0]),
         assembly=assembly(spec, dims),
-        measure=measurements(spec, dims, plan),
+        measure=measurements(spec, dims, grams, _slot_as_printed(spec, plan, edges)),
         walls=tuple(_walls(spec)),
         bill=bill(spec, dims, plan, list(zip(silicones, mixes, strict=True))),
     )
@@ -89,17 +94,26 @@ def _figures(
     casting, step = spec.casting, plan.steps[layer]
     rule = "assumed: half the time for every 10 K more; at 23 degC " + sourced(silicone.pot_life_min)
     depth = step.rim
+    channels = " + sprue and vents" if step.channels else ""
     weep = fig.weep_mm3(spec, dims, plan.layout, layer, silicone)
     found = [
         Figure("volume of one layer", volume, "mm3", "computed: the drawn layer's mesh"),
+        *(
+            [Figure("sprue and vents", sum(map(exact_volume, step.channels)), "mm3", "computed: as drawn")]
+            if channels
+            else []
+        ),
         Figure("density", float(silicone.density_g_cm3), "g/cm3", sourced(silicone.density_g_cm3)),
-        Figure("in the cavities, net", mix.net_g, "g", "computed: volume x cavities x density"),
+        Figure("in the cavities, net", mix.net_g, "g", f"computed: (volume x cavities{channels}) x density"),
         Figure("to mix", mix.mix_g, "g", f"assumed: {casting.waste:.0%} more, at least {casting.minimum_mix_g:g} g"),
         Figure("part A", mix.part_a_g, "g", "mix ratio, " + sourced(silicone.mix_ratio)),
         Figure("part B", mix.part_b_g, "g", "mix ratio, " + sourced(silicone.mix_ratio)),
         Figure("scale's error on a part, net", mix.net_error_pct, "%", f"half of {casting.scale_resolution_g:g} g"),
         Figure("scale's error on a part, mixed", mix.mix_error_pct, "%", f"half of {casting.scale_resolution_g:g} g"),
         Figure("pot life in this room", fig.at_room(float(silicone.pot_life_min), casting.room_c), "min", rule),
+        Figure("mixing", fig.MIXING_MIN, "min", "assumed: usual practice"),
+        *([Figure("degassing", fig.DEGASSING_MIN, "min", "assumed: usual practice")] if casting.vacuum else []),
+        Figure("pouring and striking off", fig.POURING_MIN, "min", "assumed: usual practice"),
         Figure("viscosity, mixed", float(silicone.mixed_viscosity_cps), "cps", sourced(silicone.mixed_viscosity_cps)),
         Figure("depth of this pour", depth, "mm", "computed: the rim over the seat"),
         Figure(
@@ -123,21 +137,40 @@ def _figures(
     ]
     if weep:
         share = 100 * weep / volume
-        found.append(Figure("weep by the windows, no grease", share, "% of a layer", "computed: flow in the clearance"))
+        under = "computed: flow in the clearance under the pour's own weight"
+        if step.lid:
+            under += "; the syringe's pressure comes on top"
+        found.append(Figure("weep by the windows, no grease", share, "% of a layer", under))
     return tuple(found)
 
 
 def _verdict(spec: Spec, step: Step, silicone: Material) -> str:
+    """Whether the pot life, less mixing, degassing and pouring, lets the bubbles rise out of the pour."""
     rise = fig.bubble_rise_s(step.rim, silicone)
     pot = 60 * fig.at_room(float(silicone.pot_life_min), spec.casting.room_c)
-    if rise <= pot:
-        return f"Bubbles clear by themselves: {rise:.0f} s through {step.rim:.2f} mm, within a pot life of {pot:.0f} s."
+    work = 60 * (fig.MIXING_MIN + fig.POURING_MIN)
+    spent = f"the pot life of {pot:.0f} s less {work:.0f} s for mixing and pouring"
+    if rise <= pot - work:
+        return f"Bubbles clear by themselves: {rise:.0f} s through {step.rim:.2f} mm, within {spent}."
     if spec.casting.vacuum:
-        return f"Degas before pouring: a bubble needs {rise:.0f} s, the pot life is {pot:.0f} s."
+        left = pot - work - 60 * fig.DEGASSING_MIN
+        told = (
+            f"Degas before pouring, {fig.DEGASSING_MIN:g} min (assumed): a bubble needs {rise:.0f} s, {spent} is less."
+        )
+        if left < 0:
+            told += f" Degassing ends {-left:.0f} s after the pot life: cool the room, or take a slower silicone."
+        return told
     return (
-        f"Bubbles stay: {rise:.0f} s against a pot life of {pot:.0f} s and no vacuum (casting.vacuum). Get one, or "
-        "brush a thin coat onto core and bore first and pour in a thread from one side."
+        f"Bubbles stay: {rise:.0f} s against {spent}, and no vacuum (casting.vacuum). Get one, or brush a thin coat "
+        "onto core and bore first and pour in a thread from one side."
     )
+
+
+def _slot_as_printed(spec: Spec, plan: Plan, edges: Sequence[OffGrid]) -> float | None:
+    """The tongue's thickness as the slicer makes it, where that is another one; a tongue that is cut has its own."""
+    printed = any(tool.name.startswith("tongue") and tool.made == "printed" for tool in plan.tools)
+    heights = [edge.nearest_mm for edge in edges if edge.piece == "tongue"]
+    return heights[0] if printed and heights else None
 
 
 def _walls(spec: Spec) -> list[Figure]:

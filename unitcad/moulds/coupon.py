@@ -80,12 +80,24 @@ def bodies(printer: Printer) -> tuple[Body, ...]:
 
 def to_markdown(printer: Printer) -> str:
     """How to judge the coupon, and the line of TOML for every station."""
+    thick, wide = float(printer.slot_height_mm), _tongue_width(printer)
+    pieces = "plate, plug and tongue"
+    if printer.technology.value == "sla":
+        pieces = "plate and plug"
     lines = [
         f"# Fit coupon for {printer.name}",
         "",
-        "Print plate, plug and tongue as they lie. At every feature choose one of the five stations and put its line",
+        f"Print {pieces} as they lie. At every feature choose one of the five stations and put its line",
         "into your spec. Station 3 is the catalogue's value.",
         "",
+    ]
+    if printer.technology.value == "sla":
+        lines += [
+            f"The tongue is no file: cut a strip {wide:g} wide and 25 long from film or steel {thick:g} mm thick, as",
+            "the moulds' tongues are; printed resin is brittle.",
+            "",
+        ]
+    lines += [
         "```toml",
         "[moulds]",
         'printer = "mine"',
@@ -101,7 +113,36 @@ def to_markdown(printer: Printer) -> str:
     for fit in fits(printer):
         cells = " | ".join(f"`{toml(printer, fit, i)}`" for i in range(len(SHARES)))
         lines.append(f"| {fit.feature} | {fit.choose} | {cells} |")
+    layer, drawn = float(printer.layer_mm), window_heights(printer)
+    made = [window_height_as_printed(printer, i) for i in range(len(SHARES))]
+    if any(abs(a - b) > 0.02 * layer for a, b in zip(drawn, made, strict=True)):
+        lines += [
+            "",
+            f"A window's edges fall between layers of {layer:g} mm, as they do in a cup, and the slicer moves them:",
+            "",
+            "| height of the window, mm | 1 | 2 | 3 | 4 | 5 |",
+            "| --- | --- | --- | --- | --- | --- |",
+            "| as drawn | " + " | ".join(f"{height:.4g}" for height in drawn) + " |",
+            "| in whole layers | " + " | ".join(f"{height:.4g}" for height in made) + " |",
+            "",
+            f"Stations of one height differ in width only. The tongue of {thick:g} mm is moved too: measure it.",
+        ]
     return "\n".join(lines) + "\n"
+
+
+def window_heights(printer: Printer) -> list[float]:
+    """The height of each station's window as drawn, mm."""
+    around = next(fit.values_mm for fit in fits(printer) if fit.feature == "window")
+    return [float(printer.slot_height_mm) + 2 * each for each in around]
+
+
+def window_height_as_printed(printer: Printer, station: int) -> float:
+    """What layers leave open of a window, mm: a slicer cuts each layer at its middle."""
+    layer = float(printer.layer_mm)
+    around = (window_heights(printer)[station] - float(printer.slot_height_mm)) / 2
+    low, high = WINDOW_Z - around, WINDOW_Z + float(printer.slot_height_mm) + around
+    middles = [layer * (k + 0.5) for k in range(math.ceil(PLATE / layer))]
+    return layer * sum(low + 1e-6 < middle < high - 1e-6 for middle in middles)
 
 
 def _plate(printer: Printer) -> Shape:

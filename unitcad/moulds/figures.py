@@ -14,6 +14,10 @@ BUBBLE_MM = 0.2
 CONTAINER = 4.0
 """Volume of the degassing container over the mix: silicone foams up under vacuum (maker's advice: 3 to 4 times)."""
 VACUUM_INHG, KPA_PER_INHG = 29.0, 3.386389
+MIXING_MIN, DEGASSING_MIN, POURING_MIN = 3.0, 3.0, 2.0
+"""What the pot life is spent on before and after the bubbles (assumed: usual practice)."""
+MOST_ERROR_PCT = 5.0
+"""What a scale may do to the ratio before a cure suffers (assumed)."""
 DATASHEET_C = 23.0
 DOUBLING_K = 10.0
 """A cure runs twice as fast for every 10 K (assumed: the usual rule of thumb, no bulletin gives it)."""

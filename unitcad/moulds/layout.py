@@ -57,17 +57,15 @@ def layout(spec: Spec, dims: Dimensions) -> Layout:
         columns, rows = _fill(spec, dims, most)
     else:
         columns, rows = spec.moulds.cavities
-    if columns > most:
-        raise Refusal(
-            "moulds.cavities", [columns, rows], f"a tail must reach an edge: {most} column(s) at most", [most, rows]
-        )
-    if columns * rows > MOST_CELLS:
-        fits = [min(columns, MOST_CELLS), max(1, MOST_CELLS // columns)]
-        raise Refusal("moulds.cavities", [columns, rows], f"cells are numbered up to {MOST_CELLS}", fits)
+    if columns > most or columns * rows > MOST_CELLS:
+        limit = f"a tail must reach an edge: {most} column{'s' if most > 1 else ''} at most"
+        if columns <= most:
+            limit = f"cells are numbered up to {MOST_CELLS}"
+        raise Refusal("moulds.cavities", [columns, rows], limit, _fitting(spec, dims, min(columns, most), rows))
     found = _layout(spec, dims, columns, rows)
     over = _excess(spec, found)
     if max(over) > 1e-9:
-        raise _too_large(spec, found, columns, rows, over)
+        raise _too_large(spec, dims, found, columns, rows, over)
     tallest = max(spec.moulds.plinth_height_mm + spec.moulds.plate_mm + dims.heights[-1], BLADE_HEIGHT)
     if tallest > (spec.moulds.bed_z_mm or 0.0) + 1e-9:
         nearest = math.ceil(tallest * 100) / 100
@@ -88,6 +86,17 @@ def _fill(spec: Spec, dims: Dimensions, most: int) -> tuple[int, int]:
     while columns * (rows + 1) <= MOST_CELLS and max(_excess(spec, _layout(spec, dims, columns, rows + 1))) <= 1e-9:
         rows += 1
     return columns, rows
+
+
+def _fitting(spec: Spec, dims: Dimensions, columns: int, rows: int) -> list[int]:
+    """As many of the columns and rows asked for as can be numbered and as the bed takes."""
+    columns = min(columns, MOST_CELLS)
+    while columns > 1 and _excess(spec, _layout(spec, dims, columns, 1))[0] > 1e-9:
+        columns -= 1
+    rows = min(rows, MOST_CELLS // columns)
+    while rows > 1 and max(_excess(spec, _layout(spec, dims, columns, rows))) > 1e-9:
+        rows -= 1
+    return [columns, rows]
 
 
 def _excess(spec: Spec, found: Layout) -> list[float]:
@@ -143,7 +152,7 @@ def _corner_for_label(radius: float, width: float, height: float) -> float:
     return half
 
 
-def _too_large(spec: Spec, found: Layout, columns: int, rows: int, over: list[float]) -> Refusal:
+def _too_large(spec: Spec, dims: Dimensions, found: Layout, columns: int, rows: int, over: list[float]) -> Refusal:
     """The refusal of a plate larger than the bed: fewer cavities if that helps, else a smaller unit or a larger bed."""
     fits = [
         max(1, count - math.ceil(max(excess, 0) / found.pitch - 1e-9))
@@ -160,4 +169,9 @@ def _too_large(spec: Spec, found: Layout, columns: int, rows: int, over: list[fl
     if still <= 1e-9:
         return Refusal("moulds.cavities", [columns, rows], f"{size} {by}", fits)
     nearest = math.floor((spec.diameter_mm - still - 1) * 100) / 100
-    return Refusal("diameter_mm", spec.diameter_mm, f"{size} {by} with one cavity", max(nearest, 0.01))
+    if nearest < spec.diameter_mm - 2 * dims.air_ring:
+        bed = "xy"[over.index(max(over))]
+        needed = math.ceil(20 * found.plate["xy".index(bed)]) / 10
+        field = f"moulds.bed_{bed}_mm"
+        return Refusal(field, getattr(spec.moulds, field[7:]), f"{size} {by} with one cavity", needed)
+    return Refusal("diameter_mm", spec.diameter_mm, f"{size} {by} with one cavity", nearest)

@@ -24,6 +24,8 @@ VENT, LEAST_VENT = 1.0, 0.8
 """Diameter of a vent, mm, and what it may come down to over a narrow ring."""
 VENT_COUNTS = tuple(range(4, 65, 4))
 """Multiples of four: the tilts of the air law then fall halfway between two vents, the worst case."""
+SPRUE_OFF_VENT = 0.1
+"""Wall between sprue and vents at the lid's upper face, at least, mm."""
 GATE = 0.8
 """Diameter of what opens into a ring, over the ring's width."""
 TILT_DEG = 5.0
@@ -56,6 +58,7 @@ def channels(spec: Spec, dims: Dimensions, lay: Layout, layer: int, beyond: floa
     rim, top, sprue = dims.heights[layer], lid_top(dims, layer), spec.moulds.sprue_mm / 2
     inner, outer = _ceiling(dims, layer)
     vent, count = vent_diameter(dims, layer) / 2, vents(spec, dims, layer)
+    _check_sprue(spec, dims, layer, count)
     turns = [math.tau * (k + 0.5) / count for k in range(count)]
     drawn = [
         moved(cylinder(vent, rim - beyond, top + beyond), (outer - vent) * math.cos(a), (outer - vent) * math.sin(a))
@@ -70,6 +73,18 @@ def channels(spec: Spec, dims: Dimensions, lay: Layout, layer: int, beyond: floa
     else:
         drawn.insert(0, cylinder(sprue, rim - beyond, top + beyond))
     return [moved(shape, c.x, c.y) for c in lay.cells for shape in drawn]
+
+
+def _check_sprue(spec: Spec, dims: Dimensions, layer: int, count: int) -> None:
+    """Raises Refusal for a sprue that runs into the vents."""
+    inner, outer = _ceiling(dims, layer)
+    vent = vent_diameter(dims, layer) / 2
+    middle, rim = (inner + outer) / 2 if inner else 0.0, outer - vent
+    apart = math.sqrt(middle**2 + rim**2 - 2 * middle * rim * math.cos(math.tau / count))
+    most = math.floor(200 * (apart - vent - SPRUE_OFF_VENT)) / 100
+    if spec.moulds.sprue_mm > most + 1e-9:
+        limit = f"between {count} vents of {2 * vent:g} mm the sprue of pour {layer + 1} has at most {most:g} mm"
+        raise Refusal("moulds.sprue_mm", spec.moulds.sprue_mm, limit, most if most > 0 else None)
 
 
 def vent_diameter(dims: Dimensions, layer: int) -> float:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from unitcad.catalogue import Material
-from unitcad.moulds.figures import Mix
+from unitcad.moulds.figures import MIXING_MIN, MOST_ERROR_PCT, Mix
 from unitcad.moulds.lid import SKIRT_WALL
 from unitcad.moulds.plan import Plan, Step
 from unitcad.spec import Dimensions, Spec
@@ -31,9 +32,9 @@ def preparation(spec: Spec, plan: Plan, resin: bool) -> tuple[str, ...]:
         )
     if any(tool.name.startswith("stub") for tool in plan.tools):
         found.append(
-            "Push the filament stub up through the core from below until its end is flush with the core's top, its "
-            "bent end "
-            "lying in the groove under the plate and on the bench. Trim its tip flush with a blade: 0.5 mm low shows."
+            f"Push {'the' if len(plan.layout.cells) == 1 else 'each'} filament stub up through the core from below "
+            "until its end is flush with the core's top, its bent end lying in the groove under the plate and on the "
+            "bench. Trim its tip flush with a blade: 0.5 mm low shows."
         )
     return tuple(found)
 
@@ -80,8 +81,8 @@ def pour_steps(spec: Spec, plan: Plan, step: Step, silicone: Material, mix: Mix,
         f"g go into "
         f"{cells} cavit{'y' if cells == 1 else 'ies'}; so small a batch would be {mix.net_error_pct:.1f} % wrong in "
         "the ratio, "
-        f"this one {mix.mix_error_pct:.2f} %). Mix for 2 to 3 min (assumed), scraping the walls; the pot life runs "
-        f"from now."
+        f"this one {mix.mix_error_pct:.2f} %{_more(mix)}). Mix for {MIXING_MIN:g} min (assumed), scraping the walls; "
+        "the pot life runs from now."
     )
     found.append(verdict)
     if step.lid:
@@ -92,8 +93,8 @@ def pour_steps(spec: Spec, plan: Plan, step: Step, silicone: Material, mix: Mix,
         )
     else:
         found.append(
-            "Pour in a thin thread at one place until the cavity stands over its rim. Wait for the bubbles, prick "
-            "what you see. "
+            f"Pour in a thin thread at one place until {'the' if cells == 1 else 'every'} cavity stands over its rim. "
+            "Wait for the bubbles, prick what you see. "
             "Strike off along the rim with the blade held upright; what it takes goes into the groove."
         )
         again = " The window weeps a little." if tongues else ""
@@ -101,14 +102,23 @@ def pour_steps(spec: Spec, plan: Plan, step: Step, silicone: Material, mix: Mix,
     found.append(
         "Let it cure, level, for the time above. Touch the overflow, not the layer, to see whether it is done."
     )
+    if tongues:
+        each = "the tongue" if len(tongues) == 1 else "every tongue"
+        found.append(f"Pull {each} out FIRST, sideways. A cup lifted over a tongue tears the layer.")
     if step.lid:
         found.append("Lift the lid: sprue and vents tear off at the layer. Trim them flush with a blade.")
-    if tongues:
-        found.append("Pull the tongue out FIRST, sideways. A cup lifted over a tongue tears the layer.")
     found.append(
         f"Lift cup {step.index} straight up, a screwdriver in each pry slot. Layer {step.index} stays on the core."
     )
     return tuple(found)
+
+
+def _more(mix: Mix) -> str:
+    """The batch that would be right enough in the ratio, where this one isn't."""
+    if mix.mix_error_pct <= MOST_ERROR_PCT:
+        return ""
+    enough = mix.mix_g * mix.mix_error_pct / MOST_ERROR_PCT
+    return f": too much; mix at least {enough:.3g} g (casting.minimum_mix_g) or use a finer scale"
 
 
 def release(spec: Spec, plan: Plan, inner: Material) -> tuple[str, ...]:
@@ -117,7 +127,8 @@ def release(spec: Spec, plan: Plan, inner: Material) -> tuple[str, ...]:
     found = []
     if any(tool.name.startswith("stub") for tool in plan.tools):
         found.append(
-            "Pull the filament out downwards: it lets air in under the unit. Never push it through: "
+            f"Pull {'the' if len(plan.layout.cells) == 1 else 'each'} filament out downwards: it lets air in under "
+            "the unit. Never push it through: "
             f"{tear:.1f} N on its end tear {inner.name} (computed: tensile strength, {inner.tensile_mpa.status}, x "
             f"its area)."
         )
@@ -127,11 +138,16 @@ def release(spec: Spec, plan: Plan, inner: Material) -> tuple[str, ...]:
 
 def assembly(spec: Spec, dims: Dimensions) -> tuple[str, ...]:
     """Motor and circuit, or wires, into the body."""
-    held = (
-        "Layer 1 holds the motor all round."
-        if spec.motor.fill
-        else f"A ring of air of {dims.air_ring:.2f} mm stays round the motor: what it is fixed to holds it."
-    )
+    if spec.motor.fill:
+        held = "Layer 1 holds the motor all round."
+    elif spec.design == "embedded" and not spec.fpcb:
+        held = (
+            f"Nothing else holds it: lay the body on a greased flat, centre the motor, and fill the ring of "
+            f"{dims.air_ring:.2f} mm round it with Layer 1's silicone or a silicone adhesive (assumed). "
+            "motor.fill = true draws Layer 1 up to the motor instead."
+        )
+    else:
+        held = f"A ring of air of {dims.air_ring:.2f} mm stays round the motor: what it is fixed to holds it."
     if spec.wires and spec.design == "encapsulating":
         found = ["Feed the wires out through the slot from inside, then push the motor in, its back against the cap."]
     elif spec.wires:
@@ -167,8 +183,12 @@ def assembly(spec: Spec, dims: Dimensions) -> tuple[str, ...]:
     return tuple(found)
 
 
-def measurements(spec: Spec, dims: Dimensions, plan: Plan) -> tuple[str, ...]:
-    """What to measure on the first part, and what it should be."""
+def measurements(
+    spec: Spec, dims: Dimensions, grams: Sequence[float], as_printed: float | None = None
+) -> tuple[str, ...]:
+    """What to measure on the first part, and what it should be: `grams` of each layer of one unit, trimmed, and the
+    slot's height if the slicer makes the tongue another one (mm).
+    """
     play = spec.moulds.plinth_clearance_mm or 0.0
     found = [
         f"Height over all: {dims.heights[-1]:.2f} mm. A cup that did not seat shows here.",
@@ -184,7 +204,19 @@ def measurements(spec: Spec, dims: Dimensions, plan: Plan) -> tuple[str, ...]:
     if dims.slot_z:
         found.append(
             f"The {'notch' if spec.design == 'embedded' else 'slot'}: {dims.slot_width:.2f} wide, "
-            f"{dims.slot_z[1] - dims.slot_z[0]:.2f} high, open all the way."
+            f"{dims.slot_z[1] - dims.slot_z[0]:.2f} high"
+            + (
+                f" ({as_printed:.2f} if the tongue was printed in layers of {spec.moulds.layer_mm:g})"
+                if as_printed
+                else ""
+            )
+            + ", open all the way."
         )
-    found.append("Weigh it: the net grams above, added up. Less means air or a low strike.")
+    sum_of = " + ".join(f"{each:.3f}" for each in grams)
+    low = "" if spec.moulds.pour == "injected" else " or a low strike"
+    found.append(
+        f"Weigh one unit, trimmed, without motor and circuit: {sum_of}"
+        + (f" = {sum(grams):.3f}" if len(grams) > 1 else "")
+        + f" g. Less means air{low}."
+    )
     return tuple(found)

@@ -23,6 +23,8 @@ TAIL_SHARE = 0.7
 """Half the tail's width over the core's radius, at most: beyond it the ledge has no shoulders."""
 LEDGE_SHARE = 0.95
 """Half the notch's width over the ledge's radius, at most: beyond it the tongue's round tip has prongs."""
+LEAST_TAIL = 0.4
+"""No circuit's tail is narrower (two traces), mm."""
 SLOT_CLEARANCE = 0.2
 """Least height of the slot over the circuit's thickness, or a wire's on each side of it, mm."""
 UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
@@ -84,6 +86,17 @@ def warnings(spec: Spec) -> list[str]:
         low, high = CIRCUIT_STOCK
         found.append(
             f"fpcb.thickness_mm = {spec.fpcb.thickness_mm:g} mm: flexible circuits are {low:g} to {high:g} mm thick"
+        )
+    play = spec.moulds.plinth_clearance_mm or 0.0
+    thinnest = min(layer.wall_mm for layer in spec.layers)
+    if (2 if len(spec.layers) > 1 else 1) * play > thinnest / 2:
+        found.append(
+            f"moulds.plinth_clearance_mm = {play:g} mm lets cups move by more than half of a wall of {thinnest:g} mm"
+        )
+    if spec.design == "embedded" and not spec.fpcb and not spec.motor.fill:
+        found.append(
+            "motor.fill = false: without a circuit's pad nothing holds the motor in an embedded unit; fill the ring of "
+            "air round it, or set motor.fill = true"
         )
     dims = dimensions(spec)
     if (
@@ -194,10 +207,17 @@ def _check_circuit(spec: Spec, dims: Dimensions) -> None:
         )
         _at_most("fpcb.tail_width_mm", tail, pad, "the tail is no wider than the pad, which has")
         return
+    widest = widest_exit(spec, dims)
+    clearance = spec.moulds.window_clearance_mm or 0.0
+    if widest < LEAST_TAIL and clearance > LEAST_TAIL:
+        # No tail fits because of the clearance: the clearance is to blame, not the tail.
+        most = _down(clearance - (tail - widest) / 2)
+        limit = f"the ledge leaves room for a tail of {tail:g} mm up to a clearance of {most:g} mm"
+        raise Refusal("moulds.window_clearance_mm", clearance, limit, most if most > 0 else None)
     _at_most(
         "fpcb.tail_width_mm",
         tail,
-        widest_exit(spec, dims),
+        widest,
         "half the tail is at most 0.7 of the core's radius and keeps off the ledge's ends, so the tail at most",
     )
     _at_most(
@@ -333,7 +353,8 @@ def _at_most(field: str, value: float, limit: float, why: str) -> None:
 
 def _bound(field: str, value: float, limit: float, why: str, broken: bool, nearest: Callable[[float], float]) -> None:
     if broken:
-        raise Refusal(field, value, f"{why} {limit:.4g} mm", nearest(limit))
+        accepted = nearest(limit)
+        raise Refusal(field, value, f"{why} {accepted:g} mm", accepted)
 
 
 def _up(limit: float) -> float:

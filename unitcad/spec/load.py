@@ -162,6 +162,8 @@ def _refusal(error: ValidationError) -> Refusal:
     value = first.get("input")
     if first["type"] == "extra_forbidden":
         return unknown_key(field, value, _known_keys(where[:-1]))
+    if field.startswith("moulds.cavities") and not isinstance(value, int):
+        return Refusal("moulds.cavities", str(value), 'takes [columns, rows] or "fill"', "fill")
     if first["type"] == "missing":
         return Refusal(field, "nothing", "is required")
     context = first.get("ctx", {})
