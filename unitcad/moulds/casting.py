@@ -154,9 +154,8 @@ def _verdict(spec: Spec, step: Step, silicone: Material) -> str:
         return f"Bubbles clear by themselves: {rise:.0f} s through {step.rim:.2f} mm, within {spent}."
     if spec.casting.vacuum:
         left = pot - work - 60 * fig.DEGASSING_MIN
-        told = (
-            f"Degas before pouring, {fig.DEGASSING_MIN:g} min (assumed): a bubble needs {rise:.0f} s, {spent} is less."
-        )
+        told = f"Degas for {fig.DEGASSING_MIN:g} min (assumed) before pouring: a bubble needs {rise:.0f} s, more than "
+        told += f"{spent}."
         if left < 0:
             told += f" Degassing ends {-left:.0f} s after the pot life: cool the room, or take a slower silicone."
         return told
