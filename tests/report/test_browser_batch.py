@@ -146,13 +146,57 @@ def test_to_a_variant_and_back_by_keys(visit: Visit) -> None:
     visit.page.locator("a.back").focus()
     visit.page.keyboard.press("Enter")
     visit.page.wait_for_selector(".variants")
-    assert visit.page.inner_text(".count") == "10 of 10 variants"
+    assert visit.page.inner_text(".count") == "1 of 10 variants"
+    assert visit.page.evaluate("() => document.activeElement.textContent") == "c 1.25"
     head(visit, "name").focus()
     visit.page.keyboard.press("Enter")
     assert visit.page.get_attribute('th:has(button:text-is("name"))', "aria-sort") == "ascending"
     visit.page.go_back()
     visit.drawn()
     assert visit.page.inner_text("h1") == "c 1.25"
+
+
+@pytest.mark.parametrize("way", ["Back", "All variants"])
+def test_back_from_a_variant_all_is_as_it_was_left(visit: Visit, way: str) -> None:
+    visit.page.check('input[name="all-columns"]')
+    visit.page.fill('input[name="filter-layers.0.wall_mm"]', "> 1")
+    visit.page.fill('input[name="search"]', "e")
+    head(visit, "layers.0.wall_mm").click()
+    head(visit, "layers.0.wall_mm").click()
+    visit.page.select_option('select[name="plot-x"]', "name")
+    visit.page.select_option('select[name="plot-y"]', "design")
+    visit.page.select_option('select[name="plot-group"]', "")
+    scrolled = "(node) => { node.scrollTo(60, 0); return node.scrollLeft; }"
+    assert visit.page.eval_on_selector(".variants .scroll", scrolled) == 60
+    visit.page.evaluate("() => window.scrollTo(0, 80)")
+    before = left(visit)
+    assert before["names"][1] == "c 1.5"
+    visit.page.locator(".variants tbody a").first.evaluate("(link) => link.click()")
+    visit.drawn()
+    assert visit.page.evaluate("() => window.scrollY") == 0
+    # What is drawn while it is away takes the colours that were chosen meanwhile.
+    visit.page.click('button[aria-label="Switch between light and dark"]')
+    if way == "Back":
+        visit.page.go_back()
+    else:
+        visit.page.click("a.back")
+    visit.page.wait_for_selector(".variants")
+    assert left(visit) == before
+    image = Image.open(io.BytesIO(visit.page.locator("#plot canvas").screenshot())).convert("RGB")
+    assert np.asarray(image).mean() < 80
+
+
+def left(visit: Visit) -> dict[str, Any]:
+    """What a person has set on the page, and what it shows for it."""
+    set_to = "(nodes) => nodes.map((e) => [e.name, e.type === 'checkbox' ? e.checked : e.value])"
+    return {
+        "fields": visit.page.locator(".variants input, #plot select").evaluate_all(set_to),
+        "names": column(visit, "name"),
+        "sorted": visit.page.locator(".variants thead th").evaluate_all("(e) => e.map((th) => th.ariaSort)"),
+        "plot": visit.page.get_attribute("#plot .plot", "aria-label"),
+        "across": visit.page.eval_on_selector(".variants .scroll", "(node) => node.scrollLeft"),
+        "down": visit.page.evaluate("() => window.scrollY"),
+    }
 
 
 def test_a_senseless_address_shows_the_table(running: Any, sweep: Path) -> None:

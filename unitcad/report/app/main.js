@@ -66,7 +66,8 @@
     leave = () => view.ready.then((made) => made && made.free());
   }
 
-  function showBatch(data) {
+  // Made once: who comes back from a variant finds filters, order and axes as they were left. Returns what shows it.
+  function batchPage(data) {
     const { table, batch } = data;
     const nameColumn = table.columns.includes("name") ? "name" : table.columns[0];
     const plotHost = el("div");
@@ -99,11 +100,18 @@
     const chips = [el("span", { className: "chip" }, `${geometries} geometries`), failed > 0 && el("span", { className: "chip bad" }, `${failed} failed`)];
     const sections = [section("variants", "Variants", made.node), section("plot", "Two columns against each other", controls, plotHost)];
     if (batch) sections.push(section("batch", "The batch", el("details", {}, el("summary", {}, "What the batch says of itself"), U.facts(batch))));
-    document.title = data.title;
-    clear(page, header(data.title, `unitcad ${data.version}`, chips), navigation(sections), sections, footer(data));
     ready = true;
-    plot();
-    leave = () => {};
+    const scrolled = made.node.querySelector(".scroll");
+    let left = { page: 0, across: 0, down: 0, focus: null };
+    return () => {
+      document.title = data.title;
+      clear(page, header(data.title, `unitcad ${data.version}`, chips), navigation(sections), sections, footer(data));
+      plot();
+      window.scrollTo(0, left.page);
+      scrolled.scrollTo(left.across, left.down);
+      if (left.focus && left.focus.isConnected) left.focus.focus({ preventScroll: true });
+      leave = () => { left = { page: window.scrollY, across: scrolled.scrollLeft, down: scrolled.scrollTop, focus: document.activeElement }; };
+    };
   }
 
   function footer(data) {
@@ -125,15 +133,19 @@
     const data = JSON.parse(new TextDecoder().decode(await U.unpacked(text)));
     const resolve = resolver(data.pool);
     const variants = new Map(data.variants);
+    const showBatch = data.table && batchPage(data);
     const route = () => {
       leave();
       const wanted = variantAsked();
+      window.scrollTo(0, 0);
       if (!data.table) showVariant(resolve(data.variants[0][1]), data);
       else if (variants.has(wanted) && wanted) showVariant(resolve(variants.get(wanted)), data, el("a", { className: "back", href: "#" }, "‹ All variants"));
-      else showBatch(data);
-      window.scrollTo(0, 0);
+      else showBatch();
     };
-    if (data.table) window.addEventListener("hashchange", route);
+    if (data.table) {
+      history.scrollRestoration = "manual";
+      window.addEventListener("hashchange", route);
+    }
     route();
     document.documentElement.dataset.ready = "yes";
   }
