@@ -5,7 +5,6 @@ A case's options are those of `unitcad.check.Options`; "printer" is a name of th
 
 from __future__ import annotations
 
-import gzip
 import sys
 import warnings
 import zipfile
@@ -13,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import malformed_files
 import numpy as np
 from shapes import (
     CUBE_CORNERS,
@@ -63,78 +63,21 @@ def cases() -> list[Case]:
     """All of them."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # zipfile warns of the duplicate entry that is wanted
-        made = [*_files(), *_packages(), *_models(), *_values(), *_topology(), *_geometry(), *_printing()]
+        made = [
+            *malformed_files.files(),
+            *malformed_files.text_meshes(),
+            *_packages(),
+            *_models(),
+            *_values(),
+            *_topology(),
+            *_geometry(),
+            *_printing(),
+        ]
     return [
         Case(name, code, content, dict(rest))
         for name, code, content, *more in made
         for rest in [more[0] if more else {}]
     ]
-
-
-def _files() -> list[tuple]:
-    good, text = stl(box()), text_stl(box())
-    facets = text.split("\n")
-    return [
-        ("empty.stl", "F001", b""),
-        ("empty.3mf", "F001", b""),
-        ("short.stl", "F001", good[:50]),
-        ("header-only.stl", "F001", good[:80] + bytes(4)),
-        ("no-facet-text.stl", "F001", "solid a\nendsolid a\n"),
-        ("zeros.stl", "F001", bytes(1000)),
-        ("cut.stl", "F002", good[:-70]),
-        ("count-high.stl", "F002", stl(box(), count=4_000_000_000)),
-        ("count-low.stl", "F002", stl(box(), count=3)),
-        ("count-zero.stl", "F002", stl(box(), count=0)),
-        ("ply-promises.ply", "F002", "ply\nformat ascii 1.0\nelement vertex 99999\nproperty float x\nend_header\n"),
-        ("cut-text.stl", "F003", text[: len(text) // 2]),
-        ("no-endsolid.stl", "F003", text[: text.index("endsolid")]),
-        ("stray-word.stl", "F003", text.replace("outer loop", "outer hoop", 1)),
-        ("missing-number.stl", "F003", text.replace("vertex 0 0 0", "vertex 0 0", 1)),
-        ("cut.3mf", "F003", package()[:-40]),
-        ("bad-crc.3mf", "F003", _flipped(package(compression=zipfile.ZIP_STORED))),
-        ("cut-xml.3mf", "F003", package(model_xml()[:-20])),
-        ("two-roots.3mf", "F003", package(model_xml() + "<model/>")),
-        ("unbound-prefix.3mf", "F003", package(model_xml(before="<x:y/>"))),
-        ("cut.ply", "F003", "ply\nformat ascii 1.0\nelement vertex 3\n"),
-        ("comma.stl", "F004", text.replace("10", "10,5")),
-        ("word.stl", "F004", text.replace("vertex 10", "vertex ten", 1)),
-        ("comma.3mf", "F004", package(model_xml().replace('x="10"', 'x="10,5"'))),
-        ("word.3mf", "F004", package(model_xml().replace('x="10"', 'x="ten"', 1))),
-        ("page.stl", "F005", "<!DOCTYPE html>\n<html><body>404</body></html>"),
-        ("page.3mf", "F005", "<html><body>sign in</body></html>"),
-        ("lfs.stl", "F005", "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 5\n"),
-        ("packed.stl", "F005", gzip.compress(good, mtime=0)),
-        ("package.stl", "F005", package()),
-        ("mesh.3mf", "F005", good),
-        ("notes.txt", "F005", "hello"),
-        ("json.stl", "F005", '{"error": 1}'),
-        ("trailing.stl", "F006", good + b"xyz"),
-        ("trailing-text.stl", "F006", text + "made by hand\n"),
-        ("solid-header.stl", "F007", stl(box(), header=b"solid made by a program")),
-        ("quad.stl", "F008", text.replace(facets[3], facets[3] + "\n" + facets[3], 1)),
-        ("two-corners.stl", "F008", text.replace(facets[3] + "\n", "", 1)),
-        ("bom.stl", "F009", b"\xef\xbb\xbf" + text.encode()),
-        ("cr-only.stl", "F009", text.replace("\n", "\r")),
-        ("utf16.stl", "F009", text.encode("utf-16")),
-        ("latin1.stl", "F009", text_stl(box(), "K\u00e4se").encode("latin-1")),
-        ("utf16.3mf", "F009", package(model_xml().replace("UTF-8", "UTF-16").encode("utf-16"))),
-        ("latin1.3mf", "F009", package(model_xml().replace("UTF-8", "ISO-8859-1").encode("latin-1"))),
-        (
-            "bad-bytes.3mf",
-            "F009",
-            package(model_xml(before='<metadata name="Title">\u00e4</metadata>').encode("latin-1")),
-        ),
-        ("two-solids.stl", "F010", text + text_stl(box(at=(20, 0, 0)))),
-        ("too-many.stl", "F011", good, {"max_faces": 5}),
-        ("too-many-text.stl", "F011", text, {"max_faces": 5}),
-        ("too-many.3mf", "F011", package(), {"max_faces": 5}),
-        ("deep-xml.3mf", "F011", package(model_xml(before="<x:a xmlns:x='q'>" * 200 + "</x:a>" * 200))),
-    ]
-
-
-def _flipped(data: bytes) -> bytes:
-    at = data.index(b'x="10"')
-    return data[:at] + b'x="90"' + data[at + 6 :]
 
 
 def _packages() -> list[tuple]:

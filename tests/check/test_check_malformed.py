@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from malformed import Case, cases, options
+from malformed_files import good_text_meshes
 from shapes import box, package, prism, stl, text_stl
 
 from unitcad.check import check_bytes
@@ -48,6 +49,7 @@ def test_every_rule_has_a_failing_file() -> None:
         ("two.stl", stl(np.concatenate([box(), box(at=(20, 0, 0))]))),
         ("box.3mf", package()),
         ("stored.3mf", package(compression=0)),
+        *good_text_meshes(),
     ],
 )
 def test_good_file_passes_every_rule(name: str, content: bytes | str, judge) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from unitcad.check import text_mesh
 from unitcad.check.findings import Finding
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Mesh, weld_exact
@@ -31,6 +32,8 @@ def reader_for(kind: str) -> Read:
 def _read(kind: str, raw: bytes, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
     findings = _looked_at(kind, raw, limits)
     deadline.tick()
+    findings += text_mesh.look(kind, raw)
+    deadline.tick()
     vertices, faces = _loaded(kind, raw)
     deadline.tick()
     if vertices.ndim != 2 or vertices.shape[1] < 3 or faces.ndim != 2 or faces.shape[1] != 3:
@@ -41,7 +44,7 @@ def _read(kind: str, raw: bytes, limits: Limits, deadline: Deadline) -> tuple[li
     if not len(faces):
         raise Unreadable(*findings, finding("F001", "the file has no face"))
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise Unreadable(*findings, finding("F003", "a face names a vertex that is not there"))
+        raise Unreadable(*findings, finding("P011", "a face names a vertex that is not there"))
     corners = vertices[faces]
     if not np.isfinite(corners).all():
         n = len(corners) - int(np.isfinite(corners).all(axis=(1, 2)).sum())
@@ -74,9 +77,10 @@ def _looked_at(kind: str, raw: bytes, limits: Limits) -> list[Finding]:
 
 
 def _loaded(kind: str, raw: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and faces by trimesh; whatever it raises on a malformed file is F003."""
+    """Vertices and faces by trimesh; whatever it raises on a malformed file is a finding."""
     import trimesh
 
+    raw = text_mesh.without_comments(raw) if kind == "off" else raw
     try:
         options: dict[str, Any] = {"maintain_order": True, "skip_materials": True} if kind == "obj" else {}
         with np.errstate(all="ignore"):
@@ -92,5 +96,4 @@ def _loaded(kind: str, raw: bytes) -> tuple[np.ndarray, np.ndarray]:
     except MemoryError:
         raise
     except Exception as error:
-        why = f"cannot be read as {kind.upper()}: {type(error).__name__}: {error}"
-        raise Unreadable(finding("F003", why)) from error
+        raise Unreadable(text_mesh.explained(kind, raw)) from error

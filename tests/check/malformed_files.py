@@ -1,0 +1,122 @@
+"""Files whose bytes or text are wrong before any geometry: the F rules, and what text formats promise of themselves."""
+
+from __future__ import annotations
+
+import gzip
+import zipfile
+
+import numpy as np
+from shapes import CUBE_CORNERS, CUBE_FACES, box, model_xml, package, stl, text_stl
+
+
+def files() -> list[tuple]:
+    """(name, code, content) each, options after it where there are any."""
+    good, text = stl(box()), text_stl(box())
+    facets = text.split("\n")
+    return [
+        ("empty.stl", "F001", b""),
+        ("empty.3mf", "F001", b""),
+        ("short.stl", "F001", good[:50]),
+        ("header-only.stl", "F001", good[:80] + bytes(4)),
+        ("no-facet-text.stl", "F001", "solid a\nendsolid a\n"),
+        ("zeros.stl", "F001", bytes(1000)),
+        ("cut.stl", "F002", good[:-70]),
+        ("count-high.stl", "F002", stl(box(), count=4_000_000_000)),
+        ("count-low.stl", "F002", stl(box(), count=3)),
+        ("count-zero.stl", "F002", stl(box(), count=0)),
+        ("ply-promises.ply", "F002", "ply\nformat ascii 1.0\nelement vertex 99999\nproperty float x\nend_header\n"),
+        ("cut-text.stl", "F003", text[: len(text) // 2]),
+        ("no-endsolid.stl", "F003", text[: text.index("endsolid")]),
+        ("stray-word.stl", "F003", text.replace("outer loop", "outer hoop", 1)),
+        ("missing-number.stl", "F003", text.replace("vertex 0 0 0", "vertex 0 0", 1)),
+        ("cut.3mf", "F003", package()[:-40]),
+        ("bad-crc.3mf", "F003", _flipped(package(compression=zipfile.ZIP_STORED))),
+        ("cut-xml.3mf", "F003", package(model_xml()[:-20])),
+        ("two-roots.3mf", "F003", package(model_xml() + "<model/>")),
+        ("unbound-prefix.3mf", "F003", package(model_xml(before="<x:y/>"))),
+        ("cut.ply", "F003", "ply\nformat ascii 1.0\nelement vertex 3\n"),
+        ("comma.stl", "F004", text.replace("10", "10,5")),
+        ("word.stl", "F004", text.replace("vertex 10", "vertex ten", 1)),
+        ("comma.3mf", "F004", package(model_xml().replace('x="10"', 'x="10,5"'))),
+        ("word.3mf", "F004", package(model_xml().replace('x="10"', 'x="ten"', 1))),
+        ("page.stl", "F005", "<!DOCTYPE html>\n<html><body>404</body></html>"),
+        ("page.3mf", "F005", "<html><body>sign in</body></html>"),
+        ("lfs.stl", "F005", "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 5\n"),
+        ("packed.stl", "F005", gzip.compress(good, mtime=0)),
+        ("package.stl", "F005", package()),
+        ("mesh.3mf", "F005", good),
+        ("notes.txt", "F005", "hello"),
+        ("json.stl", "F005", '{"error": 1}'),
+        ("trailing.stl", "F006", good + b"xyz"),
+        ("trailing-text.stl", "F006", text + "made by hand\n"),
+        ("solid-header.stl", "F007", stl(box(), header=b"solid made by a program")),
+        ("quad.stl", "F008", text.replace(facets[3], facets[3] + "\n" + facets[3], 1)),
+        ("two-corners.stl", "F008", text.replace(facets[3] + "\n", "", 1)),
+        ("bom.stl", "F009", b"\xef\xbb\xbf" + text.encode()),
+        ("cr-only.stl", "F009", text.replace("\n", "\r")),
+        ("utf16.stl", "F009", text.encode("utf-16")),
+        ("latin1.stl", "F009", text_stl(box(), "K\u00e4se").encode("latin-1")),
+        ("utf16.3mf", "F009", package(model_xml().replace("UTF-8", "UTF-16").encode("utf-16"))),
+        ("latin1.3mf", "F009", package(model_xml().replace("UTF-8", "ISO-8859-1").encode("latin-1"))),
+        (
+            "bad-bytes.3mf",
+            "F009",
+            package(model_xml(before='<metadata name="Title">\u00e4</metadata>').encode("latin-1")),
+        ),
+        ("two-solids.stl", "F010", text + text_stl(box(at=(20, 0, 0)))),
+        ("too-many.stl", "F011", good, {"max_faces": 5}),
+        ("too-many-text.stl", "F011", text, {"max_faces": 5}),
+        ("too-many.3mf", "F011", package(), {"max_faces": 5}),
+        ("deep-xml.3mf", "F011", package(model_xml(before="<x:a xmlns:x='q'>" * 200 + "</x:a>" * 200))),
+    ]
+
+
+def _flipped(data: bytes) -> bytes:
+    at = data.index(b'x="10"')
+    return data[:at] + b'x="90"' + data[at + 6 :]
+
+
+def text_meshes() -> list[tuple]:
+    """OBJ, PLY and OFF whose lines are not what they promise."""
+    off, ply, obj = _off(), _ply(), _obj()
+    return [
+        ("cut.off", "F002", off[: off.rindex("3 ", 0, -20)]),
+        ("cut-lines.ply", "F002", ply[: ply.rindex("3 ", 0, -20)]),
+        ("one-vertex-less.off", "F002", off.replace("10 10 10\n", "", 1)),
+        ("more.off", "F006", off + "3 0 1 2\n"),
+        ("more.ply", "F006", ply + "3 0 1 2\n"),
+        ("zero.obj", "P011", obj.replace("f 1 ", "f 0 ", 1)),
+        ("zero-slash.obj", "P011", obj.replace("f 1 2 4", "f 1/1 2/1 0/1", 1)),
+        ("beyond.obj", "P011", obj.replace("f 1 ", "f 9 ", 1)),
+        ("beyond.off", "P011", off.replace("3 0 ", "3 8 ", 1)),
+        ("comma.obj", "F004", obj.replace("v 10", "v 10,5", 1)),
+        ("comma.off", "F004", off.replace("10 ", "10,5 ", 1)),
+        ("comma.ply", "F004", ply.replace("10 ", "10,5 ", 1)),
+        ("underscore.obj", "F004", obj.replace("v 10", "v 1_0", 1)),
+        ("underscore.off", "F004", off.replace("\n10 ", "\n1_0 ", 1)),
+        ("word.obj", "F004", obj.replace("f 1 ", "f one ", 1)),
+        ("word.off", "F004", off.replace("\n10 ", "\nten ", 1)),
+    ]
+
+
+def _rows(start: str, numbers: np.ndarray) -> str:
+    return "".join(start + " ".join(f"{value:g}" for value in row) + "\n" for row in numbers)
+
+
+def _off() -> str:
+    return "OFF\n8 12 0  # a cube\n" + _rows("", CUBE_CORNERS * 10) + "\n" + _rows("3 ", CUBE_FACES)
+
+
+def _ply() -> str:
+    head = "ply\nformat ascii 1.0\nelement vertex 8\n" + "".join(f"property float {axis}\n" for axis in "xyz")
+    head += "element face 12\nproperty list uchar int vertex_indices\nend_header\n"
+    return head + _rows("", CUBE_CORNERS * 10) + _rows("3 ", CUBE_FACES)
+
+
+def _obj() -> str:
+    return _rows("v ", CUBE_CORNERS * 10) + _rows("f ", CUBE_FACES + 1)
+
+
+def good_text_meshes() -> list[tuple[str, str]]:
+    """(name, content) of the same cube without a fault."""
+    return [("cube.off", _off()), ("cube.ply", _ply()), ("cube.obj", _obj())]
