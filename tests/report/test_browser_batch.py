@@ -247,12 +247,59 @@ def colours(visit: Visit) -> tuple[str, str]:
     return tuple(visit.page.evaluate("() => ['paper', 'series-1'].map(window.unitcad.theme.colour)"))
 
 
+def table_page(folder: Path, columns: list[str], rows: list[list[Any]], **more: Any) -> Path:
+    """A page with a table of our own: each row the variant's folder and its cells."""
+    data = {"title": "many", "version": "0", "variants": [], "pool": [], "models": {}, "batch": None, **more}
+    file = folder / "table.html"
+    file.write_text(pages.page({**data, "table": {"columns": columns, "rows": rows}}, "many"), "utf-8")
+    return file
+
+
+def test_the_plot_says_who_is_not_in_it_and_why(running: Any, tmp_path: Path) -> None:
+    columns = ["name", "material", "wall_mm", "edge_fitted", "reason"]
+    rows: list[list[Any]] = [[f"f{i}", f"unit {i}", "soft", i, i / 10, None] for i in range(5)]
+    rows += [["g", "unit", "stiff", 3, None, None]] * 2 + [["", "burst", "soft", None, None, "wall too thin"]]
+    estimate = {"models": {"fitted": {"edge_level": {"value": None, "reason": "no modulus is known"}}}}
+    variants = [["g", {"estimate": estimate}]]
+    seen = Visit(running, table_page(tmp_path, columns, rows, variants=variants))
+    seen.page.select_option('select[name="plot-x"]', "wall_mm")
+    seen.page.select_option('select[name="plot-y"]', "edge_fitted")
+    seen.page.select_option('select[name="plot-group"]', "material")
+    assert "5 of 8 points" in seen.page.inner_text("#plot .tip")
+    assert seen.page.locator("#plot .note").all_inner_texts() == [
+        "1 has no wall_mm: burst, soft. Why: wall too thin.",
+        "2 have no edge_fitted: unit, stiff (2 times). Why: no modulus is known.",
+        "1 has no edge_fitted: burst, soft. Why: wall too thin.",
+    ]
+    assert seen.page.locator("#plot .key li").all_inner_texts() == ["soft", "stiff (no point)"]
+    seen.page.fill('input[name="filter-edge_fitted"]', "0..1")
+    assert seen.page.locator("#plot .note").count() == 0
+    seen.page.fill('input[name="filter-edge_fitted"]', "")
+    seen.page.fill('input[name="filter-material"]', "stiff")
+    assert "0 of 2 points" in seen.page.inner_text("#plot .tip")
+    assert seen.page.locator("#plot .note").all_inner_texts() == [
+        "2 have no edge_fitted: unit, stiff (2 times). Why: no modulus is known."
+    ]
+    assert seen.errors == []
+    seen.close()
+
+
+def test_the_legend_names_every_group(running: Any, tmp_path: Path) -> None:
+    rows = [["", f"v{i}", i, i, f"group {i:02}"] for i in range(42)]
+    seen = Visit(running, table_page(tmp_path, ["name", "a", "b", "group"], rows))
+    seen.page.select_option('select[name="plot-group"]', "group")
+    assert seen.page.locator("#plot .key li").all_inner_texts() == [
+        *(row[-1] for row in rows[:40]),
+        "and 2 more",
+    ]
+    seen.page.fill('input[name="search"]', "group 3")
+    assert seen.page.locator("#plot .key li").all_inner_texts() == [row[-1] for row in rows[30:40]]
+    seen.close()
+
+
 def test_two_thousand_rows_come_in_pages(running: Any, tmp_path: Path) -> None:
     rows = [["", f"v{i}", i * 7 % 2000, f"group {i % 3}", None] for i in range(2000)]
-    table = {"columns": ["name", "value", "group", "empty"], "rows": rows}
-    data = {"title": "many", "version": "0", "variants": [], "pool": [], "models": {}, "table": table, "batch": None}
-    (tmp_path / "many.html").write_text(pages.page(data, "many"), "utf-8")
-    seen = Visit(running, tmp_path / "many.html")
+    seen = Visit(running, table_page(tmp_path, ["name", "value", "group", "empty"], rows))
     assert len(column(seen, "name")) == 100
     head(seen, "value").click()
     assert column(seen, "value") == [str(i) for i in range(100)]

@@ -153,6 +153,24 @@ def test_a_batch_is_listed_as_it_lists_itself(built: Path, tmp_path: Path) -> No
     assert "variants" not in data["batch"]
 
 
+def test_what_was_swept_and_the_levels_come_first(sweep: Path, tmp_path: Path) -> None:
+    columns = ["index", "status", "reason", "folder", "motor", "moulds.draft_deg", "name", "design", "diameter_mm",
+               "layer1_volume_mm3", "layer1_mass_g", "laws", "edge_paper", "edge_fitted"]  # fmt: skip
+    said = {"name": "s", "columns": columns, "variants": [dict.fromkeys(columns)]}
+    (tmp_path / "batch.json").write_text(json.dumps(said), "utf-8")
+    assert collect.table(tmp_path, [])["columns"] == [
+        "name", "motor", "moulds.draft_deg", "design", "diameter_mm", "edge_paper", "edge_fitted",
+        "index", "status", "reason", "layer1_volume_mm3", "layer1_mass_g", "laws",
+    ]  # fmt: skip
+    without = data_of((sweep / "report.html").read_text("utf-8"))["table"]["columns"]
+    places = [
+        0 if name in ("name", "design", "diameter_mm") or name.startswith("layers.") else 1 + (name[:5] != "edge_")
+        for name in without
+    ]
+    assert places == sorted(places)
+    assert set(places) == {0, 1, 2}
+
+
 def test_what_is_no_result_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UnitcadError, match="not a folder"):
         write_report(tmp_path / "nothing")

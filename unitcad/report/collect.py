@@ -12,6 +12,8 @@ from unitcad.report.models import model_key, spec_in
 from unitcad.spec import Spec
 
 MANIFEST = "manifest.json"
+OF_EVERY_BATCH = ("index", "status", "reason", "folder")
+"""Columns that batch.json has before those that were swept, which end at `name`."""
 
 
 def is_variant(folder: Path) -> bool:
@@ -59,7 +61,8 @@ def variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]:
 def table(folder: Path, variants: list[dict[str, Any]]) -> dict[str, Any]:
     """A batch's table: `columns` and `rows`, each row with the folder of its variant first ("" for one that failed).
 
-    As batch.json lists them where there is one, else from the manifests.
+    As batch.json lists them where there is one, else from the manifests. What was chosen comes first, then the levels
+    at the edge, then the rest.
     """
     said = _json(folder / "batch.json")
     if isinstance(said, dict) and isinstance(said.get("variants"), list):
@@ -67,7 +70,7 @@ def table(folder: Path, variants: list[dict[str, Any]]) -> dict[str, Any]:
     else:
         entries = [{"folder": each["folder"], **_row(each)} for each in variants]
         columns = [name for name in dict.fromkeys(name for entry in entries for name in entry) if name != "folder"]
-    columns.sort(key=lambda name: name != "name")
+    columns = _in_order(columns)
     there = {each["folder"] for each in variants}
     return {
         "columns": columns,
@@ -76,6 +79,21 @@ def table(folder: Path, variants: list[dict[str, Any]]) -> dict[str, Any]:
             for entry in entries
         ],
     }
+
+
+def _in_order(columns: list[str]) -> list[str]:
+    """Name, what was swept (before `name` in a batch, of the spec without one), the edge's levels, the rest."""
+    before = columns[: columns.index("name")] if "name" in columns else []
+    swept = {name for name in before if name not in OF_EVERY_BATCH} | {"design", "diameter_mm"}
+
+    def place(name: str) -> int:
+        if name == "name":
+            return 0
+        if name in swept or name.startswith("layers."):
+            return 1
+        return 2 if name.startswith("edge_") else 3
+
+    return sorted(columns, key=place)
 
 
 def batch(folder: Path) -> dict[str, Any] | None:

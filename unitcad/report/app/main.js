@@ -67,7 +67,7 @@
   }
 
   // Made once: who comes back from a variant finds filters, order and axes as they were left. Returns what shows it.
-  function batchPage(data) {
+  function batchPage(data, why) {
     const { table, batch } = data;
     const nameColumn = table.columns.includes("name") ? "name" : table.columns[0];
     const plotHost = el("div");
@@ -76,7 +76,7 @@
     const at = (name) => table.columns.indexOf(name) + 1;
     const plot = () => {
       const [x, y, group] = ["x", "y", "group"].map((key) => selects[key].value);
-      const points = rows.map((row) => ({ x: row[at(x)], y: row[at(y)], group: group ? row[at(group)] : "", title: row[at(nameColumn)], open: row[0] && (() => { location.hash = encodeURIComponent(row[0]); }) }));
+      const points = rows.map((row) => ({ x: row[at(x)], y: row[at(y)], group: group ? row[at(group)] : "", title: row[at(nameColumn)] ?? row[0], why: (column) => why(row[0], column) || row[at("reason")], open: row[0] && (() => { location.hash = encodeURIComponent(row[0]); }) }));
       clear(plotHost, U.scatterPlot(points, { xLabel: x, yLabel: y, label: `${y} against ${x}, ${points.length} variants` }));
     };
     let ready = false;
@@ -133,7 +133,13 @@
     const data = JSON.parse(new TextDecoder().decode(await U.unpacked(text)));
     const resolve = resolver(data.pool);
     const variants = new Map(data.variants);
-    const showBatch = data.table && batchPage(data);
+    // Why a variant has no level by some model.
+    const why = (folder, column) => {
+      const model = column.startsWith("edge_") && variants.has(folder) && column.slice("edge_".length);
+      const { models } = (model && resolve(variants.get(folder)).estimate) || {};
+      return models && models[model] && models[model].edge_level && models[model].edge_level.reason;
+    };
+    const showBatch = data.table && batchPage(data, why);
     const route = () => {
       leave();
       const wanted = variantAsked();

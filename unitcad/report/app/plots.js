@@ -3,6 +3,9 @@
   "use strict";
   const { el, number, theme } = window.unitcad;
   const COLOURS = ["series-1", "series-2", "series-3", "series-4", "series-5", "series-6"];
+  // More names than this are counted: of points that are absent, of groups in the key.
+  const NAMED = 8;
+  const KEYED = 40;
 
   const tick = (value) => (value === null || value === undefined ? "" : number(value, 4));
 
@@ -94,19 +97,42 @@
     return { of: (v) => (v === null || v === undefined ? null : place.get(String(v))), names };
   }
 
+  const groupOf = (point) => (point.group === null || point.group === undefined ? "none" : String(point.group));
+
   const short = (text) => (text.length > 14 ? `${text.slice(0, 13)}…` : text);
 
-  // points: [{x, y, group, title, open}]; a click or a tap opens the nearest one.
+  // Which of some points have no value in a column, a line for each reason that is known.
+  function lacking(points, column) {
+    const reasons = new Map();
+    for (const point of points) {
+      const why = point.why(column) || "";
+      if (!reasons.has(why)) reasons.set(why, []);
+      reasons.get(why).push(point);
+    }
+    return [...reasons].map(([why, mine]) => {
+      const counts = new Map();
+      for (const point of mine) {
+        const name = [point.title, groupOf(point)].filter(Boolean).join(", ");
+        counts.set(name, (counts.get(name) || 0) + 1);
+      }
+      const names = [...counts].map(([name, count]) => (count > 1 ? `${name} (${count} times)` : name));
+      const more = names.length > NAMED ? `; ${names.length - NAMED} more names` : "";
+      return el("p", { className: "note" }, `${mine.length} ${mine.length === 1 ? "has" : "have"} no ${column}: ${names.slice(0, NAMED).join("; ")}${more}.${why ? ` Why: ${why}.` : ""}`);
+    });
+  }
+
+  // points: [{x, y, group, title, open, why(column)}]; a click or a tap opens the nearest one.
   function scatterPlot(points, { xLabel, yLabel, label }) {
     const xs = scaleOf(points.map((p) => p.x));
     const ys = scaleOf(points.map((p) => p.y));
     const drawn = points.map((p) => ({ ...p, px: xs.of(p.x), py: ys.of(p.y) })).filter((p) => p.px !== null && p.py !== null);
-    if (!drawn.length) return el("p", { className: "tip" }, `0 of ${points.length} points.`);
-    const groups = [...new Set(drawn.map((p) => String(p.group)))].sort();
+    const notes = [lacking(points.filter((p) => xs.of(p.x) === null), xLabel), xLabel !== yLabel && lacking(points.filter((p) => ys.of(p.y) === null), yLabel)];
+    if (!drawn.length) return el("div", {}, el("p", { className: "tip" }, `0 of ${points.length} points.`), notes);
+    const groups = [...new Set(points.map(groupOf))].sort();
     const tip = el("p", { className: "tip", "aria-live": "polite" });
     const { host } = hosted(360, (node, width, height) => {
       const tables = groups.map((group) => {
-        const mine = drawn.filter((p) => String(p.group) === group).sort((a, b) => a.px - b.px);
+        const mine = drawn.filter((p) => groupOf(p) === group).sort((a, b) => a.px - b.px);
         return [mine.map((p) => p.px), mine.map((p) => p.py)];
       });
       const names = (scale) => scale.names && ((u, splits) => splits.map((v) => (Number.isInteger(v) && scale.names[v] !== undefined ? short(scale.names[v]) : "")));
@@ -161,9 +187,11 @@
     });
     host.setAttribute("role", "img");
     host.setAttribute("aria-label", label);
-    const key = groups.length > 1 && keyOf(groups.slice(0, 12).map((group, i) => [group, i, "round"]));
+    const seen = new Set(drawn.map(groupOf));
+    const key = groups.length > 1 && keyOf(groups.slice(0, KEYED).map((group, i) => [seen.has(group) ? group : `${group} (no point)`, i, "round"]));
+    if (groups.length > KEYED) key.append(el("li", {}, `and ${groups.length - KEYED} more`));
     tip.textContent = `${drawn.length} of ${points.length} points. Point at one to read it, click to open it.`;
-    return el("div", {}, host, key, tip);
+    return el("div", {}, host, key, tip, notes);
   }
 
   Object.assign(window.unitcad, { curvePlot, scatterPlot });
