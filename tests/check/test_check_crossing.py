@@ -9,7 +9,7 @@ import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.check import check_mesh
-from unitcad.check.exact import orient2d, orient3d
+from unitcad.check.exact import integers, orient2d, orient3d
 from unitcad.check.limits import Deadline
 from unitcad.check.pairs import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
 from unitcad.check.triangles import coplanar, meet
@@ -267,3 +267,11 @@ def test_a_star_that_goes_round_twice_crosses_itself(step: int, tilt: float) -> 
     )
     codes = {found.code for found in check_mesh(points, faces).findings}
     assert ("G001" in codes) == (step > 1)
+
+
+def test_a_denormal_beside_ordinary_numbers_is_decided_without_a_warning() -> None:
+    """Warnings are errors here; the coordinates' exponents lie farther apart than a float's range."""
+    values = np.array([[0.0, 1e-320, 10.0]])
+    whole = integers(values).astype(object)[0].tolist()
+    assert whole[0] == 0
+    assert whole[2] * Fraction(1e-320) == whole[1] * 10

@@ -85,6 +85,16 @@ def test_a_package_cut_anywhere_is_an_error(share: float, judge) -> None:
     assert judge(whole[: int(share * len(whole))], "part.3mf").verdict == "error"
 
 
+@pytest.mark.parametrize("content", [stl(box()[2:], count=12), stl(box())[:-70], stl(box(), count=4_000_000_000)])
+def test_no_geometry_is_judged_where_facets_are_missing(content: bytes, judge) -> None:
+    assert [found.code for found in judge(content).findings] == ["F002"]
+
+
+def test_no_geometry_is_judged_of_numbers_that_are_none(judge) -> None:
+    report = judge(text_stl(box()).replace("vertex 10", "vertex 1_0"))
+    assert [found.code for found in report.findings] == ["F004"]
+
+
 def test_counts_and_first_places(judge) -> None:
     report = judge(stl(box()[2:]))
     hole = next(found for found in report.findings if found.code == "T001")

@@ -94,7 +94,8 @@ def integers(values: Floats) -> np.ndarray:
     nonzero = digits[digits != 0]
     trailing = np.log2((nonzero & -nonzero).astype(np.float64)).astype(np.int64)
     scale = int((exponent[digits != 0] - 53 + trailing).min())
-    scaled = np.ldexp(values, -scale)
+    with np.errstate(over="ignore"):  # a denormal beside an ordinary number: the shifts below are for that
+        scaled = np.ldexp(values, -scale)
     if np.abs(scaled).max() < 2**30:
         return scaled.astype(np.int64)
     shift = (exponent - 53 - scale).tolist()

@@ -306,6 +306,9 @@ class _Reader:
         if not self.numbers:
             return
         try:
+            text = "".join(self.numbers)
+            if not text.isascii() or "_" in text:  # which Python takes for a number's
+                raise ValueError(text[:40])
             values = np.array(self.numbers, dtype=np.float64)
         except ValueError:
             values = np.array([self._number(said) for said in self.numbers])

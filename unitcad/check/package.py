@@ -151,6 +151,8 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline) -> Packag
     except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError) as error:
         raise Unreadable(finding("F003", f"the zip cannot be read: {error}")) from error
     package = Package(archive, limits, deadline)
+    if extra := _after_the_end(data):
+        package.findings.append(finding("F006", f"{extra} bytes after the zip's end record", extra))
     entries = archive.infolist()
     if len(entries) > limits.max_entries:
         raise over_limit(f"{len(entries)} zip entries, more than {limits.max_entries}")
@@ -171,6 +173,13 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline) -> Packag
         raise Unreadable(*package.findings, finding("P008", bombs[0], len(bombs)))
     _content_types(package)
     return package
+
+
+def _after_the_end(data: memoryview) -> int:
+    """Bytes after the end record and its comment, which zipfile skips in silence (APPNOTE 4.3.16)."""
+    tail = bytes(data[-(1 << 16) - 22 :])
+    at = tail.rfind(b"PK\x05\x06")
+    return max(0, len(tail) - at - 22 - int.from_bytes(tail[at + 20 : at + 22], "little")) if at >= 0 else 0
 
 
 def _unsafe(name: str) -> str | None:

@@ -15,6 +15,7 @@ from unitcad.check.findings import Finding, Location
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Floats, Mesh, weld_exact
 from unitcad.check.rulebook import finding
+from unitcad.check.text_mesh import NUMBER
 
 RECORD = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _TOKENS = 21  # facet normal x y z outer loop (vertex x y z) x 3 endloop endfacet
@@ -22,6 +23,7 @@ _WORDS = {0: b"facet", 1: b"normal", 5: b"outer", 6: b"loop", 7: b"vertex", 11: 
 _WORDS |= {19: b"endloop", 20: b"endfacet"}
 _NUMBERS = [i for i in range(_TOKENS) if i not in _WORDS]
 _NAN_SPELLINGS = re.compile(rb"^[+-]?(nan(\(\w*\))?|inf(inity)?|1\.#(ind|inf|qnan|snan)\w*)$", re.IGNORECASE)
+_PRINTABLE = bytes(b for b in range(256) if b in b"\t\n\v\f\r" or (b >= 32 and b != 127))
 _BLOCK = 8_000_000
 
 
@@ -33,6 +35,9 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
     head = bytes(data[: min(size, 2048)])
     if _is_text(head, data):
         return _read_text(data, limits, deadline)
+    if not head.translate(None, _PRINTABLE) and size != 84 + 50 * int.from_bytes(data[80:84], "little"):
+        first = head.split(None, 1)[0][:20].decode("utf-8", "replace") if head.strip() else ""
+        raise Unreadable(finding("F005", f"text that does not begin with solid but with {first!r}"))
     if size < 84:
         raise Unreadable(finding("F001", f"{size} bytes: shorter than a binary STL's header of 84"))
     count = int.from_bytes(data[80:84], "little")
@@ -50,6 +55,8 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
         extra = size - 84 - 50 * count
         findings.append(finding("F006", f"{extra} bytes after the last facet", extra))
     facets = min(count, room)
+    if count > room and room:
+        raise Unreadable(*findings)  # a geometry of what is left would only blame the wrong thing
     if facets > limits.max_faces:
         raise Unreadable(*findings, over_limit(f"{facets} faces, more than --max-faces {limits.max_faces}").findings[0])
     if facets == 0:
@@ -106,7 +113,7 @@ def _read_text(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[li
         found.findings.append(finding("F010", f"{found.solids} solids in one file", found.solids))
     corners = np.concatenate(found.corners) if found.corners else np.empty((0, 3, 3))
     normals = np.concatenate(found.normals) if found.normals else np.empty((0, 3))
-    if not len(corners):
+    if not len(corners) or any(item.code == "F004" for item in found.findings):
         return [], found.findings
     with np.errstate(over="ignore"):
         single = corners.astype(np.float32)
@@ -199,39 +206,40 @@ def _facets(raw: bytes, at: int, found: _Text, limits: Limits, deadline: Deadlin
             inner = raw.rfind(b"ENDFACET", at, cut) if inner < 0 else inner
             cut = inner + 8 if inner >= 0 else stop
         tokens = raw[at:cut].lower().split()
-        blocks = len(tokens) // _TOKENS
         if len(tokens) % _TOKENS or any(set(tokens[i::_TOKENS]) != {word} for i, word in _WORDS.items()):
             return _explain(raw, at, cut, found, limits)
-        _take(raw, at, tokens, blocks, found, limits)
+        _take(raw, at, cut, tokens, found, limits)
         at = cut
     return stop
 
 
-def _take(raw: bytes, at: int, tokens: list[bytes], blocks: int, found: _Text, limits: Limits) -> None:
+def _take(raw: bytes, at: int, cut: int, tokens: list[bytes], found: _Text, limits: Limits) -> None:
+    blocks = len(tokens) // _TOKENS
     if found.facets + blocks > limits.max_faces:
         raise over_limit(f"more faces than --max-faces {limits.max_faces}")
     columns = []
+    block = raw[at:cut]
+    plain = block.isascii() and b"_" not in block  # numpy takes 1_0 for ten, as Python does
     for column in _NUMBERS:
         texts = tokens[column::_TOKENS]
         try:
-            columns.append(np.array(texts).astype(np.float64))
+            columns.append(np.array(texts).astype(np.float64) if plain else _slow_numbers(texts, found))
         except ValueError:
-            columns.append(_slow_numbers(texts, raw, at, found))
+            columns.append(_slow_numbers(texts, found))
     numbers = np.stack(columns, axis=1)
     found.normals.append(numbers[:, :3])
     found.corners.append(numbers[:, 3:].reshape(-1, 3, 3))
     found.facets += blocks
 
 
-def _slow_numbers(texts: list[bytes], raw: bytes, at: int, found: _Text) -> Floats:
+def _slow_numbers(texts: list[bytes], found: _Text) -> Floats:
     values = np.zeros(len(texts))
     for i, text in enumerate(texts):
-        try:
-            values[i] = float(text) if b"_" not in text else float("x")
-        except ValueError:
-            if _NAN_SPELLINGS.match(text):
-                values[i] = np.nan
-                continue
+        if NUMBER.fullmatch(text):
+            values[i] = float(text)
+        elif _NAN_SPELLINGS.match(text):
+            values[i] = np.nan
+        else:
             shown = text[:30].decode("utf-8", "replace")
             why = " (a decimal comma)" if b"," in text else ""
             place = [Location(face=found.facets + i)]
@@ -271,11 +279,7 @@ _KEYWORDS = {b"normal", b"outer", b"loop", b"vertex", b"endloop", b"facet", b"en
 
 
 def _is_number(word: bytes) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return bool(_NAN_SPELLINGS.match(word))
-    return True
+    return bool(NUMBER.fullmatch(word) or _NAN_SPELLINGS.match(word))
 
 
 def _at(code: str, message: str, raw: bytes, place: int) -> Finding:
