@@ -292,6 +292,9 @@ def _geometry() -> list[tuple]:
         ("twisted.stl", "G001", stl(crossed[CUBE_FACES])),
         ("half-in.stl", "G002", stl(np.concatenate([cube, box(at=(5, 5, 5))]))),
         ("nested.stl", "G002", stl(np.concatenate([cube, inner]))),
+        ("items-overlap.3mf", "G002", package(model_xml(build=_items("5 5 5")))),
+        ("items-the-same.3mf", "G002", package(model_xml(build=_items("0 0 0")))),
+        ("components-overlap.3mf", "G002", package(model_xml(_pair("9 0 0"), '<build><item objectid="2"/></build>'))),
         ("stacked.stl", "G003", stl(np.concatenate([cube, box((4, 4, 4), (3, 3, 10))]))),
         ("corner-on-face.stl", "G003", stl(np.concatenate([cube, _tip((4, 5, 10))]))),
         ("flush.stl", "G004", stl(np.concatenate([cube, box((4, 4, 4), (3, 3, 10))]))),
@@ -302,6 +305,18 @@ def _geometry() -> list[tuple]:
         ("microns.stl", "S001", stl(box((14_000, 14_000, 5_000)))),
         ("inches.3mf", "S001", package(model_xml(attributes='unit="meter"'))),
     ]
+
+
+def _items(shift: str) -> str:
+    """The cube, and once more with a shift."""
+    return f'<build><item objectid="1"/><item objectid="1" transform="1 0 0 0 1 0 0 0 1 {shift}"/></build>'
+
+
+def _pair(shift: str) -> str:
+    """The cube, and an object of two of it."""
+    moved = f'<component objectid="1" transform="0 1 0 -1 0 0 0 0 1 {shift}"/>'
+    both = f'<components><component objectid="1"/>{moved}</components>'
+    return f'<object id="1">{mesh_xml()}</object><object id="2">{both}</object>'
 
 
 def _ringed(low: float, high: float, start: float) -> np.ndarray:

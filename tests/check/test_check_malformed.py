@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from malformed import Case, cases, options
 from malformed_files import good_text_meshes
-from shapes import box, package, prism, stl, text_stl
+from shapes import box, model_xml, package, prism, stl, text_stl
 
 from unitcad.check import check_bytes
 from unitcad.check.rulebook import rules
@@ -86,6 +86,20 @@ def test_a_package_cut_anywhere_is_an_error(share: float, judge) -> None:
 
 
 @pytest.mark.parametrize("content", [stl(box()[2:], count=12), stl(box())[:-70], stl(box(), count=4_000_000_000)])
+@pytest.mark.parametrize(
+    "transform", ["1 0 0 0 1 0 0 0 1 10 0 0", "1 0 0 0 1 0 0 0 1 10 10 0", "0 1 0 -1 0 0 0 0 1 30 9 9"]
+)
+def test_instances_that_touch_or_stand_apart_share_nothing(transform: str, judge) -> None:
+    build = f'<build><item objectid="1"/><item objectid="1" transform="{transform}"/></build>'
+    assert judge(package(model_xml(build=build)), "two.3mf").findings == ()
+
+
+def test_many_instances_that_share_are_counted(judge) -> None:
+    places = "".join(f'<item objectid="1" transform="1 0 0 0 1 0 0 0 1 {9 * i} 0 0"/>' for i in range(40))
+    (found,) = judge(package(model_xml(build=f"<build>{places}</build>")), "row.3mf").findings
+    assert (found.code, found.severity, found.count) == ("G002", "warning", 39)
+
+
 def test_no_geometry_is_judged_where_facets_are_missing(content: bytes, judge) -> None:
     assert [found.code for found in judge(content).findings] == ["F002"]
 

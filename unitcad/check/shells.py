@@ -44,7 +44,7 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
     if n > 1:
         first = np.full(n, -1)
         first[labels[::-1]] = np.arange(len(labels))[::-1]
-        pairs = _box_pairs(low, high)
+        pairs = box_pairs(low, high)
         meeting = {(int(a), int(b)) for a, b in touching} | {(int(b), int(a)) for a, b in touching}
         groups = _faces_by_shell(labels, n)
         for a, b in pairs:
@@ -124,7 +124,7 @@ def _faces_by_shell(labels: Ints, n: int) -> list[Ints]:
     return np.split(order, np.cumsum(np.bincount(labels, minlength=n))[:-1])
 
 
-def _box_pairs(low: Floats, high: Floats) -> list[tuple[int, int]]:
+def box_pairs(low: Floats, high: Floats) -> list[tuple[int, int]]:
     """Pairs of shells whose boxes meet, by a sweep along x; at most a few for parts that were laid out apart."""
     order = np.argsort(low[:, 0], kind="stable")
     pairs = []

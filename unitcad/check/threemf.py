@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from unitcad.check import instances as placement
 from unitcad.check import package as opc
 from unitcad.check import references, scale, schema
 from unitcad.check.findings import Facts, Finding
@@ -233,6 +234,7 @@ def _geometry(
     triangles = vertices = shells = 0
     volume = area = 0.0
     watertight = bool(instances)
+    solids: list[placement.Placed] = []
     for instance in instances:
         found = models[instance.key[0]].resources[instance.key[1]]
         assert isinstance(found, Object)
@@ -256,6 +258,10 @@ def _geometry(
             np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
         )
         watertight = watertight and bool(facts.watertight)
+        if facts.watertight and (facts.volume_mm3 or 0.0) > 0 and len(solids) <= placement.MOST and options.cross:
+            placed = _mesh_of(found, factor, instance.matrix)
+            size = facts.volume_mm3 * abs(float(np.linalg.det(instance.matrix[:3])))
+            solids.append(placement.Placed(placed.vertices, placed.faces, size, f"object {found.id}"))
         deadline.tick()
     if not triangles:
         return findings, Facts(triangles=0, vertices=vertices, shells=0)
@@ -268,7 +274,7 @@ def _geometry(
         (tuple(low.tolist()), tuple(high.tolist())),
         watertight,
     )
-    findings += scale.judge(facts, True)
+    findings += placement.judge(solids, deadline) + scale.judge(facts, True)
     if options.shells is not None and shells != options.shells:
         findings.append(finding("G005", f"{shells} shells, {options.shells} expected", abs(shells - options.shells)))
     if options.printer is not None:
