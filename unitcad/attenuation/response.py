@@ -167,6 +167,8 @@ def _panels(corners: list[complex], stop: float, span: float) -> np.ndarray:
             line += list(line[-1] + longest * np.arange(1, count + 1))
         else:
             line.append(line[-1] + growth)
+    if len(line) > 1 and line[-1] > stop:
+        line[-1] = stop  # the tail's bound counts from there, and so do panels added later
     edges.append(np.array(line, dtype=complex))
     return np.concatenate([np.stack([e[:-1], e[1:]], axis=1) for e in edges])
 
@@ -185,14 +187,14 @@ def _integrate(
     full = len(problem.medium.layers)
     keep, skipped = _reached(problem, corners, materials, rtol)
     total = np.zeros_like(known)
-    quadrature = size = 0.0
+    quadrature = size = dropped = 0.0
     count = 0
     stop = tail.start(max(float(np.max(np.abs(known))), tail.scale), rtol)
     pending = _graded(_panels(corners, stop, span), materials)
     done = 0
     used = 0
     for _ in range(_MAX_ROUNDS):
-        parts, errors, absolute, kept = _evaluate(problem, pending, keep, materials, rtol)
+        parts, errors, absolute, lost, kept = _evaluate(problem, pending, keep, materials, rtol)
         count += pending.shape[0] * _NODES.size
         used = max(used, kept)
         scale = float(np.max(np.abs(known + total + parts.sum(0)))) or 1.0
@@ -203,6 +205,7 @@ def _integrate(
         total = total + parts[~bad].sum(0)
         quadrature += float(errors[~bad].sum())
         size += float(absolute[~bad].sum())
+        dropped += float(lost[~bad].sum())
         if np.any(bad):
             middle = pending[bad].mean(1)
             pending = np.concatenate(
@@ -219,72 +222,95 @@ def _integrate(
         stop = wanted
     else:
         quadrature += float(errors.sum())
+        dropped += float(lost.sum())
         total = total + parts.sum(0)
     rounding = 4e-15 * size + 4e-16 * float(np.max(np.abs(known)))
-    error = quadrature + tail.bound(stop) + skipped + rounding
+    error = quadrature + tail.bound(stop) + skipped + dropped + rounding
     return _Found(total, error, count, tuple(range(used + 1, full + 1)))
 
 
 def _evaluate(
     problem: _Problem, panels: w.Array, keep: int, materials: tuple[w.Material, ...], rtol: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Per panel: its integral (panels, 2, radii), the estimate of its error, its absolute size; and the layers used."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
+    """Per panel: its integral (panels, 2, radii), a bound of its error, its absolute size, a bound of what the layers
+    left out would add; and the layers used.
+    """
     step = max(1, _CHUNK // (_NODES.size * problem.r.size * 2))
     lifted = np.any(panels.imag != 0, axis=1)
     parts = np.empty((len(panels), 2, problem.r.size), dtype=np.complex128)
-    errors, sizes, used = np.empty(len(panels)), np.empty(len(panels)), 0
+    errors, sizes, lost, used = np.empty(len(panels)), np.empty(len(panels)), np.zeros(len(panels)), 0
+    static = np.abs(static_kernel(problem.reference, problem.column))[:, None] if problem.reference else 0.0
     for group in (np.nonzero(lifted)[0], np.nonzero(~lifted)[0]):
         for first in range(0, group.size, step):
             part = group[first : first + step]
             half = (panels[part, 1] - panels[part, 0]) / 2.0
             k = (panels[part].mean(1)[:, None] + half[:, None] * _NODES).ravel()
-            kernel, reached = _layered_kernel(problem, k, keep, materials, rtol)
+            kernel, missing, reached = _layered_kernel(problem, k, keep, materials, rtol)
             used = max(used, reached)
             if not lifted[part[0]]:  # real Bessel functions cost a tenth of complex ones
                 k = k.real
-            kernel = kernel * problem.load.transform(k)
+            transform = problem.load.transform(k)
             phase = k[:, None] * problem.r
-            values = np.stack([bessel(1, phase), bessel(0, phase)]) * kernel[:, :, None]
+            waves = np.stack([bessel(1, phase), bessel(0, phase)])
+            values = waves * (kernel * transform)[:, :, None]
             values = values.reshape(2, part.size, _NODES.size, -1) * half[:, None, None]
             parts[part] = np.einsum("n,cpnr->pcr", _WEIGHTS, values)
             errors[part], sizes[part] = _panel_errors(values)
-    return parts, errors, sizes, used
+            if np.any(missing):
+                share = missing * (np.abs(kernel) + static) * np.abs(transform)
+                share = (np.abs(waves) * share[:, :, None]).reshape(2, part.size, _NODES.size, -1)
+                lost[part] = np.abs(half) * np.einsum("n,cpnr->cpr", _WEIGHTS, share).max(axis=(0, 2))
+    return parts, errors, sizes, lost, used
 
 
 def _panel_errors(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Per panel an estimate of the error, from how far its last Legendre coefficients have died, and its absolute size.
+    """Per panel a bound of the error, from how far its last Legendre coefficients have died, and its absolute size.
 
-    Coefficients that fall like q^j leave Gauss-Legendre an error of q^2n; the last ones, to the power 3/2, lie above.
+    Gauss-Legendre with n nodes is exact to degree 2n - 1: its error is what the coefficients from degree 2n on give,
+    each at most twice over. Twice the last two that were seen, n - 2 and n - 1, is more than that as soon as the
+    coefficients halve within n degrees or so. (To count on the rate at which they seem to fall was too bold:
+    a pole of small residue next to the panel shows in the last ones only.)
     """
-    last = np.abs(np.einsum("jn,cpnr->jcpr", _LAST, values)).max(axis=0)
+    last = np.abs(np.einsum("jn,cpnr->jcpr", _LAST, values)).sum(axis=0)
     magnitude = np.abs(values)
-    largest = magnitude.max(axis=2)
-    ratio = np.divide(last, largest, out=np.zeros_like(last), where=largest > 0)
-    errors = (2.0 * last * np.sqrt(np.minimum(ratio, 1.0))).max(axis=(0, 2))
-    return errors, np.einsum("n,cpnr->cpr", _WEIGHTS, magnitude).max(axis=(0, 2))
+    return 2.0 * last.max(axis=(0, 2)), np.einsum("n,cpnr->cpr", _WEIGHTS, magnitude).max(axis=(0, 2))
 
 
 def _layered_kernel(
     problem: _Problem, k: w.Array, keep: int, materials: tuple[w.Material, ...], rtol: float
-) -> tuple[w.Array, int]:
-    """The kernel with, at each wavenumber, only the layers from which something comes back within rtol / 1000."""
+) -> tuple[w.Array, np.ndarray, int]:
+    """The kernel with, at each wavenumber, only the layers from which something comes back within rtol / 1000.
+
+    Beside it, per wavenumber, a bound of what the others would change k C by, as a share of it; and the layers used.
+    """
     layers = problem.medium.layers[:keep]
     depth = np.zeros(k.size)
     needed = np.zeros(k.size, dtype=int)
+    missing = np.zeros(k.size)
     top = 0.0
     for i, layer in enumerate(layers):
         gp, gs = w.rates(materials[i], k)
         below = max(0.0, top + layer.thickness - max(problem.z, top))
         depth += np.minimum(gp.real, gs.real) * below
-        needed[2.0 * depth < np.log(1e3 / rtol)] = i + 1
+        back = _coming_back(depth)
+        seen = (back > rtol / 1e3) | (problem.z >= top + layer.thickness)
+        needed[seen], missing[seen] = i + 1, 0.0
+        missing = np.where(~seen & (missing == 0.0), back, missing)
         top += layer.thickness
-        if problem.z >= top:
-            needed[:] = i + 1
     out = np.empty((2, k.size), dtype=np.complex128)
     for one in np.unique(needed):
         part = needed == one
         out[:, part] = problem.kernel(k[part], int(one))
-    return out, int(needed.max(initial=0))
+    return out, missing, int(needed.max(initial=0))
+
+
+def _coming_back(depth: np.ndarray) -> np.ndarray:
+    """What an interface `depth` decay lengths down changes the compliance by, as a share of it: at most that.
+
+    Twice what a rigid base does to an incompressible layer at rest, (2 + 2 x + x^2) e^-x with x = 2 depth.
+    """
+    x = 2.0 * depth
+    return 2.0 * (2.0 + 2.0 * x + x * x) * np.exp(-x)
 
 
 def _reached(

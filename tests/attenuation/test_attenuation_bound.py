@@ -1,0 +1,79 @@
+"""Response.error is a bound: seeded random media, loads and tolerances, and the cases that once broke it."""
+
+import numpy as np
+import pytest
+
+from unitcad.attenuation.loads import Point, UniformDisc
+from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.response import Response
+from unitcad.attenuation.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
+
+
+def _random_case(seed: int):
+    """(medium, load, omega, radii, depth, rtol): 0 to 4 layers of mixed dampings, omega 0 to 3000, all drawn."""
+    rng = np.random.default_rng(seed)
+
+    def damping():
+        laws = [
+            None,
+            LossFactor(rng.uniform(0, 0.5)),
+            KelvinVoigt(10 ** rng.uniform(-1, 1.5)),
+            FractionalKelvinVoigt(10 ** rng.uniform(-5, -2), 0.3),
+        ]
+        return laws[rng.integers(0, 4)]
+
+    def material():
+        nu = float(rng.choice([0.0, 0.3, 0.45, 0.49, 0.4999, 0.5]))
+        return rng.uniform(500, 3000), 10 ** rng.uniform(3.5, 7), nu, damping()
+
+    layers = [Layer(10 ** rng.uniform(-4, -1.5), *material()) for _ in range(rng.integers(0, 5))]
+    medium = LayeredMedium(layers, HalfSpace(*material()))
+    a = 10 ** rng.uniform(-3, -2)
+    load = [UniformDisc(a), UniformDisc(a), UniformDisc(a, "radial"), Point()][rng.integers(0, 4)]
+    omega = float(rng.choice([0.0, 1e-3, 10.0, 785.0, 785.0, 3000.0]))
+    r = np.sort(10 ** rng.uniform(-3.5, -1.3, 5))
+    z = float(rng.choice([0.0, 0.0, 1e-3, 5e-3]))
+    return medium, load, omega, r, z, float(rng.choice([1e-2, 1e-3, 1e-4, 1e-6]))
+
+
+def _off(found: Response, truth: Response) -> float:
+    return float(max(np.max(np.abs(found.u_z - truth.u_z)), np.max(np.abs(found.u_r - truth.u_r))))
+
+
+@pytest.mark.parametrize("block", range(5))
+def test_error_bounds_the_true_error_of_random_cases(block):
+    for seed in range(40 * block, 40 * block + 40):
+        medium, load, omega, r, z, rtol = _random_case(seed)
+        found = medium.response(load, omega, r, z=z, rtol=rtol)
+        truth = medium.response(load, omega, r, z=z, rtol=1e-4 * rtol)
+        assert _off(found, truth) <= found.error + truth.error, seed
+        assert truth.error < 0.3 * rtol * max(np.max(np.abs(truth.u_z)), np.max(np.abs(truth.u_r))), seed
+        assert found.error <= 1.01 * rtol * max(np.max(np.abs(truth.u_z)), np.max(np.abs(truth.u_r))), seed
+
+
+def test_error_at_depth_under_a_disc_at_low_frequency():
+    """Nearly incompressible: a pole next to the path, which only the last coefficients of a panel show."""
+    medium = LayeredMedium([], HalfSpace(1156.455, 7520.563, 0.4999, FractionalKelvinVoigt(0.0017520116, 0.3)))
+    r = [4.2379e-4, 1.20883e-3, 1.29139e-3, 1.68537e-3, 7.2161e-3, 0.01934345]
+    found, truth = (medium.response(UniformDisc(1.0114377e-3), 10.0, r, z=5e-3, rtol=rtol) for rtol in (1e-3, 1e-10))
+    assert _off(found, truth) <= found.error
+
+
+@pytest.mark.parametrize("omega", [0.0, 785.0])
+def test_a_longer_integral_counts_no_piece_twice(omega):
+    """Incompressible, at depth: the first guess of where the tail may be cut off is too short."""
+    medium = LayeredMedium([], HalfSpace(1800.0, 736910.0, 0.5, LossFactor(0.33)))
+    load, r = UniformDisc(1.42e-3, "radial"), [6.1e-3, 11e-3, 23e-3, 28e-3, 80e-3, 84e-3]
+    found, truth = (medium.response(load, omega, r, z=5e-3, rtol=rtol) for rtol in (1e-3, 1e-10))
+    assert _off(found, truth) <= found.error
+
+
+def test_layers_out_of_reach_count_in_the_error():
+    """Static, contrast 60: layers are left out per wavenumber, and what that changes is in the error."""
+    medium = LayeredMedium(
+        [Layer(1.0885e-4, 1098, 91993.6, 0.49), Layer(0.013613, 1427, 5.4091e6, 0.4999)],
+        HalfSpace(1128, 196607, 0.0, LossFactor(0.376)),
+    )
+    r = [5.5516e-4, 1.87628e-3, 0.01585, 0.03048, 0.0576, 0.074]
+    found, truth = (medium.response(Point(), 0.0, r, rtol=rtol) for rtol in (1e-6, 1e-11))
+    assert _off(found, truth) <= found.error
