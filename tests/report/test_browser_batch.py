@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from chromium import Visit
-
-from unitcad.report import page as pages
+from pagetable import column, table_page
 
 Image = pytest.importorskip("PIL.Image", reason="reading the screenshots needs Pillow")
 
@@ -28,16 +27,6 @@ def visit(running: Any, sweep: Path) -> Iterator[Visit]:
     assert seen.console == []
     assert {url.partition("#")[0] for url in seen.requests} == {(sweep / "report.html").resolve().as_uri()}
     seen.close()
-
-
-def column(visit: Visit, name: str) -> list[str]:
-    """The cells of a column as shown."""
-    heads = [
-        text.replace("▲", "").replace("▼", "").strip()
-        for text in visit.page.locator(".variants thead tr:first-child th").all_inner_texts()
-    ]
-    at = heads.index(name) + 1
-    return visit.page.locator(f".variants tbody tr > :nth-child({at})").all_inner_texts()
 
 
 def head(visit: Visit, name: str) -> Any:
@@ -245,14 +234,6 @@ def test_the_table_prints_with_its_heads_on_white(running: Any, sweep: Path, dar
 def colours(visit: Visit) -> tuple[str, str]:
     """Of the ground under the table and of the first series."""
     return tuple(visit.page.evaluate("() => ['paper', 'series-1'].map(window.unitcad.theme.colour)"))
-
-
-def table_page(folder: Path, columns: list[str], rows: list[list[Any]], **more: Any) -> Path:
-    """A page with a table of our own: each row the variant's folder and its cells."""
-    data = {"title": "many", "version": "0", "variants": [], "pool": [], "models": {}, "batch": None, **more}
-    file = folder / "table.html"
-    file.write_text(pages.page({**data, "table": {"columns": columns, "rows": rows}}, "many"), "utf-8")
-    return file
 
 
 def test_the_plot_says_who_is_not_in_it_and_why(running: Any, tmp_path: Path) -> None:

@@ -29,8 +29,8 @@ from unitcad.spec import Spec
 
 VENDORED = ("three.min.js", "uplot.min.js")
 PROGRAMS = (
-    "dom.js", "glb.js", "viewer.js", "controls.js", "plots.js", "estimate.js", "sections.js", "casting.js", "table.js",
-    "main.js",
+    "dom.js", "glb.js", "viewer.js", "controls.js", "plots.js", "estimate.js", "sections.js", "casting.js",
+    "filters.js", "table.js", "main.js",
 )  # fmt: skip
 STYLES = ("vendor/uplot.min.css", "app/page.css", "app/print.css")
 

@@ -1,33 +1,8 @@
 // A sortable, filterable table of variants, a page at a time.
 (() => {
   "use strict";
-  const { el, clear, number } = window.unitcad;
+  const { el, clear, number, filterOf, containing, kindsOf } = window.unitcad;
   const PAGE = 100;
-
-  // A test of whether a cell holds a text; null for no text.
-  function containing(text) {
-    const wanted = text.trim().toLowerCase();
-    return wanted ? (value) => value !== null && value !== undefined && String(value).toLowerCase().includes(wanted) : null;
-  }
-
-  // A filter: text to find, or a comparison: > 1.2, <= 3, = 4, 1..2. Returns a test of a cell.
-  function filterOf(text) {
-    const wanted = text.trim();
-    const between = wanted.match(/^(-?[\d.eE+-]+)\s*\.\.\s*(-?[\d.eE+-]+)$/);
-    if (between) {
-      const [low, high] = between.slice(1).map(Number);
-      return (value) => typeof value === "number" && value >= low && value <= high;
-    }
-    const compared = wanted.match(/^(<=|>=|<|>|=)\s*(.+)$/);
-    if (compared) {
-      const [, sign, right] = compared;
-      const limit = Number(right);
-      if (sign === "=") return (value) => (typeof value === "number" ? value === limit : String(value) === right);
-      const tests = { "<": (v) => v < limit, "<=": (v) => v <= limit, ">": (v) => v > limit, ">=": (v) => v >= limit };
-      if (Number.isFinite(limit)) return (value) => typeof value === "number" && tests[sign](value);
-    }
-    return containing(text);
-  }
 
   // Numbers before texts, nothing last whichever way.
   function compare(a, b, direction) {
@@ -46,6 +21,8 @@
   // table: {columns, rows: [[folder, ...cells]]}; open(row); changed(rows) is told whenever other rows are shown.
   function createTable(table, { open, changed, nameColumn }) {
     const same = constants(table.columns, table.rows);
+    const kinds = table.columns.map((name, i) => kindsOf(table.rows.map((row) => row[i + 1])));
+    const fault = el("p", { className: "fault", id: "filters-fault", role: "status" });
     const state = { sort: null, direction: 1, filters: new Map(), search: "", page: 0, all: false };
     const columns = () => table.columns.map((name, i) => ({ name, at: i + 1 })).filter(({ name }) => state.all || !same.has(name) || name === nameColumn);
     const body = el("tbody");
@@ -58,11 +35,25 @@
     const all = el("input", { type: "checkbox", name: "all-columns", onchange: () => { state.all = all.checked; layout(); update(); } });
 
     function chosen() {
-      const tests = [...state.filters].map(([at, text]) => [at, filterOf(text)]).filter(([, test]) => test);
+      const read = [...state.filters].map(([at, text]) => ({ at, text, ...filterOf(text, kinds[at - 1]) }));
+      complain(read.filter((filter) => filter.fault));
+      const tests = read.filter((filter) => filter.test).map((filter) => [filter.at, filter.test]);
       const anywhere = containing(state.search);
       const rows = table.rows.filter((row) => tests.every(([at, test]) => test(row[at])) && (!anywhere || row.some((cell, i) => i > 0 && anywhere(cell))));
       if (state.sort === null) return rows;
       return rows.map((row, i) => [row, i]).sort(([a, i], [b, j]) => compare(a[state.sort], b[state.sort], state.direction) || i - j).map(([row]) => row);
+    }
+
+    // A filter that is not understood holds nothing back, and says so.
+    function complain(faults) {
+      const wrong = new Set(faults.map(({ at }) => at));
+      for (const input of filters.querySelectorAll("input")) {
+        const mine = wrong.has(Number(input.dataset.at));
+        input.setAttribute("aria-invalid", String(mine));
+        if (mine) input.setAttribute("aria-describedby", fault.id);
+        else input.removeAttribute("aria-describedby");
+      }
+      fault.textContent = faults.map(({ at, text, fault: forms }) => `Not understood, so left out: "${text.trim()}" under ${table.columns[at - 1]}. It takes ${forms}.`).join(" ");
     }
 
     function sortBy(at) {
@@ -77,7 +68,7 @@
       clear(heads, columns().map(({ name, at }) => el("th", { scope: "col", "data-at": at }, el("button", { type: "button", onclick: () => sortBy(at) },
         name.split(/(?<=[._])/).flatMap((piece) => [piece, el("wbr")])))));
       clear(filters, columns().map(({ name, at }) => {
-        const input = el("input", { type: "text", name: `filter-${name}`, placeholder: "filter", "aria-label": `Filter ${name}: text, > 1, < 2, 1..2`, oninput: () => { state.filters.set(at, input.value); state.page = 0; update(); } });
+        const input = el("input", { type: "text", name: `filter-${name}`, "data-at": at, placeholder: "filter", "aria-label": `Filter ${name}: text, > 1, > 1 < 2, 1..2, !1`, oninput: () => { state.filters.set(at, input.value); state.page = 0; update(); } });
         input.value = state.filters.get(at) || "";
         return el("td", {}, input);
       }));
@@ -109,6 +100,7 @@
     }).filter(Boolean);
     const node = el("div", { className: "variants" },
       el("div", { className: "tools" }, search, el("label", {}, all, "columns that don't vary, too"), count),
+      fault,
       known.length > 0 && el("details", {}, el("summary", {}, `The same everywhere: ${known.length} columns`), el("ul", { className: "chips" }, known)),
       el("div", { className: "scroll tall", tabindex: "0", role: "group", "aria-label": "Variants" }, grid),
       pager);

@@ -1,0 +1,28 @@
+"""A batch's table: as a page shows it, and pages with a table of a test's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from chromium import Visit
+
+from unitcad.report import page as pages
+
+
+def column(visit: Visit, name: str) -> list[str]:
+    """The cells of a column as shown."""
+    heads = [
+        text.replace("▲", "").replace("▼", "").strip()
+        for text in visit.page.locator(".variants thead tr:first-child th").all_inner_texts()
+    ]
+    at = heads.index(name) + 1
+    return visit.page.locator(f".variants tbody tr > :nth-child({at})").all_inner_texts()
+
+
+def table_page(folder: Path, columns: list[str], rows: list[list[Any]], **more: Any) -> Path:
+    """A page with a table of our own: each row the variant's folder and its cells."""
+    data = {"title": "many", "version": "0", "variants": [], "pool": [], "models": {}, "batch": None, **more}
+    file = folder / "table.html"
+    file.write_text(pages.page({**data, "table": {"columns": columns, "rows": rows}}, "many"), "utf-8")
+    return file
