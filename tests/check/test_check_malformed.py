@@ -85,7 +85,6 @@ def test_a_package_cut_anywhere_is_an_error(share: float, judge) -> None:
     assert judge(whole[: int(share * len(whole))], "part.3mf").verdict == "error"
 
 
-@pytest.mark.parametrize("content", [stl(box()[2:], count=12), stl(box())[:-70], stl(box(), count=4_000_000_000)])
 @pytest.mark.parametrize(
     "transform", ["1 0 0 0 1 0 0 0 1 10 0 0", "1 0 0 0 1 0 0 0 1 10 10 0", "0 1 0 -1 0 0 0 0 1 30 9 9"]
 )
@@ -100,6 +99,7 @@ def test_many_instances_that_share_are_counted(judge) -> None:
     assert (found.code, found.severity, found.count) == ("G002", "warning", 39)
 
 
+@pytest.mark.parametrize("content", [stl(box()[2:], count=12), stl(box())[:-70], stl(box(), count=4_000_000_000)])
 def test_no_geometry_is_judged_where_facets_are_missing(content: bytes, judge) -> None:
     assert [found.code for found in judge(content).findings] == ["F002"]
 

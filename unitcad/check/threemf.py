@@ -260,7 +260,7 @@ def _geometry(
         watertight = watertight and bool(facts.watertight)
         if facts.watertight and (facts.volume_mm3 or 0.0) > 0 and len(solids) <= placement.MOST and options.cross:
             placed = _mesh_of(found, factor, instance.matrix)
-            size = facts.volume_mm3 * abs(float(np.linalg.det(instance.matrix[:3])))
+            size = (facts.volume_mm3 or 0.0) * abs(float(np.linalg.det(instance.matrix[:3])))
             solids.append(placement.Placed(placed.vertices, placed.faces, size, f"object {found.id}"))
         deadline.tick()
     if not triangles:
