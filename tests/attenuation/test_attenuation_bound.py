@@ -1,4 +1,4 @@
-"""Response.error is a bound: seeded random media, loads and tolerances, and the cases that once broke it."""
+"""Response.error is a bound on seeded random media, loads and tolerances; what has no answer is refused."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,9 @@ from unitcad.attenuation.loads import Point, UniformDisc
 from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.response import Response
 from unitcad.attenuation.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
+from unitcad.cli.estimate import frequencies
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.spec import load
 
 
 def _random_case(seed: int):
@@ -77,3 +80,37 @@ def test_layers_out_of_reach_count_in_the_error():
     r = [5.5516e-4, 1.87628e-3, 0.01585, 0.03048, 0.0576, 0.074]
     found, truth = (medium.response(Point(), 0.0, r, rtol=rtol) for rtol in (1e-6, 1e-11))
     assert _off(found, truth) <= found.error
+
+
+@pytest.mark.parametrize("r", [0.0, [0.0], [[0.0, 1e-3]]])
+@pytest.mark.parametrize("omega", [0.0, 785.0])
+def test_under_a_point_load_the_answer_is_infinite(r, omega):
+    medium = LayeredMedium([], HalfSpace(1000, 3e4, 0.3))
+    with pytest.raises(Refusal) as refused:
+        medium.response(Point(), omega, r)
+    assert refused.value.field == "r"
+    assert np.isfinite(medium.response(Point(), omega, r, z=1e-3, rtol=1e-3).error)
+
+
+def test_waves_too_short_are_refused_before_any_work():
+    medium = LayeredMedium([Layer(1e-3, 1000, 1e4, 0.5)], HalfSpace(1900, 15e9, 0.3))
+    with pytest.raises(Refusal) as refused:
+        medium.response(UniformDisc(3.5e-3), 1e9, [0.05])
+    assert refused.value.field == "omega"
+    nearest = refused.value.nearest
+    assert isinstance(nearest, float)
+    assert 1e4 < nearest < 1e9
+    far = medium.response(UniformDisc(3.5e-3), nearest, [0.05], rtol=0.1)
+    assert np.isfinite(far.error)
+
+
+@pytest.mark.parametrize(("asked", "nearest"), [("1e9", "5000"), ("0.5", "1"), ("0.1:9000:100", "1:5000:100")])
+def test_frequency_option_is_bounded(asked, nearest):
+    with pytest.raises(Refusal) as refused:
+        frequencies(asked)
+    assert (refused.value.field, refused.value.nearest) == ("--frequency", nearest)
+
+
+def test_frequency_of_a_spec_is_bounded():
+    with pytest.raises(UnitcadError, match=r"estimate\.frequency_hz"):
+        load("encapsulating", ["estimate.frequency_hz=1e6"])

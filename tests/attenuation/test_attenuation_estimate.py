@@ -191,7 +191,7 @@ def test_frequency_table():
 def test_frequency_as_typed():
     assert frequencies("120") == [120]
     assert frequencies("100:150:25") == [100, 125, 150]
-    assert frequencies("0.1:0.3:0.1") == pytest.approx([0.1, 0.2, 0.3])
+    assert frequencies("1.1:1.3:0.1") == pytest.approx([1.1, 1.2, 1.3])
     for text in ("", "0", "-1", "a", "1:2", "1:2:0", "2:1:1", "1:2:nan", "1:1e9:1"):
         with pytest.raises(Refusal) as refused:
             frequencies(text)

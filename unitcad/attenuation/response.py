@@ -26,6 +26,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _LAST = np.array([(2 * j + 1) / 2.0 * _WEIGHTS * np.polynomial.legendre.Legendre.basis(j)(_NODES) for j in (14, 15)])
 _PHASE = 4.0 * np.pi  # of the fastest Bessel product over one panel
 _MAX_PANELS = 60_000
+_MOST_PANELS = 5_000  # up to the last pole: a few seconds
 _MAX_ROUNDS = 40
 _WORTH_ASKING = 1e-3  # from this rtol on it costs more to find layers that may be left out than to keep them
 _CHUNK = 200_000  # integrand values held at once
@@ -86,9 +87,12 @@ def respond(medium: LayeredMedium, load: Load, omega: float, r: Any, z: float = 
     z, rtol = finite("z", z), finite("rtol", rtol, above=True)
     if not 1e-12 <= rtol <= 0.1:
         raise Refusal("rtol", rtol, "must be from 1e-12 to 0.1", min(max(rtol, 1e-12), 0.1))
+    if load.reach == 0.0 and z == 0.0 and np.any(radii == 0.0):
+        raise Refusal("r", 0.0, "under a point load the surface goes to infinity: give r > 0, z > 0 or a disc")
     materials = medium.materials(omega)
     flat = radii.ravel()
     end = _last_pole(medium, materials, omega)
+    _check_size(end, float(flat.max()) + load.reach + 2.0 * z, omega)
     problem = _Problem(medium, load, omega, flat, z, None)
     tail = measure_tail(problem.kernel, static_kernel, materials, load, flat, z, end, rtol)
     problem = _Problem(medium, load, omega, flat, z, tail.reference)
@@ -96,6 +100,14 @@ def respond(medium: LayeredMedium, load: Load, omega: float, r: Any, z: float = 
     found = _integrate(problem, materials, tail, known, end, rtol)
     u = (known + found.total).reshape(2, *radii.shape)
     return Response(u[0][()], u[1][()], found.error, found.wavenumbers, found.left_out)
+
+
+def _check_size(end: float, span: float, omega: float) -> None:
+    """Refuse, before anything is allocated, an omega whose waves are too short for the distance `span` (m)."""
+    panels = end * span / _PHASE
+    if panels > _MOST_PANELS:
+        limit = f"its waves are too short for {span:g} m: {panels:.2g} panels, the most is {_MOST_PANELS}"
+        raise Refusal("omega", omega, limit, float(f"{0.9 * omega * _MOST_PANELS / panels:.2g}"))
 
 
 def _static_part(problem: _Problem) -> np.ndarray:

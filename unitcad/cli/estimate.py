@@ -51,6 +51,8 @@ def estimate(
 
 def frequencies(text: str) -> list[float]:
     """HZ, or FROM:TO:STEP with both ends, as a list in Hz. Raises `Refusal`."""
+    from unitcad.spec.models import FREQUENCIES_HZ
+
     parts = text.split(":")
     try:
         numbers = [float(part) for part in parts]
@@ -58,6 +60,11 @@ def frequencies(text: str) -> list[float]:
         numbers = []
     if len(numbers) not in (1, 3) or not all(math.isfinite(n) and n > 0 for n in numbers):
         raise Refusal("--frequency", text, "must be HZ or FROM:TO:STEP, numbers above 0", "100:150:10")
+    lowest, highest = FREQUENCIES_HZ
+    clipped = [min(max(n, lowest), highest) for n in numbers[:2]]
+    if clipped != numbers[:2]:
+        nearest = ":".join(f"{n:g}" for n in (*clipped, *numbers[2:]))
+        raise Refusal("--frequency", text, f"must be from {lowest:g} to {highest:g} Hz", nearest)
     if len(numbers) == 1:
         return numbers
     low, high, step = numbers

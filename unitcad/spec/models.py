@@ -9,6 +9,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+FREQUENCIES_HZ = (1.0, 5000.0)
+"""What an estimate may be asked for: vibration motors, with room on both sides; above it waves are too short."""
 Positive = Annotated[float, Field(strict=True, gt=0)]
 NotNegative = Annotated[float, Field(strict=True, ge=0)]
 Length = Annotated[float, Field(strict=True, gt=0, le=1000)]
@@ -116,7 +118,7 @@ class CastingTable(Table):
 class EstimateTable(Table):
     """What the attenuation estimate is asked for; None takes the motor's value."""
 
-    frequency_hz: Positive | None = None
+    frequency_hz: Annotated[float, Field(strict=True, ge=FREQUENCIES_HZ[0], le=FREQUENCIES_HZ[1])] | None = None
     amplitude_um: Positive | None = None
     tissue: str = "forearm"
     models: tuple[Model, ...] = ("paper", "consistent", "fitted")
