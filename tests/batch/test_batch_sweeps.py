@@ -120,7 +120,9 @@ def test_the_paper_sweep_has_every_measured_unit() -> None:
             ["diameter_mm has 2", "has 3"],
         ),
         ({"diameter_mm": [14.0, 15.0, 14.0]}, ["14", "is there twice"]),
-        ({"diameter_mm": {"start": 1.0, "stop": 2.0, "num": 0}}, ["num"]),
+        ({"diameter_mm": {"start": 1.0, "stop": 2.0, "num": 0}}, ["a range needs", "a whole num"]),
+        ({"diameter_mm": {"start": 1.0, "stop": 2.0}}, ["a range needs start, stop"]),
+        ({"diameter_mm": {"start": 1.0, "stop": 2.0, "num": 1e12}}, ["a range needs", "a whole num"]),
         ({"diameter_mm": {"start": 1.0, "stop": 2.0, "nmu": 3}}, ["diameter_mm"]),
         ({"diameter_mm": {"start": 1.0, "stop": 1.0, "num": 3}}, ["same value"]),
         ({"diameter_mm": [float("nan")]}, []),
@@ -171,6 +173,15 @@ def test_a_thousand_million_variants_are_counted_and_limited(tmp_path: Path) -> 
     assert "1000000000" in done.stderr
     assert "--limit" in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_dry_run_of_refused_variants_alone_is_refused(tmp_path: Path) -> None:
+    sweep = tmp_path / "s.toml"
+    sweep.write_text('base = "encapsulating"\n[sweep]\ndiameter_mm = [0.5, 0.6]\n')
+    done = unitcad("batch", sweep, "-o", tmp_path / "out", "--dry-run")
+    assert done.returncode == 2
+    assert "every variant is refused" in done.stderr
+    assert "diameter_mm" in done.stderr
 
 
 def test_dry_run_counts_and_makes_nothing(tmp_path: Path) -> None:

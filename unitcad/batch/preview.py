@@ -25,7 +25,8 @@ REFUSED_TOLD = 20
 def preview(sweep: Sweep, options: Options) -> dict[str, Any]:
     """Variants, distinct geometries and parts, files and megabytes; `exact` tells whether the first three are counts.
 
-    Every variant that is looked at passes the door; `refused` tells the first ones that don't.
+    Every variant that is looked at passes the door; `refused` tells the first ones that don't. Raises UnitcadError
+    where none does.
     """
     only = checked_outputs(options.only)
     count = counted(sweep, options.limit)
@@ -41,6 +42,8 @@ def preview(sweep: Sweep, options: Options) -> dict[str, Any]:
             continue
         accepted += 1
         geometries.setdefault(geometry_key(spec, only, options.check), spec)
+    if refused and not accepted:
+        raise UnitcadError(f"every variant is refused, the first: {refused[0]['reason']}")
     share = count / looked
     spread = list(geometries.values())
     drawn = spread[:: max(1, len(spread) // DRAWN)][:DRAWN]

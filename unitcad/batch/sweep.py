@@ -231,6 +231,8 @@ def _read_base(base: str, folder: Path) -> dict[str, Any]:
 
 def _values(path: str, given: Any) -> Sequence[Any] | Range:
     """The values of an axis: a scalar or a table counts as one."""
+    if isinstance(given, dict) and given.keys() & {"start", "stop", "num"}:  # Range refused it, so it became a value
+        raise Refusal(f"sweep.{path}", str(given)[:60], "a range needs start, stop and a whole num of at least 1")
     values = given if isinstance(given, list | Range) else [given]
     if not len(values):
         raise Refusal(f"sweep.{path}", [], "an axis needs a value: the sweep is empty")
