@@ -82,6 +82,16 @@ def test_folders_and_globs(folder: Path) -> None:
         assert json.loads(result.stdout)["files"][0]["findings"][0]["code"] == "F012"
 
 
+def test_hidden_folders_and_loops_are_left_out_and_each_file_is_judged_once(folder: Path) -> None:
+    (folder / ".git").mkdir()
+    (folder / ".git" / "old.stl").write_bytes(HOLE)
+    (folder / "sub" / "again.stl").symlink_to(folder / "good.stl")
+    (folder / "sub" / "loop").symlink_to(folder, target_is_directory=True)
+    for names in (["."], ["**/*.[sS][tT][lL]"], [".", "good.stl", "./sub"]):
+        data = json.loads(run(*names, "--json", cwd=folder).stdout)
+        assert [entry["path"] for entry in data["files"]] == ["good.stl", "sub/hole.stl", "sub/warn.STL"]
+
+
 def test_jobs_give_the_same_answer(folder: Path) -> None:
     one, two = run(".", "--json", cwd=folder), run(".", "--json", "--jobs", "2", cwd=folder)
     assert one.stdout == two.stdout
@@ -107,6 +117,14 @@ def test_limits_unit_and_printer(folder: Path) -> None:
     assert "D001" in run("film.stl", "--printer", "fdm-0.4", cwd=folder).stdout
     assert "D001" not in run("film.stl", cwd=folder).stdout
     assert "G005" in run("good.stl", "--shells", "2", cwd=folder).stdout
+
+
+@pytest.mark.parametrize(
+    ("unit", "mm"), [("mm", 1), ("CM", 10), ("m", 1000), ("in", 25.4), ("Inches", 25.4), ("ft", 304.8), ("INCH", 25.4)]
+)
+def test_units_by_their_short_names(folder: Path, unit: str, mm: float) -> None:
+    data = json.loads(run("good.stl", "--unit", unit, "--json", cwd=folder).stdout)
+    assert data["files"][0]["facts"]["volume_mm3"] == pytest.approx((10 * mm) ** 3, rel=1e-12)
 
 
 def test_unit_scales_the_facts(folder: Path) -> None:

@@ -26,18 +26,39 @@ def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
     for name in names:
         path = Path(name)
         if path.is_dir():
-            inside = sorted(str(p) for p in path.rglob("*") if p.suffix.lower() in SUFFIXES and p.is_file())
+            inside = _once(_walked(path))
             if not inside:
                 empty.append(FileReport(name, (finding("F012", "no mesh file in this folder"),)))
             files.update(dict.fromkeys(inside))
         elif not path.exists() and glob.has_magic(name):
-            inside = sorted(p for p in glob.glob(name, recursive=True) if os.path.isfile(p))
+            inside = _once(p for p in glob.glob(name, recursive=True) if os.path.isfile(p))
             if not inside:
                 empty.append(FileReport(name, (finding("F012", "no file matches"),)))
             files.update(dict.fromkeys(inside))
         else:
             files[name] = None
-    return list(files), empty
+    real: dict[str, str] = {}
+    for name in files:
+        real.setdefault(os.path.realpath(name), name)
+    return list(real.values()), empty
+
+
+def _walked(folder: Path) -> Iterator[str]:
+    """Mesh files below a folder, without hidden folders and those behind links."""
+    for here, below, names in os.walk(folder):
+        below[:] = [name for name in below if not name.startswith(".")]
+        for name in names:
+            path = Path(here, name)
+            if path.suffix.lower() in SUFFIXES and path.is_file():
+                yield str(path)
+
+
+def _once(paths: Iterable[str]) -> list[str]:
+    """Each real file once, by the name with the fewest folders; sorted."""
+    real: dict[str, str] = {}
+    for path in sorted(paths, key=lambda path: (path.count(os.sep), path)):
+        real.setdefault(os.path.realpath(path), path)
+    return sorted(real.values())
 
 
 def check_files(

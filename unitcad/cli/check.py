@@ -13,6 +13,8 @@ from unitcad.errors import Refusal, UnitcadError, unknown_name
 if TYPE_CHECKING:
     from unitcad.check import FileReport, Options
 
+_SHORT_UNITS = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "in": "inch", "inches": "inch", "ft": "foot"}
+
 
 def check(
     files: Annotated[list[str] | None, typer.Argument(help="Files, folders or globs.", show_default=False)] = None,
@@ -25,7 +27,7 @@ def check(
     extend_select: Annotated[list[str] | None, typer.Option(help="Prefixes added to --select.")] = None,
     fail_on: Annotated[str, typer.Option(help="error or warning: what makes the exit code 1.")] = "error",
     printer: Annotated[str | None, typer.Option(help="Judge fit and printability (S002, D) for this printer.")] = None,
-    unit: Annotated[str | None, typer.Option(help="Unit of files that have none: millimeter, inch, meter ...")] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of files that have none: mm, cm, m, in, ft ...")] = None,
     shells: Annotated[int | None, typer.Option(min=0, help="Number of shells expected (G005).")] = None,
     manifest: Annotated[str | None, typer.Option(help="manifest.json of a build, or its folder (M rules).")] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes.")] = 1,
@@ -89,8 +91,10 @@ def _options(
     from unitcad.check.check import UNITS_MM
     from unitcad.check.rulebook import check_prefixes
 
-    if unit is not None and unit not in UNITS_MM:
-        raise unknown_name("--unit", unit, UNITS_MM)
+    if unit is not None:
+        unit = _SHORT_UNITS.get(unit.lower(), unit.lower())
+        if unit not in UNITS_MM:
+            raise unknown_name("--unit", unit, UNITS_MM)
     if not timeout < 1e7:
         raise Refusal("--timeout", timeout, "must be a number of seconds below 1e7", 600)
     chosen = Options(
