@@ -198,6 +198,60 @@ def test_the_estimate_shows_models_and_the_measured_value(visit: Visit) -> None:
     assert (np.abs(image - rgb).max(axis=2) < 30).sum() > 150
 
 
+def test_measured_and_also_printed_are_told_apart(visit: Visit) -> None:
+    marks = visit.page.locator("#estimate .ranges").first.locator(".swatch.mark")
+    looks = marks.evaluate_all("(nodes) => nodes.map((node) => getComputedStyle(node).backgroundImage)")
+    assert len(looks) == 2
+    assert looks[0] == "none"
+    assert "repeating-linear-gradient" in looks[1]
+    row = visit.page.locator("#estimate .ranges .row").first.locator(".mark")
+    lines = row.evaluate_all(
+        "(nodes) => nodes.map((node) => [node.style.left, getComputedStyle(node).backgroundImage])"
+    )
+    assert [look for _, look in lines] == looks
+    # The dashed one is the smaller value: 0.0458 of 0.0517.
+    assert float(lines[1][0].removesuffix("%")) < float(lines[0][0].removesuffix("%"))
+
+
+def test_drawings_are_whole_at_390_pixels_and_large_on_demand(running: Any, page: Path) -> None:
+    seen = Visit(running, page, width=390, height=844)
+    drawings = seen.page.locator("img.drawing").all()
+    assert len(drawings) == 3
+    for image in drawings:
+        box = image.bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 390
+        assert box["width"] > 300
+        natural = image.evaluate("(node) => [node.naturalWidth, node.naturalHeight]")
+        assert box["width"] / box["height"] == pytest.approx(natural[0] / natural[1], rel=0.01)
+        button = image.locator("xpath=../following-sibling::button")
+        button.click()
+        assert button.get_attribute("aria-pressed") == "true"
+        assert image.bounding_box()["width"] == pytest.approx(natural[0], abs=1)
+        assert seen.overflowing() == []
+        button.press("Enter")
+        assert image.bounding_box()["width"] == box["width"]
+    seen.close()
+    wide = Visit(running, page)
+    assert not wide.page.locator(".enlarge").first.is_visible()
+    wide.close()
+
+
+def test_every_part_of_a_gang_is_in_the_list(running: Any, tmp_path: Path) -> None:
+    spec = load("encapsulating", ["moulds.cavities=[2,3]", "output.formats=[]"])
+    seen = Visit(running, write_report(build(spec, tmp_path, only=["moulds"], check=False).folder))
+    seen.drawn()
+    seen.page.check('input[type="radio"][value="moulds"]')
+    parts = seen.page.locator(".parts li").all()
+    assert len(parts) > 14
+    box = seen.page.locator(".parts").bounding_box()
+    for part in parts:
+        place = part.bounding_box()
+        assert box["y"] <= place["y"]
+        assert place["y"] + place["height"] <= box["y"] + box["height"] + 0.5
+    seen.close()
+
+
 @pytest.mark.parametrize("dark", [False, True])
 def test_nothing_overflows_at_390_pixels(running: Any, page: Path, dark: bool) -> None:
     seen = Visit(running, page, width=390, height=844, dark=dark)

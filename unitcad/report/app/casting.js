@@ -1,7 +1,7 @@
 // The casting procedure: numbered steps, a drawing and the figures of each pour, ready to print.
 (() => {
   "use strict";
-  const { el, number, section, table, drawing, partName } = window.unitcad;
+  const { el, number, section, table, framed, partName } = window.unitcad;
   // What a person at the scale looks for first.
   const FIRST = [/^part A$/, /^part B$/, /^pot life/, /^cure/, /^rise of/];
 
@@ -42,7 +42,7 @@
     const pour = (each) => {
       const svg = variant.drawings[each.drawing];
       return el("div", { className: "pour" }, el("h3", {}, `Pour ${each.index}: ${partName(each.layer)}, ${each.material}`),
-        svg && el("figure", { className: "scroll", tabindex: "0", "aria-label": `Pour ${each.index} in section` }, drawing(svg, `Pour ${each.index} in section`)),
+        svg && el("figure", {}, framed(svg, `Pour ${each.index} in section`, `Drawing of pour ${each.index}`)),
         cards(each.figures), each.verdict && el("p", { className: "verdict" }, each.verdict), steps(each.steps),
         figures(each.figures, `All figures of pour ${each.index}, with their sources`));
     };

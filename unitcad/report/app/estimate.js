@@ -27,7 +27,9 @@
     return spread || "not known";
   };
 
-  // rows: [{name, entry: {value, low, high}, colour}]; marks: [{name, value}] stand as lines across all rows.
+  const markClass = (name, mark) => (mark.dashed ? `${name} dashed` : name);
+
+  // rows: [{name, entry: {value, low, high}, colour}]; marks: [{name, value, dashed}] stand as lines across all rows.
   function rangeChart(rows, marks, caption) {
     const values = [...rows.flatMap(({ entry }) => [entry.value, entry.low, entry.high]), ...marks.map((mark) => mark.value)].filter((v) => known(v) && v > 0);
     if (!values.length) return null;
@@ -39,7 +41,7 @@
       return node;
     };
     const line = ({ name, entry, colour }) => {
-      const track = el("div", { className: "track" }, ticks.map((value) => placed("grid", at(value))), marks.map((mark) => placed("mark", at(mark.value))));
+      const track = el("div", { className: "track" }, ticks.map((value) => placed("grid", at(value))), marks.map((mark) => placed(markClass("mark", mark), at(mark.value))));
       const bar = known(entry.low) && known(entry.high) && placed("bar", at(entry.low), Math.max(0.4, at(entry.high) - at(entry.low)));
       const dot = known(entry.value) && placed("dot", at(entry.value));
       for (const node of [bar, dot].filter(Boolean)) {
@@ -53,7 +55,7 @@
       label.textContent = number(value);
       return label;
     })), el("span"));
-    const legend = marks.map((mark) => el("li", {}, el("span", { className: "swatch mark", "aria-hidden": "true" }), `${mark.name}: ${number(mark.value)}`));
+    const legend = marks.map((mark) => el("li", {}, el("span", { className: markClass("swatch mark", mark), "aria-hidden": "true" }), `${mark.name}: ${number(mark.value)}`));
     return el("figure", { className: "ranges" }, el("figcaption", {}, caption), rows.map(line), scale, legend.length > 0 && el("ul", { className: "key" }, legend));
   }
 
@@ -62,7 +64,7 @@
   function levels(data) {
     const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: block.edge_level || {}, colour: COLOURS[model] || "series-4" }));
     const measured = data.measured || {};
-    const marks = [["Measured", measured.level], ["Also printed", measured.also_printed]].filter(([, value]) => known(value)).map(([name, value]) => ({ name, value }));
+    const marks = [{ name: "Measured", value: measured.level }, { name: "Also printed", value: measured.also_printed, dashed: true }].filter(({ value }) => known(value));
     const reasons = [...new Set(rows.map(({ entry }) => entry.reason).filter(Boolean))];
     return [
       rangeChart(rows, marks, "Level at the unit's edge, of the motor's amplitude; a bar is the spread from the inputs' ranges."),

@@ -5,6 +5,15 @@
 
   const drawing = (svg, alt) => el("img", { className: "drawing", src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`, alt });
 
+  // A drawing as wide as the page. Where that leaves its text small, a button shows it as large as it was drawn.
+  function framed(svg, alt, label) {
+    const frame = el("div", { className: "scroll", tabindex: "0", role: "group", "aria-label": label }, drawing(svg, alt));
+    const button = el("button", { type: "button", className: "enlarge", "aria-pressed": "false", onclick: () => {
+      button.setAttribute("aria-pressed", String(frame.classList.toggle("full")));
+    } }, "Full size");
+    return [frame, button];
+  }
+
   const absent = (what, ask) => el("p", { className: "absent" }, `${what} `, el("code", {}, ask));
 
   // Path parts are kept from being read as anything but a path.
@@ -22,7 +31,7 @@
 
   function sectionDrawing(variant) {
     const svg = variant.drawings["section.svg"];
-    return section("section", "Section", svg ? el("figure", {}, el("div", { className: "scroll", tabindex: "0", role: "group", "aria-label": "Section drawing" }, drawing(svg, "The unit cut along its tail, with its main dimensions")),
+    return section("section", "Section", svg ? el("figure", {}, framed(svg, "The unit cut along its tail, with its main dimensions", "Section drawing"),
       el("figcaption", {}, "Cut along the tail; lengths in mm; z = 0 is the skin."))
       : absent("No section drawing here. Ask for it with", "unitcad build SPEC --only unit"));
   }
@@ -74,5 +83,5 @@
       el("h3", {}, "Made by"), facts(variant.manifest.versions)));
   }
 
-  Object.assign(window.unitcad, { drawing, absent, verdict, link, parts: { sectionDrawing, laws, parts, files, spec } });
+  Object.assign(window.unitcad, { drawing, framed, absent, verdict, link, parts: { sectionDrawing, laws, parts, files, spec } });
 })();
