@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from unitcad.accuracy.result import Plot, Result, markdown
 from unitcad.attenuation.closed_form import Units
 from unitcad.attenuation.curve import NO_RATIO
 from unitcad.attenuation.edge import corners
@@ -259,3 +260,16 @@ def test_layered_block_reads_no_silicone():
     )
     assert first == second
     assert np.isfinite(first["surface_m_per_pa"]["u_z_at_the_edge"])
+
+
+@pytest.mark.parametrize(("hertz", "said"), [([50.0, 100.0], (None, 50, 100)), ([60.0], (60, 60, 60))])
+def test_a_table_over_frequencies_says_which(hertz, said):
+    found = frequency_table_of_spec(load("encapsulating"), hertz, ("fitted",))["variant"]["frequency_hz"]
+    assert (found["value"], found["low"], found["high"]) == said
+
+
+def test_no_picture_is_linked_where_none_is_written():
+    plot = Plot("decay", "r", "u", {"a": ((1.0, 1.0),)})
+    result = Result("one", "One", "text", plots=(plot,))
+    assert "![" not in markdown(result)
+    assert "![decay](a.svg)" in markdown(result, ["a.svg"])

@@ -118,8 +118,8 @@ def shown(value: Cell) -> str:
     return str(value)
 
 
-def markdown(result: Result, picture: Sequence[str]) -> str:
-    """The suite's section; `picture[i]` is the file of plot i."""
+def markdown(result: Result, picture: Sequence[str] | None = None) -> str:
+    """The suite's section; `picture[i]` is the file of plot i. None: no pictures are written, so none is linked."""
     lines = [f"## {result.title}", "", result.text, ""]
     size = ", ".join(f"{k} {v}" for k, v in result.measured.items())
     lines += [f"`unitcad accuracy {result.suite}`; measured on: {size}.", ""]
@@ -127,7 +127,7 @@ def markdown(result: Result, picture: Sequence[str]) -> str:
         lines += [f"**{table.title}**", "", *table_lines(table), ""]
         if table.note:
             lines += [table.note, ""]
-    for plot, file in zip(result.plots, picture, strict=True):
+    for plot, file in zip(result.plots, picture, strict=True) if picture is not None else ():
         lines += [f"![{plot.title}]({file})", ""]
     if result.promises:
         rows = tuple((p.what, p.value, p.limit, "kept" if p.ok else "BROKEN") for p in result.promises)

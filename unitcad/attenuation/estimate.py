@@ -85,7 +85,10 @@ def frequency_table(variant: Variant, frequencies: Sequence[float], models: Sequ
                 ),
             }
         )
-    return rounded({"variant": variant_block(variant), "frequencies": rows, "assumptions": ASSUMPTIONS})
+    block = variant_block(variant)
+    value = frequencies[0] if len(frequencies) == 1 else None
+    block["frequency_hz"] = {"value": value, "low": min(frequencies), "high": max(frequencies)}
+    return rounded({"variant": block, "frequencies": rows, "assumptions": ASSUMPTIONS})
 
 
 def variant_block(variant: Variant) -> dict[str, Any]:

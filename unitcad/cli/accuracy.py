@@ -32,7 +32,7 @@ def accuracy(
             result = runner.run(name, quick, say, specs)
         results.append(result)
         if not as_json:
-            typer.echo(markdown(result, [f"({plot.title})" for plot in result.plots]))
+            typer.echo(markdown(result))
     folder = out if out is not None or quick else Path("docs")
     if folder is not None:
         runner.write(results, folder)
