@@ -76,6 +76,14 @@ def test_m004_missing(tmp_path: Path) -> None:
     assert codes(judged(folder)["base.stl"]) == ["F012", "M004"]
 
 
+def test_m004_a_file_that_the_manifest_does_not_list(tmp_path: Path) -> None:
+    folder = written(tmp_path)
+    (folder / "other.stl").write_bytes(BASE)
+    listed = listing.read(str(folder))
+    (report,) = check_files(listing.work(listed, [str(folder / "other.stl")], Options(), False))
+    assert codes(listing.compare(listed, report, Options())) == ["M004"]
+
+
 def test_a_tool_below_the_floor_is_warned_of(tmp_path: Path) -> None:
     folder = written(tmp_path)
     parts = json.loads((folder / "manifest.json").read_text())

@@ -90,9 +90,8 @@ def work(listing: Listing, paths: Sequence[str], options: Options, printer_named
 def compare(listing: Listing, report: FileReport, options: Options) -> FileReport:
     """The report with what the manifest adds to it."""
     part = listing.files.get(os.path.abspath(report.path))
-    if part is None:
-        return report
-    added = [item for item in judge(part, report) if options.wants(item.code)]
+    found = [finding("M004", "the manifest does not list this file")] if part is None else judge(part, report)
+    added = [item for item in found if options.wants(item.code)]
     return replace(report, findings=merge([*report.findings, *added]))
 
 
