@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -147,3 +148,26 @@ def test_an_address_that_is_none(address: str, tmp_path: Path) -> None:
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     assert done.stderr.startswith("error: --scheduler")
+    assert "within" not in done.stderr or "nowhere" in address  # only who waited says so
+
+
+@pytest.mark.parametrize(
+    "said", [b"SSH-2.0-OpenSSH_9.6p1\r\n" + b"x" * 40, b"HTTP/1.1 400 Bad Request\r\n\r\n" + b"a" * 99, b"\xff" * 64]
+)
+def test_an_answer_that_is_no_schedulers(said: bytes) -> None:
+    from unitcad.batch.executors import dask_executor
+    from unitcad.errors import UnitcadError
+
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        kept = []
+
+        def answer() -> None:
+            kept.append(other.accept()[0])
+            kept[0].sendall(said)
+
+        threading.Thread(target=answer, daemon=True).start()
+        with pytest.raises(UnitcadError, match="not a Dask scheduler"):
+            dask_executor(f"tcp://127.0.0.1:{other.getsockname()[1]}")
+        kept[0].close()

@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from typing import IO, Any
@@ -29,8 +30,8 @@ from unitcad.errors import Refusal, UnitcadError
 _START = "import sys; sys.path[:] = {path!r}; from unitcad.batch.worker import serve; serve({preload!r})"
 WARM = ("unitcad.pipeline.build", "unitcad.moulds.laws", "unitcad.check", "unitcad.kernels.mesh")
 """What a worker imports before its first task."""
-DASK_SECONDS = 8.0
-"""How long a scheduler may take to answer."""
+DASK_SECONDS = 6.0
+"""How long a scheduler may take to answer; with what is loaded and started all is said within ten."""
 
 
 class WorkerDied(Exception):
@@ -181,23 +182,41 @@ def dask_executor(address: str) -> tuple[Executor, int]:
     """
     try:
         from distributed import Client
+        from distributed.comm.addressing import parse_address, parse_host_port
         from distributed.comm.core import connect
+        from distributed.comm.registry import get_backend
     except ImportError:
         raise UnitcadError("--scheduler needs Dask: pip install 'unitcad[dask]'") from None
 
-    async def ask() -> None:
+    try:
+        scheme, place = parse_address(address)
+        get_backend(scheme)
+        parse_host_port(place)
+    except (ValueError, TypeError) as error:
+        raise UnitcadError(f"--scheduler {address}: not a scheduler's address ({error})") from None
+
+    async def ask() -> Any:
         comm = await connect(address, timeout=DASK_SECONDS)
         await comm.write({"op": "identity", "reply": True})
-        await comm.read()
+        answer = await comm.read()
         await comm.close()
+        return answer
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     # Asked before there is a client, since one that finds nobody takes long to give up.
+    start = time.monotonic()
     try:
-        asyncio.run(asyncio.wait_for(ask(), DASK_SECONDS))
-    except (OSError, TimeoutError, ValueError) as error:
+        answer = asyncio.run(asyncio.wait_for(ask(), DASK_SECONDS))
+    except (OSError, TimeoutError) as error:
+        waited = time.monotonic() - start > DASK_SECONDS - 1
         why = f" ({error})" if str(error) else ""
-        raise UnitcadError(f"--scheduler {address}: no answer within {DASK_SECONDS:g} s{why}") from None
+        raise UnitcadError(
+            f"--scheduler {address}: no answer{f' within {DASK_SECONDS:g} s' if waited else ''}{why}"
+        ) from None
+    except Exception:  # bytes that are not Dask's end in anything: a length read from them in a MemoryError
+        answer = None
+    if not isinstance(answer, dict) or answer.get("type") != "Scheduler":
+        raise UnitcadError(f"--scheduler {address}: what answers there is not a Dask scheduler")
     client = Client(address, timeout=DASK_SECONDS, set_as_default=False)
     cores: Any = client.ncores()
     threads = sum(cores.values())
