@@ -13,7 +13,7 @@ import numpy as np
 
 from unitcad.catalogue import Printer
 from unitcad.check import sniff
-from unitcad.check.findings import Facts, FileReport, Finding, merge
+from unitcad.check.findings import Facts, FileReport, Finding, counted, merge
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Floats, Ints, Mesh
 from unitcad.check.rulebook import finding
@@ -167,6 +167,6 @@ def _judge_all(meshes: Sequence[Mesh], options: Options, deadline: Deadline) -> 
 
             findings += printing.judge(topology, options.printer, deadline)
     if options.shells is not None and facts.shells is not None and facts.shells != options.shells:
-        text = f"{facts.shells} shells, {options.shells} expected"
+        text = f"{counted(facts.shells, 'shell')}, {options.shells} expected"
         findings.append(finding("G005", text, abs(facts.shells - options.shells)))
     return Judged(tuple(findings), facts, topology)

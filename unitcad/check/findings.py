@@ -117,6 +117,11 @@ class FileReport:
         }
 
 
+def counted(n: int, word: str) -> str:
+    """`1 shell`, `2 shells`."""
+    return f"{n} {word}{'' if n == 1 else 's'}"
+
+
 def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """One finding a rule: counts added, first message and first places kept, worst severity; sorted, worst first."""
     by_code: dict[str, Finding] = {}

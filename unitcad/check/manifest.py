@@ -12,7 +12,7 @@ from typing import Any
 
 from unitcad import catalogue
 from unitcad.check.check import Options
-from unitcad.check.findings import FileReport, Finding, merge
+from unitcad.check.findings import FileReport, Finding, counted, merge
 from unitcad.check.rulebook import finding
 from unitcad.errors import UnitcadError
 
@@ -107,7 +107,7 @@ def judge(part: Part, report: FileReport) -> list[Finding]:
             found.append(finding("M003", f"{digest[:12]} instead of {part.sha256[:12]}"))
     facts = report.facts
     if facts.shells is not None and facts.shells != part.solids:
-        found.append(finding("M002", f"{facts.shells} solids, {part.solids} in the manifest"))
+        found.append(finding("M002", f"{counted(facts.shells, 'solid')}, {part.solids} in the manifest"))
     if facts.volume_mm3 is not None and part.volume_mm3:
         off = facts.volume_mm3 / part.volume_mm3 - 1
         if abs(off) > VOLUME:

@@ -10,7 +10,7 @@ import numpy as np
 from unitcad.check import instances as placement
 from unitcad.check import package as opc
 from unitcad.check import references, scale, schema
-from unitcad.check.findings import Facts, Finding
+from unitcad.check.findings import Facts, Finding, counted
 from unitcad.check.images import image_kind
 from unitcad.check.limits import Deadline, Limits, Unreadable
 from unitcad.check.mesh import Floats, Mesh
@@ -276,7 +276,9 @@ def _geometry(
     )
     findings += placement.judge(solids, deadline) + scale.judge(facts, True)
     if options.shells is not None and shells != options.shells:
-        findings.append(finding("G005", f"{shells} shells, {options.shells} expected", abs(shells - options.shells)))
+        findings.append(
+            finding("G005", f"{counted(shells, 'shell')}, {options.shells} expected", abs(shells - options.shells))
+        )
     if options.printer is not None:
         findings += _printed(models, instances, options, deadline)
     return findings, facts
