@@ -273,3 +273,27 @@ def test_no_picture_is_linked_where_none_is_written():
     result = Result("one", "One", "text", plots=(plot,))
     assert "![" not in markdown(result)
     assert "![decay](a.svg)" in markdown(result, ["a.svg"])
+
+
+def test_a_range_stays_a_range_in_the_papers_details():
+    """No small-strain modulus: no coefficient, exponent or side is given at a middle that nobody declared."""
+    found = estimate_spec(pair("embedded", "ecoflex-00-30", STIFF), ("paper",))["models"]["paper"]
+    for row in found["constraints"]:
+        assert row["left"] is row["right"] is row["margin"] is None
+        low, high = row["margin_low"], row["margin_high"]
+        if low is None:
+            assert row["holds"] is None
+            assert "1/2" in row["reason"]
+            continue
+        assert row["holds"] == (True if low > 0 else False if high <= 0 else None)
+        assert row.get("reason") == ("depends" if row["holds"] is None else None)
+    assert {row["holds"] for row in found["constraints"] if row["equation"] == "6d"} == {True}
+    s = found["coefficients"]["s"]
+    assert s["k_t"] == [None, None]
+    assert s["k_t_low"][0] < s["k_t_high"][0]
+    reading = found["readings"][0]
+    assert reading["exponents_s_wave"][0] is None
+    assert reading["exponents_s_wave_low"][0] < reading["exponents_s_wave_high"][0]
+    ratio = reading["hierarchical_over_control"][0]
+    assert ratio["s"] is None
+    assert ratio["s_low"] < ratio["s_high"]

@@ -14,6 +14,7 @@ from unitcad.attenuation.models import STORED_FIT, paths, scales
 from unitcad.attenuation.table import CROSSINGS, measured_table
 
 _MOST_CORNERS = 12
+_NOT_FINITE = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"
 _WAVES: tuple[cf.Wave, ...] = ("s", "p")
 _FIELDS = ("youngs_modulus", "poisson_ratio", "tan_delta")
 KINDS = {
@@ -118,7 +119,7 @@ def spread(variant: Variant, predict: Callable[[Units], Any]) -> dict[str, Any]:
         return {"value": None, "low": None, "high": None, "reason": reason}
     values = np.atleast_1d(predict(corners(variant)))
     if not np.all(np.isfinite(values)):
-        reason = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"
+        reason = _NOT_FINITE
         middle = float(values[0]) if np.isfinite(values[0]) else None
         return {"value": middle, "low": None, "high": None, "reason": reason}
     value = None if ranged(variant) else float(values[0])
@@ -183,13 +184,13 @@ def _ratio(variant: Variant, model: str, index: int) -> dict[str, Any]:
 def _paper_details(variant: Variant, controls: list[int]) -> dict[str, Any]:
     if unknown(variant):
         return {"wave_of_the_level": "s", "reading_of_eta": "loss_modulus", "constraints": None, "readings": None}
-    units = nominal(variant)
+    units = corners(variant) if ranged(variant) else nominal(variant)
     coefficients = {}
     for wave in _WAVES:
         z = cf.with_air(cf.impedances(units, wave), wave)
         coefficients[wave] = {
-            "k_t": [_number(v) for v in cf.transmission(z[..., :-1], z[..., 1:])[0]],
-            "k_r": [_number(v) for v in cf.reflection(z[..., :-1], z[..., 1:])[0]],
+            **_told("k_t", cf.transmission(z[..., :-1], z[..., 1:]), variant),
+            **_told("k_r", cf.reflection(z[..., :-1], z[..., 1:]), variant),
         }
     return {
         "wave_of_the_level": "s",
@@ -205,7 +206,7 @@ def _paper_details(variant: Variant, controls: list[int]) -> dict[str, Any]:
 def _constraints(variant: Variant, units: Units, controls: list[int]) -> list[dict[str, Any]]:
     """6a and 6b for each control, 6c and 6d, which need none, once."""
     return [
-        _constraint(found, variant.layers[index].material if found.name in ("6a", "6b") else None)
+        _constraint(found, variant.layers[index].material if found.name in ("6a", "6b") else None, variant)
         for index in controls
         for found in cf.constraints(units, units.control(index))
         if index == controls[0] or found.name in ("6a", "6b")
@@ -213,34 +214,53 @@ def _constraints(variant: Variant, units: Units, controls: list[int]) -> list[di
 
 
 def _reading(variant: Variant, units: Units, reading: str, controls: list[int]) -> dict[str, Any]:
-    def ratio(index: int, wave: cf.Wave) -> float | None:
+    def ratio(index: int, wave: cf.Wave) -> dict[str, Any]:
         control = cf.paper_path(units.control(index), wave, reading)  # type: ignore[arg-type]
-        return _number((cf.paper_path(units, wave, reading) / control)[0])  # type: ignore[arg-type]
+        return _told(wave, cf.paper_path(units, wave, reading) / control, variant)  # type: ignore[arg-type]
 
+    exponents = cf.paper_exponents(units, "s", reading)  # type: ignore[arg-type]
     return {
         "eta": reading,
         "meaning": cf.READINGS[reading],
         "unit_of_exponent": "s, which no exponent may have" if reading == "literal" else "1",
-        "exponents_s_wave": [_number(v) for v in cf.paper_exponents(units, "s", reading)[0]],  # type: ignore[arg-type]
+        **_told("exponents_s_wave", exponents, variant),
         "hierarchical_over_control": [
-            {"control": variant.layers[i].material, "s": ratio(i, "s"), "p": ratio(i, "p")} for i in controls
+            {"control": variant.layers[i].material, **ratio(i, "s"), **ratio(i, "p")} for i in controls
         ],
     }
 
 
-def _constraint(found: cf.Constraint, control: str | None) -> dict[str, Any]:
-    margin = _number(found.margin[0])
-    return {
+def _constraint(found: cf.Constraint, control: str | None, variant: Variant) -> dict[str, Any]:
+    margins = np.asarray(found.margin)
+    finite = bool(np.all(np.isfinite(margins)))
+    always, never = bool(np.all(margins > 0)), bool(np.all(margins <= 0))
+    block = {
         "equation": found.name,
         "text": found.text,
         "control": control,
-        "left": _number(found.left[0]),
+        **_told("left", found.left, variant),
         "relation": found.relation,
-        "right": _number(found.right[0]),
-        "margin": margin,
-        "holds": None if margin is None else margin > 0,
+        **_told("right", found.right, variant),
+        **_told("margin", margins, variant),
+        "holds": None if not finite else True if always else False if never else None,
         "unit": found.unit,
     }
+    if block["holds"] is None:
+        block["reason"] = "depends" if finite else _NOT_FINITE
+    return block
+
+
+def _told(name: str, values: Any, variant: Variant) -> dict[str, Any]:
+    """`values`, a row for each corner, as {name}; of an input known as a range only: null, {name}_low, {name}_high."""
+
+    def plain(row: Any) -> Any:
+        return [_number(v) for v in row] if np.ndim(row) else _number(row)
+
+    values = np.asarray(values)
+    if not ranged(variant):
+        return {name: plain(values[0])}
+    none = [None] * values.shape[1] if values.ndim > 1 else None
+    return {name: none, f"{name}_low": plain(values.min(axis=0)), f"{name}_high": plain(values.max(axis=0))}
 
 
 def _number(value: Any) -> float | None:
