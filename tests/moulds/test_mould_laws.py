@@ -8,7 +8,8 @@ from collections.abc import Callable
 import pytest
 from mould_set import MouldSet
 
-from unitcad.moulds import laws
+from unitcad.errors import Refusal
+from unitcad.moulds import dents, laws
 from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, ring, union
 from unitcad.shape.tree import Common, Revolve
 from unitcad.spec import templates
@@ -148,3 +149,17 @@ def test_chain_pad_through_the_slot_needs_118_percent(name: str) -> None:
     value = next(f.value for f in found if f.where == "tail through the slot")
     assert value == pytest.approx(100 * (2 * 8.51 / 7.8 - 1))
     assert round(value) == 118
+
+
+def test_air_under_a_tongue_is_the_formulas() -> None:
+    """The widest tail that the ledge leaves: the law measures what lengths say; on thin walls it is refused."""
+    moulds = MouldSet.of("encapsulating", "fpcb.tail_width_mm=6.3", "output.tolerance_mm=0.001")
+    measured = [f.value for f in moulds.judged() if f.code == "C400"]
+    expected = [dents.under_tongue(moulds.dims, layer) for layer in range(2)]
+    assert measured == pytest.approx(expected, rel=0.01)
+    with pytest.raises(Refusal) as refused:
+        MouldSet.of("encapsulating", "fpcb.tail_width_mm=6.3", "layers.0.wall_mm=0.6", "layers.1.wall_mm=1.9")
+    assert refused.value.field == "fpcb.tail_width_mm"
+    narrower = f"fpcb.tail_width_mm={refused.value.nearest}"
+    kept = MouldSet.of("encapsulating", narrower, "layers.0.wall_mm=0.6", "layers.1.wall_mm=1.9").judged()
+    assert [finding for finding in kept if not finding.ok] == []

@@ -16,8 +16,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from unitcad.kernels.mesh import arrays
+from unitcad.moulds.dents import TILT_DEG
 from unitcad.moulds.finding import Finding, at_most
-from unitcad.moulds.lid import DENT, TILT_DEG
 from unitcad.moulds.plan import Step
 from unitcad.shape.profile import GRID_PER_MM
 
@@ -42,9 +42,9 @@ class Pocket:
     peak: tuple[float, float, float]
 
 
-def air_law(step: Step, cells: list[Manifold], thinnest: float) -> list[Finding]:
-    """C400 for each cell of a pour: the deepest pocket over the five attitudes, in mm."""
-    found, limit = [], DENT * thinnest
+def air_law(step: Step, cells: list[Manifold], limit: float) -> list[Finding]:
+    """C400 for each cell of a pour: the deepest pocket over the five attitudes against `limit`, in mm."""
+    found = []
     for i, cavity in enumerate(cells):
         where = f"pour {step.index}" + (f" cell {i + 1}" if len(cells) > 1 else "")
         depth, advice = 0.0, ""

@@ -11,6 +11,7 @@ from manifold3d import Manifold
 
 from unitcad.moulds import fit
 from unitcad.moulds.air import air_law
+from unitcad.moulds.dents import deepest
 from unitcad.moulds.draw import draw_law
 from unitcad.moulds.finding import Finding, as_dict
 from unitcad.moulds.plan import Plan
@@ -45,12 +46,11 @@ def geometric_laws(
     """The laws that read no silicone: all but C310. Variants of one geometry share them."""
     found = fit.shape_law((*unit, *plan.tools), solids, fit.expected_genus(plan))
     found += fit.unit_overlap_law(unit, solids)
-    for step, layer in zip(plan.steps, spec.layers, strict=True):
+    for layer, step in enumerate(plan.steps):
         cells = fit.held(step, fit.cavity(step, solids, segments), segments)
         found += fit.balance_law(step, cells)
         found += fit.overlap_law(step, solids, segments)
-        thinnest = min(layer.wall_mm, layer.cap_mm or layer.wall_mm)
-        found += air_law(step, [holding for _, holding in cells], thinnest)
+        found += air_law(step, [holding for _, holding in cells], deepest(spec, layer))
     found += fit.gap_law(spec, plan, solids, segments)
     overlapping = any(finding.code == "C200" and not finding.ok for finding in found)
     return found + draw_law(plan, solids, segments, overlapping)

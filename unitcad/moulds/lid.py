@@ -14,6 +14,7 @@ import math
 
 from unitcad.designs.common import BEYOND
 from unitcad.errors import Refusal
+from unitcad.moulds.dents import MESH_ROOM, TILT_DEG, deepest
 from unitcad.moulds.layout import MARK, Layout
 from unitcad.moulds.tooling import corner_labels, outline
 from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, moved, polygon
@@ -28,12 +29,6 @@ SPRUE_OFF_VENT = 0.1
 """Wall between sprue and vents at the lid's upper face, at least, mm."""
 GATE = 0.8
 """Diameter of what opens into a ring, over the ring's width."""
-TILT_DEG = 5.0
-"""The tilt that a mould must bear on the bench."""
-DENT = 0.1
-"""Depth of a pocket of air over the layer's thinnest part, up to which it is a dent that the printer's play exceeds."""
-MESH_ROOM = 0.8
-"""The part of that depth that vents may use: a mesh's polygons, and a gate in a vent's place, add to it."""
 
 
 def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int, label: tuple[str, str, str] | None) -> Shape:
@@ -110,8 +105,7 @@ def vents(spec: Spec, dims: Dimensions, layer: int) -> int:
             f"a ring under a lid takes a vent of {LEAST_VENT} mm from {LEAST_VENT / GATE:g} mm on",
             LEAST_VENT / GATE,
         )
-    wall = spec.layers[layer]
-    limit = MESH_ROOM * DENT * min(wall.wall_mm, wall.cap_mm or wall.wall_mm)
+    limit = MESH_ROOM * deepest(spec, layer)
     enough = next((n for n in VENT_COUNTS if pocket_depth(dims, layer, n) <= limit), VENT_COUNTS[-1])
     asked = spec.moulds.vents
     if asked is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from unitcad.designs import unit_bodies
-from unitcad.moulds import filament, lid, tooling
+from unitcad.moulds import dents, filament, lid, tooling
 from unitcad.moulds.layout import Cell, Layout, layout
 from unitcad.shape import Shape, Union, content_hash, moved, turned
 from unitcad.shape.body import Body
@@ -71,10 +71,11 @@ class Plan:
 
 def plan(spec: Spec) -> Plan:
     """The plan of a spec. Raises Refusal where the moulds can't be: beyond the bed, a tail that reaches no edge, a lid
-    whose vents can't clear.
+    whose vents or a tongue whose width can't clear the air.
     """
     dims = dimensions(spec)
     lay = layout(spec, dims)
+    dents.check_tongue(spec, dims)
     blank = _tools(spec, dims, lay, "")
     layers = tuple(body.shape for body in unit_bodies(spec) if body.made == "cast")
     # Material variants share pieces: the label is of geometry alone, drawn before there is a label on it.
