@@ -120,13 +120,15 @@ def contrast_plot() -> Plot:
         "fitted, encaps.": line("fitted", 2.0),
         **{f"measured {design}": points(design) for design in ("single", "embedded", "encapsulating")},
     }
-    return Plot("Edge level, motor = 1", "modulus of Layer 2 over Layer 1", "edge level", series, lines=False)
+    curves = tuple(name for name in series if not name.startswith("measured"))
+    axes = "modulus of Layer 2 over Layer 1", "edge level"
+    return Plot("Edge level, motor = 1", *axes, series, lines=False, curves=curves)
 
 
 def decay_plot() -> Plot:
-    """The layered half-space's curve with its spread, and the paper's exponentials, against the radius."""
+    """The layered half-space's curve with its spread, and the paper's exponentials, from the unit's edge outwards."""
     layered = estimate_spec(load("encapsulating"))["layered"]
-    r = [7.0 + x for x in layered["r_mm"]]
+    r = layered["r_mm"]
     beside = layered["paper_beside"]["exponential"]
     series = {
         "layered u_z": layered["u_z"]["value"],
@@ -137,7 +139,8 @@ def decay_plot() -> Plot:
         "print, half of it": beside["kelvin_voigt"],
     }
     pairs = {name: tuple(zip(r, values, strict=True)) for name, values in series.items()}
-    return Plot("Skin outside the unit, forearm, 125 Hz", "distance from the axis, mm", "over |u_z| at the edge", pairs)
+    axes = "distance from the edge, mm", "over |u_z| at the edge"
+    return Plot("Skin outside the unit, forearm, 125 Hz", *axes, pairs, curves=tuple(pairs), linear_x=True)
 
 
 if __name__ == "__main__":

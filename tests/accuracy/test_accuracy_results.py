@@ -98,3 +98,13 @@ def test_stability_by_the_command_line():
     assert done.returncode == 0, done.stderr
     (suite,) = json.loads(done.stdout)["suites"]
     assert all(promise["ok"] for promise in suite["promises"])
+
+
+def test_curves_have_no_points_and_a_linear_axis_shows_zero():
+    series = {"model": ((0.0, 1.0), (15.0, 0.1), (30.0, 0.01)), "measured": ((10.0, 0.2),)}
+    text = svg(Plot("decay", "mm", "", series, lines=False, curves=("model",), linear_x=True))
+    assert text.count("<circle") == 2  # the measured point and its legend
+    assert 'points="70.0,36.0 300.0,212.0 530.0,388.0"' in text
+    assert text.count("<polyline") == 1
+    assert ">5<" in text
+    assert ">30<" in text

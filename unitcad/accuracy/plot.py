@@ -1,4 +1,4 @@
-"""A plot over logarithmic axes as SVG: points, thin lines between them, a legend. The same data, the same bytes."""
+"""A plot as SVG: points or curves over logarithmic axes (x also linear), a legend. The same data, the same bytes."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ COLOURS = ("#1f6fb2", "#c8553d", "#3c8d5a", "#8059a8", "#b8860b", "#4d4d4d", "#d
 
 
 def svg(plot: Plot) -> str:
-    """The plot as an SVG document. Points that are not above zero, or infinite, are left out."""
+    """The plot as an SVG document. Points that an axis can't show (not above zero, infinite) are left out."""
+    least = -math.inf if plot.linear_x else 0.0
     series = {
-        name: sorted((x, y) for x, y in points if x > 0 and y > 0 and math.isfinite(x) and math.isfinite(y))
+        name: sorted((x, y) for x, y in points if x > least and y > 0 and math.isfinite(x) and math.isfinite(y))
         for name, points in plot.series.items()
     }
-    x0, x1 = _decades([x for points in series.values() for x, _ in points])
+    xs = [x for points in series.values() for x, _ in points]
+    x0, x1 = (min(xs, default=0.0), max(xs, default=1.0)) if plot.linear_x else _decades(xs)
     y0, y1 = _decades([y for points in series.values() for _, y in points])
 
     def at(x: float, y: float) -> tuple[float, float]:
-        across = (math.log10(x) - x0) / (x1 - x0)
+        across = ((x if plot.linear_x else math.log10(x)) - x0) / ((x1 - x0) or 1)
         up = (math.log10(y) - y0) / (y1 - y0)
         return LEFT + across * (WIDTH - LEFT - RIGHT), HEIGHT - BOTTOM - up * (HEIGHT - TOP - BOTTOM)
 
@@ -32,12 +34,12 @@ def svg(plot: Plot) -> str:
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
         _text(LEFT, 20, plot.title, size=14),
     ]
-    for decade in range(x0, x1 + 1, _every(x1 - x0)):
-        x, low = at(10.0**decade, 10.0**y0)
-        parts += [_line(x, low, x, TOP, "#e2e2e2"), _text(x, low + 16, _power(decade), "middle")]
-    for decade in range(y0, y1 + 1, _every(y1 - y0)):
-        left, y = at(10.0**x0, 10.0**decade)
-        parts += [_line(left, y, WIDTH - RIGHT, y, "#e2e2e2"), _text(left - 6, y + 4, _power(decade), "end")]
+    for value, label in _ticks(x0, x1) if plot.linear_x else _powers(int(x0), int(x1)):
+        x, low = at(value, 10.0**y0)
+        parts += [_line(x, low, x, TOP, "#e2e2e2"), _text(x, low + 16, label, "middle")]
+    for value, label in _powers(y0, y1):
+        left, y = at(x0 if plot.linear_x else 10.0**x0, value)
+        parts += [_line(left, y, WIDTH - RIGHT, y, "#e2e2e2"), _text(left - 6, y + 4, label, "end")]
     parts += [
         _line(LEFT, HEIGHT - BOTTOM, WIDTH - RIGHT, HEIGHT - BOTTOM, "#444444"),
         _line(LEFT, HEIGHT - BOTTOM, LEFT, TOP, "#444444"),
@@ -48,14 +50,32 @@ def svg(plot: Plot) -> str:
     for i, (name, points) in enumerate(series.items()):
         colour = COLOURS[i % len(COLOURS)]
         spots = [at(x, y) for x, y in points]
-        if plot.lines and len(spots) > 1:
+        curve, y = name in plot.curves, TOP + 12 + 18 * i
+        if (plot.lines or curve) and len(spots) > 1:
             path = " ".join(f"{x:.1f},{y:.1f}" for x, y in spots)
-            parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-opacity="0.5"/>')
-        parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.5" fill="{colour}"/>' for x, y in spots]
-        y = TOP + 12 + 18 * i
-        parts.append(f'<circle cx="{WIDTH - RIGHT + 16}" cy="{y - 4}" r="4" fill="{colour}"/>')
+            stroke = 'stroke-width="2"' if curve else 'stroke-opacity="0.5"'
+            parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" {stroke}/>')
+        if curve:
+            parts.append(_line(WIDTH - RIGHT + 10, y - 4, WIDTH - RIGHT + 22, y - 4, colour))
+        else:
+            parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.5" fill="{colour}"/>' for x, y in spots]
+            parts.append(f'<circle cx="{WIDTH - RIGHT + 16}" cy="{y - 4}" r="4" fill="{colour}"/>')
         parts.append(_text(WIDTH - RIGHT + 26, y, name))
     return "\n".join([*parts, "</svg>", ""])
+
+
+def _powers(low: int, high: int) -> list[tuple[float, str]]:
+    return [(10.0**decade, _power(decade)) for decade in range(low, high + 1, _every(high - low))]
+
+
+def _ticks(low: float, high: float) -> list[tuple[float, str]]:
+    """Six round numbers or fewer between the ends."""
+    rough = max(high - low, 1e-300) / 6
+    unit = 10.0 ** math.floor(math.log10(rough))
+    step = next(unit * k for k in (1, 2, 5, 10) if unit * k >= rough)
+    return [
+        (k * step, f"{k * step:g}") for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
+    ]
 
 
 def _decades(values: list[float]) -> tuple[int, int]:

@@ -23,13 +23,15 @@ class Table:
 
 @dataclass(frozen=True)
 class Plot:
-    """Series of (x, y) points over logarithmic axes."""
+    """Series of (x, y) points over logarithmic axes, or x over a linear one; `curves` are lines without points."""
 
     title: str
     x_label: str
     y_label: str
     series: dict[str, tuple[tuple[float, float], ...]]
     lines: bool = True
+    curves: tuple[str, ...] = ()
+    linear_x: bool = False
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,11 @@ def print_estimate(data: dict[str, Any]) -> None:
     console.print(_errors(data))
     for reason in _reasons(data):
         console.print(f"  {reason}", soft_wrap=True)
-    constraints = data["models"].get("paper", {}).get("constraints")
-    if constraints:
-        console.print(_constraints(constraints))
+    paper = data["models"].get("paper", {})
+    if paper.get("constraints"):
+        console.print(_constraints(paper["constraints"]))
+    if paper.get("readings") and paper["readings"][0]["hierarchical_over_control"]:
+        console.print(_readings(paper["readings"]))
     console.print(_curve(data["layered"]))
     console.print(
         f"  no hierarchical / control from the layers: {data['layered']['hierarchical_over_control_reason']}",
@@ -90,13 +92,36 @@ def _reasons(data: dict[str, Any]) -> list[str]:
 
 
 def _constraints(rows: list[dict[str, Any]]) -> Table:
-    table = Table("6", "what", "left", "", "right", "margin", "holds", title="the paper's constraints, equation 6")
+    table = Table("6", "what", "left", "", "right", "margin", "unit", title="the paper's constraints, equation 6")
+    table.add_column("holds")
     for row in rows:
-        numbers = ["null" if row[k] is None else f"{row[k]:.3g}" for k in ("left", "right", "margin")]
-        holds = {True: "yes", False: "no", None: "null"}[row["holds"]]
+        numbers = [_ranged(row, key) for key in ("left", "right", "margin")]
+        holds = {True: "yes", False: "no", None: row.get("reason", "null")}[row["holds"]]
         what = row["text"].replace("control", row["control"] or "")
-        table.add_row(row["equation"][-1], what, numbers[0], row["relation"], *numbers[1:], holds)
+        table.add_row(row["equation"][-1], what, numbers[0], row["relation"], *numbers[1:], row["unit"], holds)
     return table
+
+
+def _readings(rows: list[dict[str, Any]]) -> Table:
+    """Every reading of the print's eta: the exponents along the walls, and the ratio that it leads to."""
+    controls = [one["control"] for one in rows[0]["hierarchical_over_control"]]
+    table = Table("eta read as", "exponents, S wave", "their unit", *[f"over {name}" for name in controls])
+    table.title = "the paper's model by reading of eta"
+    for row in rows:
+        key = "exponents_s_wave"
+        ends = zip(row[key], row.get(f"{key}_low", row[key]), row.get(f"{key}_high", row[key]), strict=True)
+        exponents = [_ranged({"e": value, "e_low": low, "e_high": high}, "e") for value, low, high in ends]
+        ratios = [_ranged(one, "s") for one in row["hierarchical_over_control"]]
+        table.add_row(row["eta"].replace("_", " "), ", ".join(exponents), row["unit_of_exponent"], *ratios)
+    return table
+
+
+def _ranged(row: dict[str, Any], key: str) -> str:
+    """A value to three digits, or its range where it has no nominal one."""
+    low, high = row.get(f"{key}_low"), row.get(f"{key}_high")
+    if row[key] is not None:
+        return f"{row[key]:.3g}"
+    return "null" if low is None or high is None else f"{low:.3g} to {high:.3g}"
 
 
 def _curve(layered: dict[str, Any]) -> Table:
