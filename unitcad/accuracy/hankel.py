@@ -39,11 +39,12 @@ class Case:
 
     name: str
     medium: LayeredMedium
+    omega: float = OMEGA
 
     @property
     def static(self) -> complex:
         """(1 - nu) / mu of the top layer at the frequency."""
-        material = self.medium.materials(OMEGA)[0]
+        material = self.medium.materials(self.omega)[0]
         return complex((1 - self.medium.layers[0].poisson_ratio) / material.shear)
 
     @property
@@ -54,7 +55,7 @@ class Case:
     def remainder(self, k: np.ndarray) -> np.ndarray:
         """What is left to integrate, without Bessel functions, m/Pa m; k (1/m) real or complex."""
         k = np.asarray(k)
-        return (k * self.medium.compliance(k, OMEGA)[..., 1, 1] - self.static) * DISC.transform(k)
+        return (k * self.medium.compliance(k, self.omega)[..., 1, 1] - self.static) * DISC.transform(k)
 
 
 @dataclass(frozen=True)
@@ -193,7 +194,7 @@ def _ways(case: Case, quick: bool) -> dict[tuple[str, str], Callable[[], Found]]
 
 
 def _own(case: Case, rtol: float) -> Found:
-    found = case.medium.response(DISC, OMEGA, RADII, rtol=rtol)
+    found = case.medium.response(DISC, case.omega, RADII, rtol=rtol)
     return found.u_z, found.error
 
 

@@ -1,0 +1,68 @@
+"""Responses of extreme media beside an independent path of integration: the true error and what `error` says of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from unitcad.accuracy.hankel import DISC, OMEGA, RADII, Case, brute_force
+from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.rheology import Damping, KelvinVoigt, LossFactor
+
+TOLERANCES = (1e-3, 1e-6, 1e-9)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A response's largest error over the radii, its estimate and the reference's own doubt, over the largest |u|."""
+
+    case: str
+    rtol: float
+    error: float
+    estimate: float
+    doubt: float
+
+    @property
+    def over_estimate(self) -> float:
+        """The true error over its estimate, as far as the reference can tell."""
+        return max(self.error - self.doubt, 0.0) / max(self.estimate, 2e-13)
+
+
+def rows() -> Iterator[Row]:
+    """Every case at every tolerance."""
+    for case in cases():
+        bodies = (*case.medium.layers, case.medium.half_space)
+        pairs = zip(case.medium.materials(case.omega), bodies, strict=True)
+        slowest = min(math.sqrt(abs(material.shear) / part.density) for material, part in pairs)
+        poles = max(3 * case.omega / slowest, 200.0)
+        reference = brute_force(case, end=1e6, poles=poles, height=min(50.0, poles / 4))
+        other = brute_force(case, end=1.3e6, poles=1.2 * poles, height=min(30.0, poles / 6))
+        scale = float(np.max(np.abs(reference)))
+        doubt = float(np.max(np.abs(other - reference))) / scale
+        for rtol in TOLERANCES:
+            found = case.medium.response(DISC, case.omega, RADII, rtol=rtol)
+            error = float(np.max(np.abs(found.u_z - reference))) / scale
+            yield Row(case.name, rtol, error, found.error / scale, doubt)
+
+
+def cases() -> list[Case]:
+    """Stiff on soft and soft on stiff by 1e6, next to nu = 1/2, low frequency, a film, no damping at all."""
+
+    def two(top: float, below: float, nu: float, thickness: float, damping: Damping, omega: float = OMEGA) -> Case:
+        layer = Layer(thickness, 1050.0, top, nu, damping)
+        return Case("", LayeredMedium([layer], HalfSpace(1050.0, below, nu, damping)), omega)
+
+    loss = LossFactor(0.2)
+    named = {
+        "stiff on soft, 1e6": two(1e9, 1e3, 0.45, 1e-3, loss),
+        "soft on stiff, 1e6": two(1e4, 1e10, 0.45, 5e-3, loss),
+        "nu = 1/2 - 1e-9": two(1e4, 1e5, 0.5 - 1e-9, 2e-3, KelvinVoigt(2.0)),
+        "nu = 1/2, no damping": two(2e5, 2e4, 0.5, 2e-3, None),
+        "1 rad/s, no damping": two(1e4, 1e5, 0.49, 2e-3, None, 1.0),
+        "6e3 rad/s": two(1e5, 1e6, 0.49, 2e-3, loss, 6e3),
+        "film of 0.1 mm": two(1e7, 1e4, 0.49, 1e-4, loss),
+    }
+    return [Case(name, case.medium, case.omega) for name, case in named.items()]
