@@ -29,9 +29,9 @@ def corner(x: float, y: float, r: float, start: float) -> list[tuple[float, floa
     return [(x + r * math.cos(a), y + r * math.sin(a)) for a in angles]
 
 
-def block(half: float, r: float, z0: float, z1: float) -> Manifold:
+def block(half: float, r: float, mark: float, z0: float, z1: float) -> Manifold:
     i = half - r
-    points = corner(i, -i, r, -math.pi / 2) + corner(i, i, r, 0) + corner(-i, i, r, math.pi / 2)
+    points = [*corner(i, -i, r, -math.pi / 2), (half, half - mark), (half - mark, half), *corner(-i, i, r, math.pi / 2)]
     points += corner(-i, -i, r, math.pi)
     return Manifold.extrude(CrossSection([points]), z1 - z0).translate((0, 0, z0))
 
@@ -75,7 +75,11 @@ def text(letters: list, z0: float, z1: float) -> list[Manifold]:
 def base(n: dict) -> Manifold:
     top = -n["plinth_height"]
     bottom = top - n["plate_thickness"]
-    body = block(n["plate"], n["corner"], bottom, top) + plinth(n, 0, top) + cylinder(n["cavity"], -1, n["core_height"])
+    body = (
+        block(n["plate"], n["corner"], n["mark"], bottom, top)
+        + plinth(n, 0, top)
+        + cylinder(n["cavity"], -1, n["core_height"])
+    )
     inner, outer = n["cup"] - 1.5, n["plate"] + 1
     hole, depth = n["hole"], n["filament_groove"]
     roof = bottom + depth
@@ -110,7 +114,7 @@ def cup(n: dict, i: int) -> Manifold:
         box(0, n["cup"] + 1, -half, half, low, high),
         *text(n["cup_texts"][i], rim - n["engraving"], rim + 1),
     ]
-    body = block(n["cup"], n["corner"], n["skirt_end"], rim)
+    body = block(n["cup"], n["corner"], n["mark"], n["skirt_end"], rim)
     return Manifold.batch_boolean([body, *tools], OpType.Subtract)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.moulds.filament import FLARE, STUB_TAIL
-from unitcad.moulds.layout import CORNER_RADIUS, PLINTH_DRAFT_DEG, TEXT_MARGIN
+from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN
 from unitcad.moulds.tooling import BLADE_EDGE, BLADE_THICKNESS, GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
 from unitcad.pipeline import Variant
 from unitcad.shape import mm
@@ -45,6 +45,7 @@ def lengths() -> dict:
         "splay": math.tan(math.radians(PLINTH_DRAFT_DEG)),
         "key": lay.key,
         "corner": CORNER_RADIUS,
+        "mark": MARK,
         "recess": moulds.plinth_clearance_mm / math.cos(math.radians(PLINTH_DRAFT_DEG)),
         "skirt_end": -moulds.plinth_height_mm + moulds.seat_relief_mm,
         "cup": lay.cup[0],

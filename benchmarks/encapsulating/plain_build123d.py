@@ -21,6 +21,7 @@ from build123d import (
     Rot,
     Sphere,
     Wire,
+    chamfer,
     export_step,
     export_stl,
     extrude,
@@ -43,9 +44,13 @@ def box(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> Any
     return Pos(x0, y0, z0) * Box(x1 - x0, y1 - y0, z1 - z0, align=LOW)
 
 
-def block(half: float, radius: float, z0: float, z1: float) -> Any:
+def block(half: float, radius: float, mark: float, z0: float, z1: float) -> Any:
+    """One corner cut straight, three rounded."""
     solid = box(-half, half, -half, half, z0, z1)
-    return fillet(solid.edges().filter_by(Axis.Z), radius)
+    *others, last = sorted(solid.edges().filter_by(Axis.Z), key=lambda edge: edge.center().X + edge.center().Y)
+    solid = chamfer(last, mark)
+    there = [(edge.center().X, edge.center().Y) for edge in others]
+    return fillet([e for e in solid.edges().filter_by(Axis.Z) if (e.center().X, e.center().Y) in there], radius)
 
 
 def slot(n: dict, radius: float, reach: float, half: float, z0: float, z1: float) -> Any:
@@ -97,7 +102,11 @@ def text(letters: list, z0: float, z1: float) -> list:
 def base(n: dict) -> Any:
     top = -n["plinth_height"]
     bottom = top - n["plate_thickness"]
-    body = block(n["plate"], n["corner"], bottom, top) + plinth(n, 0, top) + cylinder(n["cavity"], -1, n["core_height"])
+    body = (
+        block(n["plate"], n["corner"], n["mark"], bottom, top)
+        + plinth(n, 0, top)
+        + cylinder(n["cavity"], -1, n["core_height"])
+    )
     inner, outer = n["cup"] - 1.5, n["plate"] + 1
     body -= box(inner, outer, -4, 4, top - 1.5, top + 0.25)
     body -= box(-outer, -inner, -4, 4, top - 1.5, top + 0.25)
@@ -123,7 +132,7 @@ def base(n: dict) -> Any:
 
 def cup(n: dict, i: int) -> Any:
     rim, radius = n["heights"][i], n["radii"][i]
-    body = block(n["cup"], n["corner"], n["skirt_end"], rim) - plinth(n, n["recess"], n["skirt_end"])
+    body = block(n["cup"], n["corner"], n["mark"], n["skirt_end"], rim) - plinth(n, n["recess"], n["skirt_end"])
     body -= cylinder(radius, -1, rim + 1)
     inner, depth = radius + n["land"], min(n["groove"][1], rim / 2)
     outer = inner + n["groove"][0]

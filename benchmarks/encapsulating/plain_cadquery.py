@@ -59,6 +59,11 @@ def plinth(n: dict, grow: float, bottom: float) -> cq.Workplane:
     return section(below.workplane(offset=-bottom), grow).loft(ruled=True)
 
 
+def marked(n: dict, block: cq.Workplane) -> cq.Workplane:
+    """One corner cut straight, three rounded."""
+    return block.edges("|Z and >X and >Y").chamfer(n["mark"]).edges("|Z and (<X or <Y)").fillet(n["corner"])
+
+
 def text(letters: list, z0: float, z1: float) -> list[cq.Workplane]:
     found = []
     for letter in letters:
@@ -73,9 +78,7 @@ def base(n: dict) -> cq.Workplane:
     top = -n["plinth_height"]
     bottom = top - n["plate_thickness"]
     side = 2 * n["plate"]
-    body = (
-        cq.Workplane().workplane(offset=bottom).rect(side, side).extrude(top - bottom).edges("|Z").fillet(n["corner"])
-    )
+    body = marked(n, cq.Workplane().workplane(offset=bottom).rect(side, side).extrude(top - bottom))
     body = body.union(plinth(n, 0, top)).union(cylinder(n["cavity"], -1, n["core_height"]))
     inner, outer = n["cup"] - 1.5, n["plate"] + 1
     body = body.cut(box(inner, outer, -4, 4, top - 1.5, top + 0.25))
@@ -98,7 +101,7 @@ def base(n: dict) -> cq.Workplane:
 def cup(n: dict, i: int) -> cq.Workplane:
     rim, radius, side = n["heights"][i], n["radii"][i], 2 * n["cup"]
     body = cq.Workplane().workplane(offset=n["skirt_end"]).rect(side, side).extrude(rim - n["skirt_end"])
-    body = body.edges("|Z").fillet(n["corner"])
+    body = marked(n, body)
     body = body.cut(plinth(n, n["recess"], n["skirt_end"])).cut(cylinder(radius, -1, rim + 1))
     inner, depth = radius + n["land"], min(n["groove"][1], rim / 2)
     outer = inner + n["groove"][0]
