@@ -27,15 +27,15 @@ def accuracy(
     from unitcad.cli.output import print_json, progress
 
     results = []
+    folder = out if out is not None or quick else Path("docs")
     for name in runner.chosen(suites or []):
         with progress(name) as say:
             result = runner.run(name, quick, say, specs)
         results.append(result)
+        if folder is not None:
+            runner.write([result], folder)  # an interrupted run keeps what it has
         if not as_json:
             typer.echo(markdown(result))
-    folder = out if out is not None or quick else Path("docs")
-    if folder is not None:
-        runner.write(results, folder)
     if as_json:
         print_json({"suites": [result.as_dict() for result in results]})
     broken = [(result.suite, promise) for result in results for promise in result.promises if not promise.ok]
