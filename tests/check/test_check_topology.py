@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 
 import numpy as np
 import pytest
+from scipy import ndimage
 from shapes import CUBE_CORNERS, CUBE_FACES, box, stl
 
 from unitcad.check import check_mesh
@@ -83,7 +84,7 @@ def test_pinch_by_both_ways() -> None:
     across = mesh_edges.opposite(edges, 3 * len(faces))
     assert mesh_edges.pinched_closed(faces, across, 16).tolist() == [7]
     assert mesh_edges.pinched_open(faces, edges, 16).tolist() == [7]
-    assert mesh_edges.shells_of(faces, edges).max() == 1
+    assert mesh_edges.shells_of(np.zeros((16, 3)), faces, edges).max() == 1
 
 
 @pytest.mark.parametrize(
@@ -124,3 +125,80 @@ def test_ordinary_float32_rounding_raises_nothing(judge) -> None:
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     for shift in (0, 37.7, 211.3):
         assert judge(stl(box((13, 7, 3)) @ turn.T + shift)).findings == ()
+
+
+def _voxels(solid: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """The border of a set of unit cubes as triangles, outwards, in any order and with either diagonal."""
+    found = []
+    for cell in np.argwhere(solid):
+        for axis in range(3):
+            for way in (0, 1):
+                beyond = cell.copy()
+                beyond[axis] += 2 * way - 1
+                if (beyond >= 0).all() and (beyond < solid.shape).all() and solid[tuple(beyond)]:
+                    continue
+                u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+                ring = [cell + way * np.eye(3)[axis] + w for w in (0 * u, u, u + v, v)]
+                ring = ring if way else ring[::-1]
+                k = int(rng.integers(0, 2))
+                found += [[ring[k], ring[k + 1], ring[k + 2]], [ring[k], ring[k + 2], ring[(k + 3) % 4]]]
+    return rng.permutation(np.array(found))
+
+
+def _labelled(cells: np.ndarray, steps: int) -> np.ndarray:
+    """Components of cells; neighbours differ in up to `steps` coordinates."""
+    found = np.zeros(cells.shape, int)
+    ndimage.label(cells, ndimage.generate_binary_structure(3, steps), output=found)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_shells_of_cubes_that_touch_in_edges(seed: int) -> None:
+    """Cubes joined by faces are one solid; each of its shells parts it from what lies together outside of it."""
+    rng = np.random.default_rng(seed)
+    solid = rng.random((4, 4, 4)) < (0.35 if seed % 2 else 0.65)
+    parts = _labelled(solid, 1)
+    outside = [np.pad(parts != i, 1, constant_values=True) for i in range(1, parts.max() + 1)]
+    expected = sum(int(_labelled(space, 2).max()) for space in outside)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    vertices, faces = weld_exact(_voxels(solid, rng))
+    for points in (vertices, vertices @ turn * 7.3 + 40):
+        report = check_mesh(points, faces)
+        assert report.has("T003")
+        assert report.facts.shells == expected
+
+
+def _turned_diagonals(triangles: np.ndarray) -> np.ndarray:
+    pairs = triangles.reshape(-1, 2, 3, 3)
+    a, b, c, d = pairs[:, 0, 0], pairs[:, 0, 1], pairs[:, 0, 2], pairs[:, 1, 2]
+    return np.stack([np.stack([a, b, d], axis=1), np.stack([b, c, d], axis=1)], axis=1).reshape(-1, 3, 3)
+
+
+@pytest.mark.parametrize(
+    ("parts", "shells"),
+    [
+        ([box(), box(at=(10, 0, 0))], 2),
+        ([box(), _turned_diagonals(box(at=(10, 0, 0)))], 2),
+        ([box(), box(at=(10, 0, 0)), box(at=(0, 10, 0)), box(at=(10, 10, 0))], 4),
+        ([box(), box(at=(10, 10, 0))], 2),
+        ([box(), box()], 2),
+        ([box(), box((10, 5, 5))], 2),
+    ],
+    ids=["face to face", "other diagonals", "four about an edge", "edge to edge", "twice", "inside at an edge"],
+)
+def test_shells_that_share_edges_are_told_apart(parts: list[np.ndarray], shells: int, judge) -> None:
+    report = judge(stl(np.concatenate(parts)), shells=shells)
+    assert report.facts.shells == shells
+    assert not report.has("G005")
+    assert judge(stl(np.concatenate(parts)), shells=shells + 1).has("G005")
+
+
+def test_four_faces_at_an_edge_that_do_not_all_agree_are_wound_wrongly(judge) -> None:
+    """Two cubes that meet along an edge, one face there turned over: its other two edges say so, and this one too."""
+    cubes = np.concatenate([box(), box(at=(10, 10, 0))])
+    upright = (cubes[:, :, :2] == 10).all(axis=2).sum(axis=1) == 2
+    turned = np.argmax(upright)
+    cubes[turned] = cubes[turned, ::-1]
+    report = judge(stl(cubes))
+    assert next(found.count for found in report.findings if found.code == "T007") == 3

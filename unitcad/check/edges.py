@@ -1,4 +1,4 @@
-"""Edges of a mesh: which faces meet at each, and what follows from that: boundaries, shells, umbrellas.
+"""Edges of a mesh: which faces meet at each, and what follows from that: boundaries, shells, umbrellas, winding.
 
 A half-edge is 3 * face + side; side k runs from corner k to corner k + 1. Everything is sorting and gathering.
 """
@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.mesh import Bools, Ints, sorted_with_order
+from unitcad.check.mesh import Bools, Floats, Ints, cross, sorted_with_order
 
 _SMALL = 60_000  # nodes
+_SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane
 
 
 @dataclass(frozen=True)
@@ -114,10 +115,57 @@ def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
     return np.flatnonzero(several).astype(np.int32)
 
 
-def shells_of(faces: Ints, edges: Edges) -> Ints:
-    """The shell of each face: faces are joined across edges of exactly two faces; numbered by their first face."""
+def shells_of(vertices: Floats, faces: Ints, edges: Edges) -> Ints:
+    """The shell of each face, numbered by their first face.
+
+    Faces are joined across edges of two faces, and in pairs across edges of four, six and so on.
+    """
     pairs = edges.first[edges.size == 2]
-    return components(len(faces), edges.order[pairs] // 3, edges.order[pairs + 1] // 3)
+    left, right = edges.order[pairs], edges.order[pairs + 1]
+    if not edges.closed and len(many := np.flatnonzero((edges.size > 2) & balanced(faces, edges))):
+        one, other = _paired(vertices, faces, edges, many)
+        left, right = np.concatenate([left, one]), np.concatenate([right, other])
+    return components(len(faces), left // 3, right // 3)
+
+
+def balanced(faces: Ints, edges: Edges) -> Bools:
+    """For each edge, whether as many faces run along it one way as the other, as they do round a solid."""
+    along = faces.reshape(-1)[edges.order] == np.repeat(edges.low, edges.size)
+    return 2 * np.add.reduceat(along.astype(np.int32), edges.first) == edges.size if len(along) else along
+
+
+def _paired(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Ints, Ints]:
+    """Half-edges at the balanced edges `many` in pairs that have the solid between them.
+
+    By angle about the edge, the solid begins at faces that run from its high vertex to its low one and ends at the
+    others. Where it begins twice before it ends (solids that overlap), first begun is first ended, so that faces in one
+    place need no order.
+    """
+    size = edges.size[many]
+    group = np.repeat(np.arange(len(many)), size)
+    starts = np.cumsum(size) - size
+    place = np.arange(len(group)) - starts[group]
+    half = edges.order[edges.first[many][group] + place]
+    face, side = half // 3, half % 3
+    ends = faces[face, side] == edges.low[many][group]
+    origin = vertices[edges.low[many]]
+    axis = vertices[edges.high[many]] - origin
+    axis /= np.sqrt(np.einsum("ij,ij->i", axis, axis))[:, None]
+    axis = axis[group]
+    out = vertices[faces[face, (side + 2) % 3]] - origin[group]
+    out -= axis * np.einsum("ij,ij->i", out, axis)[:, None]
+    zero = out[starts][group]
+    angle = np.arctan2(np.einsum("ij,ij->i", cross(zero, out), axis), np.einsum("ij,ij->i", zero, out))
+    turn = np.round(angle / _SAME_ANGLE).astype(np.int64) % round(2 * np.pi / _SAME_ANGLE)
+    order = np.lexsort((half, ~ends, turn, group))
+    half, ends = half[order], ends[order]
+    inside = np.cumsum(np.where(ends, -1, 1))  # solids that have begun and not ended; zero at each edge's last face
+    outermost = np.flatnonzero(inside == np.minimum.reduceat(inside, starts)[group])
+    outermost = outermost[np.unique(group[outermost], return_index=True)[1]]
+    rank = (place + starts[group] - outermost[group] - 1) % size[group]
+    order = np.lexsort((rank, group))
+    half, ends = half[order], ends[order]
+    return half[~ends], half[ends]
 
 
 def components(n: int, left: Ints, right: Ints) -> Ints:
@@ -143,10 +191,3 @@ def components(n: int, left: Ints, right: Ints) -> Ints:
                 break
             root = above
     return np.unique(root, return_inverse=True)[1].reshape(-1)
-
-
-def consistent(faces: Ints, edges: Edges) -> Bools:
-    """Of the edges with two faces: whether the faces run along it in opposite directions, as a proper surface does."""
-    start = faces.reshape(-1)
-    pairs = edges.first[edges.size == 2]
-    return start[edges.order[pairs]] != start[edges.order[pairs + 1]]

@@ -75,12 +75,15 @@ def judge(mesh: Mesh, deadline: Deadline) -> Topology:
         )
     if len(twice):
         found.append(finding("T009", f"{len(twice)} duplicate faces", len(twice), _at_faces(mesh, kept, faces, twice)))
-    oriented = edges.closed or bool(mesh_edges.consistent(faces, edges).all())
-    if not oriented:
-        found += _winding(mesh, faces, kept, edges)
+    wrong = np.empty(0, int)
+    if not edges.closed:
+        wrong = np.flatnonzero((edges.size % 2 == 0) & ~mesh_edges.balanced(faces, edges))
+    if len(wrong):
+        text = f"{len(wrong)} edges along which more faces run one way than the other"
+        found.append(finding("T007", text, len(wrong), _at_edges(mesh, edges, kept, wrong)))
     if mesh.normals is not None:
         found += _stored_normals(mesh, kept, areas)
-    shells = mesh_edges.shells_of(faces, edges)
+    shells = mesh_edges.shells_of(vertices, faces, edges)
     deadline.tick()
     watertight = bool(len(faces)) and bool((edges.size % 2 == 0).all())
     return Topology(
@@ -91,7 +94,7 @@ def judge(mesh: Mesh, deadline: Deadline) -> Topology:
         int(shells.max(initial=-1)) + 1,
         areas,
         watertight,
-        oriented,
+        not len(wrong),
         tuple(found),
     )
 
@@ -167,12 +170,6 @@ def _many_faces(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> list[Findi
             text = f"{len(which)} edges with more than two faces, an {word} number"
             found.append(finding(code, text, len(which), _at_edges(mesh, edges, kept, which)))
     return found
-
-
-def _winding(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> list[Finding]:
-    wrong = np.flatnonzero(edges.size == 2)[~mesh_edges.consistent(faces, edges)]
-    text = f"{len(wrong)} edges whose two faces run the same way"
-    return [finding("T007", text, len(wrong), _at_edges(mesh, edges, kept, wrong))]
 
 
 def _duplicates(faces: Ints) -> Ints:
