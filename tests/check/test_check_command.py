@@ -100,7 +100,7 @@ def test_jobs_give_the_same_answer(folder: Path) -> None:
 
 def test_statistics_explain_and_select(folder: Path) -> None:
     out = run(".", "--statistics", cwd=folder).stdout
-    assert "1 files         4 x  T001 boundary edge" in out
+    assert "     1 file          4 x  T001 boundary edge" in out
     explained = run("--explain", "t001")
     assert explained.returncode == 0
     assert explained.stdout.startswith("T001 boundary edge (error)")

@@ -120,7 +120,18 @@ def test_merge_adds_counts_and_keeps_the_worst() -> None:
     two = Finding("P017", "error", "b", 3, tuple(Location(face=i) for i in range(4, 9)))
     (merged,) = merge([one, two])
     assert (merged.severity, merged.count, len(merged.locations)) == ("error", 5, 5)
-    assert merged.message == "a; and b"
+    assert merged.message == "a; and b (5 in all)"
+    assert merge([one])[0].message == "a"
+
+
+def test_statistics_count_files_and_findings() -> None:
+    once = FileReport("a.stl", (Finding("T001", "error", "x", 2), Finding("T004", "warning", "y")))
+    lines = formats.statistics([once, FileReport("b.stl", once.findings[:1])]).splitlines()
+    assert [line.split() for line in lines] == [
+        ["2", "files", "4", "x", "T001", "boundary", "edge"],
+        ["1", "file", "1", "x", "T004", "pinch", "vertex"],
+    ]
+    assert lines[0].index("T001") == lines[1].index("T004")
 
 
 def test_rules_are_whole() -> None:

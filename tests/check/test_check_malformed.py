@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from malformed import Case, cases, options
@@ -14,6 +16,7 @@ from unitcad.check.rulebook import rules
 CASES = cases()
 # Rules whose files need more than bytes under a name: test_check_manifest.py and test_check_command.py have them.
 ELSEWHERE = {"F012", "M001", "M002", "M003", "M004"}
+ONE_OF_MANY = re.compile(r"(?<!object )(?<![\d.])1 (?:\w+ )?(?:\w+[^s\W]s|vertices)\b")  # "1 pairs", "1 open edges"
 UNREADABLE = {"F001", "F003", "F005", "F011", "F012"}
 
 
@@ -26,6 +29,8 @@ def test_malformed_file_gives_its_code(case: Case, judge) -> None:
     encoding_of_a_part = case.code == "F009" and case.name.endswith(".3mf")
     filled = case.code in ("G001", "G002") and case.name.endswith(".3mf")
     assert severity == ("error" if encoding_of_a_part else "warning" if filled else expected)
+    for found in report.findings:
+        assert not ONE_OF_MANY.search(found.message), found.message
 
 
 def test_there_are_eighty_and_names_differ() -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from unitcad.check import triangles
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Bools, Floats, Ints, area_vectors, cross, float32_step
 from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
@@ -312,9 +312,10 @@ def _said(topology: Topology, faces: _Faces, found: _Found) -> Crossings:
             shown.append(Location(face=int(faces.original[i]), xyz=xyz, part=name))
         return sorted(shown, key=lambda place: place.face or 0)
 
-    for code, pairs, what in (("G001", crossing, "cross"), ("G004", overlap, "overlap in one plane")):
+    for code, pairs, what in (("G001", crossing, "that cross"), ("G004", overlap, "that overlap in one plane")):
         if len(pairs):
-            findings.append(finding(code, f"{len(pairs)} pairs of faces {what}", len(pairs), places(pairs)))
+            text = f"{counted(len(pairs), 'pair')} of faces {what}"
+            findings.append(finding(code, text, len(pairs), places(pairs)))
     touching = _joined(found.contact)
     if not len(touching):
         return Crossings(tuple(findings), bool(len(crossing)))
@@ -323,7 +324,7 @@ def _said(topology: Topology, faces: _Faces, found: _Found) -> Crossings:
     only = np.array([tuple(row) not in through for row in shells.tolist()], bool)
     if only.any():
         n = int(only.sum())
-        findings.append(finding("G003", f"{n} pairs of shells touch", n, places(touching)))
+        findings.append(finding("G003", f"{counted(n, 'pair')} of shells that touch", n, places(touching)))
     return Crossings(tuple(findings), bool(len(crossing)), shells)
 
 

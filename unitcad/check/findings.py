@@ -117,19 +117,21 @@ class FileReport:
         }
 
 
-def counted(n: int, word: str) -> str:
-    """`1 shell`, `2 shells`."""
-    return f"{n} {word}{'' if n == 1 else 's'}"
+def counted(n: int, one: str, many: str = "") -> str:
+    """`1 shell`, `2 shells`; `many` where the plural takes more than an s."""
+    return f"{n} {one if n == 1 else many or one + 's'}"
 
 
 def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """One finding a rule: counts added, first message and first places kept, worst severity; sorted, worst first."""
+    """One finding a rule: counts added, first two messages and first places kept, worst severity; worst first."""
     by_code: dict[str, Finding] = {}
+    merged: set[str] = set()
     for new in findings:
         old = by_code.get(new.code)
         if old is None:
             by_code[new.code] = replace(new, locations=new.locations[:SHOWN])
             continue
+        merged.add(new.code)
         worst = max(old.severity, new.severity, key=SEVERITIES.index)
         message = old.message
         if new.message != message and "; and " not in message:
@@ -137,4 +139,7 @@ def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
         by_code[new.code] = Finding(
             new.code, worst, message, old.count + new.count, (old.locations + new.locations)[:SHOWN]
         )
+    for code in merged:
+        found = by_code[code]
+        by_code[code] = replace(found, message=f"{found.message} ({found.count} in all)")
     return tuple(sorted(by_code.values(), key=lambda found: (-SEVERITIES.index(found.severity), found.code)))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
-from unitcad.check.findings import SEVERITIES, FileReport, Finding
+from unitcad.check.findings import SEVERITIES, FileReport, Finding, counted
 from unitcad.check.rulebook import rules
 
 FORMATS = ("text", "json", "github", "sarif", "junit")
@@ -48,7 +48,7 @@ def text(reports: Sequence[FileReport]) -> str:
         f"{verdicts[name]} {word}" for name, word in (("error", "failed"), ("warning", "warned")) if verdicts[name]
     ]
     parts.append(f"{verdicts['pass']} passed")
-    lines.append(f"{len(reports)} file{'s' if len(reports) != 1 else ''}: {', '.join(parts)}")
+    lines.append(f"{counted(len(reports), 'file')}: {', '.join(parts)}")
     return "\n".join(lines) + "\n"
 
 
@@ -70,7 +70,10 @@ def statistics(reports: Sequence[FileReport]) -> str:
         for found in report.findings:
             files[found.code] += 1
             times[found.code] += found.count
-    lines = [f"{n:6d} files {times[code]:9d} x  {code} {rules()[code].title}" for code, n in files.most_common()]
+    lines = [
+        f"{counted(n, 'file ', 'files'):>12} {times[code]:9d} x  {code} {rules()[code].title}"
+        for code, n in files.most_common()
+    ]
     return "\n".join(lines) + "\n" if lines else "no findings\n"
 
 

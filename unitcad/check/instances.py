@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Floats, Ints, extent
 from unitcad.check.rulebook import finding
@@ -56,7 +56,7 @@ def judge(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
     if not found:
         return []
     left = len(placed) > MOST or len(pairs) > _PAIRS
-    text = f"{len(found)} pairs of instances share volume{' among those compared' if left else ''}"
+    text = f"{counted(len(found), 'pair')} of instances that share volume{' among those compared' if left else ''}"
     said = finding("G002", f"{text} (3MF's fill rule says what is solid)", len(found), found)
     return [Finding(said.code, "warning", said.message, said.count, said.locations)]
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from urllib.parse import unquote
 
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.rulebook import finding
 from unitcad.check.xml_stream import Element, read_small
@@ -152,10 +152,10 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline) -> Packag
         raise Unreadable(finding("F003", f"the zip cannot be read: {error}")) from error
     package = Package(archive, limits, deadline)
     if extra := _after_the_end(data):
-        package.findings.append(finding("F006", f"{extra} bytes after the zip's end record", extra))
+        package.findings.append(finding("F006", f"{counted(extra, 'byte')} after the zip's end record", extra))
     entries = archive.infolist()
     if len(entries) > limits.max_entries:
-        raise over_limit(f"{len(entries)} zip entries, more than {limits.max_entries}")
+        raise over_limit(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
     bombs = []
     for info in entries:
         if why := _unsafe(info.filename):

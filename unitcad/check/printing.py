@@ -10,7 +10,7 @@ import numpy as np
 
 from unitcad.catalogue import Printer
 from unitcad.check import overhang, walls
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Floats, extent
 from unitcad.check.rulebook import finding
@@ -52,7 +52,7 @@ def _stands(topology: Topology, low: Floats) -> list[Finding]:
     if abs(low[2]) > ON_BED:
         return [finding("D005", f"lowest point at z = {low[2]:.4g} mm")]
     lying = (vertices[faces, 2] < low[2] + ON_BED).all(axis=1) & (topology.areas[:, 2] < 0)
-    flat = -float(topology.areas[lying, 2].sum()) / 2
+    flat = float(np.abs(topology.areas[lying, 2]).sum()) / 2
     if flat >= STAND:
         return []
     return [finding("D005", f"only {flat:.3g} mm2 of flat on the bed")]
@@ -79,7 +79,9 @@ def _features(topology: Topology, printer: Printer) -> list[Finding]:
                 places.append(Location(xyz=((x0 + x1) / 2, (y0 + y1) / 2, z)))
     if not places:
         return []
-    return [finding("D002", f"{len(places)} sections smaller than {least:g} mm both ways", len(places), places)]
+    return [
+        finding("D002", f"{counted(len(places), 'section')} smaller than {least:g} mm both ways", len(places), places)
+    ]
 
 
 def _trapped(topology: Topology) -> list[Finding]:
@@ -97,4 +99,4 @@ def _trapped(topology: Topology) -> list[Finding]:
             places.append(Location(xyz=tuple(float(v) for v in centre)))  # type: ignore[arg-type]
     if not places:
         return []
-    return [finding("D004", f"{len(places)} hollows without an opening", len(places), places)]
+    return [finding("D004", f"{counted(len(places), 'hollow')} without an opening", len(places), places)]

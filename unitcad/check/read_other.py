@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.check import text_mesh
-from unitcad.check.findings import Finding
+from unitcad.check.findings import Finding, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Mesh, weld_exact
 from unitcad.check.rulebook import finding
@@ -40,7 +40,7 @@ def _read(kind: str, raw: bytes, limits: Limits, deadline: Deadline) -> tuple[li
         raise Unreadable(*findings, finding("F003", "vertices without three coordinates"))
     vertices = vertices[:, :3]
     if len(faces) > limits.max_faces:
-        raise over_limit(f"{len(faces)} faces, more than --max-faces {limits.max_faces}")
+        raise over_limit(f"{counted(len(faces), 'face')}, more than --max-faces {limits.max_faces}")
     if not len(faces):
         raise Unreadable(*findings, finding("F001", "the file has no face"))
     if faces.min() < 0 or faces.max() >= len(vertices):
@@ -48,7 +48,7 @@ def _read(kind: str, raw: bytes, limits: Limits, deadline: Deadline) -> tuple[li
     corners = vertices[faces]
     if not np.isfinite(corners).all():
         n = len(corners) - int(np.isfinite(corners).all(axis=(1, 2)).sum())
-        return [], [*findings, finding("V001", f"{n} faces have a vertex that is not finite", n)]
+        return [], [*findings, finding("V001", f"{counted(n, 'face')} with a vertex that is not finite", n)]
     points, triangles = weld_exact(corners)  # OBJ splits vertices along texture seams
     return [Mesh(points, triangles, indexed=False)], findings
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from unitcad.check.findings import Facts, Finding
+from unitcad.check.findings import Facts, Finding, counted
 from unitcad.check.limits import Limits, Unreadable
 from unitcad.check.rulebook import finding
 
@@ -54,7 +54,9 @@ def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Fin
     elif facts.volume_mm3 is not None and facts.volume_mm3 < 0:
         findings.append(finding("T008", f"volume {facts.volume_mm3:.6g} mm3"))
     if options.shells is not None and solids != options.shells:
-        findings.append(finding("G005", f"{solids} solids, {options.shells} expected", abs(solids - options.shells)))
+        findings.append(
+            finding("G005", f"{counted(solids, 'solid')}, {options.shells} expected", abs(solids - options.shells))
+        )
     return findings, facts
 
 

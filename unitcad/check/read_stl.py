@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Floats, Mesh, weld_exact
 from unitcad.check.rulebook import finding
@@ -39,7 +39,7 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
         first = head.split(None, 1)[0][:20].decode("utf-8", "replace") if head.strip() else ""
         raise Unreadable(finding("F005", f"text that does not begin with solid but with {first!r}"))
     if size < 84:
-        raise Unreadable(finding("F001", f"{size} bytes: shorter than a binary STL's header of 84"))
+        raise Unreadable(finding("F001", f"{counted(size, 'byte')}: shorter than a binary STL's header of 84"))
     count = int.from_bytes(data[80:84], "little")
     findings: list[Finding] = []
     if head[:5].lower() == b"solid":
@@ -47,18 +47,24 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
     room, rest = divmod(size - 84, 50)
     if count > room:
         findings.append(
-            finding("F002", f"the header promises {count} facets, the file has room for {room}", count - room)
+            finding(
+                "F002", f"the header promises {counted(count, 'facet')}, the file has room for {room}", count - room
+            )
         )
     elif count < room and (rest == 0 and any(data[84 + 50 * count : 84 + 50 * count + 100])):
-        findings.append(finding("F002", f"the header promises {count} facets, the file holds {room}", room - count))
+        findings.append(
+            finding("F002", f"the header promises {counted(count, 'facet')}, the file holds {room}", room - count)
+        )
     elif size > 84 + 50 * count:
         extra = size - 84 - 50 * count
-        findings.append(finding("F006", f"{extra} bytes after the last facet", extra))
+        findings.append(finding("F006", f"{counted(extra, 'byte')} after the last facet", extra))
     facets = min(count, room)
     if count > room and room:
         raise Unreadable(*findings)  # a geometry of what is left would only blame the wrong thing
     if facets > limits.max_faces:
-        raise Unreadable(*findings, over_limit(f"{facets} faces, more than --max-faces {limits.max_faces}").findings[0])
+        raise Unreadable(
+            *findings, over_limit(f"{counted(facets, 'face')}, more than --max-faces {limits.max_faces}").findings[0]
+        )
     if facets == 0:
         raise Unreadable(*findings, finding("F001", "the file has no facet"))
     records = np.frombuffer(data, RECORD, facets, 84)
@@ -88,7 +94,10 @@ def _is_text(head: bytes, data: memoryview) -> bool:
 def _not_finite(good: Floats) -> Finding:
     bad = np.flatnonzero(~good)
     return finding(
-        "V001", f"{len(bad)} faces have a vertex that is not finite", len(bad), (Location(face=int(i)) for i in bad[:9])
+        "V001",
+        f"{counted(len(bad), 'face')} with a vertex that is not finite",
+        len(bad),
+        (Location(face=int(i)) for i in bad[:9]),
     )
 
 
@@ -176,7 +185,7 @@ def _walk(raw: bytes, found: _Text, limits: Limits, deadline: Deadline) -> None:
         else:
             code, what = ("F003", "unexpected") if inside else ("F006", "after endsolid:")
             if code == "F006" and found.facets:
-                found.findings.append(_at(code, f"{end - at} bytes after endsolid", raw, at))
+                found.findings.append(_at(code, f"{counted(end - at, 'byte')} after endsolid", raw, at))
                 return
             shown = raw[at : min(line_end, at + 30)].decode("utf-8", "replace")
             found.findings.append(_at("F003", f"{what} {shown!r}", raw, at))
@@ -257,14 +266,16 @@ def _explain(raw: bytes, at: int, cut: int, found: _Text, limits: Limits) -> int
         if not match.group(2):
             found.findings.append(_at("F003", "the text ends inside a facet", raw, place))
         elif vertices != 3:
-            found.findings.append(_at("F008", f"a facet with {vertices} vertices", raw, place))
+            found.findings.append(_at("F008", f"a facet with {counted(vertices, 'vertex', 'vertices')}", raw, place))
         elif len(body) == _TOKENS - 2 and all(_is_number(body[i - 1]) for i in _NUMBERS):
             found.findings.append(_at("F003", "a facet's keywords are not those of STL", raw, place))
         elif bad := [word for word in numbers if not _is_number(word)]:
             shown = bad[0][:30].decode("utf-8", "replace")
             found.findings.append(_at("F004", f"{shown!r} is not a number", raw, place))
         elif len(numbers) != 12:
-            found.findings.append(_at("F003", f"a facet with {len(numbers)} numbers instead of 12", raw, place))
+            found.findings.append(
+                _at("F003", f"a facet with {counted(len(numbers), 'number')} instead of 12", raw, place)
+            )
         elif len(body) != _TOKENS - 2:
             found.findings.append(_at("F003", "a facet's keywords are not in order", raw, place))
         found.facets += 1

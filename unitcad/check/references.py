@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from unitcad.check import schema
+from unitcad.check.findings import counted
 from unitcad.check.mesh import Ints
 from unitcad.check.model_data import Model, Object, Resource
 
@@ -86,17 +87,18 @@ def _mesh(model: Model, found: Object, has_default: bool) -> None:
     who, rows = f"object {found.id}", found.triangles
     solid = found.type in _SOLID and found.lattice is None
     if len(found.vertices) < 3 and not found.other_shape:
-        model.say("P017", f"the mesh of {who} has {len(found.vertices)} vertices")
+        model.say("P017", f"the mesh of {who} has {counted(len(found.vertices), 'vertex', 'vertices')}")
     if len(rows) < (4 if solid and found.type == "model" else 1) and found.lattice is None:
-        model.say("P017", f"the mesh of {who} has {len(rows)} triangles")
+        model.say("P017", f"the mesh of {who} has {counted(len(rows), 'triangle')}")
     corners = rows[:, :3]
     outside = (corners >= len(found.vertices)).any(axis=1)
     if outside.any():
         first = int(np.flatnonzero(outside)[0])
-        model.say("P011", f"{int(outside.sum())} triangles of {who} (first {first}) name vertices that are not there")
+        some = counted(int(outside.sum()), "triangle")
+        model.say("P011", f"{some} of {who} (first {first}) with a vertex that is not there")
     same = (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2]) | (corners[:, 2] == corners[:, 0])
     if same.any():
-        model.say("P017", f"{int(same.sum())} triangles of {who} name a vertex twice")
+        model.say("P017", f"{counted(int(same.sum()), 'triangle')} of {who} with one vertex twice")
     _triangle_properties(model, found, rows, has_default)
 
 

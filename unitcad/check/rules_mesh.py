@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from unitcad.check import crossing, shells, topology
-from unitcad.check.findings import Facts, Finding, Location
+from unitcad.check.findings import Facts, Finding, Location, counted
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Mesh, extent
 from unitcad.check.rulebook import finding
@@ -30,7 +30,8 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
     if not finite.all():
         bad = np.flatnonzero(~finite[mesh.faces].all(axis=1))
         places = [Location(face=int(i), part=mesh.name) for i in bad[:9]]
-        text = f"{len(finite) - int(finite.sum())} vertices are not finite"
+        wrong = len(finite) - int(finite.sum())
+        text = counted(wrong, "non-finite vertex", "non-finite vertices")
         return Judged((finding("V001", text, len(bad) or 1, places),), facts, None)
     if not len(mesh.faces):
         return Judged((finding("F001", "the mesh has no face"),), facts, None)

@@ -20,4 +20,4 @@ def judge(facts: Facts, unit_known: bool) -> list[Finding]:
     else:
         guess = f"{side / 1000:.3g} mm if it was microns"
     named = "in the unit that is named" if unit_known else "as millimetres"
-    return [finding("S001", f"largest side {side:.3g} mm {named}; {guess}")]
+    return [finding("S001", f"largest side {side:.6g} mm {named}; {guess}")]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Floats, Ints, diagonal, extent
 from unitcad.check.rulebook import finding
@@ -66,15 +66,16 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
             overlaps.append((a, a))
     if overlaps:
         places = [_where(low, high, pair[0]) for pair in overlaps]
-        found.append(finding("G002", f"{len(overlaps)} shells share volume", len(overlaps), places))
+        text = f"{counted(len(overlaps), 'pair')} of shells that share volume"
+        found.append(finding("G002", text, len(overlaps), places))
     inverted = [i for i in range(n) if depth[i] % 2 == 0 and volumes[i] < 0]
     if inverted and not (crossed and n == 1):
         places = [_where(low, high, i) for i in inverted]
-        found.append(finding("T008", f"{len(inverted)} shells face inwards", len(inverted), places))
+        found.append(finding("T008", counted(len(inverted), "inverted shell"), len(inverted), places))
     hollow = [i for i in range(n) if depth[i] % 2 and volumes[i] < 0]
     if hollow:
         places = [_where(low, high, i) for i in hollow]
-        found.append(finding("G006", f"{len(hollow)} closed cavities", len(hollow), places))
+        found.append(finding("G006", counted(len(hollow), "closed cavity", "closed cavities"), len(hollow), places))
     return Shells(volumes, low, high, tuple(found))
 
 

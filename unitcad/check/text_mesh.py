@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Unreadable
 from unitcad.check.rulebook import finding
 
@@ -40,10 +40,10 @@ def look(kind: str, raw: bytes) -> list[Finding]:
         return []
     lines = sum(1 for line in numbers.split(b"\n") if line.strip()) - (kind == "off")
     if lines < promised:
-        text = f"{promised} vertices, faces and other elements promised, {lines} there"
+        text = f"the header promises {counted(promised, 'line')} of vertices, faces and other elements, not {lines}"
         raise Unreadable(finding("F002", text, promised - lines))
     if lines > promised:
-        return [finding("F006", f"{lines - promised} lines after the last element", lines - promised)]
+        return [finding("F006", f"{counted(lines - promised, 'line')} after the last element", lines - promised)]
     return []
 
 

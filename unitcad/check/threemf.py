@@ -68,7 +68,7 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
     _singletons(package, relations, "the package", (opc.THUMBNAIL, opc.PROPERTIES))
     if len(starts) != 1:
         if not any(item.code in ("P003", "F003", "P007") for item in package.findings):
-            package.say("P003", f"{len(starts)} start parts")
+            package.say("P003", counted(len(starts), "start part"))
         if not starts:
             return {}
     models: dict[str, Model] = {}
@@ -196,7 +196,9 @@ def _expand(models: dict[str, Model], root: Model, limits: Limits, findings: lis
         faces, below = size(key_of(root.part, item), ())
         total, nodes = total + faces, nodes + below
     if total > limits.max_faces or nodes > limits.max_faces:
-        raise Unreadable(finding("P009", f"{total} faces in {nodes} instances, more than {limits.max_faces}"))
+        raise Unreadable(
+            finding("P009", f"{counted(total, 'face')} in {counted(nodes, 'instance')}, more than {limits.max_faces}")
+        )
     instances: list[Instance] = []
 
     def place(key: Key, matrix: Floats, depth: int) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from unitcad.check import edges as mesh_edges
 from unitcad.check import seams
 from unitcad.check.edges import Edges
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Bools, Floats, Ints, Mesh, area_vectors, diagonal, float32_step
 from unitcad.check.rulebook import finding
@@ -71,15 +71,22 @@ def judge(mesh: Mesh, deadline: Deadline) -> Topology:
     deadline.tick()
     if len(pinched):
         found.append(
-            finding("T004", f"{len(pinched)} pinch vertices", len(pinched), _points(mesh, vertices[pinched[:9]]))
+            finding(
+                "T004",
+                counted(len(pinched), "pinch vertex", "pinch vertices"),
+                len(pinched),
+                _points(mesh, vertices[pinched[:9]]),
+            )
         )
     if len(twice):
-        found.append(finding("T009", f"{len(twice)} duplicate faces", len(twice), _at_faces(mesh, kept, faces, twice)))
+        found.append(
+            finding("T009", counted(len(twice), "duplicate face"), len(twice), _at_faces(mesh, kept, faces, twice))
+        )
     wrong = np.empty(0, int)
     if not edges.closed:
         wrong = np.flatnonzero((edges.size % 2 == 0) & ~mesh_edges.balanced(faces, edges))
     if len(wrong):
-        text = f"{len(wrong)} edges along which more faces run one way than the other"
+        text = f"{counted(len(wrong), 'edge')} along which more faces run one way than the other"
         found.append(finding("T007", text, len(wrong), _at_edges(mesh, edges, kept, wrong)))
     if mesh.normals is not None:
         found += _stored_normals(mesh, kept, areas)
@@ -121,7 +128,7 @@ def _unreferenced(vertices: Floats, faces: Ints) -> list[Finding]:
     used = np.zeros(len(vertices), bool)
     used[faces.reshape(-1)] = True
     n = len(vertices) - int(np.count_nonzero(used))
-    return [finding("T012", f"{n} vertices that no face uses", n)] if n else []
+    return [finding("T012", f"{counted(n, 'vertex', 'vertices')} that no face uses", n)] if n else []
 
 
 def _too_far(mesh: Mesh) -> list[Finding]:
@@ -143,7 +150,7 @@ def _open_edges(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints
     if not len(left):
         n = len(open_)
         places = _at_edges(mesh, edges, kept, open_)
-        said = finding("T006", f"{n} open edges close once vertices within the tolerance are welded", n, places)
+        said = finding("T006", f"{counted(n, 'open edge')} that welding within the tolerance closes", n, places)
         return joined[whole], kept[whole], after, [said]
     found = []
     if len(left) < len(open_):
@@ -152,11 +159,11 @@ def _open_edges(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints
     if split.any():
         which = open_[split]
         found.append(
-            finding("T005", f"{len(which)} open edges with a vertex on them", len(which),
+            finding("T005", f"{counted(len(which), 'open edge')} with a vertex in between", len(which),
                     _at_edges(mesh, edges, kept, which))
         )  # fmt: skip
     n = len(open_)
-    found.append(finding("T001", f"{n} boundary edges", n, _at_edges(mesh, edges, kept, open_)))
+    found.append(finding("T001", counted(n, "boundary edge"), n, _at_edges(mesh, edges, kept, open_)))
     return faces, kept, edges, found
 
 
@@ -167,7 +174,7 @@ def _many_faces(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> list[Findi
     for code, odd, word in (("T002", 1, "odd"), ("T003", 0, "even")):
         which = np.flatnonzero((edges.size > 2) & (edges.size % 2 == odd))
         if len(which):
-            text = f"{len(which)} edges with more than two faces, an {word} number"
+            text = f"{counted(len(which), 'edge')} with more than two faces, an {word} number"
             found.append(finding(code, text, len(which), _at_edges(mesh, edges, kept, which)))
     return found
 
@@ -197,12 +204,12 @@ def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints) ->
     if n:
         places = [Location(face=int(i), part=mesh.name) for i in repeated[:9]]
         places += list(_at_faces(mesh, kept, faces, lines))
-        found.append(finding("T010", f"{n} faces without area", n, places))
+        found.append(finding("T010", f"{counted(n, 'face')} without area", n, places))
     height = np.sqrt(np.einsum("ij,ij->i", areas[suspect], areas[suspect])) / np.maximum(longest, 1e-300)
     local = np.spacing(np.abs(corners).max(axis=(1, 2), initial=0).astype(np.float32)).astype(float)
     thin = suspect[~flat & (height < local) & (longest > SLIVER * size)]
     if len(thin):
-        found.append(finding("T011", f"{len(thin)} slivers", len(thin), _at_faces(mesh, kept, faces, thin)))
+        found.append(finding("T011", counted(len(thin), "sliver"), len(thin), _at_faces(mesh, kept, faces, thin)))
     return found
 
 
@@ -250,5 +257,5 @@ def _stored_normals(mesh: Mesh, kept: Ints, areas: Floats) -> list[Finding]:
     wrong = off[(sound & (lengths[off] > 0)) | ~np.isfinite(lengths[off])]
     if not len(wrong):
         return []
-    text = f"{len(wrong)} stored normals differ from the face's own"
+    text = f"{counted(len(wrong), 'stored normal')} unlike the face's own"
     return [finding("T013", text, len(wrong), (Location(face=int(kept[i]), part=mesh.name) for i in wrong[:9]))]

@@ -10,7 +10,7 @@ import numpy as np
 
 from unitcad.catalogue import Printer
 from unitcad.check.edges import components
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Bools, Floats, Ints
 from unitcad.check.pairs import boxes_of, frame_of, meeting_between, morton_order
@@ -128,7 +128,7 @@ def _patches(
     if not found:
         return []
     found.sort(key=lambda item: item[0])
-    text = f"{len(found)} walls below the floor, the thinnest {found[0][0]:.3g} mm"
+    text = f"{counted(len(found), 'wall')} below the floor, the thinnest {found[0][0]:.3g} mm"
     return [finding("D001", text, len(found), [place for _, place in found])]
 
 
