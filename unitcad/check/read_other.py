@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.check import text_mesh
+from unitcad.check import read_ply, text_mesh
 from unitcad.check.findings import Finding, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Mesh, weld_exact
@@ -34,7 +34,13 @@ def _read(kind: str, raw: bytes, limits: Limits, deadline: Deadline) -> tuple[li
     deadline.tick()
     findings += text_mesh.look(kind, raw)
     deadline.tick()
-    vertices, faces = _loaded(kind, raw)
+    if kind == "ply":
+        raw, trailing = read_ply.trimmed(raw, deadline)
+        findings += trailing
+    try:
+        vertices, faces = _loaded(kind, raw)
+    except Unreadable as stop:
+        raise Unreadable(*findings, *stop.findings) from stop
     deadline.tick()
     if vertices.ndim != 2 or vertices.shape[1] < 3 or faces.ndim != 2 or faces.shape[1] != 3:
         raise Unreadable(*findings, finding("F003", "vertices without three coordinates"))

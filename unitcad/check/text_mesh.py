@@ -49,8 +49,8 @@ def look(kind: str, raw: bytes) -> list[Finding]:
 
 def explained(kind: str, raw: bytes) -> Finding:
     """Why trimesh could not read it, in the format's words."""
+    numbers = _numbers(kind, raw)
     try:
-        numbers = _numbers(kind, raw)
         if numbers is not None:
             _refuse_words(numbers)
         if kind == "obj":
@@ -59,7 +59,8 @@ def explained(kind: str, raw: bytes) -> Finding:
             _refuse_off_indices(numbers)
     except Unreadable as stop:
         return stop.findings[0]
-    return finding("F003", f"cannot be read as {kind.upper()}: its lines are not those of the format")
+    what = "lines are not those of the format" if numbers is not None else "elements are not those of a mesh"
+    return finding("F003", f"cannot be read as {kind.upper()}: its {what}")
 
 
 def without_comments(raw: bytes) -> bytes:

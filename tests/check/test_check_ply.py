@@ -1,0 +1,80 @@
+"""Binary PLY: the header's counts against what the file holds."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from shapes import CUBE_CORNERS, CUBE_FACES
+
+from unitcad.check import read_ply
+from unitcad.check.limits import Deadline, Unreadable
+
+ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+def cube(vertices: int = 8, faces: int = 12, order: str = "binary_little_endian", newline: str = "\n") -> bytes:
+    """A cube whose header promises other numbers of vertices and faces than the 8 and 12 that follow."""
+    head = ["ply", f"format {order} 1.0", "comment of no element 7", f"element vertex {vertices}"]
+    head += [f"property float {axis}" for axis in "xyz"]
+    head += [f"element face {faces}", "property list uchar int vertex_indices", "end_header", ""]
+    sign = ORDERS[order]
+    corners = b"".join(struct.pack(sign + "3f", *corner) for corner in CUBE_CORNERS * 10)
+    return newline.join(head).encode() + corners + b"".join(struct.pack(sign + "B3i", 3, *face) for face in CUBE_FACES)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_a_sound_cube_passes(order: str, newline: str, judge) -> None:
+    report = judge(cube(order=order, newline=newline), "cube.ply")
+    assert report.findings == ()
+    assert report.facts.volume_mm3 == pytest.approx(1000)
+
+
+@pytest.mark.parametrize(
+    ("content", "code", "said"),
+    [
+        (cube(faces=13), "F002", "promises 13 face records, the file has room for 12"),
+        (cube(vertices=100), "F002", "promises 100 vertex records, the file has room for 21"),
+        (cube(vertices=7), "F002", "promises 12 face records"),
+        (cube(vertices=9), "F003", "its elements are not those of a mesh"),
+        (cube()[:-1], "F002", "promises 12 face records, the file has room for 11"),
+        (cube(faces=11), "F006", "13 bytes after the last element"),
+        (cube() + b"x", "F006", "1 byte after the last element"),
+        (cube().replace(b"uchar", b"word "), "F003", "'property list word int vertex_indices' is no property"),
+        (cube().replace(b"face 12", b"face"), "F003", "'element face' names no element and count"),
+        (cube().replace(b"float z", b"float w"), "F003", "its elements are not those of a mesh"),
+    ],
+)
+def test_wrong_counts_are_named(content: bytes, code: str, said: str, judge) -> None:
+    report = judge(content, "cube.ply")
+    assert [found for found in report.findings if found.code == code and said in found.message], report.findings
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_elements_end_where_their_records_do(seed: int) -> None:
+    """Random elements with lists of one length, of many, and runs of each; any byte less is one too few."""
+    rng = np.random.default_rng(seed)
+    sign, order = ("<", "binary_little_endian") if seed % 2 else (">", "binary_big_endian")
+    kinds = {"uchar": "B", "int16": "h", "uint": "I", "double": "d"}
+    head, body = ["ply", f"format {order} 1.0"], b""
+    for element in range(3):
+        lists = list(rng.choice(list(kinds), 2)) if element else []
+        plain = list(rng.choice(list(kinds), 2))
+        count = int(rng.integers(1, 9000))
+        head.append(f"element e{element} {count}")
+        head += [f"property {kind} p{i}" for i, kind in enumerate(plain)]
+        head += [f"property list uchar {kind} l{i}" for i, kind in enumerate(lists)]
+        run = 1 if seed < 3 else 3000
+        lengths = np.repeat(rng.integers(0, 5, count // run + 1), run)[:count]
+        for n in lengths.tolist():
+            body += bytes(sum(struct.calcsize(sign + kinds[kind]) for kind in plain))
+            body += b"".join(bytes([n]) + bytes(n * struct.calcsize(sign + kinds[kind])) for kind in lists)
+    raw = "\n".join([*head, "end_header", ""]).encode() + body
+    assert read_ply.trimmed(raw, Deadline(60)) == (raw, [])
+    kept, findings = read_ply.trimmed(raw + b"12345", Deadline(60))
+    assert kept == raw
+    assert findings[0].count == 5
+    with pytest.raises(Unreadable, match="e2 record"):
+        read_ply.trimmed(raw[:-1], Deadline(60))
