@@ -75,7 +75,7 @@ def test_flat_lid_without_vents_traps_what_an_exact_integral_says() -> None:
     moulds = MouldSet.of("encapsulating", "moulds.pour=injected")
     step = moulds.plan.steps[1]
     sprue = step.channels[:1]
-    cup = fit.held(step, fit.cavity(step, moulds.solids(), moulds.segments), moulds.segments)[0][1]
+    cup = fit.cavities(moulds.plan, moulds.solids(), moulds.segments)[1][0][1]
     from manifold3d import Manifold, OpType
 
     from unitcad.kernels.mesh import realise
@@ -97,7 +97,7 @@ def test_measured_pocket_between_vents_is_the_formula(count: int) -> None:
     """Without a tongue, whose dent would be the deeper one; polygons stand for circles within 5 um."""
     moulds = MouldSet.of("no-fpcb", "moulds.pour=injected", f"moulds.vents={count}", "output.tolerance_mm=0.001")
     step = moulds.plan.steps[0]
-    cavity = fit.held(step, fit.cavity(step, moulds.solids(), moulds.segments), moulds.segments)[0][1]
+    cavity = fit.cavities(moulds.plan, moulds.solids(), moulds.segments)[0][0][1]
     expected = lid.pocket_depth(moulds.dims, 0, count)
     assert air.pockets(cavity, step.top)[0].depth == pytest.approx(
         expected, abs=5e-3 * math.sin(math.radians(5)) + 2e-4

@@ -8,6 +8,7 @@ is sampled.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -15,6 +16,8 @@ import manifold3d
 import numpy as np
 from manifold3d import Manifold
 
+from unitcad.check.limits import Deadline
+from unitcad.check.pairs import Frame, boxes_of, frame_of, meeting_between, morton_order
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.finding import Finding, at_most
 from unitcad.moulds.fit import boxes_meet
@@ -24,6 +27,7 @@ BLOCKED = 1e-5
 """Largest area of facing faces, mm2: what rounding leaves of faces that only touch along an edge."""
 LEVEL = 1e-9
 """Heights nearer than this are equal, mm."""
+_BLOCK = 100_000  # pairs of triangles clipped together
 
 
 @dataclass(frozen=True)
@@ -97,12 +101,28 @@ def blocked(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -
 
 def _meeting(up: np.ndarray, down: np.ndarray) -> float:
     """Area of the triangles `up` (n, 3, 3) that lie below, or against, the triangles `down`."""
+    if not len(up) or not len(down):
+        return 0.0
+    frame = frame_of(np.concatenate([up, down]).reshape(-1, 3))
+    up, risen = _boxed(up, frame, 0)
+    down, sunk = _boxed(down, frame, LEVEL)
+    # A triangle may meet all that is above it: upward boxes have no top, downward ones no bottom.
+    risen[:, 5], sunk[:, 2] = 0, 0
     total = 0.0
-    for chunk in np.array_split(up, max(1, len(up) * len(down) // 2_000_000)):
-        first, second = _near(chunk, down)
-        if len(first):
-            total += float(_area_below(chunk[first], down[second]).sum())
+    for first, second in meeting_between(risen, sunk, Deadline(math.inf)):
+        for start in range(0, len(first), _BLOCK):
+            one, other = up[first[start : start + _BLOCK]], down[second[start : start + _BLOCK]]
+            near = _overlap(one, other)
+            total += float(_area_below(one[near], other[near]).sum())
     return total
+
+
+def _boxed(triangles: np.ndarray, frame: Frame, higher: float) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles in an order in which neighbours are near, and their boxes, raised by `higher`."""
+    steps = frame.steps(triangles.reshape(-1, 3) + np.array([0.0, 0.0, higher]))
+    corners = np.arange(len(triangles) * 3).reshape(-1, 3)
+    order = morton_order(steps, corners[:, 0])
+    return triangles[order], boxes_of(steps, *corners[order].T)
 
 
 def _in_the_way(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -> bool:
@@ -154,14 +174,10 @@ def _facing(solid: Manifold, direction: tuple[int, int, int], upwards: bool) -> 
     return corners[doubled > 1e-9] if upwards else corners[doubled < -1e-9]
 
 
-def _near(up: np.ndarray, down: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs whose boxes overlap in plan and of which the second reaches up to the first or above it."""
-    low_u, high_u, low_d, high_d = up.min(1), up.max(1), down.min(1), down.max(1)
-    pairs = high_d[None, :, 2] >= low_u[:, None, 2] - LEVEL
-    for axis in (0, 1):
-        pairs &= (low_u[:, None, axis] < high_d[None, :, axis]) & (low_d[None, :, axis] < high_u[:, None, axis])
-    first, second = np.nonzero(pairs)
-    return first, second
+def _overlap(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Whether the boxes of two triangles share area in plan: a common edge is none."""
+    one, other = first[:, :, :2], second[:, :, :2]
+    return ((one.min(1) < other.max(1)) & (other.min(1) < one.max(1))).all(1)
 
 
 def _area_below(first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -54,8 +54,20 @@ def expected_genus(plan: Plan) -> dict[str, int]:
     return genus
 
 
-def cavity(step: Step, solids: Mapping[str, Manifold], segments: int) -> list[Manifold]:
-    """What silicone can reach, in components: block - tools - earlier layers - seals.
+def cavities(plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[list[tuple[Manifold, Manifold]]]:
+    """For each pour and each cell what was drawn (layer, and what stands in sprue and vents) and the component of what
+    silicone can reach that holds it.
+    """
+    found, cured = [], Manifold()
+    for step in plan.steps:
+        layers = [realise(shape, segments) for shape in step.layer]
+        found.append(_held(step, layers, _reached(step, solids, cured, segments), segments))
+        cured = Manifold.batch_boolean([cured, *layers], manifold3d.OpType.Add)
+    return found
+
+
+def _reached(step: Step, solids: Mapping[str, Manifold], cured: Manifold, segments: int) -> list[Manifold]:
+    """What silicone can reach, in components: block - tools - cured layers - seals.
 
     The block is larger than the tools and reaches below the base, so a leak joins the outside to the cavity. It ends at
     the rim plane, where the pour is open and the blade runs, or at the lid's upper face, where sprue and vents open.
@@ -63,17 +75,17 @@ def cavity(step: Step, solids: Mapping[str, Manifold], segments: int) -> list[Ma
     around = [solids[name] for name in step.tools]
     x0, y0, z0, x1, y1, _ = _box_of(around)
     block = realise(box(x0 - 5, x1 + 5, y0 - 5, y1 + 5, z0 - 5, step.top), segments)
-    filled = around + [realise(shape, segments) for shape in (*step.earlier, *step.seals)]
+    filled = [*around, cured, *(realise(shape, segments) for shape in step.seals)]
     return Manifold.batch_boolean([block, *filled], manifold3d.OpType.Subtract).decompose()
 
 
-def held(step: Step, components: list[Manifold], segments: int) -> list[tuple[Manifold, Manifold]]:
-    """For each cell what was drawn (layer, and what stands in sprue and vents) and the component that holds it."""
+def _held(
+    step: Step, layers: list[Manifold], components: list[Manifold], segments: int
+) -> list[tuple[Manifold, Manifold]]:
     channels = [realise(shape, segments) for shape in step.channels]
-    share = len(channels) // len(step.layer)
+    share = len(channels) // len(layers)
     found = []
-    for i, shape in enumerate(step.layer):
-        layer = realise(shape, segments)
+    for i, layer in enumerate(layers):
         drawn = Manifold.batch_boolean([layer, *channels[i * share : (i + 1) * share]], manifold3d.OpType.Add)
         near = [c for c in components if boxes_meet(c, layer)]
         volumes = [(c ^ layer).volume() if len(near) > 1 else 1.0 for c in near]
@@ -92,17 +104,25 @@ def balance_law(step: Step, cells: list[tuple[Manifold, Manifold]]) -> list[Find
     return found
 
 
-def overlap_law(step: Step, solids: Mapping[str, Manifold], segments: int) -> list[Finding]:
-    """C200: no two solids of an assembled step share volume: tools, cured layers and the one being cast."""
-    there = [(name, solids[name]) for name in step.tools]
-    there += [(f"{step.name}.{i + 1}", realise(shape, segments)) for i, shape in enumerate(step.layer)]
-    there += [(f"cured.{i + 1}", realise(shape, segments)) for i, shape in enumerate(step.earlier)]
-    return _overlaps(f"pour {step.index}", there)
+def overlap_law(plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[Finding]:
+    """C200: no two solids of an assembled pour share volume: tools, cured layers and the one being cast.
+
+    The cells of a layer are put to each other, then count as one solid.
+    """
+    found: list[Finding] = []
+    cast: list[tuple[str, Manifold]] = []
+    shared: dict[tuple[str, str], float] = {}
+    for step in plan.steps:
+        cells = [realise(shape, segments) for shape in step.layer]
+        found += _overlaps(f"pour {step.index}", [(f"{step.name}.{i + 1}", c) for i, c in enumerate(cells)], shared)
+        cast.append((step.name, Manifold.batch_boolean(cells, manifold3d.OpType.Add)))
+        found += _overlaps(f"pour {step.index}", [(name, solids[name]) for name in step.tools] + cast, shared)
+    return found
 
 
 def unit_overlap_law(bodies: Iterable[Body], solids: Mapping[str, Manifold]) -> list[Finding]:
     """C200 for the unit itself."""
-    return _overlaps("unit", [(body.name, solids[body.name]) for body in bodies])
+    return _overlaps("unit", [(body.name, solids[body.name]) for body in bodies], {})
 
 
 def gap_law(spec: Spec, plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[Finding]:
@@ -136,13 +156,17 @@ def boxes_meet(a: Manifold, b: Manifold) -> bool:
     return all(p[i] <= q[i + 3] and q[i] <= p[i + 3] for i in range(3))
 
 
-def _overlaps(where: str, there: list[tuple[str, Manifold]]) -> list[Finding]:
-    """The pair that shares most, and every pair that shares too much."""
-    pairs = [
-        at_most("C200", f"{where}: {a} and {b}", (solid ^ other).volume(), OVERLAP, "mm3")
-        for (a, solid), (b, other) in combinations(there, 2)
-        if boxes_meet(solid, other)
-    ]
+def _overlaps(where: str, there: list[tuple[str, Manifold]], shared: dict[tuple[str, str], float]) -> list[Finding]:
+    """The pair that shares most, and every pair that shares too much.
+
+    `shared` keeps the volumes by name: a pair that stands together in several pours is cut once.
+    """
+    pairs = []
+    for (a, solid), (b, other) in combinations(there, 2):
+        if boxes_meet(solid, other):
+            if (a, b) not in shared:
+                shared[a, b] = (solid ^ other).volume()
+            pairs.append(at_most("C200", f"{where}: {a} and {b}", shared[a, b], OVERLAP, "mm3"))
     return [f for f in pairs if not f.ok] or sorted(pairs, key=lambda f: -f.value)[:1]
 
 

@@ -5,7 +5,7 @@ C000 shape, C100 balance and leak, C200 overlap, C210 gap (fit), C300 draw, C310
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from manifold3d import Manifold
 
@@ -37,20 +37,26 @@ def judge(
 ) -> list[Finding]:
     """All laws over a unit and its moulds, in a stable order. `solids` has every body of both by name."""
     strained = strain_law(spec, strains(spec, plan, solids, segments))
-    return sorted(geometric_laws(spec, unit, plan, solids, segments) + strained, key=lambda finding: finding.code)
+    cells = fit.cavities(plan, solids, segments)
+    found = geometric_laws(spec, unit, plan, solids, segments, cells)
+    return sorted(found + strained, key=lambda finding: finding.code)
 
 
 def geometric_laws(
-    spec: Spec, unit: tuple[Body, ...], plan: Plan, solids: Mapping[str, Manifold], segments: int
+    spec: Spec,
+    unit: tuple[Body, ...],
+    plan: Plan,
+    solids: Mapping[str, Manifold],
+    segments: int,
+    cells: Sequence[list[tuple[Manifold, Manifold]]],
 ) -> list[Finding]:
-    """The laws that read no silicone: all but C310. Variants of one geometry share them."""
+    """The laws that read no silicone: all but C310. Variants of one geometry share them. `cells`: `fit.cavities`."""
     found = fit.shape_law((*unit, *plan.tools), solids, fit.expected_genus(plan))
     found += fit.unit_overlap_law(unit, solids)
-    for layer, step in enumerate(plan.steps):
-        cells = fit.held(step, fit.cavity(step, solids, segments), segments)
-        found += fit.balance_law(step, cells)
-        found += fit.overlap_law(step, solids, segments)
-        found += air_law(step, [holding for _, holding in cells], deepest(spec, layer))
+    found += fit.overlap_law(plan, solids, segments)
+    for layer, (step, poured) in enumerate(zip(plan.steps, cells, strict=True)):
+        found += fit.balance_law(step, poured)
+        found += air_law(step, [holding for _, holding in poured], deepest(spec, layer))
     found += fit.gap_law(spec, plan, solids, segments)
     overlapping = any(finding.code == "C200" and not finding.ok for finding in found)
     return found + draw_law(plan, solids, segments, overlapping)

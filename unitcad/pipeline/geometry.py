@@ -11,8 +11,9 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from unitcad.cache import Store, digest
 from unitcad.pipeline import parts
@@ -20,6 +21,9 @@ from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.variant import Variant, geometric
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.spec import Spec, printer_of
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
 
 GEOMETRIC = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
@@ -161,13 +165,11 @@ class _Making:
         from unitcad.moulds import laws
 
         def judged() -> dict[str, list[dict[str, Any]]]:
-            variant = self.variant
-            solids = {body.name: variant.mesh(body) for body in (*variant.unit, *variant.plan.tools)}
-            drawn = variant.spec, variant.plan, solids, variant.segments
-            found = laws.geometric_laws(variant.spec, variant.unit, variant.plan, solids, variant.segments)
+            spec, plan, solids, segments = self.variant.spec, self.variant.plan, self._solids, self.variant.segments
+            found = laws.geometric_laws(spec, self.variant.unit, plan, solids, segments, self._cavities)
             return {
                 "laws": [laws.as_dict(finding) for finding in found],
-                "strains": [asdict(strain) for strain in laws.strains(*drawn)],
+                "strains": [asdict(strain) for strain in laws.strains(spec, plan, solids, segments)],
             }
 
         return self.store.data(self._own_key("laws"), judged)
@@ -192,28 +194,32 @@ class _Making:
 
     def _steps(self) -> list[dict[str, Any]]:
         """The pours: volume of the cavities as the tools leave them, and of one layer as the unit has it."""
-        variant = self.variant
 
         def measured() -> list[dict[str, Any]]:
-            from unitcad.moulds import fit
-
-            solids = {body.name: variant.mesh(body) for body in (*variant.unit, *variant.plan.tools)}
-            found = []
-            for step in variant.plan.steps:
-                held = fit.held(step, fit.cavity(step, solids, variant.segments), variant.segments)
-                cavities = sum(cavity.volume() for _, cavity in held)
-                found.append(
-                    {
-                        "index": step.index,
-                        "layer": step.name,
-                        "tools": list(step.tools),
-                        "cavity_volume_mm3": float(f"{cavities:.9g}"),
-                        "layer_volume_mm3": float(f"{solids[step.name].volume():.9g}"),
-                    }
-                )
-            return found
+            return [
+                {
+                    "index": step.index,
+                    "layer": step.name,
+                    "tools": list(step.tools),
+                    "cavity_volume_mm3": float(f"{sum(cavity.volume() for _, cavity in cells):.9g}"),
+                    "layer_volume_mm3": float(f"{self._solids[step.name].volume():.9g}"),
+                }
+                for step, cells in zip(self.variant.plan.steps, self._cavities, strict=True)
+            ]
 
         return self.store.data(self._own_key("steps"), measured)
+
+    @cached_property
+    def _solids(self) -> dict[str, Manifold]:
+        """The mesh of every body by name."""
+        variant = self.variant
+        return {body.name: variant.mesh(body) for body in (*variant.unit, *variant.plan.tools)}
+
+    @cached_property
+    def _cavities(self) -> list[list[tuple[Manifold, Manifold]]]:
+        from unitcad.moulds import fit
+
+        return fit.cavities(self.variant.plan, self._solids, self.variant.segments)
 
     def _own_key(self, what: str) -> str:
         """The key of something that reads the whole geometry, but neither formats nor outputs."""
