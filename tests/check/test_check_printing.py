@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from manifold3d import Manifold
+from manifold3d import CrossSection, Manifold
 from shapes import box, prism, stl
 
 FDM = {"printer": "fdm-0.4"}
@@ -97,6 +97,40 @@ def test_a_thin_wall_in_one_part_of_a_large_solid_is_found(judge) -> None:
 def test_pins(side: float, found: bool, judge) -> None:
     solid = block(10, 10, 2) + block(side, side, 5, (5, 5, 0))
     assert ("D002" in codes(judge, solid)) == found
+
+
+@pytest.mark.parametrize(
+    ("whisker", "found"),
+    [
+        (block(10, 0.3, 0.3), True),
+        (block(10, 0.39, 0.39), True),
+        (block(10, 0.4, 0.4), False),
+        (block(10, 0.3, 0.45), False),
+        (block(10, 0.3, 0.1), True),
+        (block(2, 0.3, 0.3), True),
+        (block(10, 0.3, 0.3).rotate([0, 0, 30]), True),
+        (block(10, 0.3, 0.3).rotate([45, 0, 0]), True),
+        (Manifold.cylinder(10, 0.15, 0.15, 16).rotate([0, 90, 0]), True),
+        (Manifold.cylinder(10, 0.18, 0.18, 3).rotate([0, 90, 0]), True),
+        (Manifold.cylinder(10, 0.15, 0.15, 16).rotate([0, 50, 0]), True),
+        (Manifold.revolve(CrossSection.square([0.3, 0.3]).translate([4, 0]), 200).translate([4, 0, 0]), True),
+        (Manifold.cylinder(10, 3, 0, 32).rotate([0, 90, 0]), False),
+    ],
+    ids=["square", "below", "at the floor", "high", "foil", "short", "aslant", "on edge", "round", "three-sided",
+         "leaning", "ring", "spike"],
+)  # fmt: skip
+@pytest.mark.parametrize("height", [0, 2.5])
+def test_whiskers_that_lie_or_stand_out(whisker: Manifold, found: bool, height: float, judge) -> None:
+    solid = block(10, 10, 5) + whisker.translate([9, 5, height])
+    solid = solid ^ block(40, 40, 20, (-10, -10, 0))  # nothing below the bed
+    assert ("D002" in codes(judge, solid)) == found
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.1])
+def test_a_rib_along_its_length_is_no_whisker(depth: float, judge) -> None:
+    assert "D002" not in codes(judge, block(10, 10, 5) + block(8, 0.3, 0.3 + depth, (1, 5, 5 - depth)))
+    bent = block(8, 0.3, 0.4, (1, 5, 4.9)) + block(0.3, 4, 0.4, (1, 5, 4.9))
+    assert "D002" not in codes(judge, block(10, 10, 5) + bent)
 
 
 @pytest.mark.parametrize(("angle", "found"), [(40, False), (45, False), (50, True), (70, True)])

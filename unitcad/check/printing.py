@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from unitcad.catalogue import Printer
-from unitcad.check import overhang, walls
+from unitcad.check import features, overhang, walls
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Floats, extent
@@ -19,7 +19,6 @@ from unitcad.check.topology import Topology
 
 ON_BED = 0.02  # mm; an STL rounds to less, a layer is ten times more
 STAND = 1.0  # mm2 of flat that a part needs to stand on
-_LEVELS = 40
 
 
 def judge(topology: Topology, printer: Printer, deadline: Deadline) -> list[Finding]:
@@ -30,8 +29,9 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline) -> list[Find
     low, high = extent(mesh.vertices[np.unique(mesh.faces)])
     found = _fits(high - low, printer) + _stands(topology, low)
     if topology.watertight and topology.oriented:
-        found += walls.judge(topology, printer, deadline)
-        found += _features(topology, printer)
+        rays = walls.cast(topology, printer, deadline)
+        found += walls.judge(topology, printer, rays)
+        found += features.judge(topology, printer, rays, deadline)
         found += overhang.judge(topology, printer, deadline, float(low[2]))
         found += _trapped(topology)
     return found
@@ -56,32 +56,6 @@ def _stands(topology: Topology, low: Floats) -> list[Finding]:
     if flat >= STAND:
         return []
     return [finding("D005", f"only {flat:.3g} mm2 of flat on the bed")]
-
-
-def _features(topology: Topology, printer: Printer) -> list[Finding]:
-    """D002: islands of level sections, half-way between the heights at which the mesh has vertices."""
-    from manifold3d import Manifold, Mesh64
-
-    mesh, least = topology.mesh, float(printer.least_feature_mm)
-    solid = Manifold(Mesh64(vert_properties=mesh.vertices, tri_verts=mesh.faces.astype(np.uint64)))
-    if solid.is_empty():
-        return []
-    heights = np.unique(np.round(mesh.vertices[np.unique(mesh.faces), 2], 3))
-    gaps = np.flatnonzero(np.diff(heights) >= float(printer.layer_mm) * 0.99)
-    if len(gaps) > _LEVELS:
-        gaps = gaps[np.linspace(0, len(gaps) - 1, _LEVELS).astype(int)]
-    places = []
-    for gap in gaps:
-        z = float(heights[gap] + heights[gap + 1]) / 2
-        for island in solid.slice(z).decompose():
-            x0, y0, x1, y1 = island.bounds()
-            if max(x1 - x0, y1 - y0) < least * 0.999 and island.area() > 1e-4:
-                places.append(Location(xyz=((x0 + x1) / 2, (y0 + y1) / 2, z)))
-    if not places:
-        return []
-    return [
-        finding("D002", f"{counted(len(places), 'section')} smaller than {least:g} mm both ways", len(places), places)
-    ]
 
 
 def _trapped(topology: Topology) -> list[Finding]:

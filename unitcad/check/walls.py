@@ -6,6 +6,8 @@ floor in two directions; so bevels and wedges, tapered edges and the strips betw
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from unitcad.catalogue import Printer
@@ -18,14 +20,30 @@ from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology, max_side_squared
 
 PARALLEL = float(np.cos(np.radians(12.0)))  # two sides of a wall
+AWAY = 0.3  # two sides of a whisker, which may have three
 LEVEL = float(np.cos(np.radians(45.0)))  # normals steeper than this belong to a flat piece's wall
 _SLACK = 0.995  # of the floor: a wall drawn at the floor passes after rounding and tessellation
 _SAMPLES = 40_000
 _FINEST = 6  # a face has at most _FINEST (_FINEST + 1) / 2 points
 
 
-def judge(topology: Topology, printer: Printer, deadline: Deadline) -> list[Finding]:
-    """Apply D001 to a closed mesh."""
+@dataclass(frozen=True)
+class Rays:
+    """Points inside the faces, the face of each, and how much material lies behind it, mm (inf beyond reach).
+
+    `thickness`: up to the first face that is nearly parallel, within the wall's floor; `behind`: up to the first face
+    that looks the other way at all, within the larger of that floor and the least feature.
+    """
+
+    points: Floats
+    owner: Ints
+    floor: Floats
+    thickness: Floats
+    behind: Floats
+
+
+def cast(topology: Topology, printer: Printer, deadline: Deadline) -> Rays:
+    """Measure a closed mesh."""
     upright, level = float(printer.least_wall_mm), float(printer.least_flat_wall_mm)
     mesh = topology.mesh
     corners = mesh.vertices[mesh.faces]
@@ -34,12 +52,18 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline) -> list[Find
     sound = double > 1e-3 * longest  # a height of a micrometre: below it a face has no direction worth following
     points, owner = _spread_points(corners, longest, sound, upright)
     normal = topology.areas / np.maximum(double, 1e-300)[:, None]
-    floor = np.where(_lying(topology), level, upright) * _SLACK
-    thickness = _behind(corners, normal, sound, points, owner, floor[owner], deadline)
-    thin = np.flatnonzero(thickness < floor[owner])
+    floor = (np.where(_lying(topology), level, upright) * _SLACK)[owner]
+    reach = np.maximum(floor, float(printer.least_feature_mm))
+    thickness, behind = _behind(corners, normal, sound, points, owner, reach, deadline)
+    return Rays(points, owner, floor, thickness, behind)
+
+
+def judge(topology: Topology, printer: Printer, rays: Rays) -> list[Finding]:
+    """Apply D001."""
+    thin = np.flatnonzero(rays.thickness < rays.floor)
     if not len(thin):
         return []
-    return _patches(topology, points, owner, thickness, thin, upright * _SLACK)
+    return _patches(topology, rays.points, rays.owner, rays.thickness, thin, float(printer.least_wall_mm) * _SLACK)
 
 
 def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float) -> tuple[Floats, Ints]:
@@ -61,12 +85,12 @@ def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float)
 
 def _behind(
     corners: Floats, normal: Floats, sound: Floats, points: Floats, owner: Ints, reach: Floats, deadline: Deadline
-) -> Floats:
-    """The distance from each point, against its normal, to the first nearly parallel face; inf beyond `reach`."""
-    thickness = np.full(len(points), np.inf)
+) -> tuple[Floats, Floats]:
+    """Distances from each point, against its normal, as `Rays` has them."""
+    thickness, behind = np.full((2, len(points)), np.inf)
     ends = points - normal[owner] * reach[:, None]
     if not len(points):
-        return thickness
+        return thickness, behind
     solid = np.flatnonzero(sound)
     places = np.concatenate([points, ends, corners[solid].reshape(-1, 3)])
     steps = frame_of(places).steps(places)
@@ -79,11 +103,14 @@ def _behind(
     faces = boxes_of(steps, first, first + 1, first + 2)
     for i, j in meeting_between(rays, faces, deadline):
         ray, face = order[i], by_place[j]
-        facing = np.einsum("ij,ij->i", normal[owner[ray]], normal[face]) < -PARALLEL
-        ray, face = ray[facing], face[facing]
+        facing = np.einsum("ij,ij->i", normal[owner[ray]], normal[face])
+        away = facing < -AWAY
+        ray, face, facing = ray[away], face[away], facing[away]
         distance = _hit(points[ray], -normal[owner[ray]], corners[face], normal[face])
-        np.minimum.at(thickness, ray, distance)
-    return thickness
+        np.minimum.at(behind, ray, distance)
+        parallel = facing < -PARALLEL
+        np.minimum.at(thickness, ray[parallel], distance[parallel])
+    return thickness, behind
 
 
 def _hit(origin: Floats, along: Floats, corners: Floats, normal: Floats) -> Floats:

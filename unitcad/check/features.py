@@ -1,0 +1,136 @@
+"""D002: parts of a solid that are narrower than the printer's least feature in both directions across.
+
+Two searches. Level sections half-way between the heights at which the mesh has vertices find what stands: pins, tips.
+What lies or stands out sideways has faces with material less than the floor behind them all over; a section across such
+faces shows whether it is a whisker, or a rib or a wall, which goes on into the body.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from manifold3d import CrossSection, Manifold, Mesh64
+
+from unitcad.catalogue import Printer
+from unitcad.check.edges import components
+from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.limits import Deadline
+from unitcad.check.mesh import Floats, Ints
+from unitcad.check.rulebook import finding
+from unitcad.check.topology import Topology
+from unitcad.check.walls import Rays
+
+_LEVELS = 40
+_GROUPS = 40  # thin places looked at
+_FACES = 5  # sections tried a place
+_STANDS = 0.9  # directions nearer to the vertical than this cosine are left to the level sections
+_LEAST_MM2 = 1e-4
+_SLACK = 0.999
+
+
+def judge(topology: Topology, printer: Printer, rays: Rays, deadline: Deadline) -> list[Finding]:
+    """Apply D002 to a closed mesh."""
+    mesh, least = topology.mesh, float(printer.least_feature_mm)
+    solid = Manifold(Mesh64(vert_properties=mesh.vertices, tri_verts=mesh.faces.astype(np.uint64)))
+    if solid.is_empty():
+        return []
+    places = _standing(topology, solid, least, float(printer.layer_mm))
+    deadline.tick()
+    places += _lying(topology, solid, rays, least, deadline)
+    if not places:
+        return []
+    text = f"{counted(len(places), 'section')} smaller than {least:g} mm both ways"
+    return [finding("D002", text, len(places), places)]
+
+
+def _standing(topology: Topology, solid: Manifold, least: float, layer: float) -> list[Location]:
+    """Islands of level sections."""
+    mesh = topology.mesh
+    heights = np.unique(np.round(mesh.vertices[np.unique(mesh.faces), 2], 3))
+    gaps = np.flatnonzero(np.diff(heights) >= layer * 0.99)
+    if len(gaps) > _LEVELS:
+        gaps = gaps[np.linspace(0, len(gaps) - 1, _LEVELS).astype(int)]
+    places = []
+    for gap in gaps:
+        z = float(heights[gap] + heights[gap + 1]) / 2
+        for island in solid.slice(z).decompose():
+            if _narrow(island, least):
+                x0, y0, x1, y1 = island.bounds()
+                places.append(Location(xyz=((x0 + x1) / 2, (y0 + y1) / 2, z)))
+    return places
+
+
+def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, deadline: Deadline) -> list[Location]:
+    """One place for each connected patch of thin faces that a section across shows to be a whisker."""
+    faces, vertices, edges = topology.mesh.faces, topology.mesh.vertices, topology.edges
+    n = len(faces)
+    thick = np.bincount(rays.owner[rays.behind >= least * _SLACK], minlength=n)
+    thin = (np.bincount(rays.owner, minlength=n) > 0) & (thick == 0)
+    if not thin.any():
+        return []
+    pairs = edges.first[edges.size == 2]
+    left, right = edges.order[pairs] // 3, edges.order[pairs + 1] // 3
+    both = thin[left] & thin[right]
+    group = components(n, left[both], right[both])
+    found: list[Location] = []
+    labels, first = np.unique(group[thin], return_index=True)
+    for label in labels[np.argsort(first)][:_GROUPS]:
+        deadline.tick()
+        mine = np.flatnonzero(thin & (group == label))
+        place = _whisker(vertices, faces[mine], solid, least)
+        if place is not None:
+            found.append(Location(face=int(topology.kept[mine[0]]), xyz=place))
+    return found
+
+
+def _whisker(vertices: Floats, faces: Ints, solid: Manifold, least: float) -> tuple[float, float, float] | None:
+    """The middle of a face of the patch where the solid, cut across its length, is narrow both ways."""
+    corners = vertices[faces]
+    sides = corners[:, [1, 2, 0]] - corners
+    lengths = np.sqrt(np.einsum("fkx,fkx->fk", sides, sides))
+    longest_first = np.argsort(-lengths.max(axis=1), kind="stable")
+    for i in longest_first[np.unique(np.linspace(0, len(faces) - 1, _FACES).astype(int))]:
+        middle = corners[i].mean(axis=0)
+        for k in np.argsort(-lengths[i], kind="stable"):
+            along = sides[i, k] / lengths[i, k]
+            if abs(along[2]) > _STANDS or np.ptp(corners @ along) < least:
+                continue
+            frame = _frame(along)
+            turned = solid.transform(np.column_stack([frame, np.zeros(3)]))
+            if all(_narrow_at(turned, frame @ middle, shift, least) for shift in (0, -0.75 * least, 0.75 * least)):
+                return float(middle[0]), float(middle[1]), float(middle[2])
+    return None
+
+
+def _frame(along: Floats) -> Floats:
+    """A rotation (3, 3) that turns the unit vector `along` to z."""
+    beside = np.eye(3)[np.argmin(np.abs(along))]
+    x = np.cross(beside, along)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(along, x), along])
+
+
+def _narrow_at(turned: Manifold, point: Floats, shift: float, least: float) -> bool:
+    """Whether the level section `shift` above the point has a narrow island there.
+
+    A corner that is cut off askew is narrow too, but not so a little farther in.
+    """
+    x, y, z = point
+    room = 1e-3 + abs(shift) / 2  # a whisker may bend
+    for island in turned.slice(float(z + shift)).decompose():
+        x0, y0, x1, y1 = island.bounds()
+        if x0 - room <= x <= x1 + room and y0 - room <= y <= y1 + room and _narrow(island, least):
+            return True
+    return False
+
+
+def _narrow(island: CrossSection, least: float) -> bool:
+    """Whether a box at some angle about the island has both sides below `least`."""
+    x0, y0, x1, y1 = island.bounds()
+    if max(x1 - x0, y1 - y0) >= 1.5 * least or island.area() <= _LEAST_MM2:
+        return False
+    points = np.concatenate(island.to_polygons())
+    angle = np.radians(np.arange(0, 90, 5))
+    across = np.stack([np.cos(angle), np.sin(angle)])
+    width = np.ptp(points @ across, axis=0)
+    depth = np.ptp(points @ np.stack([-across[1], across[0]]), axis=0)
+    return bool((np.maximum(width, depth) < least * _SLACK).any())
