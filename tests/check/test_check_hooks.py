@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 from shapes import box, stl
 
+needs_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action's script is bash")
 ROOT = Path(__file__).parent.parent.parent
 
 
@@ -30,28 +32,60 @@ def test_hook_takes_mesh_files_by_suffix(name: str, wanted: bool) -> None:
     assert _value(hook, "entry") == "unitcad check"
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="the action's script is bash")
-@pytest.mark.parametrize(("content", "code"), [(stl(box()), 0), (stl(box()[2:]), 1)])
-def test_the_actions_script(content: bytes, code: int, tmp_path: Path) -> None:
+def _run_action(folder: Path, **given: str) -> subprocess.CompletedProcess[str]:
+    """The action's last script as a runner starts it, with a `unitcad` on the path that is this one."""
     text = (ROOT / "action.yml").read_text("utf-8")
-    script = text[text.rindex("run: |") + 6 :]
-    (tmp_path / "a b").mkdir()
-    (tmp_path / "part.stl").write_bytes(content)
-    (tmp_path / "unitcad").write_text(
+    script = folder / "step.sh"
+    script.write_text("".join(line[8:] for line in text[text.rindex("run: |\n") + 7 :].splitlines(keepends=True)))
+    (folder / "bin").mkdir()
+    (folder / "bin/unitcad").write_text(
         f'#!/bin/sh\nexec {sys.executable} -c "from unitcad.cli import main; main()" "$@"\n'
     )
-    (tmp_path / "unitcad").chmod(0o755)
-    given = {"FILES": "part.stl *.none", "FAIL_ON": "error", "PRINTER": "", "ARGUMENTS": "", "SARIF": "out.sarif"}
-    given["FILES"] = "part.stl"
-    environment = {**os.environ, **given, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
-    done = subprocess.run(
-        ["bash", "-e", "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == code, done.stderr
-    assert ("::error file=part.stl" in done.stdout) == bool(code)
-    assert '"version": "2.1.0"' in (tmp_path / "out.sarif").read_text()
-    for name in given:
+    (folder / "bin/unitcad").chmod(0o755)
+    inputs = {"FILES": ".", "FAIL_ON": "error", "PRINTER": "", "ARGUMENTS": "", "SARIF": ""} | given
+    for name in inputs:
         assert f"{name}: ${{{{ inputs." in text
+    environment = {**os.environ, **inputs, "PATH": f"{folder / 'bin'}:{os.environ['PATH']}"}
+    (folder / "work").mkdir()
+    (folder / "work/good.stl").write_bytes(stl(box()))
+    (folder / "work/bad.stl").write_bytes(stl(box()[2:]))
+    return subprocess.run(
+        ["bash", "--noprofile", "--norc", "-eo", "pipefail", str(script)],
+        cwd=folder / "work", env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@needs_bash
+@pytest.mark.parametrize("sarif", ["", "out.sarif", "deep/er/out.sarif"])
+@pytest.mark.parametrize(("files", "code"), [("good.stl", 0), ("bad.stl\ngood.stl", 1), ("*.stl", 1)])
+def test_the_action_reports_and_fails_on_findings(files: str, code: int, sarif: str, tmp_path: Path) -> None:
+    done = _run_action(tmp_path, FILES=files, SARIF=sarif)
+    assert done.returncode == code, done.stderr
+    assert ("::error file=bad.stl" in done.stdout) == bool(code)
+    if sarif:
+        results = json.loads((tmp_path / "work" / sarif).read_text("utf-8"))["runs"][0]["results"]
+        assert bool(results) == bool(code)
+
+
+@needs_bash
+@pytest.mark.parametrize("sarif", ["", "out.sarif"])
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [({"FAIL_ON": "never"}, "--fail-on"), ({"FILES": " "}, "needs files"), ({"PRINTER": "none-such"}, "--printer"),
+     ({"ARGUMENTS": "--no-such-option"}, "--no-such-option")],
+)  # fmt: skip
+def test_the_action_fails_on_wrong_inputs_and_says_so(
+    given: dict[str, str], said: str, sarif: str, tmp_path: Path
+) -> None:
+    done = _run_action(tmp_path, **given, SARIF=sarif)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not (tmp_path / "work/out.sarif").exists()
+
+
+@needs_bash
+def test_the_action_passes_its_arguments_on(tmp_path: Path) -> None:
+    assert _run_action(tmp_path, FILES="bad.stl", ARGUMENTS="--ignore T001").returncode == 0
 
 
 def test_the_actions_inputs_are_not_pasted_into_its_script() -> None:
