@@ -48,7 +48,7 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
         say(f"{i + 1} of {len(jobs)}: {group} {result.kind}")
         found.setdefault(group, []).append((len(found.get(group, [])), result))
     random = {name: found.get(name, []) for name in ("documented", "extreme")}
-    everything = [outcome for rows in found.values() for _, outcome in rows]
+    everything = [result for rows in found.values() for _, result in rows]
     faults = [
         (group, index, o.kind, _plain(o.message))
         for group, rows in found.items()
@@ -105,13 +105,15 @@ def _journalled(jobs: Sequence[Job], journal: Path) -> Iterator[tuple[str, Outco
     known: dict[str, Outcome] = {}
     if journal.exists():
         # A last line without its end was cut off by the interruption.
-        for line in journal.read_bytes().split(b"\n")[:-1]:
+        whole, end, cut = journal.read_bytes().rpartition(b"\n")
+        for line in whole.splitlines():
             try:
                 name, data = json.loads(line)
                 known[name] = Outcome(**{**data, "chain": tuple(data["chain"])})
             except (ValueError, TypeError, KeyError):
                 raise UnitcadError(f"{journal}: is not a journal of random specs; move it away") from None
-        journal.write_bytes(b"".join(_line(name, outcome) for name, outcome in known.items()))
+        if cut:
+            os.truncate(journal, len(whole + end))
     journal.parent.mkdir(parents=True, exist_ok=True)
     fresh = _outcomes([job for job, name in zip(jobs, names, strict=True) if name not in known])
     with journal.open("ab") as file:
@@ -119,14 +121,10 @@ def _journalled(jobs: Sequence[Job], journal: Path) -> Iterator[tuple[str, Outco
             if name in known:
                 yield job[0], known[name]
                 continue
-            group, outcome = next(fresh)
-            file.write(_line(name, outcome))
+            group, found = next(fresh)
+            file.write(json.dumps([name, asdict(found)]).encode() + b"\n")
             file.flush()
-            yield group, outcome
-
-
-def _line(name: str, outcome: Outcome) -> bytes:
-    return (json.dumps([name, asdict(outcome)]) + "\n").encode()
+            yield group, found
 
 
 def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:

@@ -121,19 +121,8 @@ def _call(script: Path, *arguments: object) -> str:
 
 
 def _build(out: Path, formats: str) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "unitcad",
-        "build",
-        "encapsulating",
-        "--no-slice",
-        "--formats",
-        formats,
-        "-o",
-        str(out),
-    ]
-    subprocess.run(command, capture_output=True, check=True)
+    words = ["build", "encapsulating", "--no-slice", "--formats", formats, "-o", str(out)]
+    subprocess.run([sys.executable, "-m", "unitcad", *words], capture_output=True, check=True)
 
 
 def _warm(script: Path, lengths: Path, out: Path, formats: str, runs: int) -> Timing:

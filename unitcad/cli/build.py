@@ -41,10 +41,10 @@ def build(
     # Every spec passes the door before the first one is built.
     wanted = [load(spec, overrides) for spec in specs]
     results, printing = [], []
+    sliced = only is None and not no_slice
     for spec in wanted:
         with progress(spec.name) as say:
             results.append(run(spec, out, only=chosen, check=not no_check, say=say))
-            sliced = only is None and not no_slice
             printing.append(slice_tools(results[-1].folder, results[-1].manifest, spec, say) if sliced else "")
             if page or (results[-1].folder / PAGE).is_file():
                 from unitcad.report import write_report

@@ -55,7 +55,7 @@ def procedure(spec: Spec, plan: Plan, layer_volumes_mm3: Sequence[float]) -> Pro
     dims, known = dimensions(spec), catalogue.materials(spec.materials)
     silicones = [known[layer.material] for layer in spec.layers]
     mixes = [
-        fig.mix(spec, silicone, len(plan.layout.cells) * volume + sum(map(exact_volume, step.channels)))
+        fig.mix(spec, silicone, len(plan.layout.cells) * volume + _channels_mm3(step))
         for silicone, volume, step in zip(silicones, layer_volumes_mm3, plan.steps, strict=True)
     ]
     edges = tuple(off_grid(spec, dims))
@@ -98,11 +98,7 @@ def _figures(
     weep = fig.weep_mm3(spec, dims, plan.layout, layer, silicone)
     found = [
         Figure("volume of one layer", volume, "mm3", "computed: the drawn layer's mesh"),
-        *(
-            [Figure("sprue and vents", sum(map(exact_volume, step.channels)), "mm3", "computed: as drawn")]
-            if channels
-            else []
-        ),
+        *([Figure("sprue and vents", _channels_mm3(step), "mm3", "computed: as drawn")] if channels else []),
         Figure("density", float(silicone.density_g_cm3), "g/cm3", sourced(silicone.density_g_cm3)),
         Figure("in the cavities, net", mix.net_g, "g", f"computed: (volume x cavities{channels}) x density"),
         Figure("to mix", mix.mix_g, "g", f"assumed: {casting.waste:.0%} more, at least {casting.minimum_mix_g:g} g"),
@@ -142,6 +138,10 @@ def _figures(
             under += "; the syringe's pressure comes on top"
         found.append(Figure("weep by the windows, no grease", share, "% of a layer", under))
     return tuple(found)
+
+
+def _channels_mm3(step: Step) -> float:
+    return sum(map(exact_volume, step.channels))
 
 
 def _verdict(spec: Spec, step: Step, silicone: Material) -> str:

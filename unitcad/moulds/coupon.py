@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass
 
 from unitcad.catalogue import Printer
+from unitcad.moulds.grid import NEAR
 from unitcad.moulds.layout import PLINTH_DRAFT_DEG
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, turned, union
 from unitcad.shape.body import Body
@@ -74,16 +75,14 @@ def toml(printer: Printer, fit: Fit, station: int) -> str:
 def bodies(printer: Printer) -> tuple[Body, ...]:
     """The coupon's pieces as they lie on the bed: the plate, the plug and the tongue."""
     found = [Body("coupon-plate", "tool", _plate(printer), _COLOUR), Body("coupon-plug", "tool", _plug(), _PLUG_COLOUR)]
-    made = "cut" if printer.technology.value == "sla" else "printed"
+    made = "cut" if _resin(printer) else "printed"
     return (*found, Body("coupon-tongue", "tool", _tongue(printer), _TONGUE_COLOUR, made=made))
 
 
 def to_markdown(printer: Printer) -> str:
     """How to judge the coupon, and the line of TOML for every station."""
     thick, wide = float(printer.slot_height_mm), _tongue_width(printer)
-    pieces = "plate, plug and tongue"
-    if printer.technology.value == "sla":
-        pieces = "plate and plug"
+    pieces = "plate and plug" if _resin(printer) else "plate, plug and tongue"
     lines = [
         f"# Fit coupon for {printer.name}",
         "",
@@ -91,7 +90,7 @@ def to_markdown(printer: Printer) -> str:
         "into your spec. Station 3 is the catalogue's value.",
         "",
     ]
-    if printer.technology.value == "sla":
+    if _resin(printer):
         lines += [
             f"The tongue is no file: cut a strip {wide:g} wide and 25 long from film or steel {thick:g} mm thick, as",
             "the moulds' tongues are; printed resin is brittle.",
@@ -113,9 +112,9 @@ def to_markdown(printer: Printer) -> str:
     for fit in fits(printer):
         cells = " | ".join(f"`{toml(printer, fit, i)}`" for i in range(len(SHARES)))
         lines.append(f"| {fit.feature} | {fit.choose} | {cells} |")
-    layer, drawn = float(printer.layer_mm), window_heights(printer)
-    made = [window_height_as_printed(printer, i) for i in range(len(SHARES))]
-    if any(abs(a - b) > 0.02 * layer for a, b in zip(drawn, made, strict=True)):
+    layer, made = float(printer.layer_mm), window_heights_as_printed(printer)
+    drawn = [high - low for low, high in _windows(printer)]
+    if any(abs(a - b) > NEAR * layer for a, b in zip(drawn, made, strict=True)):
         lines += [
             "",
             f"A window's edges fall between layers of {layer:g} mm, as they do in a cup, and the slicer moves them:",
@@ -130,19 +129,21 @@ def to_markdown(printer: Printer) -> str:
     return "\n".join(lines) + "\n"
 
 
-def window_heights(printer: Printer) -> list[float]:
-    """The height of each station's window as drawn, mm."""
-    around = next(fit.values_mm for fit in fits(printer) if fit.feature == "window")
-    return [float(printer.slot_height_mm) + 2 * each for each in around]
-
-
-def window_height_as_printed(printer: Printer, station: int) -> float:
-    """What layers leave open of a window, mm: a slicer cuts each layer at its middle."""
+def window_heights_as_printed(printer: Printer) -> list[float]:
+    """What layers leave open of each station's window, mm: a slicer cuts each layer at its middle."""
     layer = float(printer.layer_mm)
-    around = (window_heights(printer)[station] - float(printer.slot_height_mm)) / 2
-    low, high = WINDOW_Z - around, WINDOW_Z + float(printer.slot_height_mm) + around
     middles = [layer * (k + 0.5) for k in range(math.ceil(PLATE / layer))]
-    return layer * sum(low + 1e-6 < middle < high - 1e-6 for middle in middles)
+    return [layer * sum(low + 1e-6 < middle < high - 1e-6 for middle in middles) for low, high in _windows(printer)]
+
+
+def _windows(printer: Printer) -> list[tuple[float, float]]:
+    """Lower and upper edge of each station's window, mm above the bed."""
+    around = next(fit.values_mm for fit in fits(printer) if fit.feature == "window")
+    return [(WINDOW_Z - each, WINDOW_Z + float(printer.slot_height_mm) + each) for each in around]
+
+
+def _resin(printer: Printer) -> bool:
+    return printer.technology.value == "sla"
 
 
 def _plate(printer: Printer) -> Shape:
@@ -151,14 +152,13 @@ def _plate(printer: Printer) -> Shape:
     depth = _ROWS["number"] + HEIGHT * stroke * SHARES[-1] / 2 + MARGIN
     found: list[Shape] = [box(0, length, 0, depth, 0, PLATE)]
     tools: list[Shape] = []
-    by_feature = {fit.feature: fit.values_mm for fit in fits(printer)}
+    by_feature, windows = {fit.feature: fit.values_mm for fit in fits(printer)}, _windows(printer)
     for i in range(len(SHARES)):
         x = MARGIN + PITCH * (i + 0.5)
         tools.append(moved(_taper(by_feature["recess"][i], RELIEF, 0.25), x, _ROWS["recess"], PLATE - PLUG_HEIGHT))
         tools.append(moved(cylinder(by_feature["hole"][i] / 2, -1, PLATE + 1), x, _ROWS["hole"]))
-        around, half, height = by_feature["window"][i], _tongue_width(printer) / 2, float(printer.slot_height_mm)
-        low, high = WINDOW_Z - around, WINDOW_Z + height + around
-        tools.append(box(x - half - around, x + half + around, -1, WINDOW_DEPTH, low, high))
+        half = _tongue_width(printer) / 2 + by_feature["window"][i]
+        tools.append(box(x - half, x + half, -1, WINDOW_DEPTH, *windows[i]))
         wall = by_feature["wall"][i] / 2
         y = _ROWS["wall"]
         found.append(box(x - WALL_LENGTH / 2, x + WALL_LENGTH / 2, y - wall, y + wall, PLATE - 1, PLATE + WALL_HEIGHT))

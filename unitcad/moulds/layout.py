@@ -54,14 +54,14 @@ def layout(spec: Spec, dims: Dimensions) -> Layout:
     """
     most = most_columns(dims)
     if spec.moulds.cavities == "fill":
-        columns, rows = _fill(spec, dims, most)
+        columns, rows = _fill(spec, dims, most, MOST_CELLS)
     else:
         columns, rows = spec.moulds.cavities
     if columns > most or columns * rows > MOST_CELLS:
         limit = f"a tail must reach an edge: {most} column{'s' if most > 1 else ''} at most"
         if columns <= most:
             limit = f"cells are numbered up to {MOST_CELLS}"
-        raise Refusal("moulds.cavities", [columns, rows], limit, _fitting(spec, dims, min(columns, most), rows))
+        raise Refusal("moulds.cavities", [columns, rows], limit, list(_fill(spec, dims, min(columns, most), rows)))
     found = _layout(spec, dims, columns, rows)
     over = _excess(spec, found)
     if max(over) > 1e-9:
@@ -78,25 +78,18 @@ def most_columns(dims: Dimensions) -> int:
     return {0: MOST_CELLS, 1: 2, 2: 1}[len(dims.sides) if dims.slot_z else 0]
 
 
-def _fill(spec: Spec, dims: Dimensions, most: int) -> tuple[int, int]:
-    """As many columns and rows as the bed takes, or one. Found by trying: the pitch depends on the count."""
+def _fill(spec: Spec, dims: Dimensions, most: int, most_rows: int) -> tuple[int, int]:
+    """As many columns and rows as the bed takes and as can be numbered, or one.
+
+    Found by trying: the pitch depends on the count.
+    """
     columns = rows = 1
     while columns < most and _excess(spec, _layout(spec, dims, columns + 1, 1))[0] <= 1e-9:
         columns += 1
-    while columns * (rows + 1) <= MOST_CELLS and max(_excess(spec, _layout(spec, dims, columns, rows + 1))) <= 1e-9:
+    most_rows = min(most_rows, MOST_CELLS // columns)
+    while rows < most_rows and max(_excess(spec, _layout(spec, dims, columns, rows + 1))) <= 1e-9:
         rows += 1
     return columns, rows
-
-
-def _fitting(spec: Spec, dims: Dimensions, columns: int, rows: int) -> list[int]:
-    """As many of the columns and rows asked for as can be numbered and as the bed takes."""
-    columns = min(columns, MOST_CELLS)
-    while columns > 1 and _excess(spec, _layout(spec, dims, columns, 1))[0] > 1e-9:
-        columns -= 1
-    rows = min(rows, MOST_CELLS // columns)
-    while rows > 1 and max(_excess(spec, _layout(spec, dims, columns, rows))) > 1e-9:
-        rows -= 1
-    return [columns, rows]
 
 
 def _excess(spec: Spec, found: Layout) -> list[float]:
@@ -170,8 +163,8 @@ def _too_large(spec: Spec, dims: Dimensions, found: Layout, columns: int, rows: 
         return Refusal("moulds.cavities", [columns, rows], f"{size} {by}", fits)
     nearest = math.floor((spec.diameter_mm - still - 1) * 100) / 100
     if nearest < spec.diameter_mm - 2 * dims.air_ring:
-        bed = "xy"[over.index(max(over))]
-        needed = math.ceil(20 * found.plate["xy".index(bed)]) / 10
-        field = f"moulds.bed_{bed}_mm"
-        return Refusal(field, getattr(spec.moulds, field[7:]), f"{size} {by} with one cavity", needed)
+        axis = over.index(max(over))
+        field, bed = [("bed_x_mm", spec.moulds.bed_x_mm), ("bed_y_mm", spec.moulds.bed_y_mm)][axis]
+        needed = math.ceil(20 * found.plate[axis]) / 10
+        return Refusal(f"moulds.{field}", bed, f"{size} {by} with one cavity", needed)
     return Refusal("diameter_mm", spec.diameter_mm, f"{size} {by} with one cavity", nearest)
