@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.check import Options, check_file
+from unitcad.check import Options, check_file, read_step, run
 
 
 def test_without_the_extra_the_message_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -23,7 +23,21 @@ def test_without_the_extra_the_message_says_what_to_install(tmp_path: Path, monk
     monkeypatch.setattr(builtins, "__import__", refuse)
     report = check_file(path)
     assert report.verdict == "error"
+    assert report.has("F012")
     assert "pip install 'unitcad[build123d]'" in report.findings[0].message
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_step_in_a_folder_is_a_warning_without_the_extra(
+    there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.STEP").write_text("x")
+    (tmp_path / "b.stl").write_text("x")
+    monkeypatch.setattr(read_step, "installed", lambda: there)
+    paths, reports = run.expand([str(tmp_path)])
+    assert [Path(path).name for path in paths] == (["a.STEP", "b.stl"] if there else ["b.stl"])
+    assert [(report.verdict, report.has("F012")) for report in reports] == ([] if there else [("warning", True)])
+    assert run.expand([str(tmp_path / "a.STEP")]) == ([str(tmp_path / "a.STEP")], [])
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,13 @@ from unitcad.check.rulebook import finding
 
 if TYPE_CHECKING:
     from unitcad.check.check import Options
+
+NEEDS = "STEP needs the extra build123d or cadquery: pip install 'unitcad[build123d]'"
+
+
+def installed() -> bool:
+    """Whether STEP can be read here."""
+    return find_spec("OCP") is not None
 
 
 def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Finding], Facts]:
@@ -25,9 +33,7 @@ def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Fin
         from OCP.TopAbs import TopAbs_SOLID
         from OCP.TopExp import TopExp_Explorer
     except ImportError as error:
-        raise Unreadable(
-            finding("F005", f"STEP needs the extra build123d or cadquery: pip install 'unitcad[build123d]' ({error})")
-        ) from error
+        raise Unreadable(finding("F012", f"{NEEDS} ({error})")) from error
     reader = STEPControl_Reader()
     if reader.ReadFile(str(path)) != IFSelect_RetDone or reader.TransferRoots() < 1:
         raise Unreadable(finding("F003", "the STEP file holds no shape that can be read"))

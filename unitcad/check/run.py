@@ -13,6 +13,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from pathlib import Path
 
+from unitcad.check import read_step
 from unitcad.check.check import Options, check_file
 from unitcad.check.findings import FileReport
 from unitcad.check.rulebook import finding
@@ -20,7 +21,10 @@ from unitcad.check.sniff import SUFFIXES
 
 
 def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
-    """Files for names that may be folders or globs, without repeats; a report for each name that gives none."""
+    """Files for names that may be folders or globs, without repeats; a report for each name that gives none.
+
+    So for a folder's STEP files where none can be read: a warning, since nobody named them.
+    """
     files: dict[str, None] = {}
     empty: list[FileReport] = []
     for name in names:
@@ -29,7 +33,9 @@ def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
             inside = _once(_walked(path))
             if not inside:
                 empty.append(FileReport(name, (finding("F012", "no mesh file in this folder"),)))
-            files.update(dict.fromkeys(inside))
+            able, unable = _readable(inside)
+            files.update(dict.fromkeys(able))
+            empty += unable
         elif not path.exists() and glob.has_magic(name):
             inside = _once(p for p in glob.glob(name, recursive=True) if os.path.isfile(p))
             if not inside:
@@ -51,6 +57,13 @@ def _walked(folder: Path) -> Iterator[str]:
             path = Path(here, name)
             if path.suffix.lower() in SUFFIXES and path.is_file():
                 yield str(path)
+
+
+def _readable(paths: list[str]) -> tuple[list[str], list[FileReport]]:
+    """Files of a folder that can be judged here, and for those that only an extra reads a report with a warning."""
+    step = [] if read_step.installed() else [path for path in paths if Path(path).suffix.lower() in (".step", ".stp")]
+    said = finding("F012", f"{read_step.NEEDS}; not judged", severity="warning")
+    return [path for path in paths if path not in step], [FileReport(path, (said,)) for path in step]
 
 
 def _once(paths: Iterable[str]) -> list[str]:
