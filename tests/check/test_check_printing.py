@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from manifold3d import CrossSection, Manifold
@@ -102,26 +104,26 @@ def test_pins(side: float, found: bool, judge) -> None:
 @pytest.mark.parametrize(
     ("whisker", "found"),
     [
-        (block(10, 0.3, 0.3), True),
-        (block(10, 0.39, 0.39), True),
-        (block(10, 0.4, 0.4), False),
-        (block(10, 0.3, 0.45), False),
-        (block(10, 0.3, 0.1), True),
-        (block(2, 0.3, 0.3), True),
-        (block(10, 0.3, 0.3).rotate([0, 0, 30]), True),
-        (block(10, 0.3, 0.3).rotate([45, 0, 0]), True),
-        (Manifold.cylinder(10, 0.15, 0.15, 16).rotate([0, 90, 0]), True),
-        (Manifold.cylinder(10, 0.18, 0.18, 3).rotate([0, 90, 0]), True),
-        (Manifold.cylinder(10, 0.15, 0.15, 16).rotate([0, 50, 0]), True),
-        (Manifold.revolve(CrossSection.square([0.3, 0.3]).translate([4, 0]), 200).translate([4, 0, 0]), True),
-        (Manifold.cylinder(10, 3, 0, 32).rotate([0, 90, 0]), False),
+        (lambda: block(10, 0.3, 0.3), True),
+        (lambda: block(10, 0.39, 0.39), True),
+        (lambda: block(10, 0.4, 0.4), False),
+        (lambda: block(10, 0.3, 0.45), False),
+        (lambda: block(10, 0.3, 0.1), True),
+        (lambda: block(2, 0.3, 0.3), True),
+        (lambda: block(10, 0.3, 0.3).rotate([0, 0, 30]), True),
+        (lambda: block(10, 0.3, 0.3).rotate([45, 0, 0]), True),
+        (lambda: Manifold.cylinder(10, 0.15, 0.15, 16).rotate([0, 90, 0]), True),
+        (lambda: Manifold.cylinder(10, 0.18, 0.18, 3).rotate([0, 90, 0]), True),
+        (lambda: Manifold.cylinder(10, 0.15, 0.15, 16).rotate([0, 50, 0]), True),
+        (lambda: Manifold.revolve(CrossSection.square([0.3, 0.3]).translate([4, 0]), 200).translate([4, 0, 0]), True),
+        (lambda: Manifold.cylinder(10, 3, 0, 32).rotate([0, 90, 0]), False),
     ],
     ids=["square", "below", "at the floor", "high", "foil", "short", "aslant", "on edge", "round", "three-sided",
          "leaning", "ring", "spike"],
 )  # fmt: skip
 @pytest.mark.parametrize("height", [0, 2.5])
-def test_whiskers_that_lie_or_stand_out(whisker: Manifold, found: bool, height: float, judge) -> None:
-    solid = block(10, 10, 5) + whisker.translate([9, 5, height])
+def test_whiskers_that_lie_or_stand_out(whisker: Callable[[], Manifold], found: bool, height: float, judge) -> None:
+    solid = block(10, 10, 5) + whisker().translate([9, 5, height])
     solid = solid ^ block(40, 40, 20, (-10, -10, 0))  # nothing below the bed
     assert ("D002" in codes(judge, solid)) == found
 
