@@ -24,7 +24,8 @@ from PIL import Image  # noqa: E402
 
 from unitcad.cache import MemoryStore  # noqa: E402
 from unitcad.export.picture import draw  # noqa: E402
-from unitcad.pipeline import Variant, build  # noqa: E402
+from unitcad.pipeline import Variant  # noqa: E402
+from unitcad.pipeline.build import build  # noqa: E402
 from unitcad.pipeline.scenes import exploded, step_in_section, unit_cut_open  # noqa: E402
 from unitcad.report import write_report  # noqa: E402
 from unitcad.spec import load  # noqa: E402

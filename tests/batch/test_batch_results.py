@@ -14,7 +14,7 @@ from batching import bytes_of, calls, ring_sweep, rows, unitcad
 from unitcad.batch import Options, load_sweep, run
 from unitcad.batch.executors import SerialExecutor
 from unitcad.errors import UnitcadError
-from unitcad.pipeline import build
+from unitcad.pipeline.build import build
 from unitcad.spec import from_data, load, read, to_toml
 
 DOCS = Path(__file__).parent.parent.parent / "docs"

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.pipeline import Variant, build
+from unitcad.pipeline import Variant
+from unitcad.pipeline.build import build
 from unitcad.spec import load
 
 pytestmark = pytest.mark.skipif(shutil.which("gmsh") is None, reason="gmsh is not installed")

@@ -14,7 +14,7 @@ from unitcad.export import slicer, stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds import coupon
-from unitcad.pipeline import build
+from unitcad.pipeline.build import build
 from unitcad.pipeline.slicing import slice_tools
 from unitcad.spec import load, templates
 

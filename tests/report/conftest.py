@@ -11,7 +11,7 @@ import chromium
 import pytest
 
 from unitcad.cache import MemoryStore
-from unitcad.pipeline import build
+from unitcad.pipeline.build import build
 from unitcad.report import write_report
 from unitcad.spec import load
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from chromium import Visit, launched
 
-from unitcad.pipeline import build
+from unitcad.pipeline.build import build
 from unitcad.pipeline.scenes import moments
 from unitcad.pipeline.variant import Variant
 from unitcad.report import write_report

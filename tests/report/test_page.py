@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from unitcad.cache import MemoryStore
 from unitcad.cli import app
 from unitcad.errors import UnitcadError
-from unitcad.pipeline import build
+from unitcad.pipeline.build import build
 from unitcad.report import collect, page, write_report
 from unitcad.report.models import model, model_key
 from unitcad.report.pool import REFERENCE, Pool

@@ -9,8 +9,7 @@ from unitcad.accuracy.result import Result, Say, Table
 from unitcad.accuracy.timing import interleaved, machine
 from unitcad.cache import MemoryStore
 from unitcad.kernels import mesh
-from unitcad.pipeline import OUTPUTS
-from unitcad.pipeline.build import make
+from unitcad.pipeline.build import OUTPUTS, make
 from unitcad.pipeline.stages import Stages
 from unitcad.spec import load, templates
 

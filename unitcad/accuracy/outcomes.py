@@ -35,7 +35,7 @@ class Outcome:
 
 def build_outcome(data: dict[str, Any]) -> Outcome:
     """Build unit and moulds of a spec's data into a folder that is thrown away: laws, mesh files and their checks."""
-    from unitcad.pipeline import build
+    from unitcad.pipeline.build import build
     from unitcad.spec import from_data
 
     start = time.perf_counter()

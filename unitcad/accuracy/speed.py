@@ -5,6 +5,7 @@ The scripts lie in benchmarks/, beside those of the other rooms, which are run t
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -113,7 +114,7 @@ def run(quick: bool, say: Say) -> Result:
 def _call(script: Path, *arguments: object) -> str:
     """Run a script in a process of its own; its standard output. Raises UnitcadError if it fails."""
     command = [sys.executable, str(script), *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=_installed())
     if done.returncode:
         last = (done.stderr.strip().splitlines() or ["nothing on standard error"])[-1]
         raise UnitcadError(f"{script.name} ended with {done.returncode}: {last}")
@@ -122,7 +123,12 @@ def _call(script: Path, *arguments: object) -> str:
 
 def _build(out: Path, formats: str) -> None:
     words = ["build", "encapsulating", "--no-slice", "--formats", formats, "-o", str(out)]
-    subprocess.run([sys.executable, "-m", "unitcad", *words], capture_output=True, check=True)
+    subprocess.run([sys.executable, "-m", "unitcad", *words], capture_output=True, check=True, env=_installed())
+
+
+def _installed() -> dict[str, str]:
+    """The environment, with bytecode kept as an installed package has it: a clone may run where none is written."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
 def _warm(script: Path, lengths: Path, out: Path, formats: str, runs: int) -> Timing:

@@ -24,8 +24,7 @@ from unitcad.batch.sweep import MOST, Sweep
 from unitcad.batch.task import Job, Outcome, Task
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.pipeline import OUTPUTS
-from unitcad.pipeline.build import checked_outputs
+from unitcad.pipeline.build import OUTPUTS, checked_outputs
 from unitcad.pipeline.folder import clear_leftovers, folder_name
 from unitcad.pipeline.geometry import geometry_key
 from unitcad.pipeline.versions import code_version, kernel_versions

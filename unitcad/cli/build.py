@@ -30,8 +30,8 @@ def build(
     """Make a unit and its casting moulds. The last line printed is the folder."""
     from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json, progress
-    from unitcad.pipeline import OUTPUTS
-    from unitcad.pipeline import build as run
+    from unitcad.pipeline.build import OUTPUTS
+    from unitcad.pipeline.build import build as run
     from unitcad.pipeline.folder import PAGE
     from unitcad.pipeline.slicing import slice_tools
     from unitcad.spec import load

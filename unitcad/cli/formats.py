@@ -6,7 +6,7 @@ from __future__ import annotations
 def chosen_formats(formats: str | None) -> list[str]:
     """What --formats overrides in a spec. Raises Refusal for a format that there is not."""
     from unitcad.errors import unknown_name
-    from unitcad.pipeline import FORMATS
+    from unitcad.pipeline.build import FORMATS
 
     if formats is None:
         return []

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from unitcad.cache import digest
 from unitcad.errors import UnitcadError
-from unitcad.export import glb, stl, threemf
+from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.pipeline.versions import code_version, kernel_versions
@@ -93,6 +93,8 @@ def stl_content(variant: Variant, body: Body) -> bytes:
 
 def threemf_content(variant: Variant, bodies: Sequence[Body]) -> bytes:
     """The 3MF of several bodies, side by side on the spec's bed."""
+    from unitcad.export import threemf
+
     bed = variant.spec.moulds.bed_x_mm or 0.0, variant.spec.moulds.bed_y_mm or 0.0
     parts = [threemf.MeshPart(b.name, b.colour, *_ready(variant, b)) for b in bodies if printed(b)]
     return threemf.content(parts, bed)
@@ -100,6 +102,8 @@ def threemf_content(variant: Variant, bodies: Sequence[Body]) -> bytes:
 
 def glb_content(variant: Variant, bodies: Sequence[Body]) -> bytes:
     """The GLB of several bodies as assembled; what is cut or bought is in it too."""
+    from unitcad.export import glb
+
     return glb.content(
         [
             glb.GlbPart(b.name, b.colour, *arrays(variant.mesh(b)), {"role": b.role, "made": b.made, "step": b.step})
