@@ -34,7 +34,8 @@ class Ranges:
     """From where each field is drawn: (least, largest), mm where a length.
 
     `tail_share` is half the tail's width over the core's radius, drawn instead of the width where it is given; `edges`
-    is the share of lengths that lie on an end of their range.
+    is the share of lengths that lie on an end of their range, `singles` that of specs with one cavity whatever the
+    range says.
     """
 
     diameter_mm: tuple[float, float]
@@ -52,6 +53,7 @@ class Ranges:
     cavities: tuple[int, int]
     tail_share: tuple[float, float] | None = None
     edges: float = 0.0
+    singles: float = 0.0
 
     def rows(self) -> list[tuple[str, float, float]]:
         """(field, least, largest) for a table."""
@@ -91,6 +93,7 @@ EXTREME = Ranges(
     cavities=(1, 4),
     tail_share=(0.05, 0.75),
     edges=0.2,
+    singles=0.5,
 )
 """To the limits and past them: most of it is refused, and nothing else may happen."""
 
@@ -140,6 +143,7 @@ def random_spec(choose: Choose, ranges: Ranges = DOCUMENTED, formats: Sequence[s
         # Most sums of walls leave no room in a diameter drawn by itself: these are drawn round motor and walls.
         walls = motor["diameter_mm"] / 2 + sum(layer["wall_mm"] for layer in layers)
         diameter = round(min(ranges.diameter_mm[1], 2 * walls + length((0.0, 12.0))), 3)
+    alone = ranges.singles and choose.whole(1, 100) <= 100 * ranges.singles
     data: dict[str, Any] = {
         "name": "random",
         "design": design,
@@ -149,7 +153,7 @@ def random_spec(choose: Choose, ranges: Ranges = DOCUMENTED, formats: Sequence[s
         "moulds": {
             "plinth_clearance_mm": length(ranges.plinth_clearance_mm),
             "window_clearance_mm": length(ranges.window_clearance_mm),
-            "cavities": [choose.whole(*ranges.cavities), choose.whole(*ranges.cavities)],
+            "cavities": [1, 1] if alone else [choose.whole(*ranges.cavities), choose.whole(*ranges.cavities)],
         },
         "output": {"formats": list(formats), "tolerance_mm": spread(ranges.tolerance_mm)},
     }
