@@ -11,7 +11,7 @@ import pytest
 
 from unitcad.accuracy import runner
 from unitcad.accuracy.plot import svg
-from unitcad.accuracy.result import Plot, Promise, Result, Table, from_dict, frontier, markdown, shown
+from unitcad.accuracy.result import Plot, Promise, Result, Table, fastest, from_dict, frontier, markdown, shown
 from unitcad.accuracy.timing import interleaved, timing
 from unitcad.errors import Refusal, UnitcadError
 
@@ -31,6 +31,11 @@ def test_a_promise_is_kept_up_to_its_limit_and_never_by_what_is_no_number():
     assert not Promise("", 1.1, 1.0).ok
     assert not Promise("", math.nan, 1.0).ok
     assert not RESULT.ok
+
+
+def test_fastest_of_what_is_exact_enough():
+    points = [("quick", 1.0, 0.1), ("slow", 9.0, 1e-9), ("middle", 2.0, 1e-3), ("lost", 0.5, math.nan)]
+    assert [fastest(points, error) for error in (0.1, 1e-2, 1e-6, 1e-12)] == ["quick", "middle", "slow", None]
 
 
 def test_frontier_is_what_no_other_point_beats():

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy import fft, integrate, special
 
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, frontier
+from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, fastest, frontier
 from unitcad.accuracy.timing import interleaved, machine
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.loads import UniformDisc
@@ -27,8 +27,8 @@ RADII = np.array([0.5, 1, 2, 3, 4, 5, 7, 9, 12, 15, 20, 25, 30]) * 1e-3
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 _END = 3e5
 """Where the reference's path ends, 1/m: beyond it nothing of the remainder is left (checked by doubling it)."""
-
-
+_LEVELS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)
+"""Errors for which the page says what to pick."""
 _INTERVALS = 300
 """Of the adaptive quadrature, at most: beyond that it takes a second and more."""
 
@@ -84,11 +84,14 @@ def cases() -> list[Case]:
 def run(quick: bool, say: Say) -> Result:
     """Every case by every way."""
     tables, plots, promises = [], [], []
+    ends: dict[str, list[tuple[str, float, float]]] = {}
     for case in cases():
         say(case.name)
         reference = brute_force(case)
         rows = _rows(case, reference, quick)
-        marks = frontier([(row.seconds, row.error) for row in rows])
+        ends[case.name] = [(f"{row.way}, {row.setting}: {row.shown}", row.seconds, row.error) for row in rows]
+        # A way that is off by as much as the answer is no choice at any time.
+        marks = frontier([(row.seconds, row.error if row.error < 1 else math.inf) for row in rows])
         tables.append(
             Table(
                 case.name,
@@ -114,6 +117,8 @@ def run(quick: bool, say: Say) -> Result:
             # The reference itself is good to about 1e-13: below that an estimate can't be judged.
             ratio = row.error / max(row.estimate or 0.0, 2e-13)
             promises.append(Promise(f"{case.name}: error over its estimate at rtol {rtol:g}", ratio, 1.0))
+    picks = tuple((level, *(fastest(points, level) for points in ends.values())) for level in _LEVELS)
+    tables.append(Table("What to pick: the fastest way to an error", ("error", *ends), picks))
     return Result(
         suite="hankel",
         title="The Hankel integral: error against time",

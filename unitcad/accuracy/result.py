@@ -107,6 +107,11 @@ def frontier(points: Sequence[tuple[float, float]]) -> list[bool]:
     ]
 
 
+def fastest(points: Sequence[tuple[str, float, float]], error: float) -> str | None:
+    """The name of the cheapest of (name, cost, error) that is no further off than `error`; None if none is."""
+    return min(((cost, name) for name, cost, found in points if found <= error), default=(0.0, None))[1]
+
+
 def shown(value: Cell) -> str:
     """A cell as text."""
     if value is None:
