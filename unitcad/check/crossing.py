@@ -22,6 +22,7 @@ from unitcad.check.topology import Topology, max_side_squared
 
 _EPS = float(np.finfo(np.float64).eps)
 _BLOCK = 1 << 17
+_CACHED = 1 << 11  # pairs whose coordinates stay in the processor's cache
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
@@ -47,9 +48,10 @@ class _Found:
 
 @dataclass(frozen=True)
 class _Faces:
-    """Faces in Morton order and what the sieves need of them."""
+    """Faces in Morton order and what the sieves need of them; `columns` are the vertices' three coordinates."""
 
     vertices: Floats
+    columns: tuple[Floats, Floats, Floats]
     corners: tuple[Ints, Ints, Ints]
     normal: Floats
     safe: tuple[Ints, Ints, Ints]
@@ -93,9 +95,9 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
 def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) -> _Faces:
     vertices = topology.mesh.vertices
     corners = tuple(np.ascontiguousarray(ordered[:, k]) for k in range(3))
-    points = [np.ascontiguousarray(vertices[:, axis]) for axis in range(3)]
-    at = [[column.take(corner, mode="clip") for column in points] for corner in corners]
+    columns = tuple(np.ascontiguousarray(vertices[:, axis]) for axis in range(3))
     if topology.edges.closed:
+        at = [[column.take(corner, mode="clip") for column in columns] for corner in corners]
         smooth = _height_fields(len(vertices), corners, at, normal)
         smooth |= _tilted_fields(vertices, corners, normal, ~smooth)
         safe = tuple(np.where(smooth[corner], corner, -1) for corner in corners)
@@ -103,6 +105,7 @@ def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) ->
         safe = tuple(np.full(len(order), -1, np.int32) for _ in corners)
     return _Faces(
         vertices,
+        columns,  # type: ignore[arg-type]
         corners,  # type: ignore[arg-type]
         normal,
         safe,  # type: ignore[arg-type]
@@ -186,57 +189,77 @@ def _strangers(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     return i[keep], j[keep]
 
 
-def _longest(faces: _Faces, which: Ints) -> Floats:
-    """The squared length of the longest side of some faces."""
-    return max_side_squared(np.stack([faces.vertices[corner[which]] for corner in faces.corners], axis=1))
+@dataclass(frozen=True)
+class _Some:
+    """Corners (3 of them, 3 axes, n), normals (3 axes, n) and squared longest sides of some faces."""
+
+    corners: Floats
+    normal: Floats
+    longest: Floats
+
+    def only(self, which: Ints) -> _Some:
+        return _Some(self.corners[:, :, which], self.normal[:, which], self.longest[which])
 
 
-def _beside(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
-    """Without pairs where one lies wholly on one side of the other's plane, farther than rounding can hide."""
-    for _ in range(2):
-        normal, size = faces.normal[i], _longest(faces, i)
-        origin = faces.vertices[faces.corners[0][i]]
-        above, below = np.ones(len(i), bool), np.ones(len(i), bool)
-        bound = 32 * _EPS * size
-        for corner in faces.corners:
-            offset = faces.vertices[corner[j]]
-            offset -= origin
-            height = np.einsum("ij,ij->i", offset, normal)
-            np.abs(offset, out=offset)
-            error = bound * (offset[:, 0] + offset[:, 1] + offset[:, 2])
-            above &= height > error
-            below &= height < -error
-        keep = np.flatnonzero(~(above | below))
-        i, j = j[keep], i[keep]
-    return i, j
+def _some(faces: _Faces, which: Ints) -> _Some:
+    corners = np.empty((3, 3, len(which)))
+    for k, corner in enumerate(faces.corners):
+        ids = corner.take(which, mode="clip")
+        for axis, column in enumerate(faces.columns):
+            column.take(ids, out=corners[k, axis], mode="clip")
+    normal = faces.normal.take(which, axis=0, mode="clip").T.copy()
+    sides = corners - corners[[2, 0, 1]]
+    sides *= sides
+    return _Some(corners, normal, sides.sum(axis=1).max(axis=0))
 
 
-def _aside(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
-    """Without pairs where one lies wholly beyond an edge of the other, seen along that one's normal."""
-    for _ in range(2):
-        first = [faces.vertices[corner[i]] for corner in faces.corners]
-        second = [faces.vertices[corner[j]] for corner in faces.corners]
-        normal, reach = faces.normal[i], np.sqrt(_longest(faces, i))
-        beyond = np.zeros(len(i), bool)
-        for k in range(3):
-            out = cross(first[(k + 1) % 3] - first[k], normal)
-            bound = 64 * _EPS * np.abs(out).sum(axis=1)
-            apart = np.ones(len(i), bool)
-            for point in second:
-                offset = point - first[k]
-                height = np.einsum("ij,ij->i", offset, out)
-                apart &= height > bound * (np.abs(offset).sum(axis=1) + reach)
-            beyond |= apart
-        keep = np.flatnonzero(~beyond)
-        i, j = j[keep], i[keep]
-    return i, j
+def _sieved(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
+    """Without pairs of which one lies wholly beyond the other's plane, or beyond an edge seen along its normal."""
+    kept: list[tuple[Ints, Ints]] = [(i[:0], j[:0])]
+    for start in range(0, len(i), _CACHED):
+        block = slice(start, start + _CACHED)
+        a, b = _some(faces, i[block]), _some(faces, j[block])
+        left = np.arange(len(a.longest)) + start
+        for apart in (_beside, _aside):
+            for _ in range(2):
+                keep = np.flatnonzero(~apart(a, b))
+                if len(keep) < len(left):
+                    left, a, b = left[keep], a.only(keep), b.only(keep)
+                a, b = b, a
+        kept.append((i[left], j[left]))
+    return np.concatenate([pair[0] for pair in kept]), np.concatenate([pair[1] for pair in kept])
+
+
+def _beside(a: _Some, b: _Some) -> Bools:
+    """Where b lies on one side of a's plane, farther than rounding can hide."""
+    offset = b.corners - a.corners[0]
+    height = (offset * a.normal).sum(axis=1)
+    np.abs(offset, out=offset)
+    error = offset.sum(axis=1)
+    error *= 32 * _EPS * a.longest
+    return np.asarray((height > error).all(axis=0) | (height < -error).all(axis=0))
+
+
+def _aside(a: _Some, b: _Some) -> Bools:
+    """Where b lies beyond an edge of a, seen along a's normal."""
+    reach = np.sqrt(a.longest)
+    found = np.zeros(len(reach), bool)
+    for k in range(3):
+        side, normal = a.corners[(k + 1) % 3] - a.corners[k], a.normal
+        out = np.stack([side[1] * normal[2] - side[2] * normal[1], side[2] * normal[0] - side[0] * normal[2],
+                        side[0] * normal[1] - side[1] * normal[0]])  # fmt: skip
+        bound = 64 * _EPS * np.abs(out).sum(axis=0)
+        offset = b.corners - a.corners[k]
+        height = (offset * out).sum(axis=1)
+        found |= (height > bound * (np.abs(offset).sum(axis=1) + reach)).all(axis=0)
+    return found
 
 
 def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> None:
     """Exact answers for the pairs that came through the sieves."""
     i = np.concatenate([pair[0] for pair in waiting]) if waiting else np.empty(0, np.int32)
     j = np.concatenate([pair[1] for pair in waiting]) if waiting else np.empty(0, np.int32)
-    i, j = _aside(faces, *_beside(faces, i, j))
+    i, j = _sieved(faces, i, j)
     if not len(i) or found.kept > _FEW:
         return
     ids_a = np.stack([corner[i] for corner in faces.corners], axis=1)

@@ -80,20 +80,21 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
 
 
 def measures(topology: Topology) -> tuple[Floats, Floats, Floats]:
-    """Signed volume (mm3), low and high corner of each shell."""
+    """Signed volume (mm3), low and high corner of each shell; of a single one the box round all vertices."""
     mesh, labels, n = topology.mesh, topology.shells, topology.n_shells
     vertices, faces = mesh.vertices, mesh.faces
     if not n:
         return np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
-    origin = sum(extent(vertices)) / 2
-    corner = vertices[faces[:, 0]]
-    corner -= origin
-    tetra = np.einsum("ij,ij->i", corner, topology.areas)
+    low, high = extent(vertices)
+    corner = faces[:, 0]
+    tetra = np.zeros(len(faces))
+    for axis in range(3):
+        height = vertices[:, axis].take(corner)
+        height -= (low[axis] + high[axis]) / 2
+        height *= topology.areas[:, axis]
+        tetra += height
     tetra /= 6
     if n == 1:
-        used = np.zeros(len(vertices), bool)
-        used[faces] = True
-        low, high = extent(vertices[used])
         return np.array([tetra.sum()]), low[None], high[None]
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     for side in range(3):
