@@ -84,13 +84,14 @@ def _bridged(topology: Topology, faces: Ints, segments: Floats, supported: Float
     span, ledge = float(printer.bridge_mm), float(printer.least_feature_mm)
     held = _distance(points, segments[supported]) <= ledge * 1.001
     points = points[~held]
-    good = np.zeros(len(points), bool)
     for angle in np.pi * np.arange(_ANGLES) / _ANGLES:
+        if not len(points):
+            break
         along = np.array([np.cos(angle), np.sin(angle)])
         ahead, ahead_held = _first(points, along, segments, supported)
         back, back_held = _first(points, -along, segments, supported)
-        good |= ahead_held & back_held & (ahead + back <= span * 1.001)
-    return bool(good.all())
+        points = points[~(ahead_held & back_held & (ahead + back <= span * 1.001))]
+    return not len(points)
 
 
 def _first(points: Floats, along: Floats, segments: Floats, supported: Floats) -> tuple[Floats, Floats]:
