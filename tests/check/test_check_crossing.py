@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from fractions import Fraction
 
 import numpy as np
@@ -222,10 +223,17 @@ def test_a_wavy_torus_does_not_cross_itself_until_it_is_pushed_through() -> None
     assert "G001" in found
 
 
-def test_crossing_count_equals_brute_force() -> None:
+@pytest.mark.parametrize("scale", [1.0, 4.0])
+@pytest.mark.parametrize("mesh", ["closed", "with holes", "with faces turned over"])
+def test_crossing_count_equals_brute_force(mesh: str, scale: float) -> None:
     points, faces = _sphere(7)
     rng = np.random.default_rng(2)
-    points = points + rng.normal(scale=4.0, size=points.shape)
+    points = points + rng.normal(scale=scale, size=points.shape)
+    some = rng.random(len(faces)) < 0.1
+    if mesh == "with holes":
+        faces = faces[~some]
+    elif mesh == "with faces turned over":
+        faces[some] = faces[some][:, ::-1]
     report = check_mesh(points, faces)
     counted = 0
     for i in range(len(faces)):
@@ -235,6 +243,18 @@ def test_crossing_count_equals_brute_force() -> None:
                 counted += answer is not None and answer[0]
     crossing = next(found for found in report.findings if found.code == "G001")
     assert crossing.count == counted > 0
+
+
+def test_one_missing_face_does_not_make_it_slow() -> None:
+    """Faces round a vertex are left aside wherever they surround it, hole or no hole elsewhere."""
+    points, faces = _sphere(100)
+    start = time.perf_counter()
+    whole = check_mesh(points, faces)
+    closed = time.perf_counter() - start
+    opened = check_mesh(points, faces[1:])
+    assert whole.findings == ()
+    assert [found.code for found in opened.findings] == ["T001"]
+    assert time.perf_counter() - start - closed < 10 * closed + 0.5
 
 
 def test_order_of_faces_and_vertices_does_not_matter() -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from unitcad.check import triangles
+from unitcad.check.edges import balanced
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Bools, Floats, Ints, area_vectors, cross, float32_step
@@ -96,13 +97,11 @@ def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) ->
     vertices = topology.mesh.vertices
     corners = tuple(np.ascontiguousarray(ordered[:, k]) for k in range(3))
     columns = tuple(np.ascontiguousarray(vertices[:, axis]) for axis in range(3))
-    if topology.edges.closed:
-        at = [[column.take(corner, mode="clip") for column in columns] for corner in corners]
-        smooth = _height_fields(len(vertices), corners, at, normal)
-        smooth |= _tilted_fields(vertices, corners, normal, ~smooth)
-        safe = tuple(np.where(smooth[corner], corner, -1) for corner in corners)
-    else:
-        safe = tuple(np.full(len(order), -1, np.int32) for _ in corners)
+    at = [[column.take(corner, mode="clip") for column in columns] for corner in corners]
+    whole = _surrounded(topology)
+    smooth = _height_fields(len(vertices), corners, at, normal) & whole
+    smooth |= _tilted_fields(vertices, corners, normal, whole & ~smooth)
+    safe = tuple(np.where(smooth[corner], corner, -1) for corner in corners)
     return _Faces(
         vertices,
         columns,  # type: ignore[arg-type]
@@ -115,11 +114,22 @@ def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) ->
     )
 
 
+def _surrounded(topology: Topology) -> Bools:
+    """Vertices all of whose edges have two faces, wound alike."""
+    edges, found = topology.edges, np.ones(len(topology.mesh.vertices), bool)
+    if not edges.closed:
+        wrong = (edges.size != 2) | ~balanced(topology.mesh.faces, edges)
+        found[edges.low[wrong]] = False
+        found[edges.high[wrong]] = False
+    return found
+
+
 def _height_fields(n: int, corners: tuple[Ints, ...], at: list[list[Floats]], areas: Floats) -> Bools:
     """Vertices whose faces all face one way along some axis and go round once: such a star is a height field.
 
-    Needs a closed mesh. Seen along the axis each face then turns the same way by less than half a turn, so turns are
-    counted by the neighbours that pass the line of one coordinate: comparisons only, hence exact.
+    Holds for vertices that are surrounded by faces. Seen along the axis each face then turns the same way by less than
+    half a turn, so turns are counted by the neighbours that pass the line of one coordinate: comparisons only, hence
+    exact.
     """
     least = 1e-9 * (np.abs(areas[:, 0]) + np.abs(areas[:, 1]) + np.abs(areas[:, 2]))
     ways = np.zeros(len(areas), np.uint8)  # bits 0 to 2: faces up along x, y, z; 3 to 5: down

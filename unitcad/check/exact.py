@@ -14,6 +14,8 @@ from unitcad.check.mesh import Floats, Ints
 _EPS = np.finfo(np.float64).eps / 2
 _O3D = (7.0 + 56.0 * _EPS) * _EPS
 _O2D = (3.0 + 16.0 * _EPS) * _EPS
+_SMALL, _LARGE = 1e-120, 1e120
+"""Between them a product and what rounding takes of it neither underflow nor overflow."""
 
 
 def orient3d(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
@@ -35,27 +37,68 @@ def orient3d(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
 
 def orient2d(a: Floats, b: Floats, c: Floats) -> Ints:
     """The sign of the area of each triangle a, b, c in the plane, (n, 2) arrays: positive anticlockwise."""
-    left = (a[:, 0] - c[:, 0]) * (b[:, 1] - c[:, 1])
-    right = (a[:, 1] - c[:, 1]) * (b[:, 0] - c[:, 0])
+    ac, bc = a - c, b - c
+    left, right = ac[:, 0] * bc[:, 1], ac[:, 1] * bc[:, 0]
     det = left - right
     sign = np.sign(det).astype(np.int8)
     unsure = np.flatnonzero(np.abs(det) <= _O2D * (np.abs(left) + np.abs(right)) + 1e-290)
     if len(unsure):
-        whole = integers(np.stack([a[unsure], b[unsure], c[unsure]]))
-        if whole.dtype == np.int64:
-            u, v = whole[0] - whole[2], whole[1] - whole[2]
-            sign[unsure] = np.sign(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-        else:
-            for place, (p, q, r) in zip(unsure, whole.transpose(1, 0, 2).tolist(), strict=True):
-                value = (p[0] - r[0]) * (q[1] - r[1]) - (p[1] - r[1]) * (q[0] - r[0])
-                sign[place] = (value > 0) - (value < 0)
+        sign[unsure] = _exact2d(a[unsure], b[unsure], c[unsure])
     return sign
 
 
+def _exact2d(a: Floats, b: Floats, c: Floats) -> Ints:
+    """The same without error. Single precision has exact differences: then two products are compared to their last bit.
+
+    Rounding keeps order, so products that round apart are apart; else what the rounding took decides (Dekker, 1971).
+    """
+    ac, bc = a - c, b - c
+    (left, left_rest), (right, right_rest) = _product(ac[:, 0], bc[:, 1]), _product(ac[:, 1], bc[:, 0])
+    sign = np.where(left == right, np.sign(left_rest - right_rest), np.sign(left - right)).astype(np.int8)
+    exact = (_rounded_off(a, c, ac) == 0).all(axis=1) & (_rounded_off(b, c, bc) == 0).all(axis=1)
+    for value in (ac, bc):
+        size = np.abs(value)
+        exact &= ((size == 0) | ((size > _SMALL) & (size < _LARGE))).all(axis=1)
+    rest = np.flatnonzero(~exact)
+    if not len(rest):
+        return sign
+    whole = integers(np.stack([a[rest], b[rest], c[rest]]))
+    if whole.dtype == np.int64:
+        u, v = whole[0] - whole[2], whole[1] - whole[2]
+        sign[rest] = np.sign(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        return sign
+    for place, (p, q, r) in zip(rest, whole.transpose(1, 0, 2).tolist(), strict=True):
+        value = (p[0] - r[0]) * (q[1] - r[1]) - (p[1] - r[1]) * (q[0] - r[0])
+        sign[place] = (value > 0) - (value < 0)
+    return sign
+
+
+def _rounded_off(a: Floats, b: Floats, difference: Floats) -> Floats:
+    """a - b less `difference`, which is a - b rounded; exact (Shewchuk 1997, two-diff)."""
+    virtual = a - difference
+    return (a - (difference + virtual)) + (virtual - b)
+
+
+def _product(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """x y rounded, and what rounding took; exact while neither overflows or underflows (Dekker's product)."""
+    product = x * y
+    (high_x, low_x), (high_y, low_y) = _halves(x), _halves(y)
+    return product, low_x * low_y - (((product - high_x * high_y) - low_x * high_y) - high_x * low_y)
+
+
+def _halves(value: Floats) -> tuple[Floats, Floats]:
+    with np.errstate(over="ignore", invalid="ignore"):  # such values are left to whole numbers
+        scaled = value * 134_217_729.0  # 2 ** 27 + 1
+        high = scaled - (scaled - value)
+    return high, value - high
+
+
 def _exact3d(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
-    """The same with whole numbers. Faces that lie on an axis have equal coordinates: no arithmetic is needed."""
+    """The same with whole numbers. Faces square to an axis have equal coordinates, neighbours equal points: no need."""
     sign = np.zeros(len(a), np.int8)
     flat = ((a == b) & (b == c) & (c == d)).any(axis=1)
+    for point in (a, b, c):
+        flat |= (point == d).all(axis=1)
     rest = np.flatnonzero(~flat)
     if not len(rest):
         return sign
