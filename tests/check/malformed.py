@@ -301,6 +301,7 @@ def _geometry() -> list[tuple]:
         ("two.stl", "G005", stl(np.concatenate([cube, box(at=(20, 0, 0))])), {"shells": 1}),
         ("hollow.stl", "G006", stl(np.concatenate([cube, inner[:, ::-1]]))),
         ("sheet.obj", "G007", "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 3 3 0\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 1 3 2\n"),
+        ("one-point.stl", "G007", stl(np.full((9, 3, 3), 5.0))),
         ("metres.stl", "S001", stl(box((0.014, 0.014, 0.005)))),
         ("microns.stl", "S001", stl(box((14_000, 14_000, 5_000)))),
         ("inches.3mf", "S001", package(model_xml(attributes='unit="meter"'))),

@@ -54,6 +54,7 @@ def files() -> list[tuple]:
         ("comment-first.stl", "F005", "# made by hand\n" + text),
         ("json.stl", "F005", '{"error": 1}'),
         ("trailing.stl", "F006", good + b"xyz"),
+        ("facets-after-endsolid.stl", "F003", text_stl(box()) + text_stl(box(at=(20, 0, 0))).split("\n", 1)[1]),
         ("trailing-text.stl", "F006", text + "made by hand\n"),
         ("trailing.3mf", "F006", package() + b"xyz"),
         ("solid-header.stl", "F007", stl(box(), header=b"solid made by a program")),
@@ -102,6 +103,12 @@ def text_meshes() -> list[tuple]:
         ("underscore.obj", "F004", obj.replace("v 10", "v 1_0", 1)),
         ("underscore.off", "F004", off.replace("\n10 ", "\n1_0 ", 1)),
         ("word.obj", "F004", obj.replace("f 1 ", "f one ", 1)),
+        ("edge.obj", "F008", obj + "f 1 2\n"),
+        ("edge-slashes.obj", "F008", obj + "f 1/1 2/2  # an edge\n"),
+        ("edge.off", "F008", off.replace("3 0 1 3", "2 0 1", 1)),
+        ("face-too-short.off", "F003", off.replace("3 0 1 3", "999999999 0 1 3", 1)),
+        ("cr-only.obj", "F009", obj.replace("\n", "\r")),
+        ("bom.obj", "F009", "\ufeff" + obj),
         ("word.off", "F004", off.replace("\n10 ", "\nten ", 1)),
     ]
 
@@ -126,4 +133,27 @@ def _obj() -> str:
 
 def good_text_meshes() -> list[tuple[str, str]]:
     """(name, content) of the same cube without a fault."""
-    return [("cube.off", _off()), ("cube.ply", _ply()), ("cube.obj", _obj())]
+    good = [("cube.off", _off()), ("cube.ply", _ply()), ("cube.obj", _obj()), ("tabs.obj", _obj().replace(" ", "\t"))]
+    for turn in range(6):
+        for hand in (1, -1):
+            points, faces = _angle(turn, hand)
+            lines = [f"{len(face)} {' '.join(map(str, face))}\n" for face in faces]
+            good.append((f"angle{turn}{hand}.off", "OFF\n12 8 0\n" + _rows("", points) + "".join(lines)))
+            named = ["f " + " ".join(f"{i + 1}//" for i in face) + "\n" for face in faces]
+            good.append((f"angle{turn}{hand}.obj", _rows("v ", points) + "".join(named)))
+            back = ["f " + " ".join(str(i - 12) for i in face) + "\n" for face in faces]
+            good.append((f"back{turn}{hand}.obj", _rows("v ", points) + "".join(back)))
+    return good
+
+
+def _angle(turn: int, hand: int) -> tuple[np.ndarray, list[list[int]]]:
+    """A prism over an L whose six-cornered caps begin at any corner; mirrored for hand -1."""
+    plan = np.array([(0, 0), (9, 0), (9, 3), (3, 3), (3, 9), (0, 9)], float)
+    points = np.vstack([np.column_stack([plan, np.full(6, z)]) for z in (0, 4)])
+    bottom, top = np.roll([5, 4, 3, 2, 1, 0], turn), np.roll(np.arange(6, 12), turn)
+    sides = [[i, (i + 1) % 6, 6 + (i + 1) % 6, 6 + i] for i in range(6)]
+    faces = [bottom.tolist(), top.tolist(), *sides]
+    if hand < 0:  # mirrored, and turned over again
+        points[:, 0] = 9 - points[:, 0]
+        faces = [face[::-1] for face in faces]
+    return points, faces

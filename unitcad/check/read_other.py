@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.check import read_ply, text_mesh
+from unitcad.check import polygons, read_ply, text_mesh
 from unitcad.check.findings import Finding, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Mesh, weld_exact
@@ -30,7 +30,8 @@ def reader_for(kind: str) -> Read:
 
 
 def _read(kind: str, raw: bytes, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    findings = _looked_at(kind, raw, limits)
+    raw, findings = text_mesh.plain(kind, raw)
+    findings += _looked_at(kind, raw, limits)
     deadline.tick()
     findings += text_mesh.look(kind, raw)
     deadline.tick()
@@ -38,7 +39,7 @@ def _read(kind: str, raw: bytes, limits: Limits, deadline: Deadline) -> tuple[li
         raw, trailing = read_ply.trimmed(raw, deadline)
         findings += trailing
     try:
-        vertices, faces = _loaded(kind, raw)
+        vertices, faces = _loaded(kind, polygons.in_triangles(kind, raw))
     except Unreadable as stop:
         raise Unreadable(*findings, *stop.findings) from stop
     deadline.tick()
@@ -79,7 +80,7 @@ def _looked_at(kind: str, raw: bytes, limits: Limits) -> list[Finding]:
         raise over_limit(f"{max(counts)} vertices or faces promised")
     if counts and max(counts) > len(raw):
         raise Unreadable(finding("F002", f"{max(counts)} vertices or faces promised in {len(raw)} bytes"))
-    return [finding("F009", "a UTF-8 byte order mark at the start")] if raw[:3] == b"\xef\xbb\xbf" else []
+    return []
 
 
 def _loaded(kind: str, raw: bytes) -> tuple[np.ndarray, np.ndarray]:

@@ -175,10 +175,9 @@ def _walk(raw: bytes, found: _Text, limits: Limits, deadline: Deadline) -> None:
             inside, at = False, line_end
         elif word == b"facet":
             if not inside:
-                if not found.solids:
-                    found.findings.append(_at("F003", "facets without a solid line", raw, at))
-                    found.solids = 1
-                inside = True
+                what = "after endsolid" if found.solids else "without a solid line"
+                found.findings.append(_at("F003", f"facets {what}", raw, at))
+                found.solids, inside = found.solids + 1, True
             at = _facets(raw, at, found, limits, deadline)
             if at < 0:
                 return

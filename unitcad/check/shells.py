@@ -32,6 +32,8 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
     vertices, faces = mesh.vertices, mesh.faces
     volumes, low, high = measures(topology)
     found: list[Finding] = []
+    if n == 0:
+        found.append(finding("G007", "no face has an area"))
     if not topology.watertight or not topology.oriented or n == 0:
         return Shells(volumes, low, high, tuple(found))
     area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2

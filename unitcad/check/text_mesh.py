@@ -18,14 +18,31 @@ _IN_NUMBERS = b"0123456789+-.eEnNaAiIfFtTyY \t\r\n\f\v"  # of a word that may be
 _COMMENT = re.compile(rb"#[^\n]*")
 _OFF_START = re.compile(rb"^[ \t\r\n]*[A-Z0-9]*OFF\b", re.IGNORECASE)
 _PLY_ELEMENT = re.compile(rb"(?m)^[ \t]*element[ \t]+(\w+)[ \t]+(\d+)[ \t\r]*$")
-_OBJ_VERTEX = re.compile(rb"(?m)^[ \t]*v[ \t]+([^#\n]*)")
+OBJ_VERTEX = re.compile(rb"(?m)^[ \t]*v[ \t]+([^#\n]*)")
 _OBJ_FACE = re.compile(rb"(?m)^[ \t]*f[ \t]+([^#\n]*)")
+_OBJ_SHORT = re.compile(rb"(?m)^[ \t]*f(?:[ \t]+[^\s#\\]+){0,2}[ \t]*(?:#[^\n]*)?$")
+_PLY_TEXT = re.compile(rb"(?m)^[ \t]*format[ \t]+ascii\b")
 _OBJ_ZERO = re.compile(rb"(?m)^[ \t]*f[ \t](?:[^#\n]*[ \t])?[+-]?0+(?=[/\s]|\Z)")
+
+
+def plain(kind: str, raw: bytes) -> tuple[bytes, list[Finding]]:
+    """Text as trimesh reads it: no byte order mark, LF line ends, blanks for tabs. Binary files stay as they are."""
+    found = []
+    if raw[:3] == b"\xef\xbb\xbf":
+        found.append(finding("F009", "a UTF-8 byte order mark at the start"))
+        raw = raw[3:]
+    if b"\x00" in raw or (kind == "ply" and not _PLY_TEXT.search(raw[:1000])):
+        return raw, found
+    if b"\r" in raw:
+        if b"\n" not in raw:
+            found.append(finding("F009", "CR-only line ends"))
+        raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return raw.replace(b"\t", b" "), found
 
 
 def look(kind: str, raw: bytes) -> list[Finding]:
     """Findings that leave a mesh. Raises `Unreadable` for counts that the lines don't reach, index 0, no numbers."""
-    numbers = _numbers(kind, raw)
+    numbers = numbers_of(kind, raw)
     if numbers is None:
         return []
     if numbers.translate(None, _IN_NUMBERS):
@@ -34,22 +51,43 @@ def look(kind: str, raw: bytes) -> list[Finding]:
         if match := _OBJ_ZERO.search(raw):
             place = Location(line=raw.count(b"\n", 0, match.end()) + 1)
             raise Unreadable(finding("P011", "a face names vertex 0; OBJ counts from 1", places=[place]))
-        return []
+        return _short_faces([raw.count(b"\n", 0, match.start()) + 1 for match in _OBJ_SHORT.finditer(raw)])
     promised = _promised(kind, raw, numbers)
     if promised is None:
         return []
-    lines = sum(1 for line in numbers.split(b"\n") if line.strip()) - (kind == "off")
+    rows = [line for line in numbers.split(b"\n") if line.strip()]
+    lines = len(rows) - (kind == "off")
     if lines < promised:
         text = f"the header promises {counted(promised, 'line')} of vertices, faces and other elements, not {lines}"
         raise Unreadable(finding("F002", text, promised - lines))
+    found = _off_faces(rows[: promised + 1]) if kind == "off" else []
     if lines > promised:
-        return [finding("F006", f"{counted(lines - promised, 'line')} after the last element", lines - promised)]
-    return []
+        found += [finding("F006", f"{counted(lines - promised, 'line')} after the last element", lines - promised)]
+    return found
+
+
+def _short_faces(lines: list[int]) -> list[Finding]:
+    if not lines:
+        return []
+    text = f"{counted(len(lines), 'face')} with fewer than three vertices"
+    return [finding("F008", text, len(lines), [Location(line=line) for line in lines])]
+
+
+def _off_faces(rows: list[bytes]) -> list[Finding]:
+    """The counts that the face rows of an OFF begin with. Raises `Unreadable` where a row is shorter than it says."""
+    short = 0
+    for row in rows[1 + int(rows[0].split()[0][:18]) :]:
+        words = row.split()
+        size = int(words[0][:18]) if words[0].isdigit() else 0
+        if size >= len(words):
+            raise Unreadable(finding("F003", f"a face of {counted(size, 'vertex', 'vertices')} names {len(words) - 1}"))
+        short += size < 3
+    return [finding("F008", f"{counted(short, 'face')} with fewer than three vertices", short)] if short else []
 
 
 def explained(kind: str, raw: bytes) -> Finding:
     """Why trimesh could not read it, in the format's words."""
-    numbers = _numbers(kind, raw)
+    numbers = numbers_of(kind, raw)
     try:
         if numbers is not None:
             _refuse_words(numbers)
@@ -68,10 +106,10 @@ def without_comments(raw: bytes) -> bytes:
     return raw if b"\x00" in raw else _COMMENT.sub(b"", raw)
 
 
-def _numbers(kind: str, raw: bytes) -> bytes | None:
+def numbers_of(kind: str, raw: bytes) -> bytes | None:
     """The part that holds only numbers, line by line; None where the file is binary or has no such part."""
     if kind == "obj":
-        return b"\n".join(_OBJ_VERTEX.findall(raw))
+        return b"\n".join(OBJ_VERTEX.findall(raw))
     if kind == "ply":
         head, mark, body = raw.partition(b"end_header")
         return body if mark and re.search(rb"(?m)^[ \t]*format[ \t]+ascii\b", head) else None
@@ -97,7 +135,7 @@ def _refuse_words(numbers: bytes) -> None:
 
 
 def _refuse_indices(raw: bytes) -> None:
-    count = len(_OBJ_VERTEX.findall(raw))
+    count = len(OBJ_VERTEX.findall(raw))
     for match in _OBJ_FACE.finditer(raw):
         place = [Location(line=raw.count(b"\n", 0, match.start(1)) + 1)]
         for word in match.group(1).split():
