@@ -157,6 +157,11 @@ def _models() -> list[tuple]:
         ("other.3mf", "P012", package(model_xml(obj.replace('id="1"', 'id="1" type="other"')))),
         ("singular.3mf", "P013", package(model_xml(build=item("1 0 0 0 1 0 0 0 0 0 0 0")))),
         ("nan-matrix.3mf", "P013", package(model_xml(build=item("nan 0 0 0 1 0 0 0 1 0 0 0")))),
+        ("large-matrix.3mf", "P013", package(model_xml(build=item("1e300 0 0 0 1e300 0 0 0 1e300 0 0 0")))),
+        ("far-item.3mf", "V002", package(model_xml(build=item("1 0 0 0 1 0 0 0 1 1e30 0 0")))),
+        ("large-nested.3mf", "V001", package(model_xml(obj + "".join(
+            f'<object id="{i}"><components><component objectid="{i - 1}" transform="1e30 0 0 0 1e30 0 0 0 1e30 0 0 0"/>'
+            "</components></object>" for i in range(2, 40)), '<build><item objectid="39"/></build>'))),
         ("no-item.3mf", "P014", package(model_xml(build="<build/>"))),
         ("mirrored.3mf", "P015", package(model_xml(build=item("-1 0 0 0 1 0 0 0 1 20 0 0")))),
         ("extension.3mf", "P016", package(model_xml(attributes='requiredextensions="z" xmlns:z="urn:z"'))),
@@ -204,6 +209,7 @@ def _values() -> list[tuple]:
         ("too-large.stl", "V001", text_stl(box()).replace("vertex 10 0 0", "vertex 1e39 0 0")),
         ("nan.3mf", "V001", package(model_xml().replace('x="10"', 'x="NaN"', 1))),
         ("nan.obj", "V001", "v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n"),
+        ("large.obj", "V001", "v 0 0 0\nv 1e300 0 0\nv 0 1e300 0\nv 0 0 1e300\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"),
         ("far.stl", "V002", stl(box(at=(200_000, 0, 0)))),
     ]
 

@@ -17,6 +17,10 @@ Ints = NDArray[Any]
 Bools = NDArray[Any]
 
 
+LARGEST = float(np.finfo(np.float32).max)
+"""Coordinates beyond this, and NaN, are no numbers of a mesh (V001), in whatever precision a file has them."""
+
+
 @dataclass(frozen=True)
 class Mesh:
     """Vertices (n, 3) float64 mm, faces (m, 3) int32 into them; `normals` (m, 3) as stored, where the format has them.

@@ -14,7 +14,7 @@ import numpy as np
 from unitcad.check import schema
 from unitcad.check.findings import Location
 from unitcad.check.limits import Limits, Unreadable, over_limit
-from unitcad.check.mesh import Floats, Ints
+from unitcad.check.mesh import LARGEST, Floats, Ints
 from unitcad.check.model_data import Model, Object, Resource, Use
 from unitcad.check.rulebook import finding
 from unitcad.check.xml_stream import forbidden, stream
@@ -276,7 +276,7 @@ class _Reader:
         parts = said.split()
         if len(parts) == 12 and all(schema.number(part) for part in parts):
             found = np.array([float(part) for part in parts]).reshape(4, 3)
-            if np.isfinite(found).all():
+            if (np.abs(found) <= LARGEST).all():
                 det = float(np.linalg.det(found[:3]))
                 scale = float(np.prod(np.linalg.norm(found[:3], axis=1)))
                 if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
@@ -284,6 +284,8 @@ class _Reader:
                 elif det < 0:
                     self.model.say("P015", "a transform mirrors")
                 return found
+            self.model.say("P013", f'transform="{said[:60]}" is not twelve float32 numbers')
+            return identity
         code = "P013" if len(parts) == 12 and any(part.lower() in _NAMES for part in parts) else "P017"
         self.model.say(code, f'transform="{said[:60]}" is not twelve numbers')
         return identity

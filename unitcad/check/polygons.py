@@ -54,10 +54,12 @@ def _off(raw: bytes, numbers: bytes) -> bytes:
     for row in faces:
         size = int(row[0][:18]) if row[0].isdigit() else 0
         ids = row[1 : size + 1]
-        if size <= _LARGE or not all(word.isdigit() for word in ids):
+        if size <= _LARGE or len(ids) < size or not all(word.isdigit() for word in ids):
             made.append(row)
         else:
-            made += [[b"3", *(ids[k] for k in cut)] for cut in _cut([p[:3] for p in points], [int(i) for i in ids])]
+            made += [
+                [b"3", *(ids[k] for k in cut)] for cut in _cut([p[:3] for p in points], [int(i[:18]) for i in ids])
+            ]
     lines = [b"OFF", b"%d %d 0" % (n, len(made)), *(b" ".join(row) for row in points + made)]
     return b"\n".join(lines) + b"\n"
 

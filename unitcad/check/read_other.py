@@ -12,7 +12,7 @@ import numpy as np
 from unitcad.check import polygons, read_ply, text_mesh
 from unitcad.check.findings import Finding, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
-from unitcad.check.mesh import Mesh, weld_exact
+from unitcad.check.mesh import LARGEST, Mesh, weld_exact
 from unitcad.check.rulebook import finding
 
 _PLY_COUNT = re.compile(rb"element\s+(?:face|vertex)\s+(\d+)")
@@ -53,8 +53,9 @@ def _read(kind: str, raw: bytes, limits: Limits, deadline: Deadline) -> tuple[li
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise Unreadable(*findings, finding("P011", "a face names a vertex that is not there"))
     corners = vertices[faces]
-    if not np.isfinite(corners).all():
-        n = len(corners) - int(np.isfinite(corners).all(axis=(1, 2)).sum())
+    finite = (np.abs(corners) <= LARGEST).all(axis=(1, 2))
+    if not finite.all():
+        n = len(corners) - int(finite.sum())
         return [], [*findings, finding("V001", f"{counted(n, 'face')} with a vertex that is not finite", n)]
     points, triangles = weld_exact(corners)  # OBJ splits vertices along texture seams
     return [Mesh(points, triangles, indexed=False)], findings

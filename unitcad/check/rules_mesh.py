@@ -9,7 +9,7 @@ import numpy as np
 from unitcad.check import crossing, shells, topology
 from unitcad.check.findings import Facts, Finding, Location, counted
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Mesh, extent
+from unitcad.check.mesh import LARGEST, Mesh, extent
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology
 
@@ -26,7 +26,7 @@ class Judged:
 def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
     """Apply the V, T and G rules to one mesh; `cross=False` leaves self-crossing out."""
     facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
-    finite = np.asarray(np.isfinite(mesh.vertices).all(axis=1))
+    finite = np.asarray((np.abs(mesh.vertices) <= LARGEST).all(axis=1))
     if not finite.all():
         bad = np.flatnonzero(~finite[mesh.faces].all(axis=1))
         places = [Location(face=int(i), part=mesh.name) for i in bad[:9]]

@@ -9,11 +9,11 @@ import numpy as np
 
 from unitcad.check import instances as placement
 from unitcad.check import package as opc
-from unitcad.check import references, scale, schema
+from unitcad.check import references, scale, schema, topology
 from unitcad.check.findings import Facts, Finding, counted
 from unitcad.check.images import image_kind
 from unitcad.check.limits import Deadline, Limits, Unreadable
-from unitcad.check.mesh import Floats, Mesh
+from unitcad.check.mesh import LARGEST, Floats, Mesh, diagonal
 from unitcad.check.model_data import Model, Object, Use
 from unitcad.check.model_part import read_model
 from unitcad.check.package import Package, Relation
@@ -222,7 +222,8 @@ def _expand(models: dict[str, Model], root: Model, limits: Limits, findings: lis
 
 def _times(first: Floats, then: Floats) -> Floats:
     """The transform `first` followed by `then`, rows as 3MF writes them."""
-    return np.vstack([first[:3] @ then[:3], first[3] @ then[:3] + then[3]])
+    with np.errstate(all="ignore"):  # what comes out too large is found where it is used
+        return np.vstack([first[:3] @ then[:3], first[3] @ then[:3] + then[3]])
 
 
 def _geometry(
@@ -249,7 +250,13 @@ def _geometry(
             judged[instance.key] = _judge(found, factor, options, deadline)
             findings += judged[instance.key].findings
         facts = judged[instance.key].facts
-        points = (found.vertices @ instance.matrix[:3] + instance.matrix[3]) * factor
+        with np.errstate(all="ignore"):
+            turned = (found.vertices @ instance.matrix[:3]) * factor
+            points = turned + instance.matrix[3] * factor
+        if not (np.abs(points) <= LARGEST).all():
+            findings.append(finding("V001", f"an instance of object {found.id} reaches beyond the float32 numbers"))
+            return findings, Facts()
+        findings += topology.too_far(replace(_mesh_of(found, factor), vertices=points), diagonal(turned))
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
         triangles += facts.triangles or 0
         vertices += facts.vertices or 0
@@ -315,7 +322,7 @@ def _judge(found: Object, factor: float, options: Options, deadline: Deadline) -
 def _printed(
     models: dict[str, Model], instances: list[Instance], options: Options, deadline: Deadline
 ) -> list[Finding]:
-    from unitcad.check import printing, topology
+    from unitcad.check import printing
 
     assert options.printer is not None
     found: list[Finding] = []

@@ -51,7 +51,7 @@ def judge(mesh: Mesh, deadline: Deadline) -> Topology:
         faces = faces[kept]
     if mesh.indexed:
         found += _unreferenced(vertices, mesh.faces)
-    found += _too_far(mesh)
+    found += too_far(mesh, diagonal(vertices))
     edges = mesh_edges.edges_of(faces, len(vertices))
     deadline.tick()
     if not edges.closed and (edges.size == 1).any():
@@ -131,8 +131,9 @@ def _unreferenced(vertices: Floats, faces: Ints) -> list[Finding]:
     return [finding("T012", f"{counted(n, 'vertex', 'vertices')} that no face uses", n)] if n else []
 
 
-def _too_far(mesh: Mesh) -> list[Finding]:
-    size, step = diagonal(mesh.vertices), float32_step(mesh.vertices)
+def too_far(mesh: Mesh, size: float) -> list[Finding]:
+    """V002 for a mesh whose box has the diagonal `size`, mm."""
+    step = float32_step(mesh.vertices)
     if step <= FAR * size or size == 0:
         return []
     return [finding("V002", f"coordinates are {step:.3g} mm apart in float32, the part is {size:.3g} mm across")]
