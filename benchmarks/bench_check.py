@@ -1,6 +1,6 @@
 """Speed and memory of the mesh checks beside their peers, interleaved, medians of one run.
 
-    python benchmarks/bench_check.py [--peer /path/to/python-with-pymeshlab] [--sizes 10000,100000,1000000]
+    python benchmarks/bench_check.py [--peer /path/to/python-with-pymeshlab] [--sizes 10000,100000,1000000,5000000]
 
 Topology rules against trimesh's is_volume on the same arrays; all rules (topology, self-crossing, shells) against
 pymeshlab's compute_selection_by_self_intersections_per_face, which is GPL and runs in an environment of its own

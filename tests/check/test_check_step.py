@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import builtins
 from pathlib import Path
 
 import pytest
 
-from unitcad.check import Options, check_file, read_step, run
+from unitcad.check import Limits, Options, check_file, read_step, run
 
 
 def test_without_the_extra_the_message_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.step"
     path.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n")
-    real = builtins.__import__
-
-    def refuse(name: str, *rest, **more):
-        if name.startswith("OCP"):
-            raise ImportError("No module named 'OCP'")
-        return real(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", refuse)
+    monkeypatch.setattr(read_step, "installed", lambda: False)
     report = check_file(path)
     assert report.verdict == "error"
     assert report.has("F012")
@@ -74,3 +66,31 @@ def test_solids_volume_and_box(tmp_path: Path) -> None:
     cut = tmp_path / "cut.step"
     cut.write_bytes(path.read_bytes()[:-200])
     assert check_file(cut).has("F003")
+
+
+def test_a_reader_that_dies_or_prints_is_a_finding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.step"
+    path.write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n")
+    monkeypatch.setattr(read_step, "installed", lambda: True)
+    for child, code, said in (
+        ("import os; os.abort()", "F003", "died"),
+        ("print('noise'); raise ModuleNotFoundError('OCP')", "F012", "pip install"),
+        ("import time; time.sleep(60)", "F011", "not finished"),
+    ):
+        monkeypatch.setattr(read_step, "_CHILD", child)
+        (found,) = check_file(path, Options(limits=Limits(seconds=5))).findings
+        assert found.code == code
+        assert said in found.message
+    assert capfd.readouterr().out == ""
+
+
+def test_damaged_step_files_give_a_verdict_and_print_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("OCP")
+    path = tmp_path / "a.step"
+    path.write_text(
+        "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n#1=SHAPE_REPRESENTATION('',(#1),#1);\nENDSEC;\nEND-ISO-10303-21;\n"
+    )
+    assert [found.code for found in check_file(path).findings] == ["F003"]
+    assert capfd.readouterr().out == ""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from unitcad.check.findings import Facts, Finding, counted
-from unitcad.check.limits import Limits, Unreadable
+from unitcad.check.limits import Limits, Unreadable, over_limit
 from unitcad.check.rulebook import finding
 
 if TYPE_CHECKING:
@@ -24,46 +28,73 @@ def installed() -> bool:
 def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Finding], Facts]:
     """Findings about a STEP file's text and, with OCP there, about its solids."""
     _text(data, options.limits)
-    try:
-        from OCP.BRepCheck import BRepCheck_Analyzer
-        from OCP.BRepGProp import BRepGProp
-        from OCP.GProp import GProp_GProps
-        from OCP.IFSelect import IFSelect_RetDone
-        from OCP.STEPControl import STEPControl_Reader
-        from OCP.TopAbs import TopAbs_SOLID
-        from OCP.TopExp import TopExp_Explorer
-    except ImportError as error:
-        raise Unreadable(finding("F012", f"{NEEDS} ({error})")) from error
-    reader = STEPControl_Reader()
-    if reader.ReadFile(str(path)) != IFSelect_RetDone or reader.TransferRoots() < 1:
+    if not installed():
+        raise Unreadable(finding("F012", NEEDS))
+    said = _from_child(path, options.limits.seconds)
+    if not said:
         raise Unreadable(finding("F003", "the STEP file holds no shape that can be read"))
-    shape = reader.OneShape()
+    solids, volume = said["solids"], said["volume"]
     findings: list[Finding] = []
-    if not BRepCheck_Analyzer(shape).IsValid():
+    if not said["valid"]:
         findings.append(finding("G001", "the B-rep is not valid by BRepCheck"))
-    explorer, solids = TopExp_Explorer(shape, TopAbs_SOLID), 0
-    while explorer.More():
-        solids += 1
-        explorer.Next()
-    volume, area = GProp_GProps(), GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, volume)
-    BRepGProp.SurfaceProperties_s(shape, area)
-    facts = Facts(
-        shells=solids,
-        volume_mm3=float(volume.Mass()),
-        area_mm2=float(area.Mass()),
-        bbox_mm=_box(shape),
-        watertight=solids > 0,
-    )
+    facts = Facts(shells=solids, volume_mm3=volume, area_mm2=said["area"], bbox_mm=said["box"], watertight=solids > 0)
     if not solids:
         findings.append(finding("G007", "no solid in the file"))
-    elif facts.volume_mm3 is not None and facts.volume_mm3 < 0:
-        findings.append(finding("T008", f"volume {facts.volume_mm3:.6g} mm3"))
+    elif volume < 0:
+        findings.append(finding("T008", f"volume {volume:.6g} mm3"))
     if options.shells is not None and solids != options.shells:
-        findings.append(
-            finding("G005", f"{counted(solids, 'solid')}, {options.shells} expected", abs(solids - options.shells))
-        )
+        text = f"{counted(solids, 'solid')}, {options.shells} expected"
+        findings.append(finding("G005", text, abs(solids - options.shells)))
     return findings, facts
+
+
+def _from_child(path: Path, seconds: float) -> dict[str, Any]:
+    """What `measure` finds, in a process of its own: OCCT dies of some malformed files, and it prints."""
+    with TemporaryDirectory() as folder:
+        out = Path(folder, "found.json")
+        try:
+            done = subprocess.run(
+                [sys.executable, "-P", "-c", _CHILD, str(path), str(out)],
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, timeout=seconds,
+                check=False,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired as error:
+            raise over_limit(f"not finished within {seconds:g} s") from error
+        if done.returncode == 0 and out.exists():
+            return json.loads(out.read_text("utf-8"))
+    last = done.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
+    if last.startswith(("ImportError", "ModuleNotFoundError")):
+        raise Unreadable(finding("F012", f"{NEEDS} ({last[:200]})"))
+    raise Unreadable(finding("F003", f"the STEP reader died of the file (exit code {done.returncode})"))
+
+
+_CHILD = "import sys; from unitcad.check.read_step import measure; measure(sys.argv[1], sys.argv[2])"
+
+
+def measure(path: str, out: str) -> None:
+    """Write validity, solids, volume (mm3), area (mm2) and box of a STEP file as JSON; {} where it holds no shape."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+    from OCP.IFSelect import IFSelect_RetDone
+    from OCP.STEPControl import STEPControl_Reader
+    from OCP.TopAbs import TopAbs_SOLID
+    from OCP.TopExp import TopExp_Explorer
+
+    found: dict[str, Any] = {}
+    reader = STEPControl_Reader()
+    if reader.ReadFile(path) == IFSelect_RetDone and reader.TransferRoots() >= 1:
+        shape = reader.OneShape()
+        explorer, solids = TopExp_Explorer(shape, TopAbs_SOLID), 0
+        while explorer.More():
+            solids += 1
+            explorer.Next()
+        volume, area = GProp_GProps(), GProp_GProps()
+        BRepGProp.VolumeProperties_s(shape, volume)
+        BRepGProp.SurfaceProperties_s(shape, area)
+        found = {"valid": BRepCheck_Analyzer(shape).IsValid(), "solids": solids, "box": _box(shape)}
+        found |= {"volume": float(volume.Mass()), "area": float(area.Mass())}
+    Path(out).write_text(json.dumps(found, allow_nan=False), "utf-8")
 
 
 def _box(shape: Any) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
