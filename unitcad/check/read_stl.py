@@ -213,20 +213,20 @@ def _facets(raw: bytes, at: int, found: _Text, limits: Limits, deadline: Deadlin
             inner = raw.rfind(b"endfacet", at, cut)
             inner = raw.rfind(b"ENDFACET", at, cut) if inner < 0 else inner
             cut = inner + 8 if inner >= 0 else stop
-        tokens = raw[at:cut].lower().split()
+        block = raw[at:cut]
+        tokens = block.lower().split()
         if len(tokens) % _TOKENS or any(set(tokens[i::_TOKENS]) != {word} for i, word in _WORDS.items()):
             return _explain(raw, at, cut, found, limits)
-        _take(raw, at, cut, tokens, found, limits)
+        _take(block, tokens, found, limits)
         at = cut
     return stop
 
 
-def _take(raw: bytes, at: int, cut: int, tokens: list[bytes], found: _Text, limits: Limits) -> None:
+def _take(block: bytes, tokens: list[bytes], found: _Text, limits: Limits) -> None:
     blocks = len(tokens) // _TOKENS
     if found.facets + blocks > limits.max_faces:
         raise over_limit(f"more faces than --max-faces {limits.max_faces}")
     columns = []
-    block = raw[at:cut]
     plain = block.isascii() and b"_" not in block  # numpy takes 1_0 for ten, as Python does
     for column in _NUMBERS:
         texts = tokens[column::_TOKENS]

@@ -25,28 +25,25 @@ def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
 
     So for a folder's STEP files where none can be read: a warning, since nobody named them.
     """
-    files: dict[str, None] = {}
+    files: list[str] = []
     empty: list[FileReport] = []
     for name in names:
         path = Path(name)
         if path.is_dir():
-            inside = _once(_walked(path))
+            inside = _inside(_walked(path))
             if not inside:
                 empty.append(FileReport(name, (finding("F012", "no mesh file in this folder"),)))
             able, unable = _readable(inside)
-            files.update(dict.fromkeys(able))
+            files += able
             empty += unable
         elif not path.exists() and glob.has_magic(name):
-            inside = _once(p for p in glob.glob(name, recursive=True) if os.path.isfile(p))
+            inside = _inside(p for p in glob.glob(name, recursive=True) if os.path.isfile(p))
             if not inside:
                 empty.append(FileReport(name, (finding("F012", "no file matches"),)))
-            files.update(dict.fromkeys(inside))
+            files += inside
         else:
-            files[name] = None
-    real: dict[str, str] = {}
-    for name in files:
-        real.setdefault(os.path.realpath(name), name)
-    return list(real.values()), empty
+            files.append(name)
+    return _once(files), empty
 
 
 def _walked(folder: Path) -> Iterator[str]:
@@ -66,12 +63,17 @@ def _readable(paths: list[str]) -> tuple[list[str], list[FileReport]]:
     return [path for path in paths if path not in step], [FileReport(path, (said,)) for path in step]
 
 
-def _once(paths: Iterable[str]) -> list[str]:
+def _inside(paths: Iterable[str]) -> list[str]:
     """Each real file once, by the name with the fewest folders; sorted."""
+    return sorted(_once(sorted(paths, key=lambda path: (path.count(os.sep), path))))
+
+
+def _once(paths: Iterable[str]) -> list[str]:
+    """Each real file by the first of its names."""
     real: dict[str, str] = {}
-    for path in sorted(paths, key=lambda path: (path.count(os.sep), path)):
+    for path in paths:
         real.setdefault(os.path.realpath(path), path)
-    return sorted(real.values())
+    return list(real.values())
 
 
 def check_files(

@@ -237,7 +237,7 @@ def _geometry(
     triangles = vertices = shells = 0
     volume = area = 0.0
     watertight = bool(instances)
-    solids: list[placement.Placed] = []
+    compared, solids = options.cross and len(instances) > 1, list[placement.Placed]()
     for instance in instances:
         found = models[instance.key[0]].resources[instance.key[1]]
         assert isinstance(found, Object)
@@ -261,15 +261,15 @@ def _geometry(
         triangles += facts.triangles or 0
         vertices += facts.vertices or 0
         shells += facts.shells or 0
-        volume += (facts.volume_mm3 or 0.0) * abs(float(np.linalg.det(instance.matrix[:3])))
+        size = (facts.volume_mm3 or 0.0) * abs(float(np.linalg.det(instance.matrix[:3])))
+        volume += size
         corners = points[found.triangles[:, :3]]
         area += float(
             np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
         )
         watertight = watertight and bool(facts.watertight)
-        if facts.watertight and (facts.volume_mm3 or 0.0) > 0 and len(solids) <= placement.MOST and options.cross:
+        if compared and facts.watertight and size > 0 and len(solids) <= placement.MOST:
             placed = _mesh_of(found, factor, instance.matrix)
-            size = (facts.volume_mm3 or 0.0) * abs(float(np.linalg.det(instance.matrix[:3])))
             solids.append(placement.Placed(placed.vertices, placed.faces, size, f"object {found.id}"))
         deadline.tick()
     if not triangles:
