@@ -11,6 +11,10 @@ from pathlib import Path
 
 import pytest
 from shapes import box, stl
+from typer.main import get_command
+
+from unitcad.check.formats import as_dict
+from unitcad.cli import app
 
 needs_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action's script is bash")
 ROOT = Path(__file__).parent.parent.parent
@@ -93,3 +97,27 @@ def test_the_actions_inputs_are_not_pasted_into_its_script() -> None:
     text = (ROOT / "action.yml").read_text("utf-8")
     for script in re.findall(r"run: \|\n(.*)", text, re.DOTALL):
         assert "${{" not in script
+
+
+def test_the_page_on_ci_names_what_there_is() -> None:
+    """Its snippets use the hook's id, every input of the action and no other, and options of the command only."""
+    page = (ROOT / "docs/checks-in-ci.md").read_text("utf-8")
+    action = (ROOT / "action.yml").read_text("utf-8")
+    assert f"- id: {_value((ROOT / '.pre-commit-hooks.yaml').read_text('utf-8'), '- id')}\n" in page
+    inputs = re.findall(r"(?m)^  ([\w-]+):$", action[action.index("inputs:") : action.index("runs:")])
+    step = page[page.index("you/unitcad@REF  #") : page.index("- uses: github/codeql-action")]
+    assert re.findall(r"(?m)^          ([\w-]+):", step) == inputs
+    known = {name for parameter in get_command(app).commands["check"].params for name in parameter.opts}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", page)) <= known
+
+
+def test_the_page_on_ci_shows_the_json_that_is_written(judge) -> None:
+    page = (ROOT / "docs/checks-in-ci.md").read_text("utf-8")
+    shown = json.loads(page[page.index("```json\n") + 8 : page.index("```\n", page.index("```json"))])
+    content = re.search(r"open\('open.obj', 'w'\).write\('(.*)'\)", page)
+    assert content is not None
+    found = as_dict([judge(content.group(1).replace("\\n", "\n"), "open.obj")])
+    found["files"][0]["path"] = "open.obj"
+    del found["files"][0]["findings"][0]["locations"][1:]
+    found["files"][0]["facts"]["area_mm2"] = round(found["files"][0]["facts"]["area_mm2"], 6)
+    assert shown == found

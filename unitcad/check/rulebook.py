@@ -73,6 +73,7 @@ def markdown() -> str:
         "",
         "Made from `unitcad/check/rules.toml` by `python docs/make_checks.py`; a test holds the two together.",
         "Severity: an error fails a run, a warning does with `--fail-on warning`, an info never does.",
+        "How to run it in CI: [checks-in-ci.md](checks-in-ci.md).",
         "",
     ]
     for letter, family in FAMILIES.items():
