@@ -13,7 +13,7 @@ import numpy as np
 
 from unitcad.catalogue import Printer
 from unitcad.check import sniff
-from unitcad.check.findings import Facts, FileReport, Finding, counted, merge
+from unitcad.check.findings import Facts, FileReport, Finding, counted, ending, merge
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Floats, Ints, Mesh
 from unitcad.check.rulebook import finding
@@ -34,7 +34,8 @@ Reader = Callable[[memoryview, Limits, Deadline], tuple[list[Mesh], list[Finding
 class Options:
     """What to judge and against what.
 
-    `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all.
+    `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all. An error
+    that ended the judgement of a file (not readable, a limit reached, no mesh) is kept whatever they say.
     `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
     `shells`: the number of shells expected (G005). `cross`: judge self-crossing.
     """
@@ -48,7 +49,7 @@ class Options:
     limits: Limits = field(default_factory=Limits)
 
     def wants(self, code: str) -> bool:
-        """Whether findings of `code` are reported."""
+        """Whether findings of `code` are reported, unless they ended the judgement: those always are."""
         chosen = max((len(p) for p in self.select if code.startswith(p)), default=-1 if self.select else 0)
         dropped = max((len(p) for p in self.ignore if code.startswith(p)), default=-1)
         return chosen >= 0 and chosen > dropped
@@ -60,7 +61,7 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
     points = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
     triangles = np.asarray(faces).reshape(-1, 3)
     if triangles.size and (triangles.min() < 0 or triangles.max() >= len(points)):
-        return _report("", [finding("P011", "a face names a vertex that is not there")], Facts(), options)
+        return _report("", ending([finding("P011", "a face names a vertex that is not there")]), Facts(), options)
     mesh = Mesh(points, np.ascontiguousarray(triangles, dtype=np.int32))
     try:
         judged = _judge_all([mesh], options, Deadline(options.limits.seconds))
@@ -92,14 +93,14 @@ def _guarded(path: str, options: Options, work: Callable[[Deadline], tuple[list[
     except Unreadable as stop:
         findings = list(stop.findings)
     except MemoryError:
-        findings = [finding("F011", "out of memory")]
+        findings = list(over_limit("out of memory").findings)
     except RecursionError:
-        findings = [finding("F011", "nested too deeply")]
+        findings = list(over_limit("nested too deeply").findings)
     return _report(path, findings, facts, options)
 
 
 def _report(path: str, findings: Sequence[Finding], facts: Facts, options: Options) -> FileReport:
-    return FileReport(path, merge(item for item in findings if options.wants(item.code)), facts)
+    return FileReport(path, merge(item for item in findings if item.ends or options.wants(item.code)), facts)
 
 
 def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
@@ -131,6 +132,8 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
         read = reader_for(kind)
     meshes, findings = read(view, options.limits, deadline)
     del view, data
+    if not meshes:
+        return list(ending(findings)), Facts()
     factor = UNITS_MM[options.unit] if options.unit else 1.0
     if factor != 1.0:
         meshes = [replace(mesh, vertices=mesh.vertices * factor) for mesh in meshes]

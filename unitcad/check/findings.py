@@ -45,13 +45,17 @@ class Location:
 
 @dataclass(frozen=True)
 class Finding:
-    """One rule's verdict on one file: how often, and where first."""
+    """One rule's verdict on one file: how often, and where first.
+
+    `ends`: it ended the judgement, so that other rules were not run; no filter drops it.
+    """
 
     code: str
     severity: str
     message: str
     count: int = 1
     locations: tuple[Location, ...] = ()
+    ends: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready."""
@@ -117,6 +121,11 @@ class FileReport:
         }
 
 
+def ending(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """The findings, the errors among them marked as what ended the judgement."""
+    return tuple(replace(item, ends=True) if item.severity == "error" else item for item in findings)
+
+
 def counted(n: int, one: str, many: str = "") -> str:
     """`1 shell`, `2 shells`; `many` where the plural takes more than an s."""
     return f"{n} {one if n == 1 else many or one + 's'}"
@@ -137,7 +146,12 @@ def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
         if new.message != message and "; and " not in message:
             message = f"{message}; and {new.message}"
         by_code[new.code] = Finding(
-            new.code, worst, message, old.count + new.count, (old.locations + new.locations)[:SHOWN]
+            new.code,
+            worst,
+            message,
+            old.count + new.count,
+            (old.locations + new.locations)[:SHOWN],
+            old.ends or new.ends,
         )
     for code in merged:
         found = by_code[code]

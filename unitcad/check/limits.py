@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from unitcad.check.findings import Finding
+from unitcad.check.findings import Finding, ending
 from unitcad.check.rulebook import finding
 
 
@@ -23,10 +23,10 @@ class Limits:
 
 
 class Unreadable(Exception):
-    """A reader can go no further; the findings say why."""
+    """A reader can go no further; the findings say why, and no filter drops the errors among them."""
 
     def __init__(self, *findings: Finding) -> None:
-        self.findings = findings
+        self.findings = ending(findings)
         super().__init__("; ".join(found.message for found in findings))
 
 

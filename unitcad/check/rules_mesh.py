@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from unitcad.check import crossing, shells, topology
-from unitcad.check.findings import Facts, Finding, Location, counted
+from unitcad.check.findings import Facts, Finding, Location, counted, ending
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import LARGEST, Mesh, extent
 from unitcad.check.rulebook import finding
@@ -32,9 +32,9 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
         places = [Location(face=int(i), part=mesh.name) for i in bad[:9]]
         wrong = len(finite) - int(finite.sum())
         text = counted(wrong, "non-finite vertex", "non-finite vertices")
-        return Judged((finding("V001", text, len(bad) or 1, places),), facts, None)
+        return Judged(ending([finding("V001", text, len(bad) or 1, places)]), facts, None)
     if not len(mesh.faces):
-        return Judged((finding("F001", "the mesh has no face"),), facts, None)
+        return Judged(ending([finding("F001", "the mesh has no face")]), facts, None)
     found = topology.judge(mesh, deadline)
     findings = list(found.findings)
     crossings = crossing.judge(found, deadline) if cross and len(found.kept) else crossing.Crossings()

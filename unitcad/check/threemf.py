@@ -10,7 +10,7 @@ import numpy as np
 from unitcad.check import instances as placement
 from unitcad.check import package as opc
 from unitcad.check import references, scale, schema, topology
-from unitcad.check.findings import Facts, Finding, counted
+from unitcad.check.findings import Facts, Finding, counted, ending
 from unitcad.check.images import image_kind
 from unitcad.check.limits import Deadline, Limits, Unreadable
 from unitcad.check.mesh import LARGEST, Floats, Mesh, diagonal
@@ -48,10 +48,10 @@ def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[l
         references.judge(model)
         findings += model.findings
     if not models:
-        return findings, Facts()
+        return list(ending(findings)), Facts()
     root = next(iter(models.values()))
     if not root.items and root.has_build:
-        findings.append(finding("P014", "the build has no item"))
+        findings.append(replace(finding("P014", "the build has no item"), ends=True))
     try:
         instances = _expand(models, root, options.limits, findings)
     except Unreadable as stop:
@@ -232,7 +232,7 @@ def _geometry(
     judged: dict[Key, Judged] = {}
     broken = any(item.code in ("P011", "V001", "F004") for item in findings)
     if broken:
-        return findings, Facts()
+        return list(ending(findings)), Facts()
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     triangles = vertices = shells = 0
     volume = area = 0.0
@@ -255,7 +255,7 @@ def _geometry(
             points = turned + instance.matrix[3] * factor
         if not (np.abs(points) <= LARGEST).all():
             findings.append(finding("V001", f"an instance of object {found.id} reaches beyond the float32 numbers"))
-            return findings, Facts()
+            return list(ending(findings)), Facts()
         findings += topology.too_far(replace(_mesh_of(found, factor), vertices=points), diagonal(turned))
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
         triangles += facts.triangles or 0
@@ -273,7 +273,7 @@ def _geometry(
             solids.append(placement.Placed(placed.vertices, placed.faces, size, f"object {found.id}"))
         deadline.tick()
     if not triangles:
-        return findings, Facts(triangles=0, vertices=vertices, shells=0)
+        return list(ending(findings)), Facts(triangles=0, vertices=vertices, shells=0)
     facts = Facts(
         triangles,
         vertices,

@@ -21,9 +21,12 @@ def check(
     output_format: Annotated[str, typer.Option(help="text, json, github, sarif or junit.")] = "text",
     as_json: Annotated[bool, typer.Option("--json", help="Short for --output-format json.")] = False,
     select: Annotated[
-        list[str] | None, typer.Option(help="Only codes with these prefixes (comma or repeated).")
+        list[str] | None,
+        typer.Option(help="Only codes with these prefixes (comma or repeated); what ended a file's judgement stays."),
     ] = None,
-    ignore: Annotated[list[str] | None, typer.Option(help="Not codes with these prefixes.")] = None,
+    ignore: Annotated[
+        list[str] | None, typer.Option(help="Not codes with these prefixes; what ended a file's judgement stays.")
+    ] = None,
     extend_select: Annotated[list[str] | None, typer.Option(help="Prefixes added to --select.")] = None,
     fail_on: Annotated[str, typer.Option(help="error or warning: what makes the exit code 1.")] = "error",
     printer: Annotated[str | None, typer.Option(help="Judge fit and printability (S002, D) for this printer.")] = None,
