@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -26,6 +27,13 @@ UNITS_MM = {
     "inch": 25.4,
     "foot": 304.8,
     "meter": 1000.0,
+}
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a FIFO",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
 }
 Reader = Callable[[memoryview, Limits, Deadline], tuple[list[Mesh], list[Finding]]]
 
@@ -142,16 +150,21 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
 
 
 def _bytes_of(path: Path, limits: Limits) -> bytes:
+    """The content; its size is looked at first, and what is no regular file is never opened (a FIFO would wait)."""
     try:
-        if not path.is_file():
-            raise Unreadable(finding("F012", "a folder" if path.is_dir() else "no such file"))
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise Unreadable(
+                finding("F012", f"{_KINDS.get(stat.S_IFMT(status.st_mode), 'a special file')}, not a regular file")
+            )
+        if status.st_size > limits.max_bytes:
+            raise over_limit(f"{status.st_size} bytes, more than the limit of {limits.max_bytes}")
         with path.open("rb") as file:
-            data = file.read(limits.max_bytes + 1)
-    except OSError as error:
-        raise Unreadable(finding("F012", f"cannot be read: {error.strerror or error}")) from error
-    if len(data) > limits.max_bytes:
-        raise over_limit(f"more than {limits.max_bytes} bytes")
-    return data
+            return file.read(status.st_size)
+    except FileNotFoundError as error:
+        raise Unreadable(finding("F012", "no such file")) from error
+    except (OSError, ValueError) as error:
+        raise Unreadable(finding("F012", f"cannot be read: {getattr(error, 'strerror', None) or error}")) from error
 
 
 def _judge_all(meshes: Sequence[Mesh], options: Options, deadline: Deadline) -> Judged:
