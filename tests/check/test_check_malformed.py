@@ -129,3 +129,38 @@ def test_bytes_are_judged_as_the_file_is(case: Case, judge) -> None:
     of_file = judge(case.data(), case.name, **case.options)
     of_bytes = check_bytes(case.data(), case.name, options(**case.options))
     assert (of_bytes.findings, of_bytes.facts) == (of_file.findings, of_file.facts)
+
+
+CUBE = text_stl(box())  # facet k (from 0) begins at line 2 + 7 k
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (CUBE.replace("endloop", "endlop", 1), [("F003", "'endlop' where endloop belongs", 7)]),
+        (CUBE.replace("outer loop", "outer", 1), [("F003", "'vertex' where loop belongs", 4)]),
+        (CUBE.replace("endfacet", "endfact", 1), [("F003", "'endfact' where endfacet belongs", 8)]),
+        (CUBE.replace("endsolid", "endsold"), [("F003", "'endsold' where facet or endsolid belongs", 86)]),
+        (CUBE.replace("vertex 0 0 0", "vertex 0 0", 1), [("F003", "'vertex' where a number belongs", 5)]),
+        (CUBE.replace("vertex 0 0 0", "vertex 0 0 0 0", 1), [("F003", "'0' where vertex belongs", 4)]),
+        (CUBE.replace("vertex 0 0 0", "vertx 0 0 0", 1), [("F003", "'vertx' where vertex belongs", 4)]),
+        ("\n".join(line for i, line in enumerate(CUBE.split("\n"), 1) if i != 75),
+         [("F008", "a facet with 2 vertices", 72)]),
+        (CUBE.replace("endloop", "vertex 1 2 3\nendloop", 1), [("F008", "a facet with 4 vertices", 2)]),
+        (CUBE[: CUBE.index("endloop") + 3], [("F003", "the text ends inside a facet", 7)]),
+        (CUBE[: CUBE.index("endloop")], [("F003", "the text ends inside a facet", 6)]),
+        (CUBE[: CUBE.index("vertex 0 0 0") + 3], [("F003", "the text ends inside a facet", 4)]),
+        (CUBE[: CUBE.index("endsolid") + 5], [("F003", "the text ends before endsolid", 86)]),
+        (CUBE[: CUBE.rindex("endloop")] + "endsolid box\n", [("F003", "the solid ends inside a facet", 84)]),
+        (CUBE.replace("vertex 0 0 0", "vertex 0,0 0 0", 1).replace("endfacet", "", 1),
+         [("F003", "'facet' where endfacet belongs", 9), ("F004", "'0,0' is not a number (a decimal comma)", 4)]),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("block", [8_000_000, 500])
+def test_text_stl_is_blamed_where_it_breaks(
+    text: str, expected: list, block: int, judge, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first word that breaks the grammar, and nothing of the mesh that came before it."""
+    monkeypatch.setattr("unitcad.check.read_stl._BLOCK", block)
+    found = judge(text).findings
+    assert [(item.code, item.message, item.locations[0].line) for item in found] == expected

@@ -256,36 +256,60 @@ def _slow_numbers(texts: list[bytes], found: _Text) -> Floats:
 
 
 def _explain(raw: bytes, at: int, cut: int, found: _Text, limits: Limits) -> int:
-    """Read one irregular block facet by facet, say what is wrong with it, and end the reading."""
-    for match in re.finditer(rb"(?is)\bfacet\b(.*?)(\bendfacet\b|\Z)", raw[at:cut]):
-        body = match.group(1).lower().split()
-        vertices = body.count(b"vertex")
-        numbers = [word for word in body if word not in _KEYWORDS]
-        place = at + match.start()
-        if not match.group(2):
-            found.findings.append(_at("F003", "the text ends inside a facet", raw, place))
-        elif vertices != 3:
-            found.findings.append(_at("F008", f"a facet with {counted(vertices, 'vertex', 'vertices')}", raw, place))
-        elif len(body) == _TOKENS - 2 and all(_is_number(body[i - 1]) for i in _NUMBERS):
-            found.findings.append(_at("F003", "a facet's keywords are not those of STL", raw, place))
-        elif bad := [word for word in numbers if not _is_number(word)]:
-            shown = bad[0][:30].decode("utf-8", "replace")
-            found.findings.append(_at("F004", f"{shown!r} is not a number", raw, place))
-        elif len(numbers) != 12:
-            found.findings.append(
-                _at("F003", f"a facet with {counted(len(numbers), 'number')} instead of 12", raw, place)
-            )
-        elif len(body) != _TOKENS - 2:
-            found.findings.append(_at("F003", "a facet's keywords are not in order", raw, place))
-        found.facets += 1
+    """Read one irregular block token by token up to the first one that breaks the grammar, and end the reading.
+
+    Facets with more or fewer vertices than three (F008) and words in a number's place (F004) break it no further.
+    """
+    found.corners.clear()  # a mesh of what came before would only blame the wrong thing
+    found.normals.clear()
+    place, vertices, start = 0, 0, at
+    for match in _WORD.finditer(raw, at, cut):
+        word, here = match.group().lower(), match.start()
+        wanted = (b"vertex",) if place == _LOOP_END and vertices < 3 else _GRAMMAR[place]
+        if place in (_VERTEX, _LOOP_END) and word in (b"vertex", b"endloop"):
+            place = _VERTEX if word == b"vertex" else _LOOP_END
+        elif word != wanted[0] if wanted else word in _KEYWORDS or not _is_number(word):
+            if match.end() == len(raw) and (_begins(word, wanted)):
+                break  # the text was cut within the word
+            shown = word[:30].decode("utf-8", "replace")
+            if wanted or word in _KEYWORDS:
+                said = b" or ".join(wanted).decode() or "a number"
+                found.findings.append(_at("F003", f"{shown!r} where {said} belongs", raw, here))
+                return -1
+            why = " (a decimal comma)" if b"," in word else ""
+            found.findings.append(_at("F004", f"{shown!r} is not a number{why}", raw, here))
+        if place == 0:
+            start, vertices = here, 0
+            found.facets += 1
+        vertices += place == _VERTEX
+        if place == _LOOP_END and vertices != 3:
+            found.findings.append(_at("F008", f"a facet with {counted(vertices, 'vertex', 'vertices')}", raw, start))
+        place = (place + 1) % len(_GRAMMAR)
         if len(found.findings) > 50 or found.facets > limits.max_faces:
-            break
-    if not any(item.severity == "error" for item in found.findings):
-        found.findings.append(_at("F003", "the text is not a list of facets", raw, at))
+            return -1
+    else:
+        if place == 0:
+            return -1
+    if raw[cut:].strip():
+        found.findings.append(_at("F003", "the solid ends inside a facet", raw, _skip_blank(raw, cut)))
+    else:
+        inside = "inside a facet" if place else "before endsolid"
+        found.findings.append(_at("F003", f"the text ends {inside}", raw, len(raw.rstrip())))
     return -1
 
 
-_KEYWORDS = {b"normal", b"outer", b"loop", b"vertex", b"endloop", b"facet", b"endfacet"}
+_GRAMMAR: tuple[tuple[bytes, ...], ...] = (
+    *((b"facet", b"endsolid"), (b"normal",), (), (), (), (b"outer",), (b"loop",)),
+    *((b"vertex",), (), (), (), (b"endloop",), (b"endfacet",)),
+)  # what may stand where in a facet; nothing named: a number
+_VERTEX, _LOOP_END = 7, 11  # places in it
+_KEYWORDS = {words[0] for words in _GRAMMAR if words}
+_WORD = re.compile(rb"\S+")
+
+
+def _begins(word: bytes, wanted: tuple[bytes, ...]) -> bool:
+    """Whether the last word of a text may be the beginning of what belongs there."""
+    return any(whole.startswith(word) for whole in wanted) or not (wanted or word in _KEYWORDS)
 
 
 def _is_number(word: bytes) -> bool:
