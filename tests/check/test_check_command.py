@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import io
 import json
 import os
@@ -143,6 +144,46 @@ def test_manifest_of_a_folder(folder: Path) -> None:
     }
     assert files == {"good.stl": [], "gone.stl": ["F012", "M004"]}
     assert run("--manifest", "nowhere", cwd=folder).returncode == 2
+
+
+def test_a_manifest_holds_the_files_that_are_not_judged(folder: Path) -> None:
+    step = folder / "unit.step"
+    step.write_bytes(b"ISO-10303-21; not judged here")
+    listed = {"path": "unit.step", "sha256": hashlib.sha256(step.read_bytes()).hexdigest()}
+    files = {"stl": {"path": "good.stl"}, "step": listed}
+    part = {"name": "a", "role": "unit", "volume_mm3": 1000.0, "files": files}
+    (folder / "manifest.json").write_text(json.dumps({"parts": [part]}))
+
+    def codes(*more: str) -> tuple[int, dict[str, list[str]]]:
+        result = run("--manifest", str(folder), "--json", *more, cwd=folder / "sub")
+        entries = json.loads(result.stdout)["files"]
+        return result.returncode, {entry["path"]: [f["code"] for f in entry["findings"]] for entry in entries}
+
+    good = os.path.join("..", "good.stl")
+    step_path = os.path.join("..", "unit.step")
+    assert codes() == (0, {good: []})
+    step.write_bytes(step.read_bytes() + b" ")
+    assert codes() == (1, {good: [], step_path: ["M003"]})
+    assert codes("../good.stl") == codes()
+    assert codes("--ignore", "M003") == (0, {good: []})
+    step.unlink()
+    assert codes() == (1, {good: [], step_path: ["M004"]})
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("{}", "it lacks 'parts'"),
+        ('{"parts": [{"name": "a"}]}', "it lacks 'files'"),
+        ("[]", "an entry has a wrong type"),
+        ('{"parts": [3]}', "an entry has a wrong type"),
+    ],
+)
+def test_a_bad_manifest_is_one_sentence(folder: Path, content: str, said: str) -> None:
+    (folder / "manifest.json").write_text(content)
+    result = run("--manifest", "manifest.json", cwd=folder)
+    assert result.returncode == 2
+    assert result.stderr == f"error: --manifest manifest.json: not a manifest of `unitcad build`: {said}\n"
 
 
 def test_a_bomb_by_the_command_line(tmp_path: Path) -> None:

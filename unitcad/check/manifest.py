@@ -49,8 +49,12 @@ def read(where: str) -> Listing:
         return _listing(path.parent, data)
     except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise UnitcadError(f"--manifest {where}: cannot be read: {error}") from error
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise UnitcadError(f"--manifest {where}: not a manifest of `unitcad build`: {error!r}") from error
+    except KeyError as error:
+        raise UnitcadError(f"--manifest {where}: not a manifest of `unitcad build`: it lacks {error}") from error
+    except (TypeError, ValueError, AttributeError) as error:
+        raise UnitcadError(
+            f"--manifest {where}: not a manifest of `unitcad build`: an entry has a wrong type"
+        ) from error
 
 
 def _listing(folder: Path, data: Any) -> Listing:
@@ -95,6 +99,14 @@ def compare(listing: Listing, report: FileReport, options: Options) -> FileRepor
     return replace(report, findings=merge([*report.findings, *added]))
 
 
+def unjudged(listing: Listing, judged: Sequence[str], options: Options) -> list[FileReport]:
+    """Reports of the listed files that were not judged (STEP, drawings, ...) and are gone or changed: M003, M004."""
+    seen = {os.path.abspath(path) for path in judged}
+    left = [os.path.relpath(path) for path in listing.files if path not in seen]
+    reports = [compare(listing, FileReport(path), options) for path in left]
+    return [report for report in reports if report.findings]
+
+
 def judge(part: Part, report: FileReport) -> list[Finding]:
     """M001 to M004 for one file."""
     path = Path(report.path)
@@ -102,7 +114,11 @@ def judge(part: Part, report: FileReport) -> list[Finding]:
         return [finding("M004", f"listed for {', '.join(part.names)}")]
     found = []
     if part.sha256 is not None:
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        try:
+            with path.open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError as error:
+            return [finding("M003", f"cannot be read: {error.strerror or error}")]
         if digest != part.sha256.lower():
             found.append(finding("M003", f"{digest[:12]} instead of {part.sha256[:12]}"))
     facts = report.facts

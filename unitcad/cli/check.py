@@ -76,7 +76,8 @@ def _run(
     listed = listing.read(manifest)
     work = listing.work(listed, paths, options, printer_named)
     judged = list(run.check_files(work, jobs, memory))
-    return reports + [listing.compare(listed, report, options) for report in judged]
+    compared = [listing.compare(listed, report, options) for report in judged]
+    return reports + compared + listing.unjudged(listed, [path for path, _ in work], options)
 
 
 def _options(
