@@ -13,6 +13,7 @@ from unitcad.check import check_mesh
 from unitcad.check.exact import integers, orient2d, orient3d
 from unitcad.check.limits import Deadline
 from unitcad.check.pairs import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
+from unitcad.check.rulebook import explain
 from unitcad.check.triangles import coplanar, meet
 
 
@@ -295,3 +296,19 @@ def test_a_denormal_beside_ordinary_numbers_is_decided_without_a_warning() -> No
     whole = integers(values).astype(object)[0].tolist()
     assert whole[0] == 0
     assert whole[2] * Fraction(1e-320) == whole[1] * 10
+
+
+@pytest.mark.parametrize("code", ["G001", "G002", "P019"])
+def test_rules_that_are_softer_in_some_files_say_so(code: str) -> None:
+    assert "3MF" in explain(code)
+    assert "warning" in explain(code).split("\n", 1)[1]
+
+
+@pytest.mark.parametrize("code", ["G002", "G003"])
+@pytest.mark.parametrize(("shared", "overlap"), [(0.0, False), (0.9e-6, False), (1.1e-6, True)])
+def test_shells_in_line_overlap_from_a_millionth_on_as_the_rules_say(code: str, shared: float, overlap: bool) -> None:
+    assert "a millionth of the smaller one" in explain(code)
+    points = np.concatenate([CUBE_CORNERS, CUBE_CORNERS * [2, 1, 1] + [1 - shared, 0, 0]]) * 10
+    found = {item.code for item in check_mesh(points, np.concatenate([CUBE_FACES, CUBE_FACES + 8])).findings}
+    assert "G003" in found
+    assert ("G002" in found) == overlap
