@@ -111,6 +111,23 @@ def test_statistics_explain_and_select(folder: Path) -> None:
     assert run("sub/hole.stl", "--select", "F", "--extend-select", "T001", cwd=folder).returncode == 1
 
 
+def test_statistics_leave_a_machine_format_whole(folder: Path) -> None:
+    table = run(".", "--statistics", cwd=folder).stdout
+    for format_ in ("json", "sarif", "junit", "github"):
+        plain = run(".", "--output-format", format_, cwd=folder)
+        result = run(".", "--output-format", format_, "--statistics", cwd=folder)
+        assert (result.stdout, result.stderr) == (plain.stdout, table)
+        assert plain.stderr == ""
+
+
+def test_statistics_count_findings_and_not_bytes(folder: Path) -> None:
+    (folder / "bare").mkdir()
+    (folder / "bare" / "long.stl").write_bytes(GOOD + bytes(77))
+    (folder / "bare" / "cut.stl").write_bytes(GOOD[:-150])
+    lines = run("bare", "--statistics", cwd=folder).stdout.splitlines()
+    assert sorted(" ".join(line.split()[:5]) for line in lines) == ["1 file 1 x F002", "1 file 1 x F006"]
+
+
 def test_limits_unit_and_printer(folder: Path) -> None:
     assert "F011" in run("good.stl", "--max-faces", "5", cwd=folder).stdout
     assert "S001" in run("good.stl", "--unit", "meter", cwd=folder).stdout

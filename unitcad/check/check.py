@@ -19,15 +19,8 @@ from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Floats, Ints, Mesh
 from unitcad.check.rulebook import finding
 from unitcad.check.rules_mesh import Judged, judge_mesh
+from unitcad.check.scale import UNITS_MM
 
-UNITS_MM = {
-    "micron": 1e-3,
-    "millimeter": 1.0,
-    "centimeter": 10.0,
-    "inch": 25.4,
-    "foot": 304.8,
-    "meter": 1000.0,
-}
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a FIFO",
@@ -177,7 +170,7 @@ def _judge_all(meshes: Sequence[Mesh], options: Options, deadline: Deadline) -> 
         judged = judge_mesh(mesh, deadline, cross=options.cross)
         findings += judged.findings
         facts, topology = judged.facts, judged.topology
-        findings += scale.judge(judged.facts, options.unit is not None)
+        findings += scale.judge(judged.facts, options.unit)
         if options.printer is not None and topology is not None:
             from unitcad.check import printing
 

@@ -62,14 +62,17 @@ def _plain(said: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in said)
 
 
+_SIZES = {"F002", "F006", "G005"}  # their count is a number of bytes, facets or shells by which the file is wrong
+
+
 def statistics(reports: Sequence[FileReport]) -> str:
-    """How many files each rule hit and how often, most files first."""
+    """How many files each rule hit and how often, most files first. A finding that counts bytes is one occurrence."""
     files: Counter[str] = Counter()
     times: Counter[str] = Counter()
     for report in reports:
         for found in report.findings:
             files[found.code] += 1
-            times[found.code] += found.count
+            times[found.code] += 1 if found.code in _SIZES else found.count
     lines = [
         f"{counted(n, 'file ', 'files'):>12} {times[code]:9d} x  {code} {rules()[code].title}"
         for code, n in files.most_common()

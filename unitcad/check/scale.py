@@ -5,19 +5,23 @@ from __future__ import annotations
 from unitcad.check.findings import Facts, Finding
 from unitcad.check.rulebook import finding
 
+UNITS_MM = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
 SMALL, LARGE = 1.0, 2000.0  # mm; a printed part lies between
 
 
-def judge(facts: Facts, unit_known: bool) -> list[Finding]:
-    """S001 from the largest side of the box; `unit_known` says that the file or the caller named the unit."""
+def judge(facts: Facts, unit: str | None) -> list[Finding]:
+    """S001 from the largest side of the box; `unit` is the one that the file or the caller named, as in UNITS_MM."""
     if facts.bbox_mm is None:
         return []
     side = max(high - low for low, high in zip(*facts.bbox_mm, strict=True))
     if SMALL <= side <= LARGE or side == 0:
         return []
-    if side < SMALL:
+    factor = UNITS_MM.get(unit or "millimeter", 1.0)
+    if factor != 1.0:
+        guess = f"{side / factor:.6g} mm if the numbers are millimetres"
+    elif side < SMALL:
         guess = f"{side * 1000:.3g} mm if it was metres, {side * 25.4:.3g} mm if inches"
     else:
         guess = f"{side / 1000:.3g} mm if it was microns"
-    named = "in the unit that is named" if unit_known else "as millimetres"
+    named = f"with the unit {unit} that is named" if unit else "as millimetres"
     return [finding("S001", f"largest side {side:.6g} mm {named}; {guess}")]

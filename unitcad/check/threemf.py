@@ -19,11 +19,11 @@ from unitcad.check.model_part import read_model
 from unitcad.check.package import Package, Relation
 from unitcad.check.rulebook import finding
 from unitcad.check.rules_mesh import Judged, judge_mesh
+from unitcad.check.scale import UNITS_MM
 
 if TYPE_CHECKING:
     from unitcad.check.check import Options
 
-UNITS_MM = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
 _IMAGES = {"image/png": "png", "image/jpeg": "jpeg", "image/jpg": "jpeg"}
 _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
@@ -283,7 +283,7 @@ def _geometry(
         (tuple(low.tolist()), tuple(high.tolist())),
         watertight,
     )
-    findings += placement.judge(solids, deadline) + scale.judge(facts, True)
+    findings += placement.judge(solids, deadline) + scale.judge(facts, next(iter(models.values())).unit)
     if options.shells is not None and shells != options.shells:
         findings.append(
             finding("G005", f"{counted(shells, 'shell')}, {options.shells} expected", abs(shells - options.shells))

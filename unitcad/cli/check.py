@@ -37,7 +37,9 @@ def check(
     max_faces: Annotated[int, typer.Option(min=1, help="Faces a file may have.")] = 10_000_000,
     timeout: Annotated[float, typer.Option(min=0.001, help="Seconds a file may take.")] = 600.0,
     memory: Annotated[int, typer.Option(min=200, help="MB of address space a process may use.")] = 8000,
-    statistics: Annotated[bool, typer.Option(help="Count findings by rule.")] = False,
+    statistics: Annotated[
+        bool, typer.Option(help="Count findings by rule: in place of the text, beside other formats on stderr.")
+    ] = False,
     explain: Annotated[
         str | None, typer.Option(help="Say what a code means, why it matters and how to mend it.")
     ] = None,
@@ -57,8 +59,12 @@ def check(
     if not files and manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
     reports = _run(files or [], options, manifest, printer is not None, jobs, memory)
-    out = formats.statistics(reports) if statistics else formats.render(reports, output_format, fail_on)
-    sys.stdout.write(out)
+    table = formats.statistics(reports) if statistics else ""
+    if statistics and output_format == "text":
+        sys.stdout.write(table)
+    else:
+        sys.stdout.write(formats.render(reports, output_format, fail_on))
+        sys.stderr.write(table)
     raise typer.Exit(run.worst(reports, fail_on))
 
 
@@ -92,8 +98,8 @@ def _options(
 ) -> Options:
     from unitcad import catalogue
     from unitcad.check import Limits, Options
-    from unitcad.check.check import UNITS_MM
     from unitcad.check.rulebook import check_prefixes
+    from unitcad.check.scale import UNITS_MM
 
     if unit is not None:
         unit = _SHORT_UNITS.get(unit.lower(), unit.lower())
