@@ -217,3 +217,30 @@ def test_four_faces_at_an_edge_that_do_not_all_agree_are_wound_wrongly(judge) ->
     cubes[turned] = cubes[turned, ::-1]
     report = judge(stl(cubes))
     assert next(found.count for found in report.findings if found.code == "T007") == 3
+
+
+_BESIDE = box(at=(10, 0, 0))
+
+
+@pytest.mark.parametrize(
+    ("parts", "duplicates"),
+    [
+        ([box(), _BESIDE], 0),
+        ([box(), _turned_diagonals(_BESIDE)], 0),
+        ([box()[:, ::-1], _BESIDE[:, ::-1]], 0),
+        ([box(), _BESIDE, box(at=(0, 10, 0)), box(at=(10, 10, 0))], 0),
+        ([box(), _BESIDE[:, ::-1]], 2),
+        ([box(), box()], 12),
+        ([box(), box()[:, ::-1]], 12),
+        ([box()[1:], _BESIDE], 2),
+        ([box(), _BESIDE, _BESIDE], 14),
+        ([box(), box()[:1, ::-1]], 1),
+        ([box(), box()[:1], box()[:1, ::-1]], 2),
+    ],
+    ids=["side by side", "other diagonals", "both inverted", "four", "one inverted", "twice", "hollow without a wall",
+         "one open", "two and its copy", "a face turned over", "a fin"],
+)  # fmt: skip
+def test_closed_shells_side_by_side_share_no_duplicates(parts: list[np.ndarray], duplicates: int, judge) -> None:
+    report = judge(stl(np.concatenate(parts)))
+    assert sum(found.count for found in report.findings if found.code == "T009") == duplicates
+    assert report.has("G003") or duplicates

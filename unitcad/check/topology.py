@@ -69,6 +69,10 @@ def judge(mesh: Mesh, deadline: Deadline) -> Topology:
         pinched = mesh_edges.pinched_open(faces, edges, len(vertices))
         twice = _duplicates(faces)
     deadline.tick()
+    shells = mesh_edges.shells_of(vertices, faces, edges)
+    if across is None and len(twice):
+        twice = np.setdiff1d(twice, _facing(vertices, faces, edges, areas, shells))
+    deadline.tick()
     if len(pinched):
         found.append(
             finding(
@@ -90,8 +94,6 @@ def judge(mesh: Mesh, deadline: Deadline) -> Topology:
         found.append(finding("T007", text, len(wrong), _at_edges(mesh, edges, kept, wrong)))
     if mesh.normals is not None:
         found += _stored_normals(mesh, kept, areas)
-    shells = mesh_edges.shells_of(vertices, faces, edges)
-    deadline.tick()
     watertight = bool(len(faces)) and bool((edges.size % 2 == 0).all())
     return Topology(
         replace(mesh, faces=faces, normals=None),
@@ -180,11 +182,36 @@ def _many_faces(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> list[Findi
     return found
 
 
-def _duplicates(faces: Ints) -> Ints:
+def _same_vertices(faces: Ints) -> tuple[Ints, Bools]:
+    """An order of the faces, and where in it a face has the vertices of the one before."""
     ordered = np.sort(faces, axis=1)
     order = np.lexsort(ordered.T)
     same = (ordered[order[1:]] == ordered[order[:-1]]).all(axis=1)
-    return np.sort(order[1:][same])
+    return order, np.append(False, same)[: len(faces)]
+
+
+def _duplicates(faces: Ints) -> Ints:
+    order, same = _same_vertices(faces)
+    return np.sort(order[same])
+
+
+def _facing(vertices: Floats, faces: Ints, edges: Edges, areas: Floats, shells: Ints) -> Ints:
+    """Duplicates that are none: two faces back to back, of two closed shells that lie on either side of them.
+
+    The volumes of such shells have one sign. A cavity has the other one: where it reaches the wall's outer face, the
+    wall has no thickness.
+    """
+    order, same = _same_vertices(faces)
+    first = np.flatnonzero(same) - 1
+    alone = ~same[first] & ~np.append(same, False)[first + 2]  # no third face there
+    one, other = order[first[alone]], order[first[alone] + 1]
+    shell, beside = shells[one], shells[other]
+    volume = np.bincount(shells, np.einsum("ij,ij->i", vertices[faces[:, 0]] - vertices[faces[0, 0]], areas))
+    unclosed = np.repeat(~mesh_edges.balanced(faces, edges), edges.size)
+    volume[shells[edges.order[unclosed] // 3]] = 0
+    opposite = np.einsum("ij,ij->i", areas[one], areas[other]) < 0
+    touching = opposite & (shell != beside) & (volume[shell] * volume[beside] > 0)
+    return np.concatenate([one[touching], other[touching]])
 
 
 def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints) -> list[Finding]:
