@@ -11,12 +11,14 @@ from unitcad.check.rulebook import finding
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds on one file. `seconds` is wall time; `ratio` is inflated over packed size of a zip entry."""
+    """Bounds on one file. `seconds` is wall time; `ratio` is inflated over packed size of a zip entry,
+    `max_instances` what a 3MF may place: items and components, counted before they are expanded."""
 
     max_faces: int = 10_000_000
     max_bytes: int = 4_000_000_000
     max_package_bytes: int = 2_000_000_000
     max_entries: int = 10_000
+    max_instances: int = 100_000
     max_depth: int = 64
     ratio: float = 1000.0
     seconds: float = 600.0

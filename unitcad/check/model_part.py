@@ -46,9 +46,10 @@ class _Reader:
         self.model, self.limits, self.faces = model, limits, spent_faces
         self.stack: list[_Open] = [_Open("", "", None)]
         self.skip = 0
-        self.rank = 0
+        self.rank = self.uses = 0
         self.resource: Resource | None = None
         self.names: set[str] = set()
+        self.regular: set[tuple[str, ...]] = set()
         self.numbers: list[str] = []
         self.vertices: list[Floats] = []
         self.rows: list[tuple[int, ...]] = []
@@ -259,8 +260,9 @@ class _Reader:
         self.model.build_uuid = f"{schema.PRODUCTION} UUID" in attributes
 
     def _use(self, attributes: dict[str, str]) -> Use:
-        if len(self.model.items) > 1_000_000:
-            raise over_limit("more than a million instances")
+        self.uses += 1
+        if self.uses > self.limits.max_instances:
+            raise over_limit(f"more items and components than the limit of {self.limits.max_instances} instances")
         uuid = attributes.get(f"{schema.PRODUCTION} UUID")
         if uuid is not None and not schema.uuid(uuid):
             self.model.say("P017", f"UUID {uuid[:40]!r} is none")
@@ -276,16 +278,19 @@ class _Reader:
         parts = said.split()
         if len(parts) == 12 and all(schema.number(part) for part in parts):
             found = np.array([float(part) for part in parts]).reshape(4, 3)
-            if (np.abs(found) <= LARGEST).all():
+            if not (np.abs(found) <= LARGEST).all():
+                self.model.say("P013", f'transform="{said[:60]}" is not twelve float32 numbers')
+                return identity
+            if (linear := tuple(parts[:9])) not in self.regular:  # most items of a build differ by their shift only
                 det = float(np.linalg.det(found[:3]))
                 scale = float(np.prod(np.linalg.norm(found[:3], axis=1)))
                 if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
                     self.model.say("P013", "a transform has determinant zero")
                 elif det < 0:
                     self.model.say("P015", "a transform mirrors")
-                return found
-            self.model.say("P013", f'transform="{said[:60]}" is not twelve float32 numbers')
-            return identity
+                else:
+                    self.regular.add(linear)
+            return found
         code = "P013" if len(parts) == 12 and any(part.lower() in _NAMES for part in parts) else "P017"
         self.model.say(code, f'transform="{said[:60]}" is not twelve numbers')
         return identity

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,8 +13,8 @@ from unitcad.check import package as opc
 from unitcad.check import references, scale, schema, topology
 from unitcad.check.findings import Facts, Finding, counted, ending
 from unitcad.check.images import image_kind
-from unitcad.check.limits import Deadline, Limits, Unreadable
-from unitcad.check.mesh import LARGEST, Floats, Mesh, diagonal
+from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
+from unitcad.check.mesh import LARGEST, Floats, Mesh, cross, diagonal, extent
 from unitcad.check.model_data import Model, Object, Use
 from unitcad.check.model_part import read_model
 from unitcad.check.package import Package, Relation
@@ -28,6 +29,7 @@ _IMAGES = {"image/png": "png", "image/jpeg": "jpeg", "image/jpg": "jpeg"}
 _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
 _FILLED = {"G001", "G002"}
+_NO_FACE = np.empty((0, 3), np.int32)
 Key = tuple[str, int]
 
 
@@ -195,10 +197,11 @@ def _expand(models: dict[str, Model], root: Model, limits: Limits, findings: lis
     for item in root.items:
         faces, below = size(key_of(root.part, item), ())
         total, nodes = total + faces, nodes + below
-    if total > limits.max_faces or nodes > limits.max_faces:
-        raise Unreadable(
-            finding("P009", f"{counted(total, 'face')} in {counted(nodes, 'instance')}, more than {limits.max_faces}")
-        )
+    if total > limits.max_faces:
+        text = f"{_large(total)} faces in {_large(nodes)} instances, more than --max-faces {limits.max_faces}"
+        raise Unreadable(finding("P009", text))
+    if nodes > limits.max_instances:
+        raise over_limit(f"{_large(nodes)} instances, more than the limit of {limits.max_instances}")
     instances: list[Instance] = []
 
     def place(key: Key, matrix: Floats, depth: int) -> None:
@@ -220,20 +223,46 @@ def _expand(models: dict[str, Model], root: Model, limits: Limits, findings: lis
     return instances
 
 
+def _large(n: int) -> str:
+    """A count in digits that can be read: whole up to 1e15, else its power of ten."""
+    return str(n) if n < 10**15 else f"more than 1e{math.floor(math.log10(n))}"
+
+
 def _times(first: Floats, then: Floats) -> Floats:
     """The transform `first` followed by `then`, rows as 3MF writes them."""
     with np.errstate(all="ignore"):  # what comes out too large is found where it is used
         return np.vstack([first[:3] @ then[:3], first[3] @ then[:3] + then[3]])
 
 
+@dataclass(frozen=True)
+class _Turned:
+    """An object under the linear part of a transform: its box (2, 3) mm, area mm2, and the factor on its volume."""
+
+    box: Floats
+    area: float
+    scale: float
+
+
+def _turned(found: Object, linear: Floats, factor: float) -> _Turned:
+    """Measured once for all instances that differ by a shift: adding it to the box rounds as it does every vertex."""
+    assert found.vertices is not None
+    assert found.triangles is not None
+    with np.errstate(all="ignore"):
+        points = (found.vertices @ linear) * factor
+        a, b, c = (points[found.triangles[:, i]] for i in range(3))
+        area = float(np.linalg.norm(cross(b - a, c - a), axis=1).sum()) / 2
+        return _Turned(np.stack(extent(points)), area, abs(float(np.linalg.det(linear))))
+
+
 def _geometry(
     models: dict[str, Model], instances: list[Instance], options: Options, deadline: Deadline, findings: list[Finding]
 ) -> tuple[list[Finding], Facts]:
     judged: dict[Key, Judged] = {}
+    turned: dict[tuple[Key, bytes], _Turned] = {}
     broken = any(item.code in ("P011", "V001", "F004") for item in findings)
     if broken:
         return list(ending(findings)), Facts()
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    boxes, shifts, placed = list[Floats](), list[Floats](), list[int]()
     triangles = vertices = shells = 0
     volume = area = 0.0
     watertight = bool(instances)
@@ -250,36 +279,46 @@ def _geometry(
             judged[instance.key] = _judge(found, factor, options, deadline)
             findings += judged[instance.key].findings
         facts = judged[instance.key].facts
-        with np.errstate(all="ignore"):
-            turned = (found.vertices @ instance.matrix[:3]) * factor
-            points = turned + instance.matrix[3] * factor
-        if not (np.abs(points) <= LARGEST).all():
-            findings.append(finding("V001", f"an instance of object {found.id} reaches beyond the float32 numbers"))
-            return list(ending(findings)), Facts()
-        findings += topology.too_far(replace(_mesh_of(found, factor), vertices=points), diagonal(turned))
-        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+        linear = instance.key, instance.matrix[:3].tobytes()
+        if linear not in turned:
+            turned[linear] = _turned(found, instance.matrix[:3], factor)
+        one = turned[linear]
+        boxes.append(one.box)
+        shifts.append(instance.matrix[3] * factor)
+        placed.append(found.id)
         triangles += facts.triangles or 0
         vertices += facts.vertices or 0
         shells += facts.shells or 0
-        size = (facts.volume_mm3 or 0.0) * abs(float(np.linalg.det(instance.matrix[:3])))
+        size = (facts.volume_mm3 or 0.0) * one.scale
         volume += size
-        corners = points[found.triangles[:, :3]]
-        area += float(
-            np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-        )
+        area += one.area
         watertight = watertight and bool(facts.watertight)
         if compared and facts.watertight and size > 0 and len(solids) <= placement.MOST:
-            placed = _mesh_of(found, factor, instance.matrix)
-            solids.append(placement.Placed(placed.vertices, placed.faces, size, f"object {found.id}"))
+            with np.errstate(all="ignore"):
+                mesh = _mesh_of(found, factor, instance.matrix)
+            solids.append(placement.Placed(mesh.vertices, mesh.faces, size, f"object {found.id}"))
         deadline.tick()
     if not triangles:
         return list(ending(findings)), Facts(triangles=0, vertices=vertices, shells=0)
+    with np.errstate(all="ignore"):
+        corners = np.stack(boxes) + np.stack(shifts)[:, None]
+    beyond = ~(np.abs(corners) <= LARGEST).all(axis=(1, 2))
+    if beyond.any():
+        worst = placed[int(beyond.argmax())]
+        findings.append(finding("V001", f"an instance of object {worst} reaches beyond the float32 numbers"))
+        return list(ending(findings)), Facts()
+    sides = np.stack([box[1] - box[0] for box in boxes])
+    across = np.linalg.norm(sides, axis=1)
+    steps = np.spacing(np.abs(corners).max(axis=(1, 2)).astype(np.float32))
+    for i in np.flatnonzero(steps > topology.FAR * across):
+        findings += topology.too_far(Mesh(corners[i], _NO_FACE), diagonal(boxes[i]))
+    low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     facts = Facts(
         triangles,
         vertices,
         shells,
         volume if watertight else None,
-        area / 2,
+        area,
         (tuple(low.tolist()), tuple(high.tolist())),
         watertight,
     )
