@@ -14,7 +14,7 @@ from unitcad.check.exact import integers, orient2d, orient3d
 from unitcad.check.limits import Deadline
 from unitcad.check.pairs import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
 from unitcad.check.rulebook import explain
-from unitcad.check.triangles import coplanar, meet
+from unitcad.check.triangles import common_point, coplanar, meet
 
 
 def _point(p) -> list[Fraction]:
@@ -312,3 +312,61 @@ def test_shells_in_line_overlap_from_a_millionth_on_as_the_rules_say(code: str, 
     found = {item.code for item in check_mesh(points, np.concatenate([CUBE_FACES, CUBE_FACES + 8])).findings}
     assert "G003" in found
     assert ("G002" in found) == overlap
+
+
+def _two(scale: tuple[float, float, float], at: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """A cube of 10 mm and a second box."""
+    points = np.concatenate([CUBE_CORNERS * 10, CUBE_CORNERS * scale + np.array(at)])
+    return points, np.concatenate([CUBE_FACES, CUBE_FACES + 8])
+
+
+@pytest.mark.parametrize(
+    ("code", "scale", "at", "low", "high"),
+    [
+        ("G001", (2, 2, 20), (4, 4, 5), (4, 4, 10), (6, 6, 10)),  # a pillar through the top
+        ("G001", (10, 10, 10), (9, 8, 7), (9, 8, 7), (10, 10, 10)),
+        ("G002", (10, 10, 10), (9, 8, 7), (9, 8, 7), (10, 10, 10)),
+        ("G003", (2, 2, 2), (10, 4, 4), (10, 4, 4), (10, 6, 6)),
+        ("G003", (5, 5, 5), (10, 10, 10), (10, 10, 10), (10, 10, 10)),
+        ("G003", (5, 5, 5), (10, 10, 2), (10, 10, 2), (10, 10, 7)),
+        ("G004", (2, 2, 2), (10, 4, 4), (10, 4, 4), (10, 6, 6)),
+    ],
+)
+@pytest.mark.parametrize("shift", [0.0, 777.7])
+def test_places_are_where_the_shells_meet_and_differ(
+    code: str, scale: tuple, at: tuple, low: tuple, high: tuple, shift: float
+) -> None:
+    points, faces = _two(scale, at)
+    report = check_mesh(points + shift, faces)
+    places = next(found.locations for found in report.findings if found.code == code)
+    where = np.array([place.xyz for place in places]) - shift
+    assert (where >= np.array(low) - 1e-6).all()
+    assert (where <= np.array(high) + 1e-6).all()
+    assert len({tuple(row) for row in np.round(where, 4).tolist()}) == len(places)
+    assert code in ("G002", "G003") or len({place.face for place in places}) == len(places) > 1
+
+
+def test_touching_shells_are_placed_pair_by_pair() -> None:
+    boxes = [CUBE_CORNERS * 10 + [10 * k, 0, 0] for k in range(4)]
+    report = check_mesh(np.concatenate(boxes), np.concatenate([CUBE_FACES + 8 * k for k in range(4)]))
+    places = next(found.locations for found in report.findings if found.code == "G003")
+    assert sorted(place.xyz[0] for place in places if place.xyz) == pytest.approx([10, 20, 30])
+
+
+@pytest.mark.parametrize(
+    ("other", "expected"),
+    [
+        ([[1, 1, -1], [1, 1, 1], [1, -9, 0]], (1, 0.5, 0)),  # a segment from the edge y = 0 to (1, 1, 0)
+        ([[2, 2, 0], [2, 2, 5], [9, 2, 5]], (2, 2, 0)),  # a corner on the inside
+        ([[0, 0, 0], [0, 0, 3], [6, 0, 3]], (0, 0, 0)),  # a common corner
+        ([[0, 0, 0], [6, 0, 0], [0, 0, 3]], (3, 0, 0)),  # a common edge
+        ([[1, 1, 0], [2, 1, 0], [1, 2, 0]], (4 / 3, 4 / 3, 0)),  # in one plane, inside
+        ([[0, 0, 1], [1, 0, 1], [0, 1, 1]], None),
+    ],
+)
+@pytest.mark.parametrize("scale", [1.0, 1e38, 1e-150])
+def test_the_middle_of_what_two_triangles_share(other: list, expected: tuple | None, scale: float) -> None:
+    found = common_point(scale * np.array([[0, 0, 0], [6, 0, 0], [0, 6, 0]]), scale * np.array(other))
+    assert (found is None) == (expected is None)
+    if found is not None and expected is not None:
+        assert found / scale == pytest.approx(expected, abs=1e-7)

@@ -24,6 +24,7 @@ from unitcad.check.topology import Topology, max_side_squared
 _EPS = float(np.finfo(np.float64).eps)
 _BLOCK = 1 << 17
 _CACHED = 1 << 11  # pairs whose coordinates stay in the processor's cache
+_LISTED = 16  # pairs whose places are computed; a finding keeps fewer
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
@@ -335,30 +336,43 @@ def _leaning(faces: _Faces, found: _Found) -> None:
 def _said(topology: Topology, faces: _Faces, found: _Found) -> Crossings:
     findings: list[Finding] = []
     crossing, overlap = _joined(found.crossing), _joined(found.overlap)
-    name = topology.mesh.name
-
-    def places(pairs: Ints) -> list[Location]:
-        shown = []
-        for i in pairs[:9, 0]:
-            centre = np.mean([faces.vertices[corner[i]] for corner in faces.corners], axis=0)
-            xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
-            shown.append(Location(face=int(faces.original[i]), xyz=xyz, part=name))
-        return sorted(shown, key=lambda place: place.face or 0)
-
     for code, pairs, what in (("G001", crossing, "that cross"), ("G004", overlap, "that overlap in one plane")):
         if len(pairs):
             text = f"{counted(len(pairs), 'pair')} of faces {what}"
-            findings.append(finding(code, text, len(pairs), places(pairs)))
+            findings.append(finding(code, text, len(pairs), _places(topology, faces, pairs)))
     touching = _joined(found.contact)
     if not len(touching):
         return Crossings(tuple(findings), bool(len(crossing)))
-    shells = np.unique(np.sort(faces.shell[touching], axis=1), axis=0).astype(np.int64)
+    met = np.sort(faces.shell[touching], axis=1)
+    shells, first = np.unique(met, axis=0, return_index=True)
+    shells = shells.astype(np.int64)
     through = {tuple(row) for row in np.sort(faces.shell[crossing], axis=1).tolist()}
     only = np.array([tuple(row) not in through for row in shells.tolist()], bool)
     if only.any():
         n = int(only.sum())
-        findings.append(finding("G003", f"{counted(n, 'pair')} of shells that touch", n, places(touching)))
+        places = _places(topology, faces, touching[first[only]])
+        findings.append(finding("G003", f"{counted(n, 'pair')} of shells that touch", n, places))
     return Crossings(tuple(findings), bool(len(crossing)), shells)
+
+
+def _places(topology: Topology, faces: _Faces, pairs: Ints) -> list[Location]:
+    """Where pairs meet, no point twice, with a face of each that was not named before."""
+    found: dict[tuple[int, ...], Location] = {}
+    named: set[int] = set()
+    grid = 4 * max(float32_step(faces.vertices), 1e-300)
+    for pair in pairs[:: max(1, len(pairs) // _LISTED)][:_LISTED].tolist():
+        a, b = (faces.vertices[[int(corner[i]) for corner in faces.corners]] for i in pair)
+        point = triangles.common_point(a, b)
+        point = a.mean(axis=0) if point is None else point + 0.0
+        near = tuple(round(float(v) / grid) for v in point)
+        if near in found:
+            continue
+        one, other = sorted(int(faces.original[i]) for i in pair)
+        face = other if one in named else one
+        named.add(face)
+        xyz = (float(point[0]), float(point[1]), float(point[2]))
+        found[near] = Location(face=face, xyz=xyz, part=topology.mesh.name)
+    return sorted(found.values(), key=lambda place: place.face or 0)
 
 
 def _joined(blocks: list[Ints]) -> Ints:

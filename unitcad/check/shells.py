@@ -67,7 +67,7 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
         if depth[a] % 2 and volumes[a] > 0:
             overlaps.append((a, a))
     if overlaps:
-        places = [_where(low, high, pair[0]) for pair in overlaps]
+        places = [_where(low[list(pair)].max(axis=0)[None], high[list(pair)].min(axis=0)[None], 0) for pair in overlaps]
         text = f"{counted(len(overlaps), 'pair')} of shells that share volume"
         found.append(finding("G002", text, len(overlaps), places))
     inverted = [i for i in range(n) if depth[i] % 2 == 0 and volumes[i] < 0]

@@ -127,3 +127,37 @@ def segment_inside(u: Floats, v: Floats, b: Floats) -> Bools:
         inside &= np.max(side, axis=0) > 0
     across = np.stack([orient2d(ends[:, 0], ends[:, 1], flat[:, k]) for k in range(3)], axis=1)
     return inside & (across > 0).any(axis=1) & (across < 0).any(axis=1)
+
+
+def common_point(a: Floats, b: Floats) -> Floats | None:
+    """A point (3,) of two triangles (3, 3) that meet: the middle of the point, segment or polygon that they share.
+
+    `a` is cut to the prism over `b` that is as high as rounding, so it is exact to rounding only; None where nothing is
+    left.
+    """
+    shift = b[0]
+    size = float(np.abs([a - shift, b - shift]).max())
+    near = 1e-9 + 8 * float(np.spacing(np.abs([a, b]).max())) / size
+    a, b = (a - shift) / size, (b - shift) / size
+    normal = np.cross(b[1] - b[0], b[2] - b[0])
+    normal /= max(np.sqrt(normal @ normal), 1e-150)
+    planes = [(normal, b[0]), (-normal, b[0])]
+    for k in range(3):
+        inward = np.cross(normal, b[(k + 1) % 3] - b[k])
+        planes.append((inward / max(np.sqrt(inward @ inward), 1e-150), b[k]))
+    left = list(a)
+    for inward, origin in planes:
+        height = [float((point - origin) @ inward) + near for point in left]
+        cut = []
+        for k, point in enumerate(left):
+            before, low, high = left[k - 1], height[k - 1], height[k]
+            if (low < 0) != (high < 0):
+                cut.append(before + (point - before) * (low / (low - high)))
+            if high >= 0:
+                cut.append(point)
+        left = cut
+    apart: list[Floats] = []
+    for point in left:
+        if all(np.abs(point - other).max() > 4 * near for other in apart):
+            apart.append(point)
+    return np.mean(apart, axis=0) * size + shift if apart else None
