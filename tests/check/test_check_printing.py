@@ -177,3 +177,20 @@ def test_hollow(judge) -> None:
 
 def test_without_a_printer_none_of_these_rules_runs(judge) -> None:
     assert judge(stl(box((300, 0.3, 10), (0, 0, 4)))).findings == ()
+
+
+@pytest.mark.parametrize(
+    ("solid", "walls"),
+    [
+        (block(20, 0.5, 10) + block(20, 20, 2), 1),
+        (block(20, 0.5, 10) + block(20, 0.5, 10, (0, 8, 0)) + block(20, 20, 2), 2),
+        (block(20, 0.5, 10) + block(0.5, 10, 10, (0, 5, 0)) + block(20, 20, 2), 2),
+        (tube(8, 7.5, 6), 1),
+        (block(20, 20, 0.3), 1),
+    ],
+    ids=["one", "two side by side", "two at right angles", "a tube", "a flat one"],
+)
+def test_a_wall_with_two_sides_is_one_wall(solid: Manifold, walls: int, judge) -> None:
+    found = next(found for found in judge(stl(triangles(solid)), **FDM).findings if found.code == "D001")
+    assert (found.count, len(found.locations)) == (walls, walls)
+    assert found.message.startswith(f"{walls} wall{'s' * (walls > 1)} below")

@@ -32,7 +32,8 @@ class Rays:
     """Points inside the faces, the face of each, and how much material lies behind it, mm (inf beyond reach).
 
     `thickness`: up to the first face that is nearly parallel, within the wall's floor; `behind`: up to the first face
-    that looks the other way at all, within the larger of that floor and the least feature.
+    that looks the other way at all, within the larger of that floor and the least feature; `across`: the face that
+    `thickness` ends at, -1 where there is none.
     """
 
     points: Floats
@@ -40,6 +41,7 @@ class Rays:
     floor: Floats
     thickness: Floats
     behind: Floats
+    across: Ints
 
 
 def cast(topology: Topology, printer: Printer, deadline: Deadline) -> Rays:
@@ -54,8 +56,7 @@ def cast(topology: Topology, printer: Printer, deadline: Deadline) -> Rays:
     normal = topology.areas / np.maximum(double, 1e-300)[:, None]
     floor = (np.where(_lying(topology), level, upright) * _SLACK)[owner]
     reach = np.maximum(floor, float(printer.least_feature_mm))
-    thickness, behind = _behind(corners, normal, sound, points, owner, reach, deadline)
-    return Rays(points, owner, floor, thickness, behind)
+    return Rays(points, owner, floor, *_behind(corners, normal, sound, points, owner, reach, deadline))
 
 
 def judge(topology: Topology, printer: Printer, rays: Rays) -> list[Finding]:
@@ -63,7 +64,7 @@ def judge(topology: Topology, printer: Printer, rays: Rays) -> list[Finding]:
     thin = np.flatnonzero(rays.thickness < rays.floor)
     if not len(thin):
         return []
-    return _patches(topology, rays.points, rays.owner, rays.thickness, thin, float(printer.least_wall_mm) * _SLACK)
+    return _patches(topology, rays, thin, float(printer.least_wall_mm) * _SLACK)
 
 
 def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float) -> tuple[Floats, Ints]:
@@ -85,12 +86,13 @@ def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float)
 
 def _behind(
     corners: Floats, normal: Floats, sound: Floats, points: Floats, owner: Ints, reach: Floats, deadline: Deadline
-) -> tuple[Floats, Floats]:
-    """Distances from each point, against its normal, as `Rays` has them."""
+) -> tuple[Floats, Floats, Ints]:
+    """Distances from each point, against its normal, and the face across, as `Rays` has them."""
     thickness, behind = np.full((2, len(points)), np.inf)
+    across = np.full(len(points), -1)
     ends = points - normal[owner] * reach[:, None]
     if not len(points):
-        return thickness, behind
+        return thickness, behind, across
     solid = np.flatnonzero(sound)
     places = np.concatenate([points, ends, corners[solid].reshape(-1, 3)])
     steps = frame_of(places).steps(places)
@@ -109,8 +111,11 @@ def _behind(
         distance = _hit(points[ray], -normal[owner[ray]], corners[face], normal[face])
         np.minimum.at(behind, ray, distance)
         parallel = facing < -PARALLEL
-        np.minimum.at(thickness, ray[parallel], distance[parallel])
-    return thickness, behind
+        ray, face, distance = ray[parallel], face[parallel], distance[parallel]
+        np.minimum.at(thickness, ray, distance)
+        nearest = np.isfinite(distance) & (distance == thickness[ray])
+        across[ray[nearest]] = face[nearest]
+    return thickness, behind, across
 
 
 def _hit(origin: Floats, along: Floats, corners: Floats, normal: Floats) -> Floats:
@@ -126,10 +131,12 @@ def _hit(origin: Floats, along: Floats, corners: Floats, normal: Floats) -> Floa
     return np.where(inside, distance, np.inf)
 
 
-def _patches(
-    topology: Topology, points: Floats, owner: Ints, thickness: Floats, thin: Ints, upright: float
-) -> list[Finding]:
-    """Thin points grouped by faces that share edges; groups that reach farther than the floor both ways are walls."""
+def _patches(topology: Topology, rays: Rays, thin: Ints, upright: float) -> list[Finding]:
+    """Thin points grouped by faces that share edges; groups that reach farther than the floor both ways are walls.
+
+    Groups that look at each other through the material are the two sides of one wall.
+    """
+    points, owner, thickness = rays.points, rays.owner, rays.thickness
     faces = topology.mesh.faces
     edges = topology.edges
     pairs = edges.first[edges.size == 2]
@@ -140,8 +147,11 @@ def _patches(
     whole = np.bincount(owner[thin], minlength=n) > 0.6 * np.maximum(np.bincount(owner, minlength=n), 1)
     lying = _lying(topology)
     both = marked[left] & marked[right] & (lying[left] == lying[right])
-    group = components(n, left[both], right[both])[owner[thin]]
-    found: list[tuple[float, Location]] = []
+    patch = components(n, left[both], right[both])
+    group = patch[owner[thin]]
+    through = thin[marked[rays.across[thin]]]
+    wall = components(n, patch[owner[through]], patch[rays.across[through]])
+    found: dict[int, tuple[float, Location]] = {}
     for label in np.unique(group):
         mine = thin[group == label]
         of = owner[mine]
@@ -151,12 +161,13 @@ def _patches(
         worst = mine[np.argmin(thickness[mine])]
         xyz = tuple(float(v) for v in points[worst])
         place = Location(face=int(topology.kept[owner[worst]]), xyz=xyz)  # type: ignore[arg-type]
-        found.append((float(thickness[worst]), place))
+        here = (float(thickness[worst]), place)
+        found[int(wall[label])] = min(here, found.get(int(wall[label]), here), key=lambda item: item[0])
     if not found:
         return []
-    found.sort(key=lambda item: item[0])
-    text = f"{counted(len(found), 'wall')} below the floor, the thinnest {found[0][0]:.3g} mm"
-    return [finding("D001", text, len(found), [place for _, place in found])]
+    walls = sorted(found.values(), key=lambda item: item[0])
+    text = f"{counted(len(walls), 'wall')} below the floor, the thinnest {walls[0][0]:.3g} mm"
+    return [finding("D001", text, len(walls), [place for _, place in walls])]
 
 
 def _lying(topology: Topology) -> Bools:
