@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -15,7 +16,8 @@ from shapes import box, stl, text_stl
 
 from unitcad.check import FileReport, Options, check_file, formats
 from unitcad.check.findings import SEVERITIES, Finding, Location, merge
-from unitcad.check.rulebook import FAMILIES, check_prefixes, explain, markdown, rules
+from unitcad.check.rulebook import FAMILIES, check_prefixes, explain, finding, markdown, rules
+from unitcad.check.run import check_files
 from unitcad.errors import Refusal
 
 HERE = Path(__file__).parent
@@ -86,7 +88,8 @@ def test_fingerprints_stay_when_counts_and_places_change(tmp_path: Path) -> None
 
 
 def test_github_annotations_are_escaped(reports: list[FileReport]) -> None:
-    lines = formats.render(reports, "github").splitlines()
+    *lines, last = formats.render(reports, "github").splitlines()
+    assert last == "4 files: 2 failed, 1 warned, 1 passed"
     assert len(lines) == sum(len(report.findings) for report in reports)
     assert lines[0].startswith("::error file=hole & <b>.stl,title=T001 boundary edge::4 boundary edges")
     assert any("::warning file=warn%2C 100%25.stl,title=F007 " in line for line in lines)
@@ -104,9 +107,83 @@ def test_junit_parses_and_counts(reports: list[FileReport]) -> None:
 def test_text_is_one_line_a_finding_and_holds_no_control_characters() -> None:
     odd = FileReport("a\x1b[31m\n.stl", (Finding("F003", "error", "bad \x07 text", 1, (Location(line=3),)),))
     lines = formats.render([odd], "text").splitlines()
-    assert len(lines) == 2
+    assert len(lines) == 3
     assert lines[0] == "a\\x1b[31m\\n.stl: F003 error: bad \\x07 text (at line 3)"
     assert lines[1] == "1 file: 1 failed, 0 passed"
+    assert "--explain CODE" in lines[2]
+    assert formats.render([FileReport("a.stl")], "text") == "1 file: 1 passed\n"
+
+
+def test_github_says_of_a_clean_run_that_it_ran() -> None:
+    assert formats.render([FileReport("::error::.stl")], "github") == "1 file: 1 passed\n"
+
+
+def test_junit_failures_have_a_body_and_cases_a_time(reports: list[FileReport]) -> None:
+    (report,) = check_files([(str(HERE / "nothing.stl"), Options())])
+    assert report.seconds is not None
+    assert report.seconds >= 0
+    assert "seconds" not in report.as_dict()
+    timed = [replace(reports[0], seconds=1.25), replace(reports[1], seconds=0.5), *reports[2:]]
+    suite = ET.fromstring(formats.render(timed, "junit"))[0]
+    assert [case.get("time") for case in suite] == ["1.250", "0.500", None, None]
+    assert suite.get("time") == "1.750"
+    assert "time" not in ET.fromstring(formats.render(reports, "junit"))[0].attrib
+    failure = suite[1].find("failure")
+    assert failure is not None
+    assert failure.text is not None
+    lines = failure.text.splitlines()
+    assert lines[0] == "T001 boundary edge: 4 boundary edges"
+    assert lines[1].startswith("at ")
+    assert lines[-1] == f"Mend: {rules()['T001'].mend}"
+
+
+def test_sarif_says_the_first_place_in_words_and_the_line_as_a_region() -> None:
+    places = (Location(line=7, part="3D/a.model"), Location(line=9))
+    said = FileReport("a.3mf", (Finding("P017", "error", "bad", 2, places),))
+    (result,) = json.loads(formats.render([said], "sarif"))["runs"][0]["results"]
+    assert result["message"]["text"] == "bad (at 3D/a.model line 7)"
+    assert result["locations"][0]["physicalLocation"]["region"] == {"startLine": 7}
+
+
+def test_a_place_of_which_nothing_is_known_is_none(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(stl(box(), header=b"solid"))
+    (found,) = check_file(tmp_path / "a.stl").as_dict()["findings"]
+    assert (found["code"], found["locations"]) == ("F007", [])
+    assert finding("F007", "x", places=[Location(), Location(line=2)]).locations == (Location(line=2),)
+
+
+def test_fingerprints_are_those_of_the_file_however_it_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sub").mkdir()
+    monkeypatch.chdir(tmp_path)
+
+    def print_of(path: str) -> str:
+        data = json.loads(formats.render([FileReport(path, (Finding("T001", "error", "x"),))], "sarif"))
+        return data["runs"][0]["results"][0]["partialFingerprints"]["pathAndRule/v1"]
+
+    names = ["sub/a.stl", "./sub/a.stl", str(tmp_path / "sub" / "a.stl"), "sub/../sub/a.stl"]
+    assert len({print_of(name) for name in names}) == 1
+    assert print_of("a.stl") != print_of("sub/a.stl")
+    assert print_of(str(tmp_path) + "2/a.stl") != print_of("2/a.stl")
+
+
+def test_explain_takes_commas_and_prefixes() -> None:
+    said = explain("t001, G001")
+    assert [line[:4] for line in said.splitlines() if line[:4] in rules()] == ["T001", "G001"]
+    family = explain("V")
+    assert all(f"{code} {rule.title} (" in family for code, rule in rules().items() if code.startswith("V"))
+    assert "T001 " not in family
+    for wrong in ("", ",", "T001,Q"):
+        with pytest.raises(Refusal):
+            explain(wrong)
+
+
+def test_an_unknown_code_names_one_nearest_at_most() -> None:
+    with pytest.raises(Refusal, match=r"^--explain = 'T0001': begins no rule's code; nearest accepted: 'T00\d'$"):
+        explain("T0001")
+    with pytest.raises(Refusal, match=r"^--select = 'boundary': begins no rule's code$"):
+        check_prefixes("--select", ["boundary"])
 
 
 @pytest.mark.parametrize("format_", formats.FORMATS)

@@ -95,11 +95,12 @@ class Facts:
 
 @dataclass(frozen=True)
 class FileReport:
-    """A file's findings, sorted by severity and code, and its facts."""
+    """A file's findings, sorted by severity and code, its facts, and the wall time that judging it took, if known."""
 
     path: str
     findings: tuple[Finding, ...] = ()
     facts: Facts = field(default_factory=Facts)
+    seconds: float | None = field(default=None, compare=False)
 
     @property
     def verdict(self) -> str:
@@ -112,7 +113,7 @@ class FileReport:
         return any(finding.code == code for finding in self.findings)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready."""
+        """JSON-ready; without the time, so that the same file gives the same text."""
         return {
             "path": self.path,
             "verdict": self.verdict,
@@ -124,6 +125,12 @@ class FileReport:
 def ending(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """The findings, the errors among them marked as what ended the judgement."""
     return tuple(replace(item, ends=True) if item.severity == "error" else item for item in findings)
+
+
+def said(found: Finding, places: int) -> str:
+    """The message, and in brackets the first so many places."""
+    shown = ", ".join(text for place in found.locations[:places] if (text := str(place)))
+    return f"{found.message}{f' (at {shown})' if shown else ''}"
 
 
 def counted(n: int, one: str, many: str = "") -> str:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
-from unitcad.check.findings import SEVERITIES, FileReport, Finding, counted
+from unitcad.check.findings import SEVERITIES, FileReport, Finding, counted, said
 from unitcad.check.rulebook import rules
 
 FORMATS = ("text", "json", "github", "sarif", "junit")
@@ -38,28 +38,30 @@ def as_dict(reports: Sequence[FileReport]) -> dict[str, Any]:
 
 
 def text(reports: Sequence[FileReport]) -> str:
-    """A line a finding, then one that counts."""
+    """A line a finding, then one that counts, and where something was found how to learn more."""
     lines = []
     for report in reports:
         for found in report.findings:
-            lines.append(f"{_plain(report.path)}: {found.code} {found.severity}: {_plain(_said(found))}")
+            lines.append(f"{_plain(report.path)}: {found.code} {found.severity}: {_plain(said(found, 3))}")
+    explained = [_EXPLAIN] if lines else []
+    return "\n".join([*lines, _summary(reports), *explained]) + "\n"
+
+
+_EXPLAIN = "`unitcad check --explain CODE` says what a code means, why it matters and how to mend it."
+
+
+def _summary(reports: Sequence[FileReport]) -> str:
     verdicts = Counter(report.verdict for report in reports)
     parts = [
         f"{verdicts[name]} {word}" for name, word in (("error", "failed"), ("warning", "warned")) if verdicts[name]
     ]
     parts.append(f"{verdicts['pass']} passed")
-    lines.append(f"{counted(len(reports), 'file')}: {', '.join(parts)}")
-    return "\n".join(lines) + "\n"
+    return f"{counted(len(reports), 'file')}: {', '.join(parts)}"
 
 
-def _said(found: Finding) -> str:
-    places = ", ".join(shown for place in found.locations[:3] if (shown := str(place)))
-    return f"{found.message}{f' (at {places})' if places else ''}"
-
-
-def _plain(said: str) -> str:
+def _plain(text: str) -> str:
     """Text from a file made safe for a terminal: control characters are shown, not sent."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in said)
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 _SIZES = {"F002", "F006", "G005"}  # their count is a number of bytes, facets or shells by which the file is wrong
@@ -84,23 +86,23 @@ _GITHUB = {"error": "error", "warning": "warning", "info": "notice"}
 
 
 def github(reports: Sequence[FileReport]) -> str:
-    """Workflow commands: an annotation a finding."""
+    """Workflow commands: an annotation a finding, then a line for the log that counts."""
     lines = []
     for report in reports:
         for found in report.findings:
             title = f"{found.code} {rules()[found.code].title}"
             line = next((place.line for place in found.locations if place.line is not None), None)
             where = f"file={_property(report.path)}" + (f",line={line}" if line is not None else "")
-            lines.append(f"::{_GITHUB[found.severity]} {where},title={_property(title)}::{_data(_said(found))}")
-    return "\n".join(lines) + "\n" if lines else ""
+            lines.append(f"::{_GITHUB[found.severity]} {where},title={_property(title)}::{_data(said(found, 3))}")
+    return "\n".join([*lines, _summary(reports)]) + "\n"
 
 
-def _data(said: str) -> str:
-    return said.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+def _data(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
-def _property(said: str) -> str:
-    return _data(said).replace(":", "%3A").replace(",", "%2C")
+def _property(text: str) -> str:
+    return _data(text).replace(":", "%3A").replace(",", "%2C")
 
 
 def junit(reports: Sequence[FileReport], fail_on: str) -> str:
@@ -111,14 +113,15 @@ def junit(reports: Sequence[FileReport], fail_on: str) -> str:
         bad = [found for found in report.findings if SEVERITIES.index(found.severity) >= least]
         rest = [found for found in report.findings if found not in bad]
         failed += bool(bad)
-        inner = "".join(
-            f"<failure type={quoteattr(found.code)} message={quoteattr(_xml(_said(found)))}/>" for found in bad
-        )
+        inner = "".join(_failure(found) for found in bad)
         if rest:
-            said = "\n".join(f"{found.code} {found.severity}: {_said(found)}" for found in rest)
-            inner += f"<system-out>{escape(_xml(said))}</system-out>"
-        cases.append(f'<testcase classname="unitcad.check" name={quoteattr(_xml(report.path))}>{inner}</testcase>')
-    head = f'<testsuite name="unitcad check" tests="{len(reports)}" failures="{failed}" errors="0">'
+            told = "\n".join(f"{found.code} {found.severity}: {said(found, 3)}" for found in rest)
+            inner += f"<system-out>{escape(_xml(told))}</system-out>"
+        name = f"name={quoteattr(_xml(report.path))}" + _time(report.seconds)
+        cases.append(f'<testcase classname="unitcad.check" {name}>{inner}</testcase>')
+    known = [report.seconds for report in reports if report.seconds is not None]
+    total = sum(known) if known else None
+    head = f'<testsuite name="unitcad check" tests="{len(reports)}" failures="{failed}" errors="0"{_time(total)}>'
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
         + "\n".join([f"<testsuites>{head}", *cases])
@@ -126,7 +129,19 @@ def junit(reports: Sequence[FileReport], fail_on: str) -> str:
     )
 
 
-def _xml(said: str) -> str:
+def _time(seconds: float | None) -> str:
+    return "" if seconds is None else f' time="{seconds:.3f}"'
+
+
+def _failure(found: Finding) -> str:
+    rule = rules()[found.code]
+    places = [f"at {text}" for place in found.locations if (text := str(place))]
+    body = "\n".join([f"{found.code} {rule.title}: {found.message}", *places, f"Mend: {rule.mend}"])
+    head = f"type={quoteattr(found.code)} message={quoteattr(_xml(said(found, 3)))}"
+    return f"<failure {head}>{escape(_xml(body))}</failure>"
+
+
+def _xml(text: str) -> str:
     """Without the characters that XML 1.0 cannot hold."""
     return "".join(c if c in "\t\n\r" or (c >= " " and not 0xD800 <= ord(c) <= 0xDFFF and c not in "\ufffe\uffff")
-                   else "\ufffd" for c in said)  # fmt: skip
+                   else "\ufffd" for c in text)  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from functools import cache
 from importlib.resources import files
 
 from unitcad.check.findings import SHOWN, Finding, Location
-from unitcad.errors import unknown_name
+from unitcad.errors import Refusal
 
 FAMILIES = {
     "F": "File",
@@ -51,19 +52,22 @@ def finding(
     """A finding of rule `code`, with the rule's severity unless another one is given."""
     kept = []
     for place in places:
+        if place == Location():
+            continue
         if len(kept) == SHOWN:
             break
         kept.append(place)
     return Finding(code, severity or rules()[code].severity, message, int(count), tuple(kept))
 
 
-def explain(code: str) -> str:
-    """The rule in words. Raises `Refusal` for a code that is not in the table."""
-    known = rules()
-    if code.upper() not in known:
-        raise unknown_name("--explain", code, known)
-    rule = known[code.upper()]
-    return f"{rule.code} {rule.title} ({rule.severity})\n\nCause: {rule.cause}\nMend:  {rule.mend}"
+def explain(codes: str) -> str:
+    """Rules in words: codes or prefixes of codes, split by commas. Raises `Refusal` for one that begins no code."""
+    chosen = check_prefixes("--explain", [part for part in codes.split(",") if part.strip()] or [codes])
+    return "\n\n".join(
+        f"{rule.code} {rule.title} ({rule.severity})\n\nCause: {rule.cause}\nMend:  {rule.mend}"
+        for rule in rules().values()
+        if rule.code.startswith(chosen)
+    )
 
 
 def markdown() -> str:
@@ -91,6 +95,7 @@ def check_prefixes(option: str, prefixes: Sequence[str]) -> tuple[str, ...]:
     for prefix in prefixes:
         wanted = prefix.strip().upper()
         if not wanted or not any(code.startswith(wanted) for code in rules()):
-            raise unknown_name(option, prefix, rules())
+            near = difflib.get_close_matches(wanted, rules(), n=1, cutoff=0.5)
+            raise Refusal(option, prefix, "begins no rule's code", near[0] if near else None)
         kept.append(wanted)
     return tuple(kept)

@@ -7,9 +7,11 @@ import glob
 import os
 import signal
 import sys
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -90,6 +92,12 @@ def check_files(
 
 def guarded(path: str, options: Options) -> FileReport:
     """`check_file` with an alarm behind its clock and a net below it: an inner fault is a finding, not a crash."""
+    begin = time.perf_counter()
+    report = _guarded(path, options)
+    return replace(report, seconds=time.perf_counter() - begin)
+
+
+def _guarded(path: str, options: Options) -> FileReport:
     try:
         with _alarm(options.limits.seconds * 1.5 + 5):
             return check_file(path, options)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from collections.abc import Sequence
 from pathlib import PurePath
@@ -10,7 +11,7 @@ from typing import Any
 from urllib.parse import quote
 
 from unitcad import __version__
-from unitcad.check.findings import FileReport, Finding
+from unitcad.check.findings import FileReport, Finding, said
 from unitcad.check.rulebook import Rule, rules
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -56,16 +57,22 @@ def _result(report: FileReport, found: Finding, index: dict[str, int]) -> dict[s
     line = next((place.line for place in found.locations if place.line is not None), None)
     if line is not None:
         physical["region"] = {"startLine": max(line, 1)}
-    fingerprint = hashlib.sha256(f"{uri}\n{found.code}".encode()).hexdigest()
+    fingerprint = hashlib.sha256(f"{_uri(_inside(report.path))}\n{found.code}".encode()).hexdigest()
     return {
         "ruleId": found.code,
         "ruleIndex": index[found.code],
         "level": _LEVELS[found.severity],
-        "message": {"text": found.message},
+        "message": {"text": said(found, 1)},
         "locations": [{"physicalLocation": physical}],
         "partialFingerprints": {"pathAndRule/v1": fingerprint},
         "properties": {"count": found.count, "places": [place.as_dict() for place in found.locations]},
     }
+
+
+def _inside(path: str) -> str:
+    """The path from the working directory for what lies in it, however it is named; else the path itself."""
+    whole, here = os.path.abspath(path), os.getcwd()
+    return os.path.relpath(whole, here) if whole.startswith(os.path.join(here, "")) else path
 
 
 def _uri(path: str) -> str:
