@@ -61,7 +61,7 @@ class Package:
 
     def say(self, code: str, message: str, part: str | None = None) -> None:
         """Add a finding of rule `code` about a part."""
-        self.findings.append(finding(code, message, places=[Location(part=part)] if part else ()))
+        self.findings.append(finding(code, message, places=[Location(part=self.shown(part))] if part else ()))
 
     def chunks(self, name: str) -> Iterator[bytes]:
         """A part's bytes, inflated piece by piece within the limits. Raises `Unreadable`."""
@@ -89,6 +89,10 @@ class Package:
             text = f"{info.filename} cannot be unpacked: {error}"
             raise Unreadable(finding("F003", text, places=[Location(part=info.filename)])) from error
 
+    def shown(self, name: str) -> str:
+        """A part's name as the package writes it; `parts` has it in lower case, since OPC compares names so."""
+        return self.parts[name].filename.lstrip("/") if name in self.parts else name
+
     def content_type(self, name: str) -> str | None:
         """The part's content type by override or default, without parameters, in lower case."""
         said = self.overrides.get(name) or self.defaults.get(posixpath.splitext(name)[1][1:])
@@ -111,7 +115,7 @@ class Package:
     def xml(self, name: str, code: str) -> Element | None:
         """A small XML part as a tree, or None with a finding (rule `code`, or what the XML itself breaks)."""
         try:
-            root, findings = read_small(self.chunks(name), name)
+            root, findings = read_small(self.chunks(name), self.shown(name))
         except Unreadable as stop:
             self.findings += [
                 finding(code, item.message, places=item.locations) if item.code == "F003" else item

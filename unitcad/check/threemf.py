@@ -44,6 +44,21 @@ class Instance:
 def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
     """All findings about a 3MF file and the facts of what it builds."""
     package = opc.open_package(data, options.limits, deadline)
+    findings, facts = _judged(package, options, deadline)
+    return [_named(package, item) for item in findings], facts
+
+
+def _named(package: Package, item: Finding) -> Finding:
+    """The finding with its places' parts as the package writes them."""
+    return replace(
+        item,
+        locations=tuple(
+            replace(place, part=package.shown(place.part)) if place.part else place for place in item.locations
+        ),
+    )
+
+
+def _judged(package: Package, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
     models = _models(package, options.limits)
     findings = package.findings
     for model in models.values():
@@ -80,7 +95,7 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
         if part in models:
             continue
         if package.content_type(part) != opc.MODEL_TYPE:
-            package.say("P001", f"{part} has type {package.content_type(part)!r}, not the model's", part)
+            package.say("P001", f"{package.shown(part)} has type {package.content_type(part)!r}, not the model's", part)
         try:
             model = read_model(package.chunks(part), part, limits, faces)
         except Unreadable as stop:
@@ -96,12 +111,13 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
     return models
 
 
-def _reached(model: Model) -> set[str]:
+def _reached(model: Model) -> dict[str, str]:
+    """The parts that a model names by path, each as it is written there."""
     uses = [*model.items, *(use for found in model.objects().values() for use in found.components)]
     paths = {use.path for use in uses if use.path}
     for found in model.resources.values():
         paths |= {member["slicepath"] for member in found.members if "slicepath" in member}
-    return {path.lower().lstrip("/") for path in paths}
+    return {path.lower().lstrip("/"): path.lstrip("/") for path in sorted(paths)}
 
 
 def _singletons(package: Package, relations: list[Relation], who: str, kinds: tuple[str, ...]) -> None:
@@ -116,7 +132,8 @@ def _singletons(package: Package, relations: list[Relation], who: str, kinds: tu
             if kind == opc.THUMBNAIL:
                 _image(package, relation.target, "P020")
             elif kind == opc.TICKET and said != _TICKET_TYPE:
-                package.say("P020", f"{relation.target} has type {said!r}, not a print ticket's", relation.target)
+                text = f"{package.shown(relation.target)} has type {said!r}, not a print ticket's"
+                package.say("P020", text, relation.target)
             elif kind == opc.PROPERTIES:
                 package.xml(relation.target, "F003")
 
@@ -124,12 +141,12 @@ def _singletons(package: Package, relations: list[Relation], who: str, kinds: tu
 def _image(package: Package, part: str, code: str) -> None:
     said = package.content_type(part)
     if said is None:
-        package.say("P001", f"{part} has no content type", part)
+        package.say("P001", f"{package.shown(part)} has no content type", part)
         return
     if said not in _IMAGES and not (
         code == "P019" and said == "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
     ):
-        package.say(code, f"{part} has type {said!r}, not PNG's or JPEG's", part)
+        package.say(code, f"{package.shown(part)} has type {said!r}, not PNG's or JPEG's", part)
         return
     try:
         kind, why = image_kind(package.chunks(part))
@@ -137,9 +154,9 @@ def _image(package: Package, part: str, code: str) -> None:
         package.findings += stop.findings
         return
     if why:
-        package.say(code, f"{part}: {why}", part)
+        package.say(code, f"{package.shown(part)}: {why}", part)
     elif said in _IMAGES and kind != _IMAGES[said]:
-        package.say(code, f"{part} is {kind or 'no image'}, its type says {said}", part)
+        package.say(code, f"{package.shown(part)} is {kind or 'no image'}, its type says {said}", part)
 
 
 def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
@@ -158,11 +175,11 @@ def _paths(package: Package, model: Model, related: list[Relation], *, is_root: 
             package.say("P002", f"{path} of {found.kind} {found.id} has no relationship", model.part)
         else:
             _image(package, part, "P019" if found.kind == "texture2d" else "P020")
-    for part in sorted(_reached(model)):
+    for part, written in sorted(_reached(model).items()):
         if part not in package.parts:
-            package.say("P012", f"{part} is not in the package", model.part)
+            package.say("P012", f"{written} is not in the package", model.part)
         elif part not in by_kind[opc.START]:
-            package.say("P002", f"{part} has no relationship of the model type", model.part)
+            package.say("P002", f"{written} has no relationship of the model type", model.part)
         elif not is_root and any(use.path for found in model.objects().values() for use in found.components):
             package.say("P012", "a part other than the root one refers to objects by path", model.part)
 
@@ -218,7 +235,7 @@ def _expand(models: dict[str, Model], root: Model, limits: Limits, findings: lis
     for item in root.items:
         key = key_of(root.part, item)
         if item.path and key not in objects and key[0] in models:
-            findings.append(finding("P012", f"a build item names object {key[1]} of {key[0]}, which is not there"))
+            findings.append(finding("P012", f"a build item names object {key[1]} of {item.path}, which is not there"))
         place(key, item.matrix, 0)
     return instances
 
