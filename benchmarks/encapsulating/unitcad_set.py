@@ -12,6 +12,7 @@ from unitcad.pipeline import Variant, parts
 
 def make(n: dict[str, Any]) -> dict[str, Any]:
     """The variant and its bodies. The numbers are ignored: unitcad works them out of its spec."""
+    parts.forget()
     variant = Variant.of("encapsulating")
     return {"variant": variant, "bodies": (variant.unit, variant.plan.tools)}
 

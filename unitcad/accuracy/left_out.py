@@ -8,7 +8,7 @@ from typing import Any
 from unitcad.accuracy.result import Result, Say, Table
 from unitcad.accuracy.timing import interleaved, machine
 from unitcad.cache import MemoryStore
-from unitcad.kernels import mesh
+from unitcad.pipeline import parts
 from unitcad.pipeline.build import OUTPUTS, make
 from unitcad.pipeline.stages import Stages
 from unitcad.spec import load, templates
@@ -35,7 +35,7 @@ def run(quick: bool, say: Say) -> Result:
 
         def build(request: str, name: str = name, manifests: dict[str, Any] = manifests) -> None:
             only, formats, check = REQUESTS[request]
-            mesh.forget()
+            parts.forget()
             spec = load(name, [f"output.formats={list(formats)}"])
             manifests[request] = make(spec, only, check, MemoryStore(), Stages()).manifest
 

@@ -15,6 +15,7 @@ from unitcad.errors import UnitcadError
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, bounds, realise
+from unitcad.pipeline import variant as drawings
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.shape import Shape, content_hash
 from unitcad.shape.body import Body
@@ -146,6 +147,12 @@ def _ready(variant: Variant, body: Body) -> tuple[np.ndarray, np.ndarray]:
 @lru_cache(maxsize=64)
 def _rounded(shape: Shape, segments: int, upside_down: bool) -> tuple[np.ndarray, np.ndarray]:
     return print_ready(*arrays(realise(shape, segments)), upside_down)
+
+
+def forget() -> None:
+    """Drop plans, meshes and their roundings that are kept for the next call: what a measurement of times needs."""
+    _rounded.cache_clear()
+    drawings.forget()
 
 
 def _round(value: float) -> float:

@@ -38,6 +38,14 @@ def _drawn(geometry: str) -> Plan:
     return plan(Spec.model_validate_json(geometry))
 
 
+def forget() -> None:
+    """Drop plans and meshes that are kept for the next call: what a measurement of times needs."""
+    from unitcad.kernels import mesh
+
+    _drawn.cache_clear()
+    mesh.forget()
+
+
 @dataclass(frozen=True)
 class Variant:
     """A spec's unit, moulds and meshes. Lengths in mm, as assembled, z = 0 at the skin."""
