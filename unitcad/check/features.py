@@ -8,13 +8,13 @@ faces shows whether it is a whisker, or a rib or a wall, which goes on into the 
 from __future__ import annotations
 
 import numpy as np
-from manifold3d import CrossSection, Manifold, Mesh64
+from manifold3d import CrossSection, Manifold
 
 from unitcad.catalogue import Printer
 from unitcad.check.edges import components
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Floats, Ints
+from unitcad.check.mesh import Floats, Ints, solid_of
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology
 from unitcad.check.walls import Rays
@@ -30,7 +30,7 @@ _SLACK = 0.999
 def judge(topology: Topology, printer: Printer, rays: Rays, deadline: Deadline) -> list[Finding]:
     """Apply D002 to a closed mesh."""
     mesh, least = topology.mesh, float(printer.least_feature_mm)
-    solid = Manifold(Mesh64(vert_properties=mesh.vertices, tri_verts=mesh.faces.astype(np.uint64)))
+    solid = solid_of(mesh.vertices, mesh.faces)
     if solid.is_empty():
         return []
     places = _standing(topology, solid, least, float(printer.layer_mm))

@@ -8,14 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Floats, Ints, extent
+from unitcad.check.mesh import Floats, Ints, extent, solid_of
 from unitcad.check.rulebook import finding
 from unitcad.check.shells import box_pairs
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
 
 MOST = 2000
 """Instances compared; of more the first so many, and the message says so."""
@@ -40,7 +44,7 @@ def judge(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
         return []
     boxes = [extent(solid.vertices) for solid in some]
     low, high = np.array([box[0] for box in boxes]), np.array([box[1] for box in boxes])
-    solids: dict[int, object] = {}
+    solids: dict[int, Manifold] = {}
     found: list[Location] = []
     pairs = box_pairs(low, high)
     for a, b in pairs[:_PAIRS]:
@@ -61,16 +65,9 @@ def judge(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
     return [Finding(said.code, "warning", said.message, said.count, said.locations)]
 
 
-def _shared(a: int, b: int, some: Sequence[Placed], solids: dict[int, object]) -> float:
+def _shared(a: int, b: int, some: Sequence[Placed], solids: dict[int, Manifold]) -> float:
     """The volume that two share, mm3; 0 where manifold3d refuses one (its own faults are reported)."""
-    from manifold3d import Manifold, Mesh64
-
-    def solid(i: int) -> Manifold:
+    for i in (a, b):
         if i not in solids:
-            mesh = Mesh64(vert_properties=some[i].vertices, tri_verts=some[i].faces.astype(np.uint64))
-            solids[i] = Manifold(mesh)
-        made = solids[i]
-        assert isinstance(made, Manifold)
-        return made
-
-    return (solid(a) ^ solid(b)).volume()
+            solids[i] = solid_of(some[i].vertices, some[i].faces)
+    return (solids[a] ^ solids[b]).volume()

@@ -6,10 +6,13 @@ Readers give a triangle soup or an indexed mesh; `weld_exact` makes the one into
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
 
 # What an array holds; numpy's own generic types make every sum and mask a union that a type checker cannot follow.
 Floats = NDArray[Any]
@@ -123,6 +126,13 @@ def cross(a: Floats, b: Floats) -> Floats:
         i, j = (axis + 1) % 3, (axis + 2) % 3
         np.subtract(a[:, i] * b[:, j], a[:, j] * b[:, i], out=found[:, axis])
     return found
+
+
+def solid_of(vertices: Floats, faces: Ints) -> Manifold:
+    """manifold3d's solid of a mesh, vertices (n, 3) mm and faces (m, 3); empty where it refuses the mesh."""
+    from manifold3d import Manifold, Mesh64
+
+    return Manifold(Mesh64(vert_properties=vertices, tri_verts=faces.astype(np.uint64)))
 
 
 def area_vectors(vertices: Floats, faces: Ints) -> Floats:

@@ -6,6 +6,7 @@ trimesh makes fans of them, which is wrong where they are not convex, or does no
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 
 import numpy as np
 
@@ -25,7 +26,8 @@ def in_triangles(kind: str, raw: bytes) -> bytes:
 
 
 def _obj(raw: bytes) -> bytes:
-    points = [line.split()[:3] for line in OBJ_VERTEX.findall(raw)]
+    lines = list(OBJ_VERTEX.finditer(raw))
+    points, starts = [line.group(1).split()[:3] for line in lines], [line.start() for line in lines]
 
     def replaced(match: re.Match[bytes]) -> bytes:
         words = match.group(1).split()
@@ -34,7 +36,7 @@ def _obj(raw: bytes) -> bytes:
         except ValueError:
             return match.group(0)
         if min(ids) < 0:  # counted back from the last vertex so far
-            above = len(OBJ_VERTEX.findall(raw[: match.start()]))
+            above = bisect_left(starts, match.start())
             ids = [i if i > 0 else above + 1 + i for i in ids]
         rows = _cut(points, [i - 1 for i in ids])
         return b"\n".join(b"f " + b" ".join(words[k] for k in row) for row in rows)
@@ -50,16 +52,14 @@ def _off(raw: bytes, numbers: bytes) -> bytes:
     points, faces = rows[1 : n + 1], rows[n + 1 :]
     if not any(row[0].isdigit() and int(row[0][:18]) > _LARGE for row in faces):
         return raw
-    made = []
+    places, made = [point[:3] for point in points], []
     for row in faces:
         size = int(row[0][:18]) if row[0].isdigit() else 0
         ids = row[1 : size + 1]
         if size <= _LARGE or len(ids) < size or not all(word.isdigit() for word in ids):
             made.append(row)
         else:
-            made += [
-                [b"3", *(ids[k] for k in cut)] for cut in _cut([p[:3] for p in points], [int(i[:18]) for i in ids])
-            ]
+            made += [[b"3", *(ids[k] for k in cut)] for cut in _cut(places, [int(i[:18]) for i in ids])]
     lines = [b"OFF", b"%d %d 0" % (n, len(made)), *(b" ".join(row) for row in points + made)]
     return b"\n".join(lines) + b"\n"
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Floats, Ints, diagonal, extent
+from unitcad.check.mesh import Floats, Ints, diagonal, extent, solid_of
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology
 
@@ -145,8 +145,6 @@ def _shared(topology: Topology, groups: list[Ints], a: int, b: int, volumes: Flo
 
     Shells that face inwards are turned first; one that manifold3d refuses gives 0 (its own faults are reported).
     """
-    from manifold3d import Manifold, Mesh64
-
     solids = []
     for i in (a, b):
         faces = topology.mesh.faces[groups[i]]
@@ -154,7 +152,7 @@ def _shared(topology: Topology, groups: list[Ints], a: int, b: int, volumes: Flo
         local = local.reshape(-1, 3)
         if volumes[i] < 0:
             local = local[:, ::-1]
-        solid = Manifold(Mesh64(vert_properties=topology.mesh.vertices[used], tri_verts=local.astype(np.uint64)))
+        solid = solid_of(topology.mesh.vertices[used], local)
         if solid.is_empty():
             return 0.0
         solids.append(solid)

@@ -112,7 +112,7 @@ def numbers_of(kind: str, raw: bytes) -> bytes | None:
         return b"\n".join(OBJ_VERTEX.findall(raw))
     if kind == "ply":
         head, mark, body = raw.partition(b"end_header")
-        return body if mark and re.search(rb"(?m)^[ \t]*format[ \t]+ascii\b", head) else None
+        return body if mark and _PLY_TEXT.search(head) else None
     match = _OFF_START.match(raw)
     if match is None or b"\x00" in raw or raw[match.end() :].lstrip()[:6].upper() == b"BINARY":
         return None
