@@ -8,7 +8,20 @@ from pathlib import Path
 import pytest
 
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.spec import from_data, load, override, read, templates, to_toml, warnings
+from unitcad.spec import (
+    Spec,
+    from_data,
+    from_json,
+    load,
+    override,
+    read,
+    templates,
+    to_data,
+    to_json,
+    to_toml,
+    warnings,
+)
+from unitcad.spec.fields import fields_of, table_in
 
 NAMES = sorted(templates())
 
@@ -67,6 +80,9 @@ def test_odd_names_survive_the_file() -> None:
         ("encapsulating", "motor.thickness_mm=0.8", "motor.thickness_mm", 1.095),
         ("encapsulating", "motor.part='LCM0720'", "motor.part", "LCM0720A3463F"),
         ("encapsulating", "layers.1.material='dragonskin-30'", "layers.1.material", "dragon-skin-30"),
+        ("encapsulating", "layers.1.cap_mm=0", "layers.1.cap_mm", 0.5),
+        ("encapsulating", "fpcb.tail_width_mm=0.0", "fpcb.tail_width_mm", 0.001),
+        ("encapsulating", "moulds.vents=0", "moulds.vents", 1),
         ("encapsulating", "design='encapsulated'", "design", "encapsulating"),
         ("encapsulating", "output.tolerance_mm=0.5", "output.tolerance_mm", 0.2),
         ("encapsulating", "moulds.printer='fdm-04'", "moulds.printer", "fdm-0.4"),
@@ -95,9 +111,22 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("diameter_mm=inf", "finite"),
         ("diameter_mm='14'", "number"),
         ("diameter_mm=true", "number"),
-        ("layers=[]", "at least 1"),
+        ("layers=[]", r"^layers = .*must not be empty"),
+        ("layers=3", r"^layers = 3: takes a list"),
+        ("layers.0=3", r"^layers\.0 = 3: takes a table"),
         ("layers.7.wall_mm=1.0", "index"),
-        ("name=''", "at least 1"),
+        ("name=''", "must not be empty"),
+        (f"name='{'x' * 121}'", "at most 120 characters"),
+        ("name=2026-01-01", "takes a text"),
+        ("fpcb.tail=3", r"^fpcb\.tail = 3: takes a text"),
+        ("moulds.cavities=[1]", r"^moulds\.cavities = .*2 entries"),
+        ("moulds.cavities=[1, 1.5]", r"^moulds\.cavities\.1 = 1\.5: takes a whole number"),
+        ("materials.mine=3", r"^materials\.mine = 3: takes a table"),
+        ("parameters.count=[1]", r"^parameters\.count = .*a text"),
+        ("tissue.arm.skin=1", r"^tissue\.arm\.skin = 1: takes a table"),
+        ("diameter_mm=1e400", "finite"),
+        ("materials.mine.density_g_cm3=inf", r"^materials\.mine\.density_g_cm3 = inf: must be a finite"),
+        ("wires={ count = 2 }", r"^wires\.diameter_mm = 'nothing': is required"),
         ("nonsense", "path=value"),
         ("name.x=1", "table"),
     ],
@@ -105,6 +134,24 @@ def test_refused_with_a_nearest_value_that_is_accepted(
 def test_refused_in_plain_words(setting: str, words: str) -> None:
     with pytest.raises(Refusal, match=words):
         load("encapsulating", [setting])
+
+
+@pytest.mark.parametrize("key", ["a - at `$.motor", "a - at `$[0]", "a - at `$.materials[...]", "`", "", "x.y"])
+def test_a_key_is_named_whatever_it_looks_like(key: str) -> None:
+    data = read("encapsulating")
+    for table, place in ((data, ""), (data["motor"], "motor.")):
+        table[key] = 1
+        with pytest.raises(Refusal, match="unknown key") as refused:
+            from_data(data)
+        assert refused.value.field == place + key
+        del table[key]
+
+
+def test_json_is_the_same_spec_and_plain_data_too() -> None:
+    for name in templates():
+        spec = load(name)
+        assert from_json(to_json(spec)) == spec
+        assert from_data(to_data(spec)) == spec
 
 
 def test_embedded_layers_have_no_cap_and_encapsulating_ones_do() -> None:
@@ -162,7 +209,6 @@ def test_overrides_do_not_touch_the_source() -> None:
 
 def test_the_docs_name_every_key() -> None:
     page = (Path(__file__).parent.parent / "docs" / "spec.md").read_text("utf-8")
-    for table, value in load("encapsulating"):
-        fields = type(value).model_fields if hasattr(type(value), "model_fields") else {table: None}
-        for field in fields:
+    for table, entry in fields_of(Spec).items():
+        for field in fields_of(table_in(entry.type)) if table_in(entry.type) else {table: None}:
             assert f"{field}`" in page or f"[{field}." in page, f"{table}.{field} is not in docs/spec.md"

@@ -249,7 +249,7 @@ def test_select_and_ignore_by_longest_prefix(tmp_path: Path) -> None:
 def test_importing_is_light() -> None:
     code = (
         "import sys, unitcad.check as c; c.Options(); "
-        "heavy = {'scipy', 'trimesh', 'manifold3d', 'OCP', 'pydantic'} & {m.split('.')[0] for m in sys.modules}; "
+        "heavy = {'scipy', 'trimesh', 'manifold3d', 'OCP', 'msgspec'} & {m.split('.')[0] for m in sys.modules}; "
         "sys.exit(repr(heavy) if heavy else 0)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -9,6 +9,7 @@ from typing import Any
 
 import chromium
 import pytest
+from msgspec.structs import replace
 
 from unitcad.cache import MemoryStore
 from unitcad.pipeline.build import build
@@ -40,7 +41,7 @@ def sweep(tmp_path_factory: pytest.TempPathFactory, hostile: str) -> Path:
             )
         changes = [f"layers.0.wall_mm={wall}", "output.formats=[]", f'name="c {wall}"']
         build(load("encapsulating", changes), out, only=["unit"], check=False, store=store)
-    spec = load("single-embedded", ["output.formats=[]"]).model_copy(update={"name": hostile})
+    spec = replace(load("single-embedded", ["output.formats=[]"]), name=hostile)
     build(spec, out, store=store)
     write_report(out)
     return out

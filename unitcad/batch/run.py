@@ -28,6 +28,7 @@ from unitcad.pipeline.build import OUTPUTS, checked_outputs
 from unitcad.pipeline.folder import clear_leftovers, folder_name
 from unitcad.pipeline.geometry import geometry_key
 from unitcad.pipeline.versions import code_version, kernel_versions
+from unitcad.spec import to_json
 
 WINDOW = 2048
 """Variants held in memory: enough to find those that share a geometry."""
@@ -207,7 +208,7 @@ class _Batch:
                 self._finished(Outcome(index, tasks.OK), fresh=False)
                 continue
             key = geometry_key(spec, self.only, self.options.check)
-            self.groups.setdefault(key, _Group()).jobs.append(Job(index, spec.model_dump_json()))
+            self.groups.setdefault(key, _Group()).jobs.append(Job(index, to_json(spec)))
             self.waiting += 1
 
     def _give_out(self) -> None:

@@ -19,27 +19,32 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from msgspec import Meta, Struct, field, structs
 
 from unitcad.batch.paths import check_path
 from unitcad.cache import digest
-from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
-from unitcad.spec import Spec, from_data, override, put, read, read_toml, templates
+from unitcad.errors import Refusal, unknown_name
+from unitcad.spec import Spec, convert, from_data, override, put, read, read_toml, templates
+from unitcad.spec.fields import fields_of
 
-MODES = ("product", "zip", "cases")
+T = TypeVar("T", bound=Struct)
+Mode = Literal["product", "zip", "cases"]
+_KEYS = {
+    "mode": {"enum": list(get_args(Mode)), "default": "product"},
+    "cases": {"type": "array", "items": {"type": "object"}},
+}
 MOST = 1_000_000
 """Variants that a sweep may have without being asked for with --limit."""
 
 
-class Range(BaseModel):
+class Range(Struct, frozen=True, forbid_unknown_fields=True):
     """`num` values from `start` to `stop`, both among them."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
     start: float
     stop: float
-    num: Annotated[int, Field(strict=True, ge=1)]
+    num: Annotated[int, Meta(ge=1)]
 
     def __len__(self) -> int:
         return self.num
@@ -51,35 +56,29 @@ class Range(BaseModel):
         return round(self.start + (self.stop - self.start) * index / (self.num - 1), 9)
 
 
-Value = bool | int | float | str | list[Any] | dict[str, Any]
+class SweepFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A sweep as typed: `fixed` and the paths of `sweep` are looked at by `from_file`."""
+
+    base: str | Annotated[list[str], Meta(min_length=1)]
+    name: Annotated[str, Meta(min_length=1, max_length=60)] | None = None
+    fixed: Annotated[dict[str, Any], Meta(description="values by path, the same for every variant")] = field(
+        name="set", default_factory=dict
+    )
+    sweep: Annotated[dict[str, Any], Meta(description="values by path", extra_json_schema={"properties": _KEYS})]
 
 
-class Case(BaseModel):
-    """One variant: values by path, `base` where it is not the file's first one, and a `name` for its folder."""
+class SweepTable(Struct, frozen=True):
+    """The keys of `sweep` that are no paths."""
 
-    model_config = ConfigDict(frozen=True, extra="allow")
-    __pydantic_extra__: dict[str, Value]
+    mode: Mode = "product"
+    cases: tuple[dict[str, Any], ...] = ()
+
+
+class Case(Struct, frozen=True):
+    """The keys of a case that are no paths: its base where it is not the file's first one, a name for its folder."""
+
     base: str | None = None
     name: str | None = None
-
-
-class SweepTable(BaseModel):
-    """`mode`, and for each spec path its values: a list, a range, or one value; `cases` in the mode of that name."""
-
-    model_config = ConfigDict(frozen=True, extra="allow")
-    __pydantic_extra__: dict[str, Range | Value]
-    mode: Literal["product", "zip", "cases"] = "product"
-    cases: tuple[Case, ...] = ()
-
-
-class SweepFile(BaseModel):
-    """A sweep as typed."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
-    base: str | Annotated[list[str], Field(min_length=1)]
-    name: Annotated[str, Field(min_length=1, max_length=60)] | None = None
-    fixed: dict[str, Value] = Field({}, alias="set", description="values by path, the same for every variant")
-    sweep: SweepTable
 
 
 @dataclass(frozen=True)
@@ -137,7 +136,9 @@ class Sweep:
     @property
     def hash(self) -> str:
         """Over everything that decides which variants there are."""
-        axes = [(a.path, a.values.model_dump() if isinstance(a.values, Range) else list(a.values)) for a in self.axes]
+        axes = [
+            (a.path, structs.asdict(a.values) if isinstance(a.values, Range) else list(a.values)) for a in self.axes
+        ]
         return digest(json.dumps([self.name, self.bases, self.mode, axes, self.cases], default=str).encode())
 
     def values(self, index: int) -> tuple[str, dict[str, Any]]:
@@ -199,25 +200,35 @@ def load_sweep(source: str | os.PathLike[str]) -> Sweep:
 
 def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
     """A checked sweep of a sweep file's data; `folder` is where its relative paths start."""
-    try:
-        file = SweepFile.model_validate(data)
-    except ValidationError as error:
-        raise _refusal(error) from None
+    file = convert(data, SweepFile)
+    table, values = _parted(file.sweep, SweepTable, "sweep")
+    typed = [_parted(case, Case, f"sweep.cases.{i}") for i, case in enumerate(table.cases)]
     named = [file.base] if isinstance(file.base, str) else list(file.base)
-    named += [case.base for case in file.sweep.cases if case.base is not None]
+    named += [case.base for case, _ in typed if case.base is not None]
     bases: dict[str, dict[str, Any]] = {}
     for base in dict.fromkeys(named):
         bases[base] = _read_base(base, folder)
         for path, value in file.fixed.items():
             check_path(path, bases[base])
             put(bases[base], path, value)
-    axes = tuple(Axis(path, _values(path, given)) for path, given in (file.sweep.__pydantic_extra__ or {}).items())
-    cases = tuple((case.base or named[0], _case(case)) for case in file.sweep.cases)
-    _check_mode(file.sweep.mode, axes, cases)
+    axes = tuple(Axis(path, _values(path, given)) for path, given in values.items())
+    cases = tuple(
+        (case.base or named[0], {"name": case.name, **values} if case.name else values) for case, values in typed
+    )
+    _check_mode(table.mode, axes, cases)
     for base, values in cases or [(base, {axis.path: None for axis in axes}) for base in bases]:
         for path in values:
             check_path(path, bases[base])
-    return Sweep(file.name or name, tuple(bases.items()), file.sweep.mode, axes, cases)
+    return Sweep(file.name or name, tuple(bases.items()), table.mode, axes, cases)
+
+
+def _parted(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[str, Any]]:
+    """The keys that `kind` has, and the other ones, which are paths of a spec."""
+    own = fields_of(kind)
+    return (
+        convert({key: value for key, value in data.items() if key in own}, kind, field),
+        {key: value for key, value in data.items() if key not in own},
+    )
 
 
 def _read_base(base: str, folder: Path) -> dict[str, Any]:
@@ -230,9 +241,9 @@ def _read_base(base: str, folder: Path) -> dict[str, Any]:
 
 
 def _values(path: str, given: Any) -> Sequence[Any] | Range:
-    """The values of an axis: a scalar or a table counts as one."""
-    if isinstance(given, dict) and given.keys() & {"start", "stop", "num"}:  # Range refused it, so it became a value
-        raise Refusal(f"sweep.{path}", str(given)[:60], "a range needs start, stop and a whole num of at least 1")
+    """The values of an axis: a scalar or a table counts as one, a table with a range's keys as a range."""
+    if isinstance(given, dict) and given.keys() & fields_of(Range).keys():
+        given = convert(given, Range, f"sweep.{path}")
     values = given if isinstance(given, list | Range) else [given]
     if not len(values):
         raise Refusal(f"sweep.{path}", [], "an axis needs a value: the sweep is empty")
@@ -245,11 +256,6 @@ def _values(path: str, given: Any) -> Sequence[Any] | Range:
     if len(set(seen)) < len(seen) and len(seen) <= 10_000:
         raise Refusal(f"sweep.{path}", twice, "is there twice")
     return values
-
-
-def _case(case: Case) -> dict[str, Any]:
-    values = dict(case.__pydantic_extra__ or {})
-    return {"name": case.name, **values} if case.name else values
 
 
 def _check_mode(mode: str, axes: tuple[Axis, ...], cases: tuple[Any, ...]) -> None:
@@ -267,16 +273,3 @@ def _check_mode(mode: str, axes: tuple[Axis, ...], cases: tuple[Any, ...]) -> No
     if mode == "zip" and len(set(lengths.values())) > 1:
         told = ", ".join(f"{path} has {count}" for path, count in lengths.items())
         raise Refusal("sweep.mode", "zip", f"the lists are of unequal lengths: {told}")
-
-
-def _refusal(error: ValidationError) -> UnitcadError:
-    first = error.errors(include_url=False)[0]
-    where = ".".join(str(part) for part in first["loc"] if not str(part).startswith(("list[", "Range", "function-")))
-    if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
-        return unknown_key(where, first["input"], ["base", "name", "set", "sweep"])
-    if first["loc"][-1:] == ("mode",) and isinstance(first["input"], str):
-        return unknown_name("sweep.mode", first["input"], MODES)
-    if first["type"] == "missing":
-        return Refusal(where, "nothing", "is required")
-    value = first.get("input")
-    return Refusal(where, value if isinstance(value, int | float | str) else str(value)[:60], first["msg"].lower())

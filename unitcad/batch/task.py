@@ -22,7 +22,7 @@ from unitcad.pipeline import folder as folders
 from unitcad.pipeline.build import Product, build_into, make, possible_outputs
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import code_version
-from unitcad.spec import Spec
+from unitcad.spec import Spec, from_json
 
 OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no space"
 """broken: made, but a law or a mesh check says no. refused: the spec can't be. failed: did not get that far."""
@@ -104,7 +104,7 @@ def _here(job: Job, task: Task) -> Outcome:
     """Make a variant into its folder, by way of the cache on this disk."""
     assert task.out is not None
     assert task.cache is not None
-    spec = Spec.model_validate_json(job.spec)
+    spec = from_json(job.spec)
     folder = task.out / folders.folder_name(spec)
     manifest = _finished(folder, spec, task)
     if manifest is not None:
@@ -117,7 +117,7 @@ def _here(job: Job, task: Task) -> Outcome:
 
 def _away(job: Job, task: Task, known: Bundle | None) -> Outcome:
     """Make a variant in memory and hand it back: contents that the caller has are only named."""
-    spec = Spec.model_validate_json(job.spec)
+    spec = from_json(job.spec)
     store = MemoryStore(known)
     product = make(spec, task.only, task.check, store, Stages())
     outcome = _outcome(job, spec, folders.folder_name(spec), product.manifest, store.counts)

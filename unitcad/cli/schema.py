@@ -14,6 +14,8 @@ def schema(
     as_json: Annotated[bool, typer.Option("--json", help="The schema is JSON in any case.")] = False,
 ) -> None:
     """Print the JSON Schema of a spec or of a sweep file, for editors and programs."""
+    import msgspec
+
     from unitcad.batch.sweep import SweepFile
     from unitcad.cli.output import print_json
     from unitcad.errors import unknown_name
@@ -22,6 +24,6 @@ def schema(
     if kind not in KINDS:
         raise unknown_name("schema", kind, KINDS)
     model = Spec if kind == "spec" else SweepFile
-    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema(by_alias=True)}
+    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(model)}
     found["title"] = f"unitcad {kind}"
     print_json(found)

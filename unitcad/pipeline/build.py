@@ -21,7 +21,7 @@ from unitcad.pipeline.geometry import findings_count, geometry, pictures
 from unitcad.pipeline.stages import Say, Stages
 from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.versions import code_version, kernel_versions
-from unitcad.spec import Spec, to_toml, warnings
+from unitcad.spec import Spec, to_toml, warnings, with_formats
 from unitcad.spec.own import is_own
 
 OUTPUTS = ("unit", "moulds", "estimate", "casting")
@@ -274,8 +274,7 @@ def _not_needed(spec: Spec) -> list[dict[str, str]]:
 
 
 def _with_formats(spec: Spec, wanted: Sequence[str]) -> Spec:
-    formats = tuple(form for form in FORMATS if form in wanted)
-    return spec.model_copy(update={"output": spec.output.model_copy(update={"formats": formats})})
+    return with_formats(spec, tuple(form for form in FORMATS if form in wanted))
 
 
 def _left(what: str, why: str) -> dict[str, str]:

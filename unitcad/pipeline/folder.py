@@ -11,8 +11,10 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+from msgspec import structs
+
 from unitcad.errors import UnitcadError
-from unitcad.spec import Spec, read_toml
+from unitcad.spec import Spec, read_toml, to_json, with_formats
 
 UNCHECKED = "--no-check"
 TEMPORARY = ".tmp-"
@@ -28,8 +30,7 @@ def folder_name(spec: Spec) -> str:
 
 def spec_hash(spec: Spec) -> str:
     """SHA-256 of the effective spec without name and formats."""
-    output = spec.output.model_copy(update={"formats": ()})
-    return hashlib.sha256(spec.model_copy(update={"name": "", "output": output}).model_dump_json().encode()).hexdigest()
+    return hashlib.sha256(to_json(structs.replace(with_formats(spec), name="")).encode()).hexdigest()
 
 
 def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:

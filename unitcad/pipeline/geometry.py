@@ -20,7 +20,7 @@ from unitcad.pipeline import parts
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.variant import Variant, geometric
 from unitcad.pipeline.versions import code_version, kernel_versions
-from unitcad.spec import Spec, printer_of
+from unitcad.spec import Spec, printer_of, to_json, with_formats
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -51,8 +51,7 @@ def pictures(spec: Spec, only: Sequence[str], store: Store) -> dict[str, str]:
     Raises NoPicture where this machine can't draw; that is not remembered, so another try may succeed.
     """
     only = tuple(name for name in only if name in GEOMETRIC)
-    blank = geometric(spec)
-    blank = blank.model_copy(update={"output": blank.output.model_copy(update={"formats": ("png",)})})
+    blank = with_formats(geometric(spec), ("png",))
     key = _key(blank, "pictures", only)
 
     def drawn() -> dict[str, str]:
@@ -223,8 +222,7 @@ class _Making:
 
     def _own_key(self, what: str) -> str:
         """The key of something that reads the whole geometry, but neither formats nor outputs."""
-        spec = self.variant.spec
-        return _key(spec.model_copy(update={"output": spec.output.model_copy(update={"formats": ()})}), what)
+        return _key(with_formats(self.variant.spec), what)
 
     def _file(self, path: str, key: str, make: Any) -> dict[str, str]:
         """One shared file: its content by `key` in the store, its place in the variant's folder by `path`."""
@@ -236,7 +234,7 @@ class _Making:
 def _key(spec: Spec, *more: object) -> str:
     epoch = os.environ.get("SOURCE_DATE_EPOCH") if "step" in spec.output.formats else None
     versions = sorted(kernel_versions(spec.output.formats).items())
-    return digest(repr((spec.model_dump_json(), more, code_version(), versions, epoch)).encode())
+    return digest(repr((to_json(spec), more, code_version(), versions, epoch)).encode())
 
 
 def findings_count(findings: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
+from msgspec import structs
+
 from unitcad.designs import unit_bodies
 from unitcad.moulds.plan import Plan, plan
 from unitcad.shape.body import Body
-from unitcad.spec import Dimensions, Spec, dimensions, load
+from unitcad.spec import Dimensions, Spec, dimensions, from_json, load, to_json
 from unitcad.spec.models import CastingTable, EstimateTable
 
 if TYPE_CHECKING:
@@ -18,24 +20,23 @@ if TYPE_CHECKING:
 
 def geometric(spec: Spec) -> Spec:
     """The spec with everything blank that the geometry does not read."""
-    return spec.model_copy(
-        update={
-            "name": "unit",
-            "motor": spec.motor.model_copy(update={"part": None}),
-            "layers": tuple(layer.model_copy(update={"material": ""}) for layer in spec.layers),
-            "casting": CastingTable(),
-            "estimate": EstimateTable(),
-            "materials": {},
-            "motors": {},
-            "tissue": {},
-        }
+    return structs.replace(
+        spec,
+        name="unit",
+        motor=structs.replace(spec.motor, part=None),
+        layers=tuple(structs.replace(layer, material="") for layer in spec.layers),
+        casting=CastingTable(),
+        estimate=EstimateTable(),
+        materials={},
+        motors={},
+        tissue={},
     )
 
 
 @lru_cache(maxsize=32)
 def _drawn(geometry: str) -> Plan:
     """The plan of a geometry (a spec's JSON), materials blank: variants of one geometry share the drawing."""
-    return plan(Spec.model_validate_json(geometry))
+    return plan(from_json(geometry))
 
 
 def forget() -> None:
@@ -70,7 +71,7 @@ class Variant:
     @cached_property
     def plan(self) -> Plan:
         """Tools and pours. Raises Refusal where the moulds can't be."""
-        drawn = _drawn(geometric(self.spec).model_dump_json())
+        drawn = _drawn(to_json(geometric(self.spec)))
         poured = zip(drawn.steps, self.spec.layers, strict=True)
         return replace(drawn, steps=tuple(replace(step, material=layer.material) for step, layer in poured))
 

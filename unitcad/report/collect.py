@@ -9,7 +9,7 @@ from typing import Any
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.folder import PAGE, TEMPORARY
 from unitcad.report.models import model_key, spec_in
-from unitcad.spec import Spec
+from unitcad.spec import Spec, to_data
 
 MANIFEST = "manifest.json"
 OF_EVERY_BATCH = ("index", "status", "reason", "folder")
@@ -54,7 +54,7 @@ def variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]:
         spec = spec_in(folder)
     except UnitcadError as error:
         return {**found, "spec": None, "model": None, "no_model": str(error)}, None
-    found["spec"] = json.loads(spec.model_dump_json(exclude_none=True))
+    found["spec"] = to_data(spec)
     return {**found, "model": model_key(spec)}, spec
 
 

@@ -13,7 +13,7 @@ from unitcad.pipeline import Variant
 from unitcad.pipeline.geometry import GEOMETRIC, geometry_key
 from unitcad.pipeline.parts import glb_content
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
-from unitcad.spec import Spec, from_data, read_toml
+from unitcad.spec import Spec, from_data, read_toml, with_formats
 
 
 def spec_in(folder: Path) -> Spec:
@@ -23,8 +23,7 @@ def spec_in(folder: Path) -> Spec:
 
 def model_key(spec: Spec) -> str:
     """What a model depends on, whatever silicones and formats: sixteen hex digits."""
-    output = spec.output.model_copy(update={"formats": ()})
-    return geometry_key(spec.model_copy(update={"output": output}), GEOMETRIC, False)[:16]
+    return geometry_key(with_formats(spec), GEOMETRIC, False)[:16]
 
 
 def model(spec: Spec) -> dict[str, Any]:

@@ -9,16 +9,16 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from msgspec import structs
+
 from unitcad import catalogue
 from unitcad.errors import Refusal, unknown_name
 from unitcad.spec.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, dimensions
-from unitcad.spec.models import Spec
+from unitcad.spec.models import LEAST_LAYER, Spec
 from unitcad.spec.own import is_own
 from unitcad.spec.strain import allowed_strain, tail_strain, widest_tail_end
 
 DESIGNS = ("embedded", "encapsulating")
-LEAST_LAYER = 0.5
-"""Least wall and cap of a layer, mm: thinner ones tear on demoulding and hide a printer's play."""
 TAIL_SHARE = 0.7
 """Half the tail's width over the core's radius, at most: beyond it the ledge has no shoulders."""
 LEDGE_SHARE = 0.95
@@ -116,7 +116,7 @@ def printer_of(spec: Spec) -> catalogue.Printer:
     printer = catalogue.printers(spec.printers)[spec.moulds.printer]
     own = {
         name: catalogue.Value(value, "spec", "moulds")
-        for name, value in spec.moulds
+        for name, value in structs.asdict(spec.moulds).items()
         if hasattr(printer, name) and value is not None and float(getattr(printer, name)) != value
     }
     return replace(printer, **own)
@@ -128,11 +128,10 @@ def _with_defaults(spec: Spec) -> Spec:
     catalogue_motor = None
     if motor.part is not None:
         catalogue_motor = catalogue.choose("motor.part", motor.part, catalogue.motors(spec.motors))
-        motor = motor.model_copy(
-            update={
-                "diameter_mm": motor.diameter_mm or float(catalogue_motor.diameter_mm),
-                "thickness_mm": motor.thickness_mm or float(catalogue_motor.thickness_mm),
-            }
+        motor = structs.replace(
+            motor,
+            diameter_mm=motor.diameter_mm or float(catalogue_motor.diameter_mm),
+            thickness_mm=motor.thickness_mm or float(catalogue_motor.thickness_mm),
         )
     for field in ("diameter_mm", "thickness_mm"):
         if getattr(motor, field) is None:
@@ -142,11 +141,13 @@ def _with_defaults(spec: Spec) -> Spec:
         catalogue.choose(f"layers.{i}.material", layer.material, known)
     printer = catalogue.choose("moulds.printer", spec.moulds.printer, catalogue.printers(spec.printers))
     filled = {
-        name: float(getattr(printer, name)) for name, value in spec.moulds if value is None and hasattr(printer, name)
+        name: float(getattr(printer, name))
+        for name, value in structs.asdict(spec.moulds).items()
+        if value is None and hasattr(printer, name)
     }
     if spec.moulds.slot_height_mm is None:
         filled["slot_height_mm"] = max(filled["slot_height_mm"], _least_slot(spec))
-    moulds = spec.moulds.model_copy(update=filled)
+    moulds = structs.replace(spec.moulds, **filled)
     fpcb = spec.fpcb
     if fpcb and fpcb.pad_diameter_mm is None:
         inner = spec.diameter_mm / 2 - sum(layer.wall_mm for layer in spec.layers)
@@ -155,7 +156,7 @@ def _with_defaults(spec: Spec) -> Spec:
             spec.diameter_mm / 2 - min(0.5, spec.layers[-1].wall_mm / 2) if spec.design == "embedded" else cavity - 0.3
         )
         if radius > 0:
-            fpcb = fpcb.model_copy(update={"pad_diameter_mm": round(2 * radius, 9)})
+            fpcb = structs.replace(fpcb, pad_diameter_mm=round(2 * radius, 9))
     unknown = dict(UNKNOWN_MOTOR)
     if catalogue_motor and catalogue_motor.rpm:
         unknown["frequency_hz"] = round(float(catalogue_motor.rpm) / 60, 3)
@@ -163,9 +164,9 @@ def _with_defaults(spec: Spec) -> Spec:
         field: getattr(spec.estimate, field) or float(getattr(catalogue_motor, field, None) or default)
         for field, default in unknown.items()
     }
-    estimate = spec.estimate.model_copy(update=motor_values)
+    estimate = structs.replace(spec.estimate, **motor_values)
     catalogue.tissue(spec.estimate.tissue, spec.tissue)
-    return spec.model_copy(update={"motor": motor, "moulds": moulds, "fpcb": fpcb, "estimate": estimate})
+    return structs.replace(spec, motor=motor, moulds=moulds, fpcb=fpcb, estimate=estimate)
 
 
 def _check_layers(spec: Spec) -> None:

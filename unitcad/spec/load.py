@@ -10,10 +10,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+import msgspec
 
-from unitcad.errors import Refusal, UnitcadError, unknown_key, unknown_name
-from unitcad.spec.door import LEAST_LAYER, checked
+from unitcad.errors import Refusal, UnitcadError, unknown_name
+from unitcad.spec.convert import convert
+from unitcad.spec.door import checked
 from unitcad.spec.models import Spec
 from unitcad.spec.own import with_source
 
@@ -93,16 +94,27 @@ def put(data: dict[str, Any], path: str, value: Any) -> None:
 
 def from_data(data: Mapping[str, Any]) -> Spec:
     """A checked, effective `Spec` of plain data. Raises Refusal for the first thing that can't be."""
-    try:
-        spec = Spec.model_validate(with_source(dict(data), Path()))
-    except ValidationError as error:
-        raise _refusal(error) from None
-    return checked(spec)
+    return checked(convert(with_source(dict(data), Path()), Spec))
+
+
+def to_data(spec: Spec) -> dict[str, Any]:
+    """The spec as plain data, what is None left out: the same spec by `from_data`."""
+    return _given(msgspec.to_builtins(spec))
+
+
+def to_json(spec: Spec) -> str:
+    """The spec as JSON, for keys and for another process. `from_json` makes it the same spec, unchecked."""
+    return msgspec.json.encode(spec).decode()
+
+
+def from_json(text: str) -> Spec:
+    """The spec of a text by `to_json`."""
+    return msgspec.json.decode(text, type=Spec)
 
 
 def to_toml(spec: Spec) -> str:
     """The spec as TOML: the same spec when read again. Keys in the order of the models, None left out."""
-    return _table(spec.model_dump(mode="json", exclude_none=True), ())
+    return _table(to_data(spec), ())
 
 
 def _table(data: Mapping[str, Any], path: tuple[str, ...]) -> str:
@@ -154,47 +166,7 @@ def _index(node: list[Any], step: str, path: str) -> int:
     return int(step)
 
 
-def _refusal(error: ValidationError) -> Refusal:
-    """The first of pydantic's findings in our words; an unknown key comes with the closest that exist."""
-    first = error.errors(include_url=False)[0]
-    where = [part for part in first["loc"] if not (isinstance(part, str) and ("[" in part or part == "tuple"))]
-    field = ".".join(map(str, where))
-    value = first.get("input")
-    if first["type"] == "extra_forbidden":
-        return unknown_key(field, value, _known_keys(where[:-1]))
-    if field.startswith("moulds.cavities") and not isinstance(value, int):
-        return Refusal("moulds.cavities", str(value), 'takes [columns, rows] or "fill"', "fill")
-    if first["type"] == "missing":
-        return Refusal(field, "nothing", "is required")
-    context = first.get("ctx", {})
-    nearest = context.get("ge", context.get("le"))
-    if first["type"] == "greater_than":
-        nearest = LEAST_LAYER if where[0] == "layers" else 0.001
-    if first["type"] == "literal_error":
-        names = [word.strip("'") for word in str(context.get("expected", "")).replace(" or ", ", ").split(", ")]
-        if isinstance(value, str):
-            return unknown_name(field, value, names)
-    return Refusal(field, value if isinstance(value, int | float | str) else str(value), first["msg"].lower(), nearest)
-
-
-def _known_keys(where: list[Any]) -> list[str]:
-    model: Any = Spec
-    for part in where:
-        if isinstance(part, int):
-            continue
-        annotation = str(model.model_fields[part].annotation)
-        model = next(
-            (m for m in _tables() if m.__name__ in annotation),
-            Spec,
-        )
-    return list(model.model_fields)
-
-
-def _tables() -> list[Any]:
-    from unitcad.spec import models
-
-    return [
-        m
-        for m in vars(models).values()
-        if isinstance(m, type) and issubclass(m, models.Table) and m is not models.Table
-    ]
+def _given(node: Any) -> Any:
+    if isinstance(node, dict):
+        return {key: _given(value) for key, value in node.items() if value is not None}
+    return [_given(value) for value in node] if isinstance(node, list | tuple) else node

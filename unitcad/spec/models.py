@@ -7,63 +7,66 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from msgspec import Meta, Struct, structs
 
 FREQUENCIES_HZ = (1.0, 5000.0)
 """What an estimate may be asked for: vibration motors, with room on both sides; above it waves are too short."""
-Positive = Annotated[float, Field(strict=True, gt=0)]
-NotNegative = Annotated[float, Field(strict=True, ge=0)]
-Length = Annotated[float, Field(strict=True, gt=0, le=1000)]
+Positive = Annotated[float, Meta(gt=0)]
+NotNegative = Annotated[float, Meta(ge=0)]
+Length = Annotated[float, Meta(gt=0, le=1000)]
 """A length in mm: beyond a metre nothing here is printed or cast."""
-Count = Annotated[int, Field(strict=True, ge=1)]
+LEAST_LAYER = 0.5
+"""Least wall and cap of a layer, mm: thinner ones tear on demoulding and hide a printer's play."""
+Thickness = Annotated[float, Meta(gt=0, le=1000, extra={"nearest": LEAST_LAYER})]
+Count = Annotated[int, Meta(ge=1)]
 Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
 Model = Literal["paper", "consistent", "fitted"]
 Entries = dict[str, dict[str, Any]]
 
 
-class Table(BaseModel):
-    """A table of the spec: frozen, unknown keys refused, no NaN or infinity."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A table of the spec: frozen, unknown keys refused."""
 
 
-class MotorTable(Table):
+class MotorTable(Table, frozen=True, kw_only=True):
     """The motor: a catalogue `part`, or its size; a size given beside a part overrides the catalogue's."""
 
     part: str | None = None
     diameter_mm: Length | None = None
     thickness_mm: Length | None = None
-    fill: Annotated[bool, Field(description="Layer 1 reaches the motor: no ring of air between them")] = False
+    fill: Annotated[bool, Meta(description="Layer 1 reaches the motor: no ring of air between them")] = False
 
 
-class FpcbTable(Table):
+class FpcbTable(Table, frozen=True, kw_only=True):
     """The flexible circuit: a round pad on the motor's back and a straight tail to one side or to both."""
 
     tail: Literal["one", "both"] = "one"
     thickness_mm: Length = 0.11
     tail_width_mm: Length = 3.0
-    tail_length_mm: Annotated[Length, Field(description="how far the tail stands out of the body")] = 10.0
+    tail_length_mm: Annotated[Length, Meta(description="how far the tail stands out of the body")] = 10.0
     pad_diameter_mm: Length | None = None
-    tail_end_width_mm: Length | None = Field(default=None, description="of a tail's free end, which must pass the slot")
+    tail_end_width_mm: Annotated[Length | None, Meta(description="of a tail's free end, which must pass the slot")] = (
+        None
+    )
 
 
-class WiresTable(Table):
+class WiresTable(Table, frozen=True, kw_only=True):
     """Wires instead of a circuit: side by side, from the motor's side out along +x, through one exit."""
 
     diameter_mm: Length
-    count: Annotated[int, Field(strict=True, ge=1, le=8)] = 2
-    length_mm: Length = Field(default=10.0, description="how far the wires stand out of the body")
+    count: Annotated[int, Meta(ge=1, le=8)] = 2
+    length_mm: Annotated[Length, Meta(description="how far the wires stand out of the body")] = 10.0
 
 
-class LayerTable(Table):
+class LayerTable(Table, frozen=True, kw_only=True):
     """One silicone layer: a wall and, in the encapsulating design, a cap."""
 
     material: str
-    wall_mm: Length
-    cap_mm: Length | None = None
+    wall_mm: Thickness
+    cap_mm: Thickness | None = None
 
 
-class MouldsTable(Table):
+class MouldsTable(Table, frozen=True, kw_only=True):
     """The tooling. Whatever the printer's catalogue entry gives can be overridden; None takes the printer's value."""
 
     printer: str = "fdm-0.4"
@@ -87,60 +90,56 @@ class MouldsTable(Table):
     engraving_depth_mm: Length | None = None
     engraving_stroke_mm: Length | None = None
     pour: Literal["open", "injected"] = "open"
-    sprue_mm: Annotated[float, Field(strict=True, ge=3.0)] = Field(
-        default=3.0, description="3 by syringe, 4 by gravity"
-    )
-    vents: Count | None = Field(
-        default=None, description="of each cavity under a lid; None takes as many as clear the air"
-    )
+    sprue_mm: Annotated[float, Meta(ge=3.0, description="3 by syringe, 4 by gravity")] = 3.0
+    vents: Annotated[
+        Count | None, Meta(description="of each cavity under a lid; None takes as many as clear the air")
+    ] = None
     filament_mm: Length = 1.75
     plinth_height_mm: Length = 2.0
     plate_mm: Length = 4.0
     ledge_mm: Length = 0.6
 
 
-class CastingTable(Table):
+class CastingTable(Table, frozen=True, kw_only=True):
     """The lab: scale, mixing, room and the margin on a silicone's elongation."""
 
     scale_resolution_g: Positive = 0.01
     minimum_mix_g: Positive = 2.0
-    waste: Annotated[NotNegative, Field(description="extra mix as a fraction of what the cavities take")] = 0.5
-    room_c: Annotated[float, Field(strict=True, ge=5, le=45)] = 23.0
+    waste: Annotated[NotNegative, Meta(description="extra mix as a fraction of what the cavities take")] = 0.5
+    room_c: Annotated[float, Meta(ge=5, le=45)] = 23.0
     vacuum: bool = True
     strain_margin: Annotated[
         float,
-        Field(
-            strict=True, gt=0, le=1, description="the part of a silicone's elongation at break that demoulding may use"
-        ),
+        Meta(gt=0, le=1, description="the part of a silicone's elongation at break that demoulding may use"),
     ] = 0.5
 
 
-class EstimateTable(Table):
+class EstimateTable(Table, frozen=True, kw_only=True):
     """What the attenuation estimate is asked for; None takes the motor's value."""
 
-    frequency_hz: Annotated[float, Field(strict=True, ge=FREQUENCIES_HZ[0], le=FREQUENCIES_HZ[1])] | None = None
+    frequency_hz: Annotated[float, Meta(ge=FREQUENCIES_HZ[0], le=FREQUENCIES_HZ[1])] | None = None
     amplitude_um: Positive | None = None
     tissue: str = "forearm"
     models: tuple[Model, ...] = ("paper", "consistent", "fitted")
 
 
-class OutputTable(Table):
+class OutputTable(Table, frozen=True, kw_only=True):
     """Formats, and the largest distance of a mesh from the true surface."""
 
     formats: tuple[Format, ...] = ("step", "stl", "3mf")
-    tolerance_mm: Annotated[float, Field(strict=True, ge=0.0005, le=0.2)] = 0.01
+    tolerance_mm: Annotated[float, Meta(ge=0.0005, le=0.2)] = 0.01
 
 
-class Spec(Table):
+class Spec(Table, frozen=True, kw_only=True):
     """A haptic unit as asked for; `layers` run from the inside out, one entry being a single-layer control."""
 
-    name: Annotated[str, Field(min_length=1, max_length=120)]
+    name: Annotated[str, Meta(min_length=1, max_length=120)]
     design: str
     diameter_mm: Length
     motor: MotorTable = MotorTable(part="LCM0720A3463F")
     fpcb: FpcbTable | None = None
     wires: WiresTable | None = None
-    layers: Annotated[tuple[LayerTable, ...], Field(min_length=1, max_length=15)]
+    layers: Annotated[tuple[LayerTable, ...], Meta(min_length=1, max_length=15)]
     moulds: MouldsTable = MouldsTable()
     casting: CastingTable = CastingTable()
     estimate: EstimateTable = EstimateTable()
@@ -150,8 +149,13 @@ class Spec(Table):
     printers: Entries = {}
     tissue: dict[str, Entries] = {}
     parameters: Annotated[
-        dict[str, bool | int | float | str], Field(description="what a design of one's own wants to know besides")
+        dict[str, bool | int | float | str], Meta(description="what a design of one's own wants to know besides")
     ] = {}
     design_source: Annotated[
-        str | None, Field(description="the text of an own design's file; filled in when the spec is read")
+        str | None, Meta(description="the text of an own design's file; filled in when the spec is read")
     ] = None
+
+
+def with_formats(spec: Spec, formats: tuple[Format, ...] = ()) -> Spec:
+    """The spec, asked for other formats, or for none: what does not depend on them is keyed so."""
+    return structs.replace(spec, output=structs.replace(spec.output, formats=formats))

@@ -6,9 +6,11 @@ import json
 import re
 from typing import Any
 
-from pydantic import BaseModel
+from msgspec import NODEFAULT, Struct
+from msgspec.structs import FieldInfo
 
 from unitcad.errors import UnitcadError
+from unitcad.spec.fields import entry_in, fields_of, meaning, table_in
 from unitcad.spec.load import read_toml, templates
 from unitcad.spec.models import Spec
 
@@ -36,47 +38,35 @@ def starter(name: str, template: str = "encapsulating") -> str:
 def _further_keys(section: str, there: dict[str, Any]) -> str:
     """The keys that a table of the template leaves out, commented out."""
     header = re.match(r"\[(\w+)\]", section)
-    if not header or header[1] not in Spec.model_fields:
-        return ""
-    return "".join(
-        f"{line}\n"
-        for model in _models(Spec.model_fields[header[1]].annotation)
-        for line in _keys(model, set(there[header[1]]))
-    )
+    field = fields_of(Spec).get(header[1]) if header else None
+    table = table_in(field.type) if field else None
+    return "".join(f"{line}\n" for line in _keys(table, set(there[field.name]))) if field and table else ""
 
 
 def _further_tables(there: dict[str, Any]) -> str:
     lines = ["# The tables below are as if left out: take the # away to change a value. ... means: from the catalogue."]
-    for table, field in Spec.model_fields.items():
-        if table in there or table in _NOT_OFFERED:
+    for name, field in fields_of(Spec).items():
+        if name in there or name in _NOT_OFFERED:
             continue
-        models = _models(field.annotation)
-        lines += [
-            "",
-            f"# [{table}]" + (f"  # {(models[0].__doc__ or '').splitlines()[0]}" if models else _meaning(field)),
-        ]
-        lines += [line for model in models for line in _keys(model, set())]
+        table = table_in(field.type) or table_in(entry_in(field.type))
+        about = f"  # {(table.__doc__ or '').splitlines()[0]}" if table else _note(field)
+        lines += ["", f"# [{name}]{about}", *(_keys(table, set()) if table else ())]
     return "\n".join(lines) + "\n"
 
 
-def _keys(model: type[BaseModel], given: set[str]) -> list[str]:
+def _keys(table: type[Struct], given: set[str]) -> list[str]:
     return [
-        f"# {key} = {'...' if entry.is_required() else _shown(entry.default)}{_meaning(entry)}"
-        for key, entry in model.model_fields.items()
+        f"# {key} = {'...' if field.required else _shown(field)}{_note(field)}"
+        for key, field in fields_of(table).items()
         if key not in given
     ]
 
 
-def _models(annotation: Any) -> list[type[BaseModel]]:
-    from typing import get_args
-
-    kinds = get_args(annotation) or (annotation,)
-    return [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)]
+def _note(field: FieldInfo) -> str:
+    said = meaning(field.type)
+    return f"  # {said}" if said else ""
 
 
-def _meaning(field: Any) -> str:
-    return f"  # {field.description}" if field.description else ""
-
-
-def _shown(value: Any) -> str:
+def _shown(field: FieldInfo) -> str:
+    value = field.default if field.default is not NODEFAULT else field.default_factory()
     return json.dumps(list(value) if isinstance(value, tuple) else value).replace("null", "...")

@@ -1,0 +1,48 @@
+"""What the tables of a spec say of themselves: their keys, the kinds of value that a key takes, what a key means."""
+
+from __future__ import annotations
+
+import types
+import typing
+from typing import Annotated, Any
+
+import msgspec
+
+Fields = dict[str, msgspec.structs.FieldInfo]
+
+
+def fields_of(table: type[msgspec.Struct]) -> Fields:
+    """The keys of a table as typed in a file, in the order of its class."""
+    return {field.encode_name: field for field in msgspec.structs.fields(table)}
+
+
+def alternatives(kind: Any) -> tuple[Any, ...]:
+    """The members of a union, annotations taken off."""
+    if typing.get_origin(kind) is Annotated:
+        return alternatives(typing.get_args(kind)[0])
+    if typing.get_origin(kind) in (typing.Union, types.UnionType):
+        return tuple(found for member in typing.get_args(kind) for found in alternatives(member))
+    return (kind,)
+
+
+def table_in(kind: Any) -> type[msgspec.Struct] | None:
+    """The table among the alternatives of `kind`."""
+    return next((k for k in alternatives(kind) if isinstance(k, type) and issubclass(k, msgspec.Struct)), None)
+
+
+def entry_in(kind: Any, index: int = 0) -> Any:
+    """The kind of entry `index` of a list that `kind` allows; None where it allows no list so long."""
+    for found in alternatives(kind):
+        if typing.get_origin(found) in (tuple, list):
+            entries = typing.get_args(found)
+            if typing.get_origin(found) is list or entries[-1] is Ellipsis:
+                return entries[0]
+            return entries[index] if index < len(entries) else None
+    return None
+
+
+def meaning(kind: Any) -> str:
+    """The description that a kind is annotated with, or nothing."""
+    if typing.get_origin(kind) is not Annotated:
+        return ""
+    return next((note.description for note in kind.__metadata__ if note.description), "")
