@@ -50,7 +50,9 @@ class Promise:
 
 @dataclass(frozen=True)
 class Result:
-    """One suite's findings. `measured` says on what: machine, versions, size of the run."""
+    """One suite's findings. `measured` says on what: machine, versions, size of the run; `options` are the words after
+    the suite's name in the command that makes it again.
+    """
 
     suite: str
     title: str
@@ -59,6 +61,7 @@ class Result:
     plots: tuple[Plot, ...] = ()
     promises: tuple[Promise, ...] = ()
     measured: dict[str, Any] = field(default_factory=dict)
+    options: str = ""
 
     @property
     def ok(self) -> bool:
@@ -66,8 +69,10 @@ class Result:
         return all(promise.ok for promise in self.promises)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready data; what is no number becomes null."""
+        """JSON-ready data; what is no number becomes null, in a table its name."""
         data = asdict(self)
+        for table in data["tables"]:
+            table["rows"] = [[shown(cell) if _endless(cell) else cell for cell in row] for row in table["rows"]]
         for promise, there in zip(data["promises"], self.promises, strict=True):
             promise["ok"] = there.ok
         return _finite(data)
@@ -84,11 +89,11 @@ def from_dict(data: dict[str, Any]) -> Result:
         ),
         plots=tuple(
             Plot(
-                p["title"],
-                p["x_label"],
-                p["y_label"],
-                {k: tuple(map(tuple, v)) for k, v in p["series"].items()},
-                p["lines"],
+                **{
+                    **p,
+                    "series": {k: tuple(map(tuple, v)) for k, v in p["series"].items()},
+                    "curves": tuple(p["curves"]),
+                }
             )
             for p in data["plots"]
         ),
@@ -96,6 +101,7 @@ def from_dict(data: dict[str, Any]) -> Result:
             Promise(p["what"], math.nan if p["value"] is None else p["value"], p["limit"]) for p in data["promises"]
         ),
         measured=data["measured"],
+        options=data.get("options", ""),
     )
 
 
@@ -129,7 +135,8 @@ def markdown(result: Result, picture: Sequence[str] | None = None) -> str:
     """The suite's section; `picture[i]` is the file of plot i. None: no pictures are written, so none is linked."""
     lines = [f"## {result.title}", "", result.text, ""]
     size = ", ".join(f"{k} {v}" for k, v in result.measured.items())
-    lines += [f"`unitcad accuracy {result.suite}`; measured on: {size}.", ""]
+    command = f"unitcad accuracy {result.suite} {result.options}".strip()
+    lines += [f"`{command}`; measured on: {size}.", ""]
     for table in result.tables:
         lines += [f"**{table.title}**", "", *table_lines(table), ""]
         if table.note:
@@ -149,6 +156,10 @@ def table_lines(table: Table) -> list[str]:
     return ["| " + " | ".join(table.columns) + " |", "|" + " --- |" * len(table.columns), *rows]
 
 
+def _endless(value: Any) -> bool:
+    return isinstance(value, float) and not math.isfinite(value)
+
+
 def _finite(data: Any) -> Any:
     if isinstance(data, dict):
         return {key: _finite(value) for key, value in data.items()}
@@ -156,4 +167,4 @@ def _finite(data: Any) -> Any:
         return [_finite(value) for value in data]
     if hasattr(data, "item"):
         data = data.item()
-    return None if isinstance(data, float) and not math.isfinite(data) else data
+    return None if _endless(data) else data

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -39,8 +40,9 @@ def run(name: str, quick: bool, say: Say, specs: int | None = None) -> Result:
     if specs is not None and name == "extremes":
         from unitcad.accuracy.extremes import study
 
-        return study(specs, say, journal=Path("out") / "extremes.jsonl")
-    return import_module(f"unitcad.accuracy.{name.replace('-', '_')}").run(quick, say)
+        return replace(study(specs, say, journal=Path("out") / "extremes.jsonl"), options=f"--specs {specs}")
+    result: Result = import_module(f"unitcad.accuracy.{name.replace('-', '_')}").run(quick, say)
+    return replace(result, options="--quick" if quick else "")
 
 
 def write(results: Sequence[Result], folder: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import platform
 import statistics
+import subprocess
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -49,8 +50,11 @@ def timing(seconds: list[float]) -> Timing:
 
 
 def machine(*packages: str) -> dict[str, Any]:
-    """What a measurement was made on: processor, cores, Python and the versions of `packages`."""
-    found: dict[str, Any] = {"processor": _processor(), "cores": _cores(), "Python": platform.python_version()}
+    """What a measurement was made on: processor, cores, commit of a clone, Python and the versions of `packages`."""
+    found: dict[str, Any] = {"processor": _processor(), "cores": _cores()}
+    if commit := _commit():
+        found["commit"] = commit
+    found["Python"] = platform.python_version()
     for name in packages:
         try:
             found[name] = version(name)
@@ -67,6 +71,18 @@ def _processor() -> str:
     except OSError:
         pass
     return platform.processor() or platform.machine()
+
+
+def _commit() -> str:
+    """The commit of the clone that runs, with a plus if its files differ; nothing outside a clone."""
+    root = Path(__file__).parents[2]
+    if not (root / ".git").exists():
+        return ""
+    words = ["git", "-C", str(root), "describe", "--always", "--abbrev=10", "--dirty=+"]
+    try:
+        return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
+    except OSError:
+        return ""
 
 
 def _cores() -> int:
