@@ -52,6 +52,11 @@ def test_the_page_says_what_was_measured_on_what():
     assert "| broken | nan | 1 | BROKEN |" in text
 
 
+def test_lines_of_text_stand_as_they_are():
+    text = markdown(Result("speed", "Speed", "", (Table("it prints", (), (("a | b   c",), ("d",))),)))
+    assert "**it prints**\n\n```text\na | b   c\nd\n```" in text
+
+
 def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
     runner.write([RESULT], tmp_path)
     other = Result("moulds", "Laws", "More.")

@@ -13,7 +13,9 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under columns; a number is shown with three significant digits, None as a dash."""
+    """Rows under columns; a number is shown with three significant digits, None as a dash. Without columns each row is
+    a line of text, shown as it stands.
+    """
 
     title: str
     columns: tuple[str, ...]
@@ -152,6 +154,8 @@ def markdown(result: Result, picture: Sequence[str] | None = None) -> str:
 
 def table_lines(table: Table) -> list[str]:
     """A table in Markdown."""
+    if not table.columns:
+        return ["```text", *(str(line) for (line,) in table.rows), "```"]
     rows = ["| " + " | ".join(shown(cell) for cell in row) + " |" for row in table.rows]
     return ["| " + " | ".join(table.columns) + " |", "|" + " --- |" * len(table.columns), *rows]
 
