@@ -14,6 +14,7 @@ from unitcad.accuracy import runner
 from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Plot, Promise, Result, Table, fastest, frontier, markdown, shown
 from unitcad.accuracy.timing import interleaved, timing
+from unitcad.cli.accuracy import accuracy
 from unitcad.errors import Refusal, UnitcadError
 
 RESULT = Result(
@@ -71,6 +72,22 @@ def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
     (tmp_path / "accuracy.json").write_text("{}")
     with pytest.raises(UnitcadError, match="not a result"):
         runner.read(tmp_path)
+
+
+def test_what_can_not_be_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(runner, "run", lambda *_: pytest.fail("worked"))
+    (tmp_path / "file").touch()
+    (tmp_path / "damaged").mkdir()
+    (tmp_path / "damaged" / "accuracy.json").write_text("{")
+    with pytest.raises(Refusal, match="'extremes'"):
+        accuracy(["stability"], quick=False, specs=10, out=None, as_json=False)
+    with pytest.raises(Refusal, match="--quick"):
+        accuracy(["extremes"], quick=True, specs=10, out=None, as_json=False)
+    with pytest.raises(Refusal, match=r"speed; nearest accepted: 'left-out'"):
+        accuracy(["Left_Out"], quick=True, specs=None, out=None, as_json=False)
+    for place, said in (("file", "no folder that can be written"), ("damaged", "not a result")):
+        with pytest.raises(UnitcadError, match=said):
+            accuracy(["stability"], quick=True, specs=None, out=tmp_path / place, as_json=False)
 
 
 def test_plots_repeat_and_leave_out_what_has_no_logarithm():

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -12,7 +15,9 @@ from hypothesis import strategies as st
 from unitcad.accuracy import extremes
 from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, LAW, REFUSED, Outcome, build_outcome, door, outcome, put_in
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, random_spec, seeded_spec
-from unitcad.errors import UnitcadError
+from unitcad.accuracy.runner import JOURNAL
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.spec.load import text_of
 
 EXAMPLES = int(os.environ.get("UNITCAD_RANDOM_SPECS", "60"))
 
@@ -70,6 +75,38 @@ def test_nearest_values_lead_to_a_build_or_another_limit():
             pytest.fail(f"seed {seed}: the nearest values never end")
 
 
+@pytest.mark.parametrize(("seed", "ranges"), [(0, "documented"), (1, "documented"), (0, "extreme"), (1, "extreme")])
+def test_the_command_ends_as_the_outcome_says(seed, ranges, tmp_path):
+    """What the study judges through functions is what a person gets: exit 0, or 2 and the field named, and no trace."""
+    data = seeded_spec(seed, ranges)
+    file = tmp_path / "spec.toml"
+    file.write_text(text_of(data), "utf-8")
+    command = [sys.executable, "-m", "unitcad", "build", str(file), "--no-slice", "-o", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    refused = door(data)
+    assert done.returncode == (2 if refused else 0), done.stderr
+    if refused:
+        assert refused.field in done.stderr
+        assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
+    assert "Traceback" not in done.stderr
+
+
+def test_the_docs_have_the_documented_ranges():
+    page = (Path(__file__).parents[2] / "docs" / "spec.md").read_text("utf-8")
+    for name, low, high in DOCUMENTED.rows():
+        assert f"| `{name}` | {low:g} | {high:g} |" in page, name
+
+
+def test_a_refusal_without_a_field_is_a_fault(monkeypatch):
+    import unitcad.spec
+
+    def refuse(data):
+        raise Refusal("", 1, "nothing may be")
+
+    monkeypatch.setattr(unitcad.spec, "from_data", refuse)
+    assert build_outcome(seeded_spec(0)).kind not in GOOD
+
+
 def test_a_seed_is_a_spec():
     assert seeded_spec(5) == seeded_spec(5) != seeded_spec(6)
 
@@ -97,7 +134,7 @@ def test_faults_are_seen(monkeypatch):
 
 @pytest.mark.long
 def test_ten_thousand_random_specs():
-    found = extremes.study(extremes.LONG, print)
+    found = extremes.study(extremes.LONG, print, journal=JOURNAL)
     assert found.ok, [promise for promise in found.promises if not promise.ok]
 
 

@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, REFUSED, Outcome, outcome
+from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, NO_VALUE, REFUSED, Outcome, outcome
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
 from unitcad.accuracy.result import Promise, Result, Say, Table
 from unitcad.accuracy.timing import Timing, machine, timing
@@ -35,7 +35,7 @@ Job = tuple[str, dict[str, Any]]
 
 def run(quick: bool, say: Say) -> Result:
     """The sweeps and a sample of random specs; `study` takes any number."""
-    return study(10 if quick else 100, say, sweeps=1 if quick else None)
+    return study(10 if quick else 100, say, sweeps=2 if quick else None)
 
 
 def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None = None) -> Result:
@@ -80,9 +80,16 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
             ),
             Table(
                 "Refusals by field",
-                ("field", "refusals", "builds once the nearest values are in", "no value offered"),
+                (
+                    "field",
+                    "refusals",
+                    "builds once the nearest values are in",
+                    "ends at another limit",
+                    "no value offered",
+                ),
                 tuple(_refusal_rows(refused)),
-                "The rest meets a different limit and ends there without a value to offer.",
+                "Nearest values are followed from limit to limit, until it builds or a limit offers none: at once, or "
+                "at another limit than the first.",
             ),
             Table("Faults", ("where", "number", "kind", "what"), tuple(faults[:50]) or (("none", None, None, None),)),
         ),
@@ -160,7 +167,9 @@ def _sweeps(values: int | None) -> Iterator[Job]:
 
     def some(of: Iterable[Any]) -> list[Any]:
         chosen = list(of)
-        return chosen if values is None else [*chosen[: values - 1], chosen[-1]]
+        if values is None:
+            return chosen
+        return [chosen[round(len(chosen) * (i + 1) / values) - 1] for i in range(values)]
 
     def each(name: str, base: str, change: Callable[[Any], list[str]], of: Iterable[Any]) -> Iterator[Job]:
         for value in some(of):
@@ -253,8 +262,10 @@ def _outcome_table(found: dict[str, list[tuple[int, Outcome]]]) -> Table:
 
 def _refusal_rows(refused: Sequence[Outcome]) -> Iterator[tuple]:
     for name, count in Counter(o.field for o in refused).most_common():
-        ends = Counter(o.chain_end for o in refused if o.field == name)
-        yield name, count, ends[BUILT], ends["no value"]
+        mine = [o for o in refused if o.field == name]
+        built = sum(o.chain_end == BUILT for o in mine)
+        at_once = sum(o.chain_end == NO_VALUE and len(o.chain) == 1 for o in mine)
+        yield name, count, built, count - built - at_once, at_once
 
 
 def _range_rows() -> Iterator[tuple]:

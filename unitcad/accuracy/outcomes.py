@@ -14,6 +14,8 @@ from unitcad.errors import Refusal, UnitcadError
 
 BUILT, REFUSED = "built", "refused"
 LAW, CHECK, ERROR, CRASH, HANG, CIRCLE = "law", "check", "error", "crash", "hang", "circle"
+NO_VALUE = "no value"
+"""How a chain ends at a refusal that offers none."""
 GOOD = (BUILT, REFUSED)
 _MOST_STEPS = 40
 
@@ -44,7 +46,8 @@ def build_outcome(data: dict[str, Any]) -> Outcome:
         with tempfile.TemporaryDirectory() as folder:
             manifest = build(spec, Path(folder), only=("unit", "moulds")).manifest
     except Refusal as refusal:
-        return Outcome(REFUSED, str(refusal), refusal.field, seconds=time.perf_counter() - start)
+        kind = REFUSED if refusal.field else ERROR  # a refusal that names no field is a fault of ours
+        return Outcome(kind, str(refusal), refusal.field, seconds=time.perf_counter() - start)
     except UnitcadError as error:
         return Outcome(ERROR, str(error), seconds=time.perf_counter() - start)
     except Exception as error:
@@ -82,7 +85,7 @@ def outcome(data: dict[str, Any], follow: bool = True) -> Outcome:
             return Outcome(kind, message, first.field, last.worst, tuple(chain), last.kind, first.seconds)
         chain.append(refusal.field)
         if refusal.nearest is None:
-            return Outcome(REFUSED, first.message, first.field, {}, tuple(chain), "no value", first.seconds)
+            return Outcome(REFUSED, first.message, first.field, {}, tuple(chain), NO_VALUE, first.seconds)
         before, data = refusal, put_in(data, refusal.field, refusal.nearest)
         after = door(data)
         same = after is not None and (after.field, after.limit) == (before.field, before.limit)

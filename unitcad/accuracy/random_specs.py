@@ -75,7 +75,7 @@ DOCUMENTED = Ranges(
     tolerance_mm=(0.002, 0.1),
     cavities=(1, 2),
 )
-"""What the README says may be asked for: at least 60 % of what is drawn here builds."""
+"""What docs/spec.md says is tried out: at least 60 % of what is drawn here builds."""
 
 EXTREME = Ranges(
     diameter_mm=(10.0, 200.0),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import json
+import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
@@ -10,10 +12,13 @@ from pathlib import Path
 
 from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Result, Say, from_dict, markdown
-from unitcad.errors import UnitcadError, unknown_name
+from unitcad.errors import Refusal, UnitcadError
 
 SUITES = ("tessellation", "kernels", "moulds", "hankel", "stability", "models", "extremes", "left-out", "speed")
 """In the order of the page; a suite is the module of that name, with one function `run(quick, say)`."""
+
+JOURNAL = Path("out") / "extremes.jsonl"
+"""What a study of the extremes has judged, so that it can be taken up again."""
 
 HEAD = """# Error against run time, and what holds at the extremes
 
@@ -28,7 +33,8 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
     """The suites called `names`, or all of them. Raises Refusal for an unknown one."""
     for name in names:
         if name not in SUITES:
-            raise unknown_name("SUITE", name, SUITES)
+            close = difflib.get_close_matches(name.lower().replace("_", "-"), SUITES, n=1, cutoff=0.5)
+            raise Refusal("SUITE", name, f"not known; there are {', '.join(SUITES)}", close[0] if close else None)
     return tuple(name for name in SUITES if not names or name in names)
 
 
@@ -40,16 +46,26 @@ def run(name: str, quick: bool, say: Say, specs: int | None = None) -> Result:
     if specs is not None and name == "extremes":
         from unitcad.accuracy.extremes import study
 
-        return replace(study(specs, say, journal=Path("out") / "extremes.jsonl"), options=f"--specs {specs}")
+        return replace(study(specs, say, journal=JOURNAL), options=f"--specs {specs}")
     result: Result = import_module(f"unitcad.accuracy.{name.replace('-', '_')}").run(quick, say)
     return replace(result, options="--quick" if quick else "")
 
 
 def write(results: Sequence[Result], folder: Path) -> None:
-    """Put results into a folder's accuracy.json beside those there, and write the page and plots of all."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Put results into a folder's accuracy.json beside those there, and write the page and plots of all.
+
+    Raises UnitcadError for a folder that can't be written, or whose accuracy.json is not ours.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise UnitcadError(f"-o {folder}: is no folder that can be written ({error.strerror})") from None
     known = {result.suite: result for result in (*read(folder), *results)}
     ordered = [known[name] for name in SUITES if name in known]
+    if not results:
+        return
     text = json.dumps({"suites": [result.as_dict() for result in ordered]}, indent=1, allow_nan=False)
     (folder / "accuracy.json").write_bytes((text + "\n").encode())
     sections = [HEAD]

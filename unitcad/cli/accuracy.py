@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +15,9 @@ def accuracy(
     quick: Annotated[bool, typer.Option("--quick", help="Fewer cases: what CI runs.")] = False,
     specs: Annotated[
         int | None,
-        typer.Option(min=4, help="Random specs of the extremes, a quarter from beyond the documented ranges."),
+        typer.Option(
+            min=4, help="The extremes with all sweeps and so many random specs, a quarter beyond the documented ranges."
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -26,12 +29,26 @@ def accuracy(
     from unitcad.accuracy import runner
     from unitcad.accuracy.result import markdown
     from unitcad.cli.output import print_json, progress
+    from unitcad.errors import Refusal
 
+    names = runner.chosen(suites or [])
+    if specs is not None and names != ("extremes",):
+        raise Refusal("SUITE", " ".join(names), "--specs goes with the suite extremes alone", "extremes")
+    if specs is not None and quick:
+        raise Refusal("--quick", "set", "does not go with --specs, which says how many; leave one out")
     results = []
     folder = out if out is not None or quick else Path("docs")
-    for name in runner.chosen(suites or []):
-        with progress(name) as say:
-            result = runner.run(name, quick, say, specs)
+    if folder is not None:
+        runner.write([], folder)  # so that a folder that can't be is known before the work, not after it
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # worker processes end with us
+    for name in names:
+        try:
+            with progress(name) as say:
+                result = runner.run(name, quick, say, specs)
+        except KeyboardInterrupt:
+            if specs is not None:
+                typer.echo(f"{runner.JOURNAL} keeps what was judged; the same command takes up the rest", err=True)
+            raise
         results.append(result)
         if folder is not None:
             runner.write([result], folder)  # an interrupted run keeps what it has

@@ -114,7 +114,12 @@ def from_json(text: str) -> Spec:
 
 def to_toml(spec: Spec) -> str:
     """The spec as TOML: the same spec when read again. Keys in the order of the models, None left out."""
-    return _table(to_data(spec), ())
+    return text_of(to_data(spec))
+
+
+def text_of(data: Mapping[str, Any]) -> str:
+    """A spec's plain data as TOML."""
+    return _table(dict(data), ())
 
 
 def _table(data: Mapping[str, Any], path: tuple[str, ...]) -> str:
