@@ -16,7 +16,7 @@ def accuracy(
     specs: Annotated[
         int | None,
         typer.Option(
-            min=4, help="The extremes with all sweeps and so many random specs, a quarter beyond the documented ranges."
+            min=10, help="The extremes with all sweeps and so many random specs, a tenth beyond the documented ranges."
         ),
     ] = None,
     out: Annotated[
