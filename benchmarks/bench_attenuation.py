@@ -9,13 +9,11 @@ import statistics
 import subprocess
 import sys
 import time
-import warnings
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
-from scipy import integrate, special
 
+from unitcad.accuracy.hankel_peers import adaptive
 from unitcad.attenuation.closed_form import Units
 from unitcad.attenuation.inputs import TissueLayer, Variant, body
 from unitcad.attenuation.loads import UniformDisc
@@ -77,32 +75,17 @@ def by_quad_vec(medium: LayeredMedium, lifted: bool) -> tuple[np.ndarray, float,
     The static part is taken out as the solver does, or it would not converge at all.
     """
     static = (1 - medium.layers[0].poisson_ratio) / medium.materials(OMEGA)[0].shear
-    along = UniformDisc(A).static(RADII)[0]
+    disc = UniformDisc(A)
+    known = static * disc.static(RADII)[0]
     count = 0
 
-    def value(k: complex) -> np.ndarray:
+    def remainder(k: np.ndarray) -> np.ndarray:
         nonlocal count
-        count += 1
-        kernel = k * medium.compliance(np.array([k]), OMEGA)[0, 1, 1] - static
-        return kernel * A * special.jv(1, k * A) / k * special.jv(0, k * RADII)
+        count += k.size
+        return (k * medium.compliance(k, OMEGA)[:, 1, 1] - static) * disc.transform(k)
 
-    end, height = 1500.0, 20.0
-    corners = [1e-9, height * (1 + 1j), end + height * 1j, end] if lifted else [1e-9, end]
-    total, error = static * along, 0.0
-    scale = float(np.max(np.abs(total)))
-    legs = [*pairwise(corners), (end, 2e4)]
-    for a, b in legs:
-        found, off = integrate.quad_vec(
-            lambda t, a=a, b=b: value(a + (b - a) * t) * (b - a),
-            0,
-            1,
-            epsabs=RTOL * scale / 4,
-            epsrel=0,
-            norm="max",
-            limit=400,
-        )
-        total, error = total + found, error + off
-    return total, error, count
+    value, error = adaptive(remainder, RADII, RTOL * float(np.max(np.abs(known))), lifted)
+    return known + value, error, count
 
 
 def response(rounds: int) -> None:
@@ -121,9 +104,7 @@ def response(rounds: int) -> None:
         print(f"  unitcad: true error {true:.1e}, estimate {found.error / scale:.1e}, {found.wavenumbers} wavenumbers")
         jobs: dict[str, Callable[[], object]] = {"unitcad response": ours}
         for path, lifted in (("lifted path", True), ("real axis", False)):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                peer, claimed, count = by_quad_vec(medium, lifted)
+            peer, claimed, count = by_quad_vec(medium, lifted)
             off = float(np.max(np.abs(peer - truth.u_z))) / scale
             print(f"  quad_vec, {path}: true error {off:.1e}, claims {claimed / scale:.1e}, {count} wavenumbers")
             if off < 10 * RTOL:
