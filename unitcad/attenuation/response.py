@@ -185,6 +185,24 @@ def _panels(corners: list[complex], stop: float, span: float) -> np.ndarray:
     return np.concatenate([np.stack([e[:-1], e[1:]], axis=1) for e in edges])
 
 
+def _affordable(tail: Tail, span: float) -> float:
+    """The last wavenumber of the tail's that five in six of all panels reach; the others are there to be halved.
+
+    To go further would leave nothing to refine the first panels with: a tail cut short costs far less, and says so.
+    """
+    far = _PHASE / span * _MAX_PANELS * 5 / 6
+    return float(tail.k[max(np.searchsorted(tail.k, far) - 1, 0)])
+
+
+def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
+    """Of the `bad` panels the `room` worst ones."""
+    if np.count_nonzero(bad) <= room:
+        return bad
+    found = np.zeros_like(bad)
+    found[np.argsort(np.where(bad, -errors, 0.0))[: max(room, 0)]] = True
+    return found
+
+
 def _integrate(
     problem: _Problem,
     materials: tuple[w.Material, ...],
@@ -201,7 +219,8 @@ def _integrate(
     total = np.zeros_like(known)
     quadrature = size = dropped = 0.0
     count = 0
-    stop = tail.start(max(float(np.max(np.abs(known))), tail.scale), rtol)
+    most = _affordable(tail, span)
+    stop = min(tail.start(max(float(np.max(np.abs(known))), tail.scale), rtol), most)
     pending = _graded(_panels(corners, stop, span), materials)
     done = 0
     used = 0
@@ -212,8 +231,9 @@ def _integrate(
         scale = float(np.max(np.abs(known + total + parts.sum(0)))) or 1.0
         done += pending.shape[0]
         bad = errors > 0.3 * rtol * scale / max(done, 1)
-        if quadrature + errors.sum() <= 0.4 * rtol * scale or done > _MAX_PANELS:
+        if quadrature + errors.sum() <= 0.4 * rtol * scale:
             bad[:] = False
+        bad = _worst(errors, bad, (_MAX_PANELS - done) // 4)  # halves of at most half of what is left
         total = total + parts[~bad].sum(0)
         quadrature += float(errors[~bad].sum())
         size += float(absolute[~bad].sum())
@@ -227,7 +247,7 @@ def _integrate(
                 ]
             )
             continue
-        wanted = tail.start(float(np.max(np.abs(known + total))), rtol)
+        wanted = min(tail.start(float(np.max(np.abs(known + total))), rtol), most)
         if wanted <= stop or done > _MAX_PANELS:
             break
         pending = _panels([complex(stop)], wanted, span)
