@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from html import escape
 
-from unitcad.accuracy.result import Plot
+from unitcad.accuracy.result import Plot, frontier
 
 WIDTH, HEIGHT = 720, 440
 LEFT, RIGHT, TOP, BOTTOM = 70, 190, 36, 52
 COLOURS = ("#1f6fb2", "#c8553d", "#3c8d5a", "#8059a8", "#b8860b", "#4d4d4d", "#d1478c", "#17868c")
+LEGEND_LETTERS = 24
+_CORNERS = (
+    (),
+    ((-1, -1), (1, -1), (1, 1), (-1, 1)),
+    ((0, -1.3), (1.3, 0), (0, 1.3), (-1.3, 0)),
+    ((-1.1, 1), (0, -1.2), (1.1, 1)),
+)
+"""Of each marker after the circle, about its middle."""
 
 
 def svg(plot: Plot) -> str:
@@ -47,21 +56,52 @@ def svg(plot: Plot) -> str:
         f'<text transform="translate(16 {(TOP + HEIGHT - BOTTOM) / 2:.1f}) rotate(-90)" text-anchor="middle">'
         f"{escape(plot.y_label)}</text>",
     ]
+    best = _best(series) if plot.frontier else None
+    drawn, legend, y, marked = [], [], TOP + 12, 0
     for i, (name, points) in enumerate(series.items()):
         colour = COLOURS[i % len(COLOURS)]
         spots = [at(x, y) for x, y in points]
-        curve, y = name in plot.curves, TOP + 12 + 18 * i
+        curve = name in plot.curves
+        one = []
         if (plot.lines or curve) and len(spots) > 1:
             path = " ".join(f"{x:.1f},{y:.1f}" for x, y in spots)
             stroke = 'stroke-width="2"' if curve else 'stroke-opacity="0.5"'
-            parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" {stroke}/>')
+            one.append(f'<polyline points="{path}" fill="none" stroke="{colour}" {stroke}/>')
         if curve:
-            parts.append(_line(WIDTH - RIGHT + 10, y - 4, WIDTH - RIGHT + 22, y - 4, colour))
+            legend.append(_line(WIDTH - RIGHT + 10, y - 4, WIDTH - RIGHT + 22, y - 4, colour))
         else:
-            parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.5" fill="{colour}"/>' for x, y in spots]
-            parts.append(f'<circle cx="{WIDTH - RIGHT + 16}" cy="{y - 4}" r="4" fill="{colour}"/>')
-        parts.append(_text(WIDTH - RIGHT + 26, y, name))
-    return "\n".join([*parts, "</svg>", ""])
+            size = 3.5 + 1.2 * (marked % 4) + 0.6 * (marked // 4)
+            filled = [best is None or point in best for point in points]
+            one += [_marker(marked, *spot, size, colour, full) for spot, full in zip(spots, filled, strict=True)]
+            legend.append(_marker(marked, WIDTH - RIGHT + 16, y - 4, 4.0, colour, True))
+            marked += 1
+        drawn.append(one)
+        for line in textwrap.wrap(name, LEGEND_LETTERS):
+            legend.append(_text(WIDTH - RIGHT + 26, y, line))
+            y += 15
+        y += 4
+    if best is not None:
+        legend += [
+            _text(WIDTH - RIGHT + 10, y + 6 + 15 * i, line)
+            for i, line in enumerate(("filled: on the frontier", "hollow: beaten in both"))
+        ]
+    # The last series has the largest markers: where series coincide, the smaller ones lie on top of it.
+    return "\n".join([*parts, *(part for one in reversed(drawn) for part in one), *legend, "</svg>", ""])
+
+
+def _best(series: dict[str, list[tuple[float, float]]]) -> set[tuple[float, float]]:
+    points = [point for some in series.values() for point in some]
+    return {point for point, mark in zip(points, frontier(points), strict=True) if mark}
+
+
+def _marker(kind: int, x: float, y: float, size: float, colour: str, full: bool) -> str:
+    """A circle, square, diamond or triangle of that half-width; hollow ones let others be seen through them."""
+    fill = f'fill="{colour}" stroke="#ffffff" stroke-width="0.7"' if full else f'fill="none" stroke="{colour}"'
+    if kind % len(_CORNERS) == 0:
+        return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size:g}" {fill}/>'
+    corners = _CORNERS[kind % len(_CORNERS)]
+    path = " ".join(f"{x + size * dx:.1f},{y + size * dy:.1f}" for dx, dy in corners)
+    return f'<polygon points="{path}" {fill}/>'
 
 
 def _powers(low: int, high: int) -> list[tuple[float, str]]:

@@ -25,7 +25,9 @@ class Table:
 
 @dataclass(frozen=True)
 class Plot:
-    """Series of (x, y) points over logarithmic axes, or x over a linear one; `curves` are lines without points."""
+    """Series of (x, y) points over logarithmic axes, or x over a linear one; `curves` are lines without points.
+    `frontier`: markers are hollow unless no other point is lower in both.
+    """
 
     title: str
     x_label: str
@@ -34,6 +36,7 @@ class Plot:
     lines: bool = True
     curves: tuple[str, ...] = ()
     linear_x: bool = False
+    frontier: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,78 @@
+"""The page's paragraph follows from levels, the units' table shows a control's shapes, markers and legends are seen."""
+
+import math
+import re
+from dataclasses import replace
+
+import pytest
+
+from unitcad.accuracy.plot import LEGEND_LETTERS, svg
+from unitcad.accuracy.result import Plot
+from unitcad.accuracy.unexplained import NineLevels, unexplained
+from unitcad.attenuation.models import judgements
+from unitcad.attenuation.table import measured_table
+
+NAMES = measured_table().names
+
+
+def levels(change=None):
+    """A level of 0.5 everywhere but where `change` has another; controls in two shapes a factor of 4 apart."""
+    flat = {
+        name: {"embedded": 1.0, "encapsulating": 0.25} if name.startswith("single") else {name.split(" ")[0]: 0.5}
+        for name in NAMES
+    }
+    return NineLevels({**flat, **(change or {})})
+
+
+def said(drawn, bare):
+    return unexplained(measured_table(), {"drawn": drawn, "bare": bare}, {}, judgements()["paper"])
+
+
+def test_a_control_is_the_geometric_mean_of_its_shapes_and_shows_both():
+    assert levels().of("single E10") == pytest.approx(math.sqrt(1.0 * 0.25), rel=1e-15)
+    assert levels().shown("single E10") == "0.500 (1.000 embedded, 0.250 encapsulating)"
+    assert levels().shown("embedded D10/E10") == "0.500"
+
+
+def test_ranges_are_of_single_units_and_of_both_variants():
+    text = said(levels(), levels({"embedded D10/E10": {"embedded": 0.125}}))
+    assert "0.25 to 1.00 (drawn), 0.12 to 1.00 (bare)" in text
+    assert "up to 0.25 times what it was (embedded D10/E10)" in text
+    assert "soft layer inside were measured at 0.04 to 0.16" in text
+    assert "1/14 to 1/67 of a shear wavelength" in text
+    assert "must be" not in text
+
+
+def test_who_gives_the_measured_orders_is_found_and_a_tie_is_no_order():
+    assert said(levels(), levels()).count("is given by nothing here") == 3
+    above = levels({"embedded E10/D30": {"embedded": 0.6}})
+    text = said(levels(), above)
+    assert "embedded E10/D30 above E10/D10, as was measured, is given by bare." in text
+    assert "encapsulating E10/D30 above E10/D10, as was measured, is given by nothing here." in text
+    measured = dict(zip(NAMES, measured_table().levels, strict=True))
+    ordered = NineLevels({name: {"": float(level)} for name, level in measured.items()})
+    solved = {"drawn": levels(), "bare": levels()}
+    text = unexplained(measured_table(), solved, {"table": ordered}, judgements()["paper"])
+    assert "D10 < E10 < D30, is given by table." in text
+    assert text.count("is given by table.") == 3
+
+
+PLOT = Plot("p", "x", "y", {"one": ((1.0, 1.0), (10.0, 0.1)), "other": ((2.0, 1.0), (1.0, 1.0))}, frontier=True)
+
+
+def test_markers_off_the_frontier_are_hollow():
+    markers = re.findall(r"<(circle|polygon) [^>]*?(fill=\"[^\"]*\")", svg(PLOT))
+    # "other" is drawn first, below; then "one", then both in the legend.
+    hollow = 'fill="none"'
+    assert [fill == hollow for _, fill in markers] == [False, True, False, False, False, False]
+    assert [kind for kind, _ in markers] == ["polygon", "polygon", "circle", "circle", "circle", "polygon"]
+    assert hollow not in "".join(re.findall(r"<(?:circle|polygon)[^>]*>", svg(replace(PLOT, frontier=False))))
+
+
+def test_a_long_legend_is_wrapped():
+    name = "finite elements, without the circuit"
+    lines = re.findall(r">([^<]+)</text>", svg(Plot("p", "x", "y", {name: ((1.0, 1.0),)})))
+    assert name not in lines
+    start = next(i for i, line in enumerate(lines) if line.startswith("finite"))
+    assert f"{lines[start]} {lines[start + 1]}" == name
+    assert len(lines[start]) <= LEGEND_LETTERS
