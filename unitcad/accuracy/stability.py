@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.accuracy import extreme_responses, thomson_haskell
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Table
+from unitcad.accuracy.result import Cell, Plot, Promise, Result, Say, Table
 from unitcad.accuracy.timing import machine
 from unitcad.attenuation.loads import Point, UniformDisc
 from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
@@ -74,14 +74,18 @@ def run(quick: bool, say: Say) -> Result:
     """All frozen cases, grouped by each thing that is extreme; exact answers of the response."""
     known = cases()[:: 3 if quick else 1]
     say(f"{len(known)} cases")
-    own = np.array([_error(case.medium.compliance(case.k, case.omega), case) / case.condition for case in known])
-    plain = np.array([_error(thomson_haskell.compliance(c.medium, c.k, c.omega), c) / c.condition for c in known])
+    condition = np.array([case.condition for case in known])
+    found = np.array([_error(case.medium.compliance(case.k, case.omega), case) for case in known])
+    own = found / condition
+    plain = np.array([_error(thomson_haskell.compliance(c.medium, c.k, c.omega), c) for c in known]) / condition
     groups = tuple(
         (
             axis,
             label,
             int(inside.sum()),
+            float(found[inside].max()),
             float(own[inside].max()),
+            float(condition[inside].max()),
             float(np.median(plain[inside])),
             _share(plain[inside]),
         )
@@ -91,7 +95,10 @@ def run(quick: bool, say: Say) -> Result:
     )
     exact = tuple(_exact_answers())
     say("responses")
-    responses = tuple(extreme_responses.rows())
+    responses = tuple(extreme_responses.rows(extreme_responses.cases()))
+    count = 8 if quick else 40
+    say(f"{count} random media")
+    surveyed = tuple(extreme_responses.rows(extreme_responses.survey(count), extreme_responses.SURVEYED))
     wide = [i for i, case in enumerate(known) if case.kh > 0]
     return Result(
         suite="stability",
@@ -103,12 +110,16 @@ def run(quick: bool, say: Say) -> Result:
             "which "
             "multiplies growing exponentials and keeps P and S apart as omega goes to 0, stands beside it: it is "
             "wrong by "
-            "more than one percent, or no number, in the share of cases shown. **What unitcad promises**: compliance "
-            "to "
-            "1e-13 for nu from 0 to 1/2 exactly, contrast 1e-8 to 1e8, thickness 1e-9 to 0.1 m, omega from 0 to 6e3 "
+            "more than one percent times the condition number, or no number, in the share of cases shown. **What "
+            "unitcad promises**: compliance to 1e-13 times the condition number (which is large beside branch points: "
+            f"here up to {condition.max():.0e}, with a plain error of up to {found.max():.1e}) "
+            "for nu from 0 to 1/2 exactly, contrast 1e-8 to 1e8, thickness 1e-9 to 0.1 m, omega from 0 to 6e3 "
             "rad/s, "
-            "k h up to 1e12, any damping or none; the response at the surface within rtol from 1e-12 to 0.1, with an "
-            "error that says so where it can't."
+            f"k h up to {max(case.kh for case in known):.0e}, any damping or none; the response at the surface within "
+            "rtol, or an `error` above rtol that says that it is not. That has been shown on the media below: rtol "
+            "from 1e-12 to 0.1 on seven extreme ones, from 1e-9 to 1e-3 on random ones with layers of 3e-6 to 0.02 m, "
+            "contrast up to 1e6, 1 to 6e3 rad/s. A film thinner than some micrometres needs more wavenumbers than are "
+            "spent: there a small rtol is often not met, and `error` stays at what was reached."
         ),
         tables=(
             Table(
@@ -118,13 +129,13 @@ def run(quick: bool, say: Say) -> Result:
                     "range",
                     "cases",
                     "unitcad, worst error",
+                    "over the condition number",
+                    "largest condition number",
                     "Thomson-Haskell, median",
                     "Thomson-Haskell, off by more than 1 %",
                 ),
                 groups,
-                "Thomson-Haskell breaks first where k h passes about 15 (growing exponentials) and below about 10 "
-                "rad/s "
-                "(P and S cancel); unitcad nowhere in these ranges.",
+                _where_it_breaks(known, plain),
             ),
             Table("Exact answers of the response", ("case", "error"), tuple((n, e) for n, e, _ in exact)),
             Table(
@@ -135,15 +146,31 @@ def run(quick: bool, say: Say) -> Result:
                 "complex plane with 40 nodes a panel; its doubt is what a second such path differs by. The compliance "
                 "under both integrals is the one judged above.",
             ),
+            Table(
+                "Response of random media",
+                (
+                    "rtol",
+                    "media",
+                    "within rtol by their estimate",
+                    "largest estimate",
+                    "largest error",
+                    "errors above their estimate",
+                    "the reference can tell",
+                ),
+                tuple(_surveyed(surveyed, rtol) for rtol in extreme_responses.SURVEYED),
+                "One to four layers of 3e-6 to 0.02 m, 1 kPa to 1 GPa, nu from 0 to 1/2, damped or not, 1 to 6e3 "
+                "rad/s, seeded. An error counts as above its estimate by more than the reference's doubt; the last "
+                "column counts the media where that doubt is below a tenth of the estimate.",
+            ),
         ),
         plots=(
             Plot(
-                "Error over the condition number against k h of the thickest layer",
+                "Error over the condition number against k h (thickest layer; infinite errors on the upper edge)",
                 "k h",
                 "error",
                 {
-                    "unitcad": tuple((known[i].kh, max(float(own[i]), 1e-17)) for i in wide),
-                    "Thomson-Haskell": tuple((known[i].kh, min(float(plain[i]), 1e3)) for i in wide),
+                    name: tuple((known[i].kh, float(np.clip(errors[i], 1e-17, 1e3))) for i in wide)
+                    for name, errors in (("unitcad", own), ("Thomson-Haskell", plain))
                 },
                 lines=False,
             ),
@@ -151,8 +178,13 @@ def run(quick: bool, say: Say) -> Result:
         promises=(
             Promise("compliance: worst error over the condition number", float(own.max()), LIMIT),
             *(Promise(name, error, limit) for name, error, limit in exact),
-            Promise("extreme responses: error over rtol", max(r.error / r.rtol for r in responses), 1.0),
+            Promise(
+                "extreme responses: error over rtol, or the estimate says so",
+                max(max(r.error - r.doubt, 0.0) / r.rtol for r in responses if r.met),
+                1.0,
+            ),
             Promise("extreme responses: error over its estimate", max(r.over_estimate for r in responses), 1.0),
+            Promise("random media: error over its estimate", max(r.over_estimate for r in surveyed), 1.0),
         ),
         measured={**machine("numpy", "scipy"), "cases": len(known)},
     )
@@ -160,7 +192,7 @@ def run(quick: bool, say: Say) -> Result:
 
 _Bins = Sequence[tuple[str, float, float]]
 _AXES: tuple[tuple[str, Callable[[Case], float], _Bins], ...] = (
-    ("k h", lambda c: c.kh, (("to 1", 0, 1), ("1 to 15", 1, 15), ("15 to 700", 15, 700), ("700 to 1e12", 700, 1e13))),
+    ("k h", lambda c: c.kh, (("to 1", 0, 1), ("1 to 15", 1, 15), ("15 to 700", 15, 700), ("above 700", 700, math.inf))),
     (
         "omega, rad/s",
         lambda c: c.omega,
@@ -179,6 +211,29 @@ _AXES: tuple[tuple[str, Callable[[Case], float], _Bins], ...] = (
     ),
     ("k beside a branch point", lambda c: float(c.kind == "branch"), (("yes", 1, 1),)),
 )
+
+
+def _where_it_breaks(known: list[Case], errors: np.ndarray) -> str:
+    deep, slow = (np.array([case.kh > 15 for case in known]), np.array([case.omega < 0.1 for case in known]))
+    rest = ~(deep | slow)
+    return (
+        f"Thomson-Haskell is off by more than 1 % in {_share(errors[deep])} of the cases with k h above 15 (growing "
+        f"exponentials), in {_share(errors[slow])} of those below 0.1 rad/s (P and S cancel), and in "
+        f"{_share(errors[rest])} of all others."
+    )
+
+
+def _surveyed(rows: Sequence[extreme_responses.Row], rtol: float) -> tuple[Cell, ...]:
+    at = [row for row in rows if row.rtol == rtol]
+    return (
+        rtol,
+        len(at),
+        sum(row.met for row in at),
+        max(row.estimate for row in at),
+        max(row.error for row in at),
+        sum(row.over_estimate > 1 for row in at),
+        sum(row.judged for row in at),
+    )
 
 
 def _binned(values: np.ndarray, bins: _Bins) -> list[tuple[str, np.ndarray]]:

@@ -153,11 +153,15 @@ class _Found:
     left_out: tuple[int, ...]
 
 
-def _path(end: float, r_max: float) -> list[complex]:
-    """Corners of the lifted path from 0 to `end`; its height keeps the Bessel functions below e^2."""
+def _path(end: float, r_max: float, thickness: float) -> list[complex]:
+    """Corners of the lifted path from 0 to `end`; its height keeps the Bessel functions below e^2.
+
+    Layers have complex modes as well, with poles above the axis at heights of about 1 / `thickness` of them all (m):
+    the path stays well below.
+    """
     if end == 0.0:
         return [0j]
-    height = min(2.0 / r_max if r_max > 0 else np.inf, end / 4.0)
+    height = min(2.0 / r_max if r_max > 0 else np.inf, end / 4.0, 0.1 / thickness if thickness > 0 else np.inf)
     return [0j, height * (1 + 1j), end + 1j * height, end + height + 0j]
 
 
@@ -212,7 +216,7 @@ def _integrate(
     rtol: float,
 ) -> _Found:
     r_max = float(problem.r.max())
-    corners = _path(end, r_max)
+    corners = _path(end, r_max, sum(layer.thickness for layer in problem.medium.layers))
     span = r_max + problem.load.reach + 2.0 * problem.z
     full = len(problem.medium.layers)
     keep, skipped = _reached(problem, corners, materials, rtol)
