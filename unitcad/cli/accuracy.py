@@ -16,7 +16,8 @@ def accuracy(
     specs: Annotated[
         int | None,
         typer.Option(
-            min=10, help="The extremes with all sweeps and so many random specs, a tenth beyond the documented ranges."
+            min=20,
+            help="The extremes with all sweeps and so many random specs, one in twenty beyond the documented ranges.",
         ),
     ] = None,
     out: Annotated[
