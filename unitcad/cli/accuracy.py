@@ -16,8 +16,8 @@ def accuracy(
     specs: Annotated[
         int | None,
         typer.Option(
-            min=20,
-            help="The extremes with all sweeps and so many random specs, one in twenty beyond the documented ranges.",
+            min=40,
+            help="The extremes with all sweeps and so many random specs, 3 % beyond the documented ranges.",
         ),
     ] = None,
     out: Annotated[
