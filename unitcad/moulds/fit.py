@@ -61,13 +61,19 @@ def cavities(plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[
     found, cured = [], Manifold()
     for step in plan.steps:
         layers = [realise(shape, segments) for shape in step.layer]
-        found.append(_held(step, layers, _reached(step, solids, cured, segments), segments))
+        held = _held(step, layers, _reached(step, solids, cured, segments), segments)
+        if any(abs(holding.volume() - drawn.volume()) > BALANCE * drawn.volume() for drawn, holding in held):
+            # Among very fine facets the union of all that touches can lose a wedge: a second opinion, piece by piece.
+            held = _held(step, layers, _reached(step, solids, cured, segments, one_by_one=True), segments)
+        found.append(held)
         cured = Manifold.batch_boolean([cured, *layers], manifold3d.OpType.Add)
     return found
 
 
-def _reached(step: Step, solids: Mapping[str, Manifold], cured: Manifold, segments: int) -> list[Manifold]:
-    """What silicone can reach, in components: block - tools - cured layers - seals.
+def _reached(
+    step: Step, solids: Mapping[str, Manifold], cured: Manifold, segments: int, *, one_by_one: bool = False
+) -> list[Manifold]:
+    """What silicone can reach, in components: block - tools - cured layers - seals, at once or `one_by_one`.
 
     The block is larger than the tools and reaches below the base, so a leak joins the outside to the cavity. It ends at
     the rim plane, where the pour is open and the blade runs, or at the lid's upper face, where sprue and vents open.
@@ -76,6 +82,11 @@ def _reached(step: Step, solids: Mapping[str, Manifold], cured: Manifold, segmen
     x0, y0, z0, x1, y1, _ = _box_of(around)
     block = realise(box(x0 - 5, x1 + 5, y0 - 5, y1 + 5, z0 - 5, step.top), segments)
     filled = [*around, cured, *(realise(shape, segments) for shape in step.seals)]
+    if one_by_one:
+        for piece in filled:
+            block = block - piece
+            block.num_tri()  # evaluated here, or all of it is joined into one operation again
+        return block.decompose()
     return Manifold.batch_boolean([block, *filled], manifold3d.OpType.Subtract).decompose()
 
 
