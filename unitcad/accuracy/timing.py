@@ -74,13 +74,17 @@ def _processor() -> str:
 
 
 def _commit() -> str:
-    """The commit of the clone that runs, with a plus if its files differ; nothing outside a clone."""
+    """The commit of the clone that runs, with a plus if its code differs; nothing outside a clone."""
     root = Path(__file__).parents[2]
     if not (root / ".git").exists():
         return ""
-    words = ["git", "-C", str(root), "describe", "--always", "--abbrev=10", "--dirty=+"]
+
+    def git(*words: str) -> str:
+        return subprocess.run(["git", "-C", str(root), *words], capture_output=True, text=True, check=False).stdout
+
     try:
-        return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
+        commit = git("rev-parse", "--short=10", "HEAD").strip()
+        return f"{commit}+" if commit and git("status", "--porcelain", "unitcad", "benchmarks").strip() else commit
     except OSError:
         return ""
 
