@@ -97,7 +97,7 @@ def run(quick: bool, say: Say) -> Result:
         suite="models",
         title="Models of the edge level",
         text=unexplained(table, solved, closed, judgements()["paper"]),
-        tables=(judged_table, _units_table(table, solved), meshes, bare),
+        tables=(judged_table, _units_table(table, closed, solved), meshes, bare),
         plots=(plot,),
         promises=(
             Promise("bare skin: layered solver from the finest mesh, over the mesh's own error", worst, 1.0),
@@ -155,10 +155,10 @@ def _measured(table: Measured, unit: str) -> float:
     return float(table.levels[table.names.index(name)])
 
 
-def _units_table(table: Measured, solved: dict[str, NineLevels]) -> Table:
-    rows = []
+def _units_table(table: Measured, closed: dict[str, NineLevels], solved: dict[str, NineLevels]) -> Table:
+    rows: list[tuple] = []
     for i, name in enumerate(table.names):
-        models = [float(edge_levels(table.units(i), model)) for model in ("paper", "fitted")]
+        models = [level for model in ("paper", "fitted") for level in closed[model].levels[name].values()]
         rows.append((name, float(table.levels[i]), *models, *(levels.shown(name) for levels in solved.values())))
     return Table(
         "Each unit's edge level, motor = 1",

@@ -51,8 +51,8 @@ def run(name: str, quick: bool, say: Say, specs: int | None = None) -> Result:
     return replace(result, options="--quick" if quick else "")
 
 
-def write(results: Sequence[Result], folder: Path) -> None:
-    """Put results into a folder's accuracy.json beside those there, and write the page and plots of all.
+def ready(folder: Path) -> list[Result]:
+    """Make sure that `folder` can take results, and return those there: to be asked before the work, not after it.
 
     Raises UnitcadError for a folder that can't be written, or whose accuracy.json is not ours.
     """
@@ -62,10 +62,16 @@ def write(results: Sequence[Result], folder: Path) -> None:
             pass
     except OSError as error:
         raise UnitcadError(f"-o {folder}: is no folder that can be written ({error.strerror})") from None
-    known = {result.suite: result for result in (*read(folder), *results)}
+    return read(folder)
+
+
+def write(results: Sequence[Result], folder: Path) -> None:
+    """Put results into a folder's accuracy.json beside those there, and write the page and plots of all.
+
+    Raises UnitcadError as `ready` does.
+    """
+    known = {result.suite: result for result in (*ready(folder), *results)}
     ordered = [known[name] for name in SUITES if name in known]
-    if not results:
-        return
     text = json.dumps({"suites": [result.as_dict() for result in ordered]}, indent=1, allow_nan=False)
     (folder / "accuracy.json").write_bytes((text + "\n").encode())
     sections = [HEAD]

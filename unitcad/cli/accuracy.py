@@ -40,7 +40,7 @@ def accuracy(
     results = []
     folder = out if out is not None or quick else Path("docs")
     if folder is not None:
-        runner.write([], folder)  # so that a folder that can't be is known before the work, not after it
+        runner.ready(folder)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # worker processes end with us
     for name in names:
         try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import types
 import typing
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, TypeVar
@@ -12,7 +11,7 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from unitcad.errors import Refusal, unknown_key, unknown_name
-from unitcad.spec.fields import alternatives, entry_in, fields_of, table_in
+from unitcad.spec.fields import alternatives, entry_in, fields_of, notes, table_in
 
 T = TypeVar("T")
 _NAMES = {
@@ -56,7 +55,11 @@ def _numbers(node: Any, field: str) -> Iterator[tuple[str, float]]:
         yield field, node
     elif isinstance(node, Mapping | list | tuple):
         for key, below in node.items() if isinstance(node, Mapping) else enumerate(node):
-            yield from _numbers(below, f"{field}.{key}" if field else str(key))
+            yield from _numbers(below, _below(field, key))
+
+
+def _below(field: str, key: object) -> str:
+    return f"{field}.{key}" if field else str(key)
 
 
 def _unknown(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
@@ -65,26 +68,25 @@ def _unknown(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
     if isinstance(node, Mapping) and table:
         fields = fields_of(table)
         for key, below in node.items():
-            place = f"{field}.{key}" if field else key
+            place = _below(field, key)
             if key in fields:
                 yield from _unknown(below, fields[key].type, place)
             else:
                 yield unknown_key(place, below, fields)
     elif isinstance(node, list):
         for i, below in enumerate(node):
-            yield from _unknown(below, entry_in(kind, i), f"{field}.{i}")
+            yield from _unknown(below, entry_in(kind, i), _below(field, i))
 
 
 def _refusal(what: str, path: str, data: Any, kind: Any, above: str) -> Refusal:
     """What msgspec says is wrong at `path` of `data`, in our words."""
     steps, value, kind = _followed(path, data, kind)
-    steps = [above, *steps] if above else steps
-    field = ".".join(steps)
+    field = ".".join([above, *steps] if above else steps)
     table = table_in(kind)
     if what.startswith("Object ") and table:
         fields = fields_of(table)
         missing = next(name for name, entry in fields.items() if entry.required and name not in value)
-        return Refusal(".".join([*steps, missing]), "nothing", "is required")
+        return Refusal(_below(field, missing), "nothing", "is required")
     if what.startswith("Invalid enum value"):
         return unknown_name(field, value, _words(kind))
     shown = value if isinstance(value, int | float | str) else str(value)[:60]
@@ -93,9 +95,10 @@ def _refusal(what: str, path: str, data: Any, kind: Any, above: str) -> Refusal:
         limit = int(limit) if bound["kind"] != "float" else limit
         if bound["length"]:
             of = "characters" if bound["kind"] == "str" else "entries"
-            least = bound["sign"] == ">="
-            return Refusal(field, shown, "must not be empty" if least else f"must have at most {limit} {of}")
-        nearest = _nearest(kind) if bound["sign"] == ">" else limit
+            empty = bound["sign"] == ">="
+            return Refusal(field, shown, "must not be empty" if empty else f"must have at most {limit} {of}")
+        least = max((note.extra["nearest"] for note in notes(kind) if note.extra), default=_LEAST)
+        nearest = least if bound["sign"] == ">" else limit
         return Refusal(field, shown, f"must be {_SIGNS[bound['sign']]} {limit:g}", nearest)
     if length := _LENGTH.match(what):
         return Refusal(field, shown, f"must have {length['length']} entries")
@@ -129,12 +132,6 @@ def _fits(value: Any, kind: Any) -> bool:
     except msgspec.ValidationError:
         return False
     return True
-
-
-def _nearest(kind: Any) -> float:
-    if typing.get_origin(kind) in (typing.Union, types.UnionType):
-        return max(map(_nearest, typing.get_args(kind)))
-    return next((note.extra["nearest"] for note in getattr(kind, "__metadata__", ()) if note.extra), _LEAST)
 
 
 def _words(kind: Any) -> list[str]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import types
 import typing
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import msgspec
 
+_UNIONS = (typing.Union, types.UnionType)
 Fields = dict[str, msgspec.structs.FieldInfo]
 
 
@@ -20,7 +22,7 @@ def alternatives(kind: Any) -> tuple[Any, ...]:
     """The members of a union, annotations taken off."""
     if typing.get_origin(kind) is Annotated:
         return alternatives(typing.get_args(kind)[0])
-    if typing.get_origin(kind) in (typing.Union, types.UnionType):
+    if typing.get_origin(kind) in _UNIONS:
         return tuple(found for member in typing.get_args(kind) for found in alternatives(member))
     return (kind,)
 
@@ -41,8 +43,16 @@ def entry_in(kind: Any, index: int = 0) -> Any:
     return None
 
 
+def notes(kind: Any) -> Iterator[msgspec.Meta]:
+    """What a kind and the members of its unions are annotated with."""
+    if typing.get_origin(kind) is Annotated:
+        yield from kind.__metadata__
+        yield from notes(typing.get_args(kind)[0])
+    elif typing.get_origin(kind) in _UNIONS:
+        for member in typing.get_args(kind):
+            yield from notes(member)
+
+
 def meaning(kind: Any) -> str:
     """The description that a kind is annotated with, or nothing."""
-    if typing.get_origin(kind) is not Annotated:
-        return ""
-    return next((note.description for note in kind.__metadata__ if note.description), "")
+    return next((note.description for note in notes(kind) if note.description), "")
