@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import errno
+import importlib
 import json
 import multiprocessing
 import os
 import time
 from pathlib import Path
 
+import platformdirs
 import pytest
 
-from unitcad.cache import DiskStore, MemoryStore, MissingContent, collect, usage
+from unitcad.cache import DiskStore, MemoryStore, MissingContent, collect, default_root, usage
 from unitcad.cache import disk as disk_module
 from unitcad.errors import UnitcadError
 
@@ -205,6 +207,52 @@ def test_collecting_spares_what_somebody_is_using(tmp_path: Path) -> None:
     assert store.has(sha)
     store.close()
     assert collect(tmp_path / "c", 0).entries == 1
+
+
+def test_locks_that_dead_processes_left_are_no_users(tmp_path: Path) -> None:
+    root = tmp_path / "c"
+    store = DiskStore(root)
+    store.file("ab1", Made())
+    store.close()
+    for name in ("open-0123", "ab1"):
+        (root / "locks" / name).touch()
+    (root / "tmp" / "half").touch()
+    assert collect(root, 0).entries == 1
+    assert not (root / "tmp" / "half").exists()
+    assert not list((root / "locks").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("system", "folder"),
+    [("unix", ".cache/unitcad"), ("macos", "Library/Caches/unitcad"), ("windows", "Local/unitcad/Cache")],
+)
+def test_the_cache_lies_where_each_system_keeps_caches(system, folder, tmp_path: Path, monkeypatch) -> None:
+    module = importlib.import_module(f"platformdirs.{system}")
+    kind = {"unix": "Unix", "macos": "MacOS", "windows": "Windows"}[system]
+    monkeypatch.setattr(platformdirs, "PlatformDirs", getattr(module, kind))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv("UNITCAD_CACHE", raising=False)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    if system == "windows":
+        monkeypatch.setattr(module, "get_win_folder", lambda name: str(tmp_path / "Local"))
+    assert default_root() == tmp_path / folder
+
+
+def test_the_cache_of_a_person_without_a_home_is_refused(monkeypatch) -> None:
+    for name in ("HOME", "UNITCAD_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.path.expanduser", lambda path: path)
+    with pytest.raises(UnitcadError, match="UNITCAD_CACHE"):
+        default_root()
+
+
+def test_on_windows_no_content_is_read_only(tmp_path: Path, monkeypatch) -> None:
+    store = DiskStore(tmp_path / "c")
+    for system, mode in (("win32", 0o200), ("linux", 0)):
+        with monkeypatch.context() as faked:
+            faked.setattr("unitcad.cache.disk.sys.platform", system)
+            sha = store.keep(system.encode())
+        assert (tmp_path / "c" / "content" / sha[:2] / sha).stat().st_mode & 0o222 & 0o200 == mode
 
 
 def test_a_folder_of_others_is_refused(tmp_path: Path) -> None:

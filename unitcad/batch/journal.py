@@ -13,7 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from unitcad.cache.disk import flock
+from filelock import FileLock, Timeout
+
 from unitcad.errors import UnitcadError
 
 JOURNAL, LOCK = "journal.jsonl", "batch.lock"
@@ -35,7 +36,7 @@ class Journal:
         try:
             fresh = not path.exists() or not _fits(path, head)
         except BaseException:
-            self._lock.close()
+            self._lock.release()
             raise
         self._file = open(path, "ab+" if not fresh else "wb+")  # noqa: SIM115
         if fresh:
@@ -72,7 +73,7 @@ class Journal:
     def close(self) -> None:
         """Let go of the folder."""
         self._file.close()
-        self._lock.close()
+        self._lock.release()
 
     def _append(self, entry: dict[str, Any]) -> int:
         start = self._file.seek(0, os.SEEK_END)
@@ -98,19 +99,21 @@ class Journal:
             offset += len(line)
 
 
-def _lock(out: Path) -> Any:
+def _lock(out: Path) -> FileLock:
+    lock = FileLock(out / LOCK, blocking=False, thread_local=False)
     try:
         out.mkdir(parents=True, exist_ok=True)
         if not (out / JOURNAL).exists() and any(path.name != LOCK for path in out.iterdir()):
             raise UnitcadError(f"{out}: holds something that is no batch's result; choose another folder with -o")
-        lock = open(out / LOCK, "a+")  # noqa: SIM115  (held while the batch runs)
+        lock.acquire()
     except (FileExistsError, NotADirectoryError):
         raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o") from None
+    except Timeout:
+        raise UnitcadError(
+            f"{out}: another batch is running in this folder; wait for it or choose another with -o"
+        ) from None
     except OSError as error:
         raise UnitcadError(f"{out}: can't be written: {error.strerror}") from None
-    if not flock(lock.fileno(), exclusive=True, wait=False):
-        lock.close()
-        raise UnitcadError(f"{out}: another batch is running in this folder; wait for it or choose another with -o")
     return lock
 
 

@@ -7,7 +7,9 @@ contents are kept once. `MemoryStore` keeps them for one build, `DiskStore` for 
     <root>/data/ab/<key>          checksum, newline, JSON
     <root>/files/ab/<key>         checksum, newline, JSON {"sha256", "size"}
     <root>/content/ab/<sha256>    the bytes, read-only, since results are hard links to them
+    <root>/unitcad-cache.lock     held while a store comes in, and while one process collects alone
     <root>/locks/<key>            held by the process that makes the entry
+    <root>/locks/open-<id>        held by each that has the cache open
     <root>/tmp/                   what is being written
 """
 

@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from unitcad.cache.disk import MARK, flock
+from unitcad.cache.disk import GATE, MARK, let_go, lock
 from unitcad.errors import UnitcadError
 
 DEFAULT_LIMIT_MB = 4096
@@ -41,13 +41,38 @@ def collect(root: Path, limit_bytes: int) -> Usage:
     cache.
     """
     _expect(root)
-    with open(root / MARK, "rb") as mark:
-        alone = flock(mark.fileno(), exclusive=True, wait=False)
+    with contextlib.ExitStack() as held:
+        alone = _alone(root, held)
         newest = time.time() - (0.0 if alone else GRACE_S)
         if alone:
-            for left in (*(root / "tmp").iterdir(), *(root / "locks").iterdir()):
+            for left in (root / "tmp").glob("*"):
                 left.unlink(missing_ok=True)
         return _collect(root, limit_bytes, newest)
+
+
+def _alone(root: Path, held: contextlib.ExitStack) -> bool:
+    """Whether nobody else has the cache open; nobody can then open it until `held` ends.
+
+    Locks that processes left behind when they died are removed.
+    """
+    gate = lock(root / GATE)
+    try:
+        gate.acquire(blocking=False)
+    except OSError:
+        return False
+    alone = True
+    for path in (root / "locks").glob("*"):
+        other = lock(path)
+        try:
+            other.acquire(blocking=False)
+        except OSError:
+            alone = False
+        let_go(other)
+    if alone:
+        held.callback(gate.release)
+    else:
+        gate.release()
+    return alone
 
 
 def _collect(root: Path, limit: int, newest: float) -> Usage:

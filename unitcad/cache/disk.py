@@ -7,18 +7,26 @@ import errno
 import json
 import os
 import shutil
+import sys
 import threading
 import time
+import uuid
 import weakref
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import platformdirs
+from filelock import FileLock
+
 from unitcad.cache.store import Intact, Make, MissingContent, digest
 from unitcad.errors import UnitcadError
 
 MARK = "unitcad-cache"
+GATE = "unitcad-cache.lock"
+"""Held while a store comes in, and while one process collects alone."""
+_POLL_S = 0.01
 
 
 class DiskStore:
@@ -36,10 +44,11 @@ class DiskStore:
         self._touched: dict[Path, float] = {}
         self._held: dict[str, bytes] = {}
         _claim(self.root)
-        # Held open and locked while the store lives: see `collect`.
-        mark = os.open(self.root / MARK, os.O_RDONLY)
-        flock(mark, exclusive=False)
-        self._let_go = weakref.finalize(self, os.close, mark)
+        # Held while the store lives: see `collect`.
+        held = lock(self.root / "locks" / f"open-{uuid.uuid4().hex}")
+        with contextlib.suppress(OSError), lock(self.root / GATE):
+            held.acquire()
+        self._let_go = weakref.finalize(self, let_go, held)
 
     def close(self) -> None:
         """Let go of the folder: others may collect everything."""
@@ -172,7 +181,7 @@ class DiskStore:
         fresh = self.root / "tmp" / f"{path.name[:20]}-{os.getpid()}-{threading.get_ident()}"
         try:
             fresh.write_bytes(content)
-            if read_only:
+            if read_only and sys.platform != "win32":  # Windows neither replaces nor removes a read-only file
                 fresh.chmod(fresh.stat().st_mode & 0o444)
             path.parent.mkdir(exist_ok=True)
             fresh.replace(path)
@@ -183,25 +192,16 @@ class DiskStore:
     @contextlib.contextmanager
     def _lock(self, key: str) -> Iterator[None]:
         """Held by one thread of one process at a time; a process that dies lets go of it."""
-        path = self.root / "locks" / key
-        while True:
-            try:
-                handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-            except OSError:  # read-only, or no space: better twice than not at all
-                yield
-                return
-            flock(handle, exclusive=True)
-            try:
-                if os.fstat(handle).st_ino == path.stat().st_ino:
-                    break
-            except OSError:
-                pass
-            os.close(handle)  # its last holder removed the file; another one has been made since
+        held = lock(self.root / "locks" / key)
+        try:
+            held.acquire()
+        except OSError:  # read-only, or no space: better twice than not at all
+            yield
+            return
         try:
             yield
         finally:
-            path.unlink(missing_ok=True)
-            os.close(handle)
+            let_go(held)
 
     def _path(self, kind: str, key: str) -> Path:
         return self.root / ("data" if kind == "data" else "files") / key[:2] / key
@@ -211,11 +211,17 @@ class DiskStore:
 
 
 def default_root() -> Path:
-    """UNITCAD_CACHE, or unitcad in the person's cache folder."""
+    """UNITCAD_CACHE, or unitcad in the person's cache folder, where the system keeps such folders.
+
+    Raises UnitcadError where there is no home.
+    """
     chosen = os.environ.get("UNITCAD_CACHE")
     if chosen:
         return Path(chosen)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "unitcad"
+    try:
+        return platformdirs.user_cache_path("unitcad", appauthor=False)
+    except RuntimeError:
+        raise UnitcadError("there is no home folder; choose the cache's with --cache or UNITCAD_CACHE") from None
 
 
 def _signature(path: Path) -> tuple[int, int, int]:
@@ -240,14 +246,14 @@ def _claim(root: Path) -> None:
         raise UnitcadError(f"{root}: can't be used as a cache: {error.strerror}") from None
 
 
-def flock(handle: int, *, exclusive: bool, wait: bool = True) -> bool:
-    """Lock an open file until it is closed; False if that would mean waiting and we don't wait."""
-    try:
-        import fcntl
-    except ImportError:  # no such locks on this system: the renames alone keep the store whole
-        return True
-    try:
-        fcntl.flock(handle, (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH) | (0 if wait else fcntl.LOCK_NB))
-    except OSError:
-        return False
-    return True
+def lock(path: Path) -> FileLock:
+    """A lock on a file, not taken yet; the system lets go of it when its process dies."""
+    return FileLock(path, thread_local=False, poll_interval=_POLL_S)
+
+
+def let_go(held: FileLock) -> None:
+    """Release a lock and remove its file: whoever waits on it makes a new one."""
+    if held.is_locked:
+        with contextlib.suppress(OSError):  # Windows: an open file stays until the lock itself removes it
+            os.unlink(held.lock_file)
+        held.release()
