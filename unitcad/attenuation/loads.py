@@ -7,12 +7,13 @@ A normal load (F1 of the paper's equation 2a) is a pressure, positive into the b
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
 from scipy import special
 
+from unitcad.attenuation.bessel import bessel, moment
 from unitcad.attenuation.rheology import finite
 from unitcad.errors import Refusal, unknown_name
 
@@ -77,7 +78,7 @@ class UniformDisc:
         a = self.radius
         if self.direction == "normal":
             return a * bessel(1, k * a) / k
-        return a * a * _mean_bessel(k * a)
+        return a * a * moment(k * a)
 
     def envelope(self, k: Any) -> Any:
         """A bound of |q(k)| for real k."""
@@ -104,54 +105,48 @@ class UniformDisc:
 Load = Point | UniformDisc
 
 
-def bessel(order: int, x: Any) -> Any:
-    """J0 or J1 of a real or complex array."""
-    if np.iscomplexobj(x):
-        return special.jv(order, x)
-    return special.j0(x) if order == 0 else special.j1(x)
-
-
-def _mean_bessel(x: Any) -> Any:
-    """Integral of t J1(x t) over t from 0 to 1: Struve functions for a large real x, else Gauss-Legendre."""
-    x = np.asarray(x)
-    if not np.iscomplexobj(x):
-        far = np.maximum(x, 8.0)
-        struve = special.j1(far) * special.struve(0, far) - special.j0(far) * special.struve(1, far)
-        by_struve = np.pi / 2.0 * struve / far
-        return np.where(x > 8.0, by_struve, _mean_bessel(np.minimum(x, 8.0) + 0j).real)
-    nodes, weights = np.polynomial.legendre.leggauss(24 + int(0.7 * np.max(np.abs(x), initial=0.0)))
-    t = (nodes + 1.0) / 2.0
-    return special.jv(1, x[..., None] * t) @ (weights / 2.0 * t)
-
-
 def _radial_static(s: Any) -> Any:
     """1/a times the integral of J1(kr) q(k) dk for the radial disc at s = r/a: K - E of Legendre, integrated.
 
     The kernel of a ring of radius x a is the integral of J1(kxa) J1(kr) dk = 2 (K - E)(m) / (pi max(r, xa)), with
     m = (min / max)^2.
     """
-    s = np.atleast_1d(np.asarray(s, dtype=float))
-    out = np.zeros_like(s)
-    for i, one in np.ndenumerate(s):
-        if one > 1.0:
-            out[i] = 2.0 * one / np.pi * _legendre_integral(0.0, 1.0 / one, 0)
-        elif one > 0.0:
-            out[i] = 2.0 * one / np.pi * (_CATALAN - 0.5 + _legendre_integral(one, 1.0, 3))
-    return out
+    s = np.asarray(s, dtype=float)
+    inside, outside = np.clip(s, 1e-300, 1.0), np.maximum(s, 1.0)
+    near = inside * (_CATALAN - 0.5 + _legendre_integral(1.0, 3) - _legendre_integral(inside, 3))
+    far = outside * _legendre_integral(1.0 / outside, 0)
+    return 2.0 / np.pi * np.where(s > 1.0, far, np.where(s > 0.0, near, 0.0))
 
 
-def _legendre_integral(low: float, high: float, power: int) -> float:
-    """Integral of (K - E)(x^2) / x^power from low to high <= 1, graded towards both ends of (0, 1)."""
+_SMALL = 2.0**-30  # of x: below it (K - E)(x^2) is pi x^2 / 4
+
+
+def _legendre_integral(x: Any, power: int) -> Any:
+    """Integral of (K - E)(t^2) / t^power from 0 (power 0) or from `_SMALL` (power 3) to x, 0 < x <= 1."""
+    edges, sums = _legendre_sums(power)
+    x = np.asarray(x, dtype=float)
+    whole = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, edges.size - 2)
+    found = sums[whole] + _legendre_panel(edges[whole], x, power)
+    if power == 0:
+        return np.where(x < _SMALL, np.pi / 12.0 * x**3, found)
+    return np.where(x < _SMALL, np.pi / 4.0 * np.log(x / _SMALL), found)
+
+
+@cache
+def _legendre_sums(power: int) -> tuple[np.ndarray, np.ndarray]:
+    """Edges from `_SMALL` to 1, graded towards both ends, and the integral up to each of them."""
+    halves = 2.0 ** -np.arange(1, 50)
+    edges = np.unique([_SMALL, *halves[halves > _SMALL], *(1.0 - halves), 1.0])
+    panels = _legendre_panel(edges[:-1], edges[1:], power)
+    start = np.pi / 12.0 * _SMALL**3 if power == 0 else 0.0
+    return edges, start + np.concatenate([[0.0], np.cumsum(panels)])
+
+
+def _legendre_panel(low: Any, high: Any, power: int) -> Any:
+    """Gauss-Legendre with 20 nodes over each panel."""
     nodes, weights = np.polynomial.legendre.leggauss(20)
-    edges = [low, high]
-    edges += [e for j in range(1, 50) for e in (2.0**-j, 1.0 - 2.0**-j) if low < e < high]
-    edges.sort()
-    total = 0.0
-    for a, b in pairwise(edges):
-        x = (a + b) / 2.0 + (b - a) / 2.0 * nodes
-        near_one = np.maximum((1.0 - x) * (1.0 + x), 1e-300)
-        k_minus_e = special.ellipkm1(near_one) - special.ellipe(x * x)
-        small = x < 1e-3
-        k_minus_e = np.where(small, np.pi / 4 * x * x * (1 + 3 / 8 * x * x), k_minus_e)
-        total += float((b - a) / 2.0 * np.sum(weights * k_minus_e / x**power))
-    return total
+    low, high = np.broadcast_arrays(low, high)
+    x = ((low + high) / 2.0)[..., None] + ((high - low) / 2.0)[..., None] * nodes
+    near_one = np.maximum((1.0 - x) * (1.0 + x), 1e-300)
+    k_minus_e = special.elliprd(0.0, near_one, 1.0) / 3.0  # over x^2; written as a difference it loses digits
+    return (high - low) / 2.0 * ((k_minus_e * x ** (2 - power)) @ weights)

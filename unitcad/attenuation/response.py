@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation import waves as w
-from unitcad.attenuation.loads import Load, bessel
+from unitcad.attenuation.bessel import bessel
+from unitcad.attenuation.loads import Load
 from unitcad.attenuation.medium import LayeredMedium
 from unitcad.attenuation.rheology import finite
 from unitcad.attenuation.tail import Tail, measure_tail

@@ -1,0 +1,84 @@
+"""Bessel functions of the Hankel transforms, and the moment of J1 that a radial disc has for its transform."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+_SERIES = 1.0  # |x| up to which the power series of the moment is summed
+_FAR = 40.0  # |x| from which the expansion in 1/x is good to 1e-16
+_FIRST_ORDER = 100  # J of this order is below 1e-25 for |x| up to _FAR
+_LEAST = 1e-220  # where the downward recurrence starts: at |x| = _SERIES it grows by 1e189
+
+
+def bessel(order: int, x: Any) -> Any:
+    """J0 or J1 of a real or complex array."""
+    if np.iscomplexobj(x):
+        return special.jv(order, x)
+    return special.j0(x) if order == 0 else special.j1(x)
+
+
+def moment(x: Any) -> Any:
+    """Integral of t J1(x t) over t from 0 to 1, for real or complex x with Re x >= 0, any shape.
+
+    Equal to (pi / 2x) (J1 H0 - J0 H1) with Struve's H, which scipy has for real x only, and not for all of them.
+    """
+    x = np.asarray(x)
+    flat = x.ravel()
+    out = np.empty(flat.shape, dtype=np.result_type(flat, float))
+    size = np.abs(flat)
+    near, far = size < _SERIES, size >= _FAR
+    for part, formula in ((near, _by_series), (~near & ~far, _by_recurrence), (far, _by_expansion)):
+        if np.any(part):
+            out[part] = formula(flat[part])
+    return out.reshape(x.shape)
+
+
+def _by_series(x: Any) -> Any:
+    """Power series: (-1)^m (x/2)^(2m+1) / (m! (m+1)! (2m+3))."""
+    quarter = -(x * x) / 4.0
+    term, total = x / 2.0, x / 6.0
+    for m in range(1, 12):
+        term = term * quarter / (m * (m + 1.0))
+        total = total + term / (2 * m + 3)
+    return total
+
+
+def _by_recurrence(x: Any) -> Any:
+    """Neumann series: x^2 times the moment is x J2 + 2 (J3 + J5 + ...), the orders by downward recurrence."""
+    above, here = np.zeros_like(x), np.full_like(x, _LEAST)
+    odd = np.zeros_like(x)
+    inverse = 2.0 / x
+    for order in range(_FIRST_ORDER, 0, -1):  # `here` is of this order, up to one common factor
+        if order % 2 == 1 and order > 1:
+            odd = odd + here
+        if order == 2:
+            second = here
+        above, here = here, order * inverse * here - above
+    true0, true1 = bessel(0, x), bessel(1, x)
+    # J0 and J1 have no common zero: the larger one gives the factor.
+    by0 = np.abs(true0) > np.abs(true1)
+    factor = np.where(by0, true0, true1) / np.where(by0, here, above)
+    return factor * (x * second + 2.0 * odd) / (x * x)
+
+
+def _by_expansion(x: Any) -> Any:
+    """1 / x^2 + (pi / 2x) (J1 K0 - J0 K1), K = H - Y by its expansion in 1/x (the Wronskian gives the first term)."""
+    inverse = 1.0 / (x * x)
+    zero, one = np.zeros_like(x), np.zeros_like(x)
+    for of_zero, of_one in reversed(_coefficients()):  # Horner
+        zero, one = zero * inverse + of_zero, one * inverse + of_one
+    return inverse + (bessel(1, x) * zero / x - bessel(0, x) * one) / x
+
+
+@cache
+def _coefficients() -> tuple[tuple[float, float], ...]:
+    """Of x^-2n in (pi/2) x K0 and (pi/2) K1: 1, -1, 9, -225, ... and 1, 1, -3, 45, ..."""
+    zero, one = [1.0], [1.0]
+    for n in range(20):
+        zero.append(-zero[-1] * (2 * n + 1) ** 2)
+        one.append(-one[-1] * (2 * n + 1) * (2 * n - 1))
+    return tuple(zip(zero, one, strict=True))
