@@ -14,9 +14,12 @@ import numpy as np
 import pytest
 from shapes import box, stl, text_stl
 
-from unitcad.check import FileReport, Options, check_file, formats
+from unitcad.check import FileReport, Options, check_file, check_mesh, formats
 from unitcad.check.findings import SEVERITIES, Finding, Location, merge
+from unitcad.check.limits import Deadline
+from unitcad.check.mesh import Mesh
 from unitcad.check.rulebook import FAMILIES, check_prefixes, explain, finding, markdown, rules
+from unitcad.check.rules_mesh import in_file, judge_mesh
 from unitcad.check.run import check_files
 from unitcad.errors import Refusal
 
@@ -149,7 +152,45 @@ def test_a_place_of_which_nothing_is_known_is_none(tmp_path: Path) -> None:
     (tmp_path / "a.stl").write_bytes(stl(box(), header=b"solid"))
     (found,) = check_file(tmp_path / "a.stl").as_dict()["findings"]
     assert (found["code"], found["locations"]) == ("F007", [])
-    assert finding("F007", "x", places=[Location(), Location(line=2)]).locations == (Location(line=2),)
+
+
+def test_a_location_names_every_face_the_object_and_the_line() -> None:
+    assert Location(face=3) == Location(faces=(3,))
+    both = Location(faces=(3, 17), xyz=(1.0, -0.0, 2.5), line=12, object="bolt")
+    assert both.as_dict() == {"object": "bolt", "face": 3, "faces": [3, 17], "xyz": [1.0, 0.0, 2.5], "line": 12}
+    assert str(both) == "object 'bolt' line 12 faces 3 and 17 (1, 0, 2.5)"
+    assert str(Location(face=3, part="object 2", object="object 2")) == "object 2 face 3"
+
+
+def test_both_faces_of_a_crossing_are_named_in_every_format() -> None:
+    first = box()
+    report = check_mesh(np.concatenate([first, box((4, 4, 4), (8, 3, 3))]).reshape(-1, 3), np.arange(72).reshape(-1, 3))
+    (crossing,) = [found for found in report.findings if found.code == "G001"]
+    for place in crossing.locations:
+        one, other = sorted(place.faces)
+        assert one < 12 <= other  # one of each box
+    named = "faces {} and {} (".format(*crossing.locations[0].faces)
+    for format_ in ("text", "github", "junit"):
+        assert named in formats.render([report], format_)
+    for result in json.loads(formats.render([report], "sarif"))["runs"][0]["results"]:
+        if result["ruleId"] == "G001":
+            assert named in result["message"]["text"]
+            assert [tuple(place["faces"]) for place in result["properties"]["places"]] == [
+                place.faces for place in crossing.locations
+            ]
+
+
+def test_line_and_object_of_a_face_come_from_its_mesh() -> None:
+    points = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]], float)
+    mesh = Mesh(points, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3]]), lines=np.array([7, 8, 11]),
+                objects=("bolt", "nut"), object_of=np.array([0, 1, -1]))  # fmt: skip
+    found = judge_mesh(mesh, Deadline(60)).findings
+    assert {(place.face, place.line, place.object) for item in found for place in item.locations} <= {
+        (0, 7, "bolt"), (1, 8, "nut"), (2, 11, None)
+    }  # fmt: skip
+    assert {item.code for item in found} == {"T001"}
+    (two,) = in_file([finding("G001", "x", places=[Location(faces=(1, 0))])], mesh)
+    assert (two.locations[0].line, two.locations[0].object) == (8, "nut and bolt")
 
 
 def test_fingerprints_are_those_of_the_file_however_it_is_named(

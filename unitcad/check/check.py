@@ -18,7 +18,7 @@ from unitcad.check.findings import Facts, FileReport, Finding, counted, ending, 
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Floats, Ints, Mesh
 from unitcad.check.rulebook import finding
-from unitcad.check.rules_mesh import Judged, judge_mesh
+from unitcad.check.rules_mesh import Judged, in_file, judge_mesh
 from unitcad.check.scale import UNITS_MM
 
 _KINDS = {
@@ -174,7 +174,7 @@ def _judge_all(meshes: Sequence[Mesh], options: Options, deadline: Deadline) -> 
         if options.printer is not None and topology is not None:
             from unitcad.check import printing
 
-            findings += printing.judge(topology, options.printer, deadline)
+            findings += in_file(printing.judge(topology, options.printer, deadline), mesh)
     if options.shells is not None and facts.shells is not None and facts.shells != options.shells:
         text = f"{counted(facts.shells, 'shell')}, {options.shells} expected"
         findings.append(finding("G005", text, abs(facts.shells - options.shells)))

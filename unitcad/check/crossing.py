@@ -368,10 +368,10 @@ def _places(topology: Topology, faces: _Faces, pairs: Ints) -> list[Location]:
         if near in found:
             continue
         one, other = sorted(int(faces.original[i]) for i in pair)
-        face = other if one in named else one
-        named.add(face)
+        first, second = (other, one) if one in named else (one, other)
+        named.add(first)
         xyz = (float(point[0]), float(point[1]), float(point[2]))
-        found[near] = Location(face=face, xyz=xyz, part=topology.mesh.name)
+        found[near] = Location(faces=(first, second), xyz=xyz, part=topology.mesh.name)
     return sorted(found.values(), key=lambda place: place.face or 0)
 
 

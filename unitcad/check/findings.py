@@ -12,35 +12,53 @@ SHOWN = 5  # locations kept for a finding; the count says how many there are
 
 @dataclass(frozen=True)
 class Location:
-    """Where: a face's index (0-based, file order), a point in the file's mm, a line or byte, a part or object."""
+    """Where: faces' indices (0-based, file order), a point in mm, a line (from 1), a part of the package, an object.
+
+    `faces` are all that are concerned, both of a crossing; `face` is the first of them. Either may be given alone.
+    `line` is that of the first face where the format has lines, else that of the fault.
+    """
 
     face: int | None = None
     xyz: tuple[float, float, float] | None = None
     line: int | None = None
     part: str | None = None
+    object: str | None = None
+    faces: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.faces and self.face is None:
+            object.__setattr__(self, "face", self.faces[0])
+        elif self.face is not None and not self.faces:
+            object.__setattr__(self, "faces", (self.face,))
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready, without what is not known."""
-        found: dict[str, Any] = {}
+        known: dict[str, Any] = {}
         if self.part is not None:
-            found["part"] = self.part
+            known["part"] = self.part
+        if self.object is not None:
+            known["object"] = self.object
         if self.face is not None:
-            found["face"] = self.face
+            known |= {"face": self.face, "faces": list(self.faces)}
         if self.xyz is not None:
-            found["xyz"] = [float(f"{v:.9g}") for v in self.xyz]
+            known["xyz"] = [float(f"{v:.9g}") + 0.0 for v in self.xyz]
         if self.line is not None:
-            found["line"] = self.line
-        return found
+            known["line"] = self.line
+        return known
 
     def __str__(self) -> str:
-        said = [self.part] if self.part else []
+        words = [self.part] if self.part else []
+        if self.object and self.object != self.part:
+            words.append(f"object {self.object!r}")
         if self.line is not None:
-            said.append(f"line {self.line}")
-        if self.face is not None:
-            said.append(f"face {self.face}")
+            words.append(f"line {self.line}")
+        if len(self.faces) > 1:
+            words.append(f"faces {', '.join(map(str, self.faces[:-1]))} and {self.faces[-1]}")
+        elif self.face is not None:
+            words.append(f"face {self.face}")
         if self.xyz is not None:
-            said.append("({:.6g}, {:.6g}, {:.6g})".format(*self.xyz))
-        return " ".join(said)
+            words.append("({:.6g}, {:.6g}, {:.6g})".format(*(v + 0.0 for v in self.xyz)))
+        return " ".join(words)
 
 
 @dataclass(frozen=True)

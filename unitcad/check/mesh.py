@@ -29,7 +29,8 @@ class Mesh:
     """Vertices (n, 3) float64 mm, faces (m, 3) int32 into them; `normals` (m, 3) as stored, where the format has them.
 
     `name` says which object of the file this is. `indexed` is false where vertices were shared by their place alone.
-    `single` is true where coordinates were stored as float32.
+    `single` is true where coordinates were stored as float32. `lines` (m,): each face's line in the file, from 1.
+    `objects` are the names of objects inside a mesh, `object_of` (m,) the index of each face's own, -1 for none.
     """
 
     vertices: Floats
@@ -38,6 +39,9 @@ class Mesh:
     name: str | None = None
     indexed: bool = True
     single: bool = False
+    lines: Ints | None = None
+    objects: tuple[str, ...] = ()
+    object_of: Ints | None = None
 
 
 def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDArray[np.uint64], Ints]:

@@ -43,7 +43,7 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
     count = int.from_bytes(data[80:84], "little")
     findings: list[Finding] = []
     if head[:5].lower() == b"solid":
-        findings.append(finding("F007", "the binary header starts with 'solid'", places=[Location(line=None)]))
+        findings.append(finding("F007", "the binary header starts with 'solid'"))
     room, rest = divmod(size - 84, 50)
     if count > room:
         findings.append(

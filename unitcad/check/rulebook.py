@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from itertools import islice
 
 from unitcad.check.findings import SHOWN, Finding, Location
 from unitcad.errors import Refusal
@@ -50,14 +51,7 @@ def finding(
     severity: str | None = None,
 ) -> Finding:
     """A finding of rule `code`, with the rule's severity unless another one is given."""
-    kept = []
-    for place in places:
-        if place == Location():
-            continue
-        if len(kept) == SHOWN:
-            break
-        kept.append(place)
-    return Finding(code, severity or rules()[code].severity, message, int(count), tuple(kept))
+    return Finding(code, severity or rules()[code].severity, message, int(count), tuple(islice(places, SHOWN)))
 
 
 def explain(codes: str) -> str:

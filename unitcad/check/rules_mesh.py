@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,7 +33,7 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
         places = [Location(face=int(i), part=mesh.name) for i in bad[:9]]
         wrong = len(finite) - int(finite.sum())
         text = counted(wrong, "non-finite vertex", "non-finite vertices")
-        return Judged(ending([finding("V001", text, len(bad) or 1, places)]), facts, None)
+        return Judged(in_file(ending([finding("V001", text, len(bad) or 1, places)]), mesh), facts, None)
     if not len(mesh.faces):
         return Judged(ending([finding("F001", "the mesh has no face")]), facts, None)
     found = topology.judge(mesh, deadline)
@@ -50,4 +51,23 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
         bbox_mm=(tuple(low.tolist()), tuple(high.tolist())),
         watertight=found.watertight,
     )
-    return Judged(tuple(findings), facts, found)
+    return Judged(in_file(findings, mesh), facts, found)
+
+
+def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
+    """The findings with the line and the object of each location's faces, where the reader of `mesh` knows them."""
+    if mesh.lines is None and mesh.object_of is None:
+        return tuple(findings)
+    return tuple(replace(item, locations=tuple(_in_file(place, mesh) for place in item.locations)) for item in findings)
+
+
+def _in_file(place: Location, mesh: Mesh) -> Location:
+    if place.face is None:
+        return place
+    line, names = place.line, place.object
+    if line is None and mesh.lines is not None:
+        line = int(mesh.lines[place.face])
+    if names is None and mesh.object_of is not None:
+        own = dict.fromkeys(int(mesh.object_of[face]) for face in place.faces)
+        names = " and ".join(mesh.objects[i] for i in own if i >= 0) or None
+    return replace(place, line=line, object=names)

@@ -19,7 +19,7 @@ from unitcad.check.model_data import Model, Object, Use
 from unitcad.check.model_part import read_model
 from unitcad.check.package import Package, Relation
 from unitcad.check.rulebook import finding
-from unitcad.check.rules_mesh import Judged, judge_mesh
+from unitcad.check.rules_mesh import Judged, in_file, judge_mesh
 from unitcad.check.scale import UNITS_MM
 
 if TYPE_CHECKING:
@@ -388,5 +388,5 @@ def _printed(
         if thing.type != "model" or thing.triangles is None or not len(thing.triangles):
             continue
         mesh = _mesh_of(thing, UNITS_MM.get(models[instance.key[0]].unit, 1.0), instance.matrix)
-        found += printing.judge(topology.judge(mesh, deadline), options.printer, deadline)
+        found += in_file(printing.judge(topology.judge(mesh, deadline), options.printer, deadline), mesh)
     return found
