@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,7 +88,7 @@ def test_a_child_that_falls_is_followed_by_one_under_a_virtual_display(monkeypat
 def test_no_display_and_no_server_is_a_message(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkXOpenGLRenderWindow")
-    monkeypatch.setattr(picture.shutil, "which", lambda name: None)
+    monkeypatch.setattr(picture, "shutil", SimpleNamespace(which=lambda name: None))
     with pytest.raises(NoPicture, match=r"libegl1.*xvfb"):
         draw([Scene((drawn(0, 1, 0, 1, 0, 1),), (0, -1, 0))])
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
 import faulthandler
 import importlib
 import os
 import pickle
+import queue
 import signal
-import sys
+import threading
+from typing import IO
 
 from unitcad.batch.frames import receive, send
+from unitcad.children import end_with_parent
 
 
 def serve(preload: tuple[str, ...]) -> None:
     """Import `preload`, then run tasks until the parent goes."""
-    _die_with_parent()
+    end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     faulthandler.enable()
     tasks, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
@@ -24,13 +25,11 @@ def serve(preload: tuple[str, ...]) -> None:
     os.dup2(2, 1)  # what a kernel prints must not get between the answers
     for name in preload:
         importlib.import_module(name)
+    coming: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    threading.Thread(target=_read, args=(tasks, coming), daemon=True).start()
     while True:
         try:
-            message = receive(tasks)
-        except EOFError:
-            os._exit(0)
-        try:
-            function, args, kwargs = pickle.loads(message)
+            function, args, kwargs = pickle.loads(coming.get())
             answer = True, function(*args, **kwargs)
         except Exception as error:
             answer = False, error
@@ -45,8 +44,10 @@ def serve(preload: tuple[str, ...]) -> None:
             os._exit(0)
 
 
-def _die_with_parent() -> None:
-    """On Linux the kernel ends us when the parent's thread ends, even inside a CAD kernel that hangs."""
-    if sys.platform == "linux":
-        with contextlib.suppress(OSError, AttributeError):
-            ctypes.CDLL(None, use_errno=True).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+def _read(tasks: IO[bytes], coming: queue.SimpleQueue[bytes]) -> None:
+    """Hand on every message; when the parent is gone, end this process, whatever it is doing."""
+    while True:
+        try:
+            coming.put(receive(tasks))
+        except EOFError:
+            os._exit(0)

@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from unitcad import children
 from unitcad.check.findings import Facts, Finding, counted
 from unitcad.check.limits import Limits, Unreadable, over_limit
 from unitcad.check.rulebook import finding
@@ -53,11 +54,7 @@ def _from_child(path: Path, seconds: float) -> dict[str, Any]:
     with TemporaryDirectory() as folder:
         out = Path(folder, "found.json")
         try:
-            done = subprocess.run(
-                [sys.executable, "-P", "-c", _CHILD, str(path), str(out)],
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, timeout=seconds,
-                check=False,
-            )  # fmt: skip
+            done = children.run([sys.executable, "-P", "-c", _CHILD, str(path), str(out)], timeout=seconds)
         except subprocess.TimeoutExpired as error:
             raise over_limit(f"not finished within {seconds:g} s") from error
         if done.returncode == 0 and out.exists():

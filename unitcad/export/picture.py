@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from unitcad import children
 from unitcad.errors import UnitcadError
 
 SECONDS = 300
@@ -65,9 +66,9 @@ def draw(scenes: Sequence[Scene]) -> list[bytes]:
 
 def _ask(request: bytes, environment: dict[str, str]) -> list[bytes] | None:
     """The child's pictures; None where it fell."""
-    child = [sys.executable, "-m", "unitcad.export.picture_child"]
+    child = [sys.executable, "-P", "-m", "unitcad.export.picture_child"]
     try:
-        done = subprocess.run(child, input=request, capture_output=True, timeout=SECONDS, env=environment)
+        done = children.run(child, content=request, timeout=SECONDS, env=environment)
         return pickle.loads(done.stdout) if done.returncode == 0 else None
     except (subprocess.TimeoutExpired, EOFError, pickle.UnpicklingError):
         return None
@@ -75,14 +76,8 @@ def _ask(request: bytes, environment: dict[str, str]) -> list[bytes] | None:
 
 @contextlib.contextmanager
 def _virtual_display() -> Iterator[str]:
-    """An X server of our own for a while; yields its display. It picks a free number and says it through a pipe."""
-    reading, writing = os.pipe()
-    command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]
-    server = subprocess.Popen(command, pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    os.close(writing)
-    try:
-        with os.fdopen(reading) as pipe:
-            yield f":{pipe.readline().strip()}"
-    finally:
-        server.terminate()
-        server.wait()
+    """An X server of our own for a while; yields its display. It picks a free number and prints it."""
+    command = ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]
+    with children.started(command, stderr=subprocess.DEVNULL) as server:
+        assert server.stdout is not None
+        yield f":{server.stdout.readline().decode().strip()}"

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from unitcad import children
 from unitcad.catalogue import Printer
 from unitcad.errors import UnitcadError
 
@@ -117,14 +118,12 @@ def _version() -> str:
 
 def _run(*arguments: str) -> str:
     try:
-        done = subprocess.run(
-            [PROGRAM, *arguments], capture_output=True, text=True, errors="replace", timeout=TIMEOUT_S, check=False
-        )
+        done = children.run([PROGRAM, *arguments], timeout=TIMEOUT_S)
     except FileNotFoundError:
         raise UnitcadError(f"{PROGRAM} is not installed") from None
     except subprocess.TimeoutExpired:
         raise UnitcadError(f"{PROGRAM} took more than {TIMEOUT_S} s") from None
-    return done.stdout + done.stderr
+    return (done.stdout + done.stderr).decode("utf-8", "replace")
 
 
 def _found(text: str, name: str) -> str:

@@ -1,0 +1,115 @@
+"""Programs that end when this process ends, however it ends.
+
+A program is started by a keeper: a small process that holds one end of a pipe. The system closes our end when we end,
+by SIGKILL too; the keeper then ends the program and its process group. Nothing here depends on a handler of ours.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+
+GRACE_S = 2.0
+"""How long a program that was asked to end may take until it is killed."""
+
+
+def run(
+    command: Sequence[str], *, content: bytes = b"", timeout: float | None = None, env: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[bytes]:
+    """Run a program to its end, `content` on its standard input.
+
+    Raises FileNotFoundError where there is no such program, subprocess.TimeoutExpired after `timeout` seconds; the
+    program is ended then.
+    """
+    with started(command, content=content, env=env) as keeper:
+        output, errors = keeper.communicate(timeout=timeout)
+    return subprocess.CompletedProcess(command, keeper.returncode, output, errors)
+
+
+@contextlib.contextmanager
+def started(
+    command: Sequence[str], *, content: bytes = b"", env: Mapping[str, str] | None = None, stderr: int = subprocess.PIPE
+) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a program while the block lasts; yields the keeper, whose outputs and exit code are the program's.
+
+    Raises FileNotFoundError where there is no such program.
+    """
+    program = shutil.which(command[0])
+    if program is None:
+        raise FileNotFoundError(command[0])
+    reading, lifeline = os.pipe()
+    try:
+        # Its own session: what a terminal sends to our group is ours to handle.
+        keeper = subprocess.Popen(
+            [sys.executable, "-I", "-S", __file__, program, *command[1:]],
+            stdin=reading, stdout=subprocess.PIPE, stderr=stderr, env=env, start_new_session=True,
+        )  # fmt: skip
+    except BaseException:
+        os.close(lifeline)
+        raise
+    finally:
+        os.close(reading)
+    with keeper:
+        try:
+            with contextlib.suppress(BrokenPipeError), open(lifeline, "wb", closefd=False, buffering=0) as pipe:
+                _write(pipe, len(content).to_bytes(8, "little") + content)
+            yield keeper
+        finally:
+            os.close(lifeline)
+            try:
+                keeper.wait(2 * GRACE_S)
+            except subprocess.TimeoutExpired:
+                keeper.kill()
+
+
+def end_with_parent() -> None:
+    """Have the kernel kill this process when its parent ends, even inside a call that never returns; on Linux only."""
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError, AttributeError):
+            import ctypes
+
+            ctypes.CDLL(None, use_errno=True).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+
+
+def _write(pipe, content: bytes) -> None:
+    left = memoryview(content)
+    while left:
+        left = left[pipe.write(left) :]
+
+
+def _keep(command: list[str]) -> int:
+    """The keeper: run a program until it ends or the pipe does; returns its exit code, as a shell counts it."""
+    lifeline = sys.stdin.buffer
+    # The whole content first: nothing that the program does can keep us from reading the pipe's end.
+    size = int.from_bytes(lifeline.read(8), "little")
+    content = lifeline.read(size)
+    if len(content) < size:
+        return 1
+    child = subprocess.Popen(
+        command, stdin=subprocess.PIPE, preexec_fn=end_with_parent if sys.platform == "linux" else None
+    )
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it is for the group's other members
+    threading.Thread(target=_end_with_pipe, args=(child,), daemon=True).start()
+    with contextlib.suppress(OSError):
+        child.communicate(content)
+    return child.returncode if child.returncode >= 0 else 128 - child.returncode
+
+
+def _end_with_pipe(child: subprocess.Popen[bytes]) -> None:
+    os.read(0, 1)
+    alone = sys.platform != "win32" and os.getpgrp() == os.getpid()
+    os.killpg(os.getpid(), signal.SIGTERM) if alone else child.terminate()
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        child.wait(GRACE_S)
+        return
+    os.killpg(os.getpid(), signal.SIGKILL) if alone else child.kill()
+
+
+if __name__ == "__main__":
+    os._exit(_keep(sys.argv[1:]))
