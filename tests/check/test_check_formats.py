@@ -21,6 +21,7 @@ from unitcad.check.mesh import Mesh
 from unitcad.check.rulebook import FAMILIES, check_prefixes, explain, finding, markdown, rules
 from unitcad.check.rules_mesh import in_file, judge_mesh
 from unitcad.check.run import check_files
+from unitcad.check.source import Source
 from unitcad.errors import Refusal
 
 HERE = Path(__file__).parent
@@ -182,8 +183,8 @@ def test_both_faces_of_a_crossing_are_named_in_every_format() -> None:
 
 def test_line_and_object_of_a_face_come_from_its_mesh() -> None:
     points = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]], float)
-    mesh = Mesh(points, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3]]), lines=np.array([7, 8, 11]),
-                objects=("bolt", "nut"), object_of=np.array([0, 1, -1]))  # fmt: skip
+    mesh = Mesh(points, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3]]), source=Source(
+        lines=np.array([7, 8, 11]), starts=np.array([0, 1, 2]), names=b"bolt\nnut\n"))  # fmt: skip
     found = judge_mesh(mesh, Deadline(60)).findings
     assert {(place.face, place.line, place.object) for item in found for place in item.locations} <= {
         (0, 7, "bolt"), (1, 8, "nut"), (2, 11, None)

@@ -22,7 +22,7 @@ UNREADABLE = {"F001", "F003", "F005", "F011", "F012"}
 
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
 def test_malformed_file_gives_its_code(case: Case, judge) -> None:
-    report = judge(case.data(), case.name, **case.options)
+    report = judge(case.data(), case.name, strict_3mf=True, **case.options)
     assert report.has(case.code), [found.code for found in report.findings]
     severity = next(found.severity for found in report.findings if found.code == case.code)
     expected = rules()[case.code].severity

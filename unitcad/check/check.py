@@ -38,7 +38,8 @@ class Options:
     `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all. An error
     that ended the judgement of a file (not readable, a limit reached, no mesh) is kept whatever they say.
     `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
-    `shells`: the number of shells expected (G005). `cross`: judge self-crossing.
+    `shells`: the number of shells expected (G005). `cross`: judge self-crossing. `strict_3mf`: what the 3MF
+    specification forbids and common programs write all the same is an error, not a warning.
     """
 
     select: tuple[str, ...] = ()
@@ -47,6 +48,7 @@ class Options:
     printer: Printer | None = None
     shells: int | None = None
     cross: bool = True
+    strict_3mf: bool = False
     limits: Limits = field(default_factory=Limits)
 
     def wants(self, code: str) -> bool:

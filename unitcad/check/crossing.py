@@ -371,7 +371,7 @@ def _places(topology: Topology, faces: _Faces, pairs: Ints) -> list[Location]:
         first, second = (other, one) if one in named else (one, other)
         named.add(first)
         xyz = (float(point[0]), float(point[1]), float(point[2]))
-        found[near] = Location(faces=(first, second), xyz=xyz, part=topology.mesh.name)
+        found[near] = Location(faces=(first, second), xyz=xyz, object=topology.mesh.name)
     return sorted(found.values(), key=lambda place: place.face or 0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -12,8 +13,9 @@ SHOWN = 5  # locations kept for a finding; the count says how many there are
 
 @dataclass(frozen=True)
 class Location:
-    """Where: faces' indices (0-based, file order), a point in mm, a line (from 1), a part of the package, an object.
+    """Where: faces' indices (from 0, file order), a point in mm, a line (from 1), a part of the package, an object.
 
+    A polygon is one face, however it is cut into triangles. `object` is an id of a 3MF, or a name of an OBJ or GLB.
     `faces` are all that are concerned, both of a crossing; `face` is the first of them. Either may be given alone.
     `line` is that of the first face where the format has lines, else that of the fault.
     """
@@ -57,7 +59,7 @@ class Location:
         elif self.face is not None:
             words.append(f"face {self.face}")
         if self.xyz is not None:
-            words.append("({:.6g}, {:.6g}, {:.6g})".format(*(v + 0.0 for v in self.xyz)))
+            words.append(f"({', '.join(number(v) for v in self.xyz)})")
         return " ".join(words)
 
 
@@ -149,6 +151,18 @@ def said(found: Finding, places: int) -> str:
     """The message, and in brackets the first so many places."""
     shown = ", ".join(text for place in found.locations[:places] if (text := str(place)))
     return f"{found.message}{f' (at {shown})' if shown else ''}"
+
+
+def number(value: float, digits: int = 6) -> str:
+    """A length, area or volume in a message: never -0, and no power of ten where digits can say it.
+
+    What is below a millionth of a mm is 0.
+    """
+    if not 1e-6 <= abs(value) < 1e15:
+        return "0" if abs(value) < 1e-6 else f"{value:.{digits}g}"
+    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    text = f"{float(f'{value:.{digits}g}'):.{places}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def counted(n: int, one: str, many: str = "") -> str:

@@ -29,7 +29,7 @@ _SHARE = 1e-6  # of the smaller volume, below which solids only touch
 
 @dataclass(frozen=True)
 class Placed:
-    """A sound solid in its place: vertices (n, 3) mm, faces (m, 3) outwards, volume mm3, its object's name."""
+    """A sound solid in its place: vertices (n, 3) mm, faces (m, 3) outwards, volume mm3, its object's id."""
 
     vertices: Floats
     faces: Ints
@@ -56,7 +56,7 @@ def judge(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
         if _shared(a, b, some, solids) > _SHARE * least:
             centre = (np.maximum(low[a], low[b]) + np.minimum(high[a], high[b])) / 2
             xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
-            found.append(Location(xyz=xyz, part=f"{some[a].name} and {some[b].name}"))
+            found.append(Location(xyz=xyz, object=f"{some[a].name} and {some[b].name}"))
     if not found:
         return []
     left = len(placed) > MOST or len(pairs) > _PAIRS

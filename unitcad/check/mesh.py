@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
+    from unitcad.check.source import Source
+
 # What an array holds; numpy's own generic types make every sum and mask a union that a type checker cannot follow.
 Floats = NDArray[Any]
 Ints = NDArray[Any]
@@ -28,9 +30,8 @@ LARGEST = float(np.finfo(np.float32).max)
 class Mesh:
     """Vertices (n, 3) float64 mm, faces (m, 3) int32 into them; `normals` (m, 3) as stored, where the format has them.
 
-    `name` says which object of the file this is. `indexed` is false where vertices were shared by their place alone.
-    `single` is true where coordinates were stored as float32. `lines` (m,): each face's line in the file, from 1.
-    `objects` are the names of objects inside a mesh, `object_of` (m,) the index of each face's own, -1 for none.
+    `name` says which object of the file this is, `source` where its triangles stand in the file. `indexed` is false
+    where vertices were shared by their place alone. `single` is true where coordinates were stored as float32.
     """
 
     vertices: Floats
@@ -39,9 +40,7 @@ class Mesh:
     name: str | None = None
     indexed: bool = True
     single: bool = False
-    lines: Ints | None = None
-    objects: tuple[str, ...] = ()
-    object_of: Ints | None = None
+    source: Source | None = None
 
 
 def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDArray[np.uint64], Ints]:
@@ -62,11 +61,17 @@ def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDAr
 
 
 def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
-    """Vertices and faces of a triangle soup (m, 3, 3): corners with the same three numbers become one vertex.
+    """Vertices and faces of a triangle soup (m, 3, 3), welded by `weld_points`."""
+    vertices, index = weld_points(corners.reshape(-1, 3))
+    return vertices, index.reshape(-1, 3)
 
-    -0.0 is 0.0. Vertices are float64. The order of vertices is that of a hash, the same on every run.
+
+def weld_points(points: Floats) -> tuple[Floats, Ints]:
+    """Distinct points as float64 (v, 3), and for each of the points (n, 3) which of them it is.
+
+    Points with the same three numbers are one; -0.0 is 0.0. Their order is that of a hash, the same on every run.
     """
-    flat = np.ascontiguousarray(corners).reshape(-1, 3)
+    flat = np.ascontiguousarray(points)
     bits = (flat + np.zeros(1, flat.dtype)).view(np.uint32 if flat.dtype == np.float32 else np.uint64)
     kept = 64 - max(len(flat) - 1, 1).bit_length()
     key, order = sorted_with_order(_mix(bits) >> np.uint64(64 - kept), kept)
@@ -82,7 +87,7 @@ def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
     if not _same_places(vertices, index, flat):  # two places with one hash
         vertices, inverse = np.unique(flat + np.zeros(1, flat.dtype), axis=0, return_inverse=True)
         index = inverse.reshape(-1).astype(np.int32)
-    return vertices.astype(np.float64), index.reshape(-1, 3)
+    return vertices.astype(np.float64), index
 
 
 def _same_places(vertices: Floats, index: Ints, flat: Floats) -> bool:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 from unitcad.check.findings import Finding, Location
 from unitcad.check.mesh import Floats, Ints
 from unitcad.check.rulebook import finding
 
+LINE = 7  # column of a triangle's line
 _NOTED = 200  # findings kept of one part
 
 
 @dataclass
 class Resource:
-    """A resource by id: its element's name, how many members it has, its attributes, and its rank in the file."""
+    """A resource by id: its element's name, how many members it has, its attributes, its rank and line in the file."""
 
     kind: str
     id: int
@@ -21,6 +23,7 @@ class Resource:
     attributes: dict[str, str]
     members: list[dict[str, str]] = field(default_factory=list)
     count: int = 0
+    line: int | None = None
 
 
 @dataclass
@@ -32,11 +35,15 @@ class Use:
     matrix: Floats
     rank: int
     uuid: bool
+    line: int | None = None
 
 
 @dataclass
 class Object(Resource):
-    """An object: a mesh (vertices (n, 3), triangles (m, 7): v1 v2 v3 p1 p2 p3 pid, -1 for none) or components."""
+    """An object: a mesh (vertices (n, 3), triangles (m, 8)) or components.
+
+    A triangle's row is v1 v2 v3 p1 p2 p3 pid line, -1 for what is not there.
+    """
 
     type: str = "model"
     vertices: Floats | None = None
@@ -63,11 +70,19 @@ class Model:
     findings: list[Finding] = field(default_factory=list)
     has_build: bool = False
     build_uuid: bool = False
+    strict: bool = False
+    where: Callable[[], Location] = Location
 
-    def say(self, code: str, message: str, severity: str | None = None) -> None:
-        """Add a finding about this part."""
+    def say(self, code: str, message: str, severity: str | None = None, line: int | None = None) -> None:
+        """Add a finding about this part, placed by `where`, or at `line`."""
         if len(self.findings) < _NOTED:
-            self.findings.append(finding(code, message, 1, [Location(part=self.part)], severity))
+            place = replace(self.where(), part=self.part)
+            place = place if line is None else replace(place, line=line)
+            self.findings.append(finding(code, message, 1, [place], severity))
+
+    def say_lenient(self, code: str, message: str) -> None:
+        """Add a finding that real programs' files have: a warning unless the model is judged strictly."""
+        self.say(code, message, None if self.strict else "warning")
 
     def objects(self) -> dict[int, Object]:
         """The object resources by id."""

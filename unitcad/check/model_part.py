@@ -15,9 +15,9 @@ from unitcad.check import schema
 from unitcad.check.findings import Location
 from unitcad.check.limits import Limits, Unreadable, over_limit
 from unitcad.check.mesh import LARGEST, Floats, Ints
-from unitcad.check.model_data import Model, Object, Resource, Use
+from unitcad.check.model_data import LINE, Model, Object, Resource, Use
 from unitcad.check.rulebook import finding
-from unitcad.check.xml_stream import forbidden, stream
+from unitcad.check.xml_stream import forbidden, new_parser, stream
 
 _BATCH = 50_000
 _DEPTH = 60
@@ -44,6 +44,8 @@ class _Reader:
 
     def __init__(self, model: Model, limits: Limits, spent_faces: int) -> None:
         self.model, self.limits, self.faces = model, limits, spent_faces
+        self.parser = new_parser()
+        model.where = self._where
         self.stack: list[_Open] = [_Open("", "", None)]
         self.skip = 0
         self.rank = self.uses = 0
@@ -51,10 +53,15 @@ class _Reader:
         self.names: set[str] = set()
         self.regular: set[tuple[str, ...]] = set()
         self.numbers: list[str] = []
+        self.lines: list[int] = []
         self.vertices: list[Floats] = []
         self.rows: list[tuple[int, ...]] = []
         self.triangles: list[Ints] = []
         self.text: dict[str, str] = {}
+
+    def _where(self) -> Location:
+        inside = self.resource.id if isinstance(self.resource, Object) else None
+        return Location(line=self.parser.CurrentLineNumber, object=None if inside is None else str(inside))
 
     def namespace(self, prefix: str | None, uri: str) -> None:
         self.model.namespaces[prefix or ""] = uri
@@ -68,6 +75,7 @@ class _Reader:
         above = self.stack[-1]
         if name == _VERTEX and flat[::2] == _XYZ and above.name == "vertices" and above.space == schema.CORE:
             self.numbers += flat[1::2]
+            self.lines.append(self.parser.CurrentLineNumber)
             self.stack.append(_LEAF)
             if len(self.numbers) >= 3 * _BATCH:
                 self._flush_vertices()
@@ -171,7 +179,7 @@ class _Reader:
             elif name.startswith("http://www.w3.org/XML/1998/namespace ") and local != "model":
                 self.model.say("P017", f"attribute xml:lang in <{local}>")
             elif " " not in name:
-                self.model.say("P017", f"unknown attribute {name!r} of <{local}>")
+                self.model.say_lenient("P017", f"unknown attribute {name!r} of <{local}>")
             elif not rules.open_ and " " in name:
                 self.model.say("P017", f"attribute {name.split()[-1]!r} of <{local}>, which takes none of others")
         return good
@@ -202,6 +210,7 @@ class _Reader:
     def _resource(self, resource: Resource) -> None:
         if resource.id in self.model.resources or resource.id in self.model.foreign:
             self.model.say("P018", f"id {resource.id} twice")
+        resource.line = self.parser.CurrentLineNumber
         self.model.resources.setdefault(resource.id, resource)
         self.resource = resource
 
@@ -226,7 +235,7 @@ class _Reader:
             self.model.say("P017", f"metadata name {name!r} has no namespace")
         if self.stack[-2].name == "model":
             if name in self.names:
-                self.model.say("P017", f"metadata {name!r} twice")
+                self.model.say_lenient("P017", f"metadata {name!r} twice")
             self.names.add(name)
 
     def _take_basematerials(self, attributes: dict[str, str]) -> None:
@@ -238,7 +247,7 @@ class _Reader:
 
     def _take_triangle(self, attributes: dict[str, str]) -> None:
         row = tuple(int(attributes.get(name, -1)) for name in ("v1", "v2", "v3", "p1", "p2", "p3", "pid"))
-        self.rows.append(row)
+        self.rows.append((*row, self.parser.CurrentLineNumber))
         self.faces += 1
         if self.faces > self.limits.max_faces:
             raise over_limit(f"more faces than --max-faces {self.limits.max_faces}")
@@ -247,6 +256,7 @@ class _Reader:
 
     def _take_vertex(self, attributes: dict[str, str]) -> None:
         self.numbers += [attributes["x"], attributes["y"], attributes["z"]]
+        self.lines.append(self.parser.CurrentLineNumber)
 
     def _take_component(self, attributes: dict[str, str]) -> None:
         if isinstance(self.resource, Object):
@@ -268,7 +278,9 @@ class _Reader:
             self.model.say("P017", f"UUID {uuid[:40]!r} is none")
         path = attributes.get(f"{schema.PRODUCTION} path", "")
         matrix = self._matrix(attributes.get("transform"))
-        return Use(int(attributes["objectid"]), path, matrix, self.rank, uuid is not None)
+        return Use(
+            int(attributes["objectid"]), path, matrix, self.rank, uuid is not None, self.parser.CurrentLineNumber
+        )
 
     def _matrix(self, said: str | None) -> Floats:
         """The transform (4, 3); the identity with a finding where it is none."""
@@ -318,23 +330,24 @@ class _Reader:
                 raise ValueError(text[:40])
             values = np.array(self.numbers, dtype=np.float64)
         except ValueError:
-            values = np.array([self._number(said) for said in self.numbers])
-        if not np.isfinite(values).all() or (np.abs(values) > np.finfo(np.float32).max).any():
-            self.model.say("V001", "a vertex is not a finite float32 number")
+            values = np.array([self._number(said, self.lines[i // 3]) for i, said in enumerate(self.numbers)])
+        bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
+        if len(bad):
+            self.model.say("V001", "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
             values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
         self.vertices.append(values.reshape(-1, 3))
-        self.numbers = []
+        self.numbers, self.lines = [], []
         if sum(len(block) for block in self.vertices) > 3 * self.limits.max_faces + 3:
             raise over_limit("more vertices than three times --max-faces")
 
-    def _number(self, said: str) -> float:
+    def _number(self, said: str, line: int) -> float:
         said = said.strip()
         if schema.number(said):
             return float(said)
         if said.lower() in _NAMES:
             return math.nan
         why = " (a decimal comma)" if "," in said else ""
-        self.model.say("F004", f"{said[:40]!r} is not a number{why}")
+        self.model.say("F004", f"{said[:40]!r} is not a number{why}", line=line)
         return 0.0
 
     def _flush_triangles(self) -> None:
@@ -344,7 +357,7 @@ class _Reader:
 
     def _close_mesh(self) -> None:
         vertices = np.concatenate(self.vertices) if self.vertices else np.empty((0, 3))
-        triangles = np.concatenate(self.triangles) if self.triangles else np.empty((0, 7), np.int64)
+        triangles = np.concatenate(self.triangles) if self.triangles else np.empty((0, LINE + 1), np.int64)
         self.vertices, self.triangles = [], []
         if isinstance(self.resource, Object):
             self.resource.vertices, self.resource.triangles = vertices, triangles
@@ -363,12 +376,14 @@ _LEAF = _Open(schema.CORE, "vertex", None)
 _VERTEX = f"{schema.CORE} vertex"
 
 
-def read_model(chunks: Iterable[bytes], part: str, limits: Limits, spent_faces: int = 0) -> Model:
+def read_model(
+    chunks: Iterable[bytes], part: str, limits: Limits, spent_faces: int = 0, *, strict: bool = False
+) -> Model:
     """Read one model part. Schema faults are the model's findings; raises `Unreadable` where XML or a limit ends it."""
-    model = Model(part)
+    model = Model(part, strict=strict)
     reader = _Reader(model, limits, spent_faces)
     try:
-        stream(chunks, part, reader.start, reader.end, reader.namespace)
+        stream(chunks, part, reader.start, reader.end, reader.namespace, reader.parser)
     except Unreadable as stop:
         raise Unreadable(*model.findings, *stop.findings) from stop
     return model

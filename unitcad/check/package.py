@@ -58,10 +58,16 @@ class Package:
     defaults: dict[str, str] = field(default_factory=dict)
     overrides: dict[str, str] = field(default_factory=dict)
     spent: int = 0
+    strict: bool = False
 
-    def say(self, code: str, message: str, part: str | None = None) -> None:
+    def say(self, code: str, message: str, part: str | None = None, severity: str | None = None) -> None:
         """Add a finding of rule `code` about a part."""
-        self.findings.append(finding(code, message, places=[Location(part=self.shown(part))] if part else ()))
+        places = [Location(part=self.shown(part))] if part else ()
+        self.findings.append(finding(code, message, places=places, severity=severity))
+
+    def say_lenient(self, code: str, message: str, part: str | None = None) -> None:
+        """Add a finding that real programs' files have: a warning unless the package is judged strictly."""
+        self.say(code, message, part, None if self.strict else "warning")
 
     def chunks(self, name: str) -> Iterator[bytes]:
         """A part's bytes, inflated piece by piece within the limits. Raises `Unreadable`."""
@@ -143,18 +149,19 @@ class Package:
             part = posixpath.normpath(unquote(path)).lstrip("/").lower()
             if kind in KNOWN and part not in self.parts:
                 code = "P003" if kind == START and rels == "_rels/.rels" else "P002"
-                self.say(code, f"target {target!r} is not in the package", rels)
+                say = self.say_lenient if kind == THUMBNAIL else self.say
+                say(code, f"target {target!r} is not in the package", rels)
                 continue
             yield Relation(kind, part, target)
 
 
-def open_package(data: memoryview, limits: Limits, deadline: Deadline) -> Package:
+def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict: bool = False) -> Package:
     """Open a package and check its entries, names and content types. Raises `Unreadable` if it is no zip."""
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError) as error:
         raise Unreadable(finding("F003", f"the zip cannot be read: {error}")) from error
-    package = Package(archive, limits, deadline)
+    package = Package(archive, limits, deadline, strict=strict)
     if extra := _after_the_end(data):
         package.findings.append(finding("F006", f"{counted(extra, 'byte')} after the zip's end record", extra))
     entries = archive.infolist()

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from unitcad.check import schema
-from unitcad.check.findings import counted
+from unitcad.check.findings import Location, counted
 from unitcad.check.mesh import Ints
-from unitcad.check.model_data import Model, Object, Resource
+from unitcad.check.model_data import LINE, Model, Object, Resource, Use
 
 _MATERIALS = ("basematerials", "compositematerials")
 _GROUPS = (*_MATERIALS, "colorgroup", "texture2dgroup", "multiproperties")
@@ -21,15 +22,22 @@ _STACK = f"{schema.SLICE} slicestackid"
 def judge(model: Model) -> None:
     """Add findings about references to the model. Objects in other parts are the package's business."""
     for resource in model.resources.values():
+        model.where = partial(_line_of, resource)
         if isinstance(resource, Object):
             _object(model, resource)
         else:
             _property(model, resource)
     for item in model.items:
+        model.where = partial(_line_of, item)
         if not item.path:
             _used(model, item.object, item.rank, "a build item")
+    model.where = Location
     if schema.PRODUCTION in (model.namespaces.get(prefix) for prefix in model.required):
         _uuids(model)
+
+
+def _line_of(thing: Resource | Use) -> Location:
+    return Location(line=thing.line, object=str(thing.id) if isinstance(thing, Object) else None)
 
 
 def _used(model: Model, id_: int, rank: int, who: str) -> None:
@@ -48,7 +56,7 @@ def _object(model: Model, found: Object) -> None:
             _used(model, use.object, found.rank - (use.object == found.id), f"a component of {who}")
     pid = found.attributes.get("pid")
     if found.components and pid is not None:
-        model.say("P019", f"{who} has components and a pid")
+        model.say_lenient("P019", f"{who} has components and a pid")
     if "pindex" in found.attributes and pid is None:
         model.say("P019", f"{who} has a pindex without a pid")
     group = _group(model, int(pid), found.rank, who) if pid is not None else None
@@ -95,21 +103,23 @@ def _mesh(model: Model, found: Object, has_default: bool) -> None:
     if outside.any():
         first = int(np.flatnonzero(outside)[0])
         some = counted(int(outside.sum()), "triangle")
-        model.say("P011", f"{some} of {who} (first {first}) with a vertex that is not there")
+        line = int(rows[first, LINE])
+        model.say("P011", f"{some} of {who} (first {first}) with a vertex that is not there", line=line)
     same = (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2]) | (corners[:, 2] == corners[:, 0])
     if same.any():
-        model.say("P017", f"{counted(int(same.sum()), 'triangle')} of {who} with one vertex twice")
+        line = int(rows[same.argmax(), LINE])
+        model.say("P017", f"{counted(int(same.sum()), 'triangle')} of {who} with one vertex twice", line=line)
     _triangle_properties(model, found, rows, has_default)
 
 
 def _triangle_properties(model: Model, found: Object, rows: Ints, has_default: bool) -> None:
     who = f"object {found.id}"
-    used = (rows[:, 3:] >= 0).any(axis=1)
+    used = (rows[:, 3:LINE] >= 0).any(axis=1)
     if not used.any():
         return
     rows = rows[used]
     if not has_default:
-        model.say("P019", f"triangles of {who} have properties, the object has no pid as default")
+        model.say_lenient("P019", f"triangles of {who} have properties, the object has no pid as default")
     if ((rows[:, 3] < 0) & (rows[:, 4:6] >= 0).any(axis=1)).any():
         model.say("P019", f"a triangle of {who} has p2 or p3 without p1")
     default = int(found.attributes.get("pid", -1))
@@ -304,4 +314,4 @@ def _uuids(model: Model) -> None:
         if any(not use.uuid for use in found.components):
             missing.append(f"a component of object {found.id}")
     if missing:
-        model.say("P017", f"no UUID for {', '.join(missing[:3])}")
+        model.say_lenient("P017", f"no UUID for {', '.join(missing[:3])}")

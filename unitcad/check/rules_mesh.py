@@ -30,7 +30,7 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
     finite = np.asarray((np.abs(mesh.vertices) <= LARGEST).all(axis=1))
     if not finite.all():
         bad = np.flatnonzero(~finite[mesh.faces].all(axis=1))
-        places = [Location(face=int(i), part=mesh.name) for i in bad[:9]]
+        places = [Location(face=int(i), object=mesh.name) for i in bad[:9]]
         wrong = len(finite) - int(finite.sum())
         text = counted(wrong, "non-finite vertex", "non-finite vertices")
         return Judged(in_file(ending([finding("V001", text, len(bad) or 1, places)]), mesh), facts, None)
@@ -55,19 +55,5 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
 
 
 def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
-    """The findings with the line and the object of each location's faces, where the reader of `mesh` knows them."""
-    if mesh.lines is None and mesh.object_of is None:
-        return tuple(findings)
-    return tuple(replace(item, locations=tuple(_in_file(place, mesh) for place in item.locations)) for item in findings)
-
-
-def _in_file(place: Location, mesh: Mesh) -> Location:
-    if place.face is None:
-        return place
-    line, names = place.line, place.object
-    if line is None and mesh.lines is not None:
-        line = int(mesh.lines[place.face])
-    if names is None and mesh.object_of is not None:
-        own = dict.fromkeys(int(mesh.object_of[face]) for face in place.faces)
-        names = " and ".join(mesh.objects[i] for i in own if i >= 0) or None
-    return replace(place, line=line, object=names)
+    """The findings with the faces of each location as the file has them, and their line and object where known."""
+    return tuple(findings) if mesh.source is None else tuple(mesh.source.located(item) for item in findings)

@@ -15,12 +15,13 @@ from unitcad.check.findings import Facts, Finding, counted, ending
 from unitcad.check.images import image_kind
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import LARGEST, Floats, Mesh, cross, diagonal, extent
-from unitcad.check.model_data import Model, Object, Use
+from unitcad.check.model_data import LINE, Model, Object, Use
 from unitcad.check.model_part import read_model
 from unitcad.check.package import Package, Relation
 from unitcad.check.rulebook import finding
 from unitcad.check.rules_mesh import Judged, in_file, judge_mesh
 from unitcad.check.scale import UNITS_MM
+from unitcad.check.source import Source
 
 if TYPE_CHECKING:
     from unitcad.check.check import Options
@@ -43,7 +44,7 @@ class Instance:
 
 def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
     """All findings about a 3MF file and the facts of what it builds."""
-    package = opc.open_package(data, options.limits, deadline)
+    package = opc.open_package(data, options.limits, deadline, strict=options.strict_3mf)
     findings, facts = _judged(package, options, deadline)
     return [_named(package, item) for item in findings], facts
 
@@ -97,7 +98,7 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
         if package.content_type(part) != opc.MODEL_TYPE:
             package.say("P001", f"{package.shown(part)} has type {package.content_type(part)!r}, not the model's", part)
         try:
-            model = read_model(package.chunks(part), part, limits, faces)
+            model = read_model(package.chunks(part), part, limits, faces, strict=package.strict)
         except Unreadable as stop:
             package.findings += stop.findings
             continue
@@ -169,10 +170,11 @@ def _paths(package: Package, model: Model, related: list[Relation], *, is_root: 
             continue
         part = path.lower().lstrip("/")
         if part not in package.parts:
-            code = "P019" if found.kind == "texture2d" else "P002"
-            package.say(code, f"{path} of {found.kind} {found.id} is not in the package", model.part)
+            code, say = ("P019", package.say) if found.kind == "texture2d" else ("P002", package.say_lenient)
+            say(code, f"{path} of {found.kind} {found.id} is not in the package", model.part)
         elif part not in (by_kind[opc.TEXTURE] if found.kind == "texture2d" else images):
-            package.say("P002", f"{path} of {found.kind} {found.id} has no relationship", model.part)
+            say = package.say if found.kind == "texture2d" else package.say_lenient
+            say("P002", f"{path} of {found.kind} {found.id} has no relationship", model.part)
         else:
             _image(package, part, "P019" if found.kind == "texture2d" else "P020")
     for part, written in sorted(_reached(model).items()):
@@ -293,7 +295,7 @@ def _geometry(
             continue
         factor = UNITS_MM.get(models[instance.key[0]].unit, 1.0)
         if instance.key not in judged:
-            judged[instance.key] = _judge(found, factor, options, deadline)
+            judged[instance.key] = _judge(found, instance.key[0], factor, options, deadline)
             findings += judged[instance.key].findings
         facts = judged[instance.key].facts
         linear = instance.key, instance.matrix[:3].tobytes()
@@ -312,8 +314,8 @@ def _geometry(
         watertight = watertight and bool(facts.watertight)
         if compared and facts.watertight and size > 0 and len(solids) <= placement.MOST:
             with np.errstate(all="ignore"):
-                mesh = _mesh_of(found, factor, instance.matrix)
-            solids.append(placement.Placed(mesh.vertices, mesh.faces, size, f"object {found.id}"))
+                mesh = _mesh_of(found, instance.key[0], factor, instance.matrix)
+            solids.append(placement.Placed(mesh.vertices, mesh.faces, size, str(found.id)))
         deadline.tick()
     if not triangles:
         return list(ending(findings)), Facts(triangles=0, vertices=vertices, shells=0)
@@ -349,19 +351,20 @@ def _geometry(
     return findings, facts
 
 
-def _mesh_of(found: Object, factor: float, matrix: Floats | None = None) -> Mesh:
+def _mesh_of(found: Object, part: str, factor: float, matrix: Floats | None = None) -> Mesh:
     assert found.vertices is not None
     assert found.triangles is not None
     points = found.vertices if matrix is None else found.vertices @ matrix[:3] + matrix[3]
     faces = found.triangles[:, :3].astype(np.int32)
     if matrix is not None and np.linalg.det(matrix[:3]) < 0:
         faces = faces[:, ::-1]
-    return Mesh(points * factor, np.ascontiguousarray(faces), name=f"object {found.id}")
+    source = Source(lines=found.triangles[:, LINE], part=part)
+    return Mesh(points * factor, np.ascontiguousarray(faces), name=str(found.id), source=source)
 
 
-def _judge(found: Object, factor: float, options: Options, deadline: Deadline) -> Judged:
+def _judge(found: Object, part: str, factor: float, options: Options, deadline: Deadline) -> Judged:
     """The geometry rules for one object; only model and solidsupport objects must be solids, unless slices stand in."""
-    mesh = _mesh_of(found, factor)
+    mesh = _mesh_of(found, part, factor)
     stand_in = found.attributes.get(f"{schema.SLICE} meshresolution") == "lowres"
     if found.type not in ("model", "solidsupport") or stand_in:
         return Judged((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)), None)
@@ -387,6 +390,6 @@ def _printed(
         assert isinstance(thing, Object)
         if thing.type != "model" or thing.triangles is None or not len(thing.triangles):
             continue
-        mesh = _mesh_of(thing, UNITS_MM.get(models[instance.key[0]].unit, 1.0), instance.matrix)
+        mesh = _mesh_of(thing, instance.key[0], UNITS_MM.get(models[instance.key[0]].unit, 1.0), instance.matrix)
         found += in_file(printing.judge(topology.judge(mesh, deadline), options.printer, deadline), mesh)
     return found

@@ -110,20 +110,20 @@ def judge(mesh: Mesh, deadline: Deadline) -> Topology:
 
 def _points(mesh: Mesh, points: Floats) -> Iterator[Location]:
     for point in points:
-        yield Location(xyz=(float(point[0]), float(point[1]), float(point[2])), part=mesh.name)
+        yield Location(xyz=(float(point[0]), float(point[1]), float(point[2])), object=mesh.name)
 
 
 def _at_faces(mesh: Mesh, kept: Ints, faces: Ints, which: Ints) -> Iterator[Location]:
     for i in which[:9]:
         centre = mesh.vertices[faces[i]].mean(axis=0)
-        yield Location(face=int(kept[i]), xyz=tuple(float(v) for v in centre), part=mesh.name)  # type: ignore[arg-type]
+        yield Location(face=int(kept[i]), xyz=tuple(float(v) for v in centre), object=mesh.name)  # type: ignore[arg-type]
 
 
 def _at_edges(mesh: Mesh, edges: Edges, kept: Ints, which: Ints) -> Iterator[Location]:
     for i in which[:9]:
         middle = (mesh.vertices[edges.low[i]] + mesh.vertices[edges.high[i]]) / 2
         face = int(kept[edges.order[edges.first[i]] // 3])
-        yield Location(face=face, xyz=tuple(float(v) for v in middle), part=mesh.name)  # type: ignore[arg-type]
+        yield Location(face=face, xyz=tuple(float(v) for v in middle), object=mesh.name)  # type: ignore[arg-type]
 
 
 def _unreferenced(vertices: Floats, faces: Ints) -> list[Finding]:
@@ -230,7 +230,7 @@ def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints) ->
     lines = suspect[flat]
     n = len(repeated) + len(lines)
     if n:
-        places = [Location(face=int(i), part=mesh.name) for i in repeated[:9]]
+        places = [Location(face=int(i), object=mesh.name) for i in repeated[:9]]
         places += list(_at_faces(mesh, kept, faces, lines))
         found.append(finding("T010", f"{counted(n, 'face')} without area", n, places))
     height = np.sqrt(np.einsum("ij,ij->i", areas[suspect], areas[suspect])) / np.maximum(longest, 1e-300)
@@ -286,4 +286,4 @@ def _stored_normals(mesh: Mesh, kept: Ints, areas: Floats) -> list[Finding]:
     if not len(wrong):
         return []
     text = f"{counted(len(wrong), 'stored normal')} unlike the face's own"
-    return [finding("T013", text, len(wrong), (Location(face=int(kept[i]), part=mesh.name) for i in wrong[:9]))]
+    return [finding("T013", text, len(wrong), (Location(face=int(kept[i]), object=mesh.name) for i in wrong[:9]))]

@@ -32,22 +32,31 @@ Start = Callable[[str, list[str]], Any]
 End = Callable[[str], Any]
 
 
+def new_parser() -> expat.XMLParserType:
+    """A parser that names elements "namespace local"."""
+    parser = expat.ParserCreate(None, " ")
+    parser.ordered_attributes = True
+    parser.buffer_text = True
+    return parser
+
+
 def stream(
     chunks: Iterable[bytes],
     part: str,
     start: Start,
     end: End,
     namespace: Callable[[str | None, str], Any] | None = None,
+    parser: expat.XMLParserType | None = None,
 ) -> None:
     """Feed a part to `start` and `end`; names are "namespace local", attributes a flat list.
+
+    A caller that wants to know line numbers gives the `parser`, made by `new_parser`.
 
     Raises `Unreadable`: P006 for a DTD, F009 (as an error) for another encoding than UTF-8, F003 for XML that is not
     well formed.
     """
     place = [Location(part=part)]
-    parser = expat.ParserCreate(None, " ")
-    parser.ordered_attributes = True
-    parser.buffer_text = True
+    parser = parser or new_parser()
 
     def refuse(*_: object) -> None:
         raise Unreadable(finding("P006", "a document type declaration", places=place))

@@ -32,6 +32,9 @@ def check(
     printer: Annotated[str | None, typer.Option(help="Judge fit and printability (S002, D) for this printer.")] = None,
     unit: Annotated[str | None, typer.Option(help="Unit of files that have none: mm, cm, m, in, ft ...")] = None,
     shells: Annotated[int | None, typer.Option(min=0, help="Number of shells expected (G005).")] = None,
+    strict_3mf: Annotated[
+        bool, typer.Option("--3mf-strict", help="Judge 3MF by the letter: vendors' attributes, lost thumbnails fail.")
+    ] = False,
     manifest: Annotated[str | None, typer.Option(help="manifest.json of a build, or its folder (M rules).")] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes.")] = 1,
     max_faces: Annotated[int, typer.Option(min=1, help="Faces a file may have.")] = 10_000_000,
@@ -55,7 +58,7 @@ def check(
         raise unknown_name("--output-format", output_format, formats.FORMATS)
     if fail_on not in ("error", "warning"):
         raise unknown_name("--fail-on", fail_on, ("error", "warning"))
-    options = _options(select, ignore, extend_select, unit, printer, shells, max_faces, timeout)
+    options = _options(select, ignore, extend_select, unit, printer, shells, strict_3mf, max_faces, timeout)
     if not files and manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
     reports = _run(files or [], options, manifest, printer is not None, jobs, memory)
@@ -93,6 +96,7 @@ def _options(
     unit: str | None,
     printer: str | None,
     shells: int | None,
+    strict_3mf: bool,
     max_faces: int,
     timeout: float,
 ) -> Options:
@@ -111,6 +115,7 @@ def _options(
         unit=unit,
         printer=None if printer is None else catalogue.choose("--printer", printer, catalogue.printers()),
         shells=shells,
+        strict_3mf=strict_3mf,
         limits=replace(Limits(), max_faces=max_faces, seconds=timeout),
     )
     wanted = check_prefixes("--select", _split(select))

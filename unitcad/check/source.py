@@ -1,0 +1,60 @@
+"""Where the triangles of a mesh come from in its file: polygon, line, part and object."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from unitcad.check.findings import Finding, Location
+from unitcad.check.mesh import Ints
+
+_NO_INDEX = np.empty(0, np.int64)
+
+
+@dataclass(frozen=True)
+class Source:
+    """The places of a mesh's triangles (m) in its file, by polygon (p); what is None or empty is not known.
+
+    `polygons` (m,) gives the polygon of each triangle, None where every triangle is one by itself. `lines` (p,) are
+    line numbers from 1. `starts` (s,) are the first polygons of the file's objects, `names` their names, a line each.
+    """
+
+    polygons: Ints | None = None
+    lines: Ints | None = None
+    part: str | None = None
+    starts: Ints = field(default_factory=lambda: _NO_INDEX)
+    names: bytes = b""
+
+    @cached_property
+    def _names(self) -> list[str]:
+        return self.names.decode("utf-8", "replace").split("\n")
+
+    def located(self, found: Finding) -> Finding:
+        """The finding with its triangles' places as the file has them."""
+        return replace(found, locations=tuple(self._place(place) for place in found.locations))
+
+    def _place(self, place: Location) -> Location:
+        part = place.part or self.part
+        if place.face is None:
+            return replace(place, part=part)
+        faces = [face if self.polygons is None else int(self.polygons[face]) for face in place.faces]
+        names = dict.fromkeys(name for face in faces if (name := self.object(face)))
+        return replace(
+            place,
+            face=faces[0],
+            faces=tuple(dict.fromkeys(faces)),
+            line=self.line(faces[0]) if place.line is None else place.line,
+            part=part,
+            object=place.object or " and ".join(names) or None,
+        )
+
+    def line(self, polygon: int) -> int | None:
+        """The line on which a polygon stands."""
+        return None if self.lines is None else int(self.lines[polygon])
+
+    def object(self, polygon: int) -> str | None:
+        """The name of the object that a polygon belongs to."""
+        at = int(np.searchsorted(self.starts, polygon, "right")) - 1
+        return self._names[at] if at >= 0 and self._names[at] else None
