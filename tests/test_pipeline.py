@@ -127,8 +127,6 @@ def test_an_interrupted_build_leaves_the_old_result_whole(tmp_path: Path) -> Non
         (fresh / "spec.toml").write_text("half")
         raise KeyboardInterrupt
     assert _tree(folder) == before
-    # Killed between the two renames: the old result lies aside, and the next run takes it back.
-    folder.rename(tmp_path / f".tmp-{folder.name}-old")
     assert _tree(build(spec, tmp_path, only=["unit"]).folder) == before
     assert [p.name for p in tmp_path.iterdir()] == [folder.name]
 
@@ -150,6 +148,26 @@ def test_a_killed_process_leaves_the_old_result_whole(tmp_path: Path) -> None:
     child.stdout.close()
     assert _tree(folder) == before
     build(spec, tmp_path, only=["unit"])
+    assert [p.name for p in tmp_path.iterdir()] == [folder.name]
+
+
+def test_a_process_killed_between_the_two_renames_leaves_the_old_result_whole(tmp_path: Path) -> None:
+    spec = load("single-embedded", ['output.formats=["stl"]'])
+    folder = build(spec, tmp_path, only=["unit"]).folder
+    before = _tree(folder)
+    code = (
+        "import os, signal; from pathlib import Path; from unitcad.pipeline.folder import replacing\n"
+        "rename = Path.rename\n"
+        "def fatal(path, target):\n"
+        "    rename(path, target)\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+        "Path.rename = fatal\n"
+        f"with replacing(Path({str(folder)!r})) as fresh:\n"
+        "    (fresh / 'spec.toml').write_text('half')\n"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == -signal.SIGKILL
+    assert not folder.exists()
+    assert _tree(build(spec, tmp_path, only=["unit"]).folder) == before
     assert [p.name for p in tmp_path.iterdir()] == [folder.name]
 
 
@@ -201,7 +219,8 @@ def test_ctrl_c_stops_without_a_traceback(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
     )
-    time.sleep(2.5)
+    while not list(tmp_path.glob("*")) and child.poll() is None:
+        time.sleep(0.02)
     child.send_signal(signal.SIGINT)
     _, errors = child.communicate(timeout=60)
     assert child.returncode in (130, 0)

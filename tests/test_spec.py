@@ -173,7 +173,7 @@ def test_toml_that_does_not_parse_names_line_and_column(tmp_path: Path) -> None:
         load(str(bad))
     with pytest.raises(UnitcadError, match="no such file"):
         load(str(tmp_path / "none.toml"))
-    with pytest.raises(UnitcadError, match="directory"):
+    with pytest.raises(UnitcadError, match="is a folder"):
         load(f"{tmp_path}/")
 
 

@@ -219,7 +219,11 @@ def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path: P
     assert manifest["check"]["errors"] == 0
     assert {left["what"] for left in manifest["left_out"]} >= {"moulds", "casting", "estimate"}
     (tmp_path / "dome.py").unlink()
-    again = unitcad("build", folder / "spec.toml", "-o", tmp_path / "out", "--formats", "stl,3mf")
+    again = [folder / "spec.toml", "-o", tmp_path / "out", "--formats", "stl,3mf"]
+    refused = unitcad("build", *again)
+    assert refused.returncode == 2
+    assert "--allow-code" in refused.stderr
+    again = unitcad("build", *again, "--allow-code")
     assert Path(again.stdout.splitlines()[-1]) == folder
 
 
@@ -241,13 +245,13 @@ def test_a_design_that_does_not_work_says_where(code: str, said: str, tmp_path: 
     layers = [{"material": "ecoflex-00-10", "wall_mm": 1.25}]
     data = {"name": "x", "design": f"{tmp_path / 'd.py'}:unit", "diameter_mm": 14.0, "layers": layers}
     with pytest.raises(UnitcadError, match=said):
-        build(from_data(data), tmp_path / "out", only=("unit",), check=False)
+        build(from_data(data, tmp_path), tmp_path / "out", only=("unit",), check=False)
 
 
 def test_a_design_that_is_not_there(tmp_path: Path) -> None:
     data = {**read("embedded"), "design": f"{tmp_path / 'no.py'}:unit"}
     with pytest.raises(UnitcadError, match="no such file"):
-        from_data(data)
+        from_data(data, tmp_path)
     with pytest.raises(UnitcadError, match="only a design of one's own"):
         from_data({**read("embedded"), "parameters": {"x": 1}})
 

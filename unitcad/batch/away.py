@@ -8,6 +8,7 @@ from pathlib import Path
 from unitcad.batch import task as tasks
 from unitcad.batch.task import Outcome
 from unitcad.cache import Bundle, DiskStore, digest
+from unitcad.files import write_new
 from unitcad.pipeline.folder import replacing
 from unitcad.pipeline.versions import code_version
 
@@ -38,7 +39,7 @@ class Receiver:
             timings = {"code": code_version(), "seconds": {"all": round(outcome.seconds, 4)}}
             with replacing(folder) as fresh:
                 outcome.product.place(fresh, self.store)
-                (fresh / "timings.json").write_text(json.dumps(timings) + "\n", "utf-8")
+                write_new(fresh / "timings.json", (json.dumps(timings) + "\n").encode())
         except OSError:
             raise
         except Exception as error:

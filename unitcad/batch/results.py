@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
+from unitcad import files
 from unitcad.batch.journal import Journal
 from unitcad.batch.sweep import Sweep
 
@@ -27,7 +30,7 @@ def write_timings(out: Path, summary: Any, workers: int) -> None:
     told = {key: value for key, value in vars(summary).items() if key != "failures"}
     fresh = summary.done - summary.taken_up
     told["variants_per_second"] = round(fresh / summary.seconds, 2) if summary.seconds else None
-    (out / "timings.json").write_text(json.dumps({"workers": workers, **told}, indent=1) + "\n", "utf-8")
+    files.write(out / "timings.json", (json.dumps({"workers": workers, **told}, indent=1) + "\n").encode())
 
 
 def columns_of(sweep: Sweep, journal: Journal) -> list[str]:
@@ -45,25 +48,31 @@ def flat(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def _write_csv(path: Path, columns: list[str], entries: Iterable[dict[str, Any]]) -> None:
-    fresh = path.with_name(f".tmp-{path.name}")
-    with open(fresh, "w", encoding="utf-8", newline="") as file:
+    with _written(path) as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(columns)
         for entry in entries:
             values = flat(entry)
             table.writerow([_cell(values.get(column)) for column in columns])
-    fresh.replace(path)
 
 
 def _write_json(path: Path, head: dict[str, Any], entries: Iterable[dict[str, Any]]) -> None:
-    fresh = path.with_name(f".tmp-{path.name}")
-    with open(fresh, "w", encoding="utf-8") as file:
+    with _written(path) as file:
         text = json.dumps(head, indent=1, ensure_ascii=False, allow_nan=False)
         file.write(text.removesuffix("\n}") + ',\n "variants": [')
         for i, entry in enumerate(entries):
             file.write((",\n  " if i else "\n  ") + json.dumps(flat(entry), ensure_ascii=False, allow_nan=False))
         file.write("\n ]\n}\n")
-    fresh.replace(path)
+
+
+@contextlib.contextmanager
+def _written(path: Path) -> Iterator[IO[str]]:
+    """A text file in UTF-8, its line ends as written, that takes the place of `path` when the block ends well."""
+    with files.writing(path) as file:
+        text = io.TextIOWrapper(file, "utf-8", newline="")
+        yield text
+        text.flush()
+        text.detach()
 
 
 def _cell(value: Any) -> Any:

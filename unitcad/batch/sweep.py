@@ -162,7 +162,7 @@ class Sweep:
         data = self.base_data(base)
         for path, value in values.items():
             put(data, path, value)
-        return from_data(data)
+        return from_data(data, Path())
 
     def base_data(self, base: str) -> dict[str, Any]:
         """A base's data, to be changed at will."""

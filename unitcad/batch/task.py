@@ -22,7 +22,7 @@ from unitcad.pipeline import folder as folders
 from unitcad.pipeline.build import Product, build_into, make, possible_outputs
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import code_version
-from unitcad.spec import Spec, from_json
+from unitcad.spec import Spec, from_json, own
 
 OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no space"
 """broken: made, but a law or a mesh check says no. refused: the spec can't be. failed: did not get that far."""
@@ -41,7 +41,8 @@ class Task:
     """Variants of one geometry, and how to make them.
 
     With `out` and `cache` (folders that the worker reaches) results go there. Without, they come back in the outcomes;
-    `known` is then what the caller has of this geometry already.
+    `known` is then what the caller has of this geometry already. `allowed` is the code that the caller may run: the
+    worker may too.
     """
 
     jobs: tuple[Job, ...]
@@ -53,6 +54,7 @@ class Task:
     cache: Path | None = None
     known: Bundle | None = None
     code: str = field(default_factory=code_version)
+    allowed: frozenset[str] = field(default_factory=own.allowed)
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,7 @@ def work(task: Task) -> list[Outcome]:
     """Make a task's variants. Whatever goes wrong with one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
+    own.allow(task.allowed)
     outcomes = []
     known = task.known
     for job in task.jobs:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from unitcad.cli.code import AllowCode, allow_code
+
 if TYPE_CHECKING:
     from unitcad.batch import Summary
 
@@ -40,6 +42,7 @@ def batch(
         bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")
     ] = False,
     no_check: Annotated[bool, typer.Option("--no-check", help="Leave out the laws and the mesh checks.")] = False,
+    code: AllowCode = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     json_lines: Annotated[bool, typer.Option("--json-lines", help="One JSON object a line as variants end.")] = False,
 ) -> None:
@@ -59,6 +62,7 @@ def batch(
 
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
     wanted = load_sweep(sweep).overridden([*(sets or []), *chosen_formats(formats)])
+    allow_code(code, nothing_else=dry_run)
     options = Options(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit)
     if dry_run:
         found = preview(wanted, options)

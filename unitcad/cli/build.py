@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from unitcad.cli.code import AllowCode, allow_code
+
 Specs = Annotated[list[str], typer.Argument(metavar="SPEC...", help="A spec file, or the name of a template.")]
 Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the spec.")]
 
@@ -25,6 +27,7 @@ def build(
     no_slice: Annotated[
         bool, typer.Option("--no-slice", help="Leave out PrusaSlicer's print time and filament (slicer.json).")
     ] = False,
+    code: AllowCode = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
     """Make a unit and its casting moulds. The last line printed is the folder."""
@@ -38,6 +41,7 @@ def build(
 
     overrides = [*(sets or []), *chosen_formats(formats)]
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
+    allow_code(code)
     # Every spec passes the door before the first one is built.
     wanted = [load(spec, overrides) for spec in specs]
     results, printing = [], []

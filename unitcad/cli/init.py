@@ -17,6 +17,7 @@ def init(
     """Write a commented spec to start from. The last line printed is the file."""
     from unitcad.cli.output import print_json
     from unitcad.errors import Refusal, UnitcadError
+    from unitcad.files import write_new
     from unitcad.spec.starter import starter
 
     stem = name.removesuffix(".toml")
@@ -24,9 +25,9 @@ def init(
         near = re.sub(r"[^A-Za-z0-9._-]+", "-", stem).strip("-._")[:60] or "my-unit"
         raise Refusal("NAME", name, "is a file's name of letters, digits, dots, dashes", near)
     path = Path(f"{stem}.toml")
+    text = starter(stem, template)
     try:
-        with open(path, "x", encoding="utf-8", newline="\n") as file:
-            file.write(starter(stem, template))
+        write_new(path, text.encode())
     except FileExistsError:
         raise UnitcadError(f"{path}: is there already; choose another name") from None
     except OSError as error:

@@ -11,7 +11,7 @@ from typing import Any, get_args
 from unitcad.errors import UnitcadError
 from unitcad.shape import ProfileError, Shape
 from unitcad.spec import Spec
-from unitcad.spec.own import function_of
+from unitcad.spec.own import expect_allowed, function_of
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
 
@@ -19,9 +19,11 @@ _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
 def shapes(spec: Spec) -> dict[str, Shape]:
     """What the spec's function makes of it, by name: a single tree is "layer1".
 
-    Raises UnitcadError, with the line in the file, where the function raises or returns anything else.
+    Raises UnitcadError, with the line in the file, where the function raises or returns anything else, and where its
+    code is not allowed to run.
     """
     assert spec.design_source is not None
+    expect_allowed(spec.design, spec.design_source)
     function = _function(spec.design, spec.design_source)
     try:
         made = function(spec)

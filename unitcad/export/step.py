@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.kernels import occt
 from unitcad.kernels.ocp import loading
@@ -63,7 +64,7 @@ class StepBody:
 
 def write(path: Path, bodies: Sequence[Body], name: str) -> None:
     """Write `bodies` as an assembly called `name`, in their order, as assembled (mm)."""
-    path.write_bytes(content(bodies, name))
+    files.write(path, content(bodies, name))
 
 
 def content(bodies: Sequence[Body], name: str) -> bytes:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from unitcad import files
+
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -14,7 +16,7 @@ def write(path: Path, vertices: np.ndarray, faces: np.ndarray, name: str) -> Non
 
     The header names the part. It never starts with "solid", by which some readers take a file for the ASCII kind.
     """
-    path.write_bytes(content(vertices, faces, name))
+    files.write(path, content(vertices, faces, name))
 
 
 def content(vertices: np.ndarray, faces: np.ndarray, name: str) -> bytes:

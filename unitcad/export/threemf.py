@@ -14,6 +14,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from unitcad import files
+
 GAP_MM = 5.0
 
 _CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
@@ -41,7 +43,7 @@ class MeshPart:
 
 def write(path: Path, parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220.0)) -> None:
     """Write `parts` in their order, in rows along x within the bed's width, GAP_MM apart."""
-    path.write_bytes(content(parts, bed_mm))
+    files.write(path, content(parts, bed_mm))
 
 
 def content(parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220.0)) -> bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from unitcad import files
 from unitcad.catalogue import Printer
 from unitcad.errors import UnitcadError
 from unitcad.export import stl, threemf
@@ -24,11 +25,11 @@ def write(printer: Printer, out: Path) -> Path:
             if body.made != "printed":
                 continue
             ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
-            (folder / f"{body.name}.stl").write_bytes(stl.content(*ready, body.name))
+            files.write(folder / f"{body.name}.stl", stl.content(*ready, body.name))
             parts.append(threemf.MeshPart(body.name, body.colour, *ready))
         bed = float(printer.bed_x_mm), float(printer.bed_y_mm)
-        (folder / "coupon.3mf").write_bytes(threemf.content(parts, bed))
-        (folder / "coupon.md").write_bytes(coupon.to_markdown(printer).encode())
+        files.write(folder / "coupon.3mf", threemf.content(parts, bed))
+        files.write(folder / "coupon.md", coupon.to_markdown(printer).encode())
     except OSError as error:
         raise UnitcadError(f"{folder}: {error.strerror}") from None
     return folder

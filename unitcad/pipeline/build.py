@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from unitcad import __version__
+from unitcad import __version__, files
 from unitcad.cache import MemoryStore, Store, digest
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.pipeline import folder as folders
@@ -57,7 +57,7 @@ class Product:
         for path, sha256 in self.shared.items():
             store.place(sha256, folder / path)
         for path, content in self.own.items():
-            (folder / path).write_bytes(content)
+            files.write_new(folder / path, content)
 
 
 def build(
@@ -80,7 +80,6 @@ def build(
     if out.exists() and not out.is_dir():
         raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o")
     folder = out / folders.folder_name(spec)
-    folders.restore(folder)
     folders.clear_leftovers(out)
     spec = _with_formats(spec, (*folders.earlier_formats(folder, spec), *spec.output.formats))
     only = checked_outputs((*only, *folders.earlier_outputs(folder)))
@@ -101,7 +100,7 @@ def build_into(
     }
     with folders.replacing(folder) as fresh:
         product.place(fresh, store)
-        (fresh / "timings.json").write_bytes(_json(timings))
+        files.write_new(fresh / "timings.json", _json(timings))
     return Built(folder, product.manifest)
 
 

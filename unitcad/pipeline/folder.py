@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
 import os
 import re
 import shutil
@@ -13,11 +12,11 @@ from pathlib import Path
 
 from msgspec import structs
 
+from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.spec import Spec, read_toml, to_json, with_formats
 
 UNCHECKED = "--no-check"
-TEMPORARY = ".tmp-"
 PAGE = "report.html"
 """The page of a folder, made on request and kept up by every later build into it."""
 
@@ -38,6 +37,7 @@ def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:
 
     Raises UnitcadError for a folder that holds something else: no spec.toml of ours, or another spec.
     """
+    expect_folder(folder)
     if not folder.exists():
         return ()
     file = folder / "spec.toml"
@@ -57,79 +57,76 @@ def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:
 def earlier_checked(folder: Path) -> bool:
     """Whether an existing result has laws judged and files checked: a later build keeps them up."""
     try:
-        left_out = json.loads((folder / "manifest.json").read_text("utf-8"))["left_out"]
+        left_out = files.read_json(folder / "manifest.json", links=False)["left_out"]
         return all(entry["why"] != UNCHECKED for entry in left_out)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (UnitcadError, KeyError, TypeError):
         return False
 
 
 def earlier_outputs(folder: Path) -> tuple[str, ...]:
     """The outputs that an existing result has."""
     try:
-        return tuple(json.loads((folder / "manifest.json").read_text("utf-8"))["outputs"])
-    except (OSError, ValueError, KeyError, TypeError):
+        outputs = files.read_json(folder / "manifest.json", links=False)["outputs"]
+        return tuple(name for name in outputs if isinstance(name, str))
+    except (UnitcadError, KeyError, TypeError):
         return ()
 
 
 @contextlib.contextmanager
 def replacing(folder: Path) -> Iterator[Path]:
-    """A fresh temporary folder that takes `folder`'s place when the block ends well, and goes when it does not.
+    """A fresh folder that takes `folder`'s place when the block ends well, and goes when it does not.
 
     Files of the old result that the new one lacks are kept. An interruption at any point leaves the old result whole:
-    at its place, or beside it under a temporary name from which the next run takes it back.
+    at its place, or in a marked scratch folder from which the next run takes it back. Raises UnitcadError where a link
+    or a file is in the folder's place.
     """
+    expect_folder(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    fresh = folder.parent / f"{TEMPORARY}{folder.name}-{os.getpid()}"
-    aside = folder.parent / f"{TEMPORARY}{folder.name}-old"
-    restore(folder)
-    shutil.rmtree(fresh, ignore_errors=True)
-    fresh.mkdir()
-    try:
-        yield fresh
-        if folder.exists():
-            _keep_others(folder, fresh)
-            folder.rename(aside)
-        fresh.rename(folder)
-    except BaseException:
-        shutil.rmtree(fresh, ignore_errors=True)
-        restore(folder)
-        raise
-    shutil.rmtree(aside, ignore_errors=True)
-
-
-def restore(folder: Path) -> None:
-    """Put back an old result that an interrupted swap left aside."""
-    aside = folder.parent / f"{TEMPORARY}{folder.name}-old"
-    if aside.exists() and not folder.exists():
-        aside.rename(folder)
+    with files.scratch(folder.parent, folder.name) as scratch:
+        fresh, aside = scratch / files.NEW, scratch / files.OLD
+        fresh.mkdir()
+        try:
+            yield fresh
+            if folder.exists():
+                _keep_others(folder, fresh)
+                folder.rename(aside)
+            fresh.rename(folder)
+        except BaseException:
+            _restore(aside, folder)
+            raise
 
 
 def clear_leftovers(out: Path) -> None:
-    """Remove what processes that are gone left half written in `out`, and put back what they had moved aside."""
-    for left in out.glob(f"{TEMPORARY}*"):
-        name, _, owner = left.name.removeprefix(TEMPORARY).rpartition("-")
-        if owner == "old":
-            restore(out / name)
-            shutil.rmtree(left, ignore_errors=True)
-        elif owner.isdigit() and not _alive(owner):
-            shutil.rmtree(left, ignore_errors=True)
+    """Remove what processes that are gone left half written in `out`, and put back what they had moved aside.
+
+    Only scratch folders that carry our mark are touched.
+    """
+    for scratch, name in files.leftovers(out):
+        if name:
+            _restore(scratch / files.OLD, out / name)
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def expect_folder(folder: Path) -> None:
+    """Raise UnitcadError where something else than a real folder is in a result's place: nothing is written through."""
+    if folder.is_symlink():
+        raise UnitcadError(f"{folder}: is a link, not a folder; remove it or choose another folder with -o")
+    if folder.exists() and not folder.is_dir():
+        raise UnitcadError(f"{folder}: is a file, not a folder; remove it or choose another folder with -o")
+
+
+def _restore(aside: Path, folder: Path) -> None:
+    """Put back an old result that an interrupted swap left aside."""
+    if aside.is_dir() and not aside.is_symlink() and not os.path.lexists(folder):
+        aside.rename(folder)
 
 
 def _keep_others(old: Path, new: Path) -> None:
-    for file in sorted(old.rglob("*")):
-        copy = new / file.relative_to(old)
-        if file.is_file() and not copy.exists():
-            copy.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(file, copy)
-
-
-def _alive(pid: str) -> bool:
-    if not pid.isdigit():
-        return False
-    try:
-        os.kill(int(pid), 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
+    """Copy what the new folder lacks: files, and links as links."""
+    for here, below, names in os.walk(old):
+        for name in (*below, *names):
+            file = Path(here, name)
+            copy = new / file.relative_to(old)
+            if (file.is_file() or file.is_symlink()) and not os.path.lexists(copy):
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(file, copy, follow_symlinks=False)

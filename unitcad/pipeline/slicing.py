@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
+from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.export import slicer
-from unitcad.pipeline.folder import TEMPORARY
 from unitcad.pipeline.stages import Say
 from unitcad.spec import Spec, printer_of
 
@@ -22,23 +21,21 @@ def slice_tools(folder: Path, manifest: dict[str, Any], spec: Spec, say: Say = l
     Pieces whose STL is that of the slicer.json that is there are not sliced again. A file that the slicer does not take
     is said and no error: the folder stands, and another slicer may take it.
     """
-    files = [
+    tools = [
         folder / part["files"]["stl"]["path"]
         for part in manifest["parts"]
         if part["role"] == "tool" and "stl" in part["files"]
     ]
-    if not files:
+    if not tools:
         return ""
     there = folder / SLICED
     try:
-        found = slicer.report(files, printer_of(spec), _earlier(there), say)
+        found = slicer.report(tools, printer_of(spec), _earlier(there), say)
     except UnitcadError as error:
         return f"not sliced: {error}"
     if found is None:
         return ""
-    fresh = folder / f"{TEMPORARY}{SLICED}"
-    fresh.write_text(json.dumps(found, indent=2) + "\n", "utf-8")
-    os.replace(fresh, there)
+    files.write(there, (json.dumps(found, indent=2) + "\n").encode())
     if repaired := [piece["file"] for piece in found["pieces"] if piece["repaired"]]:
         return f"{found['slicer']} had to repair {', '.join(repaired)}"
     hours, minutes = divmod(round(found["print_s"] / 60), 60)
@@ -47,7 +44,7 @@ def slice_tools(folder: Path, manifest: dict[str, Any], spec: Spec, say: Say = l
 
 def _earlier(path: Path) -> dict[str, Any] | None:
     try:
-        found = json.loads(path.read_text("utf-8"))
+        found = files.read_json(path, links=False)
         return found if all({"file", "sha256"} <= piece.keys() for piece in found["pieces"]) else None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (UnitcadError, KeyError, TypeError, AttributeError):
         return None

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.folder import PAGE, TEMPORARY
+from unitcad.files import TEMPORARY
+from unitcad.pipeline.folder import PAGE
 from unitcad.report.models import model_key, spec_in
 from unitcad.spec import Spec, to_data
 

@@ -11,7 +11,6 @@ import gzip
 import hashlib
 import html
 import json
-import os
 import tomllib
 from collections.abc import Iterable
 from functools import cache
@@ -21,7 +20,8 @@ from typing import Any
 
 from unitcad import __version__
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.folder import PAGE, TEMPORARY
+from unitcad.files import write
+from unitcad.pipeline.folder import PAGE
 from unitcad.report import collect
 from unitcad.report.models import model
 from unitcad.report.pool import Pool
@@ -42,12 +42,7 @@ def write_report(folder: Path) -> Path:
     """
     data, title = page_data(folder)
     target = folder / PAGE
-    fresh = folder / f"{TEMPORARY}{PAGE}-{os.getpid()}"
-    try:
-        fresh.write_bytes(page(data, title).encode())
-        fresh.replace(target)
-    finally:
-        fresh.unlink(missing_ok=True)
+    write(target, page(data, title).encode())
     return target
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 
 from unitcad.errors import Refusal, UnitcadError, unknown_name
+from unitcad.files import read_text
 from unitcad.spec.convert import convert
 from unitcad.spec.door import checked
 from unitcad.spec.models import Spec
@@ -32,11 +33,14 @@ def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Spec:
     `overrides` are "path=value" with a value in TOML syntax (a bare word counts as a string). Raises Refusal or
     UnitcadError, naming the field, for whatever can't be.
     """
-    return from_data(override(read(source), overrides))
+    return from_data(override(read(source), overrides), Path())
 
 
 def read(source: str | os.PathLike[str]) -> dict[str, Any]:
-    """The data of a spec file or template, not checked. Raises UnitcadError for a file that can't be read as TOML."""
+    """The data of a spec file or template, not checked. Raises UnitcadError for a file that can't be read as TOML.
+
+    The code of a design that the file names may run from now on: see `unitcad.spec.own`.
+    """
     text = os.fspath(source)
     if os.sep in text or "/" in text or text.endswith(".toml"):
         path = Path(text)
@@ -49,17 +53,14 @@ def read(source: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """A TOML file's data. Raises UnitcadError with line and column where it does not parse."""
+    """A TOML file's data. Raises UnitcadError with line and column where it does not parse, for a special file, and for
+    one that is larger than `unitcad.files.LARGEST`.
+    """
+    text = read_text(path)
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8"))
-    except FileNotFoundError:
-        raise UnitcadError(f"{path}: no such file") from None
-    except UnicodeDecodeError as error:
-        raise UnitcadError(f"{path}: not UTF-8 (byte {error.start})") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
         raise UnitcadError(f"{path}: not TOML: {error}") from None
-    except OSError as error:
-        raise UnitcadError(f"{path}: {error.strerror}") from None
 
 
 def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
@@ -92,9 +93,13 @@ def put(data: dict[str, Any], path: str, value: Any) -> None:
         raise Refusal(path, value, "the path runs through a value, not a table")
 
 
-def from_data(data: Mapping[str, Any]) -> Spec:
-    """A checked, effective `Spec` of plain data. Raises Refusal for the first thing that can't be."""
-    return checked(convert(with_source(dict(data), Path()), Spec))
+def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
+    """A checked, effective `Spec` of plain data. Raises Refusal for the first thing that can't be.
+
+    `folder` is where the path of a design of one's own starts, whose file is then read and may run; without one no
+    file is.
+    """
+    return checked(convert(with_source(dict(data), folder) if folder else dict(data), Spec))
 
 
 def to_data(spec: Spec) -> dict[str, Any]:

@@ -5,11 +5,14 @@ So a result's spec.toml stands alone, the result's hash covers the code, and a w
 
 from __future__ import annotations
 
+import hashlib
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from unitcad.errors import Refusal, UnitcadError
+from unitcad.files import read_text
 
 _FORM = re.compile(r"(?P<file>.+\.py):(?P<function>[A-Za-z_][A-Za-z0-9_]*)", re.DOTALL)
 LARGEST = 1_000_000
@@ -27,7 +30,7 @@ def function_of(design: str) -> str:
 
 def with_source(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     """A spec's data with its own design's text in `design_source`, where it has one; a relative path starts at
-    `folder`. Raises UnitcadError for a file that can't be read.
+    `folder`. Such a file is the person's own: its code may run. Raises UnitcadError for a file that can't be read.
     """
     design = data.get("design")
     if not is_own(design) or data.get("design_source") is not None:
@@ -35,11 +38,43 @@ def with_source(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     file, _, function = str(design).rpartition(":")
     path = folder / file
     try:
-        source = path.read_bytes()[: LARGEST + 1].decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise Refusal("design", str(design), f"{path} is not UTF-8 (byte {error.start})") from None
-    except OSError as error:
-        raise Refusal("design", str(design), f"{path}: {(error.strerror or 'unreadable').lower()}") from None
-    if len(source) > LARGEST:
-        raise UnitcadError(f"design = {design!r}: {path} is larger than a megabyte")
-    return {**data, "design": f"{path.name}:{function}", "design_source": source}
+        source = read_text(path, largest=LARGEST)
+    except UnitcadError as error:
+        raise Refusal("design", str(design), str(error)) from None
+    named = f"{path.name}:{function}"
+    allow({_digest(named, source)})
+    return {**data, "design": named, "design_source": source}
+
+
+# Code runs only where somebody has allowed it: it came from a file that the command line led to, or with --allow-code.
+# Text that lies in a result, or that a spec brings along, is data until then.
+_allowed: set[str] = set()
+ANY = "any"
+
+
+def allow(codes: Iterable[str]) -> None:
+    """Let this process run these codes, as `allowed` gives them; ANY: whatever a spec brings along."""
+    _allowed.update(codes)
+
+
+def allowed() -> frozenset[str]:
+    """What this process may run, for a worker that gets its tasks from here."""
+    return frozenset(_allowed)
+
+
+def allow_nothing() -> None:
+    """Take back whatever was allowed."""
+    _allowed.clear()
+
+
+def expect_allowed(design: str, source: str) -> None:
+    """Raise UnitcadError unless this process may run a design's code."""
+    if ANY not in _allowed and _digest(design, source) not in _allowed:
+        raise UnitcadError(
+            f"design {design}: its code is not run, since this command was not given the file; "
+            "read the code, then allow it with --allow-code"
+        )
+
+
+def _digest(design: str, source: str) -> str:
+    return hashlib.sha256(f"{design}\0{source}".encode("utf-8", "surrogatepass")).hexdigest()

@@ -1,0 +1,120 @@
+"""Code that lies in a result, or that a spec brings along, never runs unasked."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SPEC = """
+name = "planted"
+design = "{design}"
+diameter_mm = 14.0
+[[layers]]
+material = "ecoflex-00-10"
+wall_mm = 1.25
+[output]
+formats = []
+tolerance_mm = 0.1
+"""
+CODE = """
+open({ran!r}, "w").close()
+from unitcad.shape import ring
+def f(spec):
+    return ring(4.5, 7.0, 0, 2.0)
+"""
+
+
+def _unitcad(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "unitcad", *map(str, arguments)]
+    environment = {**os.environ, "UNITCAD_CACHE": str(cwd / "cache")}
+    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False, timeout=120)
+
+
+class Planted:
+    """A folder with code that leaves a mark when it runs: as a file, embedded in a spec, in results, behind a sweep."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.ran = folder / "RAN"
+        self.code = CODE.format(ran=str(self.ran))
+        (folder / "d.py").write_text(self.code)
+        (folder / "named.toml").write_text(SPEC.format(design="d.py:f"))
+        source = f"design_source = {json.dumps(self.code)}\n"
+        (folder / "embedded.toml").write_text(source + SPEC.format(design="d.py:f"))
+        for name, base in (("named", "./named.toml"), ("embedded", "./embedded.toml")):
+            text = f'base = "{base}"\n[sweep]\ndiameter_mm = [14.0, 15.0]\n'
+            (folder / f"sweep-{name}.toml").write_text(text)
+        text = f'base = "./named.toml"\n[sweep]\ndesign_source = [{json.dumps(self.code + "# other text")}]\n'
+        (folder / "sweep-swept.toml").write_text(text)
+        for place, manifest in (("results/one", "{}"), ("results/two", '{"parts": []}')):
+            (folder / place).mkdir(parents=True)
+            (folder / place / "manifest.json").write_text(manifest)
+        (folder / "results/one/spec.toml").write_text(source + SPEC.format(design="d.py:f"))
+        # Without the text: a path, to where the command runs or anywhere else.
+        (folder / "results/two/spec.toml").write_text(SPEC.format(design=f"{folder}/d.py:f"))
+
+
+@pytest.fixture
+def planted(tmp_path: Path) -> Planted:
+    return Planted(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "report results",
+        "report results/one",
+        "report results/two",
+        "batch sweep-named.toml --dry-run",
+        "batch sweep-embedded.toml --dry-run",
+        "batch sweep-swept.toml --dry-run",
+        "batch sweep-embedded.toml -j 0",
+        "batch sweep-embedded.toml -j 1",
+        "batch sweep-swept.toml -j 0",
+        "batch sweep-embedded.toml --only estimate",
+        "build embedded.toml --only unit",
+        "build results/one/spec.toml --only unit",
+        "estimate embedded.toml",
+        "estimate named.toml",
+        "list templates",
+        "check results",
+    ],
+)
+def test_code_that_nobody_named_does_not_run(arguments: str, planted: Planted) -> None:
+    done = _unitcad(*arguments.split(), cwd=planted.folder)
+    assert not planted.ran.exists()
+    assert "Traceback" not in done.stderr
+    assert "internal error" not in done.stderr
+    if arguments.startswith(("build", "batch")) and "estimate" not in arguments:
+        assert done.returncode in (1, 2)
+        assert "--allow-code" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "build named.toml --only unit",
+        "build embedded.toml --only unit --allow-code",
+        "batch sweep-named.toml --only unit -j 0",
+        "batch sweep-named.toml --only unit -j 1",
+        "batch sweep-embedded.toml --only unit -j 1 --allow-code",
+        "batch sweep-named.toml --dry-run --allow-code",
+    ],
+)
+def test_code_of_a_file_that_was_named_runs_and_other_code_when_allowed(arguments: str, planted: Planted) -> None:
+    done = _unitcad(*arguments.split(), cwd=planted.folder)
+    assert done.returncode == 0, done.stderr
+    assert planted.ran.exists()
+
+
+def test_a_page_is_made_of_a_result_whose_code_does_not_run(planted: Planted) -> None:
+    done = _unitcad("report", "results", cwd=planted.folder)
+    assert done.returncode == 0, done.stderr
+    assert (planted.folder / "results" / "report.html").is_file()
+    assert _unitcad("report", "results", "--allow-code", cwd=planted.folder).returncode == 0
+    assert planted.ran.exists()

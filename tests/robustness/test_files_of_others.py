@@ -1,0 +1,196 @@
+"""What others put into a folder is neither removed nor written through, and no special file is read."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from unitcad import files
+from unitcad.batch import Options, load_sweep, run
+from unitcad.batch.executors import SerialExecutor
+from unitcad.errors import UnitcadError
+from unitcad.pipeline.build import build
+from unitcad.pipeline.folder import clear_leftovers, folder_name, replacing
+from unitcad.report import write_report
+from unitcad.spec import load
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and pipes as POSIX has them")
+
+
+def _letter(folder: Path) -> Path:
+    folder.mkdir(parents=True)
+    (folder / "letter.txt").write_text("keep")
+    return folder
+
+
+@pytest.mark.parametrize(
+    "name", [".tmp-photos-20240101", ".tmp-x-old", ".tmp-x-99999999", ".tmp-", ".tmp-0123456789abcdef"]
+)
+def test_a_folder_of_others_stays_whatever_its_name(name: str, tmp_path: Path) -> None:
+    letter = _letter(tmp_path / name) / "letter.txt"
+    build(load("single-embedded", ["output.formats=[]"]), tmp_path, only=["estimate"])
+    clear_leftovers(tmp_path)
+    assert letter.read_text() == "keep"
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    "mark",
+    [
+        "",
+        "unitcad scratch 1\nfedcba9876543210\n\n",
+        "unitcad scratch 2\n0123456789abcdef\n\n",
+        "unitcad scratch 1\n0123456789abcdef\n../x\n",
+        "unitcad scratch 1\n0123456789abcdef\n..\n",
+        "unitcad scratch 1\n0123456789abcdef\n",
+    ],
+)
+def test_a_folder_with_a_mark_that_is_not_its_own_stays(mark: str, tmp_path: Path) -> None:
+    folder = _letter(tmp_path / "out" / ".tmp-0123456789abcdef")
+    (folder / files.MARK).write_text(mark)
+    clear_leftovers(tmp_path / "out")
+    assert (folder / "letter.txt").exists()
+
+
+def test_a_link_with_the_name_of_a_scratch_folder_is_not_followed(tmp_path: Path) -> None:
+    elsewhere = _letter(tmp_path / "elsewhere")
+    (elsewhere / files.MARK).write_text(f"{files.FORMAT}\n0123456789abcdef\n\n")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / ".tmp-0123456789abcdef").symlink_to(elsewhere)
+    clear_leftovers(tmp_path / "out")
+    assert (elsewhere / "letter.txt").exists()
+
+
+def test_what_a_killed_process_left_goes_and_what_a_live_one_has_stays(tmp_path: Path) -> None:
+    code = (
+        "import os, sys; from pathlib import Path; from unitcad import files\n"
+        f"with files.scratch(Path({str(tmp_path)!r})) as folder:\n"
+        "    (folder / 'half').write_text('half'); print('in', flush=True); sys.stdin.readline()\n"
+        "    os._exit(9)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline()
+        clear_leftovers(tmp_path)
+        assert len(list(tmp_path.iterdir())) == 1
+        child.communicate(b"\n")
+    assert len(list(tmp_path.iterdir())) == 1
+    clear_leftovers(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    files.write(path, b"old", sync=True)
+    with pytest.raises(KeyboardInterrupt), files.writing(path) as file:
+        file.write(b"half")
+        raise KeyboardInterrupt
+    with pytest.raises(FileExistsError):
+        files.write_new(path, b"new")
+    with _files_limited_to(10):
+        for put in (files.write, files.write_new):
+            with pytest.raises(OSError, match="File too large"):
+                put(tmp_path / "b", b"more than ten")
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+    assert stat.S_IMODE(path.stat().st_mode) == 0o666 & ~_umask()
+
+
+@contextlib.contextmanager
+def _files_limited_to(size: int) -> Iterator[None]:
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def _umask() -> int:
+    found = os.umask(0)
+    os.umask(found)
+    return found
+
+
+@pytest.mark.parametrize("name", ["timings.json", "variants.csv", "batch.json", ".tmp-variants.csv", ".tmp-batch.json"])
+def test_a_link_planted_in_a_batchs_folder_is_not_written_through(name: str, tmp_path: Path) -> None:
+    sweep, out = load_sweep("thickness"), tmp_path / "out"
+    options = Options(only=("estimate",), limit=1, cache=tmp_path / "cache")
+    run(sweep, out, options, SerialExecutor(), workers=1)
+    target = tmp_path / "target"
+    target.write_text("keep")
+    (out / name).unlink(missing_ok=True)
+    (out / name).symlink_to(target)
+    run(sweep, out, options, SerialExecutor(), workers=1)
+    assert target.read_text() == "keep"
+    if not name.startswith("."):
+        assert (out / name).read_text() != "keep"
+        assert not (out / name).is_symlink()
+
+
+def test_a_link_planted_in_a_results_place_is_not_written_through(tmp_path: Path) -> None:
+    spec = load("single-embedded", ["output.formats=[]"])
+    folder = build(spec, tmp_path, only=["estimate"]).folder
+    target = tmp_path / "target"
+    target.write_text("keep")
+    for name in ("report.html", "timings.json", f".tmp-report.html-{os.getpid()}", ".tmp-slicer.json"):
+        (folder / name).unlink(missing_ok=True)
+        (folder / name).symlink_to(target)
+    build(spec, tmp_path, only=["estimate"])
+    write_report(folder)
+    assert target.read_text() == "keep"
+    elsewhere = tmp_path / "elsewhere"
+    folder.rename(elsewhere)
+    folder.symlink_to(elsewhere)
+    before = sorted(path.name for path in elsewhere.iterdir())
+    with pytest.raises(UnitcadError, match="is a link"):
+        build(spec, tmp_path, only=["estimate"])
+    with pytest.raises(UnitcadError, match="is a link"), replacing(tmp_path / folder_name(spec)):
+        pass
+    assert sorted(path.name for path in elsewhere.iterdir()) == before
+
+
+@pytest.mark.parametrize("kind", ["pipe", "socket", "folder", "/dev/zero", "large", "link"])
+def test_what_is_no_regular_file_of_a_fair_size_is_refused(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "socket":
+        os.mknod(path, stat.S_IFSOCK)
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "large":
+        with open(path, "wb") as file:
+            file.truncate(files.LARGEST + 1)
+    elif kind == "link":
+        (tmp_path / "target").write_text("text")
+        path.symlink_to(tmp_path / "target")
+        assert files.read_text(path) == "text"
+    else:
+        path = Path(kind)
+    reason = {"large": "larger than 16 MB", "/dev/zero": "a device"}.get(kind, f"is a {kind}")
+    with pytest.raises(UnitcadError, match=reason):
+        files.read(path, links=kind != "link")
+
+
+@pytest.mark.parametrize("text", ['{"a": NaN}', '{"a": 1e999}', "[" * 100_000, "1" * 5000, '{"a": ', "\x00", ""])
+def test_json_that_is_none_is_one_clear_error(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(UnitcadError, match=r"a\.json: not JSON"):
+        files.read_json(tmp_path / "a.json")
+
+
+def test_init_leaves_no_file_behind_when_it_fails(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "unitcad", "init", "mine", "--template", "nosuch"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert list(tmp_path.iterdir()) == []

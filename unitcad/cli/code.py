@@ -1,0 +1,21 @@
+"""The option --allow-code."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+AllowCode = Annotated[
+    bool, typer.Option("--allow-code", help="Run Python code that came with a spec (design_source), not from a file.")
+]
+
+
+def allow_code(wanted: bool, nothing_else: bool = False) -> None:
+    """Let this process run what a spec brings along, or with `nothing_else` no design's code at all."""
+    from unitcad.spec import own
+
+    if wanted:
+        own.allow({own.ANY})
+    elif nothing_else:
+        own.allow_nothing()

@@ -1,0 +1,232 @@
+"""The one place that reads files which others may have put there, and that writes files whole.
+
+Reading refuses what is not a regular file, before it is opened, and what is larger than it may be. Writing goes to a
+fresh file in a scratch folder of an unpredictable name, then renames: no link that lies at the target or at a
+temporary name is written through, and the target is the old file or the new one, never half of it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import math
+import os
+import secrets
+import shutil
+import stat
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO, Any
+
+from unitcad.errors import UnitcadError
+
+LARGEST = 16_000_000
+"""Bytes that a spec, a sweep, a manifest or another file of one variant may have."""
+TEMPORARY = ".tmp-"
+MARK = "unitcad-scratch"
+"""The file in every scratch folder: locked while its maker lives, it holds FORMAT, the folder's token, a name."""
+FORMAT = "unitcad scratch 1"
+OLD, NEW = "old", "new"
+
+
+class NotThere(UnitcadError):
+    """A file that does not exist."""
+
+
+def read(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> bytes:
+    """The content of a regular file of at most `largest` bytes; without `links` a symbolic link is refused.
+
+    Raises NotThere where there is no such file, UnitcadError for whatever else keeps it from being read.
+    """
+    try:
+        with open(path, "rb", opener=regular(links)) as file:
+            content = file.read(largest + 1)
+    except (FileNotFoundError, NotADirectoryError):
+        raise NotThere(f"{path}: no such file") from None
+    except OSError as error:
+        raise UnitcadError(f"{path}: {(error.strerror or 'unreadable').lower()}") from None
+    except ValueError:
+        raise UnitcadError(f"{os.fspath(path)!r}: is no name for a file") from None
+    if len(content) > largest:
+        raise UnitcadError(f"{path}: is larger than {largest / 1e6:g} MB")
+    return content
+
+
+def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> str:
+    """The text of a file in UTF-8; else as `read`."""
+    try:
+        return read(path, largest=largest, links=links).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise UnitcadError(f"{path}: not UTF-8 (byte {error.start})") from None
+
+
+def read_json(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> Any:
+    """The data of a JSON file, all of its numbers finite; else as `read`."""
+    text = read_text(path, largest=largest, links=links)
+    try:
+        return json.loads(text, parse_constant=_no_number, parse_float=_finite)
+    except (ValueError, RecursionError) as error:
+        raise UnitcadError(f"{path}: not JSON: {error}") from None
+
+
+def regular(links: bool = True) -> Callable[[str, int], int]:
+    """An `opener` for `open` that opens regular files only, and makes them; without `links` no symbolic link.
+
+    Raises UnitcadError for anything else, which is not opened.
+    """
+
+    def opened(path: str, flags: int) -> int:
+        flags |= getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        with contextlib.suppress(FileNotFoundError):
+            _expect_regular(path, os.stat(path, follow_symlinks=links))
+        try:
+            handle = os.open(path, flags if links else flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
+        except OSError as error:
+            if error.errno == errno.ELOOP and not links:
+                raise UnitcadError(f"{path}: is a link, not a regular file") from None
+            raise
+        try:
+            _expect_regular(path, os.fstat(handle))
+        except BaseException:
+            os.close(handle)
+            raise
+        return handle
+
+    return opened
+
+
+def write(path: Path, content: bytes, *, sync: bool = False) -> None:
+    """Put a file of `content` in place of what is at `path`, with `sync` on the disk at the end. Raises OSError."""
+    with writing(path, sync=sync) as file:
+        file.write(content)
+
+
+@contextlib.contextmanager
+def writing(path: Path, *, sync: bool = False) -> Iterator[IO[bytes]]:
+    """A new file that takes the place of what is at `path` when the block ends well, and goes when it does not.
+
+    With `sync` content and name are on the disk when the block has ended. Raises OSError.
+    """
+    with scratch(path.parent) as folder:
+        fresh = folder / NEW
+        with open(fresh, "xb") as file:
+            yield file
+            if sync:
+                _sync(file)
+        fresh.replace(path)
+    if sync:
+        sync_folder(path.parent)
+
+
+def write_new(path: Path, content: bytes, *, sync: bool = False) -> None:
+    """Make a file that is not there yet; none is left where that fails. Raises FileExistsError, also for a link, or
+    OSError.
+    """
+    with open(path, "xb") as file:
+        try:
+            file.write(content)
+            if sync:
+                _sync(file)
+            else:
+                file.flush()
+        except BaseException:
+            with contextlib.suppress(OSError):
+                file.close()
+            path.unlink(missing_ok=True)
+            raise
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring a folder's names to the disk; nothing where the system can't. Raises OSError."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+@contextlib.contextmanager
+def scratch(parent: Path, name: str = "") -> Iterator[Path]:
+    """A fresh folder in `parent`, of an unpredictable name and with our mark inside, that goes with the block.
+
+    `name` is what in `parent` the work is for: what a killed process leaves is handed out with it by `leftovers`.
+    """
+    from filelock import FileLock
+
+    token = secrets.token_hex(8)
+    folder = parent / f"{TEMPORARY}{token}"
+    try:
+        folder.mkdir(0o700)
+    except OSError as error:
+        error.filename = str(parent)  # the name that the person knows
+        raise
+    lock = FileLock(folder / MARK, thread_local=False)
+    try:
+        lock.acquire(blocking=False)
+        with open(folder / MARK, "r+b", opener=regular(links=False)) as mark:
+            mark.write(f"{FORMAT}\n{token}\n{name}\n".encode())
+        yield folder
+    finally:
+        lock.release()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
+    """Scratch folders in `parent` whose process is gone, each with the name it was for, locked while it is given out.
+
+    Only real folders with our mark and their own token inside are given out.
+    """
+    from filelock import FileLock
+
+    for folder in sorted(parent.glob(f"{TEMPORARY}*")):
+        name = _marked(folder)
+        if name is None:
+            continue
+        lock = FileLock(folder / MARK, thread_local=False)
+        try:
+            lock.acquire(blocking=False)
+        except OSError:  # it is held (Timeout is an OSError), or can't be
+            continue
+        try:
+            if _marked(folder) == name:
+                yield folder, name
+        finally:
+            lock.release()
+
+
+def _marked(folder: Path) -> str | None:
+    """The name in a scratch folder's mark; None for a folder that is not ours."""
+    try:
+        if not stat.S_ISDIR(folder.lstat().st_mode):
+            return None
+        form, token, name, rest = read_text(folder / MARK, largest=1000, links=False).split("\n")
+    except (UnitcadError, ValueError, OSError):
+        return None
+    plain = name in ("", os.path.basename(name)) and name not in (".", "..") and "\\" not in name
+    return name if form == FORMAT and folder.name == f"{TEMPORARY}{token}" and plain and not rest else None
+
+
+def _expect_regular(path: str, found: os.stat_result) -> None:
+    if stat.S_ISREG(found.st_mode):
+        return
+    kinds = {stat.S_IFLNK: "a link", stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+    raise UnitcadError(f"{path}: is {kinds.get(stat.S_IFMT(found.st_mode), 'a device')}, not a regular file")
+
+
+def _sync(file: IO[bytes]) -> None:
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def _no_number(text: str) -> Any:
+    raise ValueError(f"{text} is no number")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is out of range")
+    return value
