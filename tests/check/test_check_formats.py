@@ -48,7 +48,8 @@ def test_json_has_the_promised_shape(reports: list[FileReport]) -> None:
             "triangles", "vertices", "shells", "volume_mm3", "area_mm2", "bbox_mm", "watertight"
         ]  # fmt: skip
         for found in entry["findings"]:
-            assert list(found) == ["code", "severity", "message", "count", "locations"]
+            assert list(found) == ["code", "severity", "message", "count", "locations", "fix"]
+            assert found["fix"] == rules()[found["code"]].mend
     assert [entry["verdict"] for entry in data["files"]] == ["pass", "error", "error", "warning"]
 
 
@@ -111,10 +112,13 @@ def test_junit_parses_and_counts(reports: list[FileReport]) -> None:
 def test_text_is_one_line_a_finding_and_holds_no_control_characters() -> None:
     odd = FileReport("a\x1b[31m\n.stl", (Finding("F003", "error", "bad \x07 text", 1, (Location(line=3),)),))
     lines = formats.render([odd], "text").splitlines()
-    assert len(lines) == 3
-    assert lines[0] == "a\\x1b[31m\\n.stl: F003 error: bad \\x07 text (at line 3)"
-    assert lines[1] == "1 file: 1 failed, 0 passed"
-    assert "--explain CODE" in lines[2]
+    assert lines == [
+        "a\\x1b[31m\\n.stl: F003 error: bad \\x07 text (at line 3)",
+        "How to fix:",
+        "  F003 truncated text, XML or zip: Copy or export the file again.",
+        "`unitcad check --explain CODE` says what a code means and why it matters.",
+        "1 file: 1 failed, 0 passed",
+    ]
     assert formats.render([FileReport("a.stl")], "text") == "1 file: 1 passed\n"
 
 
@@ -138,14 +142,40 @@ def test_junit_failures_have_a_body_and_cases_a_time(reports: list[FileReport]) 
     lines = failure.text.splitlines()
     assert lines[0] == "T001 boundary edge: 4 boundary edges"
     assert lines[1].startswith("at ")
-    assert lines[-1] == f"Mend: {rules()['T001'].mend}"
+    assert lines[-1] == f"Fix: {rules()['T001'].mend}"
+
+
+def test_every_format_says_how_to_fix_what_was_found(reports: list[FileReport]) -> None:
+    for code in {found.code for report in reports for found in report.findings}:
+        for format_ in formats.FORMATS:
+            strict = formats.render(reports, format_, "warning")
+            assert (
+                json.dumps(rules()[code].mend)[1:-1] if format_ in ("json", "sarif") else rules()[code].mend
+            ) in strict
+    rule = json.loads(formats.render(reports, "sarif"))["runs"][0]["tool"]["driver"]["rules"][0]
+    assert rule["help"]["text"].endswith(f" Fix: {rules()[rule['id']].mend}")
+    assert "**Fix:**" in rule["help"]["markdown"]
+
+
+def test_text_says_what_a_file_that_passed_holds(reports: list[FileReport]) -> None:
+    first = formats.render(reports, "text").splitlines()[0]
+    assert first == "good.stl: passed: 10 x 10 x 10 mm, 1000 mm3, 1 shell, 12 triangles"
+
+
+def test_sarif_names_objects_as_logical_locations() -> None:
+    found = Finding("G001", "error", "x", 2, (Location(face=1, object="bolt"), Location(face=2, object="nut")))
+    data = json.loads(formats.render([FileReport("a.obj", (found,))], "sarif"))
+    schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
+    jsonschema.validate(data, schema, jsonschema.Draft202012Validator)
+    (place,) = data["runs"][0]["results"][0]["locations"]
+    assert [item["name"] for item in place["logicalLocations"]] == ["bolt", "nut"]
 
 
 def test_sarif_says_the_first_place_in_words_and_the_line_as_a_region() -> None:
     places = (Location(line=7, part="3D/a.model"), Location(line=9))
     said = FileReport("a.3mf", (Finding("P017", "error", "bad", 2, places),))
     (result,) = json.loads(formats.render([said], "sarif"))["runs"][0]["results"]
-    assert result["message"]["text"] == "bad (at 3D/a.model line 7)"
+    assert result["message"]["text"] == f"bad (at 3D/a.model line 7). Fix: {rules()['P017'].mend}"
     assert result["locations"][0]["physicalLocation"]["region"] == {"startLine": 7}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -96,4 +97,57 @@ def test_a_tool_below_the_floor_is_warned_of(tmp_path: Path) -> None:
 def test_what_is_no_manifest_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "manifest.json").write_text(text)
     with pytest.raises(UnitcadError):
+        listing.read(str(tmp_path))
+
+
+OUTSIDE = [
+    "../secret.stl", "unit/../../secret.stl", "unit/../base.stl", "{tmp}/secret.stl", "C:\\secret.stl",
+    "\\\\host\\a.stl", "..\\secret.stl", "file-link.stl", "folder-link/secret.stl", "", ".", "a\x00.stl",
+    "\ud800.stl",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("path", OUTSIDE)
+@pytest.mark.parametrize("suffix", ["stl", "step"])
+def test_m005_nothing_outside_the_folder_is_read(
+    tmp_path: Path, path: str, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "build"
+    folder.mkdir()
+    written(folder)
+    secret = tmp_path / "secret.stl"
+    secret.write_bytes(stl(box()[2:]))
+    (folder / "file-link.stl").symlink_to(secret)
+    (folder / "folder-link").symlink_to(tmp_path, target_is_directory=True)
+    data = json.loads((folder / "manifest.json").read_text())
+    listed = {"path": path.replace("{tmp}", str(tmp_path)), "sha256": "0" * 64}
+    data["parts"].append({"name": "x", "role": "unit", "volume_mm3": 1.0, "files": {suffix: listed}})
+    (folder / "manifest.json").write_text(json.dumps(data))
+    opened: list[str] = []
+    plain_open = Path.open
+    monkeypatch.setattr(Path, "open", lambda self, *a, **k: opened.append(str(self)) or plain_open(self, *a, **k))
+    assert {name: codes(report) for name, report in judged(folder).items()} == {"base.stl": [], "film.stl": []}
+    (report,) = listing.unjudged(listing.read(str(folder)), [], Options(select=("M005",)))
+    assert Path(report.path).name == "manifest.json"
+    assert codes(report) == ["M005"]
+    assert report.findings[0].severity == "error"
+    assert {Path(name).name for name in opened} <= {"manifest.json", "base.stl", "film.stl"}
+
+
+def test_links_that_stay_inside_the_folder_are_followed(tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    folder = written(home)
+    (tmp_path / "also").symlink_to(home, target_is_directory=True)
+    (folder / "base.stl").rename(folder / "real.stl")
+    (folder / "base.stl").symlink_to("real.stl")
+    assert {name: codes(report) for name, report in judged(tmp_path / "also").items()} == {
+        "base.stl": [], "film.stl": []
+    }  # fmt: skip
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs FIFOs")
+def test_a_manifest_that_is_no_regular_file_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "manifest.json")
+    with pytest.raises(UnitcadError, match="not a regular file"):
         listing.read(str(tmp_path))

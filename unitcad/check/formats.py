@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
-from unitcad.check.findings import SEVERITIES, FileReport, Finding, counted, said
+from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, counted, said
 from unitcad.check.rulebook import rules
 
 FORMATS = ("text", "json", "github", "sarif", "junit")
@@ -33,21 +33,49 @@ def _dump(data: Any) -> str:
 
 
 def as_dict(reports: Sequence[FileReport]) -> dict[str, Any]:
-    """The JSON object: {files: [{path, verdict, findings, facts}]}."""
-    return {"files": [report.as_dict() for report in reports]}
+    """The JSON object: {files: [{path, verdict, findings, facts}]}; a finding also says how to fix it."""
+    return {"files": [_entry(report) for report in reports]}
+
+
+def _entry(report: FileReport) -> dict[str, Any]:
+    entry = report.as_dict()
+    for found in entry["findings"]:
+        found["fix"] = rules()[found["code"]].mend
+    return entry
 
 
 def text(reports: Sequence[FileReport]) -> str:
-    """A line a finding, then one that counts, and where something was found how to learn more."""
+    """A line a finding, one with the size of each file that passed, how to fix what was found, then a count."""
     lines = []
+    codes: set[str] = set()
     for report in reports:
         for found in report.findings:
+            codes.add(found.code)
             lines.append(f"{_plain(report.path)}: {found.code} {found.severity}: {_plain(said(found, 3))}")
-    explained = [_EXPLAIN] if lines else []
-    return "\n".join([*lines, _summary(reports), *explained]) + "\n"
+        if report.verdict == "pass" and (size := _size(report.facts)):
+            lines.append(f"{_plain(report.path)}: passed: {size}")
+    fixes = [f"  {code} {rule.title}: {rule.mend}" for code, rule in rules().items() if code in codes]
+    if fixes:
+        lines += ["How to fix:", *fixes, _EXPLAIN]
+    return "\n".join([*lines, _summary(reports)]) + "\n"
 
 
-_EXPLAIN = "`unitcad check --explain CODE` says what a code means, why it matters and how to mend it."
+_EXPLAIN = "`unitcad check --explain CODE` says what a code means and why it matters."
+
+
+def _size(facts: Facts) -> str:
+    """Sides of the box, volume, shells and triangles, as far as they are known."""
+    parts = []
+    if facts.bbox_mm is not None:
+        sides = [high - low for low, high in zip(*facts.bbox_mm, strict=True)]
+        parts.append(" x ".join(f"{side:.6g}" for side in sides) + " mm")
+    if facts.volume_mm3 is not None:
+        parts.append(f"{facts.volume_mm3:.6g} mm3")
+    if facts.shells is not None:
+        parts.append(counted(facts.shells, "shell"))
+    if facts.triangles is not None:
+        parts.append(counted(facts.triangles, "triangle"))
+    return ", ".join(parts)
 
 
 def _summary(reports: Sequence[FileReport]) -> str:
@@ -93,12 +121,15 @@ def github(reports: Sequence[FileReport]) -> str:
             title = f"{found.code} {rules()[found.code].title}"
             line = next((place.line for place in found.locations if place.line is not None), None)
             where = f"file={_property(report.path)}" + (f",line={line}" if line is not None else "")
-            lines.append(f"::{_GITHUB[found.severity]} {where},title={_property(title)}::{_data(said(found, 3))}")
+            text = f"{said(found, 3)}. Fix: {rules()[found.code].mend}"
+            lines.append(f"::{_GITHUB[found.severity]} {where},title={_property(title)}::{_data(text)}")
     return "\n".join([*lines, _summary(reports)]) + "\n"
 
 
 def _data(text: str) -> str:
-    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    """Text of a workflow command: line breaks as the runner decodes them, other control characters shown, not sent."""
+    lines = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return _plain(lines)
 
 
 def _property(text: str) -> str:
@@ -136,7 +167,7 @@ def _time(seconds: float | None) -> str:
 def _failure(found: Finding) -> str:
     rule = rules()[found.code]
     places = [f"at {text}" for place in found.locations if (text := str(place))]
-    body = "\n".join([f"{found.code} {rule.title}: {found.message}", *places, f"Mend: {rule.mend}"])
+    body = "\n".join([f"{found.code} {rule.title}: {found.message}", *places, f"Fix: {rule.mend}"])
     head = f"type={quoteattr(found.code)} message={quoteattr(_xml(said(found, 3)))}"
     return f"<failure {head}>{escape(_xml(body))}</failure>"
 

@@ -1,4 +1,4 @@
-"""A build's manifest.json against the files beside it: M001 to M004, and which parts are tools (D and S rules)."""
+"""A build's manifest.json against the files beside it: M001 to M005, and which parts are tools (D and S rules)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from unitcad import catalogue
@@ -33,11 +33,15 @@ class Part:
 
 @dataclass(frozen=True)
 class Listing:
-    """Files of a manifest by absolute path, and the printer it names, if any."""
+    """Files of a manifest by absolute path, the printer it names, if any, and listed paths that are not to be followed.
 
-    folder: Path
+    `path` is the manifest's own.
+    """
+
+    path: Path
     files: dict[str, Part]
     printer: str | None
+    outside: tuple[str, ...] = ()
 
 
 def read(where: str) -> Listing:
@@ -45,8 +49,10 @@ def read(where: str) -> Listing:
     path = Path(where)
     path = path / "manifest.json" if path.is_dir() else path
     try:
+        if path.exists() and not path.is_file():
+            raise UnitcadError(f"--manifest {where}: not a regular file")
         data = json.loads(path.read_text("utf-8"))
-        return _listing(path.parent, data)
+        return _listing(path, data)
     except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise UnitcadError(f"--manifest {where}: cannot be read: {error}") from error
     except KeyError as error:
@@ -57,17 +63,37 @@ def read(where: str) -> Listing:
         ) from error
 
 
-def _listing(folder: Path, data: Any) -> Listing:
+def _listing(manifest: Path, data: Any) -> Listing:
     files: dict[str, Part] = {}
+    outside: list[str] = []
     for part in data["parts"]:
         for entry in part["files"].values():
-            path = os.path.abspath(folder / entry["path"])
+            if leads_outside(manifest.parent, entry["path"]):
+                outside.append(entry["path"])
+                continue
+            path = os.path.abspath(manifest.parent / entry["path"])
             volume = part.get("volume_mm3")
             new = Part((part["name"],), part["role"] == "tool", entry.get("sha256"), volume, part.get("solids", 1))
             old = files.get(path)
             files[path] = new if old is None else _together(old, new)
     printer = data.get("printer")
-    return Listing(folder, files, printer if isinstance(printer, str) else None)
+    return Listing(manifest, files, printer if isinstance(printer, str) else None, tuple(outside))
+
+
+def leads_outside(folder: Path, listed: str) -> bool:
+    """Whether a path of a manifest is absolute, has `..` in it, or leaves the manifest's folder through a link.
+
+    What is absolute or climbs on any system is refused on all of them.
+    """
+    windows = PureWindowsPath(listed)
+    if windows.drive or windows.root or ".." in windows.parts:
+        return True
+    home = os.path.realpath(folder)
+    try:
+        real = os.path.realpath(os.path.join(home, listed))
+    except ValueError:  # a NUL or half a surrogate pair: no file has such a name
+        return True
+    return not real.startswith(os.path.join(home, ""))
 
 
 def _together(old: Part, new: Part) -> Part:
@@ -100,17 +126,27 @@ def compare(listing: Listing, report: FileReport, options: Options) -> FileRepor
 
 
 def unjudged(listing: Listing, judged: Sequence[str], options: Options) -> list[FileReport]:
-    """Reports of the listed files that were not judged (STEP, drawings, ...) and are gone or changed: M003, M004."""
+    """Reports of the listed files that were not judged (STEP, drawings, ...) and are gone or changed: M003, M004.
+
+    One of the manifest itself comes last where it lists paths outside its folder (M005): nothing there is read.
+    """
     seen = {os.path.abspath(path) for path in judged}
     left = [os.path.relpath(path) for path in listing.files if path not in seen]
     reports = [compare(listing, FileReport(path), options) for path in left]
+    if listing.outside and options.wants("M005"):
+        shown = ", ".join(repr(path[:80]) for path in listing.outside[:3]) + (
+            ", ..." if len(listing.outside) > 3 else ""
+        )
+        text = f"{counted(len(listing.outside), 'path')} outside the manifest's folder: {shown}"
+        found = finding("M005", text, len(listing.outside))
+        reports.append(FileReport(os.path.relpath(listing.path), (found,)))
     return [report for report in reports if report.findings]
 
 
 def judge(part: Part, report: FileReport) -> list[Finding]:
     """M001 to M004 for one file."""
     path = Path(report.path)
-    if not path.is_file():
+    if not os.path.isfile(path):
         return [finding("M004", f"listed for {', '.join(part.names)}")]
     found = []
     if part.sha256 is not None:

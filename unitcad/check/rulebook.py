@@ -58,7 +58,7 @@ def explain(codes: str) -> str:
     """Rules in words: codes or prefixes of codes, split by commas. Raises `Refusal` for one that begins no code."""
     chosen = check_prefixes("--explain", [part for part in codes.split(",") if part.strip()] or [codes])
     return "\n\n".join(
-        f"{rule.code} {rule.title} ({rule.severity})\n\nCause: {rule.cause}\nMend:  {rule.mend}"
+        f"{rule.code} {rule.title} ({rule.severity})\n\nCause: {rule.cause}\nFix:   {rule.mend}"
         for rule in rules().values()
         if rule.code.startswith(chosen)
     )
@@ -75,7 +75,7 @@ def markdown() -> str:
         "",
     ]
     for letter, family in FAMILIES.items():
-        lines += [f"## {family}", "", "| code | severity | rule | cause | mend |", "| --- | --- | --- | --- | --- |"]
+        lines += [f"## {family}", "", "| code | severity | rule | cause | fix |", "| --- | --- | --- | --- | --- |"]
         for rule in rules().values():
             if rule.code.startswith(letter):
                 lines.append(f"| {rule.code} | {rule.severity} | {rule.title} | {rule.cause} | {rule.mend} |")

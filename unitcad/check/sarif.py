@@ -46,9 +46,17 @@ def _rule(rule: Rule) -> dict[str, Any]:
         "name": "".join(word.capitalize() for word in re.findall(r"[A-Za-z0-9]+", rule.title.replace("'", ""))),
         "shortDescription": {"text": rule.title},
         "fullDescription": {"text": rule.cause},
-        "help": {"text": f"{rule.cause} Mend: {rule.mend}"},
+        "help": {
+            "text": f"{rule.cause} Fix: {rule.mend}",
+            "markdown": f"{_markdown(rule.cause)}\n\n**Fix:** {_markdown(rule.mend)}",
+        },
         "defaultConfiguration": {"level": _LEVELS[rule.severity]},
     }
+
+
+def _markdown(text: str) -> str:
+    """Plain text as Markdown: what would be markup is escaped."""
+    return re.sub(r"([\\`*_{}\[\]<>#|~])", r"\\\1", text)
 
 
 def _result(report: FileReport, found: Finding, index: dict[str, int]) -> dict[str, Any]:
@@ -57,13 +65,15 @@ def _result(report: FileReport, found: Finding, index: dict[str, int]) -> dict[s
     line = next((place.line for place in found.locations if place.line is not None), None)
     if line is not None:
         physical["region"] = {"startLine": max(line, 1)}
+    objects = dict.fromkeys(place.object for place in found.locations if place.object)
+    logical = {"logicalLocations": [{"name": name, "kind": "object"} for name in objects]} if objects else {}
     fingerprint = hashlib.sha256(f"{_uri(_inside(report.path))}\n{found.code}".encode()).hexdigest()
     return {
         "ruleId": found.code,
         "ruleIndex": index[found.code],
         "level": _LEVELS[found.severity],
-        "message": {"text": said(found, 1)},
-        "locations": [{"physicalLocation": physical}],
+        "message": {"text": f"{said(found, 1)}. Fix: {rules()[found.code].mend}"},
+        "locations": [{"physicalLocation": physical, **logical}],
         "partialFingerprints": {"pathAndRule/v1": fingerprint},
         "properties": {"count": found.count, "places": [place.as_dict() for place in found.locations]},
     }

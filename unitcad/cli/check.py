@@ -44,7 +44,7 @@ def check(
         bool, typer.Option(help="Count findings by rule: in place of the text, beside other formats on stderr.")
     ] = False,
     explain: Annotated[
-        str | None, typer.Option(help="Say what a code means, why it matters and how to mend it.")
+        str | None, typer.Option(help="Say what a code means, why it matters and how to fix it.")
     ] = None,
 ) -> None:
     """Judge mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, and STEP with a B-rep extra."""
