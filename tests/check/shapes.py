@@ -69,6 +69,47 @@ def text_stl(triangles: np.ndarray, name: str = "box") -> str:
     return "\n".join([*lines, f"endsolid {name}", ""])
 
 
+def text_ply(corners: np.ndarray, faces: np.ndarray) -> str:
+    """A text PLY of triangles."""
+    head = ["ply", "format ascii 1.0", f"element vertex {len(corners)}", *(f"property double {axis}" for axis in "xyz")]
+    head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    rows = [f"{x:.17g} {y:.17g} {z:.17g}" for x, y, z in corners] + [f"3 {a} {b} {c}" for a, b, c in faces]
+    return "\n".join([*head, *rows, ""])
+
+
+def obj(corners: np.ndarray, faces: np.ndarray) -> str:
+    """A text OBJ of triangles."""
+    rows = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in corners]
+    return "\n".join([*rows, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces), ""])
+
+
+FORMATS = ("binary.stl", "text.stl", "part.ply", "part.obj", "part.3mf")
+
+
+def in_format(triangles: np.ndarray, name: str) -> bytes | str:
+    """Triangles (n, 3, 3) as a file of one of FORMATS; indexed formats list each place once."""
+    if name == "binary.stl":
+        return stl(triangles)
+    if name == "text.stl":
+        return text_stl(triangles)
+    corners, faces = np.unique(np.asarray(triangles, float).reshape(-1, 3), axis=0, return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    if name == "part.3mf":
+        return package(model_xml(f'<object id="1">{mesh_xml(corners, faces)}</object>'))
+    return (text_ply if name == "part.ply" else obj)(corners, faces)
+
+
+def turned(
+    triangles: np.ndarray, seed: int, scale: float = 1.0, shift: float = 0.0, mirror: bool = False
+) -> np.ndarray:
+    """The same body turned by odd angles, scaled, shifted by up to `shift` mm, mirrored; faces still look outwards."""
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn)) * (-1 if mirror else 1)
+    found = np.asarray(triangles, float) @ turn.T * scale + rng.uniform(-shift, shift, 3)
+    return found[:, ::-1] if mirror else found
+
+
 def mesh_xml(corners: np.ndarray = CUBE_CORNERS * 10, faces: np.ndarray = CUBE_FACES, per_face: str = "") -> str:
     """A <mesh> element."""
     points = "".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in corners)

@@ -38,7 +38,7 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
         return Judged(ending([finding("F001", "the mesh has no face")]), facts, None)
     found = topology.judge(mesh, deadline)
     findings = list(found.findings)
-    crossings = crossing.judge(found, deadline) if cross and len(found.kept) else crossing.Crossings()
+    crossings = crossing.judge(found.as_stored(), deadline) if cross and len(found.kept) else crossing.Crossings()
     findings += crossings.findings
     judged = shells.judge(found, crossings.crossed, crossings.touching, deadline)
     findings += judged.findings

@@ -1,52 +1,142 @@
-"""Open edges: whether welding closes them (T006), and which are T-junctions (T005)."""
+"""Open edges: whether welding closes them (T006), and which are T-junctions (T005).
+
+How near two vertices must lie to count as one depends on their own shell and edges, never on what else is in the file.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from unitcad.check.edges import components
-from unitcad.check.mesh import Bools, Floats, Ints, diagonal, float32_step, weld_exact
+from unitcad.check.edges import components, half_edges
+from unitcad.check.mesh import Bools, Floats, Ints, extents, float32_steps, weld_exact
 
-WELD = 1e-5  # of the bounding box's diagonal; six-digit text rounds coordinates by a tenth of this
+WELD = 1e-5  # of the shell's diagonal
+NARROW = 0.1  # of the shortest edge at a vertex
 _CROWD = 30  # pairs within reach a vertex: more means points that lie everywhere, not a seam
 
 
-def tolerance(vertices: Floats) -> float:
-    """How near two vertices must lie to count as one, mm: 1e-5 of the diagonal, or two float32 steps."""
-    return max(WELD * diagonal(vertices), 2 * float32_step(vertices))
+@dataclass(frozen=True)
+class Seams:
+    """Faces with vertices joined: `stored` those in one place, `joined` also those within reach; `whole` are the faces
+    that keep three vertices in `stored`. `reach`: how near to a vertex another one counts as the same, mm (0 where the
+    vertex is on no open edge).
+    """
+
+    stored: Ints
+    joined: Ints
+    whole: Bools
+    reach: Floats
 
 
-def welded(vertices: Floats, faces: Ints, loose: Ints) -> Ints:
-    """The faces with the vertices `loose` joined where they lie within the tolerance; faces may then collapse."""
-    places = vertices[loose]
+def join(vertices: Floats, faces: Ints, loose: Ints) -> Seams:
+    """Join the vertices `loose` (those of open edges).
+
+    Two are joined where they are nearer than a tenth of the shortest edge at either, and than 1e-5 of the diagonal of
+    their shell (or two float32 steps). A shell is here what faces and these joins connect: of all ways to choose it the
+    largest that agrees with itself. No face collapses: joins that would do that are left out.
+    """
+    n = len(vertices)
+    place = np.arange(n, dtype=np.int32)
+    place[loose] = loose[_same_place(vertices[loose])]
+    stored = place[faces]
+    whole = _three(stored)
+    points = np.unique(place[loose])
+    short = _shortest_edges(vertices, stored[whole], points)
+    step = 2 * float32_steps(vertices[points])
+    part = connected(stored, n)
+    boxes = extents(vertices, part, int(part.max()) + 1)
+    mine = part[points]
+
+    def reaches(shell: Ints) -> Floats:
+        low = extents(boxes[0][mine], shell[mine], len(shell))[0]
+        high = extents(boxes[1][mine], shell[mine], len(shell))[1]
+        size = np.linalg.norm((high - low)[shell[mine]], axis=1)
+        return np.minimum(NARROW * short, np.maximum(WELD * size, step))
+
+    reach = reaches(np.zeros(len(boxes[0]), np.int64))
+    pairs, distance = _near(vertices[points], reach)
+    while True:
+        reach = reaches(components(len(boxes[0]), mine[pairs[:, 0]], mine[pairs[:, 1]]))
+        fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
+        if fits.all():
+            break
+        pairs, distance = pairs[fits], distance[fits]
+    everywhere = np.zeros(n)
+    everywhere[points] = reach
+    return Seams(stored, _joined(place, stored, points, pairs), whole, everywhere)
+
+
+def _same_place(places: Floats) -> Ints:
+    """For each of (n, 3) places the first one that is the same."""
     _, same = weld_exact(places.reshape(-1, 1, 3).repeat(3, axis=1))
-    rank = same[:, 0]
-    unique, back = np.unique(rank, return_index=True)
-    new_id = np.searchsorted(unique, rank)
-    points = places[back]
-    joined = _close_groups(points, tolerance(vertices))
-    target = np.arange(len(vertices), dtype=np.int32)
-    group = joined[new_id]
-    _, first = np.unique(group, return_index=True)
-    target[loose] = loose[first[np.searchsorted(np.unique(group), group)]]
-    return target[faces]
+    _, first, rank = np.unique(same[:, 0], return_index=True, return_inverse=True)
+    return first[rank]
 
 
-def _close_groups(points: Floats, reach: float) -> Ints:
+def _three(faces: Ints) -> Bools:
+    return (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+
+
+def connected(faces: Ints, n: int) -> Ints:
+    """For each of `n` vertices which part of the mesh it belongs to: faces connect their vertices."""
+    spokes = np.concatenate([faces[:, 0], faces[:, 0]]), np.concatenate([faces[:, 1], faces[:, 2]])
+    return components(n, *spokes)
+
+
+def _shortest_edges(vertices: Floats, faces: Ints, points: Ints) -> Floats:
+    """The length of the shortest edge at each of `points`, mm."""
+    asked = np.zeros(len(vertices), bool)
+    asked[points] = True
+    start, end = half_edges(faces[asked[faces].any(axis=1)])
+    length = np.linalg.norm(vertices[end] - vertices[start], axis=1)
+    short = np.full(len(vertices), np.inf)
+    np.minimum.at(short, start, length)
+    np.minimum.at(short, end, length)
+    return short[points]
+
+
+def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
+    """Pairs of points within both their reaches, and their distances.
+
+    Points of like reach are searched together, so that a coarse shell does not make a fine one a crowd.
+    """
     from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
-    n = len(points)
-    if n < 2:
-        return np.arange(n)
-    tree = cKDTree(points)
-    if tree.count_neighbors(tree, reach) > _CROWD * n:
-        return np.arange(n)
-    pairs = tree.query_pairs(reach, output_type="ndarray")
-    return components(n, pairs[:, 0], pairs[:, 1])
+    found = [np.empty((0, 2), np.int64)]
+    level = np.ceil(np.log2(np.maximum(reach, 1e-300)) / 2)
+    for size in np.unique(level):
+        some = np.flatnonzero(level >= size)
+        within = float(4.0**size)
+        tree = cKDTree(points[some])
+        if len(some) < 2 or tree.count_neighbors(tree, within) > _CROWD * len(some):
+            continue
+        pairs = some[tree.query_pairs(within, output_type="ndarray")]
+        found.append(pairs[level[pairs].min(axis=1, initial=np.inf) == size])
+    pairs = np.concatenate(found)
+    distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
+    return pairs[fits], distance[fits]
 
 
-def t_junctions(vertices: Floats, low: Ints, high: Ints, reach: float) -> Bools:
-    """Which open edges (low, high) have another vertex of the open border on them.
+def _joined(place: Ints, stored: Ints, points: Ints, pairs: Ints) -> Ints:
+    """The faces with the points of each group of pairs made one, but for groups that would collapse a face."""
+    group = components(len(points), pairs[:, 0], pairs[:, 1])
+    _, first = np.unique(group, return_index=True)
+    target = np.arange(len(place), dtype=np.int32)
+    target[points] = points[first[group]]
+    joined = target[stored]
+    spoilt = joined[_three(stored) & ~_three(joined)].reshape(-1)
+    if len(spoilt):
+        back = np.isin(target, spoilt)
+        target[back] = np.flatnonzero(back)
+        joined = target[stored]
+    return joined
+
+
+def t_junctions(vertices: Floats, low: Ints, high: Ints, reach: Floats) -> Bools:
+    """Which open edges (low, high) have another vertex of the open border on them, within the `reach` of their vertex.
 
     Where a long open edge meets a chain of short ones, the first short one starts at an end of the long one and lies
     along it; so only open edges that share a vertex are compared.
@@ -65,12 +155,13 @@ def t_junctions(vertices: Floats, low: Ints, high: Ints, reach: float) -> Bools:
         if not len(together):
             break
         for a, b in ((together, together + shift), (together + shift, together)):
+            near = reach[here[a]]
             origin = vertices[here[a]]
             along = vertices[there[a]] - origin
             other = vertices[there[b]] - origin
             length = np.linalg.norm(along, axis=1)
             part = np.einsum("ij,ij->i", along, other) / np.maximum(length, 1e-300)
             off = np.linalg.norm(other - along * (part / np.maximum(length, 1e-300))[:, None], axis=1)
-            on = (off <= reach) & (part > reach) & (part < length - reach)
+            on = (off <= near) & (part > near) & (part < length - near)
             hit[edge[a[on]]] = True
     return hit

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from unitcad.check.edges import balanced
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Floats, Ints, diagonal, extent, solid_of
+from unitcad.check.mesh import Bools, Floats, Ints, solid_of
 from unitcad.check.rulebook import finding
-from unitcad.check.topology import Topology
+from unitcad.check.topology import Topology, diagonals
 
-FLAT = 1e-6  # G007: volume over area times size
+FLAT = 1e-6  # G007: a shell's volume over its area times its diagonal
 _BLOCK = 500_000
 
 
@@ -30,17 +31,21 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
     """Apply the rules; `crossed`: some faces cross; `touching` (k, 2): pairs of shells whose faces meet."""
     mesh, labels, n = topology.mesh, topology.shells, topology.n_shells
     vertices, faces = mesh.vertices, mesh.faces
-    volumes, low, high = measures(topology)
+    volumes, low, high = volumes_of(topology), topology.low, topology.high
     found: list[Finding] = []
     if n == 0:
         found.append(finding("G007", "no face has an area"))
-    if not topology.watertight or not topology.oriented or n == 0:
+    sound = _closed(topology)
+    if not sound.any():
         return Shells(volumes, low, high, tuple(found))
-    area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
-    total = float(np.abs(volumes).sum())
-    if total <= FLAT * area * diagonal(vertices):
-        found.append(finding("G007", f"volume {total:.3g} mm3 over {area:.3g} mm2 of surface"))
-        return Shells(volumes, low, high, tuple(found))
+    area = np.bincount(labels, np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)), n) / 2
+    flat = np.abs(volumes) <= FLAT * area * diagonals(low, high)
+    which = np.flatnonzero(sound & flat)
+    if len(which):
+        worst = which[np.argmax(area[which])]
+        text = f"volume {volumes[worst]:.3g} mm3 over {area[worst]:.3g} mm2 of surface"
+        found.append(finding("G007", text, len(which), [_where(low, high, i) for i in which.tolist()]))
+    sound &= ~flat
     depth = np.zeros(n, int)
     overlaps: list[tuple[int, int]] = []
     if n > 1:
@@ -51,6 +56,8 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
         groups = _faces_by_shell(labels, n)
         for a, b in pairs:
             deadline.tick()
+            if not (sound[a] and sound[b]):
+                continue
             if (a, b) in meeting:
                 least = min(abs(volumes[a]), abs(volumes[b]))
                 common = _shared(topology, groups, a, b, volumes)
@@ -64,45 +71,47 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
                     point = vertices[faces[groups[inner][0], 0]]
                     depth[inner] += winding_number(vertices, faces[groups[outer]], point) != 0
     for a in range(n):
-        if depth[a] % 2 and volumes[a] > 0:
+        if sound[a] and depth[a] % 2 and volumes[a] > 0:
             overlaps.append((a, a))
     if overlaps:
         places = [_where(low[list(pair)].max(axis=0)[None], high[list(pair)].min(axis=0)[None], 0) for pair in overlaps]
         text = f"{counted(len(overlaps), 'pair')} of shells that share volume"
         found.append(finding("G002", text, len(overlaps), places))
-    inverted = [i for i in range(n) if depth[i] % 2 == 0 and volumes[i] < 0]
+    inverted = [i for i in range(n) if depth[i] % 2 == 0 and volumes[i] < 0 and sound[i]]
     if inverted and not (crossed and n == 1):
         places = [_where(low, high, i) for i in inverted]
         found.append(finding("T008", counted(len(inverted), "inverted shell"), len(inverted), places))
-    hollow = [i for i in range(n) if depth[i] % 2 and volumes[i] < 0]
+    hollow = [i for i in range(n) if depth[i] % 2 and volumes[i] < 0 and sound[i]]
     if hollow:
         places = [_where(low, high, i) for i in hollow]
         found.append(finding("G006", counted(len(hollow), "closed cavity", "closed cavities"), len(hollow), places))
     return Shells(volumes, low, high, tuple(found))
 
 
-def measures(topology: Topology) -> tuple[Floats, Floats, Floats]:
-    """Signed volume (mm3), low and high corner of each shell; of a single one the box round all vertices."""
-    mesh, labels, n = topology.mesh, topology.shells, topology.n_shells
-    vertices, faces = mesh.vertices, mesh.faces
+def _closed(topology: Topology) -> Bools:
+    """Whether each shell has an inside: all its edges have as many faces one way as the other."""
+    found, edges = np.ones(topology.n_shells, bool), topology.edges
+    if not edges.closed:
+        wrong = np.repeat(~balanced(topology.mesh.faces, edges), edges.size)
+        found[topology.shells[edges.order[wrong] // 3]] = False
+    return found
+
+
+def volumes_of(topology: Topology) -> Floats:
+    """The signed volume of each shell, mm3."""
+    mesh, n = topology.mesh, topology.n_shells
     if not n:
-        return np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
-    low, high = extent(vertices)
-    corner = faces[:, 0]
-    tetra = np.zeros(len(faces))
+        return np.zeros(0)
+    low, high = topology.low.min(axis=0), topology.high.max(axis=0)
+    corner = mesh.faces[:, 0]
+    tetra = np.zeros(len(corner))
     for axis in range(3):
-        height = vertices[:, axis].take(corner)
+        height = mesh.vertices[:, axis].take(corner)
         height -= (low[axis] + high[axis]) / 2
         height *= topology.areas[:, axis]
         tetra += height
     tetra /= 6
-    if n == 1:
-        return np.array([tetra.sum()]), low[None], high[None]
-    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
-    for side in range(3):
-        np.minimum.at(low, labels, vertices[faces[:, side]])
-        np.maximum.at(high, labels, vertices[faces[:, side]])
-    return np.bincount(labels, tetra, n).astype(float), low, high
+    return np.bincount(topology.shells, tetra, n).astype(float) if n > 1 else np.array([tetra.sum()])
 
 
 def winding_number(vertices: Floats, faces: Ints, point: Floats) -> int:

@@ -14,7 +14,7 @@ from unitcad.check import references, scale, schema, topology
 from unitcad.check.findings import Facts, Finding, counted, ending
 from unitcad.check.images import image_kind
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
-from unitcad.check.mesh import LARGEST, Floats, Mesh, cross, diagonal, extent
+from unitcad.check.mesh import LARGEST, Floats, Mesh, cross, extent
 from unitcad.check.model_data import LINE, Model, Object, Use
 from unitcad.check.model_part import read_model
 from unitcad.check.package import Package, Relation
@@ -30,7 +30,6 @@ _IMAGES = {"image/png": "png", "image/jpeg": "jpeg", "image/jpg": "jpeg"}
 _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
 _FILLED = {"G001", "G002"}
-_NO_FACE = np.empty((0, 3), np.int32)
 Key = tuple[str, int]
 
 
@@ -326,11 +325,7 @@ def _geometry(
         worst = placed[int(beyond.argmax())]
         findings.append(finding("V001", f"an instance of object {worst} reaches beyond the float32 numbers"))
         return list(ending(findings)), Facts()
-    sides = np.stack([box[1] - box[0] for box in boxes])
-    across = np.linalg.norm(sides, axis=1)
-    steps = np.spacing(np.abs(corners).max(axis=(1, 2)).astype(np.float32))
-    for i in np.flatnonzero(steps > topology.FAR * across):
-        findings += topology.too_far(Mesh(corners[i], _NO_FACE), diagonal(boxes[i]))
+    findings += topology.too_far(corners, topology.diagonals(*np.swapaxes(np.stack(boxes), 0, 1)))
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     facts = Facts(
         triangles,

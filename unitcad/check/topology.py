@@ -9,12 +9,12 @@ from fractions import Fraction
 import numpy as np
 
 from unitcad.check import edges as mesh_edges
-from unitcad.check import seams
 from unitcad.check.edges import Edges
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Bools, Floats, Ints, Mesh, area_vectors, diagonal, float32_step
+from unitcad.check.mesh import Bools, Floats, Ints, Mesh, area_vectors, extent, extents, float32_step, float32_steps
 from unitcad.check.rulebook import finding
+from unitcad.check.seams import connected, join, t_junctions
 
 FAR = 1e-4  # V002: float32 step over the bounding box's diagonal
 SLIVER = 1e-3  # T011: shortest length of a sliver, as part of the diagonal
@@ -24,9 +24,10 @@ _EXACT = 2000  # faces looked at with exact arithmetic before the float verdict 
 
 @dataclass(frozen=True)
 class Topology:
-    """What the topology rules found out; `mesh` is without degenerate faces and, where that closed it, welded.
+    """What the topology rules found out; `mesh` is without degenerate faces, and its open edges are welded.
 
-    `kept` maps its faces to the file's; `areas` are twice the area vectors, mm2; `shells` labels faces.
+    `kept` maps its faces to the file's; `areas` are twice the area vectors, mm2; `shells` labels faces. `stored` are
+    the faces before welding moved any, with vertices in one place joined. `low` and `high`: each shell's box, mm.
     """
 
     mesh: Mesh
@@ -38,27 +39,41 @@ class Topology:
     watertight: bool
     oriented: bool
     findings: tuple[Finding, ...]
+    stored: Ints
+    low: Floats
+    high: Floats
+
+    def as_stored(self) -> Topology:
+        """The same with every face where the file has it."""
+        if self.stored is self.mesh.faces:
+            return self
+        edges = mesh_edges.edges_of(self.stored, len(self.mesh.vertices))
+        areas = area_vectors(self.mesh.vertices, self.stored)
+        return replace(self, mesh=replace(self.mesh, faces=self.stored), edges=edges, areas=areas)
 
 
 def judge(mesh: Mesh, deadline: Deadline) -> Topology:
     """Apply the topology rules to a mesh with finite vertices."""
     found: list[Finding] = []
+    if mesh.indexed:
+        mesh, found = _referenced(mesh)
     faces, vertices = mesh.faces, mesh.vertices
     repeated = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
     kept = np.arange(len(faces), dtype=np.int32)
     if repeated.any():
         kept = np.flatnonzero(~repeated).astype(np.int32)
         faces = faces[kept]
-    if mesh.indexed:
-        found += _unreferenced(vertices, mesh.faces)
-    found += too_far(mesh, diagonal(vertices))
     edges = mesh_edges.edges_of(faces, len(vertices))
     deadline.tick()
+    stored = faces
     if not edges.closed and (edges.size == 1).any():
-        faces, kept, edges, extra = _open_edges(mesh, faces, kept, edges)
+        faces, stored, kept, edges, extra = _open_edges(mesh, faces, kept, edges)
         found += extra
-    areas = area_vectors(vertices, faces)
-    found += _thin(mesh, faces, kept, areas, np.flatnonzero(repeated))
+    areas = stored_areas = area_vectors(vertices, stored)
+    if mesh.normals is not None:
+        found += _stored_normals(mesh, kept, areas)
+    if stored is not faces:
+        areas = area_vectors(vertices, faces)
     deadline.tick()
     found += _many_faces(mesh, faces, kept, edges)
     across = mesh_edges.opposite(edges, 3 * len(faces)) if edges.closed else None
@@ -70,6 +85,10 @@ def judge(mesh: Mesh, deadline: Deadline) -> Topology:
         twice = _duplicates(faces)
     deadline.tick()
     shells = mesh_edges.shells_of(vertices, faces, edges)
+    low, high = _boxes(vertices, faces, shells)
+    size = diagonals(low, high)
+    found += too_far(np.stack([low, high], axis=1), size)
+    found += _thin(mesh, stored, kept, stored_areas, np.flatnonzero(repeated), size[shells])
     if across is None and len(twice):
         twice = np.setdiff1d(twice, _facing(vertices, faces, edges, areas, shells))
     deadline.tick()
@@ -92,19 +111,20 @@ def judge(mesh: Mesh, deadline: Deadline) -> Topology:
     if len(wrong):
         text = f"{counted(len(wrong), 'edge')} along which more faces run one way than the other"
         found.append(finding("T007", text, len(wrong), _at_edges(mesh, edges, kept, wrong)))
-    if mesh.normals is not None:
-        found += _stored_normals(mesh, kept, areas)
     watertight = bool(len(faces)) and bool((edges.size % 2 == 0).all())
     return Topology(
         replace(mesh, faces=faces, normals=None),
         kept,
         edges,
         shells,
-        int(shells.max(initial=-1)) + 1,
+        len(low),
         areas,
         watertight,
         not len(wrong),
         tuple(found),
+        stored,
+        low,
+        high,
     )
 
 
@@ -126,48 +146,80 @@ def _at_edges(mesh: Mesh, edges: Edges, kept: Ints, which: Ints) -> Iterator[Loc
         yield Location(face=face, xyz=tuple(float(v) for v in middle), object=mesh.name)  # type: ignore[arg-type]
 
 
-def _unreferenced(vertices: Floats, faces: Ints) -> list[Finding]:
-    used = np.zeros(len(vertices), bool)
-    used[faces.reshape(-1)] = True
-    n = len(vertices) - int(np.count_nonzero(used))
-    return [finding("T012", f"{counted(n, 'vertex', 'vertices')} that no face uses", n)] if n else []
+def _referenced(mesh: Mesh) -> tuple[Mesh, list[Finding]]:
+    """The mesh without the vertices that no face uses (T012): they have no part in its size."""
+    used = np.zeros(len(mesh.vertices), bool)
+    used[mesh.faces.reshape(-1)] = True
+    n = len(used) - int(np.count_nonzero(used))
+    if not n:
+        return mesh, []
+    place = np.cumsum(used, dtype=np.int32) - np.int32(1)
+    said = finding("T012", f"{counted(n, 'vertex', 'vertices')} that no face uses", n)
+    return replace(mesh, vertices=mesh.vertices[used], faces=place[mesh.faces]), [said]
 
 
-def too_far(mesh: Mesh, size: float) -> list[Finding]:
-    """V002 for a mesh whose box has the diagonal `size`, mm."""
-    step = float32_step(mesh.vertices)
-    if step <= FAR * size or size == 0:
+def _boxes(vertices: Floats, faces: Ints, shells: Ints) -> tuple[Floats, Floats]:
+    """Low and high corner of each shell, (n, 3) mm."""
+    n = int(shells.max(initial=-1)) + 1
+    if n == 1:
+        low, high = extent(vertices)
+        return low[None], high[None]
+    return extents(vertices[faces.reshape(-1)], np.repeat(shells, 3), n)
+
+
+def diagonals(low: Floats, high: Floats) -> Floats:
+    """The diagonals of boxes, mm."""
+    sides = high - low
+    return np.sqrt(np.einsum("ij,ij->i", sides, sides))
+
+
+def too_far(corners: Floats, size: Floats) -> list[Finding]:
+    """V002 for shells or instances: the low and high corner of each one's box, (n, 2, 3) mm, and its diagonal, mm."""
+    step = float32_steps(corners)
+    far = np.flatnonzero((step > FAR * size) & (size > 0))
+    if not len(far):
         return []
-    return [finding("V002", f"coordinates are {step:.3g} mm apart in float32, the part is {size:.3g} mm across")]
+    worst = far[np.argmax(step[far] / size[far])]
+    text = f"coordinates are {step[worst]:.3g} mm apart in float32, the part is {size[worst]:.3g} mm across"
+    return [finding("V002", text, len(far))]
 
 
-def _open_edges(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints, Ints, Edges, list[Finding]]:
-    """Boundary edges: closed by welding (T006), or T-junctions (T005) and boundaries (T001)."""
+def _open_edges(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints, Ints, Ints, Edges, list[Finding]]:
+    """Boundary edges: closed by welding (T006), or T-junctions (T005) and boundaries (T001).
+
+    Returns the faces welded and as stored, what they are in the file, and the edges of the former.
+    """
     vertices = mesh.vertices
     open_ = np.flatnonzero(edges.size == 1)
-    loose = np.unique(np.concatenate([edges.low[open_], edges.high[open_]]))
-    joined = seams.welded(vertices, faces, loose)
-    whole = (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 2] != joined[:, 0])
-    after = mesh_edges.edges_of(joined[whole], len(vertices))
+    seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])))
+    joined, stored, whole = seams.joined, seams.stored, seams.whole
+    if not whole.all():
+        joined, stored, whole_kept = joined[whole], stored[whole], kept[whole]
+    else:
+        whole_kept = kept
+    if np.array_equal(joined, stored):
+        stored = joined
+    after = mesh_edges.edges_of(joined, len(vertices))
     left = np.flatnonzero(after.size == 1)
-    if not len(left):
-        n = len(open_)
-        places = _at_edges(mesh, edges, kept, open_)
-        said = finding("T006", f"{counted(n, 'open edge')} that welding within the tolerance closes", n, places)
-        return joined[whole], kept[whole], after, [said]
     found = []
-    if len(left) < len(open_):
-        faces, kept, edges, open_ = joined[whole], kept[whole], after, left
-    split = seams.t_junctions(vertices, edges.low[open_], edges.high[open_], seams.tolerance(vertices))
-    if split.any():
-        which = open_[split]
-        found.append(
-            finding("T005", f"{counted(len(which), 'open edge')} with a vertex in between", len(which),
-                    _at_edges(mesh, edges, kept, which))
-        )  # fmt: skip
-    n = len(open_)
-    found.append(finding("T001", counted(n, "boundary edge"), n, _at_edges(mesh, edges, kept, open_)))
-    return faces, kept, edges, found
+    shut = open_
+    if len(left):  # only what belongs to shells without a boundary left
+        part = connected(joined, len(vertices))
+        at = seams.joined[edges.order[edges.first[open_]] // 3, 0]
+        shut = open_[~np.isin(part[at], part[after.low[left]])]
+    if len(shut):
+        text = f"{counted(len(shut), 'open edge')} that welding within the tolerance closes"
+        found.append(finding("T006", text, len(shut), _at_edges(mesh, edges, kept, shut)))
+    if len(left):
+        n = len(left)
+        split = t_junctions(vertices, after.low[left], after.high[left], seams.reach)
+        if split.any():
+            which = left[split]
+            places = _at_edges(mesh, after, whole_kept, which)
+            text = f"{counted(len(which), 'open edge')} with a vertex in between"
+            found.append(finding("T005", text, len(which), places))
+        found.append(finding("T001", counted(n, "boundary edge"), n, _at_edges(mesh, after, whole_kept, left)))
+    return joined, stored, whole_kept, after, found
 
 
 def _many_faces(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> list[Finding]:
@@ -214,16 +266,16 @@ def _facing(vertices: Floats, faces: Ints, edges: Edges, areas: Floats, shells: 
     return np.concatenate([one[touching], other[touching]])
 
 
-def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints) -> list[Finding]:
-    """Degenerate faces (T010) and slivers (T011).
+def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints, size: Floats) -> list[Finding]:
+    """Degenerate faces (T010) and slivers (T011); `size` is the diagonal of each face's shell.
 
     A sliver harms where it is long: its height is below the float32 step, so rounding alone decides where it faces,
-    and it is longer than SLIVER of the part. Short ones vanish in a slicer's own resolution.
+    and it is longer than SLIVER of its shell. Short ones vanish in a slicer's own resolution.
     """
     found, vertices = [], mesh.vertices
     double = np.abs(areas[:, 0]) + np.abs(areas[:, 1]) + np.abs(areas[:, 2])
-    size, step = diagonal(vertices), float32_step(vertices)
-    suspect = np.flatnonzero(double < 8 * max(step, 1e-7 * size) * size)
+    whole, step = float(size.max(initial=0)), float32_step(vertices)
+    suspect = np.flatnonzero(double < 8 * max(step, 1e-7 * whole) * whole)
     corners = vertices[faces[suspect]]
     longest = np.sqrt(max_side_squared(corners))
     flat = _exactly_flat(corners, areas[suspect])
@@ -234,8 +286,7 @@ def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints) ->
         places += list(_at_faces(mesh, kept, faces, lines))
         found.append(finding("T010", f"{counted(n, 'face')} without area", n, places))
     height = np.sqrt(np.einsum("ij,ij->i", areas[suspect], areas[suspect])) / np.maximum(longest, 1e-300)
-    local = np.spacing(np.abs(corners).max(axis=(1, 2), initial=0).astype(np.float32)).astype(float)
-    thin = suspect[~flat & (height < local) & (longest > SLIVER * size)]
+    thin = suspect[~flat & (height < float32_steps(corners)) & (longest > SLIVER * size[suspect])]
     if len(thin):
         found.append(finding("T011", counted(len(thin), "sliver"), len(thin), _at_faces(mesh, kept, faces, thin)))
     return found
