@@ -68,6 +68,23 @@ def started(
                 keeper.kill()
 
 
+@contextlib.contextmanager
+def safe_path() -> Iterator[None]:
+    """Python processes that are started in this block import nothing from the folder that they start in.
+
+    For `multiprocessing`, whose commands are its own; a command of ours has -P.
+    """
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONSAFEPATH"]
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
+
+
 def end_with_parent() -> None:
     """Have the kernel kill this process when its parent ends, even inside a call that never returns; on Linux only."""
     if sys.platform == "linux":

@@ -184,16 +184,16 @@ def _run_with_full_disk(sweep: Path, out: Path, tmp_path: Path) -> subprocess.Co
     site = tmp_path / "site"
     site.mkdir()
     (site / "sitecustomize.py").write_text(
-        "import os, pathlib\n"
-        "write = pathlib.Path.write_bytes\n"
+        "import builtins, os\n"
+        "plain = open\n"
         f"count = {str(tmp_path / 'count')!r}\n"
-        "def full(self, data):\n"
-        "    if self.name == 'manifest.json':\n"
-        "        with open(count, 'a') as file: file.write('x')\n"
+        "def full(path, mode='r', *more, **named):\n"
+        "    if mode == 'xb' and str(path).endswith('manifest.json'):\n"
+        "        with plain(count, 'a') as file: file.write('x')\n"
         "        if os.path.getsize(count) > 3:\n"
-        "            with open('/dev/full', 'wb') as file: file.write(data)\n"
-        "    return write(self, data)\n"
-        "pathlib.Path.write_bytes = full\n"
+        "            path, mode = '/dev/full', 'wb'\n"
+        "    return plain(path, mode, *more, **named)\n"
+        "builtins.open = full\n"
     )
     env = {**environment(), "PYTHONPATH": str(site)}
     return subprocess.run(

@@ -22,6 +22,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from importlib.resources import files
 from typing import IO, Any
 
 from unitcad.batch.frames import receive, send
@@ -128,9 +129,10 @@ class ProcessExecutor(Executor):
 
     def _start(self, slot: int) -> tuple[subprocess.Popen[bytes], IO[bytes]]:
         log = tempfile.TemporaryFile()  # noqa: SIM115  (closed when the worker has ended)
-        code = _START.format(path=[p for p in sys.path if p] or [""], preload=self._preload)
+        path = [*filter(None, sys.path), str(files("unitcad").joinpath(os.pardir))]  # not the working directory
+        code = _START.format(path=path, preload=self._preload)
         child = subprocess.Popen(
-            [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log
+            [sys.executable, "-P", "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log
         )
         if before := self._children.pop(slot, None):
             _close(before)

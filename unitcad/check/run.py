@@ -15,6 +15,7 @@ from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
+from unitcad import children
 from unitcad.check import read_step
 from unitcad.check.check import Options, check_file
 from unitcad.check.findings import FileReport
@@ -118,8 +119,9 @@ def _stopped(path: str, why: str) -> FileReport:
 def _in_processes(work: Sequence[tuple[str, Options]], jobs: int, memory_mb: int | None) -> Iterator[FileReport]:
     left = list(work)
     while left:
-        pool = ProcessPoolExecutor(jobs, get_context("spawn"), _limit_memory, (memory_mb,))
-        futures = [pool.submit(guarded, path, options) for path, options in left]
+        with children.safe_path():
+            pool = ProcessPoolExecutor(jobs, get_context("spawn"), _limit_memory, (memory_mb,))
+            futures = [pool.submit(guarded, path, options) for path, options in left]
         done = 0
         try:
             for future in futures:
@@ -136,7 +138,7 @@ def _in_processes(work: Sequence[tuple[str, Options]], jobs: int, memory_mb: int
 
 
 def _alone(path: str, options: Options, memory_mb: int | None) -> FileReport:
-    with ProcessPoolExecutor(1, get_context("spawn"), _limit_memory, (memory_mb,)) as pool:
+    with children.safe_path(), ProcessPoolExecutor(1, get_context("spawn"), _limit_memory, (memory_mb,)) as pool:
         try:
             return pool.submit(guarded, path, options).result()
         except BrokenProcessPool:
