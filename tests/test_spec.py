@@ -71,7 +71,7 @@ def test_odd_names_survive_the_file() -> None:
         ("encapsulating", "fpcb.pad_diameter_mm=2.0", "fpcb.pad_diameter_mm", 3.0),
         ("embedded", "fpcb.pad_diameter_mm=11.0", "fpcb.pad_diameter_mm", 11.7),
         ("embedded", "fpcb.pad_diameter_mm=15.0", "fpcb.pad_diameter_mm", 14.0),
-        ("encapsulating", "moulds.slot_height_mm=0.2", "moulds.slot_height_mm", 0.31),
+        ("encapsulating", "moulds.slot_height_mm=0.2", "moulds.slot_height_mm", 0.4),
         ("encapsulating", "moulds.least_wall_mm=0.4", "moulds.least_wall_mm", 0.8),
         ("encapsulating", "moulds.skirt_wall_mm=0.5", "moulds.skirt_wall_mm", 0.8),
         ("encapsulating", "moulds.seat_relief_mm=1.8", "moulds.seat_relief_mm", 1.5),
@@ -81,7 +81,7 @@ def test_odd_names_survive_the_file() -> None:
         ("encapsulating", "motor.part='LCM0720'", "motor.part", "LCM0720A3463F"),
         ("encapsulating", "layers.1.material='dragonskin-30'", "layers.1.material", "dragon-skin-30"),
         ("encapsulating", "layers.1.cap_mm=0", "layers.1.cap_mm", 0.5),
-        ("encapsulating", "fpcb.tail_width_mm=0.0", "fpcb.tail_width_mm", 0.001),
+        ("encapsulating", "fpcb.tail_width_mm=0.0", "fpcb.tail_width_mm", 0.4),
         ("encapsulating", "moulds.vents=0", "moulds.vents", 1),
         ("encapsulating", "design='encapsulated'", "design", "encapsulating"),
         ("encapsulating", "output.tolerance_mm=0.5", "output.tolerance_mm", 0.2),
@@ -100,8 +100,8 @@ def test_refused_with_a_nearest_value_that_is_accepted(
     if isinstance(nearest, int | float):
         try:
             load(template, [f"{field}={nearest}"])
-        except Refusal as other:  # another limit may come next
-            assert str(other) != str(refused.value)
+        except Refusal as other:  # another field may have to follow
+            assert other.field != field
 
 
 @pytest.mark.parametrize(

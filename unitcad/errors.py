@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable
 
 
@@ -33,10 +34,14 @@ class Refusal(UnitcadError):
         return {
             "message": str(self),
             "field": self.field,
-            "value": self.value,
+            "value": _plain(self.value),
             "limit": self.limit,
-            "nearest": self.nearest,
+            "nearest": _plain(self.nearest),
         }
+
+
+class UnknownKey(Refusal):
+    """A key that its table does not have; `nearest` is the whole path of the closest one that it has."""
 
 
 def unknown_name(field: str, value: str, known: Iterable[str]) -> Refusal:
@@ -46,17 +51,40 @@ def unknown_name(field: str, value: str, known: Iterable[str]) -> Refusal:
     return Refusal(field, value, f"not known; closest: {', '.join(close)}", close[0] if close else None)
 
 
-def unknown_key(field: str, value: object, known: Iterable[str]) -> Refusal:
+def unknown_key(field: str, value: object, known: Iterable[str]) -> UnknownKey:
     """A refusal of a key that no table has; `field` is its whole path, `known` the keys of that table."""
     table, _, key = field.rpartition(".")
     known = list(known)
     close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
     nearest = f"{table}.{close[0]}" if table and close else close[0] if close else None
-    shown = value if isinstance(value, int | float | str) else str(value)
-    return Refusal(field, shown, f"unknown key; known here: {', '.join(known)}", nearest)
+    return UnknownKey(field, value, f"unknown key; known here: {', '.join(known)}", nearest)
 
 
 def _shown(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
+    value = _plain(value)
     return repr(value) if isinstance(value, str) else str(value)
+
+
+def _plain(value: object) -> bool | int | float | str | None:
+    """A value as JSON has it, and short: numbers that JSON lacks and whatever is long become text."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**_LONGEST:
+        return f"a number of about {round(value.bit_length() * math.log10(2))} digits"
+    if value is None or isinstance(value, bool | int | float):
+        return value
+    text = value if isinstance(value, str) else _text(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+def _text(value: object) -> str:
+    try:
+        return str(value)
+    except (ValueError, RecursionError):  # a number of thousands of digits in it, or it is deeply nested
+        return f"a {type(value).__name__}"
+
+
+_LONGEST = 200
+"""Characters of a value that are shown."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
-from unitcad.spec.fields import alternatives, entry_in, fields_of, table_in
+from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
 
 
 def check_path(path: str, base: dict[str, Any]) -> None:
@@ -28,7 +28,7 @@ def check_path(path: str, base: dict[str, Any]) -> None:
             kind = fields_of(table)[step].type
         elif entry is not None:
             there = node if isinstance(node, list) else []
-            if not step.isdigit() or int(step) >= len(there):
+            if index_in(step, len(there)) is None:
                 known = ", ".join(str(n) for n in range(len(there))) or "none"
                 raise Refusal(path, step, f"there is no such entry in the base's {'.'.join(steps[:i])} (has {known})")
             kind = entry

@@ -42,9 +42,9 @@ MOST = 1_000_000
 class Range(Struct, frozen=True, forbid_unknown_fields=True):
     """`num` values from `start` to `stop`, both among them."""
 
-    start: float
-    stop: float
-    num: Annotated[int, Meta(ge=1)]
+    start: Annotated[float, Meta(ge=-1e12, le=1e12)]
+    stop: Annotated[float, Meta(ge=-1e12, le=1e12)]
+    num: Annotated[int, Meta(ge=1, le=1_000_000_000)]
 
     def __len__(self) -> int:
         return self.num

@@ -51,7 +51,7 @@ def estimate(
 
 def frequencies(text: str) -> list[float]:
     """HZ, or FROM:TO:STEP with both ends, as a list in Hz. Raises `Refusal`."""
-    from unitcad.spec.models import FREQUENCIES_HZ
+    from unitcad.catalogue import FREQUENCIES_HZ
 
     parts = text.split(":")
     try:

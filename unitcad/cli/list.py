@@ -37,6 +37,8 @@ def list_(
 
 
 def _entries(kind: str) -> dict[str, Any]:
+    import msgspec
+
     from unitcad import catalogue
     from unitcad.spec import read, templates
     from unitcad.spec.door import DESIGNS
@@ -51,11 +53,7 @@ def _entries(kind: str) -> dict[str, Any]:
         return {code: rule.title for code, rule in rules().items()}
     found = {"materials": catalogue.materials, "motors": catalogue.motors, "printers": catalogue.printers}[kind]()
     return {
-        name: {
-            key: {k: v for k, v in vars(value).items() if v is not None}
-            for key, value in vars(entry).items()
-            if isinstance(value, catalogue.Value)
-        }
+        name: {key: value for key, value in msgspec.to_builtins(entry).items() if isinstance(value, dict)}
         for name, entry in found.items()
     }
 

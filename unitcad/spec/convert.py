@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from unitcad.errors import Refusal, unknown_key, unknown_name
-from unitcad.spec.fields import alternatives, entry_in, fields_of, notes, table_in
+from unitcad.spec.fields import alternatives, entry_in, fields_of, named_in, table_in
 
 T = TypeVar("T")
 _NAMES = {
@@ -23,24 +23,23 @@ _NAMES = {
     "object": "a table",
     "null": "nothing",
 }
-_BOUND = re.compile(r"Expected `(?P<kind>\w+)`(?P<length> of length)? (?P<sign>[<>]=?) (?P<limit>\S+)")
+_BOUND = re.compile(r"Expected `(?P<kind>\w+)`(?P<length> of length)? (?P<sign>[<>]=) (?P<limit>\S+)")
 _LENGTH = re.compile(r"Expected `array` of length (?P<length>\d+)")
 _KIND = re.compile(r"Expected `(?P<kinds>[^`]+)`")
 _STEP = re.compile(r"\.([^.\[]+)|\[(\d+|\.\.\.)\]")
-_SIGNS = {">": "more than", ">=": "at least", "<": "less than", "<=": "at most"}
-_LEAST = 0.001
-"""What is offered in place of a number that must be above zero: the step in which lengths are typed. A kind may name
-another one (`nearest` in the extra of its Meta)."""
+_LARGEST_INT = 2**63 - 1
+_SIGNS = {">=": "at least", "<=": "at most"}
+DEEPEST = 20
+"""Tables in tables that data may have: more than any spec or sweep needs."""
 
 
 def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
     """`data`, the table at `field`, as a `kind`, types strict. Raises Refusal for the first value that can't be one.
 
-    An infinite number or one that is none is refused wherever it stands.
+    A number that is infinite, huge or none is refused wherever it stands, and so is what nests too deeply. A kind's
+    numbers have limits that they may reach (ge, le), so that a limit is what a refusal can offer.
     """
-    for place, value in _numbers(data, field):
-        if not math.isfinite(value):
-            raise Refusal(place, value, "must be a finite number")
+    check_plain(data, field)
     try:
         return msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
@@ -50,12 +49,17 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
         raise _refusal(before or last, last.removesuffix("`") if before else "", data, kind, field) from None
 
 
-def _numbers(node: Any, field: str) -> Iterator[tuple[str, float]]:
-    if isinstance(node, float):
-        yield field, node
-    elif isinstance(node, Mapping | list | tuple):
+def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
+    """Raise Refusal for a number in plain data that is not finite, and for tables that nest too deeply."""
+    if isinstance(node, float) and not math.isfinite(node):
+        raise Refusal(field, node, "must be a finite number")
+    if isinstance(node, int) and abs(node) > _LARGEST_INT:
+        raise Refusal(field, node, "is too large for a number here")
+    if isinstance(node, Mapping | list | tuple):
+        if depth > DEEPEST:
+            raise Refusal(".".join(field.split(".")[:3]), "...", f"nests more than {DEEPEST} tables deep")
         for key, below in node.items() if isinstance(node, Mapping) else enumerate(node):
-            yield from _numbers(below, _below(field, key))
+            check_plain(below, _below(field, key), depth + 1)
 
 
 def _below(field: str, key: object) -> str:
@@ -73,6 +77,9 @@ def _unknown(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
                 yield from _unknown(below, fields[key].type, place)
             else:
                 yield unknown_key(place, below, fields)
+    elif isinstance(node, Mapping):
+        for key, below in node.items():
+            yield from _unknown(below, named_in(kind), _below(field, key))
     elif isinstance(node, list):
         for i, below in enumerate(node):
             yield from _unknown(below, entry_in(kind, i), _below(field, i))
@@ -89,23 +96,20 @@ def _refusal(what: str, path: str, data: Any, kind: Any, above: str) -> Refusal:
         return Refusal(_below(field, missing), "nothing", "is required")
     if what.startswith("Invalid enum value"):
         return unknown_name(field, value, _words(kind))
-    shown = value if isinstance(value, int | float | str) else str(value)[:60]
     if bound := _BOUND.match(what):
         limit = float(bound["limit"])
         limit = int(limit) if bound["kind"] != "float" else limit
         if bound["length"]:
             of = "characters" if bound["kind"] == "str" else "entries"
             empty = bound["sign"] == ">="
-            return Refusal(field, shown, "must not be empty" if empty else f"must have at most {limit} {of}")
-        least = max((note.extra["nearest"] for note in notes(kind) if note.extra), default=_LEAST)
-        nearest = least if bound["sign"] == ">" else limit
-        return Refusal(field, shown, f"must be {_SIGNS[bound['sign']]} {limit:g}", nearest)
+            return Refusal(field, value, "must not be empty" if empty else f"must have at most {limit} {of}")
+        return Refusal(field, value, f"must be {_SIGNS[bound['sign']]} {limit:g}", limit)
     if length := _LENGTH.match(what):
-        return Refusal(field, shown, f"must have {length['length']} entries")
+        return Refusal(field, value, f"must have {length['length']} entries")
     if kinds := _KIND.match(what):
         names = [_NAMES.get(name, name) for name in kinds["kinds"].split(" | ") if name != "null"]
-        return Refusal(field, shown, f"takes {' or '.join(names)}")
-    return Refusal(field, shown, what.lower())
+        return Refusal(field, value, f"takes {' or '.join(names)}")
+    return Refusal(field, value, what.lower())
 
 
 def _followed(path: str, node: Any, kind: Any) -> tuple[list[str], Any, Any]:
@@ -114,7 +118,7 @@ def _followed(path: str, node: Any, kind: Any) -> tuple[list[str], Any, Any]:
     for name, index in _STEP.findall(path):
         table = table_in(kind)
         if index == "...":
-            kind = next(typing.get_args(k)[1] for k in alternatives(kind) if typing.get_origin(k) is dict)
+            kind = named_in(kind)
             step = next(key for key, below in node.items() if not _fits(below, kind))
         elif index:
             step, kind = index, entry_in(kind, int(index))

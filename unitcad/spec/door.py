@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 from msgspec import structs
 
 from unitcad import catalogue
 from unitcad.errors import Refusal, unknown_name
 from unitcad.spec.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, dimensions
-from unitcad.spec.models import LEAST_LAYER, Spec
+from unitcad.spec.models import LEAST_TAIL, Spec
 from unitcad.spec.own import is_own
 from unitcad.spec.strain import allowed_strain, tail_strain, widest_tail_end
 
@@ -23,8 +22,6 @@ TAIL_SHARE = 0.7
 """Half the tail's width over the core's radius, at most: beyond it the ledge has no shoulders."""
 LEDGE_SHARE = 0.95
 """Half the notch's width over the ledge's radius, at most: beyond it the tongue's round tip has prongs."""
-LEAST_TAIL = 0.4
-"""No circuit's tail is narrower (two traces), mm."""
 SLOT_CLEARANCE = 0.2
 """Least height of the slot over the circuit's thickness, or a wire's on each side of it, mm."""
 UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
@@ -61,12 +58,7 @@ def _checked_own(spec: Spec) -> Spec:
     """A spec whose shapes a function of its own draws: what that function makes of its lengths is not for us to say."""
     if spec.design_source is None:
         raise Refusal("design_source", "nothing", f"is required with design = {spec.design!r}")
-    spec = _with_defaults(spec)
-    for i, layer in enumerate(spec.layers):
-        for field in ("wall_mm", "cap_mm"):
-            if getattr(layer, field) is not None:
-                _at_least(f"layers.{i}.{field}", getattr(layer, field), LEAST_LAYER, "a layer's least thickness is")
-    return spec
+    return _with_defaults(spec)
 
 
 def warnings(spec: Spec) -> list[str]:
@@ -119,15 +111,15 @@ def printer_of(spec: Spec) -> catalogue.Printer:
         for name, value in structs.asdict(spec.moulds).items()
         if hasattr(printer, name) and value is not None and float(getattr(printer, name)) != value
     }
-    return replace(printer, **own)
+    return structs.replace(printer, **own)
 
 
 def _with_defaults(spec: Spec) -> Spec:
     """Every default written out: motor sizes, pad, mould values from the printer, frequency and amplitude."""
     motor = spec.motor
-    catalogue_motor = None
+    catalogue_motor, motors = None, catalogue.motors(spec.motors)
     if motor.part is not None:
-        catalogue_motor = catalogue.choose("motor.part", motor.part, catalogue.motors(spec.motors))
+        catalogue_motor = catalogue.choose("motor.part", motor.part, motors)
         motor = structs.replace(
             motor,
             diameter_mm=motor.diameter_mm or float(catalogue_motor.diameter_mm),
@@ -165,7 +157,8 @@ def _with_defaults(spec: Spec) -> Spec:
         for field, default in unknown.items()
     }
     estimate = structs.replace(spec.estimate, **motor_values)
-    catalogue.tissue(spec.estimate.tissue, spec.tissue)
+    for name in (spec.estimate.tissue, *spec.tissue):
+        catalogue.tissue(name, spec.tissue)
     return structs.replace(spec, motor=motor, moulds=moulds, fpcb=fpcb, estimate=estimate)
 
 
@@ -177,10 +170,6 @@ def _check_layers(spec: Spec) -> None:
             )
         if spec.design == "encapsulating" and layer.cap_mm is None:
             raise Refusal(f"layers.{i}.cap_mm", "nothing", "every encapsulating layer has a cap", layer.wall_mm)
-        for field in ("wall_mm", "cap_mm"):
-            value = getattr(layer, field)
-            if value is not None:
-                _at_least(f"layers.{i}.{field}", value, LEAST_LAYER, "a layer's least thickness is")
 
 
 def _check_motor(spec: Spec, dims: Dimensions) -> None:

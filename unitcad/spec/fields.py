@@ -29,7 +29,16 @@ def alternatives(kind: Any) -> tuple[Any, ...]:
 
 def table_in(kind: Any) -> type[msgspec.Struct] | None:
     """The table among the alternatives of `kind`."""
-    return next((k for k in alternatives(kind) if isinstance(k, type) and issubclass(k, msgspec.Struct)), None)
+    return next((k for k in alternatives(kind) if _is_table(typing.get_origin(k) or k)), None)
+
+
+def _is_table(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+
+
+def named_in(kind: Any) -> Any:
+    """The kind of what lies under any name in a free table that `kind` allows; None where it allows none."""
+    return next((typing.get_args(k)[1] for k in alternatives(kind) if typing.get_origin(k) is dict), None)
 
 
 def entry_in(kind: Any, index: int = 0) -> Any:
@@ -41,6 +50,13 @@ def entry_in(kind: Any, index: int = 0) -> Any:
                 return entries[0]
             return entries[index] if index < len(entries) else None
     return None
+
+
+def index_in(step: str, count: int) -> int | None:
+    """A path's step as an index of a list of `count` entries; None where it is none."""
+    if not (step.isascii() and step.isdigit()) or len(step) > len(str(count)):
+        return None
+    return int(step) if int(step) < count else None
 
 
 def notes(kind: Any) -> Iterator[msgspec.Meta]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import tomllib
@@ -12,12 +13,16 @@ from typing import Any
 
 import msgspec
 
-from unitcad.errors import Refusal, UnitcadError, unknown_name
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, unknown_name
 from unitcad.files import read_text
-from unitcad.spec.convert import convert
+from unitcad.spec.convert import check_plain, convert
 from unitcad.spec.door import checked
+from unitcad.spec.fields import index_in
 from unitcad.spec.models import Spec
 from unitcad.spec.own import with_source
+
+_MOST_LIMITS = 5
+"""Limits of one field that are tried out in turn for a value to offer."""
 
 
 def templates() -> dict[str, Path]:
@@ -59,13 +64,18 @@ def read_toml(path: Path) -> dict[str, Any]:
     text = read_text(path)
     try:
         return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise UnitcadError(f"{path}: not TOML: {error}") from None
+    except RecursionError:
+        raise UnitcadError(f"{path}: nests too deeply") from None
+    except ValueError:
+        raise UnitcadError(f"{path}: holds a number of thousands of digits") from None
 
 
 def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
     """`data` with each "path=value" put in. Raises Refusal for a path that runs through something not there."""
-    result: dict[str, Any] = json.loads(json.dumps(data, default=str))
+    check_plain(data)
+    result: dict[str, Any] = copy.deepcopy(dict(data))
     for text in overrides:
         path, equals, raw = text.partition("=")
         if not equals or not path.strip():
@@ -94,12 +104,36 @@ def put(data: dict[str, Any], path: str, value: Any) -> None:
 
 
 def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
-    """A checked, effective `Spec` of plain data. Raises Refusal for the first thing that can't be.
+    """A checked, effective `Spec` of plain data.
 
     `folder` is where the path of a design of one's own starts, whose file is then read and may run; without one no
-    file is.
+    file is. Raises Refusal for the first thing that can't be; the value that it offers is accepted in that field.
     """
-    return checked(convert(with_source(dict(data), folder) if folder else dict(data), Spec))
+    plain = with_source(dict(data), folder) if folder else dict(data)
+    try:
+        return checked(convert(plain, Spec))
+    except UnknownKey:
+        raise
+    except Refusal as refusal:
+        raise _settled(refusal, plain) from None
+
+
+def _settled(refusal: Refusal, data: dict[str, Any]) -> Refusal:
+    """The refusal, offering a value that passes every check of its field: one limit may lie beyond another."""
+    nearest = refusal.nearest
+    for _ in range(_MOST_LIMITS):
+        if nearest is None:
+            break
+        tried = copy.deepcopy(data)
+        try:
+            put(tried, refusal.field, nearest)
+            checked(convert(tried, Spec))
+        except Refusal as other:
+            if other.field == refusal.field:
+                nearest = other.nearest
+                continue
+        return Refusal(refusal.field, refusal.value, refusal.limit, nearest)
+    return Refusal(refusal.field, refusal.value, refusal.limit)
 
 
 def to_data(spec: Spec) -> dict[str, Any]:
@@ -162,7 +196,7 @@ def _toml(value: Any) -> str:
 def _parsed(raw: str) -> Any:
     try:
         return tomllib.loads(f"value = {raw}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         pass
     try:
         return float(raw)
@@ -171,9 +205,10 @@ def _parsed(raw: str) -> Any:
 
 
 def _index(node: list[Any], step: str, path: str) -> int:
-    if not step.isdigit() or int(step) >= len(node):
+    index = index_in(step, len(node))
+    if index is None:
         raise Refusal(path, step, f"needs an index from 0 to {len(node) - 1} here", len(node) - 1 if node else None)
-    return int(step)
+    return index
 
 
 def _given(node: Any) -> Any:

@@ -5,23 +5,25 @@ Only types and signs are settled here; what depends on several values at once is
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct, structs
 
-FREQUENCIES_HZ = (1.0, 5000.0)
-"""What an estimate may be asked for: vibration motors, with room on both sides; above it waves are too short."""
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
-Length = Annotated[float, Meta(gt=0, le=1000)]
-"""A length in mm: beyond a metre nothing here is printed or cast."""
+from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
+from unitcad.catalogue import entries as kinds
+
 LEAST_LAYER = 0.5
 """Least wall and cap of a layer, mm: thinner ones tear on demoulding and hide a printer's play."""
-Thickness = Annotated[float, Meta(gt=0, le=1000, extra={"nearest": LEAST_LAYER})]
-Count = Annotated[int, Meta(ge=1)]
+LEAST_TAIL = 0.4
+"""No circuit's tail is narrower (two traces), mm."""
+Length = Annotated[float, Meta(ge=0.1, le=kinds.LONGEST_MM)]
+Thickness = Annotated[float, Meta(ge=LEAST_LAYER, le=kinds.LONGEST_MM)]
+CircuitThickness = Annotated[float, Meta(ge=0.01, le=5)]
+Cavities = Annotated[int, Meta(ge=1, le=200)]
+Vents = Annotated[int, Meta(ge=1, le=1000)]
+TailWidth = Annotated[float, Meta(ge=LEAST_TAIL, le=kinds.LONGEST_MM)]
 Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
 Model = Literal["paper", "consistent", "fitted"]
-Entries = dict[str, dict[str, Any]]
 
 
 class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -32,8 +34,8 @@ class MotorTable(Table, frozen=True, kw_only=True):
     """The motor: a catalogue `part`, or its size; a size given beside a part overrides the catalogue's."""
 
     part: str | None = None
-    diameter_mm: Length | None = None
-    thickness_mm: Length | None = None
+    diameter_mm: kinds.MotorDiameter | None = None
+    thickness_mm: kinds.MotorThickness | None = None
     fill: Annotated[bool, Meta(description="Layer 1 reaches the motor: no ring of air between them")] = False
 
 
@@ -41,19 +43,19 @@ class FpcbTable(Table, frozen=True, kw_only=True):
     """The flexible circuit: a round pad on the motor's back and a straight tail to one side or to both."""
 
     tail: Literal["one", "both"] = "one"
-    thickness_mm: Length = 0.11
-    tail_width_mm: Length = 3.0
+    thickness_mm: CircuitThickness = 0.11
+    tail_width_mm: TailWidth = 3.0
     tail_length_mm: Annotated[Length, Meta(description="how far the tail stands out of the body")] = 10.0
     pad_diameter_mm: Length | None = None
-    tail_end_width_mm: Annotated[Length | None, Meta(description="of a tail's free end, which must pass the slot")] = (
-        None
-    )
+    tail_end_width_mm: Annotated[
+        TailWidth | None, Meta(description="of a tail's free end, which must pass the slot")
+    ] = None
 
 
 class WiresTable(Table, frozen=True, kw_only=True):
     """Wires instead of a circuit: side by side, from the motor's side out along +x, through one exit."""
 
-    diameter_mm: Length
+    diameter_mm: Annotated[float, Meta(ge=0.05, le=20)]
     count: Annotated[int, Meta(ge=1, le=8)] = 2
     length_mm: Annotated[Length, Meta(description="how far the wires stand out of the body")] = 10.0
 
@@ -70,57 +72,57 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     """The tooling. Whatever the printer's catalogue entry gives can be overridden; None takes the printer's value."""
 
     printer: str = "fdm-0.4"
-    cavities: tuple[Count, Count] | Literal["fill"] = (1, 1)
-    bed_x_mm: Length | None = None
-    bed_y_mm: Length | None = None
-    bed_z_mm: Length | None = None
-    layer_mm: Length | None = None
-    xy_play_mm: NotNegative | None = None
-    plinth_clearance_mm: Length | None = None
-    seat_relief_mm: Length | None = None
-    slot_height_mm: Length | None = None
-    slot_width_clearance_mm: Length | None = None
-    window_clearance_mm: Length | None = None
-    least_wall_mm: Length | None = None
-    skirt_wall_mm: Length | None = None
-    land_mm: Length | None = None
-    groove_width_mm: Length | None = None
-    groove_depth_mm: Length | None = None
-    filament_hole_mm: Length | None = None
-    engraving_depth_mm: Length | None = None
-    engraving_stroke_mm: Length | None = None
+    cavities: tuple[Cavities, Cavities] | Literal["fill"] = (1, 1)
+    bed_x_mm: kinds.Bed | None = None
+    bed_y_mm: kinds.Bed | None = None
+    bed_z_mm: kinds.Bed | None = None
+    layer_mm: kinds.LayerHeight | None = None
+    xy_play_mm: kinds.Play | None = None
+    plinth_clearance_mm: kinds.PlinthClearance | None = None
+    seat_relief_mm: kinds.SeatRelief | None = None
+    slot_height_mm: kinds.SlotHeight | None = None
+    slot_width_clearance_mm: kinds.SlotClearance | None = None
+    window_clearance_mm: kinds.WindowClearance | None = None
+    least_wall_mm: kinds.Wall | None = None
+    skirt_wall_mm: kinds.Skirt | None = None
+    land_mm: kinds.Land | None = None
+    groove_width_mm: kinds.GrooveWidth | None = None
+    groove_depth_mm: kinds.GrooveDepth | None = None
+    filament_hole_mm: kinds.FilamentHole | None = None
+    engraving_depth_mm: kinds.EngravingDepth | None = None
+    engraving_stroke_mm: kinds.EngravingStroke | None = None
     pour: Literal["open", "injected"] = "open"
-    sprue_mm: Annotated[float, Meta(ge=3.0, description="3 by syringe, 4 by gravity")] = 3.0
+    sprue_mm: Annotated[float, Meta(ge=3.0, le=50, description="3 by syringe, 4 by gravity")] = 3.0
     vents: Annotated[
-        Count | None, Meta(description="of each cavity under a lid; None takes as many as clear the air")
+        Vents | None, Meta(description="of each cavity under a lid; None takes as many as clear the air")
     ] = None
-    filament_mm: Length = 1.75
-    plinth_height_mm: Length = 2.0
-    plate_mm: Length = 4.0
-    ledge_mm: Length = 0.6
+    filament_mm: Annotated[float, Meta(ge=0.1, le=20)] = 1.75
+    plinth_height_mm: Annotated[float, Meta(ge=0.6, le=100)] = 2.0
+    plate_mm: Annotated[float, Meta(ge=0.5, le=100)] = 4.0
+    ledge_mm: Annotated[float, Meta(ge=0.1, le=100)] = 0.6
 
 
 class CastingTable(Table, frozen=True, kw_only=True):
     """The lab: scale, mixing, room and the margin on a silicone's elongation."""
 
-    scale_resolution_g: Positive = 0.01
-    minimum_mix_g: Positive = 2.0
-    waste: Annotated[NotNegative, Meta(description="extra mix as a fraction of what the cavities take")] = 0.5
+    scale_resolution_g: Annotated[float, Meta(ge=1e-6, le=1000)] = 0.01
+    minimum_mix_g: Annotated[float, Meta(ge=0.001, le=1e6)] = 2.0
+    waste: Annotated[float, Meta(ge=0, le=10, description="extra mix as a fraction of what the cavities take")] = 0.5
     room_c: Annotated[float, Meta(ge=5, le=45)] = 23.0
     vacuum: bool = True
     strain_margin: Annotated[
         float,
-        Meta(gt=0, le=1, description="the part of a silicone's elongation at break that demoulding may use"),
+        Meta(ge=0.01, le=1, description="the part of a silicone's elongation at break that demoulding may use"),
     ] = 0.5
 
 
 class EstimateTable(Table, frozen=True, kw_only=True):
     """What the attenuation estimate is asked for; None takes the motor's value."""
 
-    frequency_hz: Annotated[float, Meta(ge=FREQUENCIES_HZ[0], le=FREQUENCIES_HZ[1])] | None = None
-    amplitude_um: Positive | None = None
+    frequency_hz: kinds.Frequency | None = None
+    amplitude_um: kinds.Amplitude | None = None
     tissue: str = "forearm"
-    models: tuple[Model, ...] = ("paper", "consistent", "fitted")
+    models: Annotated[tuple[Model, ...], Meta(min_length=1)] = ("paper", "consistent", "fitted")
 
 
 class OutputTable(Table, frozen=True, kw_only=True):
@@ -135,7 +137,7 @@ class Spec(Table, frozen=True, kw_only=True):
 
     name: Annotated[str, Meta(min_length=1, max_length=120)]
     design: str
-    diameter_mm: Length
+    diameter_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM)]
     motor: MotorTable = MotorTable(part="LCM0720A3463F")
     fpcb: FpcbTable | None = None
     wires: WiresTable | None = None
@@ -144,10 +146,10 @@ class Spec(Table, frozen=True, kw_only=True):
     casting: CastingTable = CastingTable()
     estimate: EstimateTable = EstimateTable()
     output: OutputTable = OutputTable()
-    materials: Entries = {}
-    motors: Entries = {}
-    printers: Entries = {}
-    tissue: dict[str, Entries] = {}
+    materials: dict[str, MaterialEntry] = {}
+    motors: dict[str, MotorEntry] = {}
+    printers: dict[str, PrinterEntry] = {}
+    tissue: dict[str, Annotated[dict[str, TissueEntry], Meta(min_length=1)]] = {}
     parameters: Annotated[
         dict[str, bool | int | float | str], Meta(description="what a design of one's own wants to know besides")
     ] = {}

@@ -1,0 +1,211 @@
+"""What an entry of the catalogue holds: for each key its type, its range and a sentence.
+
+`Material`, `Motor`, `Printer` and `Tissue` are whole entries; the `...Entry` of each is what a spec may give of one.
+"""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct
+
+T = TypeVar("T")
+Status = Literal["datasheet", "paper", "secondary", "assumed", "spec"]
+FREQUENCIES_HZ = (1.0, 5000.0)
+"""What an estimate may be asked for: vibration motors, with room on both sides; above it waves are too short."""
+LONGEST_MM = 1000.0
+"""Beyond a metre nothing here is printed or cast."""
+
+Source = Annotated[str, Meta(min_length=1, max_length=500)]
+Shore = Annotated[str, Meta(min_length=1, max_length=20, description="hardness as the data sheet has it")]
+Technology = Annotated[Literal["fdm", "sla"], Meta(description="molten filament, or cured resin")]
+Density = Annotated[float, Meta(ge=0.1, le=25, description="of the cured silicone")]
+Viscosity = Annotated[float, Meta(ge=1, le=1e8, description="of both parts mixed")]
+PotLife = Annotated[float, Meta(ge=0.1, le=1e5, description="from mixing until it no longer flows")]
+Cure = Annotated[float, Meta(ge=0.01, le=1e4, description="from pouring until it may be demoulded")]
+StaticModulus = Annotated[float, Meta(ge=0.1, le=1e6, description="static, at 100 % strain")]
+Tensile = Annotated[float, Meta(ge=0.001, le=1000, description="strength in tension")]
+Elongation = Annotated[float, Meta(ge=1, le=5000, description="at break")]
+CastingFloor = Annotated[float, Meta(ge=0.01, le=100, description="least wall that pours and demoulds")]
+Poisson = Annotated[float, Meta(ge=0, le=0.5, description="Poisson's ratio; 0.5: incompressible")]
+LossFactor = Annotated[float, Meta(ge=0, le=10, description="tan delta at the motor's frequency")]
+MixRatio = Annotated[float, Meta(ge=0.001, le=1000, description="parts A to one part B")]
+Young = Annotated[float, Meta(ge=0.01, le=1e8, description="Young's modulus at small strain and the motor's frequency")]
+FractionalModulus = Annotated[float, Meta(ge=0.01, le=1e8, description="static shear modulus of a fractional law")]
+FractionalTime = Annotated[float, Meta(ge=0, le=1e9, description="time constant of a fractional law")]
+FractionalOrder = Annotated[float, Meta(ge=0, le=1, description="order of a fractional law")]
+
+MotorDiameter = Annotated[float, Meta(ge=1, le=LONGEST_MM, description="of the motor's can")]
+MotorThickness = Annotated[float, Meta(ge=0.5, le=100, description="of the motor's can, along its axis")]
+Frequency = Annotated[float, Meta(ge=FREQUENCIES_HZ[0], le=FREQUENCIES_HZ[1], description="of the drive")]
+Amplitude = Annotated[float, Meta(ge=0.001, le=1e5, description="of the motor's vibration")]
+Speed = Annotated[float, Meta(ge=60 * FREQUENCIES_HZ[0], le=60 * FREQUENCIES_HZ[1], description="at the rated voltage")]
+Voltage = Annotated[float, Meta(ge=0.01, le=1000, description="rated")]
+Current = Annotated[float, Meta(ge=0.01, le=1e5, description="at the rated voltage")]
+Acceleration = Annotated[float, Meta(ge=0.001, le=1000, description="of the maker's test mass")]
+
+Bed = Annotated[float, Meta(ge=10, le=LONGEST_MM, description="side of the space that the printer fills")]
+LayerHeight = Annotated[float, Meta(ge=0.01, le=2, description="height of a printed layer")]
+Play = Annotated[float, Meta(ge=0, le=2, description="how far the machine's axes miss, per side")]
+PlinthClearance = Annotated[float, Meta(ge=0.01, le=2, description="between a cup and its plinth, per side")]
+SeatRelief = Annotated[float, Meta(ge=0.01, le=20, description="how far a cup's foot stays above the plate")]
+SlotHeight = Annotated[float, Meta(ge=0.05, le=20, description="of the slot that a tail or wires leave through")]
+SlotClearance = Annotated[float, Meta(ge=0.01, le=20, description="what the slot is wider than the tail or the wires")]
+WindowClearance = Annotated[float, Meta(ge=0.01, le=5, description="between the tongue and a cup's window, per side")]
+Wall = Annotated[float, Meta(ge=0.05, le=50, description="least wall that comes out whole")]
+FlatWall = Annotated[float, Meta(ge=0.05, le=50, description="least wall that lies flat on the bed")]
+Feature = Annotated[float, Meta(ge=0.05, le=20, description="least width of a rib, a groove or a stroke")]
+Skirt = Annotated[float, Meta(ge=0.05, le=50, description="wall of a cup round its plinth")]
+Land = Annotated[float, Meta(ge=0.05, le=50, description="width of the rim that a cavity is struck off along")]
+GrooveWidth = Annotated[float, Meta(ge=0.05, le=50, description="of the groove that takes what overflows")]
+GrooveDepth = Annotated[float, Meta(ge=0.05, le=50, description="of the groove that takes what overflows")]
+FilamentHole = Annotated[float, Meta(ge=0.1, le=20, description="of the hole in the core that takes the filament")]
+EngravingDepth = Annotated[float, Meta(ge=0.01, le=10, description="of the lettering")]
+EngravingStroke = Annotated[float, Meta(ge=0.05, le=10, description="width of the lettering's strokes")]
+Draft = Annotated[float, Meta(ge=0, le=45, description="of walls along the direction of draw")]
+Overhang = Annotated[float, Meta(ge=0, le=90, description="most lean from the vertical without support")]
+Bridge = Annotated[float, Meta(ge=0, le=LONGEST_MM, description="longest bridge without support")]
+
+TissueDensity = Annotated[float, Meta(ge=1, le=25000, description="of the tissue")]
+TissueThickness = Annotated[float, Meta(ge=0.001, le=1e4, description="of a layer; the last one has none")]
+TissueModulus = Annotated[float, Meta(ge=0.001, le=1e9, description="at small strain; the shear modulus goes first")]
+TissueViscosity = Annotated[float, Meta(ge=0, le=1e6, description="of shear; it goes before the loss factor")]
+
+
+class Value(Struct, Generic[T], frozen=True, omit_defaults=True, forbid_unknown_fields=True):
+    """A number or a word with where it comes from; `low` and `high` bound it where a range is known."""
+
+    value: T
+    status: Status = "spec"
+    source: Source = "the spec"
+    low: T | None = None
+    high: T | None = None
+
+    def __float__(self) -> float:
+        return float(self.value)  # type: ignore[arg-type]
+
+
+class Material(Struct, frozen=True, kw_only=True):
+    """A castable silicone. Times at 23 degC; `youngs_modulus_kpa`: small strain, the motor's frequency."""
+
+    name: str
+    density_g_cm3: Value[Density]
+    mixed_viscosity_cps: Value[Viscosity]
+    pot_life_min: Value[PotLife]
+    cure_h: Value[Cure]
+    shore: Value[Shore]
+    modulus_100pct_kpa: Value[StaticModulus]
+    tensile_mpa: Value[Tensile]
+    elongation_pct: Value[Elongation]
+    casting_floor_mm: Value[CastingFloor]
+    poisson_ratio: Value[Poisson]
+    loss_factor: Value[LossFactor]
+    mix_ratio: Value[MixRatio]
+    youngs_modulus_kpa: Value[Young] | None = None
+    fractional_mu0_kpa: Value[FractionalModulus] | None = None
+    fractional_tau_us: Value[FractionalTime] | None = None
+    fractional_n: Value[FractionalOrder] | None = None
+
+
+class Motor(Struct, frozen=True, kw_only=True):
+    """A coin ERM motor."""
+
+    name: str
+    diameter_mm: Value[MotorDiameter]
+    thickness_mm: Value[MotorThickness]
+    frequency_hz: Value[Frequency] | None = None
+    amplitude_um: Value[Amplitude] | None = None
+    rpm: Value[Speed] | None = None
+    voltage_v: Value[Voltage] | None = None
+    current_ma: Value[Current] | None = None
+    acceleration_g: Value[Acceleration] | None = None
+
+
+class Printer(Struct, frozen=True, kw_only=True):
+    """What a printer can do and the clearances that follow from it; all lengths mm, clearances per side."""
+
+    name: str
+    technology: Value[Technology]
+    bed_x_mm: Value[Bed]
+    bed_y_mm: Value[Bed]
+    bed_z_mm: Value[Bed]
+    layer_mm: Value[LayerHeight]
+    xy_play_mm: Value[Play]
+    plinth_clearance_mm: Value[PlinthClearance]
+    seat_relief_mm: Value[SeatRelief]
+    slot_height_mm: Value[SlotHeight]
+    slot_width_clearance_mm: Value[SlotClearance]
+    window_clearance_mm: Value[WindowClearance]
+    least_wall_mm: Value[Wall]
+    least_flat_wall_mm: Value[FlatWall]
+    least_feature_mm: Value[Feature]
+    skirt_wall_mm: Value[Skirt]
+    land_mm: Value[Land]
+    groove_width_mm: Value[GrooveWidth]
+    groove_depth_mm: Value[GrooveDepth]
+    filament_hole_mm: Value[FilamentHole]
+    engraving_depth_mm: Value[EngravingDepth]
+    engraving_stroke_mm: Value[EngravingStroke]
+    draft_deg: Value[Draft]
+    overhang_deg: Value[Overhang]
+    bridge_mm: Value[Bridge]
+
+
+class Tissue(Struct, frozen=True, kw_only=True):
+    """One layer of the body under the unit, skin first; no `thickness_mm` means a half-space."""
+
+    name: str
+    density_kg_m3: Value[TissueDensity]
+    poisson_ratio: Value[Poisson]
+    thickness_mm: Value[TissueThickness] | None = None
+    youngs_modulus_kpa: Value[TissueModulus] | None = None
+    shear_modulus_kpa: Value[TissueModulus] | None = None
+    loss_factor: Value[LossFactor] | None = None
+    viscosity_pa_s: Value[TissueViscosity] | None = None
+
+
+def kinds_of(entry: type[Struct]) -> Iterator[tuple[str, Any]]:
+    """The keys of an entry and the kind of value that each takes."""
+    for field in msgspec.structs.fields(entry):
+        for kind in (field.type, *typing.get_args(field.type)):
+            if typing.get_origin(kind) is Value:
+                yield field.name, typing.get_args(kind)[0]
+
+
+def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:
+    """What a spec may give of an entry: a value, or a value with where it comes from; the rest is as in `like`."""
+    said = "where values stand without it"
+    fields: list[tuple[str, Any, Any]] = [
+        *([("like", Annotated[str | None, Meta(description="the shipped entry to start from")], None)] if like else []),
+        ("status", Annotated[Status | None, Meta(description=said)], None),
+        ("source", Annotated[Source | None, Meta(description=said)], None),
+        *((name, kind | Value[kind] | None, None) for name, kind in kinds_of(entry)),
+    ]
+    return msgspec.defstruct(
+        f"{entry.__name__}Entry",
+        fields,
+        module=__name__,
+        namespace={"__doc__": (entry.__doc__ or "").splitlines()[0]},
+        frozen=True,
+        kw_only=True,
+        omit_defaults=True,
+        forbid_unknown_fields=True,
+    )
+
+
+if TYPE_CHECKING:
+
+    class MaterialEntry(Struct): ...
+
+    class MotorEntry(Struct): ...
+
+    class PrinterEntry(Struct): ...
+
+    class TissueEntry(Struct): ...
+
+else:
+    MaterialEntry, MotorEntry, PrinterEntry = map(_entry_of, (Material, Motor, Printer))
+    TissueEntry = _entry_of(Tissue, like=False)
