@@ -1,4 +1,4 @@
-"""Entries of the catalogue: every key has a type, a range and a sentence; shipped entries and a spec's own pass them."""
+"""Entries of the catalogue: every key has a type, a range and a sentence; shipped ones and a spec's own pass them."""
 
 from __future__ import annotations
 
