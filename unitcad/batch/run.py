@@ -199,7 +199,7 @@ class _Batch:
             try:
                 spec = self.sweep.spec(index)
             except UnitcadError as error:
-                self._finished(tasks.failure(index, error))
+                self._finished(Outcome(index, tasks.REFUSED, reason=tasks.failure(index, error).reason))
                 continue
             identity = int(folder_name(spec)[-12:], 16)
             first = self.seen.setdefault(identity, index)
@@ -321,7 +321,8 @@ class _Batch:
             if len(summary.failures) < MOST_FAILURES_TOLD:
                 entry = self.journal.entry(outcome.index) or {}
                 summary.failures.append({k: entry.get(k, "") for k in ("index", "status", "reason", "folder")})
-            if fresh and not self.options.keep_going:
+            # A refused variant says nothing of the others; what broke or failed may happen to each.
+            if fresh and outcome.status != tasks.REFUSED and not self.options.keep_going:
                 summary.stopped = summary.stopped or f"variant {outcome.index}: {outcome.reason}"
         self.watch(summary, outcome)
 

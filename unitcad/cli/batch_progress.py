@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 from unitcad.batch.run import Summary, Watch
 from unitcad.batch.task import Outcome
+from unitcad.cli.output import console
 
 
 @contextlib.contextmanager
@@ -43,7 +44,6 @@ def _line(summary: Summary, outcome: Outcome | None) -> None:
 
 @contextlib.contextmanager
 def _bar() -> Iterator[Watch]:
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
@@ -52,7 +52,7 @@ def _bar() -> Iterator[Watch]:
         TextColumn("{task.fields[rate]:.1f}/s  reused {task.fields[reused]}  failed {task.fields[failed]}"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True)) as progress:
+    with Progress(*columns, console=console(stderr=True)) as progress:
         shown = progress.add_task("", total=None, rate=0.0, reused=0, failed=0)
 
         def watch(summary: Summary, outcome: Outcome | None) -> None:

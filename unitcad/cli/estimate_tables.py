@@ -4,45 +4,43 @@ from __future__ import annotations
 
 from typing import Any
 
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from unitcad.cli.estimate import level
+from unitcad.cli.output import console
 
 
 def print_estimate(data: dict[str, Any]) -> None:
     """Models against each other, the paper's constraints, the layered curve, what is assumed."""
-    console = Console(highlight=False)
+    screen = console()
     variant = data["variant"]
     layers = " / ".join(layer["material"] for layer in variant["layers"])
-    console.print(
-        f"[bold]{escape(variant['name'])}[/bold]: {variant['design']}, {layers}, "
-        f"{level(variant['frequency_hz'], digits=4)} Hz"
-    )
-    console.print(_models(data))
-    console.print(_errors(data))
+    rest = f": {variant['design']}, {layers}, {level(variant['frequency_hz'], digits=4)} Hz"
+    screen.print(Text.assemble((variant["name"], "bold"), rest))
+    screen.print(_models(data))
+    screen.print(_errors(data))
     for reason in _reasons(data):
-        console.print(f"  {reason}", soft_wrap=True)
+        screen.print(f"  {reason}", soft_wrap=True)
     paper = data["models"].get("paper", {})
     if paper.get("constraints"):
-        console.print(_constraints(paper["constraints"]))
+        screen.print(_constraints(paper["constraints"]))
     if paper.get("readings") and paper["readings"][0]["hierarchical_over_control"]:
-        console.print(_readings(paper["readings"]))
-    console.print(_curve(data["layered"]))
-    console.print(
+        screen.print(_readings(paper["readings"]))
+    screen.print(_curve(data["layered"]))
+    screen.print(
         f"  no hierarchical / control from the layers: {data['layered']['hierarchical_over_control_reason']}",
         soft_wrap=True,
     )
     for line in data["assumptions"]:
-        console.print(f"  {escape(line)}", soft_wrap=True)
+        screen.print(f"  {line}", soft_wrap=True)
 
 
 def print_frequencies(data: dict[str, Any]) -> None:
     """A row per frequency: edge level by model, decay of the skin's motion by distance."""
     rows = data["frequencies"]
     table = Table(
-        "Hz", title=f"{escape(data['variant']['name'])}: edge level (motor = 1); |u_z| over its value at the edge"
+        "Hz", title=f"{data['variant']['name']}: edge level (motor = 1); |u_z| over its value at the edge"
     )
     for model in rows[0]["edge_level"]:
         table.add_column(model)
@@ -51,7 +49,7 @@ def print_frequencies(data: dict[str, Any]) -> None:
     for row in rows:
         decay = [f"{value:.3g}" for value in row["u_z_over_edge"].values()]
         table.add_row(f"{row['frequency_hz']:g}", *[level(one) for one in row["edge_level"].values()], *decay)
-    Console(highlight=False).print(table)
+    console().print(table)
 
 
 def _models(data: dict[str, Any]) -> Table:
@@ -88,7 +86,7 @@ def _errors(data: dict[str, Any]) -> Table:
 
 def _reasons(data: dict[str, Any]) -> list[str]:
     found = [block["edge_level"].get("reason") for block in data["models"].values()]
-    return [escape(reason) for reason in dict.fromkeys(found) if reason]
+    return [reason for reason in dict.fromkeys(found) if reason]
 
 
 def _constraints(rows: list[dict[str, Any]]) -> Table:

@@ -6,9 +6,12 @@ import contextlib
 import json
 import sys
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from unitcad.errors import UnitcadError
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 def print_json(data: Any) -> None:
@@ -23,13 +26,21 @@ def say_error(error: UnitcadError, as_json: bool) -> None:
         print_json({"error": error.as_dict()})
 
 
+def console(stderr: bool = False) -> Console:
+    """Where rich draws. Text is shown as it is: a name may hold square brackets, or colons that spell an emoji."""
+    from rich.console import Console
+
+    return Console(markup=False, emoji=False, highlight=False, stderr=stderr)
+
+
 @contextlib.contextmanager
 def progress(name: str) -> Iterator[Callable[[str], None]]:
     """A spinner with the stage of work on a terminal; silent in a pipe. Yields the function that names the stage."""
     if not sys.stderr.isatty():
         yield lambda stage: None
         return
-    from rich.console import Console
+    from rich.text import Text
 
-    with Console(stderr=True).status(name) as status:
-        yield lambda stage: status.update(f"{name}: {stage}")
+    # As Text: a spinner reads markup whatever its console is told.
+    with console(stderr=True).status(Text(name)) as status:
+        yield lambda stage: status.update(Text(f"{name}: {stage}"))
