@@ -2,69 +2,67 @@
 
 <out>/batch.lock      held while a batch runs: a second one in the same folder is refused
 <out>/journal.jsonl   a head that says which batch this is, then a line a finished variant; the last one counts
+
+Each line ends with a checksum over itself and over what the batch is. A line that was damaged, or that belongs to
+another batch, is left out, and its variant is looked at again.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import zlib
 from array import array
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from filelock import FileLock, Timeout
 
 from unitcad.errors import UnitcadError
 
-JOURNAL, LOCK = "journal.jsonl", "batch.lock"
+JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
 NOT_THERE = -1
+FORMAT = 2
+"""Of the journal's lines. The first had no checksum; what wrote it was another version of the code, so it begins anew."""
+LONGEST = 1 << 26
+"""Bytes of a line; what is longer was not written by us."""
 
 
 class Journal:
-    """The journal of one output folder, open and locked. `done(index)` says whether a variant was ended well before.
+    """The journal of one output folder, open and locked; `damaged` counts the lines that were left out.
 
     Raises UnitcadError for a folder that isn't ours, that holds another batch, or in which a batch is running.
     """
 
     def __init__(self, out: Path, head: dict[str, Any]) -> None:
-        self.out = out
-        self._lock = _lock(out)
+        self.out, self.head = out, {"format": FORMAT, **head}
+        self._seed = zlib.crc32(_text(self.head))
         self._lines = array("q")
-        self.counts: dict[str, int] = {}
-        path = out / JOURNAL
+        self.damaged = 0
+        self._lock = _lock(out, head)
         try:
-            fresh = not path.exists() or not _fits(path, head)
+            self._file = self._open(out / JOURNAL)
         except BaseException:
             self._lock.release()
             raise
-        self._file = open(path, "ab+" if not fresh else "wb+")  # noqa: SIM115
-        if fresh:
-            self._append(head)
-        else:
-            self._scan()
-
-    def done(self, index: int) -> bool:
-        """Whether a variant is finished, with or without a broken law, and its folder is there."""
-        entry = self.entry(index)
-        if entry is None or entry["status"] not in ("ok", "broken"):
-            return False
-        return (self.out / entry["folder"] / "manifest.json").is_file() if entry.get("folder") else True
 
     def add(self, entry: dict[str, Any]) -> None:
         """Write one variant's end. Raises OSError."""
-        self._note(entry["index"], self._append(entry))
+        start = self._file.seek(0, os.SEEK_END)
+        self._file.write(_packed(entry, self._seed))
+        self._file.flush()
+        self._note(entry["index"], start)
 
     def entry(self, index: int) -> dict[str, Any] | None:
-        """What was written last of a variant; a variant equal to an earlier one gets that one's entry."""
-        if index >= len(self._lines) or self._lines[index] == NOT_THERE:
+        """What was written last of a variant; a variant equal to another one gets that one's entry."""
+        found = self._own(index)
+        if found is None or "same_as" not in found:
+            return found
+        other = self._own(found["same_as"])
+        if other is None or "same_as" in other:
             return None
-        self._file.seek(self._lines[index])
-        found = json.loads(self._file.readline())
-        if "same_as" in found:
-            other = self.entry(found["same_as"])
-            return None if other is None else {**other, "index": index, "values": found["values"]}
-        return found
+        return {**other, "index": index, "values": found["values"]}
 
     def entries(self) -> Iterator[dict[str, Any]]:
         """Every variant's entry in the sweep's order, read one by one."""
@@ -75,36 +73,129 @@ class Journal:
         self._file.close()
         self._lock.release()
 
-    def _append(self, entry: dict[str, Any]) -> int:
-        start = self._file.seek(0, os.SEEK_END)
-        self._file.write(json.dumps(entry, ensure_ascii=False, allow_nan=False).encode() + b"\n")
-        self._file.flush()
-        return start
+    def _own(self, index: int) -> dict[str, Any] | None:
+        if index >= len(self._lines) or self._lines[index] == NOT_THERE:
+            return None
+        self._file.seek(self._lines[index])
+        return _unpacked(self._file.readline(LONGEST), self._seed)
 
     def _note(self, index: int, offset: int) -> None:
         while len(self._lines) <= index:
             self._lines.append(NOT_THERE)
         self._lines[index] = offset
 
-    def _scan(self) -> None:
-        """Find every line; a last one that a kill tore is cut off."""
-        self._file.seek(0)
-        offset = len(self._file.readline())
-        while line := self._file.readline():
-            try:
-                self._note(json.loads(line)["index"], offset)
-            except (ValueError, KeyError):
-                self._file.truncate(offset)
-                break
+    def _open(self, path: Path) -> IO[bytes]:
+        """The journal's file with whole lines only: those of this batch, or just a head."""
+        going_on = path.exists() and self._goes_on(path)
+        if not going_on or self.damaged or not _ended(path):
+            fresh = path.with_name(f".tmp-{path.name}")
+            fresh.unlink(missing_ok=True)
+            with open(fresh, "xb") as file:
+                file.write(_packed(self.head, 0))
+                if going_on:
+                    file.writelines(line for line, _ in self._entries(path))
+                file.flush()
+                os.fsync(file.fileno())
+            fresh.replace(path)
+        file = open(path, "ab+")  # noqa: SIM115
+        file.seek(0)
+        offset = len(file.readline())
+        for line, entry in self._entries(path):
+            self._note(entry["index"], offset)
             offset += len(line)
+        return file
+
+    def _goes_on(self, path: Path) -> bool:
+        """Whether a journal is this batch's, of this version of the code; counts the lines that are damaged.
+
+        Raises UnitcadError where the folder holds another batch.
+        """
+        if path.is_symlink() or not path.is_file():
+            raise UnitcadError(f"{path}: is not a file; choose another folder with -o")
+        with open(path, "rb") as file:
+            first = file.readline(LONGEST)
+            whole = sum(1 for _ in self._entries(path))
+            there = _head(first)
+            torn = not _packed(self.head, 0) == first
+            if there is None and whole == 0:
+                if first.strip(b"\0 \n") and not _packed(self.head, 0).startswith(first):
+                    raise UnitcadError(
+                        f"{path}: is no journal of a batch, or damaged in whole; choose another folder with -o, or delete "
+                        "the journal to have finished variants looked at again"
+                    )
+                return False
+            if there is not None and there["batch"] != self.head["batch"]:
+                raise _another(path.parent, there["name"])
+            if there is not None and there != self.head:
+                return False
+            self.damaged = sum(1 for line in _lines(file)) - whole + torn
+        return True
+
+    def _entries(self, path: Path) -> Iterator[tuple[bytes, dict[str, Any]]]:
+        """The lines below the head that are whole, and what they hold."""
+        with open(path, "rb") as file:
+            file.readline(LONGEST)
+            for line in _lines(file):
+                entry = _unpacked(line, self._seed)
+                if entry is not None:
+                    yield line, entry
 
 
-def _lock(out: Path) -> FileLock:
+def _lines(file: IO[bytes]) -> Iterator[bytes]:
+    """The rest of a file by lines; a last one that lacks its end has it."""
+    while line := file.readline(LONGEST):
+        yield line if line.endswith(b"\n") else line + b"\n"
+
+
+def _ended(path: Path) -> bool:
+    with open(path, "rb") as file:
+        file.seek(-1, os.SEEK_END)
+        return file.read() == b"\n"
+
+
+def _text(data: dict[str, Any]) -> bytes:
+    return json.dumps(data, ensure_ascii=False, allow_nan=False).encode()
+
+
+def _packed(data: dict[str, Any], seed: int) -> bytes:
+    """A line: JSON whose last key is the checksum of what stands before it."""
+    text = _text(data)[:-1]
+    return text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed)
+
+
+def _unpacked(line: bytes, seed: int) -> dict[str, Any] | None:
+    """What a line holds; None where it is damaged or of another batch."""
+    text, _, _ = line.rpartition(b', "crc": "')
+    if line != text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed):
+        return None
+    return json.loads(text + b"}")
+
+
+def _head(line: bytes) -> dict[str, Any] | None:
+    """A journal's head, with a checksum or, as of before there was one, without; None where it is none."""
+    found = _unpacked(line, 0)
+    if found is None:
+        try:
+            found = json.loads(line)
+            assert found["batch"] and found["name"] and "format" not in found
+        except (ValueError, KeyError, TypeError, AssertionError, RecursionError):
+            return None
+    return found
+
+
+def _another(out: Path, name: str) -> UnitcadError:
+    return UnitcadError(
+        f"{out}: holds another batch ({name}, or the same with other values or options); "
+        "choose another folder with -o, or delete it"
+    )
+
+
+def _lock(out: Path, head: dict[str, Any]) -> FileLock:
     lock = FileLock(out / LOCK, blocking=False, thread_local=False)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        if not (out / JOURNAL).exists() and any(path.name != LOCK for path in out.iterdir()):
-            raise UnitcadError(f"{out}: holds something that is no batch's result; choose another folder with -o")
+        if not (out / JOURNAL).exists():
+            _check_free(out, head)
         lock.acquire()
     except (FileExistsError, NotADirectoryError):
         raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o") from None
@@ -117,23 +208,16 @@ def _lock(out: Path) -> FileLock:
     return lock
 
 
-def _fits(path: Path, head: dict[str, Any]) -> bool:
-    """Whether a journal is this batch's; False where it is, but of another version of the code.
-
-    Raises UnitcadError where the folder holds another batch.
-    """
-    with open(path, "rb") as file:
-        line = file.readline()
-    if not line.strip():
-        return False
+def _check_free(out: Path, head: dict[str, Any]) -> None:
+    """Refuse a folder without a journal that holds something, unless it is this batch's and has lost it."""
+    if all(path.name == LOCK for path in out.iterdir()):
+        return
+    if not (out / LOCK).exists():
+        raise UnitcadError(f"{out}: holds something that is no batch's result; choose another folder with -o")
     try:
-        there = json.loads(line)
-        batch, name = there["batch"], there["name"]
-    except (ValueError, KeyError, TypeError):
-        raise UnitcadError(f"{path}: is no journal of a batch; choose another folder with -o") from None
-    if batch != head["batch"]:
-        raise UnitcadError(
-            f"{path.parent}: holds another batch ({name}, or the same with other values or options); "
-            "choose another folder with -o, or delete it"
-        )
-    return there == head
+        there = json.loads((out / TABLE).read_bytes())
+        name, same = there["name"], there["batch"] == head["batch"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return  # it was interrupted before there was a table
+    if not same:
+        raise _another(out, name)

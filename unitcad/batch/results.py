@@ -27,7 +27,7 @@ def write_results(
 
 def write_timings(out: Path, summary: Any, workers: int) -> None:
     """What this run did and how fast: not part of what is the same from run to run."""
-    told = {key: value for key, value in vars(summary).items() if key != "failures"}
+    told = {key: value for key, value in vars(summary).items() if key not in ("failures", "warnings")}
     fresh = summary.done - summary.taken_up
     told["variants_per_second"] = round(fresh / summary.seconds, 2) if summary.seconds else None
     files.write(out / "timings.json", (json.dumps({"workers": workers, **told}, indent=1) + "\n").encode())

@@ -18,7 +18,7 @@ from unitcad import __version__
 from unitcad.batch import task as tasks
 from unitcad.batch.away import Receiver
 from unitcad.batch.executors import ProcessExecutor
-from unitcad.batch.journal import Journal
+from unitcad.batch.journal import JOURNAL, Journal
 from unitcad.batch.results import columns_of, write_results, write_timings
 from unitcad.batch.sweep import MOST, Sweep
 from unitcad.batch.task import Job, Outcome, Task
@@ -66,6 +66,7 @@ class Summary:
     seconds: float = 0.0
     stopped: str = ""
     failures: list[dict[str, Any]] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
 
 Watch = Callable[[Summary, Outcome | None], None]
@@ -97,6 +98,10 @@ def run(
     if executor is None:
         executor = own = ProcessExecutor(workers)
     batch = _Batch(sweep, out, only, options, executor, workers, away, watch, journal, store, Summary(count))
+    if journal.damaged:
+        batch.summary.warnings.append(
+            f"{out / JOURNAL}: damaged in {journal.damaged} lines; their variants were looked at again"
+        )
     start = time.perf_counter()
     try:
         clear_leftovers(out)
@@ -168,6 +173,7 @@ class _Batch:
         self.receiver = Receiver(out, store) if away else None
         self.room = 2 * workers
         self.coming = iter(range(summary.variants))
+        self.failed_before: deque[int] = deque()
         self.groups: dict[str, _Group] = {}
         self.waiting = 0
         self.again: deque[tuple[str, Job]] = deque()
@@ -190,11 +196,18 @@ class _Batch:
     def _fill(self) -> None:
         """Bring variants into the window, those that are done or can't be noted at once."""
         while self.waiting < WINDOW and not self.summary.stopped:
-            index = next(self.coming, None)
+            index, again = next(self.coming, None), True
             if index is None:
-                return
-            if self.journal.done(index):
-                self._finished(Outcome(index, (self.journal.entry(index) or {})["status"]), fresh=False)
+                if not self.failed_before:
+                    return
+                index, again = self.failed_before.popleft(), False
+            entry = self.journal.entry(index)
+            if entry is not None and self._stands(entry):
+                self._finished(Outcome(index, entry["status"]), fresh=False)
+                continue
+            if entry is not None and entry["status"] == tasks.FAILED and again:
+                # What failed before comes last: a batch that stops at a failure has made all others by then.
+                self.failed_before.append(index)
                 continue
             try:
                 spec = self.sweep.spec(index)
@@ -210,6 +223,12 @@ class _Batch:
             key = geometry_key(spec, self.only, self.options.check)
             self.groups.setdefault(key, _Group()).jobs.append(Job(index, to_json(spec)))
             self.waiting += 1
+
+    def _stands(self, entry: dict[str, Any]) -> bool:
+        """Whether a variant is finished, with or without a broken law, and its folder is whole."""
+        if entry["status"] not in (tasks.OK, tasks.BROKEN):
+            return False
+        return not entry["folder"] or (self.out / entry["folder"] / "manifest.json").is_file()
 
     def _give_out(self) -> None:
         """Keep every worker busy, and one task ahead for each."""

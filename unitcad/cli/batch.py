@@ -93,6 +93,8 @@ def batch(
 
 
 def _tell(summary: Summary, folder: Path) -> None:
+    for warning in summary.warnings:
+        typer.echo(f"warning: {warning}", err=True)
     for failure in summary.failures:
         typer.echo(f"variant {failure['index']}: {failure['status']}: {failure['reason']}", err=True)
     if summary.failed > len(summary.failures):

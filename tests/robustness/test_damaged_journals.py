@@ -1,0 +1,224 @@
+"""A journal that was damaged: what is left of it is true, and nothing ends in anything but one clear error."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from unitcad.batch.journal import JOURNAL, Journal
+from unitcad.errors import UnitcadError
+
+HEAD = {"batch": "0123456789abcdef", "name": "rings", "mode": "product", "code": "0.1.0+abc"}
+VARIANTS = 12
+
+
+def _entry(index: int, tries: int = 0) -> dict:
+    row = {"name": f"n{index}", "diameter_mm": 14.0 + index / 7, "laws": tries}
+    return {"index": index, "status": "ok", "reason": "", "folder": "", "values": {"a": index}, "row": row}
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> bytes:
+    """A journal of VARIANTS variants, some written twice, two equal to an earlier one."""
+    journal = Journal(tmp_path / "whole", HEAD)
+    for index in range(VARIANTS):
+        journal.add({"index": index, "same_as": index - 3, "values": {"a": -index}} if index in (5, 9) else _entry(index))
+        if index % 4 == 3:
+            journal.add(_entry(index, 1))
+    journal.close()
+    return (tmp_path / "whole" / JOURNAL).read_bytes()
+
+
+def _true(index: int) -> list[dict]:
+    """What may be told of a variant."""
+    if index in (5, 9):
+        return [{**_entry(index - 3), "index": index, "values": {"a": -index}}]
+    return [_entry(index), _entry(index, 1)]
+
+
+def _open(folder: Path, content: bytes) -> tuple[list[dict], int]:
+    """The entries of a journal of that content, opened twice; how many lines were left out."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / JOURNAL).write_bytes(content)
+    journal = Journal(folder, HEAD)
+    try:
+        found, damaged = list(journal.entries()), journal.damaged
+        journal.add(_entry(VARIANTS))
+    finally:
+        journal.close()
+    again = Journal(folder, HEAD)
+    seen = list(again.entries()), again.damaged
+    again.close()
+    assert seen == ([*found, _entry(VARIANTS)], 0)
+    return found, damaged
+
+
+def _flipped(content: bytes, dice: random.Random) -> bytes:
+    found = bytearray(content)
+    for _ in range(dice.randint(1, 8)):
+        found[dice.randrange(len(found))] ^= 1 << dice.randrange(8)
+    return bytes(found)
+
+
+def _lines(content: bytes, dice: random.Random, change: Callable[[list[bytes], int], None]) -> bytes:
+    lines = content.splitlines(keepends=True)
+    change(lines, dice.randrange(1, len(lines)))
+    return b"".join(lines)
+
+
+def _swap(lines: list[bytes], at: int) -> None:
+    lines[at], lines[1] = lines[1], lines[at]
+
+
+def _block(content: bytes, dice: random.Random, byte: bytes) -> bytes:
+    start = dice.randrange(len(content))
+    return content[:start] + byte * dice.randint(1, 600) + content[start + dice.randint(0, 600) :]
+
+
+def _changed_value(content: bytes, dice: random.Random) -> bytes:
+    """A line that is still JSON and says something else."""
+    return _lines(content, dice, lambda lines, at: lines.__setitem__(at, lines[at].replace(b'"laws": 0', b'"laws": 7')))
+
+
+RANDOM = {
+    "cut": lambda content, dice: content[: dice.randrange(len(content))],
+    "flipped": _flipped,
+    "zeros": lambda content, dice: _block(content, dice, b"\0"),
+    "junk": lambda content, dice: _block(content, dice, dice.randbytes(1)),
+    "newlines": lambda content, dice: _block(content, dice, b"\n"),
+    "line gone": lambda content, dice: _lines(content, dice, lambda lines, at: lines.pop(at)),
+    "line twice": lambda content, dice: _lines(content, dice, lambda lines, at: lines.insert(1, lines[at])),
+    "lines swapped": lambda content, dice: _lines(content, dice, _swap),
+    "lines glued": lambda content, dice: _lines(
+        content, dice, lambda lines, at: lines.__setitem__(at, lines[at].rstrip(b"\n"))
+    ),
+    "value changed": _changed_value,
+    "head gone": lambda content, dice: content.partition(b"\n")[2],
+}
+
+
+def _hold_to_truth(folder: Path, content: bytes) -> None:
+    try:
+        found, _ = _open(folder, content)
+    except UnitcadError as error:
+        assert "no journal of a batch" in str(error)
+        assert (folder / JOURNAL).read_bytes() == content
+        return
+    for entry in found:
+        assert entry in _true(entry["index"]), entry
+
+
+@pytest.mark.parametrize("kind", RANDOM)
+def test_what_is_left_is_true(kind: str, whole: bytes, tmp_path: Path) -> None:
+    for seed in range(4):
+        _hold_to_truth(tmp_path / f"{kind}{seed}", RANDOM[kind](whole, random.Random(f"{kind} {seed}")))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", RANDOM)
+def test_what_is_left_is_true_of_many(kind: str, whole: bytes, tmp_path: Path) -> None:
+    for seed in range(1000):
+        _hold_to_truth(tmp_path / f"{kind}{seed}", RANDOM[kind](whole, random.Random(f"{kind} {seed}")))
+
+
+def _hold_to_tear(folder: Path, whole: bytes, cut: int) -> None:
+    """All that stands before the tear is there, also where only the last line's end is missing."""
+    head, *lines = whole.splitlines(keepends=True)
+    complete, position = [], len(head)
+    while lines and position + len(lines[0]) - 1 <= cut:
+        complete.append(lines.pop(0))
+        position += len(complete[-1])
+    found, damaged = _open(folder, whole[:cut])
+    assert {entry["index"] for entry in found} == {json.loads(line)["index"] for line in complete}
+    assert damaged == (cut > position)
+
+
+def test_torn_at_its_ends(whole: bytes, tmp_path: Path) -> None:
+    head = whole.index(b"\n") + 1
+    for cut in (0, 1, 30, head - 1, head, head + 1, head + 99, *range(len(whole) - 4, len(whole) + 1)):
+        _hold_to_tear(tmp_path / str(cut), whole, cut)
+
+
+@pytest.mark.long
+def test_torn_at_every_byte(whole: bytes, tmp_path: Path) -> None:
+    for cut in range(len(whole) + 1):
+        _hold_to_tear(tmp_path / str(cut), whole, cut)
+
+
+TEXTS = {
+    "empty": b"",
+    "newline": b"\n",
+    "nonsense": b"nonsense\n",
+    "a list": b"[]\n",
+    "a number": b"5\n",
+    "deep": b"[" * 100_000 + b"\n",
+    "not UTF-8": b"\xff\xfe{}\n",
+    "a name that is a list": b'{"batch": "0123456789abcdef", "name": []}\n',
+    "an integer of 5,000 digits": b'{"batch": ' + b"9" * 5000 + b"}\n",
+    "one line without end": b"x" * 3_000_000,
+    "other keys": b'{"batch": 5}\n',
+}
+FORGED = {
+    "a huge index": {"index": 10**12, "status": "ok", "reason": "", "folder": "", "values": {}, "row": {}},
+    "a negative index": {"index": -1, "status": "ok", "reason": "", "folder": "", "values": {}, "row": {}},
+    "no index": {"status": "ok"},
+    "an index that is a word": {"index": "one", "status": "ok"},
+    "no status": {"index": 3},
+    "a row that is a list": {"index": 3, "status": "ok", "row": [], "values": {}},
+    "equal to itself": {"index": 3, "same_as": 3, "values": {}},
+    "equal to nobody": {"index": 3, "same_as": 10**9, "values": {}},
+    "equal to a word": {"index": 3, "same_as": "one"},
+    "a list": [],
+    "a number": 5,
+}
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_what_is_no_journal_is_refused_or_begun_anew(kind: str, tmp_path: Path) -> None:
+    _hold_to_truth(tmp_path / "out", TEXTS[kind])
+
+
+@pytest.mark.parametrize("kind", FORGED)
+@pytest.mark.parametrize("old", [False, True], ids=["", "without checksums"])
+def test_a_line_that_we_did_not_write_is_left_out(kind: str, old: bool, whole: bytes, tmp_path: Path) -> None:
+    lines = whole.splitlines(keepends=True)
+    if old:
+        lines = [json.dumps(line).encode() + b"\n" for line in (HEAD, *(_entry(index) for index in range(3)))]
+    start = time.monotonic()
+    found, damaged = _open(tmp_path / "out", b"".join([*lines, json.dumps(FORGED[kind]).encode() + b"\n"]))
+    assert time.monotonic() - start < 5
+    assert len(found) == (0 if old else VARIANTS)
+    assert damaged == (0 if old else 1)
+
+
+def test_lines_of_another_batch_are_left_out(whole: bytes, tmp_path: Path) -> None:
+    other = Journal(tmp_path / "other", {**HEAD, "batch": "f" * 16})
+    other.add(_entry(2, 7))
+    other.close()
+    foreign = (tmp_path / "other" / JOURNAL).read_bytes().splitlines(keepends=True)[1]
+    found, damaged = _open(tmp_path / "out", whole + foreign)
+    assert damaged == 1
+    assert found[2] == _entry(2)
+
+
+@pytest.mark.parametrize("kind", ["folder", "pipe", "link"])
+def test_what_is_not_a_file_is_refused(kind: str, whole: bytes, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (tmp_path / "elsewhere").write_bytes(whole)
+    match kind:
+        case "folder":
+            (out / JOURNAL).mkdir()
+        case "pipe":
+            os.mkfifo(out / JOURNAL)
+        case "link":
+            (out / JOURNAL).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(UnitcadError, match=JOURNAL):
+        Journal(out, HEAD)
+    assert (tmp_path / "elsewhere").read_bytes() == whole
