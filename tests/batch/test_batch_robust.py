@@ -199,3 +199,31 @@ def _run_with_full_disk(sweep: Path, out: Path, tmp_path: Path) -> subprocess.Co
     return subprocess.run(
         command("batch", sweep, "-o", out, "-j", 2), capture_output=True, text=True, check=False, timeout=240, env=env
     )
+
+
+def test_a_refused_variant_stops_nothing(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s"), tmp_path / "out"
+    sweep.write_text(
+        'base = "./ring.toml"\nname = "rings"\n[sweep]\nmode = "zip"\n'
+        '"layers.0.wall_mm" = [0.1, 1.25, 0.2, 1.5]\n"parameters.height_mm" = [2.0, 3.0, 4.0, 5.0]\n'
+    )
+    for _ in range(2):
+        done = unitcad("batch", sweep, "-o", out, "-j", 1)
+        assert done.returncode == 1
+        assert "stopped" not in done.stderr
+        for index, wall in ((0, "0.1"), (2, "0.2")):
+            assert f"variant {index}: refused: layers.0.wall_mm = {wall}" in done.stderr
+        assert [row["status"] for row in rows(out)] == ["refused", "ok", "refused", "ok"]
+        assert rows(out)[0]["reason"].startswith("layers.0.wall_mm = 0.1")
+        assert len(_results(out)) == 2
+        assert calls(tmp_path / "s") == ["3.0", "5.0"]
+
+
+def test_what_failed_before_is_tried_again_last(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", "fails", [3.0, 4.0, 5.0, 6.0, 7.0, 8.0]), tmp_path / "out"
+    assert unitcad("batch", sweep, "-o", out, "-j", 1).returncode == 1
+    assert len(_results(out)) < 5
+    again = unitcad("batch", sweep, "-o", out, "-j", 1)
+    assert again.returncode == 1
+    assert "stopped: variant 0:" in again.stderr
+    assert [row["status"] for row in rows(out)] == ["failed", *["ok"] * 5]

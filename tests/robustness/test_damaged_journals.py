@@ -28,7 +28,9 @@ def whole(tmp_path: Path) -> bytes:
     """A journal of VARIANTS variants, some written twice, two equal to an earlier one."""
     journal = Journal(tmp_path / "whole", HEAD)
     for index in range(VARIANTS):
-        journal.add({"index": index, "same_as": index - 3, "values": {"a": -index}} if index in (5, 9) else _entry(index))
+        journal.add(
+            {"index": index, "same_as": index - 3, "values": {"a": -index}} if index in (5, 9) else _entry(index)
+        )
         if index % 4 == 3:
             journal.add(_entry(index, 1))
     journal.close()

@@ -19,12 +19,13 @@ from typing import IO, Any
 
 from filelock import FileLock, Timeout
 
+from unitcad import files
 from unitcad.errors import UnitcadError
 
 JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
 NOT_THERE = -1
 FORMAT = 2
-"""Of the journal's lines. The first had no checksum; what wrote it was another version of the code, so it begins anew."""
+"""Of the lines. The first had no checksum; other code wrote it, so it begins anew."""
 LONGEST = 1 << 26
 """Bytes of a line; what is longer was not written by us."""
 
@@ -88,15 +89,10 @@ class Journal:
         """The journal's file with whole lines only: those of this batch, or just a head."""
         going_on = path.exists() and self._goes_on(path)
         if not going_on or self.damaged or not _ended(path):
-            fresh = path.with_name(f".tmp-{path.name}")
-            fresh.unlink(missing_ok=True)
-            with open(fresh, "xb") as file:
+            with files.writing(path, sync=True) as file:
                 file.write(_packed(self.head, 0))
                 if going_on:
                     file.writelines(line for line, _ in self._entries(path))
-                file.flush()
-                os.fsync(file.fileno())
-            fresh.replace(path)
         file = open(path, "ab+")  # noqa: SIM115
         file.seek(0)
         offset = len(file.readline())
@@ -116,12 +112,12 @@ class Journal:
             first = file.readline(LONGEST)
             whole = sum(1 for _ in self._entries(path))
             there = _head(first)
-            torn = not _packed(self.head, 0) == first
+            torn = _packed(self.head, 0) != first
             if there is None and whole == 0:
                 if first.strip(b"\0 \n") and not _packed(self.head, 0).startswith(first):
                     raise UnitcadError(
-                        f"{path}: is no journal of a batch, or damaged in whole; choose another folder with -o, or delete "
-                        "the journal to have finished variants looked at again"
+                        f"{path}: is no journal of a batch, or damaged in whole; choose another folder with -o, or "
+                        "delete the journal to have finished variants looked at again"
                     )
                 return False
             if there is not None and there["batch"] != self.head["batch"]:
@@ -177,8 +173,8 @@ def _head(line: bytes) -> dict[str, Any] | None:
     if found is None:
         try:
             found = json.loads(line)
-            assert found["batch"] and found["name"] and "format" not in found
-        except (ValueError, KeyError, TypeError, AssertionError, RecursionError):
+            return found if found["batch"] and found["name"] and "format" not in found else None
+        except (ValueError, KeyError, TypeError, RecursionError):
             return None
     return found
 

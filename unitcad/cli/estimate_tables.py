@@ -39,9 +39,7 @@ def print_estimate(data: dict[str, Any]) -> None:
 def print_frequencies(data: dict[str, Any]) -> None:
     """A row per frequency: edge level by model, decay of the skin's motion by distance."""
     rows = data["frequencies"]
-    table = Table(
-        "Hz", title=f"{data['variant']['name']}: edge level (motor = 1); |u_z| over its value at the edge"
-    )
+    table = Table("Hz", title=f"{data['variant']['name']}: edge level (motor = 1); |u_z| over its value at the edge")
     for model in rows[0]["edge_level"]:
         table.add_column(model)
     for name in rows[0]["u_z_over_edge"]:
