@@ -73,3 +73,33 @@ def test_a_huge_expansion_is_said_in_few_digits(judge: Judge) -> None:
     content = package(model_xml(f'<object id="1">{mesh_xml()}</object>{rows}', '<build><item objectid="59"/></build>'))
     (said,) = [found.message for found in judge(content, "a.3mf").findings if found.code == "P009"]
     assert said == "more than 1e117 faces in more than 1e116 instances, more than --max-faces 10000000"
+
+
+def test_a_printers_rules_are_applied_once_to_instances_that_differ_by_their_place_on_the_bed(
+    judge: Judge, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from unitcad.check import printing
+
+    thin = mesh_xml(CUBE_CORNERS * [20, 0.2, 20])
+    turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    matrices = [np.vstack([linear, [20.0 * k, 5.0 * k, 0]]) for k in range(4) for linear in (np.eye(3), turn)]
+
+    def findings(of: list[np.ndarray]) -> dict:
+        content = package(model_xml(f'<object id="1">{thin}</object>', build=build(of)))
+        return {
+            item.code: item
+            for item in judge(content, "a.3mf", printer="fdm-0.4", cross=False).findings
+            if item.code.startswith("D")
+        }
+
+    single = [findings([matrix]) for matrix in matrices]
+    calls = []
+    real = printing.judge
+    monkeypatch.setattr(printing, "judge", lambda *given: calls.append(1) or real(*given))
+    found = findings(matrices)
+    assert len(calls) == 2
+    assert set(found) == set(single[0]) >= {"D001"}
+    assert found["D001"].count == sum(item["D001"].count for item in single)
+    places = [np.array(single[k % 2]["D001"].locations[0].xyz) + matrices[k][3] for k in range(len(matrices))]
+    shown = [place.xyz for place in found["D001"].locations]
+    assert np.allclose(shown, places[: len(shown)])

@@ -15,7 +15,7 @@ import numpy as np
 from unitcad.catalogue import Printer
 from unitcad.check import sniff
 from unitcad.check.findings import Facts, FileReport, Finding, counted, ending, merge
-from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
+from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.mesh import Floats, Ints, Mesh
 from unitcad.check.rulebook import finding
 from unitcad.check.rules_mesh import Judged, in_file, judge_mesh
@@ -66,11 +66,12 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
     if triangles.size and (triangles.min() < 0 or triangles.max() >= len(points)):
         return _report("", ending([finding("P011", "a face names a vertex that is not there")]), Facts(), options)
     mesh = Mesh(points, np.ascontiguousarray(triangles, dtype=np.int32))
-    try:
-        judged = _judge_all([mesh], options, Deadline(options.limits.seconds))
-    except Unreadable as stop:
-        return _report("", stop.findings, Facts(), options)
-    return _report("", judged.findings, judged.facts, options)
+
+    def work(deadline: Deadline) -> tuple[Sequence[Finding], Facts]:
+        judged = _judge_all([mesh], options, deadline)
+        return judged.findings, judged.facts
+
+    return _guarded("", options, work)
 
 
 def check_file(path: str | Path, options: Options | None = None) -> FileReport:
@@ -88,17 +89,12 @@ def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileR
     return _guarded(name, options, lambda deadline: _check(data, Path(name), options, deadline))
 
 
-def _guarded(path: str, options: Options, work: Callable[[Deadline], tuple[list[Finding], Facts]]) -> FileReport:
-    findings: list[Finding] = []
-    facts = Facts()
+def _guarded(path: str, options: Options, work: Callable[[Deadline], tuple[Sequence[Finding], Facts]]) -> FileReport:
     try:
-        findings, facts = work(Deadline(options.limits.seconds))
+        with keeping():
+            findings, facts = work(Deadline(options.limits.seconds))
     except Unreadable as stop:
-        findings = list(stop.findings)
-    except MemoryError:
-        findings = list(over_limit("out of memory").findings)
-    except RecursionError:
-        findings = list(over_limit("nested too deeply").findings)
+        findings, facts = stop.findings, stop.facts
     return _report(path, findings, facts, options)
 
 
@@ -140,7 +136,8 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
     factor = UNITS_MM[options.unit] if options.unit else 1.0
     if factor != 1.0:
         meshes = [replace(mesh, vertices=mesh.vertices * factor) for mesh in meshes]
-    judged = _judge_all(meshes, options, deadline)
+    with keeping(findings):
+        judged = _judge_all(meshes, options, deadline)
     return findings + list(judged.findings), judged.facts
 
 
@@ -169,14 +166,16 @@ def _judge_all(meshes: Sequence[Mesh], options: Options, deadline: Deadline) -> 
     findings: list[Finding] = []
     facts, topology = Facts(), None
     for mesh in meshes:
-        judged = judge_mesh(mesh, deadline, cross=options.cross)
+        with keeping(findings):
+            judged = judge_mesh(mesh, deadline, cross=options.cross)
         findings += judged.findings
         facts, topology = judged.facts, judged.topology
         findings += scale.judge(judged.facts, options.unit)
         if options.printer is not None and topology is not None:
             from unitcad.check import printing
 
-            findings += in_file(printing.judge(topology, options.printer, deadline), mesh)
+            with keeping(findings, facts), keeping(change=lambda found, mesh=mesh: in_file(found, mesh)):
+                findings += in_file(printing.judge(topology, options.printer, deadline), mesh)
     if options.shells is not None and facts.shells is not None and facts.shells != options.shells:
         text = f"{counted(facts.shells, 'shell')}, {options.shells} expected"
         findings.append(finding("G005", text, abs(facts.shells - options.shells)))

@@ -15,7 +15,7 @@ import numpy as np
 from unitcad.check import triangles
 from unitcad.check.edges import balanced
 from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.limits import Deadline
+from unitcad.check.limits import Deadline, Unreadable
 from unitcad.check.mesh import Bools, Floats, Ints, area_vectors, cross, float32_step
 from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
 from unitcad.check.rulebook import finding
@@ -81,15 +81,21 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
     found = _Found()
     waiting: list[tuple[Ints, Ints]] = []
     count = 0
-    for i, j in meeting_pairs(boxes, deadline):
-        i, j = _strangers(faces, i, j)
-        waiting.append((i, j))
-        count += len(i)
-        if count > _BLOCK:
-            _decide(faces, waiting, found)
-            waiting, count = [], 0
-            deadline.tick()
-    _decide(faces, waiting, found)
+    try:
+        for i, j in meeting_pairs(boxes, deadline):
+            i, j = _strangers(faces, i, j)
+            waiting.append((i, j))
+            count += len(i)
+            if count > _BLOCK:
+                _decide(faces, waiting, found)
+                waiting, count = [], 0
+                deadline.tick()
+        _decide(faces, waiting, found)
+    except Unreadable as stop:
+        _leaning(faces, found)
+        found.contact.clear()  # shells that touch there may cross elsewhere
+        stop.findings = (*_said(topology, faces, found).findings, *stop.findings)
+        raise
     _leaning(faces, found)
     return _said(topology, faces, found)
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from unitcad.check.findings import Finding, ending
+from unitcad.check.findings import Facts, Finding, ending
 from unitcad.check.rulebook import finding
 
 
@@ -25,11 +27,22 @@ class Limits:
 
 
 class Unreadable(Exception):
-    """A reader can go no further; the findings say why, and no filter drops the errors among them."""
+    """The judgement can go no further; the findings say why, and no filter drops the errors among them.
+
+    What was found before, and the facts known by then, are added on the way up (`keeping`).
+    """
 
     def __init__(self, *findings: Finding) -> None:
         self.findings = ending(findings)
+        self.facts = Facts()
         super().__init__("; ".join(found.message for found in findings))
+
+
+class OutOfTime(Unreadable):
+    """The time is up: no fault of the part that was being read, so nothing is concluded from it."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(finding("F011", f"not finished within {seconds:g} s"))
 
 
 def over_limit(what: str) -> Unreadable:
@@ -37,14 +50,37 @@ def over_limit(what: str) -> Unreadable:
     return Unreadable(finding("F011", what))
 
 
+@contextlib.contextmanager
+def keeping(
+    found: Sequence[Finding] = (),
+    facts: Facts | None = None,
+    change: Callable[[Iterable[Finding]], Iterable[Finding]] = iter,
+) -> Iterator[None]:
+    """Put what `found` holds by then, and the facts, beside what ends the judgement inside; `change` all of it.
+
+    Raises `Unreadable`, with F011 where memory runs out or calls nest too deeply.
+    """
+    try:
+        yield
+    except (Unreadable, MemoryError, RecursionError) as error:
+        if isinstance(error, Unreadable):
+            stop = error
+        else:
+            stop = over_limit("out of memory" if isinstance(error, MemoryError) else "nested too deeply")
+        stop.findings = tuple(change((*found, *stop.findings)))
+        if facts is not None and stop.facts == Facts():
+            stop.facts = facts
+        raise stop from None
+
+
 class Deadline:
-    """A clock that ends a check: `tick()` raises `Unreadable` once the time is up."""
+    """A clock that ends a check: `tick()` raises `OutOfTime` once the time is up."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
         self._end = time.monotonic() + seconds
 
     def tick(self) -> None:
-        """Raises `Unreadable` (F011) after the last second."""
+        """Raises `OutOfTime` (F011) after the last second."""
         if time.monotonic() > self._end:
-            raise over_limit(f"not finished within {self.seconds:g} s")
+            raise OutOfTime(self.seconds)

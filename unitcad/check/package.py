@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from urllib.parse import unquote
 
 from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
+from unitcad.check.limits import Deadline, Limits, OutOfTime, Unreadable, over_limit
 from unitcad.check.rulebook import finding
 from unitcad.check.xml_stream import Element, read_small
 
@@ -122,6 +122,8 @@ class Package:
         """A small XML part as a tree, or None with a finding (rule `code`, or what the XML itself breaks)."""
         try:
             root, findings = read_small(self.chunks(name), self.shown(name))
+        except OutOfTime:
+            raise
         except Unreadable as stop:
             self.findings += [
                 finding(code, item.message, places=item.locations) if item.code == "F003" else item

@@ -11,7 +11,7 @@ import numpy as np
 from unitcad.catalogue import Printer
 from unitcad.check import features, overhang, walls
 from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.limits import Deadline
+from unitcad.check.limits import Deadline, keeping
 from unitcad.check.mesh import Floats, extent
 from unitcad.check.rulebook import finding
 from unitcad.check.shells import volumes_of, winding_number
@@ -29,11 +29,12 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline) -> list[Find
     low, high = extent(mesh.vertices[np.unique(mesh.faces)])
     found = _fits(high - low, printer) + _stands(topology, low)
     if topology.watertight and topology.oriented:
-        rays = walls.cast(topology, printer, deadline)
-        found += walls.judge(topology, printer, rays)
-        found += features.judge(topology, printer, rays, deadline)
-        found += overhang.judge(topology, printer, deadline, float(low[2]))
-        found += _trapped(topology)
+        with keeping(found):
+            rays = walls.cast(topology, printer, deadline)
+            found += walls.judge(topology, printer, rays)
+            found += features.judge(topology, printer, rays, deadline)
+            found += overhang.judge(topology, printer, deadline, float(low[2]))
+            found += _trapped(topology)
     return found
 
 

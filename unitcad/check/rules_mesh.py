@@ -9,7 +9,7 @@ import numpy as np
 
 from unitcad.check import crossing, shells, topology
 from unitcad.check.findings import Facts, Finding, Location, counted, ending
-from unitcad.check.limits import Deadline
+from unitcad.check.limits import Deadline, keeping
 from unitcad.check.mesh import LARGEST, Mesh, extent
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology
@@ -36,21 +36,20 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
         return Judged(in_file(ending([finding("V001", text, len(bad) or 1, places)]), mesh), facts, None)
     if not len(mesh.faces):
         return Judged(ending([finding("F001", "the mesh has no face")]), facts, None)
-    found = topology.judge(mesh, deadline)
-    findings = list(found.findings)
-    crossings = crossing.judge(found.as_stored(), deadline) if cross and len(found.kept) else crossing.Crossings()
-    findings += crossings.findings
-    judged = shells.judge(found, crossings.crossed, crossings.touching, deadline)
-    findings += judged.findings
     low, high = extent(mesh.vertices)
-    facts = replace(
-        facts,
-        shells=found.n_shells,
-        volume_mm3=float(judged.volumes.sum()) if found.watertight else None,
-        area_mm2=float(np.sqrt(np.einsum("ij,ij->i", found.areas, found.areas)).sum()) / 2,
-        bbox_mm=(tuple(low.tolist()), tuple(high.tolist())),
-        watertight=found.watertight,
-    )
+    facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
+    with keeping((), facts, lambda kept: in_file(kept, mesh)):
+        found = topology.judge(mesh, deadline)
+    findings = list(found.findings)
+    area = float(np.sqrt(np.einsum("ij,ij->i", found.areas, found.areas)).sum()) / 2
+    facts = replace(facts, shells=found.n_shells, area_mm2=area, watertight=found.watertight)
+    with keeping(findings, facts, lambda kept: in_file(kept, mesh)):
+        crossings = crossing.judge(found.as_stored(), deadline) if cross and len(found.kept) else crossing.Crossings()
+        findings += crossings.findings
+        judged = shells.judge(found, crossings.crossed, crossings.touching, deadline)
+    findings += judged.findings
+    if found.watertight:
+        facts = replace(facts, volume_mm3=float(judged.volumes.sum()))
     return Judged(in_file(findings, mesh), facts, found)
 
 

@@ -19,8 +19,11 @@ from unitcad import children
 from unitcad.check import read_step
 from unitcad.check.check import Options, check_file
 from unitcad.check.findings import FileReport
+from unitcad.check.limits import OutOfTime, Unreadable
 from unitcad.check.rulebook import finding
 from unitcad.check.sniff import SUFFIXES
+
+_GRACE = 5.0  # s, beyond half of the limit more, until code that never looks at the clock is interrupted
 
 
 def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
@@ -100,10 +103,10 @@ def guarded(path: str, options: Options) -> FileReport:
 
 def _guarded(path: str, options: Options) -> FileReport:
     try:
-        with _alarm(options.limits.seconds * 1.5 + 5):
+        with _alarm(options.limits.seconds):
             return check_file(path, options)
-    except _OutOfTime:
-        return _stopped(path, f"not finished within {options.limits.seconds:g} s")
+    except Unreadable as stop:
+        return FileReport(path, stop.findings)
     except MemoryError:
         return _stopped(path, "out of memory")
     except Exception as error:
@@ -171,13 +174,12 @@ def _bounded(memory_mb: int | None) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_AS, before)
 
 
-class _OutOfTime(Exception):
-    pass
-
-
 @contextlib.contextmanager
 def _alarm(seconds: float) -> Iterator[None]:
-    """Interrupts Python code that no deadline's tick reaches; does nothing outside the main thread or on Windows."""
+    """Raises `OutOfTime` in Python code that no deadline's tick reaches, when half the time more has passed.
+
+    Does nothing outside the main thread or on Windows.
+    """
     import threading
 
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
@@ -185,10 +187,10 @@ def _alarm(seconds: float) -> Iterator[None]:
         return
 
     def ring(signum: int, frame: object) -> None:
-        raise _OutOfTime
+        raise OutOfTime(seconds)
 
     before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.setitimer(signal.ITIMER_REAL, seconds * 1.5 + _GRACE)
     try:
         yield
     finally:

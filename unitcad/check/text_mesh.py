@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.limits import Unreadable
+from unitcad.check.limits import OutOfTime, Unreadable
 from unitcad.check.rulebook import finding
 
 NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
@@ -95,6 +95,8 @@ def explained(kind: str, raw: bytes) -> Finding:
             _refuse_indices(raw)
         elif kind == "off" and numbers is not None:
             _refuse_off_indices(numbers)
+    except OutOfTime:
+        raise
     except Unreadable as stop:
         return stop.findings[0]
     what = "lines are not those of the format" if numbers is not None else "elements are not those of a mesh"

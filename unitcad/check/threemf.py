@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,15 +14,15 @@ from unitcad.check import package as opc
 from unitcad.check import references, scale, schema, topology
 from unitcad.check.findings import Facts, Finding, counted, ending
 from unitcad.check.images import image_kind
-from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
-from unitcad.check.mesh import LARGEST, Floats, Mesh, cross, extent
-from unitcad.check.model_data import LINE, Model, Object, Use
+from unitcad.check.instances import Instance, Key, mesh_of
+from unitcad.check.limits import Deadline, Limits, OutOfTime, Unreadable, keeping, over_limit
+from unitcad.check.mesh import LARGEST, Floats, cross, extent
+from unitcad.check.model_data import Model, Object, Use
 from unitcad.check.model_part import read_model
 from unitcad.check.package import Package, Relation
 from unitcad.check.rulebook import finding
-from unitcad.check.rules_mesh import Judged, in_file, judge_mesh
+from unitcad.check.rules_mesh import Judged, judge_mesh
 from unitcad.check.scale import UNITS_MM
-from unitcad.check.source import Source
 
 if TYPE_CHECKING:
     from unitcad.check.check import Options
@@ -30,21 +31,16 @@ _IMAGES = {"image/png": "png", "image/jpeg": "jpeg", "image/jpg": "jpeg"}
 _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
 _FILLED = {"G001", "G002"}
-Key = tuple[str, int]
-
-
-@dataclass(frozen=True)
-class Instance:
-    """An object of the build with its whole transform (4, 3), in the model's unit."""
-
-    key: Key
-    matrix: Floats
 
 
 def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
     """All findings about a 3MF file and the facts of what it builds."""
     package = opc.open_package(data, options.limits, deadline, strict=options.strict_3mf)
-    findings, facts = _judged(package, options, deadline)
+    try:
+        with keeping(package.findings):
+            findings, facts = _judged(package, options, deadline)
+    except Unreadable as stop:  # its facts are one object's
+        findings, facts = list(stop.findings), Facts()
     return [_named(package, item) for item in findings], facts
 
 
@@ -98,6 +94,8 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
             package.say("P001", f"{package.shown(part)} has type {package.content_type(part)!r}, not the model's", part)
         try:
             model = read_model(package.chunks(part), part, limits, faces, strict=package.strict)
+        except OutOfTime:
+            raise
         except Unreadable as stop:
             package.findings += stop.findings
             continue
@@ -150,6 +148,8 @@ def _image(package: Package, part: str, code: str) -> None:
         return
     try:
         kind, why = image_kind(package.chunks(part))
+    except OutOfTime:
+        raise
     except Unreadable as stop:
         package.findings += stop.findings
         return
@@ -313,7 +313,7 @@ def _geometry(
         watertight = watertight and bool(facts.watertight)
         if compared and facts.watertight and size > 0 and len(solids) <= placement.MOST:
             with np.errstate(all="ignore"):
-                mesh = _mesh_of(found, instance.key[0], factor, instance.matrix)
+                mesh = mesh_of(found, instance.key[0], factor, instance.matrix)
             solids.append(placement.Placed(mesh.vertices, mesh.faces, size, str(found.id)))
         deadline.tick()
     if not triangles:
@@ -342,49 +342,25 @@ def _geometry(
             finding("G005", f"{counted(shells, 'shell')}, {options.shells} expected", abs(shells - options.shells))
         )
     if options.printer is not None:
-        findings += _printed(models, instances, options, deadline)
+        findings += placement.printed(models, instances, options.printer, deadline)
     return findings, facts
-
-
-def _mesh_of(found: Object, part: str, factor: float, matrix: Floats | None = None) -> Mesh:
-    assert found.vertices is not None
-    assert found.triangles is not None
-    points = found.vertices if matrix is None else found.vertices @ matrix[:3] + matrix[3]
-    faces = found.triangles[:, :3].astype(np.int32)
-    if matrix is not None and np.linalg.det(matrix[:3]) < 0:
-        faces = faces[:, ::-1]
-    source = Source(lines=found.triangles[:, LINE], part=part)
-    return Mesh(points * factor, np.ascontiguousarray(faces), name=str(found.id), source=source)
 
 
 def _judge(found: Object, part: str, factor: float, options: Options, deadline: Deadline) -> Judged:
     """The geometry rules for one object; only model and solidsupport objects must be solids, unless slices stand in."""
-    mesh = _mesh_of(found, part, factor)
+    mesh = mesh_of(found, part, factor)
     stand_in = found.attributes.get(f"{schema.SLICE} meshresolution") == "lowres"
     if found.type not in ("model", "solidsupport") or stand_in:
         return Judged((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)), None)
-    judged = judge_mesh(mesh, deadline, cross=options.cross)
-    kept = tuple(
-        replace(item, severity="warning", message=f"{item.message} (3MF's fill rule says what is solid)")
-        if item.code in _FILLED
-        else item
-        for item in judged.findings
-    )
-    return replace(judged, findings=kept)
+    with keeping(change=_filled):
+        judged = judge_mesh(mesh, deadline, cross=options.cross)
+    return replace(judged, findings=tuple(_filled(judged.findings)))
 
 
-def _printed(
-    models: dict[str, Model], instances: list[Instance], options: Options, deadline: Deadline
-) -> list[Finding]:
-    from unitcad.check import printing
-
-    assert options.printer is not None
-    found: list[Finding] = []
-    for instance in instances:
-        thing = models[instance.key[0]].resources[instance.key[1]]
-        assert isinstance(thing, Object)
-        if thing.type != "model" or thing.triangles is None or not len(thing.triangles):
-            continue
-        mesh = _mesh_of(thing, instance.key[0], UNITS_MM.get(models[instance.key[0]].unit, 1.0), instance.matrix)
-        found += in_file(printing.judge(topology.judge(mesh, deadline), options.printer, deadline), mesh)
-    return found
+def _filled(findings: Iterable[Finding]) -> Iterator[Finding]:
+    """The findings, of rules that 3MF answers by its fill rule as warnings."""
+    for item in findings:
+        if item.code in _FILLED:
+            yield replace(item, severity="warning", message=f"{item.message} (3MF's fill rule says what is solid)")
+        else:
+            yield item

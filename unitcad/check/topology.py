@@ -11,7 +11,7 @@ import numpy as np
 from unitcad.check import edges as mesh_edges
 from unitcad.check.edges import Edges
 from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.limits import Deadline
+from unitcad.check.limits import Deadline, keeping
 from unitcad.check.mesh import Bools, Floats, Ints, Mesh, area_vectors, extent, extents, float32_step, float32_steps
 from unitcad.check.rulebook import finding
 from unitcad.check.seams import connected, join, t_junctions
@@ -57,6 +57,11 @@ def judge(mesh: Mesh, deadline: Deadline) -> Topology:
     found: list[Finding] = []
     if mesh.indexed:
         mesh, found = _referenced(mesh)
+    with keeping(found):
+        return _judged(mesh, deadline, found)
+
+
+def _judged(mesh: Mesh, deadline: Deadline, found: list[Finding]) -> Topology:
     faces, vertices = mesh.faces, mesh.vertices
     repeated = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
     kept = np.arange(len(faces), dtype=np.int32)
