@@ -46,7 +46,7 @@ def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:
     try:
         from unitcad.spec import from_data
 
-        there = from_data(read_toml(file))
+        there = from_data(read_toml(file, links=False))
     except UnitcadError as error:
         raise UnitcadError(f"{folder}: its spec.toml can't be read ({error}); move the folder away") from None
     if spec_hash(there) != spec_hash(spec):

@@ -1,30 +1,46 @@
-"""What a result folder says, read back from its files. What is absent stays absent; the page says what to ask for."""
+"""What a result folder says, read back from its files. What is absent stays absent; the page says what to ask for.
+
+A folder may be damaged, or made by somebody who means harm: nothing outside it is read, no link is followed, no special
+file opened, and no code of a spec run. What can't be read is named with its reason, and the rest is shown.
+"""
 
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.files import TEMPORARY
 from unitcad.pipeline.folder import PAGE
 from unitcad.report.models import model_key, spec_in
+from unitcad.report.records import BatchFile, Manifest, expect
 from unitcad.spec import Spec, to_data
 
 MANIFEST = "manifest.json"
+TIMINGS = "timings.json"
+"""Not on the page: how long a build took differs from run to run."""
 OF_EVERY_BATCH = ("index", "status", "reason", "folder")
 """Columns that batch.json has before those that were swept, which end at `name`."""
+DAMAGED = "damaged"
+LARGEST_BATCH, LARGEST_DRAWING = 256_000_000, 4_000_000
+"""Bytes of a batch.json and of a drawing."""
+MOST_FILES = 2000
+"""Files of a variant that the page lists."""
 
 
 def is_variant(folder: Path) -> bool:
-    """Whether a folder is one variant's result."""
-    return (folder / MANIFEST).is_file()
+    """Whether a folder is one variant's result, damaged or not."""
+    return os.path.lexists(folder / MANIFEST)
 
 
 def variant_folders(folder: Path) -> list[Path]:
-    """The results directly below a folder, by name; unfinished ones are left out."""
-    return sorted(f for f in folder.iterdir() if not f.name.startswith(TEMPORARY) and f.is_dir() and is_variant(f))
+    """The results directly below a folder, by name; unfinished ones and those behind links are left out."""
+    there = [Path(entry.path) for entry in os.scandir(folder) if entry.is_dir(follow_symlinks=False)]
+    return sorted(path for path in there if not path.name.startswith(TEMPORARY) and is_variant(path))
 
 
 def variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]:
@@ -32,45 +48,83 @@ def variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]:
 
     Raises UnitcadError for a manifest that can't be read.
     """
-    manifest = _json(folder / MANIFEST)
-    if not isinstance(manifest, dict):
-        raise UnitcadError(f"{folder / MANIFEST}: is not a manifest of unitcad")
+    manifest = files.read_json(folder / MANIFEST, links=False)
+    expect(manifest, Manifest, folder / MANIFEST)
     where = folder.relative_to(root).as_posix()
-    found: dict[str, Any] = {
-        "folder": "" if where == "." else where,
-        "manifest": manifest,
-        "estimate": _json(folder / "estimate.json"),
-        "casting": _json(folder / "casting.json"),
-        "slicer": _json(folder / "slicer.json"),
-        "drawings": {
-            file.relative_to(folder).as_posix(): file.read_text("utf-8") for file in sorted(folder.rglob("*.svg"))
-        },
-        "files": [
-            [file.relative_to(folder).as_posix(), file.stat().st_size]
-            for file in sorted(folder.rglob("*"))
-            if file.is_file() and file.name != PAGE
-        ],
-    }
+    found: dict[str, Any] = {"folder": "" if where == "." else where, "manifest": manifest}
+    damage: list[str] = []
+    for name in ("estimate", "casting", "slicer"):
+        found[name] = _sound(lambda file=folder / f"{name}.json": _json(file), damage)
+    listed = list(_regular(folder, damage))
+    drawings = [path for path in listed if path.endswith(".svg")]
+    read = {path: _sound(lambda file=folder / path: _drawing(file), damage) for path in drawings}
+    found["drawings"] = {path: text for path, text in read.items() if text is not None}
+    found["files"] = [[path, (folder / path).lstat().st_size] for path in listed if path not in (PAGE, TIMINGS)]
+    found[DAMAGED] = damage
     try:
         spec = spec_in(folder)
+        return {**found, "spec": to_data(spec), "model": model_key(spec)}, spec
     except UnitcadError as error:
         return {**found, "spec": None, "model": None, "no_model": str(error)}, None
-    found["spec"] = to_data(spec)
-    return {**found, "model": model_key(spec)}, spec
 
 
-def table(folder: Path, variants: list[dict[str, Any]]) -> dict[str, Any]:
+def _sound(read: Any, damage: list[str]) -> Any:
+    """What `read` gives, None without the file; None and a line in `damage` where it can't be read."""
+    try:
+        return read()
+    except files.NotThere:
+        return None
+    except UnitcadError as error:
+        damage.append(str(error))
+        return None
+
+
+def _regular(folder: Path, damage: list[str]) -> Iterator[str]:
+    """Regular files below a folder by their paths in it, sorted; `damage` gets what is none, and what is too much."""
+    found: list[str] = []
+    left = [folder]
+    while left and len(found) < MOST_FILES:
+        try:
+            entries = list(os.scandir(left.pop()))
+        except OSError as error:
+            damage.append(f"{error.filename}: {error.strerror}")
+            continue
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                left.append(Path(entry.path))
+            elif entry.is_file(follow_symlinks=False):
+                found.append(Path(entry.path).relative_to(folder).as_posix())
+            else:
+                damage.append(f"{entry.path}: is a link or a special file, left out")
+    if len(found) >= MOST_FILES:
+        damage.append(f"{folder}: has more than {MOST_FILES} files, the others are left out")
+    return iter(sorted(found)[:MOST_FILES])
+
+
+def _drawing(path: Path) -> str:
+    return files.read_text(path, largest=LARGEST_DRAWING, links=False)
+
+
+def table(said: dict[str, Any] | None, variants: list[dict[str, Any]], damaged: dict[str, str]) -> dict[str, Any]:
     """A batch's table: `columns` and `rows`, each row with the folder of its variant first ("" for one that failed).
 
-    As batch.json lists them where there is one, else from the manifests. What was chosen comes first, then the levels
-    at the edge, then the rest.
+    As batch.json lists them where there is one (`said`), else from the manifests. What was chosen comes first, then the
+    levels at the edge, then the rest. `damaged`: why the result in a folder can't be read.
     """
-    said = _json(folder / "batch.json")
-    if isinstance(said, dict) and isinstance(said.get("variants"), list):
-        entries, columns = said["variants"], [name for name in said.get("columns", []) if name != "folder"]
+    if said:
+        entries, columns = said["variants"], [name for name in said["columns"] if name != "folder"]
     else:
         entries = [{"folder": each["folder"], **_row(each)} for each in variants]
+        entries += [{"folder": name, "name": name} for name in damaged]
         columns = [name for name in dict.fromkeys(name for entry in entries for name in entry) if name != "folder"]
+    if damaged:
+        entries = [
+            {**entry, "status": DAMAGED, "reason": damaged[entry["folder"]]}
+            if entry.get("folder") in damaged
+            else entry
+            for entry in entries
+        ]
+        columns = [*(name for name in ("status", "reason") if name not in columns), *columns]
     columns = _in_order(columns)
     there = {each["folder"] for each in variants}
     return {
@@ -98,9 +152,13 @@ def _in_order(columns: list[str]) -> list[str]:
 
 
 def batch(folder: Path) -> dict[str, Any] | None:
-    """What the batch says of itself: batch.json without its variants, or None."""
-    said = _json(folder / "batch.json")
-    return {key: value for key, value in said.items() if key != "variants"} if isinstance(said, dict) else None
+    """batch.json of a folder, None without one. Raises UnitcadError where it can't be read."""
+    try:
+        said = files.read_json(folder / "batch.json", largest=LARGEST_BATCH, links=False)
+    except files.NotThere:
+        return None
+    expect(said, BatchFile, folder / "batch.json")
+    return said
 
 
 def _row(each: dict[str, Any]) -> dict[str, Any]:
@@ -111,7 +169,7 @@ def _row(each: dict[str, Any]) -> dict[str, Any]:
         row |= {f"layers.{i}.{key}": value for key, value in layer.items()}
     for part in manifest.get("parts", []):
         if part.get("made") == "cast":
-            row[f"{part['name']}_mm3"] = part["volume_mm3"]
+            row[f"{part['name']}_mm3"] = part.get("volume_mm3")
     for model, said in ((manifest.get("estimate") or {}).get("models") or {}).items():
         row[f"edge_{model}"] = said.get("edge")
     laws = manifest.get("laws", [])
@@ -127,11 +185,7 @@ def _cell(value: Any) -> Any:
     return value if isinstance(value, int | float | str) and not isinstance(value, bool) else json.dumps(value)
 
 
-def _json(path: Path) -> Any:
-    """The data of a JSON file, None without the file. Raises UnitcadError where it can't be read."""
-    try:
-        return json.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError) as error:
-        raise UnitcadError(f"{path}: can't be read ({error})") from None
+def _json(path: Path) -> dict[str, Any]:
+    data = files.read_json(path, links=False)
+    expect(data, dict[str, Any], path)
+    return data

@@ -18,7 +18,7 @@ from unitcad.spec import Spec, from_data, read_toml, with_formats
 
 def spec_in(folder: Path) -> Spec:
     """The effective spec of a result folder. Raises UnitcadError where it can't be read."""
-    return from_data(read_toml(folder / "spec.toml"))
+    return from_data(read_toml(folder / "spec.toml", links=False))
 
 
 def model_key(spec: Spec) -> str:

@@ -42,7 +42,7 @@ def write_report(folder: Path) -> Path:
     """
     data, title = page_data(folder)
     target = folder / PAGE
-    write(target, page(data, title).encode())
+    write(target, page(data, title).encode("utf-8", "replace"))
     return target
 
 
@@ -50,17 +50,30 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str]:
     """The page's data and title. Raises UnitcadError where the folder holds no result."""
     if not folder.is_dir():
         raise UnitcadError(f"{folder}: is not a folder")
+    damaged: dict[str, str] = {}
     if collect.is_variant(folder):
         record, spec = collect.variant(folder, folder)
         records, specs, table, batch = [record], [spec], None, None
-        title = str(record["manifest"].get("name", folder.name))
+        title = str(record["manifest"].get("name") or folder.resolve().name)
     else:
-        folders, batch = collect.variant_folders(folder), collect.batch(folder)
+        records, specs, batch = [], [], None
+        folders = collect.variant_folders(folder)
+        try:
+            batch = collect.batch(folder)
+        except UnitcadError as error:
+            damaged["batch.json"] = str(error)
         if not folders and not batch:
-            raise UnitcadError(f"{folder}: holds no result of unitcad (no manifest.json in it or right below it)")
-        pairs = [collect.variant(each, folder) for each in folders]
-        records, specs = [record for record, _ in pairs], [spec for _, spec in pairs]
-        table = collect.table(folder, records)
+            why = damaged.get("batch.json") or "no manifest.json in it or right below it"
+            raise UnitcadError(f"{folder}: holds no result of unitcad ({why})")
+        for each in folders:
+            try:
+                record, spec = collect.variant(each, folder)
+            except UnitcadError as error:
+                damaged[each.name] = str(error)
+                continue
+            records.append(record)
+            specs.append(spec)
+        table = collect.table(batch, records, {name: why for name, why in damaged.items() if name != "batch.json"})
         title = f"{(batch or {}).get('name') or folder.resolve().name}: {len(table['rows'])} variants"
     models = _models(records, specs)
     pool = Pool()
@@ -69,7 +82,8 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str]:
         "version": __version__,
         "variants": [[record["folder"], pool.put(record)] for record in records],
         "table": table,
-        "batch": batch,
+        "batch": {key: value for key, value in batch.items() if key != "variants"} if batch else None,
+        "damaged": sorted(damaged.items()),
         "pool": pool.entries,
         "models": models,
     }
@@ -98,7 +112,7 @@ def page(data: dict[str, Any], title: str) -> str:
         f"{name} {entry['version']}\n{_asset(f'vendor/{name}.LICENSE.txt')}" for name, entry in vendored().items()
     )
     text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
-    packed = base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+    packed = base64.b64encode(gzip.compress(text.encode("utf-8", "replace"), 9, mtime=0)).decode()
     policy = "; ".join(
         [
             "default-src 'none'",

@@ -57,11 +57,11 @@ def read(source: str | os.PathLike[str]) -> dict[str, Any]:
     return with_source(read_toml(path), path.parent)
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path, links: bool = True) -> dict[str, Any]:
     """A TOML file's data. Raises UnitcadError with line and column where it does not parse, for a special file, and for
-    one that is larger than `unitcad.files.LARGEST`.
+    one that is larger than `unitcad.files.LARGEST`; without `links` for a symbolic link too.
     """
-    text = read_text(path)
+    text = read_text(path, links=links)
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -53,16 +53,36 @@
     return { node, ready };
   }
 
+  // What a damaged result says wrongly stays in its own section.
+  function guarded(id, title, make) {
+    try {
+      return make();
+    } catch (error) {
+      return section(id, title, el("p", { className: "absent" }, `The result is damaged here: ${error.message}`));
+    }
+  }
+
   function showVariant(variant, data, back) {
     const { manifest } = variant;
+    const name = manifest.name || variant.folder || data.title;
     const view = stage(variant, variant.model && data.models[variant.model]);
-    const sections = [view.node, U.parts.sectionDrawing(variant), U.estimate(variant), U.parts.laws(variant), U.procedure(variant), U.parts.parts(variant), U.parts.files(variant), U.parts.spec(variant)];
+    const sections = [
+      view.node,
+      guarded("section", "Section", () => U.parts.sectionDrawing(variant)),
+      guarded("estimate", "Attenuation estimate", () => U.estimate(variant)),
+      guarded("laws", "Laws and checks", () => U.parts.laws(variant)),
+      guarded("procedure", "Procedure", () => U.procedure(variant)),
+      guarded("parts", "Parts", () => U.parts.parts(variant)),
+      guarded("files", "Files", () => U.parts.files(variant)),
+      guarded("spec", "Spec", () => U.parts.spec(variant)),
+    ];
+    if (variant.damaged.length) sections.push(section("damaged", "Damaged", el("ul", {}, variant.damaged.map((line) => el("li", {}, line)))));
     const { state, text } = U.verdict(manifest);
     const layers = ((variant.spec || {}).layers || []).map((layer) => layer.material).join(" / ");
     const line = [manifest.design, layers, manifest.hash].filter(Boolean).join(" · ");
     const chips = [el("span", { className: `chip ${state}` }, text), manifest.label && el("span", { className: "chip", title: "Engraved on the moulds" }, `label ${manifest.label}`)];
-    document.title = manifest.name;
-    clear(page, header(manifest.name, line, chips, back), navigation(sections), sections, footer(data));
+    document.title = name;
+    clear(page, header(name, line, chips, back), navigation(sections), sections, footer(data));
     leave = () => view.ready.then((made) => made && made.free());
   }
 
@@ -99,6 +119,7 @@
     const failed = table.rows.filter((row) => !row[0]).length;
     const chips = [el("span", { className: "chip" }, `${geometries} geometries`), failed > 0 && el("span", { className: "chip bad" }, `${failed} failed`)];
     const sections = [section("variants", "Variants", made.node), section("plot", "Two columns against each other", controls, plotHost)];
+    if (data.damaged.length) sections.push(section("damaged", "Damaged", U.table(["Result", "Why"], data.damaged, { label: "Damaged results" })));
     if (batch) sections.push(section("batch", "The batch", el("details", {}, el("summary", {}, "What the batch says of itself"), U.facts(batch))));
     ready = true;
     const scrolled = made.node.querySelector(".scroll");

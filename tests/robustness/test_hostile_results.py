@@ -1,0 +1,166 @@
+"""Pages of damaged or hostile results: nothing outside is read, nothing runs, nothing hangs, the rest is shown."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import os
+import re
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import hostile_results
+import pytest
+from hostile_results import KINDS, SECRET
+
+from unitcad.errors import UnitcadError
+from unitcad.pipeline.build import build
+from unitcad.report import write_report
+from unitcad.spec import load
+
+sys.path.append(str(Path(__file__).parent.parent / "report"))
+import chromium
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and pipes as POSIX has them")
+SHOWN_IN_BROWSER = [
+    "estimate.json is of wrong types",
+    "casting.json is of wrong types",
+    "slicer.json is of wrong types",
+    "names hold markup",
+    "names hold half characters",
+    "drawings hold scripts",
+    "files have odd names",
+]
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result with everything but tools."""
+    spec = load("embedded", ["output.formats=[]"])
+    return build(spec, tmp_path_factory.mktemp("good"), only=["unit", "estimate", "casting"]).folder
+
+
+def _spoilt(good: Path, folder: Path, kinds: list[str]) -> Path:
+    """A folder of results: a good one, and one of each kind."""
+    root = folder / "results"
+    shutil.copytree(good, root / "good")
+    hostile_results.outside(folder / "outside")
+    for kind in kinds:
+        there = root / re.sub(r"\W+", "-", kind)
+        shutil.copytree(good, there)
+        KINDS[kind][0](there)
+    return root
+
+
+def _data(page: Path) -> dict[str, Any]:
+    packed = re.search(r'<script type="text/plain" id="data">([A-Za-z0-9+/=]*)</script>', page.read_text("utf-8"))
+    assert packed
+    return json.loads(gzip.decompress(base64.b64decode(packed[1])))
+
+
+def test_one_damaged_result_does_not_keep_the_others_from_the_page(good: Path, tmp_path: Path) -> None:
+    root = _spoilt(good, tmp_path, list(KINDS))
+    data = _data(write_report(root))
+    text = json.dumps(data)
+    assert SECRET not in text
+    assert not (tmp_path / "RAN").exists()
+    shown = {folder for folder, _ in data["variants"]}
+    damaged = dict(data["damaged"])
+    for kind, (_, is_shown) in KINDS.items():
+        folder = re.sub(r"\W+", "-", kind)
+        assert (folder in shown, folder in damaged) == (is_shown, not is_shown), kind
+    assert "good" in shown
+    columns = ["folder", *data["table"]["columns"]]
+    rows = [dict(zip(columns, row, strict=True)) for row in data["table"]["rows"]]
+    assert {row["name"] for row in rows if row["status"] == "damaged"} == set(damaged)
+    assert all(row["reason"] for row in rows if row["status"] == "damaged")
+    assert write_report(root).read_bytes() == write_report(root).read_bytes()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_damaged_result_alone_is_one_clear_error_or_a_page(kind: str, good: Path, tmp_path: Path) -> None:
+    folder = _spoilt(good, tmp_path, [kind]) / re.sub(r"\W+", "-", kind)
+    if not KINDS[kind][1]:
+        with pytest.raises(UnitcadError, match=r"manifest\.json"):
+            write_report(folder)
+        return
+    assert SECRET not in json.dumps(_data(write_report(folder)))
+
+
+@pytest.mark.parametrize(
+    "content", ["", "{", "[]", '{"columns": 5, "variants": []}', '{"columns": ["a"], "variants": [1]}', "pipe", "link"]
+)
+def test_a_damaged_batch_json_is_named_and_the_variants_are_shown(content: str, good: Path, tmp_path: Path) -> None:
+    root = _spoilt(good, tmp_path, ["manifest.json is torn"])
+    if content == "pipe":
+        os.mkfifo(root / "batch.json")
+    elif content == "link":
+        (root / "batch.json").symlink_to(tmp_path / "outside" / "secret.json")
+    else:
+        (root / "batch.json").write_text(content)
+    data = _data(write_report(root))
+    assert dict(data["damaged"]).keys() == {"batch.json", "manifest-json-is-torn"}
+    assert [row[0] for row in data["table"]["rows"]] == ["good", ""]
+
+
+def test_a_damaged_variant_of_a_batch_is_named_in_its_table(good: Path, tmp_path: Path) -> None:
+    root = _spoilt(good, tmp_path, ["manifest.json is torn"])
+    variants = [
+        {"index": i, "status": "ok", "folder": name} for i, name in enumerate(["good", "manifest-json-is-torn"])
+    ]
+    said = {"columns": ["index", "status", "reason", "folder"], "variants": variants}
+    (root / "batch.json").write_text(json.dumps(said))
+    table = _data(write_report(root))["table"]
+    assert [[row[0], row[1 + table["columns"].index("status")]] for row in table["rows"]] == [
+        ["good", "ok"],
+        ["", "damaged"],
+    ]
+
+
+def test_a_variant_behind_a_link_is_left_out(good: Path, tmp_path: Path) -> None:
+    shutil.copytree(good, tmp_path / "results" / "good")
+    (tmp_path / "results" / "other").symlink_to(good)
+    assert [folder for folder, _ in _data(write_report(tmp_path / "results"))["variants"]] == ["good"]
+
+
+def test_the_page_does_not_depend_on_how_long_the_build_took(good: Path, tmp_path: Path) -> None:
+    pages = set()
+    for seconds in (0.1, 12345.678):
+        folder = tmp_path / str(seconds) / "one"
+        shutil.copytree(good, folder)
+        (folder / "timings.json").write_text(json.dumps({"seconds": {"all": seconds}}))
+        pages.add(write_report(folder).read_bytes())
+    assert len(pages) == 1
+
+
+def test_in_a_browser_no_script_runs_and_nothing_is_asked_for(good: Path, tmp_path: Path) -> None:
+    if chromium.executable() is None and not os.environ.get("CI"):
+        pytest.skip("no chromium on this machine (Debian's package of that name)")
+    root = _spoilt(good, tmp_path, [*SHOWN_IN_BROWSER, "manifest.json is torn"])
+    page = write_report(root)
+    with chromium.browser() as running:
+        _visited(running, page, "")
+        for kind in SHOWN_IN_BROWSER:
+            text = _visited(running, page, re.sub(r"\W+", "-", kind))
+            assert "Files" in text
+        folder = root / re.sub(r"\W+", "-", "drawings hold scripts")
+        _visited(running, write_report(folder), "")
+
+
+def _visited(running: Any, page: Path, fragment: str) -> str:
+    """The page's text, when it has asked for nothing but itself and run nothing but its own."""
+    visit = chromium.Visit(running, page, fragment=fragment)
+    try:
+        visit.page.on("dialog", lambda dialog: visit.errors.append(f"dialog: {dialog.message}"))
+        visit.page.wait_for_timeout(300)
+        asked = [url for url in visit.requests if not url.startswith(("data:", "blob:"))]
+        assert [url.partition("#")[0] for url in asked] == [page.resolve().as_uri()]
+        assert visit.errors == []
+        assert visit.page.evaluate("window.hit") is None
+        assert "can't be drawn" not in visit.page.inner_text("main")
+        return visit.page.inner_text("main")
+    finally:
+        visit.close()

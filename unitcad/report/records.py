@@ -1,0 +1,121 @@
+"""What the page takes for granted of a result's files: no more than it reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from unitcad.errors import UnitcadError
+
+DEEPEST = 40
+"""Lists and tables within each other that a result's file may have."""
+
+
+class Law(Struct):
+    """A law of the moulds, kept or broken."""
+
+    code: str
+    ok: bool
+    where: str = ""
+
+
+class Found(Struct):
+    """A finding in a file."""
+
+    code: str
+    severity: str
+    path: str = ""
+    message: str = ""
+
+
+class Checked(Struct):
+    """What the mesh check found."""
+
+    errors: int
+    findings: list[Found] = []
+
+
+class Part(Struct):
+    """A body."""
+
+    name: str
+    role: str = ""
+    made: str | None = None
+    material: str | None = None
+    volume_mm3: float | None = None
+    bbox_mm: list[float] = []
+
+
+class LeftOut(Struct):
+    """What a build left out."""
+
+    what: str
+    why: str
+
+
+class Level(Struct):
+    """A model's level at the edge."""
+
+    edge: float | None = None
+
+
+class Levels(Struct):
+    """The estimate's summary."""
+
+    models: dict[str, Level] = {}
+
+
+class Manifest(Struct):
+    """manifest.json."""
+
+    name: str = ""
+    design: str = ""
+    hash: str = ""
+    label: str | None = None
+    laws: list[Law] = []
+    check: Checked | None = None
+    parts: list[Part] = []
+    warnings: list[str] = []
+    left_out: list[LeftOut] = []
+    estimate: Levels | None = None
+    versions: dict[str, str] = {}
+
+
+class Row(Struct):
+    """A variant of a batch."""
+
+    folder: str | None = None
+
+
+class BatchFile(Struct):
+    """batch.json."""
+
+    columns: list[str]
+    variants: list[Row]
+
+
+def expect(data: Any, kind: Any, path: Path) -> None:
+    """Raise UnitcadError, naming the file and the place, for data that is not of a kind or nested too deep."""
+    if _deeper(data, DEEPEST):
+        raise UnitcadError(f"{path}: nested deeper than {DEEPEST}")
+    try:
+        msgspec.convert(data, kind)
+    except msgspec.ValidationError as error:
+        raise UnitcadError(f"{path}: is not a result of unitcad: {error}") from None
+
+
+def _deeper(data: Any, most: int) -> bool:
+    level = [data]
+    for _ in range(most):
+        level = [
+            item
+            for node in level
+            if isinstance(node, dict | list)
+            for item in (node.values() if isinstance(node, dict) else node)
+        ]
+        if not level:
+            return False
+    return True
