@@ -109,6 +109,7 @@ def text_meshes() -> list[tuple]:
         ("face-too-short.off", "F003", off.replace("3 0 1 3", "999999999 0 1 3", 1)),
         ("cr-only.obj", "F009", obj.replace("\n", "\r")),
         ("bom.obj", "F009", "\ufeff" + obj),
+        ("bent.off", "F013", "OFF\n4 3 0\n0 0 0\n9 0 0\n9 9 1\n0 9 0\n4 0 1 2 3\n3 2 1 0\n3 3 2 0\n"),
         ("word.off", "F004", off.replace("\n10 ", "\nten ", 1)),
     ]
 

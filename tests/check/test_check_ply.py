@@ -6,10 +6,8 @@ import struct
 
 import numpy as np
 import pytest
+from polygon_files import ply
 from shapes import CUBE_CORNERS, CUBE_FACES
-
-from unitcad.check import read_ply
-from unitcad.check.limits import Deadline, Unreadable
 
 ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
 
@@ -38,7 +36,7 @@ def test_a_sound_cube_passes(order: str, newline: str, judge) -> None:
         (cube(faces=13), "F002", "promises 13 face records, the file has room for 12"),
         (cube(vertices=100), "F002", "promises 100 vertex records, the file has room for 21"),
         (cube(vertices=7), "F002", "promises 12 face records"),
-        (cube(vertices=9), "F003", "its elements are not those of a mesh"),
+        (cube(vertices=9), "F008", "1 face with fewer than three vertices"),
         (cube()[:-1], "F002", "promises 12 face records, the file has room for 11"),
         (cube(faces=11), "F006", "13 bytes after the last element"),
         (cube() + b"x", "F006", "1 byte after the last element"),
@@ -53,28 +51,47 @@ def test_wrong_counts_are_named(content: bytes, code: str, said: str, judge) -> 
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_elements_end_where_their_records_do(seed: int) -> None:
+def test_elements_end_where_their_records_do(seed: int, judge) -> None:
     """Random elements with lists of one length, of many, and runs of each; any byte less is one too few."""
     rng = np.random.default_rng(seed)
     sign, order = ("<", "binary_little_endian") if seed % 2 else (">", "binary_big_endian")
     kinds = {"uchar": "B", "int16": "h", "uint": "I", "double": "d"}
-    head, body = ["ply", f"format {order} 1.0"], b""
+    whole = cube(order=order)
+    head, body = whole.split(b"end_header\n")
+    lines = head.decode().splitlines()
     for element in range(3):
         lists = list(rng.choice(list(kinds), 2)) if element else []
         plain = list(rng.choice(list(kinds), 2))
         count = int(rng.integers(1, 9000))
-        head.append(f"element e{element} {count}")
-        head += [f"property {kind} p{i}" for i, kind in enumerate(plain)]
-        head += [f"property list uchar {kind} l{i}" for i, kind in enumerate(lists)]
+        lines.append(f"element e{element} {count}")
+        lines += [f"property {kind} p{i}" for i, kind in enumerate(plain)]
+        lines += [f"property list uchar {kind} l{i}" for i, kind in enumerate(lists)]
         run = 1 if seed < 3 else 3000
         lengths = np.repeat(rng.integers(0, 5, count // run + 1), run)[:count]
         for n in lengths.tolist():
             body += bytes(sum(struct.calcsize(sign + kinds[kind]) for kind in plain))
             body += b"".join(bytes([n]) + bytes(n * struct.calcsize(sign + kinds[kind])) for kind in lists)
-    raw = "\n".join([*head, "end_header", ""]).encode() + body
-    assert read_ply.trimmed(raw, Deadline(60)) == (raw, [])
-    kept, findings = read_ply.trimmed(raw + b"12345", Deadline(60))
-    assert kept == raw
-    assert findings[0].count == 5
-    with pytest.raises(Unreadable, match="e2 record"):
-        read_ply.trimmed(raw[:-1], Deadline(60))
+    raw = "\n".join([*lines, "end_header", ""]).encode() + body
+    assert judge(raw, "a.ply").findings == ()
+    (found,) = judge(raw + b"12345", "a.ply").findings
+    assert (found.code, found.count) == ("F006", 5)
+    (found,) = judge(raw[:-1], "a.ply").findings
+    assert found.code == "F002"
+    assert "e2 record" in found.message
+
+
+def test_numbers_after_the_last_property_of_a_text_face_are_a_warning(judge) -> None:
+    """MeshLab announces plain colours of faces and writes a list."""
+    text = ply(CUBE_CORNERS * 10, CUBE_FACES.tolist(), "").decode()
+    lines = text.split("\n")
+    longer = [line + " 1 1 1" if line.startswith("3 ") and line.count(" ") == 3 else line for line in lines]
+    (found,) = judge("\n".join(longer), "a.ply").findings
+    assert (found.code, found.severity, found.count) == ("F006", "warning", 12)
+    wide = text.replace("\n10 ", "\n1 0 ", 1)
+    assert [found.code for found in judge(wide, "a.ply").findings] == ["F003"]
+
+
+def test_an_element_named_twice_is_refused(judge) -> None:
+    head, body = cube().split(b"end_header\n")
+    twice = head + b"element face 0\nproperty list uchar int vertex_indices\nend_header\n" + body
+    assert "names element face twice" in judge(twice, "a.ply").findings[0].message

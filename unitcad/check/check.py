@@ -123,13 +123,7 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
         from unitcad.check.read_step import check_step
 
         return check_step(path, view, options)
-    if kind == "stl":
-        from unitcad.check.read_stl import read_stl as read
-    else:
-        from unitcad.check.read_other import reader_for
-
-        read = reader_for(kind)
-    meshes, findings = read(view, options.limits, deadline)
+    meshes, findings = _reader(kind)(view, options.limits, deadline)
     del view, data
     if not meshes:
         return list(ending(findings)), Facts()
@@ -139,6 +133,19 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
     with keeping(findings):
         judged = _judge_all(meshes, options, deadline)
     return findings + list(judged.findings), judged.facts
+
+
+def _reader(kind: str) -> Reader:
+    """The reader of a format that holds one mesh; its module is loaded by the first file that needs it."""
+    if kind == "stl":
+        from unitcad.check.read_stl import read_stl as read
+    elif kind == "ply":
+        from unitcad.check.read_ply import read_ply as read
+    elif kind == "obj":
+        from unitcad.check.read_obj import read_obj as read
+    else:
+        from unitcad.check.read_off import read_off as read
+    return read
 
 
 def _bytes_of(path: Path, limits: Limits) -> bytes:

@@ -1,84 +1,167 @@
-"""Faces of five and more corners in text OBJ and OFF, cut into triangles before trimesh reads them.
+"""Polygons as a file has them, cut into triangles: what the readers of PLY, OBJ, OFF and GLB hand over.
 
-trimesh makes fans of them, which is wrong where they are not convex, or does not read them at all.
+A polygon is cut in its own plane. A fan from a corner is taken where all its triangles turn the same way; concave
+polygons, and those with corners on a line, are cut by manifold3d.
 """
 
 from __future__ import annotations
 
-import re
-from bisect import bisect_left
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check.text_mesh import OBJ_VERTEX, numbers_of
+from unitcad.check.findings import Finding, Location, counted, number
+from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
+from unitcad.check.mesh import LARGEST, Bools, Floats, Ints, Mesh, weld_points
+from unitcad.check.rulebook import finding
+from unitcad.check.source import Source
 
-_OBJ_FACE = re.compile(rb"(?m)^[ ]*f((?:[ ]+[^\s#\\\\]+){5,})[^\n]*$")
-_LARGE = 4  # corners that trimesh manages
-
-
-def in_triangles(kind: str, raw: bytes) -> bytes:
-    """The file's text with large faces replaced; the same bytes where it has none."""
-    if kind == "obj" and _OBJ_FACE.search(raw):
-        return _obj(raw)
-    if kind == "off" and (numbers := numbers_of("off", raw)) is not None:
-        return _off(raw, numbers)
-    return raw
+FLAT = 1e-3  # F013: distance of a corner from the polygon's plane, as part of the polygon's size
+_CHUNK = 50_000  # corners looked at together
+_PROPER = 1e-12  # least area of a fan's triangle, as part of the squared length of its polygon
+_PLACES = 9
 
 
-def _obj(raw: bytes) -> bytes:
-    lines = list(OBJ_VERTEX.finditer(raw))
-    points, starts = [line.group(1).split()[:3] for line in lines], [line.start() for line in lines]
+@dataclass(frozen=True)
+class Polygons:
+    """Vertices (n, 3) mm, the corners of all polygons one after the other (c,), and how many each has (p,).
 
-    def replaced(match: re.Match[bytes]) -> bytes:
-        words = match.group(1).split()
-        try:
-            ids = [int(word.split(b"/")[0]) for word in words]
-        except ValueError:
-            return match.group(0)
-        if min(ids) < 0:  # counted back from the last vertex so far
-            above = bisect_left(starts, match.start())
-            ids = [i if i > 0 else above + 1 + i for i in ids]
-        rows = _cut(points, [i - 1 for i in ids])
-        return b"\n".join(b"f " + b" ".join(words[k] for k in row) for row in rows)
+    `lines` (p,) from 1, `starts` and `names` of objects are those of `Source`. `counts_from` is the format's first
+    index, for messages.
+    """
 
-    return _OBJ_FACE.sub(replaced, raw)
+    vertices: Floats
+    corners: Ints
+    sizes: Ints
+    lines: Ints | None = None
+    starts: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    names: bytes = b""
+    counts_from: int = 0
 
 
-def _off(raw: bytes, numbers: bytes) -> bytes:
-    rows = [line.split() for line in numbers.split(b"\n") if line.strip()]
-    if len(rows) < 2 or not rows[0][0].isdigit():
-        return raw
-    n = int(rows[0][0][:18])
-    points, faces = rows[1 : n + 1], rows[n + 1 :]
-    if not any(row[0].isdigit() and int(row[0][:18]) > _LARGE for row in faces):
-        return raw
-    places, made = [point[:3] for point in points], []
-    for row in faces:
-        size = int(row[0][:18]) if row[0].isdigit() else 0
-        ids = row[1 : size + 1]
-        if size <= _LARGE or len(ids) < size or not all(word.isdigit() for word in ids):
-            made.append(row)
-        else:
-            made += [[b"3", *(ids[k] for k in cut)] for cut in _cut(places, [int(i[:18]) for i in ids])]
-    lines = [b"OFF", b"%d %d 0" % (n, len(made)), *(b" ".join(row) for row in points + made)]
-    return b"\n".join(lines) + b"\n"
+def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
+    """The mesh, none where a vertex is not finite, and what is wrong with the polygons.
+
+    Raises `Unreadable` where there is no polygon (F001), too many (F011), or one names a missing vertex (P011).
+    """
+    sizes, findings = polygons.sizes, []
+    source = Source(lines=polygons.lines, starts=polygons.starts, names=polygons.names)
+    short = np.flatnonzero(sizes < 3)
+    if len(short):
+        text = f"{counted(len(short), 'face')} with fewer than three vertices"
+        findings.append(_at("F008", text, short, source))
+    if not len(sizes) - len(short):
+        raise Unreadable(*findings, finding("F001", "the file has no face"))
+    triangles = int(sizes.sum()) - 2 * len(sizes) + int((2 - sizes[short]).sum())
+    if triangles > limits.max_faces:
+        raise Unreadable(
+            *findings, *over_limit(f"{counted(triangles, 'face')}, more than --max-faces {limits.max_faces}").findings
+        )
+    vertices, corners = polygons.vertices, polygons.corners
+    if int(corners.min()) < 0 or int(corners.max()) >= len(vertices):
+        wrong = int(np.flatnonzero((corners < 0) | (corners >= len(vertices)))[0])
+        polygon = np.searchsorted(np.cumsum(sizes), wrong, "right")
+        counting = "" if polygons.counts_from else ", counted from 0"
+        text = f"a face names vertex {corners[wrong] + polygons.counts_from} of {len(vertices)}{counting}"
+        raise Unreadable(*findings, _at("P011", text, np.array([polygon]), source))
+    used = np.zeros(len(vertices), bool)
+    used[corners] = True
+    finite = np.ones(len(vertices), bool)
+    finite[used] = (np.abs(vertices[used]) <= LARGEST).all(axis=1)
+    if not finite.all():
+        bad = np.unique(np.searchsorted(np.cumsum(sizes), np.flatnonzero(~finite[corners]), "right"))
+        text = f"{counted(len(bad), 'face')} with a vertex that is not finite"
+        return [], [*findings, _at("V001", text, bad, source)]
+    faces, of, bent = _in_triangles(vertices, corners, sizes, deadline)
+    if bent is not None and bent.any():
+        findings.append(_at("F013", _bent(bent), np.flatnonzero(bent), source))
+    points, index = weld_points(vertices[used])  # OBJ splits vertices along texture seams
+    place = np.zeros(len(vertices), np.int32)
+    place[used] = index
+    source = Source(of, polygons.lines, starts=polygons.starts, names=polygons.names)
+    return [Mesh(points, place[faces], indexed=False, source=source)], findings
 
 
-def _cut(points: list[list[bytes]], polygon: list[int]) -> list[list[int]]:
-    """Triangles of places in a polygon that turn as it does; a fan where its corners are not there or lie on a line."""
+def _at(code: str, message: str, polygons: Ints, source: Source) -> Finding:
+    places = [Location(face=int(i), line=source.line(int(i)), object=source.object(int(i))) for i in polygons[:_PLACES]]
+    return finding(code, message, len(polygons), places)
+
+
+def _bent(bent: Floats) -> str:
+    few = counted(int(np.count_nonzero(bent)), "face of four or more corners", "faces of four or more corners")
+    return f"{few} not in a plane: a corner lies up to {number(float(bent.max()))} mm off"
+
+
+def _in_triangles(
+    vertices: Floats, corners: Ints, sizes: Ints, deadline: Deadline
+) -> tuple[Ints, Ints | None, Floats | None]:
+    """Triangles (t, 3) in the polygons' order, the polygon of each (t,), how far each polygon is bent (p,) mm.
+
+    Where all are triangles, the second is None, since triangle and polygon are one, and so is the third.
+    """
+    if (sizes == 3).all():
+        return corners.reshape(-1, 3), None, None
+    bent = np.zeros(len(sizes), np.float32)
+    counts = np.maximum(sizes - 2, 0)
+    first, offsets = np.cumsum(sizes) - sizes, np.cumsum(counts) - counts
+    found = np.empty((int(counts.sum()), 3), corners.dtype)
+    for size in np.unique(sizes[sizes >= 3]).tolist():
+        alike = np.flatnonzero(sizes == size)
+        step = max(1, _CHUNK // size)
+        for at in range(0, len(alike), step):
+            deadline.tick()
+            some = alike[at : at + step]
+            ring = corners[first[some, None] + np.arange(size)]
+            rows = offsets[some, None] + np.arange(size - 2)
+            if size == 3:
+                found[rows[:, 0]] = ring
+                continue
+            cut, off = _cut(vertices[ring], deadline)
+            found[rows] = np.take_along_axis(ring, cut.reshape(len(ring), -1), axis=1).reshape(len(ring), -1, 3)
+            bent[some] = off
+    return found, np.repeat(np.arange(len(sizes)), counts), bent
+
+
+def _cut(points: Floats, deadline: Deadline) -> tuple[Ints, Floats]:
+    """Triangles (k, n - 2, 3) of polygons (k, n, 3) as places in them; how far each is bent, mm, 0 where it is flat."""
+    n = points.shape[1]
+    with np.errstate(all="ignore"):
+        local = points - points.mean(axis=1, keepdims=True)
+        normal = np.cross(local, np.roll(local, -1, axis=1)).sum(axis=1)
+        length = np.linalg.norm(normal, axis=1)
+        size = np.linalg.norm(np.ptp(local, axis=1), axis=1)
+        off = np.abs(np.einsum("kni,ki->kn", local, normal)).max(axis=1) / length
+        rounding = 2 * np.spacing(np.abs(points).max(axis=(1, 2)).astype(np.float32))
+        off = np.where((length > 0) & (off > np.maximum(FLAT * size, rounding)), off, 0.0)
+        least = _PROPER * size * size * length
+        fans = np.stack([np.zeros(n - 2, int), np.arange(1, n - 1), np.arange(2, n)], axis=1)
+        cut = np.broadcast_to(fans, (len(points), n - 2, 3)).copy()
+        left = np.flatnonzero(~_proper(local, normal, fans, least))
+        if n == 4 and len(left):
+            turned = (fans + 1) % 4
+            good = _proper(local[left], normal[left], turned, least[left])
+            cut[left[good]] = turned
+            return cut, off
+    for i in left.tolist() if n > 4 else ():
+        deadline.tick()
+        cut[i] = _concave(local[i], normal[i], fans)
+    return cut, off
+
+
+def _proper(local: Floats, normal: Floats, fans: Ints, least: Floats) -> Bools:
+    """Which polygons all triangles of a fan turn with, none of them without an area."""
+    a, b, c = (local[:, fans[:, k]] for k in range(3))
+    areas = np.einsum("kti,ki->kt", np.cross(b - a, c - a), normal)
+    return np.asarray((areas > least[:, None]).all(axis=1))
+
+
+def _concave(local: Floats, normal: Floats, fan: Ints) -> Ints:
+    """Triangles of one polygon by manifold3d; the fan where its corners lie on a line or it crosses itself."""
     from manifold3d import triangulate
 
-    fan = [[0, k, k + 1] for k in range(1, len(polygon) - 1)]
-    if min(polygon) < 0 or max(polygon) >= len(points):
+    drop = int(np.argmax(np.abs(normal)))
+    if not abs(normal[drop]) > 0:
         return fan
-    try:
-        corners = np.array([points[i] for i in polygon]).astype(np.float64)
-    except ValueError:
-        return fan
-    area = np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
-    drop = int(np.argmax(np.abs(area)))
-    if not abs(area[drop]) > 0:
-        return fan
-    flat = corners[:, [(drop + 1) % 3, (drop + 2) % 3]] * [np.sign(area[drop]), 1]
-    found = triangulate([flat])
-    return [[int(k) for k in row] for row in found] if len(found) == len(fan) else fan
+    flat = local[:, [(drop + 1) % 3, (drop + 2) % 3]] * [np.sign(normal[drop]), 1]
+    found = np.asarray(triangulate([flat]))
+    return found if found.shape == fan.shape else fan

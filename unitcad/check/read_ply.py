@@ -1,140 +1,260 @@
-"""A binary PLY's header held against its size before trimesh reads it: each element walked, none made.
+"""PLY as Greg Turk defined it (Stanford, 1994), text and binary of either byte order.
 
-The format is Greg Turk's (Stanford, 1994): elements in the header's order, records without padding, lists with a count
-of their own before them.
+Elements stand in the header's order, records without padding, lists with a count of their own before them. Of all that
+a file holds, `x`, `y` and `z` of `vertex` and `vertex_indices` (or `vertex_index`) of `face` are kept.
 """
 
 from __future__ import annotations
 
+import re
 import struct
+from array import array
 from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.findings import Finding, counted
-from unitcad.check.limits import Deadline, Unreadable
-from unitcad.check.mesh import Ints
+from unitcad.check import rows
+from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
+from unitcad.check.mesh import Floats, Ints, Mesh
+from unitcad.check.polygons import Polygons, mesh_of
+from unitcad.check.rows import Rows
 from unitcad.check.rulebook import finding
 
 _TYPES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}
 _TYPES |= {"int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I"}
 _TYPES |= {"float32": "f", "float64": "d"}
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
-_ALIKE = 4096  # records looked at together, if their lists have one length
-_SINGLE = 1000  # records read one by one after two that differ
+_TEXT = re.compile(rb"[\r\n][ \t]*format[ \t]+ascii\b")
+_HEADER = 100_000  # bytes
+_WANTED = {"vertex": ("x", "y", "z"), "face": ("vertex_indices", "vertex_index")}
+_TICK = 100_000
+Column = tuple[Ints | None, Floats]  # lengths of lists, None for a plain property, and its numbers
 
 
 @dataclass(frozen=True)
 class _Element:
-    """An element's name, count and properties: type of its list's length ("" for a plain one) and of its numbers."""
+    """An element: its properties are (name, type of the list's length or "" for a plain one, type of numbers)."""
 
     name: str
     count: int
-    properties: list[tuple[str, str]]
+    properties: list[tuple[str, str, str]]
+
+    @property
+    def lists(self) -> bool:
+        return any(length for _, length, _ in self.properties)
 
 
-def trimmed(raw: bytes, deadline: Deadline) -> tuple[bytes, list[Finding]]:
-    """The file without bytes after its last element (F006). Raises `Unreadable` where its elements do not fit (F002).
+def read_ply(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
+    """The mesh of a PLY file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh remains."""
+    raw, findings = bytes(data), list[Finding]()
+    if _TEXT.search(raw[:1000]):
+        raw, findings = rows.plain(raw)
+    if not raw.startswith(b"ply"):
+        raise Unreadable(finding("F005", "named .ply, but does not begin with ply"))
+    if b"end_header" not in raw[:_HEADER]:
+        raise Unreadable(finding("F003", "the header has no end"))
+    with keeping(findings):
+        order, elements, at = _header(raw)
+        largest = max((element.count for element in elements), default=0)
+        if largest > 3 * limits.max_faces:
+            raise over_limit(f"{largest} vertices or faces promised")
+        if largest > len(raw):
+            raise Unreadable(finding("F002", f"{largest} vertices or faces promised in {len(raw)} bytes"))
+        tables, lines, more = (
+            _text(raw, at, elements, deadline) if order == "ascii" else _binary(raw, at, order, elements, deadline)
+        )
+        findings += more
+        meshes, more = mesh_of(_polygons(elements, tables, lines), limits, deadline)
+    return meshes, findings + more
 
-    A text PLY is returned as it is.
-    """
-    order, elements, at = _header(raw)
-    if not order:
-        return raw, []
-    for element in elements:
-        at = _after(raw, at, element, order, deadline)
-    if at == len(raw):
-        return raw, []
-    extra = len(raw) - at
-    return raw[:at], [finding("F006", f"{counted(extra, 'byte')} after the last element", extra)]
+
+def _polygons(elements: list[_Element], tables: dict[str, dict[str, Column]], lines: Ints | None) -> Polygons:
+    if not any(element.name == "face" and element.count for element in elements):
+        raise Unreadable(finding("F001", "the file has no face"))
+    points = [tables.get("vertex", {}).get(axis, (None, None)) for axis in "xyz"]
+    sizes, corners = next(iter(tables["face"].values()), (None, None))
+    if sizes is None or corners is None or any(column is None or of is not None for of, column in points):
+        raise Unreadable(finding("F003", "cannot be read as PLY: its elements are not those of a mesh"))
+    vertices = np.stack([np.asarray(column, np.float64) for _, column in points], axis=1)
+    indices = rows.integers(corners) if corners.dtype.kind == "f" else corners.astype(np.int64)
+    return Polygons(vertices, indices, sizes, lines)
 
 
 def _header(raw: bytes) -> tuple[str, list[_Element], int]:
-    """Byte order ("" for text), elements, and where the header ends."""
-    order, elements, at = "", [], 0
+    """Byte order ("ascii" for text), elements, and where the header ends."""
+    order, elements, at = "", list[_Element](), 0
     while True:
         end = raw.find(b"\n", at)
         words = raw[at : end if end >= 0 else len(raw)].decode("ascii", "replace").split()
         if end < 0 or words[:1] == ["end_header"]:
-            return order, elements, end + 1 if end >= 0 else len(raw)
+            break
         at = end + 1
         if words[:1] == ["format"]:
-            order = _ORDERS.get(words[1] if len(words) > 1 else "", "")
+            order = "ascii" if words[1:2] == ["ascii"] else _ORDERS.get(" ".join(words[1:2]), "")
         elif words[:1] == ["element"]:
             if len(words) != 3 or not words[2].isdecimal():
-                raise Unreadable(
-                    finding("F003", f"the header's line {' '.join(words)[:60]!r} names no element and count")
-                )
+                raise _no("element and count", words)
+            if any(element.name == words[1] for element in elements):
+                raise Unreadable(finding("F003", f"the header names element {words[1][:30]} twice"))
             elements.append(_Element(words[1], int(words[2][:18]), []))
         elif words[:1] == ["property"] and elements:
             kinds = words[2:4] if words[1:2] == ["list"] else ["", *words[1:2]]
             if len(kinds) < 2 or any(kind not in _TYPES for kind in kinds if kind):
-                raise Unreadable(finding("F003", f"the header's line {' '.join(words)[:60]!r} is no property"))
-            elements[-1].properties.append((_TYPES.get(kinds[0], ""), _TYPES[kinds[1]]))
+                text = f"the header's line {' '.join(words)[:60]!r} is no property"
+                raise Unreadable(finding("F003", text))
+            elements[-1].properties.append((" ".join(words[-1:]), _TYPES.get(kinds[0], ""), _TYPES[kinds[1]]))
+    if not order:
+        raise Unreadable(finding("F003", "the header names no format that is known"))
+    return order, elements, end + 1 if end >= 0 else len(raw)
 
 
-def _after(raw: bytes, at: int, element: _Element, order: str, deadline: Deadline) -> int:
-    """Where the records of an element that begin at `at` end."""
-    if not any(length for length, _ in element.properties):
-        size = sum(struct.calcsize(order + kind) for _, kind in element.properties)
-        if at + size * element.count > len(raw):
-            raise _short(element, (len(raw) - at) // size)
-        return at + size * element.count
-    done = window = 0
-    while done < element.count:
-        deadline.tick()
-        alike = 0
-        if window:
-            alike, after = _alike(raw, at, element, order, min(window, element.count - done))
-            done, at = done + alike, at + after
-        if alike == window and window:
-            window *= 2
-            continue
-        window = _ALIKE
-        for _ in range(min(_SINGLE, element.count - done)):
-            sizes = _sizes(raw, at, element, order)
-            at += sum(sizes)
-            if not sizes or at > len(raw):
-                raise _short(element, done)
-            done += 1
-    return at
+def _no(what: str, words: list[str]) -> Unreadable:
+    return Unreadable(finding("F003", f"the header's line {' '.join(words)[:60]!r} names no {what}"))
 
 
-def _sizes(raw: bytes, at: int, element: _Element, order: str) -> list[int]:
-    """Bytes of each property of the record at `at`; none where it reaches past the end or a list has no length."""
-    sizes = []
-    for length, kind in element.properties:
-        size = struct.calcsize(order + kind)
+def _text(
+    raw: bytes, at: int, elements: list[_Element], deadline: Deadline
+) -> tuple[dict[str, dict[str, Column]], Ints | None, list[Finding]]:
+    """The wanted columns of each element, the lines of the faces, and findings."""
+    found = rows.all_rows(raw, at, raw.count(b"\n", 0, at) + 1, deadline, comments=False)
+    promised = sum(element.count for element in elements)
+    if len(found) < promised:
+        text = (
+            f"the header promises {counted(promised, 'line')} of vertices, faces and other elements, not {len(found)}"
+        )
+        raise Unreadable(finding("F002", text, promised - len(found)))
+    extra, longer, tables, lines, row = len(found) - promised, 0, {}, None, 0
+    for element in elements:
+        which = slice(row, row + element.count)
+        tables[element.name], more = _text_element(found, which, element)
+        longer += more
+        lines = found.lines[which] if element.name == "face" else lines
+        row += element.count
+    findings = [finding("F006", f"{counted(extra, 'line')} after the last element", extra)] if extra else []
+    if longer:  # as MeshLab writes, which announces colours of faces and writes a list
+        findings.append(
+            finding("F006", f"{counted(longer, 'line')} with more numbers than the properties take", longer)
+        )
+    return tables, lines, findings
+
+
+def _text_element(found: Rows, which: slice, element: _Element) -> tuple[dict[str, Column], int]:
+    """The wanted columns, and how many records have numbers after their last property; only faces may."""
+    columns: dict[str, Column] = {}
+    place, ends, lines = found.starts[:-1][which], found.starts[1:][which], found.lines[which]
+    for name, length, _ in element.properties:
+        _refuse(place >= ends, element, lines)
+        sizes = None
+        if length:
+            sizes = rows.lengths(found.values[place], ends - place - 1, lines, element.name)
+        if name in _WANTED.get(element.name, ()):
+            columns[name] = (sizes, found.values[place if sizes is None else rows.spread(place + 1, sizes)])
+        place = place + 1 + (0 if sizes is None else sizes)
+    if element.name != "face":
+        _refuse(place < ends, element, lines)
+    return columns, int((place < ends).sum())
+
+
+def _refuse(wrong: Ints, element: _Element, lines: Ints) -> None:
+    """Raises `Unreadable` (F003) where a record of the element has more or fewer numbers than its properties."""
+    if wrong.any():
+        text = f"a {element.name} with more or fewer numbers than its properties take"
+        raise Unreadable(finding("F003", text, int(wrong.sum()), [Location(line=int(lines[int(np.argmax(wrong))]))]))
+
+
+def _binary(
+    raw: bytes, at: int, order: str, elements: list[_Element], deadline: Deadline
+) -> tuple[dict[str, dict[str, Column]], None, list[Finding]]:
+    tables = {}
+    for element in elements:
+        if element.lists and not _alike(raw, at, element, order):
+            tables[element.name], at = _walked(raw, at, element, order, deadline)
+        else:
+            tables[element.name], at = _records(raw, at, element, order)
+    extra = len(raw) - at
+    more = [finding("F006", f"{counted(extra, 'byte')} after the last element", extra)] if extra else []
+    return tables, None, more
+
+
+def _layout(raw: bytes, at: int, element: _Element, order: str) -> np.dtype | None:
+    """The type of the record at `at`, a list as its length "#i" and its numbers; None where that cannot be had."""
+    fields: list[tuple] = []
+    begin = at
+    for i, (name, length, kind) in enumerate(element.properties):
         if length:
             own = struct.calcsize(order + length)
             if at + own > len(raw):
-                return []
+                return None
             (n,) = struct.unpack_from(order + length, raw, at)
             if not 0 <= n <= len(raw):  # a NaN, where a length is a float, is neither
-                return []
-            size = own + int(n) * size
-        sizes.append(size)
-        at += size
-    return sizes
+                return None
+            fields += [(f"#{i}", order + length), (f"{i} {name}", order + kind, (int(n),))]
+            at += own + int(n) * struct.calcsize(order + kind)
+        else:
+            fields.append((f"{i} {name}", order + kind))
+            at += struct.calcsize(order + kind)
+        if at > len(raw) or at - begin >= 2**31:  # which numpy's types cannot hold
+            return None
+    return np.dtype(fields)
 
 
-def _alike(raw: bytes, at: int, element: _Element, order: str, most: int) -> tuple[int, int]:
-    """How many of the next records have lists as long as the first one's, and their bytes."""
-    sizes = _sizes(raw, at, element, order)
-    stride = sum(sizes)
-    most = min(most, (len(raw) - at) // stride if stride else 0)
-    if not most:
-        return 0, 0
-    table: Ints = np.frombuffer(raw, np.uint8, most * stride, at).reshape(most, stride)
-    same = np.ones(most, bool)
-    place = 0
-    for (length, _), size in zip(element.properties, sizes, strict=True):
-        if length:
-            own = struct.calcsize(order + length)
-            same &= (table[:, place : place + own] == table[0, place : place + own]).all(axis=1)
-        place += size
-    alike = most if same.all() else int(np.argmin(same))
-    return alike, alike * stride
+def _alike(raw: bytes, at: int, element: _Element, order: str) -> bool:
+    """Whether all records of an element have lists as long as the first one's, as far as the file goes."""
+    layout = _layout(raw, at, element, order)
+    if layout is None or not element.count:
+        return layout is not None
+    if at + element.count * layout.itemsize > len(raw):
+        return False
+    table = np.frombuffer(raw, layout, element.count, at)
+    return all((table[name] == table[name][0]).all() for name in layout.names or () if name.startswith("#"))
+
+
+def _records(raw: bytes, at: int, element: _Element, order: str) -> tuple[dict[str, Column], int]:
+    """The columns of an element whose records are alike, and where they end."""
+    layout = _layout(raw, at, element, order) if element.count else np.dtype([])
+    size = layout.itemsize if layout is not None else 0
+    if layout is None or at + size * element.count > len(raw):
+        raise _short(element, (len(raw) - at) // size if size else 0)
+    columns: dict[str, Column] = {}
+    if size and element.count:
+        table = np.frombuffer(raw, layout, element.count, at)
+        for i, (name, length, _) in enumerate(element.properties):
+            if name in _WANTED.get(element.name, ()):
+                values = table[f"{i} {name}"]
+                sizes = np.full(element.count, values.shape[1]) if length else None
+                columns[name] = (sizes, values.reshape(-1))
+    return columns, at + size * element.count
+
+
+def _walked(raw: bytes, at: int, element: _Element, order: str, deadline: Deadline) -> tuple[dict[str, Column], int]:
+    """The columns of an element whose lists differ in length, record after record, and where they end."""
+    steps = [(struct.Struct(order + (length or kind)), struct.calcsize(order + kind) if length else 0,
+              name in _WANTED.get(element.name, ())) for name, length, kind in element.properties]  # fmt: skip
+    kept = {i: (array("q"), array("q")) for i, (_, _, wanted) in enumerate(steps) if wanted}
+    for done in range(element.count):
+        if not done % _TICK:
+            deadline.tick()
+        for i, (number, size, wanted) in enumerate(steps):
+            first, n = at + number.size, 0
+            if size and first <= len(raw):
+                (n,) = number.unpack_from(raw, at)
+                n = int(n) if 0 <= n <= len(raw) else len(raw)
+            if wanted:
+                kept[i][0].append(first if size else at)
+                kept[i][1].append(n if size else 1)
+            at = first + n * size
+        if at > len(raw):
+            raise _short(element, done)
+    columns: dict[str, Column] = {}
+    for i, (starts, counts) in kept.items():
+        name, length, kind = element.properties[i]
+        size = struct.calcsize(order + kind)
+        numbers = np.ndarray(len(raw) - size + 1, order + kind, raw, strides=(1,))  # at every byte
+        sizes = np.frombuffer(counts, np.int64)
+        values = numbers[rows.spread(np.frombuffer(starts, np.int64), sizes, size)]
+        columns[name] = (sizes if length else None, values)
+    return columns, at
 
 
 def _short(element: _Element, room: int) -> Unreadable:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.findings import SHOWN, Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Floats, Mesh, weld_exact
+from unitcad.check.rows import NUMBER
 from unitcad.check.rulebook import finding
-from unitcad.check.text_mesh import NUMBER
 
 RECORD = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _TOKENS = 21  # facet normal x y z outer loop (vertex x y z) x 3 endloop endfacet
@@ -109,6 +109,8 @@ class _Text:
     normals: list[Floats] = field(default_factory=list)
     facets: int = 0
     solids: int = 0
+    nested: int = 0
+    nested_at: list[int] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
 
 
@@ -116,6 +118,9 @@ def _read_text(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[li
     found = _Text()
     raw = _decoded(data.obj if isinstance(data.obj, bytes) else bytes(data), found.findings)
     _walk(raw, found, limits, deadline)
+    if found.nested:  # one finding for all of them: a file may have a hundred thousand
+        places = [Location(line=line) for line in found.nested_at]
+        found.findings.append(finding("F003", "solid begins before the last one ended", found.nested, places))
     if not found.facets:
         raise Unreadable(*found.findings, finding("F001", "the file has no facet"))
     if found.solids > 1:
@@ -169,7 +174,9 @@ def _walk(raw: bytes, found: _Text, limits: Limits, deadline: Deadline) -> None:
         word = raw[at : at + 8].split(None, 1)[0].lower() if raw[at : at + 8].strip() else b""
         if word.startswith(b"solid"):
             if inside:
-                found.findings.append(_at("F003", "solid begins before the last one ended", raw, at))
+                found.nested += 1
+                if found.nested <= SHOWN:
+                    found.nested_at.append(raw.count(b"\n", 0, at) + 1)
             inside, found.solids, at = True, found.solids + 1, line_end
         elif word == b"endsolid":
             inside, at = False, line_end

@@ -29,7 +29,7 @@ class Source:
 
     @cached_property
     def _names(self) -> list[str]:
-        return self.names.decode("utf-8", "replace").split("\n")
+        return [name.strip() for name in self.names.decode("utf-8", "replace").split("\n")]
 
     def located(self, found: Finding) -> Finding:
         """The finding with its triangles' places as the file has them."""

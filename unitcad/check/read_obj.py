@@ -1,0 +1,125 @@
+"""OBJ as Wavefront's appendix B1 defines it: the polygons, with continued lines and negative indices.
+
+What a face says of texture and normals, and all other statements, are left out; materials cost nothing.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from unitcad.check import rows
+from unitcad.check.findings import Finding, Location
+from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
+from unitcad.check.mesh import Floats, Ints, Mesh
+from unitcad.check.polygons import Polygons, mesh_of
+from unitcad.check.rows import BLANK, JOINED, NEWLINE, SLASH, SPACE
+from unitcad.check.rulebook import finding
+
+_ANY = re.compile(rb"(?m)^[ \t]*(?:v|f|o|g|mtllib|usemtl|#)\s")
+
+
+@dataclass
+class _Read:
+    """What has been read so far; `objects` and `groups` are (polygons before, name in a line) of o and g statements."""
+
+    vertices: list[Floats] = field(default_factory=list)
+    corners: list[Ints] = field(default_factory=list)
+    sizes: list[Ints] = field(default_factory=list)
+    lines: list[Ints] = field(default_factory=list)
+    objects: list[tuple[Ints, bytes]] = field(default_factory=list)
+    groups: list[tuple[Ints, bytes]] = field(default_factory=list)
+    n_vertices: int = 0
+    n_polygons: int = 0
+    n_corners: int = 0
+
+
+def read_obj(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
+    """The mesh of an OBJ file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh remains."""
+    raw, findings = rows.plain(bytes(data))
+    if not _ANY.search(raw):
+        raise Unreadable(finding("F005", "named .obj, but has no line of one"))
+    raw = raw.replace(b"\\\n", b" \v")
+    found = _Read()
+    with keeping(findings):
+        for block, line in rows.blocks(raw, 0, deadline):
+            _take(block, line, found)
+            if max(found.n_vertices, found.n_corners) > 3 * limits.max_faces + 2:
+                raise over_limit(f"more faces or vertices than --max-faces {limits.max_faces} allows")
+        meshes, more = mesh_of(_polygons(found), limits, deadline)
+    return meshes, findings + more
+
+
+def _polygons(found: _Read) -> Polygons:
+    named = found.objects or found.groups
+    empty = np.empty(0, np.int64)
+    return Polygons(
+        np.concatenate(found.vertices) if found.vertices else np.empty((0, 3)),
+        np.concatenate([empty, *found.corners]),
+        np.concatenate([empty, *found.sizes]),
+        np.concatenate([empty, *found.lines]).astype(np.int32),
+        np.concatenate([empty, *(starts for starts, _ in named)]),
+        b"".join(names for _, names in named),
+        counts_from=1,
+    )
+
+
+def _take(block: Ints, line: int, found: _Read) -> None:
+    """Add a block's vertices, faces and names."""
+    text = rows.without_comments(block)
+    starts, ends = rows.words(text)
+    counts = np.diff(ends, prepend=0)
+    lines = np.flatnonzero(counts)
+    keys = starts[ends[lines] - counts[lines]]
+    letters = np.where(BLANK[text[keys + 1]], text[keys], 0)  # of statements that have one letter
+    widths = np.diff(np.flatnonzero(block == NEWLINE), prepend=-1)
+
+    def statements(letter: bytes) -> tuple[Ints, Ints]:
+        """The lines of a statement, and the text with nothing but their arguments and the ends of lines."""
+        ours = letters == ord(letter)
+        chosen = np.zeros(len(counts), bool)
+        chosen[lines[ours]] = True
+        kept = np.repeat(chosen, widths)
+        kept |= (text == NEWLINE) | (text == JOINED)
+        kept[keys[ours]] = False
+        return lines[ours], np.where(kept, text, np.uint8(SPACE))
+
+    points, arguments = statements(b"v")
+    if len(points):
+        numbers = rows.rows_of(arguments, line, which=points)
+        found.vertices.append(rows.columns(numbers, slice(None), 3))
+    faces, arguments = statements(b"f")
+    for letter, names in ((b"o", found.objects), (b"g", found.groups)):
+        if (letters == ord(letter)).any():
+            named, _ = statements(letter)
+            begins = np.flatnonzero(block == NEWLINE)[named] - widths[named] + 1
+            places = rows.spread(
+                keys[letters == ord(letter)] + 1, begins + widths[named] - keys[letters == ord(letter)] - 1
+            )
+            names.append((found.n_polygons + np.searchsorted(faces, named), block[places].tobytes()))
+    if len(faces):
+        above = found.n_vertices + np.searchsorted(points, faces)
+        _take_faces(arguments, line, faces, above, found)
+    found.n_vertices += len(points)
+
+
+def _take_faces(text: Ints, line: int, faces: Ints, above: Ints, found: _Read) -> None:
+    """Add the faces on the lines `faces`; `above` is how many vertices stand before each."""
+    behind = rows.between(text, SLASH, BLANK[text])
+    behind[1:] &= ~BLANK[text[:-1]]  # a word that begins with a slash is no index
+    refs = rows.rows_of(np.where(behind, np.uint8(SPACE), text), line, integers=True, which=faces)
+    ids, sizes = refs.values, refs.sizes
+    before = np.repeat(above, sizes)
+    wrong = np.flatnonzero((ids == 0) | (ids < -before))
+    if len(wrong):
+        at = int(refs.lines[np.searchsorted(refs.starts, wrong[0], "right") - 1])
+        said = ids[wrong[0]]
+        why = f"vertex {said}, of {before[wrong[0]]} above it" if said else "vertex 0; OBJ counts from 1"
+        raise Unreadable(finding("P011", f"a face names {why}", places=[Location(line=at)]))
+    found.corners.append(np.where(ids > 0, ids - 1, before + ids))
+    found.sizes.append(sizes)
+    found.lines.append(refs.lines)
+    found.n_polygons += len(sizes)
+    found.n_corners += len(ids)

@@ -1,0 +1,213 @@
+"""Numbers of a text, row by row, in numpy: what OBJ, OFF and text PLY are read with. No Python object for a number.
+
+A text is taken in blocks of whole lines, so that what is made on the way has the size of a block.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.limits import Deadline, Unreadable
+from unitcad.check.mesh import Bools, Floats, Ints
+from unitcad.check.rulebook import finding
+
+NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
+_NOT_FINITE = re.compile(rb"[+-]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
+_INTEGER = re.compile(rb"[+-]?\d{1,18}")
+_WORD = re.compile(rb"\S+")
+BLOCK = 2_000_000
+NEWLINE, HASH, SLASH, SPACE = 10, 35, 47, 32
+JOINED = 11  # a vertical tab stands where a line was continued
+
+
+def _table(characters: bytes) -> Bools:
+    found = np.zeros(256, bool)
+    found[list(characters)] = True
+    return found
+
+
+BLANK = _table(b" \t\n\v\f\r")
+_IN_NUMBERS = _table(b"0123456789+-.eEnNaAiIfFtTyY \t\n\v\f\r")
+_IN_INTEGERS = _table(b"0123456789+- \t\n\v\f\r")
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Numbers of the lines that have any: row r is values[starts[r] : starts[r + 1]], on line lines[r] (from 1)."""
+
+    values: Floats
+    starts: Ints
+    lines: Ints
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    @property
+    def sizes(self) -> Ints:
+        """Numbers a row."""
+        return np.diff(self.starts)
+
+
+def plain(raw: bytes) -> tuple[bytes, list[Finding]]:
+    """A text with LF line ends and without a byte order mark; what had to be changed is a finding."""
+    found = []
+    if raw[:3] == b"\xef\xbb\xbf":
+        found.append(finding("F009", "a UTF-8 byte order mark at the start"))
+        raw = raw[3:]
+    if b"\r" in raw:
+        if b"\n" not in raw:
+            found.append(finding("F009", "CR-only line ends"))
+        raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return raw.replace(b"\v", b" "), found
+
+
+def blocks(raw: bytes, at: int, deadline: Deadline, line: int = 1) -> Iterator[tuple[Ints, int]]:
+    """Whole lines of the text from `at` on as bytes (n,), each block ending in a newline, with their first line."""
+    while at < len(raw):
+        deadline.tick()
+        cut = raw.find(b"\n", min(at + BLOCK, len(raw)))
+        cut = len(raw) if cut < 0 else cut + 1
+        piece = raw[at:cut]
+        block = np.frombuffer(piece if piece.endswith(b"\n") else piece + b"\n", np.uint8)
+        yield block, line
+        line += int(np.count_nonzero((block == NEWLINE) | (block == JOINED)))
+        at = cut
+
+
+def between(block: Ints, mark: int, stop: Bools) -> Bools:
+    """Which bytes stand behind a `mark`, itself included, with no `stop` in between."""
+    marked = block == mark
+    if not marked.any():
+        return marked
+    places = np.arange(1, len(block) + 1, dtype=np.int32)
+    last = np.maximum.accumulate(np.where(marked, places, 0))
+    return last > np.maximum.accumulate(np.where(stop, places, 0))
+
+
+def words(block: Ints) -> tuple[Ints, Ints]:
+    """Where words begin, and how many of them began before each line's end."""
+    blank = BLANK[block]
+    first = ~blank
+    first[1:] &= blank[:-1]
+    starts = np.flatnonzero(first)
+    return starts, np.searchsorted(starts, np.flatnonzero(block == NEWLINE))
+
+
+def rows_of(block: Ints, line: int, *, integers: bool = False, which: Ints | None = None) -> Rows:
+    """The numbers of a block that begins on `line`, a row for each line that has any, or for each of the lines `which`.
+
+    Raises `Unreadable` (F004) for a word that is no number.
+    """
+    starts, ends = words(block)
+    values = _parsed(block, len(starts), integers)
+    if values is None:
+        values = _slowly(block, line, integers)
+    used = np.flatnonzero(np.diff(ends, prepend=0)) if which is None else which
+    lines = line + used
+    joined = np.flatnonzero(block == JOINED)
+    if len(joined):
+        begins = np.concatenate([[0], np.flatnonzero(block == NEWLINE)])[used]
+        lines = lines + np.searchsorted(joined, begins)
+    return Rows(values, np.concatenate([[0], ends[used]]), lines)
+
+
+def all_rows(raw: bytes, at: int, line: int, deadline: Deadline, *, comments: bool) -> Rows:
+    """The numbers of a text from `at`, which stands on `line`; with `comments` a # begins one."""
+    return joined(
+        [
+            rows_of(without_comments(block) if comments else block, first)
+            for block, first in blocks(raw, at, deadline, line)
+        ]
+    )
+
+
+def without_comments(block: Ints) -> Ints:
+    """The block with blanks from each # to the end of its line."""
+    return np.where(between(block, HASH, block == NEWLINE), np.uint8(SPACE), block)
+
+
+def spread(firsts: Ints, counts: Ints, step: int = 1) -> Ints:
+    """The places firsts[i], firsts[i] + step ... of all runs, counts[i] each."""
+    ends = np.cumsum(counts)
+    places = np.arange(int(ends[-1]) if len(ends) else 0) - np.repeat(ends - counts, counts)
+    places *= step
+    places += np.repeat(firsts, counts)
+    return places
+
+
+def columns(found: Rows, which: slice, most: int) -> Floats:
+    """The first so many numbers of each row. Raises `Unreadable` (F003) for a row that has fewer."""
+    sizes, lines = found.sizes[which], found.lines[which]
+    short = np.flatnonzero(sizes < most)
+    if len(short):
+        text = f"a vertex with {counted(int(sizes[short[0]]), 'number')}"
+        raise Unreadable(finding("F003", text, len(short), [Location(line=int(lines[short[0]]))]))
+    return found.values[found.starts[:-1][which, None] + np.arange(most)]
+
+
+def lengths(counts: Floats, room: Ints, lines: Ints, what: str = "face") -> Ints:
+    """The lengths of lists whose rows have `room` numbers for them. Raises `Unreadable` (F003) where one is longer."""
+    bad = np.flatnonzero(~((counts >= 0) & (counts <= room) & (counts == np.floor(counts))))
+    if len(bad):
+        row = int(bad[0])
+        of = f"{counts[row]:.15g}"
+        text = f"a {what} of {of} {'vertex' if of == '1' else 'vertices'} names {max(int(room[row]), 0)}"
+        raise Unreadable(finding("F003", text, len(bad), [Location(line=int(lines[row]))]))
+    return counts.astype(np.int64)
+
+
+def integers(values: Floats) -> Ints:
+    """Indices from numbers. Raises `Unreadable` (F004) for one that is no integer."""
+    bad = np.flatnonzero(~((values == np.floor(values)) & (np.abs(values) < 2**53)))
+    if len(bad):
+        raise Unreadable(finding("F004", f"'{values[bad[0]]:.15g}' is not a vertex's index", len(bad)))
+    return values.astype(np.int64)
+
+
+def joined(parts: list[Rows]) -> Rows:
+    """Rows after each other."""
+    if not parts:
+        return Rows(np.empty(0), np.zeros(1, np.int64), np.empty(0, np.int64))
+    ends = np.cumsum([len(part.values) for part in parts])
+    starts = [part.starts[1:] + end - len(part.values) for part, end in zip(parts, ends, strict=True)]
+    return Rows(
+        np.concatenate([part.values for part in parts]),
+        np.concatenate([[0], *starts]),
+        np.concatenate([part.lines for part in parts]),
+    )
+
+
+def _parsed(block: Ints, count: int, integers: bool) -> Floats | None:
+    """The numbers where all words of the block are some; None where one may be none."""
+    if not (_IN_INTEGERS if integers else _IN_NUMBERS)[block].all():
+        return None
+    kind = np.int64 if integers else np.float64
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            values = np.fromstring(block.tobytes(), kind, sep=" ")
+        except (DeprecationWarning, ValueError):
+            return None
+    return values if len(values) == count else None  # "1-2" is two numbers to numpy
+
+
+def _slowly(block: Ints, line: int, integers: bool) -> Floats:
+    """The numbers word by word. Raises `Unreadable` for the first word that is none."""
+    text = block.tobytes()
+    values = []
+    for match in _WORD.finditer(text):
+        word = match.group()
+        good = _INTEGER.fullmatch(word) if integers else NUMBER.fullmatch(word) or _NOT_FINITE.fullmatch(word)
+        if not good:
+            shown = word[:30].decode("utf-8", "replace")
+            why = "a vertex's index" if integers else "a number (a decimal comma)" if b"," in word else "a number"
+            at = line + sum(text.count(mark, 0, match.start()) for mark in (b"\n", b"\v"))
+            raise Unreadable(finding("F004", f"{shown!r} is not {why}", places=[Location(line=at)]))
+        values.append(int(word) if integers else float(word))
+    return np.array(values, np.int64 if integers else np.float64)
