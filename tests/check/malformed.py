@@ -308,10 +308,23 @@ def _geometry() -> list[tuple]:
         ("hollow.stl", "G006", stl(np.concatenate([cube, inner[:, ::-1]]))),
         ("sheet.obj", "G007", "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 3 3 0\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 1 3 2\n"),
         ("one-point.stl", "G007", stl(np.full((9, 3, 3), 5.0))),
+        ("bow-tie.stl", "G008", stl(np.concatenate([_wedge(5)[:, ::-1], _wedge(-5)]))),
+        ("fin-of-a-face.stl", "G009", stl(np.concatenate([cube, _fin()]))),
         ("metres.stl", "S001", stl(box((0.014, 0.014, 0.005)))),
         ("microns.stl", "S001", stl(box((14_000, 14_000, 5_000)))),
         ("inches.3mf", "S001", package(model_xml(attributes='unit="meter"'))),
     ]
+
+
+def _wedge(width: float) -> np.ndarray:
+    """A prism over a triangle with a corner at the origin; its faces look inwards."""
+    return prism([(0, 0), (width, width), (width, -width)], 0, 5)
+
+
+def _fin() -> np.ndarray:
+    """Two sheets in one place at an edge of the cube, cut along different diagonals."""
+    a, b, c, d = np.array([[0, 0, 0], [0, 0, 10], [-5, -5, 10], [-5, -5, 0]], float)
+    return np.array([[a, b, c], [a, c, d], [b, a, d], [b, d, c]])
 
 
 def _items(shift: str) -> str:

@@ -1,4 +1,4 @@
-"""Self-crossing (G001), touching shells (G003) and coplanar overlap (G004), decided exactly.
+"""Self-crossing (G001), touching shells (G003) and coplanar overlap (G004, G008, G009), decided exactly.
 
 Four sieves, each a whole block of pairs at a time: boxes; faces round a vertex whose star is a height field, which can
 meet in that vertex only; planes of the faces; planes through their edges, both in floating point with an error bound.
@@ -12,14 +12,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check import triangles
+from unitcad.check import overlap, triangles
 from unitcad.check.edges import balanced
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Unreadable
-from unitcad.check.mesh import Bools, Floats, Ints, area_vectors, cross, float32_step
+from unitcad.check.mesh import Bools, Floats, Ints, cross, float32_step
 from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
 from unitcad.check.rulebook import finding
-from unitcad.check.topology import Topology, max_side_squared
+from unitcad.check.topology import Topology
 
 _EPS = float(np.finfo(np.float64).eps)
 _BLOCK = 1 << 17
@@ -60,6 +60,7 @@ class _Faces:
     shell: Ints
     original: Ints
     several: bool
+    doubled: bool
 
 
 def judge(topology: Topology, deadline: Deadline) -> Crossings:
@@ -118,6 +119,7 @@ def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) ->
         topology.shells[order],
         topology.kept[order],
         topology.n_shells > 1,
+        not topology.edges.closed,
     )
 
 
@@ -284,6 +286,8 @@ def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> N
     shared = (ids_a[:, :, None] == ids_b[:, None, :]).sum(axis=(1, 2))
     # Neighbours across an edge meet elsewhere only if one is folded flat onto the other.
     open_ = (shared >= 2) & (np.einsum("ij,ij->i", faces.normal[i], faces.normal[j]) > 0)
+    if faces.doubled:
+        open_[open_] = ~overlap.run_alike(ids_a[open_], ids_b[open_])
     if open_.any():
         i, j, ids_a, ids_b, shared = (array[~open_] for array in (i, j, ids_a, ids_b, shared))
     a, b = faces.vertices[ids_a], faces.vertices[ids_b]
@@ -292,8 +296,7 @@ def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> N
     crossing = meeting.crosses & (shared < 2)
     found.crossing.append(pair[crossing])
     wide = np.flatnonzero(meeting.overlaps & (shared < 3))
-    step = float32_step(faces.vertices)
-    found.overlap.append(pair[wide[_wide(a[wide], b[wide], 4 * step)]])
+    found.overlap.append(pair[wide[overlap.wide(a[wide], b[wide])]])
     if faces.several:
         apart = faces.shell[i] != faces.shell[j]
         meets = meeting.touches | meeting.crosses | (shared > 0)
@@ -316,16 +319,6 @@ def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> N
     found.kept += int(crossing.sum()) + len(wide)
 
 
-def _wide(a: Floats, b: Floats, least: float) -> Bools:
-    """Of coplanar pairs that overlap: whether both are higher than `least`. Lower ones are made by rounding."""
-    high = np.ones(len(a), bool)
-    for corners in (a, b):
-        double = area_vectors(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-        height = np.sqrt(np.einsum("ij,ij->i", double, double)) / np.sqrt(max_side_squared(corners))
-        high &= height > least
-    return high
-
-
 def _leaning(faces: _Faces, found: _Found) -> None:
     """Edges that lie in a face with their two faces on both sides of it: crossings through an edge."""
     if not found.leaning:
@@ -341,8 +334,15 @@ def _leaning(faces: _Faces, found: _Found) -> None:
 
 def _said(topology: Topology, faces: _Faces, found: _Found) -> Crossings:
     findings: list[Finding] = []
-    crossing, overlap = _joined(found.crossing), _joined(found.overlap)
-    for code, pairs, what in (("G001", crossing, "that cross"), ("G004", overlap, "that overlap in one plane")):
+    crossing, covering = _joined(found.crossing), _joined(found.overlap)
+    opposite = np.einsum("ij,ij->i", faces.normal[covering[:, 0]], faces.normal[covering[:, 1]]) < 0
+    twice, thin = overlap.kinds(topology, faces.shell[covering], opposite)
+    for code, pairs, what in (
+        ("G001", crossing, "that cross"),
+        ("G004", covering[~twice & ~thin], "that overlap in one plane"),
+        ("G008", covering[twice], "of one shell that overlap in one plane and look the same way"),
+        ("G009", covering[thin], "in one plane with nothing between them"),
+    ):
         if len(pairs):
             text = f"{counted(len(pairs), 'pair')} of faces {what}"
             findings.append(finding(code, text, len(pairs), _places(topology, faces, pairs)))

@@ -159,18 +159,17 @@ def balanced(faces: Ints, edges: Edges) -> Bools:
     return 2 * np.add.reduceat(along.astype(np.int32), edges.first) == edges.size if len(along) else along
 
 
-def _paired(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Ints, Ints]:
-    """Half-edges at the balanced edges `many` in pairs that have the solid between them.
+def around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Ints, Ints, Bools, Ints]:
+    """The half-edges of the edges `many` by angle; of each the place of its edge in `many`, whether the solid ends at
+    its face, and its turn: the rank of that angle, the same for faces in one plane.
 
     By angle about the edge, the solid begins at faces that run from its high vertex to its low one and ends at the
-    others. Where it begins twice before it ends (solids that overlap), first begun is first ended, so that faces in one
-    place need no order.
+    others. Half-edges are in the order of edge and turn.
     """
     size = edges.size[many]
     group = np.repeat(np.arange(len(many)), size)
     starts = np.cumsum(size) - size
-    place = np.arange(len(group)) - starts[group]
-    half = edges.order[edges.first[many][group] + place]
+    half = edges.order[edges.first[many][group] + np.arange(len(group)) - starts[group]]
     face, side = half // 3, half % 3
     ends = faces[face, side] == edges.low[many][group]
     origin = vertices[edges.low[many]]
@@ -181,7 +180,25 @@ def _paired(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[In
     out -= axis * np.einsum("ij,ij->i", out, axis)[:, None]
     zero = out[starts][group]
     angle = np.arctan2(np.einsum("ij,ij->i", cross(zero, out), axis), np.einsum("ij,ij->i", zero, out))
-    turn = np.round(angle / _SAME_ANGLE).astype(np.int64) % round(2 * np.pi / _SAME_ANGLE)
+    angle[angle < -_SAME_ANGLE] += 2 * np.pi
+    angle[angle > 2 * np.pi - _SAME_ANGLE] -= 2 * np.pi
+    order = np.lexsort((angle, group))
+    angle, half, ends = angle[order], half[order], ends[order]
+    fresh = np.diff(angle, prepend=-np.inf) > _SAME_ANGLE
+    fresh[starts] = True
+    return half, group, ends, np.cumsum(fresh) - 1
+
+
+def _paired(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Ints, Ints]:
+    """Half-edges at the balanced edges `many` in pairs that have the solid between them.
+
+    Where it begins twice before it ends (solids that overlap), first begun is first ended, so that faces in one place
+    need no order. Where it begins and ends in one plane, one solid ends and the next one begins.
+    """
+    half, group, ends, turn = around(vertices, faces, edges, many)
+    size = edges.size[many]
+    starts = np.cumsum(size) - size
+    place = np.arange(len(group)) - starts[group]
     order = np.lexsort((half, ~ends, turn, group))
     half, ends = half[order], ends[order]
     inside = np.cumsum(np.where(ends, -1, 1))  # solids that have begun and not ended; zero at each edge's last face

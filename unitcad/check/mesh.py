@@ -90,6 +90,13 @@ def weld_points(points: Floats) -> tuple[Floats, Ints]:
     return vertices.astype(np.float64), index
 
 
+def same_place(points: Floats) -> Ints:
+    """For each of (n, 3) points the first one that is in the same place."""
+    _, index = weld_points(points)
+    _, first = np.unique(index, return_index=True)
+    return first[index].astype(np.int32)
+
+
 def _same_places(vertices: Floats, index: Ints, flat: Floats) -> bool:
     return all(np.array_equal(vertices[:, axis][index], flat[:, axis]) for axis in range(3))
 

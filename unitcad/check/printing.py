@@ -14,7 +14,7 @@ from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, keeping
 from unitcad.check.mesh import Floats, extent
 from unitcad.check.rulebook import finding
-from unitcad.check.shells import volumes_of, winding_number
+from unitcad.check.shells import winding_number
 from unitcad.check.topology import Topology
 
 ON_BED = 0.02  # mm; an STL rounds to less, a layer is ten times more
@@ -63,7 +63,7 @@ def _trapped(topology: Topology) -> list[Finding]:
     """D004: shells that face inwards inside another one."""
     if topology.n_shells < 2:
         return []
-    volumes, low, high = volumes_of(topology), topology.low, topology.high
+    volumes, low, high = topology.volumes, topology.low, topology.high
     faces, vertices = topology.mesh.faces, topology.mesh.vertices
     places = []
     for i in np.flatnonzero(volumes < 0)[:50]:

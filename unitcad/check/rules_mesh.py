@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from unitcad.check import crossing, shells, topology
+from unitcad.check import crossing, overlap, shells, topology
 from unitcad.check.findings import Facts, Finding, Location, counted, ending
 from unitcad.check.limits import Deadline, keeping
 from unitcad.check.mesh import LARGEST, Mesh, extent
@@ -46,6 +46,7 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
     with keeping(findings, facts, lambda kept: in_file(kept, mesh)):
         crossings = crossing.judge(found.as_stored(), deadline) if cross and len(found.kept) else crossing.Crossings()
         findings += crossings.findings
+        findings += overlap.judge(found)
         judged = shells.judge(found, crossings.crossed, crossings.touching, deadline)
     findings += judged.findings
     if found.watertight:

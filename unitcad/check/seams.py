@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.check.edges import components, half_edges
-from unitcad.check.mesh import Bools, Floats, Ints, extents, float32_steps, weld_exact
+from unitcad.check.mesh import Bools, Floats, Ints, extents, float32_steps, same_place
 
 WELD = 1e-5  # of the shell's diagonal
 NARROW = 0.1  # of the shortest edge at a vertex
@@ -39,7 +39,7 @@ def join(vertices: Floats, faces: Ints, loose: Ints) -> Seams:
     """
     n = len(vertices)
     place = np.arange(n, dtype=np.int32)
-    place[loose] = loose[_same_place(vertices[loose])]
+    place[loose] = loose[same_place(vertices[loose])]
     stored = place[faces]
     whole = _three(stored)
     points = np.unique(place[loose])
@@ -66,13 +66,6 @@ def join(vertices: Floats, faces: Ints, loose: Ints) -> Seams:
     everywhere = np.zeros(n)
     everywhere[points] = reach
     return Seams(stored, _joined(place, stored, points, pairs), whole, everywhere)
-
-
-def _same_place(places: Floats) -> Ints:
-    """For each of (n, 3) places the first one that is the same."""
-    _, same = weld_exact(places.reshape(-1, 1, 3).repeat(3, axis=1))
-    _, first, rank = np.unique(same[:, 0], return_index=True, return_inverse=True)
-    return first[rank]
 
 
 def _three(faces: Ints) -> Bools:

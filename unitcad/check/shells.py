@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.edges import balanced
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Bools, Floats, Ints, solid_of
+from unitcad.check.mesh import Floats, Ints, solid_of
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology, diagonals
 
@@ -31,11 +30,10 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
     """Apply the rules; `crossed`: some faces cross; `touching` (k, 2): pairs of shells whose faces meet."""
     mesh, labels, n = topology.mesh, topology.shells, topology.n_shells
     vertices, faces = mesh.vertices, mesh.faces
-    volumes, low, high = volumes_of(topology), topology.low, topology.high
+    volumes, low, high, sound = topology.volumes, topology.low, topology.high, topology.closed
     found: list[Finding] = []
     if n == 0:
         found.append(finding("G007", "no face has an area"))
-    sound = _closed(topology)
     if not sound.any():
         return Shells(volumes, low, high, tuple(found))
     area = np.bincount(labels, np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)), n) / 2
@@ -45,7 +43,7 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
         worst = which[np.argmax(area[which])]
         text = f"volume {volumes[worst]:.3g} mm3 over {area[worst]:.3g} mm2 of surface"
         found.append(finding("G007", text, len(which), [_where(low, high, i) for i in which.tolist()]))
-    sound &= ~flat
+    sound = sound & ~flat
     depth = np.zeros(n, int)
     overlaps: list[tuple[int, int]] = []
     if n > 1:
@@ -86,32 +84,6 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
         places = [_where(low, high, i) for i in hollow]
         found.append(finding("G006", counted(len(hollow), "closed cavity", "closed cavities"), len(hollow), places))
     return Shells(volumes, low, high, tuple(found))
-
-
-def _closed(topology: Topology) -> Bools:
-    """Whether each shell has an inside: all its edges have as many faces one way as the other."""
-    found, edges = np.ones(topology.n_shells, bool), topology.edges
-    if not edges.closed:
-        wrong = np.repeat(~balanced(topology.mesh.faces, edges), edges.size)
-        found[topology.shells[edges.order[wrong] // 3]] = False
-    return found
-
-
-def volumes_of(topology: Topology) -> Floats:
-    """The signed volume of each shell, mm3."""
-    mesh, n = topology.mesh, topology.n_shells
-    if not n:
-        return np.zeros(0)
-    low, high = topology.low.min(axis=0), topology.high.max(axis=0)
-    corner = mesh.faces[:, 0]
-    tetra = np.zeros(len(corner))
-    for axis in range(3):
-        height = mesh.vertices[:, axis].take(corner)
-        height -= (low[axis] + high[axis]) / 2
-        height *= topology.areas[:, axis]
-        tetra += height
-    tetra /= 6
-    return np.bincount(topology.shells, tetra, n).astype(float) if n > 1 else np.array([tetra.sum()])
 
 
 def winding_number(vertices: Floats, faces: Ints, point: Floats) -> int:

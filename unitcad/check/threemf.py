@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _IMAGES = {"image/png": "png", "image/jpeg": "jpeg", "image/jpg": "jpeg"}
 _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
-_FILLED = {"G001", "G002"}
+_FILLED = {"G001", "G002", "G008"}
 
 
 def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:

@@ -9,6 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from unitcad.check import edges as mesh_edges
+from unitcad.check import volumes
 from unitcad.check.edges import Edges
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, keeping
@@ -27,7 +28,8 @@ class Topology:
     """What the topology rules found out; `mesh` is without degenerate faces, and its open edges are welded.
 
     `kept` maps its faces to the file's; `areas` are twice the area vectors, mm2; `shells` labels faces. `stored` are
-    the faces before welding moved any, with vertices in one place joined. `low` and `high`: each shell's box, mm.
+    the faces before welding moved any, with vertices in one place joined. `low` and `high`: each shell's box, mm;
+    `volumes`: what it holds, mm3, below zero where its faces look inwards; `closed`: whether it has an inside.
     """
 
     mesh: Mesh
@@ -42,6 +44,8 @@ class Topology:
     stored: Ints
     low: Floats
     high: Floats
+    volumes: Floats
+    closed: Bools
 
     def as_stored(self) -> Topology:
         """The same with every face where the file has it."""
@@ -91,11 +95,13 @@ def _judged(mesh: Mesh, deadline: Deadline, found: list[Finding]) -> Topology:
     deadline.tick()
     shells = mesh_edges.shells_of(vertices, faces, edges)
     low, high = _boxes(vertices, faces, shells)
+    volume = volumes.signed(vertices, faces, areas, shells, len(low))
+    closed = volumes.closed(faces, edges, shells, len(low))
     size = diagonals(low, high)
     found += too_far(np.stack([low, high], axis=1), size)
     found += _thin(mesh, stored, kept, stored_areas, np.flatnonzero(repeated), size[shells])
     if across is None and len(twice):
-        twice = np.setdiff1d(twice, _facing(vertices, faces, edges, areas, shells))
+        twice = np.setdiff1d(twice, _facing(faces, areas, shells, volume * closed))
     deadline.tick()
     if len(pinched):
         found.append(
@@ -130,6 +136,8 @@ def _judged(mesh: Mesh, deadline: Deadline, found: list[Finding]) -> Topology:
         stored,
         low,
         high,
+        volume,
+        closed,
     )
 
 
@@ -252,22 +260,18 @@ def _duplicates(faces: Ints) -> Ints:
     return np.sort(order[same])
 
 
-def _facing(vertices: Floats, faces: Ints, edges: Edges, areas: Floats, shells: Ints) -> Ints:
+def _facing(faces: Ints, areas: Floats, shells: Ints, volume: Floats) -> Ints:
     """Duplicates that are none: two faces back to back, of two closed shells that lie on either side of them.
 
-    The volumes of such shells have one sign. A cavity has the other one: where it reaches the wall's outer face, the
-    wall has no thickness.
+    Where a cavity reaches the wall's outer face, the wall has no thickness.
     """
     order, same = _same_vertices(faces)
     first = np.flatnonzero(same) - 1
     alone = ~same[first] & ~np.append(same, False)[first + 2]  # no third face there
     one, other = order[first[alone]], order[first[alone] + 1]
     shell, beside = shells[one], shells[other]
-    volume = np.bincount(shells, np.einsum("ij,ij->i", vertices[faces[:, 0]] - vertices[faces[0, 0]], areas))
-    unclosed = np.repeat(~mesh_edges.balanced(faces, edges), edges.size)
-    volume[shells[edges.order[unclosed] // 3]] = 0
     opposite = np.einsum("ij,ij->i", areas[one], areas[other]) < 0
-    touching = opposite & (shell != beside) & (volume[shell] * volume[beside] > 0)
+    touching = opposite & (shell != beside) & volumes.side_by_side(volume[shell], volume[beside])
     return np.concatenate([one[touching], other[touching]])
 
 

@@ -1,0 +1,135 @@
+"""Faces that cover each other and shells that pass through themselves along their edges: G004, G008, G009.
+
+Where no two faces cross, the winding number can take a value other than 0 and 1 within one shell only if the shell goes
+through itself along edges that four or more of its faces share. Between the faces round such an edge, sorted by angle,
+the winding number goes up where the solid begins and down where it ends: three values or more are one too many.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from unitcad.check import edges as mesh_edges
+from unitcad.check.edges import Edges
+from unitcad.check.exact import orient3d
+from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.mesh import Bools, Floats, Ints, area_vectors, float32_steps, same_place
+from unitcad.check.rulebook import finding
+from unitcad.check.topology import Topology, max_side_squared
+from unitcad.check.volumes import side_by_side
+
+_FLAT = 2.0  # float32 steps: a fold thinner than that has no thickness
+_WIDE = 64.0  # float32 steps: a face lower than that may be thin by rounding
+
+
+def judge(topology: Topology) -> list[Finding]:
+    """Apply G008 and G009 along edges. Vertices in one place are one, whether or not the file lists them apart."""
+    mesh, edges, faces = topology.mesh, topology.edges, topology.mesh.faces
+    kept, shells, areas = topology.kept, topology.shells, topology.areas
+    if mesh.indexed:
+        place = same_place(mesh.vertices)
+        if not np.array_equal(place, np.arange(len(place))):
+            faces = place[faces]
+            whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+            faces, kept, shells, areas = faces[whole], kept[whole], shells[whole], areas[whole]
+            edges = mesh_edges.edges_of(faces, len(mesh.vertices))
+    found = []
+    for code, which, text in (
+        ("G008", _through(mesh.vertices, faces, edges, shells), "at which a shell passes through itself"),
+        ("G009", _folded(mesh.vertices, faces, edges, areas), "at which two faces fold onto each other"),
+    ):
+        if len(which):
+            places = [_at(topology, faces, kept, edges, i) for i in which[:9].tolist()]
+            found.append(finding(code, f"{counted(len(which), 'edge')} {text}", len(which), places))
+    return found
+
+
+def kinds(topology: Topology, shells: Ints, opposite: Bools) -> tuple[Bools, Bools]:
+    """Of pairs of faces that cover each other in one plane: which double a shell (G008), which have nothing between
+    them (G009). `shells` (n, 2) are theirs; `opposite`: they look opposite ways.
+
+    The others belong to two shells side by side, or to one within the other, of which G003 and G002 tell.
+    """
+    volume, closed = topology.volumes[shells], topology.closed[shells].all(axis=1)
+    apart = shells[:, 0] != shells[:, 1]
+    bare = apart & closed & ~side_by_side(volume[:, 0], volume[:, 1])
+    return ~opposite & ~apart, opposite & (~apart | bare)
+
+
+def run_alike(a: Ints, b: Ints) -> Bools:
+    """Which pairs of faces (n, 3) run along a common edge in the same direction: they lie on the same side of it."""
+    ends = [np.roll(face, -1, axis=1) for face in (a, b)]
+    same = (a[:, :, None] == b[:, None, :]) & (ends[0][:, :, None] == ends[1][:, None, :])
+    return np.asarray(same.any(axis=(1, 2)))
+
+
+def wide(a: Floats, b: Floats) -> Bools:
+    """Of coplanar pairs that overlap: whether both are higher than four float32 steps. Rounding makes lower ones."""
+    high = np.ones(len(a), bool)
+    least = 4 * float32_steps(np.concatenate([a, b], axis=1))
+    for corners in (a, b):
+        double = area_vectors(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+        height = np.sqrt(np.einsum("ij,ij->i", double, double)) / np.sqrt(max_side_squared(corners))
+        high &= height > least
+    return high
+
+
+def _at(topology: Topology, faces: Ints, kept: Ints, edges: Edges, edge: int) -> Location:
+    vertices = topology.mesh.vertices
+    x, y, z = ((vertices[edges.low[edge]] + vertices[edges.high[edge]]) / 2).tolist()
+    return Location(face=int(kept[edges.order[edges.first[edge]] // 3]), xyz=(x, y, z), object=topology.mesh.name)
+
+
+def _through(vertices: Floats, faces: Ints, edges: Edges, shells: Ints) -> Ints:
+    """Edges round which the winding number of one shell takes three values or more."""
+    if edges.closed:
+        return np.empty(0, np.int64)
+    many = np.flatnonzero((edges.size > 3) & mesh_edges.balanced(faces, edges))
+    if not len(many):
+        return many
+    half, group, ends, turn = mesh_edges.around(vertices, faces, edges, many)
+    shell = shells[half // 3]
+    order = np.lexsort((turn, shell, group))
+    group, ends, turn, shell = group[order], ends[order], turn[order], shell[order]
+    own = np.append(True, (group[1:] != group[:-1]) | (shell[1:] != shell[:-1]))
+    start = np.flatnonzero(own)
+    change = np.where(ends, -1, 1)
+    level = np.cumsum(change)
+    level -= np.repeat(level[start] - change[start], np.diff(np.append(start, len(level))))
+    last = np.append((turn[1:] != turn[:-1]) | own[1:], True)
+    between = np.flatnonzero(last)  # values in sectors that have a width, one shell of one edge after the other
+    of = (np.cumsum(own) - 1)[between]
+    low, high = np.full(len(start), 10**9), np.full(len(start), -(10**9))
+    np.minimum.at(low, of, level[between])
+    np.maximum.at(high, of, level[between])
+    evenly = np.add.reduceat(change, start) == 0
+    return many[np.unique(group[start][(high - low > 1) & evenly])]
+
+
+def _folded(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> Ints:
+    """Edges of two faces that look opposite ways and are in one plane as float32 has it, though not exactly."""
+    two = edges.size == 2
+    if not edges.closed:  # two faces that run alike are turned over, not folded
+        two &= mesh_edges.balanced(faces, edges)
+    pair = edges.first[two]
+    left, right = edges.order[pair] // 3, edges.order[pair + 1] // 3
+    facing = np.zeros(len(pair))
+    for axis in range(3):
+        facing += areas[left, axis] * areas[right, axis]
+    against = np.flatnonzero(facing < 0)
+    if not len(against):
+        return against
+    pair, left, right, facing = pair[against], left[against], right[against], facing[against]
+    square = [np.einsum("ij,ij->i", areas[face], areas[face]) for face in (left, right)]
+    flat = facing * facing > (1 - 1e-6) * square[0] * square[1]
+    pair, left, square = pair[flat], left[flat], [values[flat] for values in square]
+    ends = [faces[edges.order[pair] // 3, (edges.order[pair] % 3 + k) % 3] for k in range(3)]
+    tip = faces[edges.order[pair + 1] // 3, (edges.order[pair + 1] % 3 + 2) % 3]
+    corners = vertices[np.stack([*ends, tip], axis=1)]
+    step = float32_steps(corners)
+    length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+    height = np.sqrt(np.minimum(*square)) / length
+    apart = np.abs(np.einsum("ij,ij->i", areas[left], corners[:, 3] - corners[:, 0])) / np.sqrt(square[0])
+    thin = np.flatnonzero((height > _WIDE * step) & (apart <= _FLAT * step))
+    exact = orient3d(*(corners[thin, k] for k in range(4))) == 0
+    return np.flatnonzero(two)[against][flat][thin[~exact]]

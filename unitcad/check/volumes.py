@@ -1,0 +1,43 @@
+"""Volumes of shells: which are closed, how much each holds, and whether two that meet in a face lie side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from unitcad.check.edges import Edges, balanced
+from unitcad.check.mesh import Bools, Floats, Ints
+
+
+def closed(faces: Ints, edges: Edges, shells: Ints, n: int) -> Bools:
+    """Whether each of `n` shells has an inside: at all its edges as many faces run one way as the other."""
+    found = np.ones(n, bool)
+    if not edges.closed:
+        wrong = np.repeat(~balanced(faces, edges), edges.size)
+        found[shells[edges.order[wrong] // 3]] = False
+    return found
+
+
+def signed(vertices: Floats, faces: Ints, areas: Floats, shells: Ints, n: int) -> Floats:
+    """The volume of each of `n` shells, mm3: below zero where its faces look inwards, anything where it is not closed.
+
+    Tetrahedra stand on the middle of all vertices, so that a part far from the origin loses no digits.
+    """
+    corner = faces[:, 0]
+    tetra = np.zeros(len(faces))
+    for axis in range(3):
+        column = vertices[:, axis]
+        height = column.take(corner)
+        height -= (column.min() + column.max()) / 2 if n else 0.0
+        height *= areas[:, axis]
+        tetra += height
+    tetra /= 6
+    return np.bincount(shells, tetra, n).astype(float) if n > 1 else np.array([tetra.sum()] * n)
+
+
+def side_by_side(one: Floats, other: Floats) -> Bools:
+    """Whether closed shells of these volumes, which meet in faces that look opposite ways, have material on both sides.
+
+    Two solids have; a cavity and the wall's outer face have not: the wall is without thickness there. What stands in a
+    cavity has less volume than the cavity, whose volume is below zero. 0 stands for a shell that is not closed.
+    """
+    return np.asarray((one * other > 0) | ((one * other < 0) & (one + other < -1e-9 * np.abs(one))))
