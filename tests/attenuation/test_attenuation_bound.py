@@ -71,8 +71,8 @@ def test_a_longer_integral_counts_no_piece_twice(omega):
     assert _off(found, truth) <= found.error
 
 
-def test_layers_out_of_reach_count_in_the_error():
-    """Static, contrast 60: layers are left out per wavenumber, and what that changes is in the error."""
+def test_a_stiff_layer_below_a_thin_one():
+    """Static, contrast 60: layers used to be left out per wavenumber by a bound that this one broke."""
     medium = LayeredMedium(
         [Layer(1.0885e-4, 1098, 91993.6, 0.49), Layer(0.013613, 1427, 5.4091e6, 0.4999)],
         HalfSpace(1128, 196607, 0.0, LossFactor(0.376)),

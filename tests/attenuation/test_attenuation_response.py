@@ -237,19 +237,6 @@ def test_tolerance_is_reached_on_the_forearm():
         assert difference(found, truth) <= found.error <= 1e-6 * largest(found)
 
 
-def test_layers_out_of_reach_are_left_out_and_named():
-    deep = LayeredMedium(
-        [Layer(0.02, 1100, 1e5, 0.3, LossFactor(0.5)), Layer(0.5, 1000, 5e4, 0.3, LossFactor(0.5))],
-        HalfSpace(2000, 1e9, 0.3),
-    )
-    found = deep.response(UniformDisc(A), 3000.0, RADII)
-    assert found.layers_left_out == (2,)
-    kept = LayeredMedium(deep.layers, HalfSpace(1000, 5e4, 0.3, LossFactor(0.5)))
-    other = kept.response(UniformDisc(A), 3000.0, RADII)
-    assert difference(found, other) <= found.error + other.error
-    assert forearm().response(UniformDisc(A), 100.0, RADII).layers_left_out == ()
-
-
 def test_wavenumbers_follow_from_the_problem():
     near = forearm().response(UniformDisc(A), OMEGA, [5e-3])
     far = forearm().response(UniformDisc(A), OMEGA, [0.5])

@@ -115,10 +115,17 @@ def charted(raw: Plane) -> Plane:
     return Plane(np.where(by_u, one, ratio), np.where(by_u, ratio, one), bottom)
 
 
-def parameter(plane: Plane, u: w.Array, t: w.Array) -> w.Array:
-    """The c, shape (2, m, n), of a state (u, t) that lies on a charted plane."""
-    by_u = (plane.u[0, 0] == 1) & (plane.u[1, 1] == 1) & (plane.u[0, 1] == 0) & (plane.u[1, 0] == 0)
-    return np.where(by_u, u, t)
+def parameter(plane: Plane, u: w.Array, t: w.Array, stiffness: w.Array) -> w.Array:
+    """The c, shape (2, m, n), of a state (u, t) that lies on a plane and comes from a layer above it.
+
+    stiffness: traction over displacement of that layer's waves (Pa/m), which is how their rounding compares. On
+    something stiffer u is what is left of waves that cancel, on something softer t is: each would lose the contrast.
+    """
+    det_u, det_t = w.determinant(plane.u), w.determinant(plane.t)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of the one that is singular, which is not taken
+        by_t = np.sqrt(_square(plane.t)) * np.abs(det_u) * stiffness < np.sqrt(_square(plane.u)) * np.abs(det_t)
+    block, det = np.where(by_t, plane.t, plane.u), np.where(by_t, det_t, det_u)
+    return w.product(w.adjugate(block), np.where(by_t, t, u)) / det
 
 
 def _square(a: w.Array) -> np.ndarray:

@@ -40,7 +40,6 @@ def layered_block(variant: Variant, rtol: float = 1e-4) -> dict[str, Any]:
     many = [(found.u_z, found.u_r)] + [_at_ends(variant, load, r, end) for end in _ends(variant)]
     curves = [np.abs([u_z, u_r]) / abs(u_z[0]) for u_z, u_r in many]
     low, high = np.min(curves, axis=0), np.max(curves, axis=0)
-    names = [layer.name for layer in variant.tissue]
     return {
         "tissue": variant.tissue_name,
         "frequency_hz": variant.frequency.middle,
@@ -55,7 +54,6 @@ def layered_block(variant: Variant, rtol: float = 1e-4) -> dict[str, Any]:
         "surface_m_per_pa": {"u_z_at_the_edge": float(edge)},
         "error_estimate": found.error / edge,
         "wavenumbers": found.wavenumbers,
-        "layers_left_out": [names[i] for i in found.layers_left_out],
         "hierarchical_over_control": None,
         "hierarchical_over_control_reason": NO_RATIO,
         "assumptions": ASSUMPTIONS,

@@ -100,31 +100,33 @@ class LayeredMedium:
             raise Refusal("omega", omega, "nothing holds this body: static loads would carry it away")
         return tuple(_material(body, omega) for body in (*self.layers, self.half_space))
 
-    def planes(self, k: w.Array, omega: float, depth: float = 0.0, keep: int | None = None) -> list[Plane]:
+    def planes(self, k: w.Array, omega: float, depth: float = 0.0) -> list[Plane]:
         """The stack's planes, top first, down to the cut at `depth` (m), for k of shape (n,).
 
-        The cut (in a layer or in the half-space) changes no result. With `keep`, layer number `keep` is taken for the
-        half-space and what is under it is left out; the cut must then be above it or in it.
+        The cut (in a layer or in the half-space) changes no result.
         """
         materials = self.materials(omega)
-        keep = len(self.layers) if keep is None else keep
-        planes = [underside(materials[keep], k)]
-        for kind, h, above in reversed(_cut([layer.thickness for layer in self.layers[:keep]], depth)):
+        planes = [underside(materials[-1], k)]
+        for kind, h, above in reversed(_cut([layer.thickness for layer in self.layers], depth)):
             planes.append(raised(materials[kind], h, k, planes[-1], with_bottom=above))
         return planes[::-1]
 
-    def transfer(self, traction: w.Array, k: w.Array, omega: float, depth: float, keep: int | None = None) -> w.Array:
+    def transfer(self, traction: w.Array, k: w.Array, omega: float, depth: float) -> w.Array:
         """(u_r, u_z) at `depth`, shape (2, n), for surface tractions of shape (2, n) at wavenumbers k (n,)."""
-        planes = self.planes(k, omega, depth, keep)
+        planes = self.planes(k, omega, depth)
         state = traction[:, None]
         top = planes[0]
         c = w.product(w.adjugate(top.t), state) / w.determinant(top.t)
         u = w.product(top.u, c)
-        for plane, below in pairwise(planes):
+        materials = self.materials(omega)
+        pieces = _cut([layer.thickness for layer in self.layers], depth)
+        for (plane, below), (kind, _, _) in zip(pairwise(planes), pieces, strict=True):
             if plane.bottom is None:
                 break
             u, t = w.product(plane.bottom[0], c), w.product(plane.bottom[1], c)
-            c = parameter(below, u, t)
+            material = materials[kind]
+            stiffness = abs(material.shear) * np.maximum(np.abs(k), abs(material.ks2) ** 0.5)
+            c = parameter(below, u, t, stiffness)
         return u[:, 0]
 
 

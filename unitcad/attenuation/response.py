@@ -3,13 +3,13 @@
 u_z(r) = integral of C_z(k) q(k) J0(kr) k dk, u_r(r) the same with J1, over a path lifted off the real axis while k is
 below every wave's wavenumber (the poles lie below it for e^{+i omega t}), then along the axis. At the surface the
 static half-space of one of the layers, known in closed form, is taken out first. Composite Gauss-Legendre on panels in
-proportion to the oscillation; a panel whose last Legendre coefficients have not died is halved. Layers that a wave
-does not reach within the tolerance are left out, per wavenumber and, where that holds for all, altogether.
+proportion to the oscillation; a panel whose last Legendre coefficients have not died is halved. All layers count at
+every wavenumber: no bound is known of what a lower layer sends back that is both proved and cheaper than the layer.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -20,8 +20,8 @@ from unitcad.attenuation.bessel import bessel
 from unitcad.attenuation.loads import Load
 from unitcad.attenuation.medium import LayeredMedium
 from unitcad.attenuation.rheology import finite
-from unitcad.attenuation.tail import Tail, measure_tail
-from unitcad.errors import Refusal
+from unitcad.attenuation.tail import measure_tail
+from unitcad.errors import Refusal, UnitcadError
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _LAST = np.array([(2 * j + 1) / 2.0 * _WEIGHTS * np.polynomial.legendre.Legendre.basis(j)(_NODES) for j in (14, 15)])
@@ -29,23 +29,27 @@ _PHASE = 4.0 * np.pi  # of the fastest Bessel product over one panel
 _MAX_PANELS = 60_000
 _MOST_PANELS = 5_000  # up to the last pole: a few seconds
 _MAX_ROUNDS = 40
-_WORTH_ASKING = 1e-3  # from this rtol on it costs more to find layers that may be left out than to keep them
 _CHUNK = 200_000  # integrand values held at once
 
 
 @dataclass(frozen=True)
 class Response:
-    """Displacement (m per pascal or per newton, complex) with the shape of r; what it cost and what it left out.
+    """Displacement (m per pascal or per newton, complex) with the shape of r, and how far off each value may be.
 
-    error: estimate of the largest error of u_r and u_z over r, same unit, meant as a bound; wavenumbers: how many were
-    evaluated; layers_left_out: indices (top 0; the half-space is the last) that nothing within rtol depends on.
+    error_r, error_z: bound of the error of u_r and of u_z at each radius, same unit and shape; wavenumbers: how many
+    were evaluated.
     """
 
     u_r: Any
     u_z: Any
-    error: float
+    error_r: Any
+    error_z: Any
     wavenumbers: int
-    layers_left_out: tuple[int, ...] = ()
+
+    @property
+    def error(self) -> float:
+        """The largest of all bounds: what rtol times the largest |u| is compared with."""
+        return float(max(np.max(self.error_r), np.max(self.error_z)))
 
 
 @dataclass(frozen=True)
@@ -61,11 +65,11 @@ class _Problem:
     def column(self) -> int:
         return 1 if self.load.direction == "normal" else 0
 
-    def kernel(self, k: w.Array, keep: int) -> w.Array:
+    def kernel(self, k: w.Array) -> w.Array:
         """k C(k), less the static one, of (u_r, u_z), shape (2, n); the load's transform is not in it."""
         traction = np.zeros((2, k.size), dtype=np.complex128)
         traction[self.column] = 1.0
-        out = k * self.medium.transfer(traction, k, self.omega, self.z, keep)
+        out = k * self.medium.transfer(traction, k, self.omega, self.z)
         return out - static_kernel(self.reference, self.column)[:, None] if self.reference else out
 
 
@@ -80,7 +84,8 @@ def respond(medium: LayeredMedium, load: Load, omega: float, r: Any, z: float = 
     """Displacement of `medium` under `load` at radii r (m), any shape, and one depth z (m), at omega (rad/s).
 
     rtol: wanted error over the largest |u| of all radii, 1e-12 to 0.1. Raises `Refusal` for values that can't be, and
-    for r = 0 under a surface point load. If rtol can't be reached `error` says so.
+    for r = 0 under a surface point load, `UnitcadError` where no finite answer was found. If rtol can't be reached
+    the errors say so.
     """
     radii = np.asarray(r, dtype=float)
     if radii.size == 0 or not np.all(np.isfinite(radii)) or np.any(radii < 0):
@@ -90,17 +95,31 @@ def respond(medium: LayeredMedium, load: Load, omega: float, r: Any, z: float = 
         raise Refusal("rtol", rtol, "must be from 1e-12 to 0.1", min(max(rtol, 1e-12), 0.1))
     if load.reach == 0.0 and z == 0.0 and np.any(radii == 0.0):
         raise Refusal("r", 0.0, "under a point load the surface goes to infinity: give r > 0, z > 0 or a disc")
+    # A layer of no thickness changes nothing, so its waves must not set the path.
+    medium = LayeredMedium([layer for layer in medium.layers if layer.thickness > 0], medium.half_space)
     materials = medium.materials(omega)
     flat = radii.ravel()
     end = _last_pole(medium, materials, omega)
     _check_size(end, float(flat.max()) + load.reach + 2.0 * z, omega)
-    problem = _Problem(medium, load, omega, flat, z, None)
-    tail = measure_tail(problem.kernel, static_kernel, materials, load, flat, z, end, rtol)
-    problem = _Problem(medium, load, omega, flat, z, tail.reference)
-    known = _static_part(problem)
-    found = _integrate(problem, materials, tail, known, end, rtol)
-    u = (known + found.total).reshape(2, *radii.shape)
-    return Response(u[0][()], u[1][()], found.error, found.wavenumbers, found.left_out)
+    found = _solve(_Problem(medium, load, omega, flat, z, None), materials, end, rtol)
+    u, error = found.total.reshape(2, *radii.shape), found.error.reshape(2, *radii.shape)
+    if not (np.all(np.isfinite(u)) and np.all(np.isfinite(error))):
+        raise UnitcadError(f"no finite answer at omega = {omega:g} rad/s: an undamped mode on the path, or an overflow")
+    return Response(u[0][()], u[1][()], error[0][()], error[1][()], found.wavenumbers)
+
+
+def _solve(bare: _Problem, materials: tuple[w.Material, ...], end: float, rtol: float) -> _Found:
+    """The best that is reached: where the panels do not suffice for rtol, a larger one may spend them better."""
+    best, count = None, 0
+    while True:
+        found = _integrate(bare, materials, end, rtol)
+        count += found.wavenumbers
+        if best is None or np.max(found.error) < np.max(best.error):
+            best = found
+        reached = float(np.max(best.error)) / (float(np.max(np.abs(best.total))) or 1.0)
+        if reached <= rtol or found.cut_short or 10.0 * rtol > min(reached, 0.1):
+            return replace(best, wavenumbers=count)
+        rtol = max(10.0 * rtol, 0.3 * reached)
 
 
 def _check_size(end: float, span: float, omega: float) -> None:
@@ -124,9 +143,7 @@ def _last_pole(medium: LayeredMedium, materials: tuple[w.Material, ...], omega: 
     shear = max(abs(m.ks2) ** 0.5 for m in materials)
     mass = sum(layer.thickness * layer.density for layer in medium.layers)
     bending = [
-        (12.0 * mass * omega**2 / (layer.youngs_modulus * layer.thickness**3)) ** 0.25
-        for layer in medium.layers
-        if layer.thickness > 0
+        (12.0 * mass * omega**2 / (layer.youngs_modulus * layer.thickness**3)) ** 0.25 for layer in medium.layers
     ]
     floor = min(max(bending, default=0.0), 20.0 * shear) if medium.layers else 0.0
     return 1.5 * max(1.5 * shear, floor)
@@ -148,21 +165,23 @@ def _graded(panels: np.ndarray, materials: tuple[w.Material, ...]) -> np.ndarray
 
 @dataclass(frozen=True)
 class _Found:
+    """(u_r, u_z) at each radius, shape (2, n), a bound of its error, and whether that is mostly the tail's."""
+
     total: np.ndarray
-    error: float
+    error: np.ndarray
     wavenumbers: int
-    left_out: tuple[int, ...]
+    cut_short: bool
 
 
-def _path(end: float, r_max: float, thickness: float) -> list[complex]:
-    """Corners of the lifted path from 0 to `end`; its height keeps the Bessel functions below e^2.
+def _path(end: float, reach: float, thickness: float) -> list[complex]:
+    """Corners of the lifted path from 0 to `end`; its height keeps Bessel functions of k times `reach` (m) below e^2.
 
     Layers have complex modes as well, with poles above the axis at heights of about 1 / `thickness` of them all (m):
     the path stays well below.
     """
     if end == 0.0:
         return [0j]
-    height = min(2.0 / r_max if r_max > 0 else np.inf, end / 4.0, 0.1 / thickness if thickness > 0 else np.inf)
+    height = min(2.0 / reach if reach > 0 else np.inf, end / 4.0, 0.1 / thickness if thickness > 0 else np.inf)
     return [0j, height * (1 + 1j), end + 1j * height, end + height + 0j]
 
 
@@ -190,15 +209,6 @@ def _panels(corners: list[complex], stop: float, span: float) -> np.ndarray:
     return np.concatenate([np.stack([e[:-1], e[1:]], axis=1) for e in edges])
 
 
-def _affordable(tail: Tail, span: float) -> float:
-    """The last wavenumber of the tail's that five in six of all panels reach; the others are there to be halved.
-
-    To go further would leave nothing to refine the first panels with: a tail cut short costs far less, and says so.
-    """
-    far = _PHASE / span * _MAX_PANELS * 5 / 6
-    return float(tail.k[max(np.searchsorted(tail.k, far) - 1, 0)])
-
-
 def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
     """Of the `bad` panels the `room` worst ones."""
     if np.count_nonzero(bad) <= room:
@@ -208,41 +218,32 @@ def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
     return found
 
 
-def _integrate(
-    problem: _Problem,
-    materials: tuple[w.Material, ...],
-    tail: Tail,
-    known: np.ndarray,
-    end: float,
-    rtol: float,
-) -> _Found:
-    r_max = float(problem.r.max())
-    corners = _path(end, r_max, sum(layer.thickness for layer in problem.medium.layers))
-    span = r_max + problem.load.reach + 2.0 * problem.z
-    full = len(problem.medium.layers)
-    keep, skipped = _reached(problem, corners, materials, rtol)
-    total = np.zeros_like(known)
-    quadrature = size = dropped = 0.0
-    count = 0
-    most = _affordable(tail, span)
-    stop = min(tail.start(max(float(np.max(np.abs(known))), tail.scale), rtol), most)
+def _integrate(bare: _Problem, materials: tuple[w.Material, ...], end: float, rtol: float) -> _Found:
+    load, r, z = bare.load, bare.r, bare.z
+    r_max = float(r.max())
+    span = r_max + load.reach + 2.0 * z
+    far = _PHASE / span * _MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
+    tail = measure_tail(bare.kernel, static_kernel, materials, load, r, z, end, far, rtol)
+    problem = replace(bare, reference=tail.reference)
+    known = _static_part(problem)
+    corners = _path(end, max(r_max, load.reach), sum(layer.thickness for layer in bare.medium.layers))
+    total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
+    count = done = 0
+    stop = tail.start(tail.scale, rtol)
     pending = _graded(_panels(corners, stop, span), materials)
-    done = 0
-    used = 0
     for _ in range(_MAX_ROUNDS):
-        parts, errors, absolute, lost, kept = _evaluate(problem, pending, keep, materials, rtol)
+        parts, errors, absolute = _evaluate(problem, pending)
         count += pending.shape[0] * _NODES.size
-        used = max(used, kept)
         scale = float(np.max(np.abs(known + total + parts.sum(0)))) or 1.0
         done += pending.shape[0]
-        bad = errors > 0.3 * rtol * scale / max(done, 1)
-        if quadrature + errors.sum() <= 0.4 * rtol * scale:
+        worst = errors.max(axis=(1, 2))
+        bad = worst > 0.3 * rtol * scale / max(done, 1)
+        if np.max(quadrature + errors.sum(0)) <= 0.4 * rtol * scale:
             bad[:] = False
-        bad = _worst(errors, bad, (_MAX_PANELS - done) // 4)  # halves of at most half of what is left
+        bad = _worst(worst, bad, (_MAX_PANELS - done) // 4)  # halves of at most half of what is left
         total = total + parts[~bad].sum(0)
-        quadrature += float(errors[~bad].sum())
-        size += float(absolute[~bad].sum())
-        dropped += float(lost[~bad].sum())
+        quadrature += errors[~bad].sum(0)
+        size += absolute[~bad].sum(0)
         if np.any(bad):
             middle = pending[bad].mean(1)
             pending = np.concatenate(
@@ -252,52 +253,40 @@ def _integrate(
                 ]
             )
             continue
-        wanted = min(tail.start(float(np.max(np.abs(known + total))), rtol), most)
+        wanted = tail.start(float(np.max(np.abs(known + total))), rtol)
         if wanted <= stop or done > _MAX_PANELS:
             break
         pending = _panels([complex(stop)], wanted, span)
         stop = wanted
     else:
-        quadrature += float(errors.sum())
-        dropped += float(lost.sum())
-        total = total + parts.sum(0)
-    rounding = 4e-15 * size + 4e-16 * float(np.max(np.abs(known)))
-    error = quadrature + tail.bound(stop) + skipped + dropped + rounding
-    return _Found(total, error, count, tuple(range(used + 1, full + 1)))
+        parts, errors, absolute = _evaluate(problem, pending)
+        total, quadrature, size = total + parts.sum(0), quadrature + errors.sum(0), size + absolute.sum(0)
+    rest = tail.bound(stop)
+    error = quadrature + rest + 4e-15 * size + 4e-16 * np.abs(known)
+    return _Found(known + total, error, count, bool(np.max(rest) > 0.5 * np.max(error)))
 
 
-def _evaluate(
-    problem: _Problem, panels: w.Array, keep: int, materials: tuple[w.Material, ...], rtol: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
-    """Per panel: its integral (panels, 2, radii), a bound of its error, its absolute size, a bound of what the layers
-    left out would add; and the layers used.
-    """
+def _evaluate(problem: _Problem, panels: w.Array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Per panel, of (u_r, u_z) at each radius: its integral, a bound of its error and its absolute size."""
     step = max(1, _CHUNK // (_NODES.size * problem.r.size * 2))
     lifted = np.any(panels.imag != 0, axis=1)
-    parts = np.empty((len(panels), 2, problem.r.size), dtype=np.complex128)
-    errors, sizes, lost, used = np.empty(len(panels)), np.empty(len(panels)), np.zeros(len(panels)), 0
-    static = np.abs(static_kernel(problem.reference, problem.column))[:, None] if problem.reference else 0.0
+    shape = (len(panels), 2, problem.r.size)
+    parts, errors, sizes = np.empty(shape, dtype=np.complex128), np.empty(shape), np.empty(shape)
     for group in (np.nonzero(lifted)[0], np.nonzero(~lifted)[0]):
         for first in range(0, group.size, step):
             part = group[first : first + step]
             half = (panels[part, 1] - panels[part, 0]) / 2.0
             k = (panels[part].mean(1)[:, None] + half[:, None] * _NODES).ravel()
-            kernel, missing, reached = _layered_kernel(problem, k, keep, materials, rtol)
-            used = max(used, reached)
+            kernel = problem.kernel(k)
             if not lifted[part[0]]:  # real Bessel functions cost a tenth of complex ones
                 k = k.real
-            transform = problem.load.transform(k)
             phase = k[:, None] * problem.r
             waves = np.stack([bessel(1, phase), bessel(0, phase)])
-            values = waves * (kernel * transform)[:, :, None]
+            values = waves * (kernel * problem.load.transform(k))[:, :, None]
             values = values.reshape(2, part.size, _NODES.size, -1) * half[:, None, None]
             parts[part] = np.einsum("n,cpnr->pcr", _WEIGHTS, values)
             errors[part], sizes[part] = _panel_errors(values)
-            if np.any(missing):
-                share = missing * (np.abs(kernel) + static) * np.abs(transform)
-                share = (np.abs(waves) * share[:, :, None]).reshape(2, part.size, _NODES.size, -1)
-                lost[part] = np.abs(half) * np.einsum("n,cpnr->cpr", _WEIGHTS, share).max(axis=(0, 2))
-    return parts, errors, sizes, lost, used
+    return parts, errors, sizes
 
 
 def _panel_errors(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -308,67 +297,5 @@ def _panel_errors(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     coefficients halve within n degrees or so. (To count on the rate at which they seem to fall was too bold:
     a pole of small residue next to the panel shows in the last ones only.)
     """
-    last = np.abs(np.einsum("jn,cpnr->jcpr", _LAST, values)).sum(axis=0)
-    magnitude = np.abs(values)
-    return 2.0 * last.max(axis=(0, 2)), np.einsum("n,cpnr->cpr", _WEIGHTS, magnitude).max(axis=(0, 2))
-
-
-def _layered_kernel(
-    problem: _Problem, k: w.Array, keep: int, materials: tuple[w.Material, ...], rtol: float
-) -> tuple[w.Array, np.ndarray, int]:
-    """The kernel with, at each wavenumber, only the layers from which something comes back within rtol / 1000.
-
-    Beside it, per wavenumber, a bound of what the others would change k C by, as a share of it; and the layers used.
-    """
-    layers = problem.medium.layers[:keep]
-    depth = np.zeros(k.size)
-    needed = np.zeros(k.size, dtype=int)
-    missing = np.zeros(k.size)
-    top = 0.0
-    for i, layer in enumerate(layers):
-        gp, gs = w.rates(materials[i], k)
-        below = max(0.0, top + layer.thickness - max(problem.z, top))
-        depth += np.minimum(gp.real, gs.real) * below
-        back = _coming_back(depth)
-        seen = (back > rtol / 1e3) | (problem.z >= top + layer.thickness)
-        needed[seen], missing[seen] = i + 1, 0.0
-        missing = np.where(~seen & (missing == 0.0), back, missing)
-        top += layer.thickness
-    out = np.empty((2, k.size), dtype=np.complex128)
-    for one in np.unique(needed):
-        part = needed == one
-        out[:, part] = problem.kernel(k[part], int(one))
-    return out, missing, int(needed.max(initial=0))
-
-
-def _coming_back(depth: np.ndarray) -> np.ndarray:
-    """What an interface `depth` decay lengths down changes the compliance by, as a share of it: at most that.
-
-    Twice what a rigid base does to an incompressible layer at rest, (2 + 2 x + x^2) e^-x with x = 2 depth.
-    """
-    x = 2.0 * depth
-    return 2.0 * (2.0 + 2.0 * x + x * x) * np.exp(-x)
-
-
-def _reached(
-    problem: _Problem, corners: list[complex], materials: tuple[w.Material, ...], rtol: float
-) -> tuple[int, float]:
-    """How many layers (from the top) matter within rtol on the lifted path, and a bound of what the others add."""
-    full = len(problem.medium.layers)
-    bottom = np.cumsum([layer.thickness for layer in problem.medium.layers])
-    if full == 0 or len(corners) == 1 or rtol >= _WORTH_ASKING:
-        return full, 0.0
-    panels = _panels(corners, 0.0, 0.0)
-    half = (panels[:, 1] - panels[:, 0]) / 2.0
-    k = (panels.mean(1)[:, None] + half[:, None] * _NODES).ravel()
-    weight = np.abs(half[:, None] * _WEIGHTS).ravel() * np.abs(problem.load.transform(k))
-    span = np.exp(np.abs(k.imag) * float(problem.r.max()))
-    whole = problem.kernel(k, full)
-    scale = np.max(np.abs((whole * weight).sum(1)))
-    keep, bound = full, 0.0
-    while keep > 0 and bottom[keep - 1] > problem.z:
-        change = float(np.max((np.abs(problem.kernel(k, keep - 1) - whole) * weight * span).sum(1)))
-        if change > 0.02 * rtol * scale:
-            break
-        keep, bound = keep - 1, 2.0 * change
-    return keep, bound
+    last = np.abs(np.einsum("jn,cpnr->jpcr", _LAST, values)).sum(axis=0)
+    return 2.0 * last, np.einsum("n,cpnr->pcr", _WEIGHTS, np.abs(values))

@@ -16,7 +16,10 @@ _MARGIN = 1.5
 
 @dataclass(frozen=True)
 class Tail:
-    """bounds[i]: the integral from k[i] to infinity is at most that (m per pascal or newton), at any of the radii."""
+    """bounds[i]: the integrals of (u_r, u_z) from k[i] to infinity are at most that (m per pascal or newton).
+
+    Shape (wavenumbers, 2, radii).
+    """
 
     k: np.ndarray
     bounds: np.ndarray
@@ -25,60 +28,68 @@ class Tail:
 
     def start(self, scale: float, rtol: float) -> float:
         """The least wavenumber (1/m) beyond which less than 0.4 rtol scale is missing; the last one if none is."""
-        good = np.nonzero(self.bounds <= 0.4 * rtol * scale)[0]
+        good = np.nonzero(self.bounds.max(axis=(1, 2)) <= 0.4 * rtol * scale)[0]
         return float(self.k[good[0]] if good.size else self.k[-1])
 
-    def bound(self, stop: float) -> float:
-        """The bound at `stop`, one of `k`."""
-        return float(self.bounds[min(np.searchsorted(self.k, stop), self.k.size - 1)])
+    def bound(self, stop: float) -> np.ndarray:
+        """The bounds at `stop`, one of `k`; shape (2, radii)."""
+        return self.bounds[min(np.searchsorted(self.k, stop), self.k.size - 1)]
 
 
 def measure_tail(
-    kernel: Callable[[w.Array, int], w.Array],
+    kernel: Callable[[w.Array], w.Array],
     static_kernel: Callable[[w.Material, int], w.Array],
     materials: tuple[w.Material, ...],
     load: Load,
     r: np.ndarray,
     z: float,
     end: float,
+    far: float,
     rtol: float,
 ) -> Tail:
     """Sample k C(k) beyond the last pole on a geometric grid; choose the static half-space that leaves the least.
 
-    kernel(k, layers kept): with nothing taken out. Two bounds, the lower one counts: the envelope of the Bessel
-    functions, and, where the kernel falls off, integration by parts against their oscillation.
+    kernel(k): with nothing taken out; far: the last wavenumber (1/m) that can be afforded. Two bounds, the lower one
+    counts: the envelope of the Bessel functions, and, where the kernel falls off, integration by parts against their
+    oscillation.
     """
     lengths = [x for x in (load.reach, z, float(r.max())) if x > 0]
     first = max(1.4 * end, 1e-3 / max(lengths))
     last = max(1e5 * first, 1e5 / min(lengths))
     k = np.geomspace(first, last, int(_PER_DECADE * np.log10(last / first)) + 2)
     column = 1 if load.direction == "normal" else 0
-    raw = kernel(k.astype(complex), len(materials) - 1)
+    raw = kernel(k.astype(complex))
+    within = max(1, int(np.searchsorted(k, far)))
     if z > 0:
-        bounds = _bounds(k, raw, load, r)
-        return Tail(k, bounds, None, float(bounds[0]))
-    found = []
-    for material in dict.fromkeys(reversed(materials)):
-        if material.shear == 0:
-            continue
-        static = static_kernel(material, column)
-        bounds = _bounds(k, raw - static[:, None], load, r)
-        along = np.max(np.abs(load.static(r)[0])) * np.max(np.abs(static))
-        found.append(Tail(k, bounds, material, float(along)))
-    return min(found, key=lambda tail: (tail.start(tail.scale, rtol), tail.bounds[-1]))
+        bounds = _bounds(k, raw, load, r)[:within]
+        return Tail(k[:within], bounds, None, float(bounds[0].max()))
+    # As on a half-space of the compliance at the wavenumber of the load's size: a film is not what the disc rests on.
+    at = min(int(np.searchsorted(k, 1.0 / max(load.reach, float(r.min())))), k.size - 1)
+    scale = float(np.max(np.abs(load.static(r)[0])) * np.abs(raw[column, at]))
+    found = [
+        Tail(k[:within], _bounds(k, raw - static_kernel(material, column)[:, None], load, r)[:within], material, scale)
+        for material in dict.fromkeys(reversed(materials))
+        if material.shear != 0
+    ]
+
+    def left(tail: Tail) -> tuple[float, float]:
+        """What it leaves where it stops, nothing below the tolerance being better, and how far that is."""
+        stop = tail.start(scale, rtol)
+        return max(float(tail.bound(stop).max()), 0.4 * rtol * scale), stop
+
+    return min(found, key=left)
 
 
 def _bounds(k: np.ndarray, kernel: w.Array, load: Load, r: np.ndarray) -> np.ndarray:
-    fall = np.max(np.abs(kernel), axis=0)
-    size = fall * load.envelope(k)
-    wave = _wave(k[:, None] * r)
-    by_envelope = _from_right(k, size[:, None] * wave)
-    steps = np.abs(np.diff(kernel, axis=1)).max(axis=0)
-    variation = fall + np.concatenate([np.cumsum(steps[::-1])[::-1], [0.0]])
+    size = np.abs(kernel).T[:, :, None]  # axes: wavenumbers, components, radii
+    envelope = load.envelope(k)[:, None, None] * _wave(k[:, None] * r)[:, None]
+    by_envelope = _from_right(k, size * envelope)
+    steps = np.abs(np.diff(kernel, axis=1)).T[:, :, None]
+    variation = size + np.concatenate([np.cumsum(steps[::-1], axis=0)[::-1], np.zeros((1, 2, 1))])
     distance = np.maximum(np.abs(r - load.reach), 1e-12 * (r + load.reach) + 1e-300)
-    by_parts = (variation * load.envelope(k))[:, None] * wave * (4.0 / distance)
+    by_parts = variation * envelope * (4.0 / distance)
     oscillating = (k[:, None] * r > 3.0) & ((k * load.reach > 3.0) | (load.reach == 0.0))[:, None]
-    return _MARGIN * np.minimum(by_envelope, np.where(oscillating, by_parts, np.inf)).max(axis=1)
+    return _MARGIN * np.minimum(by_envelope, np.where(oscillating[:, None], by_parts, np.inf))
 
 
 def _wave(x: np.ndarray) -> np.ndarray:
@@ -88,9 +99,9 @@ def _wave(x: np.ndarray) -> np.ndarray:
 
 
 def _from_right(k: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """Trapezoids from each k to the last, and beyond it as k^-1.5 (or faster, as it was falling)."""
-    pieces = (f[1:] + f[:-1]) / 2.0 * np.diff(k)[:, None]
+    """Trapezoids from each k (first axis) to the last, and beyond it as k^-1.5 (or faster, as it was falling)."""
+    pieces = (f[1:] + f[:-1]) / 2.0 * np.diff(k)[:, None, None]
     last = np.maximum(f[-1], 1e-300)
     power = np.log(np.maximum(f[-8], 1e-300) / last) / np.log(k[-1] / k[-8])
     beyond = f[-1] * k[-1] / np.maximum(power - 1.0, 1e-3)
-    return np.concatenate([np.cumsum(pieces[::-1], axis=0)[::-1], np.zeros((1, f.shape[1]))]) + beyond
+    return np.concatenate([np.cumsum(pieces[::-1], axis=0)[::-1], np.zeros((1, *f.shape[1:]))]) + beyond
