@@ -186,7 +186,7 @@ def test_a_dry_run_of_refused_variants_alone_is_refused(tmp_path: Path) -> None:
 
 def test_dry_run_counts_and_makes_nothing(tmp_path: Path) -> None:
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=5)
-    done = unitcad("batch", sweep, "-o", tmp_path / "out", "--dry-run", "--json")
+    done = unitcad("batch", sweep, "-o", tmp_path / "out", "--dry-run", "--json", "--allow-code")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     # Three rings and one motor.

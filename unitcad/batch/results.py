@@ -13,6 +13,7 @@ from typing import IO, Any
 from unitcad import files
 from unitcad.batch.journal import Journal
 from unitcad.batch.sweep import Sweep
+from unitcad.text import cell
 
 FIRST = ("index", "status", "reason", "folder")
 
@@ -80,5 +81,4 @@ def _cell(value: Any) -> Any:
         return ""
     if isinstance(value, bool | list | dict):
         return json.dumps(value, ensure_ascii=False)
-    # A cell that begins like a formula is one to a spreadsheet.
-    return f"'{value}" if isinstance(value, str) and value[:1] in "=+-@\t\r" and value else value
+    return cell(value) if isinstance(value, str) else value

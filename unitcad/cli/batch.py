@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from unitcad.cli.code import AllowCode, allow_code
+from unitcad.cli.output import warn
 
 if TYPE_CHECKING:
     from unitcad.batch import Summary
@@ -94,13 +95,13 @@ def batch(
 
 def _tell(summary: Summary, folder: Path) -> None:
     for warning in summary.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        warn(f"warning: {warning}")
     for failure in summary.failures:
-        typer.echo(f"variant {failure['index']}: {failure['status']}: {failure['reason']}", err=True)
+        warn(f"variant {failure['index']}: {failure['status']}: {failure['reason']}")
     if summary.failed > len(summary.failures):
         typer.echo(f"and {summary.failed - len(summary.failures)} more: see variants.csv", err=True)
     if summary.stopped:
-        typer.echo(f"stopped: {summary.stopped}; the next run takes up the rest", err=True)
+        warn(f"stopped: {summary.stopped}; the next run takes up the rest")
     taken_up = f", {summary.taken_up} from before" if summary.taken_up else ""
     typer.echo(
         f"{summary.done} of {summary.variants} variants{taken_up}, {summary.geometries} geometries made, "
@@ -116,6 +117,6 @@ def _tell_preview(found: dict) -> None:
     sizes = f"{found['stored_mb']:.1f} MB stored, {found['linked_mb']:.1f} MB with every link counted"
     typer.echo(f"about {found['files']} files, {sizes}")
     for refused in found["refused"]:
-        typer.echo(f"variant {refused['index']} can't be: {refused['reason']}", err=True)
+        warn(f"variant {refused['index']} can't be: {refused['reason']}")
     if found["refused_count"] > len(found["refused"]):
         typer.echo(f"and {about}{found['refused_count'] - len(found['refused'])} more", err=True)

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from unitcad.cli.code import AllowCode, allow_code
+from unitcad.cli.output import warn
 
 Specs = Annotated[list[str], typer.Argument(metavar="SPEC...", help="A spec file, or the name of a template.")]
 Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the spec.")]
@@ -70,7 +71,7 @@ def build(
 def _tell(manifest: dict) -> None:
     """What a person should know of a result: warnings, broken laws, bad files."""
     for warning in manifest["warnings"]:
-        typer.echo(f"warning: {warning}", err=True)
+        warn(f"warning: {warning}")
     for entry in manifest["left_out"]:
         if entry["what"] == "pictures":
             typer.echo(f"warning: no pictures: {entry['why']}", err=True)

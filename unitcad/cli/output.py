@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from unitcad.errors import UnitcadError
+from unitcad.text import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,9 +22,14 @@ def print_json(data: Any) -> None:
 
 def say_error(error: UnitcadError, as_json: bool) -> None:
     """One error: a line on standard error and, with `--json`, an object on standard output."""
-    sys.stderr.write(f"error: {error}\n")
+    sys.stderr.write(f"error: {printable(str(error))}\n")
     if as_json:
         print_json({"error": error.as_dict()})
+
+
+def warn(line: str) -> None:
+    """One line on standard error; what a terminal would take for an order is written out."""
+    sys.stderr.write(printable(line) + "\n")
 
 
 def console(stderr: bool = False) -> Console:

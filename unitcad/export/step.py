@@ -155,7 +155,7 @@ def _read_body(label: TDF_Label, colours: XCAFDoc_ColorTool) -> StepBody:
 def _with_header(text: str, name: str) -> str:
     """The file with a header of ours: OCCT's holds the time of writing."""
     when = datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH", "315532800")), UTC)
-    shown = name.replace("'", "''").encode("ascii", "replace").decode()
+    shown = name.replace("\\", "\\\\").replace("'", "''").encode("ascii", "replace").decode()
     header = f"FILE_NAME('{shown}.step','{when:%Y-%m-%dT%H:%M:%S}',('unitcad'),(''),'Open CASCADE','unitcad','');"
     text, count = re.subn(r"FILE_NAME\(.*?\);", lambda _: header, text, count=1, flags=re.DOTALL)
     if count != 1:

@@ -11,6 +11,7 @@ from unitcad.catalogue import Material
 from unitcad.moulds.figures import Mix
 from unitcad.moulds.plan import Plan
 from unitcad.spec import Dimensions, Spec
+from unitcad.text import cell
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ def to_csv(items: tuple[Item, ...]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["item", "quantity", "unit", "made", "note"])
-    writer.writerows([i.item, f"{i.quantity:.4g}", i.unit, i.made, i.note] for i in items)
+    writer.writerows([cell(i.item), f"{i.quantity:.4g}", i.unit, i.made, cell(i.note)] for i in items)
     return text.getvalue()
 
 

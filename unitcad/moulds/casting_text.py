@@ -13,6 +13,7 @@ from unitcad.moulds.casting import Pour, Procedure
 from unitcad.moulds.figures import Figure
 from unitcad.moulds.plan import Plan, Step
 from unitcad.shape.body import Body
+from unitcad.text import markdown
 
 UNPRINTED = "Nothing of this tooling has been printed yet: every clearance is a choice with a check behind it."
 
@@ -33,10 +34,10 @@ def to_markdown(found: Procedure) -> str:
     number = count(1)
 
     def steps(texts: tuple[str, ...]) -> list[str]:
-        return [f"{next(number)}. {text}" for text in texts]
+        return [f"{next(number)}. {markdown(text)}" for text in texts]
 
     cavities = f"{found.cells} cavit{'y' if found.cells == 1 else 'ies'}"
-    lines = [f"# Casting {found.name}", "", f"Mould set {found.label}, {cavities}. {UNPRINTED}", ""]
+    lines = [f"# Casting {markdown(found.name)}", "", f"Mould set {found.label}, {cavities}. {UNPRINTED}", ""]
     lines += ["## Before the first pour", "", *steps(found.preparation), ""]
     if found.off_grid:
         lines += ["These edges fall between two of the printer's layers; the slicer moves them to the nearest:", ""]
@@ -46,10 +47,11 @@ def to_markdown(found: Procedure) -> str:
         lines += _pour(pour, steps(pour.steps))
     lines += ["## Out of the mould", "", *steps(found.release), ""]
     lines += ["## Motor in", "", *steps(found.assembly), ""]
-    lines += ["## Measure on the first part", "", *(f"- {text}" for text in found.measure), ""]
+    lines += ["## Measure on the first part", "", *(f"- {markdown(text)}" for text in found.measure), ""]
     lines += ["The cups' play on the plinth is the largest error of all:", "", *_table(found.walls), ""]
     lines += ["## Needed", "", "| item | quantity | made | note |", "| --- | --- | --- | --- |"]
-    lines += [f"| {i.item} | {i.quantity:.4g} {i.unit} | {i.made} | {i.note} |" for i in found.bill]
+    bill = [(markdown(i.item), f"{i.quantity:.4g} {i.unit}", i.made, markdown(i.note)) for i in found.bill]
+    lines += [f"| {' | '.join(row)} |" for row in bill]
     return "\n".join(lines) + "\n"
 
 
@@ -80,10 +82,10 @@ def _spaced(name: str) -> str:
 
 
 def _pour(pour: Pour, steps: list[str]) -> list[str]:
-    head = f"## Pour {pour.index}: {_spaced(pour.layer)}, {pour.material}"
+    head = f"## Pour {pour.index}: {_spaced(pour.layer)}, {markdown(pour.material)}"
     return [head, "", f"![pour {pour.index}]({pour.drawing})", "", *_table(pour.figures), "", *steps, ""]
 
 
 def _table(figures: tuple[Figure, ...]) -> list[str]:
-    rows = [f"| {f.name} | {f.value:.4g} {f.unit} | {f.source} |" for f in figures]
+    rows = [f"| {markdown(f.name)} | {f.value:.4g} {f.unit} | {markdown(f.source)} |" for f in figures]
     return ["| figure | value | source |", "| --- | --- | --- |", *rows]

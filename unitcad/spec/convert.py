@@ -12,6 +12,7 @@ import msgspec
 
 from unitcad.errors import Refusal, unknown_key, unknown_name
 from unitcad.spec.fields import alternatives, entry_in, fields_of, named_in, table_in
+from unitcad.text import invisible, printable, without_invisible
 
 T = TypeVar("T")
 _NAMES = {
@@ -29,6 +30,8 @@ _KIND = re.compile(r"Expected `(?P<kinds>[^`]+)`")
 _STEP = re.compile(r"\.([^.\[]+)|\[(\d+|\.\.\.)\]")
 _LARGEST_INT = 2**63 - 1
 _SIGNS = {">=": "at least", "<=": "at most"}
+SOURCE = "design_source"
+"""The field whose text has lines."""
 DEEPEST = 20
 """Tables in tables that data may have: more than any spec or sweep needs."""
 
@@ -50,7 +53,11 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
 
 
 def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
-    """Raise Refusal for a number in plain data that is not finite, and for tables that nest too deeply."""
+    """Raise Refusal for a number in plain data that is not finite, for a text or key with characters that nobody sees,
+    and for tables that nest too deeply.
+    """
+    if isinstance(node, str) and SOURCE not in field.split("."):
+        _check_text(node, field)
     if isinstance(node, float) and not math.isfinite(node):
         raise Refusal(field, node, "must be a finite number")
     if isinstance(node, int) and abs(node) > _LARGEST_INT:
@@ -59,7 +66,16 @@ def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
         if depth > DEEPEST:
             raise Refusal(".".join(field.split(".")[:3]), "...", f"nests more than {DEEPEST} tables deep")
         for key, below in node.items() if isinstance(node, Mapping) else enumerate(node):
+            if isinstance(key, str):
+                _check_text(key, printable(_below(field, key)))
             check_plain(below, _below(field, key), depth + 1)
+
+
+def _check_text(text: str, field: str) -> None:
+    found = invisible(text)
+    if found is not None:
+        limit = f"holds {found!a}: control characters and those that turn the direction of text are refused"
+        raise Refusal(field, text, limit, without_invisible(text).strip() or None)
 
 
 def _below(field: str, key: object) -> str:

@@ -70,10 +70,7 @@ def allow_nothing() -> None:
 def expect_allowed(design: str, source: str) -> None:
     """Raise UnitcadError unless this process may run a design's code."""
     if ANY not in _allowed and _digest(design, source) not in _allowed:
-        raise UnitcadError(
-            f"design {design}: its code is not run, since this command was not given the file; "
-            "read the code, then allow it with --allow-code"
-        )
+        raise UnitcadError(f"design {design}: this command runs its code only with --allow-code; read it first")
 
 
 def _digest(design: str, source: str) -> str:
