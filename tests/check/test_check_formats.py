@@ -40,7 +40,7 @@ def reports(tmp_path: Path) -> list[FileReport]:
 
 def test_json_has_the_promised_shape(reports: list[FileReport]) -> None:
     data = json.loads(formats.render(reports, "json"))
-    assert list(data) == ["files"]
+    assert list(data) == ["files", "config", "baseline"]
     for entry, report in zip(data["files"], reports, strict=True):
         assert list(entry) == ["path", "verdict", "findings", "facts"]
         assert entry["verdict"] == report.verdict
@@ -48,7 +48,7 @@ def test_json_has_the_promised_shape(reports: list[FileReport]) -> None:
             "triangles", "vertices", "shells", "volume_mm3", "area_mm2", "bbox_mm", "watertight"
         ]  # fmt: skip
         for found in entry["findings"]:
-            assert list(found) == ["code", "severity", "message", "count", "locations", "fix"]
+            assert list(found) == ["code", "severity", "message", "count", "locations", "fix", "known"]
             assert found["fix"] == rules()[found["code"]].mend
     assert [entry["verdict"] for entry in data["files"]] == ["pass", "error", "error", "warning"]
 

@@ -10,11 +10,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 from shapes import box, stl
+from test_check_command import run
 from typer.main import get_command
 
 from unitcad.check.formats import as_dict
-from unitcad.cli import app
+from unitcad.cli import app, check_settings
 
 needs_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action's script is bash")
 ROOT = Path(__file__).parent.parent.parent
@@ -46,11 +48,11 @@ def _run_action(folder: Path, **given: str) -> subprocess.CompletedProcess[str]:
         f'#!/bin/sh\nexec {sys.executable} -c "from unitcad.cli import main; main()" "$@"\n'
     )
     (folder / "bin/unitcad").chmod(0o755)
-    inputs = {"FILES": ".", "FAIL_ON": "error", "PRINTER": "", "ARGUMENTS": "", "SARIF": ""} | given
+    inputs = {"FILES": ".", "FAIL_ON": "", "PRINTER": "", "ARGUMENTS": "", "SARIF": ""} | given
     for name in inputs:
         assert f"{name}: ${{{{ inputs." in text
     environment = {**os.environ, **inputs, "PATH": f"{folder / 'bin'}:{os.environ['PATH']}"}
-    (folder / "work").mkdir()
+    (folder / "work").mkdir(exist_ok=True)
     (folder / "work/good.stl").write_bytes(stl(box()))
     (folder / "work/bad.stl").write_bytes(stl(box()[2:]))
     return subprocess.run(
@@ -90,6 +92,33 @@ def test_the_action_fails_on_wrong_inputs_and_says_so(
 @needs_bash
 def test_the_action_passes_its_arguments_on(tmp_path: Path) -> None:
     assert _run_action(tmp_path, FILES="bad.stl", ARGUMENTS="--ignore T001").returncode == 0
+
+
+@needs_bash
+@pytest.mark.parametrize(("fail_on", "code"), [("", 1), ("error", 0)])
+def test_the_action_takes_the_checkouts_settings(fail_on: str, code: int, tmp_path: Path) -> None:
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work/warn.stl").write_bytes(stl(box(), header=b"solid"))
+    (tmp_path / "work/unitcad.toml").write_text("[check]\nfail-on = 'warning'\n")
+    done = _run_action(tmp_path, FILES="warn.stl", FAIL_ON=fail_on)
+    assert done.returncode == code, done.stderr
+
+
+def test_the_settings_on_the_page_are_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (ROOT / "docs/checks-in-ci.md").read_text("utf-8")
+    monkeypatch.chdir(tmp_path)
+    shown = re.findall(r"```toml\n# (\S+)\n(.*?)```", page, re.DOTALL)
+    assert [name for name, _ in shown] == ["unitcad.toml", "pyproject.toml"]
+    for name, text in shown:
+        (tmp_path / name).write_text(text)
+        found = check_settings.find(name)
+        assert found.settings.select is not None
+        assert found.ignored("scans/a.stl")
+        if name == "unitcad.toml":  # it shows every key there is
+            assert all(value is not None for value in structs.asdict(found.settings).values())
+            (tmp_path / "known.json").write_text('{"unitcad-baseline": 1, "files": {}}')
+            (tmp_path / "part.stl").write_bytes(stl(box()))
+            assert run("part.stl", cwd=tmp_path).returncode == 0
 
 
 def test_the_actions_inputs_are_not_pasted_into_its_script() -> None:

@@ -9,17 +9,21 @@ import stat
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.catalogue import Printer
 from unitcad.check import sniff
+from unitcad.check.detail import SHOWN, detailed
 from unitcad.check.findings import Facts, FileReport, Finding, counted, ending, merge
 from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.mesh import Floats, Ints, Mesh
 from unitcad.check.rulebook import finding
 from unitcad.check.rules_mesh import Judged, in_file, judge_mesh
 from unitcad.check.scale import UNITS_MM
+
+if TYPE_CHECKING:
+    from unitcad.catalogue import Printer
 
 _KINDS = {
     stat.S_IFDIR: "a folder",
@@ -39,7 +43,8 @@ class Options:
     that ended the judgement of a file (not readable, a limit reached, no mesh) is kept whatever they say.
     `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
     `shells`: the number of shells expected (G005). `cross`: judge self-crossing. `strict_3mf`: what the 3MF
-    specification forbids and common programs write all the same is an error, not a warning.
+    specification forbids and common programs write all the same is an error, not a warning. `unwanted`: prefixes of
+    codes that no select brings back. `locations`: how many are kept of a finding; `draw`: keep meshes with the report.
     """
 
     select: tuple[str, ...] = ()
@@ -50,12 +55,15 @@ class Options:
     cross: bool = True
     strict_3mf: bool = False
     limits: Limits = field(default_factory=Limits)
+    unwanted: tuple[str, ...] = ()
+    locations: int = SHOWN
+    draw: bool = False
 
     def wants(self, code: str) -> bool:
         """Whether findings of `code` are reported, unless they ended the judgement: those always are."""
         chosen = max((len(p) for p in self.select if code.startswith(p)), default=-1 if self.select else 0)
         dropped = max((len(p) for p in self.ignore if code.startswith(p)), default=-1)
-        return chosen >= 0 and chosen > dropped
+        return chosen >= 0 and chosen > dropped and not code.startswith(self.unwanted or ("-",))
 
 
 def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) -> FileReport:
@@ -63,11 +71,11 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
     options = options or Options()
     points = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
     triangles = np.asarray(faces).reshape(-1, 3)
-    if triangles.size and (triangles.min() < 0 or triangles.max() >= len(points)):
-        return _report("", ending([finding("P011", "a face names a vertex that is not there")]), Facts(), options)
-    mesh = Mesh(points, np.ascontiguousarray(triangles, dtype=np.int32))
 
     def work(deadline: Deadline) -> tuple[Sequence[Finding], Facts]:
+        if triangles.size and (triangles.min() < 0 or triangles.max() >= len(points)):
+            raise Unreadable(finding("P011", "a face names a vertex that is not there"))
+        mesh = Mesh(points, np.ascontiguousarray(triangles, dtype=np.int32))
         judged = _judge_all([mesh], options, deadline)
         return judged.findings, judged.facts
 
@@ -90,16 +98,15 @@ def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileR
 
 
 def _guarded(path: str, options: Options, work: Callable[[Deadline], tuple[Sequence[Finding], Facts]]) -> FileReport:
-    try:
-        with keeping():
-            findings, facts = work(Deadline(options.limits.seconds))
-    except Unreadable as stop:
-        findings, facts = stop.findings, stop.facts
-    return _report(path, findings, facts, options)
-
-
-def _report(path: str, findings: Sequence[Finding], facts: Facts, options: Options) -> FileReport:
-    return FileReport(path, merge(item for item in findings if item.ends or options.wants(item.code)), facts)
+    meshes: list[Mesh] | None = [] if options.draw else None
+    with detailed(options.locations, meshes):
+        try:
+            with keeping():
+                findings, facts = work(Deadline(options.limits.seconds))
+        except Unreadable as stop:
+            findings, facts = stop.findings, stop.facts
+        kept = merge(item for item in findings if item.ends or options.wants(item.code))
+    return FileReport(path, kept, facts, meshes=tuple(meshes or ()))
 
 
 def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:

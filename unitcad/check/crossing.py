@@ -8,11 +8,13 @@ A crossing is one of: two faces pass through each other; an edge lies in a face 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from unitcad.check import overlap, triangles
+from unitcad.check.detail import detail
 from unitcad.check.edges import balanced
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Unreadable
@@ -24,7 +26,7 @@ from unitcad.check.topology import Topology
 _EPS = float(np.finfo(np.float64).eps)
 _BLOCK = 1 << 17
 _CACHED = 1 << 11  # pairs whose coordinates stay in the processor's cache
-_LISTED = 16  # pairs whose places are computed; a finding keeps fewer
+_LISTED = 16  # pairs whose places are computed, unless more are kept: some fall together
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
@@ -350,23 +352,34 @@ def _said(topology: Topology, faces: _Faces, found: _Found) -> Crossings:
     if not len(touching):
         return Crossings(tuple(findings), bool(len(crossing)))
     met = np.sort(faces.shell[touching], axis=1)
-    shells, first = np.unique(met, axis=0, return_index=True)
+    shells, first, which = np.unique(met, axis=0, return_index=True, return_inverse=True)
     shells = shells.astype(np.int64)
     through = {tuple(row) for row in np.sort(faces.shell[crossing], axis=1).tolist()}
     only = np.array([tuple(row) not in through for row in shells.tolist()], bool)
     if only.any():
         n = int(only.sum())
-        places = _places(topology, faces, touching[first[only]])
+        order, which = np.argsort(which, axis=None, kind="stable"), np.sort(which, axis=None)
+
+        def contact(at: int) -> Ints:
+            """All faces of a pair of shells that touch."""
+            begin, end = np.searchsorted(which, np.flatnonzero(only)[at] + np.arange(2))
+            return faces.original[np.unique(touching[order[begin:end]])]
+
+        places = _places(topology, faces, touching[first[only]], contact)
         findings.append(finding("G003", f"{counted(n, 'pair')} of shells that touch", n, places))
     return Crossings(tuple(findings), bool(len(crossing)), shells)
 
 
-def _places(topology: Topology, faces: _Faces, pairs: Ints) -> list[Location]:
-    """Where pairs meet, no point twice, with a face of each that was not named before."""
+def _places(
+    topology: Topology, faces: _Faces, pairs: Ints, region: Callable[[int], Ints] | None = None
+) -> list[Location]:
+    """Where pairs meet, no point twice, with both faces; first the one that was not named before."""
     found: dict[tuple[int, ...], Location] = {}
     named: set[int] = set()
     grid = 4 * max(float32_step(faces.vertices), 1e-300)
-    for pair in pairs[:: max(1, len(pairs) // _LISTED)][:_LISTED].tolist():
+    listed = max(_LISTED, detail().locations)
+    for at in range(0, len(pairs), max(1, len(pairs) // listed))[:listed]:
+        pair = pairs[at].tolist()
         a, b = (faces.vertices[[int(corner[i]) for corner in faces.corners]] for i in pair)
         point = triangles.common_point(a, b)
         point = a.mean(axis=0) if point is None else point + 0.0
@@ -377,7 +390,7 @@ def _places(topology: Topology, faces: _Faces, pairs: Ints) -> list[Location]:
         first, second = (other, one) if one in named else (one, other)
         named.add(first)
         xyz = (float(point[0]), float(point[1]), float(point[2]))
-        found[near] = Location(faces=(first, second), xyz=xyz, object=topology.mesh.name)
+        found[near] = Location(faces=(first, second), xyz=xyz, object=topology.mesh.name, region=region and region(at))
     return sorted(found.values(), key=lambda place: place.face or 0)
 
 

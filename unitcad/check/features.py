@@ -78,7 +78,7 @@ def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, deadli
         mine = np.flatnonzero(thin & (group == label))
         place = _whisker(vertices, faces[mine], solid, least)
         if place is not None:
-            found.append(Location(face=int(topology.kept[mine[0]]), xyz=place))
+            found.append(Location(face=int(topology.kept[mine[0]]), xyz=place, region=topology.kept[mine]))
     return found
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from unitcad.check.detail import detail
+
+if TYPE_CHECKING:
+    from unitcad.check.mesh import Mesh
 
 SEVERITIES = ("info", "warning", "error")
-SHOWN = 5  # locations kept for a finding; the count says how many there are
 
 
 @dataclass(frozen=True)
@@ -17,7 +21,8 @@ class Location:
 
     A polygon is one face, however it is cut into triangles. `object` is an id of a 3MF, or a name of an OBJ or GLB.
     `faces` are all that are concerned, both of a crossing; `face` is the first of them. Either may be given alone.
-    `line` is that of the first face where the format has lines, else that of the fault.
+    `line` is that of the first face where the format has lines, else that of the fault. `centre`: of the box round the
+    faces, the same in whatever order they are, mm. `region`, for pictures: its triangles in the mesh of number `mesh`.
     """
 
     face: int | None = None
@@ -26,6 +31,9 @@ class Location:
     part: str | None = None
     object: str | None = None
     faces: tuple[int, ...] = ()
+    region: Any = field(default=None, compare=False, repr=False)
+    mesh: int | None = field(default=None, compare=False, repr=False)
+    centre: tuple[float, float, float] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.faces and self.face is None:
@@ -67,7 +75,8 @@ class Location:
 class Finding:
     """One rule's verdict on one file: how often, and where first.
 
-    `ends`: it ended the judgement, so that other rules were not run; no filter drops it.
+    `ends`: it ended the judgement, so that other rules were not run; no filter drops it. `known`: a baseline lists it,
+    and it does not fail.
     """
 
     code: str
@@ -76,6 +85,7 @@ class Finding:
     count: int = 1
     locations: tuple[Location, ...] = ()
     ends: bool = False
+    known: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready."""
@@ -115,17 +125,21 @@ class Facts:
 
 @dataclass(frozen=True)
 class FileReport:
-    """A file's findings, sorted by severity and code, its facts, and the wall time that judging it took, if known."""
+    """A file's findings, sorted by severity and code, its facts, and the wall time that judging it took, if known.
+
+    `meshes`: those that the locations number, where `Options.draw` asked for them.
+    """
 
     path: str
     findings: tuple[Finding, ...] = ()
     facts: Facts = field(default_factory=Facts)
     seconds: float | None = field(default=None, compare=False)
+    meshes: tuple[Mesh, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def verdict(self) -> str:
-        """`error`, `warning` or `pass`: the worst finding, infos aside."""
-        found = {finding.severity for finding in self.findings}
+        """`error`, `warning` or `pass`: the worst finding, infos and known ones aside."""
+        found = {finding.severity for finding in self.findings if not finding.known}
         return "error" if "error" in found else "warning" if "warning" in found else "pass"
 
     def has(self, code: str) -> bool:
@@ -177,7 +191,7 @@ def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     for new in findings:
         old = by_code.get(new.code)
         if old is None:
-            by_code[new.code] = replace(new, locations=new.locations[:SHOWN])
+            by_code[new.code] = replace(new, locations=new.locations[: detail().locations])
             continue
         merged.add(new.code)
         worst = max(old.severity, new.severity, key=SEVERITIES.index)
@@ -189,7 +203,7 @@ def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
             worst,
             message,
             old.count + new.count,
-            (old.locations + new.locations)[:SHOWN],
+            (old.locations + new.locations)[: detail().locations],
             old.ends or new.ends,
         )
     for code in merged:

@@ -14,13 +14,19 @@ from unitcad.check.rulebook import rules
 FORMATS = ("text", "json", "github", "sarif", "junit")
 
 
-def render(reports: Sequence[FileReport], format_: str, fail_on: str = "error") -> str:
-    """All reports in one of FORMATS, ending in a newline."""
+def render(
+    reports: Sequence[FileReport],
+    format_: str,
+    fail_on: str = "error",
+    config: str | None = None,
+    baseline: str | None = None,
+) -> str:
+    """All reports in one of FORMATS, ending in a newline; JSON names the files of settings and of known findings."""
     from unitcad.check.sarif import sarif
 
     makers: dict[str, Callable[[], str]] = {
         "text": lambda: text(reports),
-        "json": lambda: _dump(as_dict(reports)),
+        "json": lambda: _dump(as_dict(reports, config, baseline)),
         "github": lambda: github(reports),
         "sarif": lambda: _dump(sarif(reports)),
         "junit": lambda: junit(reports, fail_on),
@@ -32,15 +38,18 @@ def _dump(data: Any) -> str:
     return json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def as_dict(reports: Sequence[FileReport]) -> dict[str, Any]:
-    """The JSON object: {files: [{path, verdict, findings, facts}]}; a finding also says how to fix it."""
-    return {"files": [_entry(report) for report in reports]}
+def as_dict(reports: Sequence[FileReport], config: str | None = None, baseline: str | None = None) -> dict[str, Any]:
+    """The JSON object: {files: [{path, verdict, findings, facts}], config, baseline}.
+
+    A finding also says how to fix it, and whether the baseline lists it.
+    """
+    return {"files": [_entry(report) for report in reports], "config": config, "baseline": baseline}
 
 
 def _entry(report: FileReport) -> dict[str, Any]:
     entry = report.as_dict()
-    for found in entry["findings"]:
-        found["fix"] = rules()[found["code"]].mend
+    for shown, found in zip(entry["findings"], report.findings, strict=True):
+        shown |= {"fix": rules()[found.code].mend, "known": found.known}
     return entry
 
 
@@ -50,14 +59,20 @@ def text(reports: Sequence[FileReport]) -> str:
     codes: set[str] = set()
     for report in reports:
         for found in report.findings:
-            codes.add(found.code)
-            lines.append(f"{_plain(report.path)}: {found.code} {found.severity}: {_plain(said(found, 3))}")
+            if not found.known:
+                codes.add(found.code)
+            lines.append(_line(report, found))
         if report.verdict == "pass" and (size := _size(report.facts)):
             lines.append(f"{_plain(report.path)}: passed: {size}")
     fixes = [f"  {code} {rule.title}: {rule.mend}" for code, rule in rules().items() if code in codes]
     if fixes:
         lines += ["How to fix:", *fixes, _EXPLAIN]
     return "\n".join([*lines, _summary(reports)]) + "\n"
+
+
+def _line(report: FileReport, found: Finding) -> str:
+    known = " (known)" if found.known else ""
+    return f"{_plain(report.path)}: {found.code} {found.severity}{known}: {_plain(said(found, 3))}"
 
 
 _EXPLAIN = "`unitcad check --explain CODE` says what a code means and why it matters."
@@ -84,6 +99,8 @@ def _summary(reports: Sequence[FileReport]) -> str:
         f"{verdicts[name]} {word}" for name, word in (("error", "failed"), ("warning", "warned")) if verdicts[name]
     ]
     parts.append(f"{verdicts['pass']} passed")
+    if known := sum(found.known for report in reports for found in report.findings):
+        parts.append(counted(known, "known finding"))
     return f"{counted(len(reports), 'file')}: {', '.join(parts)}"
 
 
@@ -114,10 +131,13 @@ _GITHUB = {"error": "error", "warning": "warning", "info": "notice"}
 
 
 def github(reports: Sequence[FileReport]) -> str:
-    """Workflow commands: an annotation a finding, then a line for the log that counts."""
+    """Workflow commands: an annotation a finding that is not known, then a line for the log that counts."""
     lines = []
     for report in reports:
         for found in report.findings:
+            if found.known:
+                lines.append(f"known: {_line(report, found)}")
+                continue
             title = f"{found.code} {rules()[found.code].title}"
             line = next((place.line for place in found.locations if place.line is not None), None)
             where = f"file={_property(report.path)}" + (f",line={line}" if line is not None else "")
@@ -141,12 +161,14 @@ def junit(reports: Sequence[FileReport], fail_on: str) -> str:
     least = SEVERITIES.index(fail_on)
     cases, failed = [], 0
     for report in reports:
-        bad = [found for found in report.findings if SEVERITIES.index(found.severity) >= least]
+        bad = [found for found in report.findings if not found.known and SEVERITIES.index(found.severity) >= least]
         rest = [found for found in report.findings if found not in bad]
         failed += bool(bad)
         inner = "".join(_failure(found) for found in bad)
         if rest:
-            told = "\n".join(f"{found.code} {found.severity}: {said(found, 3)}" for found in rest)
+            told = "\n".join(
+                f"{found.code} {found.severity}{' (known)' if found.known else ''}: {said(found, 3)}" for found in rest
+            )
             inner += f"<system-out>{escape(_xml(told))}</system-out>"
         name = f"name={quoteattr(_xml(report.path))}" + _time(report.seconds)
         cases.append(f'<testcase classname="unitcad.check" {name}>{inner}</testcase>')

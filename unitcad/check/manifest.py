@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
-from unitcad import catalogue
+from unitcad import catalogue, files
 from unitcad.check.check import Options
 from unitcad.check.findings import FileReport, Finding, counted, merge
 from unitcad.check.rulebook import finding
@@ -18,6 +17,7 @@ from unitcad.errors import UnitcadError
 
 VOLUME = 1e-3  # M001: a mesh's share of a B-rep's volume that tessellation may cost
 _MESHES = ("stl", "3mf")
+Choice = Callable[[str], Options]
 
 
 @dataclass(frozen=True)
@@ -49,11 +49,8 @@ def read(where: str) -> Listing:
     path = Path(where)
     path = path / "manifest.json" if path.is_dir() else path
     try:
-        if path.exists() and not path.is_file():
-            raise UnitcadError(f"--manifest {where}: not a regular file")
-        data = json.loads(path.read_text("utf-8"))
-        return _listing(path, data)
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        return _listing(path, files.read_json(path))
+    except UnitcadError as error:
         raise UnitcadError(f"--manifest {where}: cannot be read: {error}") from error
     except KeyError as error:
         raise UnitcadError(f"--manifest {where}: not a manifest of `unitcad build`: it lacks {error}") from error
@@ -101,19 +98,23 @@ def _together(old: Part, new: Part) -> Part:
     return Part(old.names + new.names, old.tool and new.tool, old.sha256, volume, old.solids + new.solids)
 
 
-def work(listing: Listing, paths: Sequence[str], options: Options, printer_named: bool) -> list[tuple[str, Options]]:
-    """What to judge: the named files, or all meshes of the manifest; tools with a printer, other parts without."""
+def work(listing: Listing, paths: Sequence[str], options: Choice, printer_named: bool) -> list[tuple[str, Options]]:
+    """What to judge: the named files, or all meshes of the manifest; tools with a printer, other parts without.
+
+    `options` gives those of a path.
+    """
     chosen = list(paths) or [os.path.relpath(path) for path in listing.files if path.lower().endswith(_MESHES)]
     known = catalogue.printers()
     found = []
     for path in chosen:
         part = listing.files.get(os.path.abspath(path))
-        printer = options.printer
+        chosen_here = options(path)
+        printer = chosen_here.printer
         if part is not None and not printer_named:
             printer = known.get(listing.printer or "fdm-0.4") if part.tool else None
         elif part is not None and not part.tool:
             printer = None
-        found.append((path, replace(options, printer=printer)))
+        found.append((path, replace(chosen_here, printer=printer)))
     return found
 
 
@@ -125,21 +126,22 @@ def compare(listing: Listing, report: FileReport, options: Options) -> FileRepor
     return replace(report, findings=merge([*report.findings, *added]))
 
 
-def unjudged(listing: Listing, judged: Sequence[str], options: Options) -> list[FileReport]:
+def unjudged(listing: Listing, judged: Sequence[str], options: Choice) -> list[FileReport]:
     """Reports of the listed files that were not judged (STEP, drawings, ...) and are gone or changed: M003, M004.
 
     One of the manifest itself comes last where it lists paths outside its folder (M005): nothing there is read.
     """
     seen = {os.path.abspath(path) for path in judged}
     left = [os.path.relpath(path) for path in listing.files if path not in seen]
-    reports = [compare(listing, FileReport(path), options) for path in left]
-    if listing.outside and options.wants("M005"):
+    reports = [compare(listing, FileReport(path), options(path)) for path in left]
+    name = os.path.relpath(listing.path)
+    if listing.outside and options(name).wants("M005"):
         shown = ", ".join(repr(path[:80]) for path in listing.outside[:3]) + (
             ", ..." if len(listing.outside) > 3 else ""
         )
         text = f"{counted(len(listing.outside), 'path')} outside the manifest's folder: {shown}"
         found = finding("M005", text, len(listing.outside))
-        reports.append(FileReport(os.path.relpath(listing.path), (found,)))
+        reports.append(FileReport(name, (found,)))
     return [report for report in reports if report.findings]
 
 

@@ -54,7 +54,7 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline, bed: float) 
             continue
         centre = mesh.vertices[mesh.faces[faces[0]]].mean(axis=0)
         xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
-        bad.append((area, Location(face=int(topology.kept[faces[0]]), xyz=xyz)))
+        bad.append((area, Location(face=int(topology.kept[faces[0]]), xyz=xyz, region=topology.kept[faces])))
     if not bad:
         return []
     bad.sort(key=lambda item: -item[0])

@@ -39,7 +39,7 @@ def judge(topology: Topology) -> list[Finding]:
         ("G009", _folded(mesh.vertices, faces, edges, areas), "at which two faces fold onto each other"),
     ):
         if len(which):
-            places = [_at(topology, faces, kept, edges, i) for i in which[:9].tolist()]
+            places = (_at(topology, faces, kept, edges, i) for i in which.tolist())
             found.append(finding(code, f"{counted(len(which), 'edge')} {text}", len(which), places))
     return found
 

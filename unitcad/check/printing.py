@@ -71,7 +71,9 @@ def _trapped(topology: Topology) -> list[Finding]:
         point = vertices[faces[np.argmax(own), 0]]
         if winding_number(vertices, faces[~own], point) > 0:
             centre = (low[i] + high[i]) / 2
-            places.append(Location(xyz=tuple(float(v) for v in centre)))  # type: ignore[arg-type]
+            region = topology.kept[own]
+            xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
+            places.append(Location(face=int(region[0]), xyz=xyz, region=region))
     if not places:
         return []
     return [finding("D004", f"{counted(len(places), 'hollow')} without an opening", len(places), places)]

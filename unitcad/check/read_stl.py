@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check.findings import SHOWN, Finding, Location, counted
+from unitcad.check.detail import SHOWN
+from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Floats, Mesh, weld_exact
 from unitcad.check.rows import NUMBER
@@ -97,7 +98,7 @@ def _not_finite(good: Floats) -> Finding:
         "V001",
         f"{counted(len(bad), 'face')} with a vertex that is not finite",
         len(bad),
-        (Location(face=int(i)) for i in bad[:9]),
+        (Location(face=int(i)) for i in bad),
     )
 
 

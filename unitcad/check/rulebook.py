@@ -10,7 +10,8 @@ from functools import cache
 from importlib.resources import files
 from itertools import islice
 
-from unitcad.check.findings import SHOWN, Finding, Location
+from unitcad.check.detail import detail
+from unitcad.check.findings import Finding, Location
 from unitcad.errors import Refusal
 
 FAMILIES = {
@@ -51,7 +52,8 @@ def finding(
     severity: str | None = None,
 ) -> Finding:
     """A finding of rule `code`, with the rule's severity unless another one is given."""
-    return Finding(code, severity or rules()[code].severity, message, int(count), tuple(islice(places, SHOWN)))
+    kept = tuple(islice(places, detail().locations))
+    return Finding(code, severity or rules()[code].severity, message, int(count), kept)
 
 
 def explain(codes: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from unitcad.check import crossing, overlap, shells, topology
+from unitcad.check.detail import detail
 from unitcad.check.findings import Facts, Finding, Location, counted, ending
 from unitcad.check.limits import Deadline, keeping
 from unitcad.check.mesh import LARGEST, Mesh, extent
@@ -30,7 +31,7 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
     finite = np.asarray((np.abs(mesh.vertices) <= LARGEST).all(axis=1))
     if not finite.all():
         bad = np.flatnonzero(~finite[mesh.faces].all(axis=1))
-        places = [Location(face=int(i), object=mesh.name) for i in bad[:9]]
+        places = (Location(face=int(i), object=mesh.name) for i in bad)
         wrong = len(finite) - int(finite.sum())
         text = counted(wrong, "non-finite vertex", "non-finite vertices")
         return Judged(in_file(ending([finding("V001", text, len(bad) or 1, places)]), mesh), facts, None)
@@ -56,4 +57,23 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
 
 def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
     """The findings with the faces of each location as the file has them, and their line and object where known."""
-    return tuple(findings) if mesh.source is None else tuple(mesh.source.located(item) for item in findings)
+    drawn = tuple(replace(item, locations=tuple(_drawn(place, mesh) for place in item.locations)) for item in findings)
+    return drawn if mesh.source is None else tuple(mesh.source.located(item) for item in drawn)
+
+
+def _drawn(place: Location, mesh: Mesh) -> Location:
+    """The location with the middle of its triangles and, where somebody draws, the number of their mesh."""
+    if place.centre is not None:
+        return place
+    whole, meshes = place.region is not None, detail().meshes
+    region = place.region if whole else np.array(place.faces, np.int64)
+    centre = place.xyz
+    if len(region) and (whole or len(region) > 1 or centre is None):
+        low, high = extent(mesh.vertices[mesh.faces[region]].reshape(-1, 3))
+        x, y, z = ((low + high) / 2).tolist()
+        centre = (x, y, z)
+    if meshes is None or (not len(region) and centre is None):
+        return replace(place, region=None, centre=centre)
+    number = next((i for i, known in enumerate(meshes) if known is mesh), len(meshes))
+    meshes[number:] = meshes[number:] or [mesh]
+    return replace(place, region=region, mesh=number, centre=centre)

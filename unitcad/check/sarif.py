@@ -19,7 +19,10 @@ _LEVELS = {"error": "error", "warning": "warning", "info": "note"}
 
 
 def sarif(reports: Sequence[FileReport]) -> dict[str, Any]:
-    """One run with every rule and a result a finding. Fingerprints depend on path and rule only."""
+    """One run with every rule and a result a finding. Fingerprints depend on path and rule only.
+
+    What the baseline lists is `unchanged`, and suppressed.
+    """
     index = {code: i for i, code in enumerate(rules())}
     return {
         "$schema": SCHEMA,
@@ -68,6 +71,7 @@ def _result(report: FileReport, found: Finding, index: dict[str, int]) -> dict[s
     objects = dict.fromkeys(place.object for place in found.locations if place.object)
     logical = {"logicalLocations": [{"name": name, "kind": "object"} for name in objects]} if objects else {}
     fingerprint = hashlib.sha256(f"{_uri(_inside(report.path))}\n{found.code}".encode()).hexdigest()
+    known = {"baselineState": "unchanged", "suppressions": [{"kind": "external"}]} if found.known else {}
     return {
         "ruleId": found.code,
         "ruleIndex": index[found.code],
@@ -76,6 +80,7 @@ def _result(report: FileReport, found: Finding, index: dict[str, int]) -> dict[s
         "locations": [{"physicalLocation": physical, **logical}],
         "partialFingerprints": {"pathAndRule/v1": fingerprint},
         "properties": {"count": found.count, "places": [place.as_dict() for place in found.locations]},
+        **known,
     }
 
 

@@ -42,7 +42,7 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
     if len(which):
         worst = which[np.argmax(area[which])]
         text = f"volume {volumes[worst]:.3g} mm3 over {area[worst]:.3g} mm2 of surface"
-        found.append(finding("G007", text, len(which), [_where(low, high, i) for i in which.tolist()]))
+        found.append(finding("G007", text, len(which), (_where(topology, low, high, i) for i in which.tolist())))
     sound = sound & ~flat
     depth = np.zeros(n, int)
     overlaps: list[tuple[int, int]] = []
@@ -72,16 +72,16 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
         if sound[a] and depth[a] % 2 and volumes[a] > 0:
             overlaps.append((a, a))
     if overlaps:
-        places = [_where(low[list(pair)].max(axis=0)[None], high[list(pair)].min(axis=0)[None], 0) for pair in overlaps]
+        places = (_where(topology, low, high, *pair) for pair in overlaps)
         text = f"{counted(len(overlaps), 'pair')} of shells that share volume"
         found.append(finding("G002", text, len(overlaps), places))
     inverted = [i for i in range(n) if depth[i] % 2 == 0 and volumes[i] < 0 and sound[i]]
     if inverted and not (crossed and n == 1):
-        places = [_where(low, high, i) for i in inverted]
+        places = (_where(topology, low, high, i) for i in inverted)
         found.append(finding("T008", counted(len(inverted), "inverted shell"), len(inverted), places))
     hollow = [i for i in range(n) if depth[i] % 2 and volumes[i] < 0 and sound[i]]
     if hollow:
-        places = [_where(low, high, i) for i in hollow]
+        places = (_where(topology, low, high, i) for i in hollow)
         found.append(finding("G006", counted(len(hollow), "closed cavity", "closed cavities"), len(hollow), places))
     return Shells(volumes, low, high, tuple(found))
 
@@ -99,9 +99,12 @@ def winding_number(vertices: Floats, faces: Ints, point: Floats) -> int:
     return round(total / (2 * np.pi))
 
 
-def _where(low: Floats, high: Floats, i: int) -> Location:
-    centre = (low[i] + high[i]) / 2
-    return Location(xyz=(float(centre[0]), float(centre[1]), float(centre[2])))
+def _where(topology: Topology, low: Floats, high: Floats, *shells: int) -> Location:
+    """The middle of what the boxes of the shells have in common, with all faces of the shells."""
+    which = list(shells)
+    x, y, z = ((low[which].max(axis=0) + high[which].min(axis=0)) / 2).tolist()
+    region = topology.kept[np.isin(topology.shells, which)]
+    return Location(face=int(region[0]), xyz=(x, y, z), object=topology.mesh.name, region=region)
 
 
 def _faces_by_shell(labels: Ints, n: int) -> list[Ints]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import chain
 
 import numpy as np
 
@@ -109,7 +110,7 @@ def _judged(mesh: Mesh, deadline: Deadline, found: list[Finding]) -> Topology:
                 "T004",
                 counted(len(pinched), "pinch vertex", "pinch vertices"),
                 len(pinched),
-                _points(mesh, vertices[pinched[:9]]),
+                _points(mesh, vertices[pinched]),
             )
         )
     if len(twice):
@@ -147,13 +148,13 @@ def _points(mesh: Mesh, points: Floats) -> Iterator[Location]:
 
 
 def _at_faces(mesh: Mesh, kept: Ints, faces: Ints, which: Ints) -> Iterator[Location]:
-    for i in which[:9]:
+    for i in which:
         centre = mesh.vertices[faces[i]].mean(axis=0)
         yield Location(face=int(kept[i]), xyz=tuple(float(v) for v in centre), object=mesh.name)  # type: ignore[arg-type]
 
 
 def _at_edges(mesh: Mesh, edges: Edges, kept: Ints, which: Ints) -> Iterator[Location]:
-    for i in which[:9]:
+    for i in which:
         middle = (mesh.vertices[edges.low[i]] + mesh.vertices[edges.high[i]]) / 2
         face = int(kept[edges.order[edges.first[i]] // 3])
         yield Location(face=face, xyz=tuple(float(v) for v in middle), object=mesh.name)  # type: ignore[arg-type]
@@ -291,9 +292,9 @@ def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints, si
     lines = suspect[flat]
     n = len(repeated) + len(lines)
     if n:
-        places = [Location(face=int(i), object=mesh.name) for i in repeated[:9]]
-        places += list(_at_faces(mesh, kept, faces, lines))
-        found.append(finding("T010", f"{counted(n, 'face')} without area", n, places))
+        places = (Location(face=int(i), object=mesh.name) for i in repeated)
+        text = f"{counted(n, 'face')} without area"
+        found.append(finding("T010", text, n, chain(places, _at_faces(mesh, kept, faces, lines))))
     height = np.sqrt(np.einsum("ij,ij->i", areas[suspect], areas[suspect])) / np.maximum(longest, 1e-300)
     thin = suspect[~flat & (height < float32_steps(corners)) & (longest > SLIVER * size[suspect])]
     if len(thin):
@@ -346,4 +347,4 @@ def _stored_normals(mesh: Mesh, kept: Ints, areas: Floats) -> list[Finding]:
     if not len(wrong):
         return []
     text = f"{counted(len(wrong), 'stored normal')} unlike the face's own"
-    return [finding("T013", text, len(wrong), (Location(face=int(kept[i]), object=mesh.name) for i in wrong[:9]))]
+    return [finding("T013", text, len(wrong), (Location(face=int(kept[i]), object=mesh.name) for i in wrong))]

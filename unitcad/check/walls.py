@@ -160,7 +160,8 @@ def _patches(topology: Topology, rays: Rays, thin: Ints, upright: float) -> list
             continue
         worst = mine[np.argmin(thickness[mine])]
         xyz = tuple(float(v) for v in points[worst])
-        place = Location(face=int(topology.kept[owner[worst]]), xyz=xyz)  # type: ignore[arg-type]
+        region = topology.kept[np.unique(of)]
+        place = Location(face=int(topology.kept[owner[worst]]), xyz=xyz, region=region)  # type: ignore[arg-type]
         here = (float(thickness[worst]), place)
         found[int(wall[label])] = min(here, found.get(int(wall[label]), here), key=lambda item: item[0])
     if not found:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,7 +13,9 @@ import typer
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 
 if TYPE_CHECKING:
-    from unitcad.check import FileReport, Options
+    from unitcad.catalogue import Printer
+    from unitcad.check import FileReport, Limits, Options
+    from unitcad.cli.check_settings import Configuration
 
 _SHORT_UNITS = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "in": "inch", "inches": "inch", "ft": "foot"}
 
@@ -28,18 +32,30 @@ def check(
         list[str] | None, typer.Option(help="Not codes with these prefixes; what ended a file's judgement stays.")
     ] = None,
     extend_select: Annotated[list[str] | None, typer.Option(help="Prefixes added to --select.")] = None,
-    fail_on: Annotated[str, typer.Option(help="error or warning: what makes the exit code 1.")] = "error",
+    fail_on: Annotated[str | None, typer.Option(help="error (default) or warning: what makes the exit code 1.")] = None,
     printer: Annotated[str | None, typer.Option(help="Judge fit and printability (S002, D) for this printer.")] = None,
     unit: Annotated[str | None, typer.Option(help="Unit of files that have none: mm, cm, m, in, ft ...")] = None,
     shells: Annotated[int | None, typer.Option(min=0, help="Number of shells expected (G005).")] = None,
     strict_3mf: Annotated[
-        bool, typer.Option("--3mf-strict", help="Judge 3MF by the letter: vendors' attributes, lost thumbnails fail.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--3mf-strict/--no-3mf-strict", help="Judge 3MF by the letter: vendors' attributes, lost thumbnails fail."
+        ),
+    ] = None,
     manifest: Annotated[str | None, typer.Option(help="manifest.json of a build, or its folder (M rules).")] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes.")] = 1,
-    max_faces: Annotated[int, typer.Option(min=1, help="Faces a file may have.")] = 10_000_000,
-    timeout: Annotated[float, typer.Option(min=0.001, help="Seconds a file may take.")] = 600.0,
-    memory: Annotated[int, typer.Option(min=200, help="MB of address space a process may use.")] = 8000,
+    max_faces: Annotated[int | None, typer.Option(min=1, help="Faces a file may have (default 10000000).")] = None,
+    timeout: Annotated[float | None, typer.Option(min=0.001, help="Seconds a file may take (default 600).")] = None,
+    memory: Annotated[
+        int | None, typer.Option(min=200, help="MB of address space a process may use (default 8000).")
+    ] = None,
+    all_locations: Annotated[bool, typer.Option(help="List every location of a finding, up to 10000.")] = False,
+    baseline: Annotated[str | None, typer.Option(help="File of known findings; they do not fail.")] = None,
+    write_baseline: Annotated[bool, typer.Option(help="Write what is found to the baseline.")] = False,
+    config: Annotated[
+        str | None, typer.Option(help="Settings: a TOML file with a table [check]; else the nearest is found.")
+    ] = None,
+    no_config: Annotated[bool, typer.Option("--no-config", help="Read no settings.")] = False,
     statistics: Annotated[
         bool, typer.Option(help="Count findings by rule: in place of the text, beside other formats on stderr.")
     ] = False,
@@ -48,7 +64,8 @@ def check(
     ] = None,
 ) -> None:
     """Judge mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, and STEP with a B-rep extra."""
-    from unitcad.check import formats, rulebook, run
+    from unitcad.check import detail, formats, rulebook, run
+    from unitcad.cli import check_settings
 
     if explain is not None:
         typer.echo(rulebook.explain(explain))
@@ -56,71 +73,127 @@ def check(
     output_format = "json" if as_json else output_format
     if output_format not in formats.FORMATS:
         raise unknown_name("--output-format", output_format, formats.FORMATS)
+    found = check_settings.find(config, wanted=not no_config)
+    settings = found.settings
+    fail_on = fail_on or settings.fail_on or "error"
     if fail_on not in ("error", "warning"):
         raise unknown_name("--fail-on", fail_on, ("error", "warning"))
-    options = _options(select, ignore, extend_select, unit, printer, shells, strict_3mf, max_faces, timeout)
+    base = Path(baseline) if baseline is not None else found.baseline
+    if write_baseline and base is None:
+        raise UnitcadError("--write-baseline needs a file: --baseline FILE, or the key baseline of the settings")
+    if base is not None:
+        from unitcad.check import baseline as baselines
+
+        known = baselines.read(base) if base.exists() or not write_baseline else baselines.EMPTY
+    options = replace(
+        _filters(found, select, ignore, extend_select),
+        unit=_unit("--unit", unit) if unit is not None else _unit(found.name("unit"), settings.unit),
+        printer=_printer("--printer", printer) if printer else _printer(found.name("printer"), settings.printer),
+        shells=shells,
+        strict_3mf=bool(settings.strict_3mf if strict_3mf is None else strict_3mf),
+        limits=_limits(found, max_faces, timeout),
+        locations=detail.MOST if all_locations or base is not None else detail.SHOWN,
+    )
     if not files and manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
-    reports = _run(files or [], options, manifest, printer is not None, jobs, memory)
+    per_file = _per_file(found, options)
+    reports = _run(
+        files or [], per_file, manifest, options.printer is not None, jobs, memory or settings.memory or 8000
+    )
+    if base is not None:
+        known = baselines.write(base, known, reports) if write_baseline else known
+        shown = detail.MOST if all_locations else detail.SHOWN
+        reports = [baselines.apply(known, base, report, shown) for report in reports]
     table = formats.statistics(reports) if statistics else ""
     if statistics and output_format == "text":
         sys.stdout.write(table)
     else:
-        sys.stdout.write(formats.render(reports, output_format, fail_on))
+        used = None if base is None else base.as_posix()
+        sys.stdout.write(formats.render(reports, output_format, fail_on, found.shown, used))
         sys.stderr.write(table)
     raise typer.Exit(run.worst(reports, fail_on))
 
 
 def _run(
-    names: list[str], options: Options, manifest: str | None, printer_named: bool, jobs: int, memory: int
+    names: list[str],
+    options: Callable[[str], Options],
+    manifest: str | None,
+    printer_named: bool,
+    jobs: int,
+    memory: int,
 ) -> list[FileReport]:
     from unitcad.check import run
 
     paths, reports = run.expand(names)
     if manifest is None:
-        work = [(path, options) for path in paths]
+        work = [(path, options(path)) for path in paths]
         return reports + list(run.check_files(work, jobs, memory))
     from unitcad.check import manifest as listing
 
     listed = listing.read(manifest)
     work = listing.work(listed, paths, options, printer_named)
     judged = list(run.check_files(work, jobs, memory))
-    compared = [listing.compare(listed, report, options) for report in judged]
+    compared = [listing.compare(listed, report, options(report.path)) for report in judged]
     return reports + compared + listing.unjudged(listed, [path for path, _ in work], options)
 
 
-def _options(
-    select: list[str] | None,
-    ignore: list[str] | None,
-    extend_select: list[str] | None,
-    unit: str | None,
-    printer: str | None,
-    shells: int | None,
-    strict_3mf: bool,
-    max_faces: int,
-    timeout: float,
+def _filters(
+    found: Configuration, select: list[str] | None, ignore: list[str] | None, extend_select: list[str] | None
 ) -> Options:
-    from unitcad import catalogue
-    from unitcad.check import Limits, Options
+    """Which codes are wanted: those of the command line, else those of the settings."""
+    from unitcad.check import Options
     from unitcad.check.rulebook import check_prefixes
+
+    settings = found.settings
+    wanted = check_prefixes("--select", _split(select))
+    if select is None and settings.select:
+        wanted = check_prefixes(found.name("select"), settings.select)
+    unwanted = check_prefixes("--ignore", _split(ignore))
+    if ignore is None and settings.ignore:
+        unwanted = check_prefixes(found.name("ignore"), settings.ignore)
+    extra = check_prefixes("--extend-select", _split(extend_select))
+    return Options(select=wanted + extra if wanted else (), ignore=unwanted)
+
+
+def _per_file(found: Configuration, options: Options) -> Callable[[str], Options]:
+    """The options of a path: `options` without what the settings ignore for it."""
+    from unitcad.check.rulebook import check_prefixes
+
+    for pattern, codes in found.settings.per_file_ignores.items():
+        check_prefixes(found.name(f"per-file-ignores.{pattern}"), codes)
+
+    def chosen(path: str) -> Options:
+        return replace(options, unwanted=tuple(code.strip().upper() for code in found.ignored(path)))
+
+    return chosen
+
+
+def _unit(field: str, unit: str | None) -> str | None:
     from unitcad.check.scale import UNITS_MM
 
-    if unit is not None:
-        unit = _SHORT_UNITS.get(unit.lower(), unit.lower())
-        if unit not in UNITS_MM:
-            raise unknown_name("--unit", unit, UNITS_MM)
-    if not timeout < 1e7:
-        raise Refusal("--timeout", timeout, "must be a number of seconds below 1e7", 600)
-    chosen = Options(
-        unit=unit,
-        printer=None if printer is None else catalogue.choose("--printer", printer, catalogue.printers()),
-        shells=shells,
-        strict_3mf=strict_3mf,
-        limits=replace(Limits(), max_faces=max_faces, seconds=timeout),
-    )
-    wanted = check_prefixes("--select", _split(select))
-    extra = check_prefixes("--extend-select", _split(extend_select))
-    return replace(chosen, select=wanted + extra if wanted else (), ignore=check_prefixes("--ignore", _split(ignore)))
+    if unit is None:
+        return None
+    known = _SHORT_UNITS.get(unit.lower(), unit.lower())
+    if known not in UNITS_MM:
+        raise unknown_name(field, unit, UNITS_MM)
+    return known
+
+
+def _printer(field: str, name: str | None) -> Printer | None:
+    from unitcad import catalogue
+
+    return None if name is None else catalogue.choose(field, name, catalogue.printers())
+
+
+def _limits(found: Configuration, max_faces: int | None, timeout: float | None) -> Limits:
+    from unitcad.check import Limits
+
+    field = "--timeout" if timeout is not None else found.name("timeout")
+    settings, default = found.settings, Limits()
+    seconds = timeout or settings.timeout or default.seconds
+    if not seconds < 1e7:
+        raise Refusal(field, seconds, "must be a number of seconds below 1e7", default.seconds)
+    return replace(default, max_faces=max_faces or settings.max_faces or default.max_faces, seconds=seconds)
 
 
 def _split(values: list[str] | None) -> list[str]:

@@ -1,0 +1,151 @@
+"""Findings that are known and do not fail: a file that lists them by file, code and place.
+
+A finding is known if the baseline lists its code for the file with at least this count and severity, and each of its
+places near a listed one. Places are middles of boxes, so the order of vertices and faces does not matter. An error that
+ended the judgement of a file is never known, nor is one about a manifest.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from unitcad import files
+from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, Location
+from unitcad.check.mesh import Bools, Floats
+from unitcad.errors import UnitcadError
+
+NEAR = 1e-4
+"""Known places lie within this part of the file's size."""
+NEAR_PRINTING = 2e-2
+"""The same for printability, whose places are sampled."""
+_LARGEST = 256_000_000  # bytes
+_COUNTED = ("F002", "F006", "G005")  # their count is a size, not a number of faults
+
+
+class Entry(msgspec.Struct, frozen=True, omit_defaults=True, forbid_unknown_fields=True):
+    """A known finding: its places in mm, and the names of parts and objects of those that have no point."""
+
+    code: str
+    severity: str
+    count: int
+    places: list[tuple[float, float, float]] = []
+    names: list[str] = []
+
+
+class Baseline(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename="kebab"):
+    """Known findings by file, each named by its path from the baseline's folder."""
+
+    unitcad_baseline: int
+    files: dict[str, list[Entry]]
+
+
+EMPTY = Baseline(1, {})
+
+
+def read(path: Path) -> Baseline:
+    """Read a baseline. Raises UnitcadError where there is none."""
+    content = files.read(path, largest=_LARGEST)
+    try:
+        found = msgspec.json.decode(content, type=Baseline)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise UnitcadError(f"{path}: not a baseline of `unitcad check`: {error}") from None
+    if found.unitcad_baseline != 1:
+        raise UnitcadError(f"{path}: a baseline of form {found.unitcad_baseline}; this version reads form 1")
+    return found
+
+
+def write(path: Path, old: Baseline, reports: Sequence[FileReport]) -> Baseline:
+    """Write the findings of the reports as known, and return them.
+
+    Entries of `old` for files that were not judged stay as long as the file exists.
+    """
+    judged = {
+        _key(path, report.path): [_entry(item) for item in report.findings if _may_be(item)] for report in reports
+    }
+    stay = {key: known for key, known in old.files.items() if os.path.exists(os.path.join(path.parent, key))}
+    entries = {key: known for key, known in sorted((stay | judged).items()) if known}
+    found = Baseline(1, entries)
+    files.write(path, msgspec.json.format(msgspec.json.encode(found), indent=1) + b"\n")
+    return found
+
+
+def apply(baseline: Baseline, path: Path, report: FileReport, shown: int) -> FileReport:
+    """The report with what the baseline at `path` lists marked as known, and at most `shown` locations a finding."""
+    known = {entry.code: entry for entry in baseline.files.get(_key(path, report.path), [])}
+    found = [_compared(item, known.get(item.code), report.facts) for item in report.findings]
+    return replace(report, findings=tuple(replace(item, locations=item.locations[:shown]) for item in found))
+
+
+def _key(path: Path, file: str) -> str:
+    """A file's name in the baseline at `path`."""
+    whole = os.path.abspath(file)
+    try:
+        relative = Path(os.path.relpath(whole, os.path.abspath(path.parent))).as_posix()
+    except ValueError:  # another drive of Windows
+        relative = Path(whole).as_posix()
+    return relative.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+
+
+def _may_be(found: Finding) -> bool:
+    return not found.ends and not found.code.startswith("M")
+
+
+def _entry(found: Finding) -> Entry:
+    places = sorted({_rounded(place.centre) for place in found.locations if place.centre is not None})
+    names = sorted({_name(place) for place in found.locations if place.centre is None})
+    return Entry(found.code, found.severity, found.count, places, names)
+
+
+def _rounded(point: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (float(f"{value:.9g}") + 0.0 for value in point)
+    return x, y, z
+
+
+def _name(place: Location) -> str:
+    name = " ".join(filter(None, (place.part, place.object)))
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+
+
+def _compared(found: Finding, entry: Entry | None, facts: Facts) -> Finding:
+    """The finding as known, or with the places that are new in front."""
+    if entry is None or not _may_be(found):
+        return found
+    new = _new(found, entry, facts)
+    worse = SEVERITIES.index(found.severity) > (SEVERITIES.index(entry.severity) if entry.severity in SEVERITIES else 0)
+    if not worse and not new.any() and (found.count <= entry.count or found.code in _COUNTED):
+        return replace(found, known=True)
+    order = np.argsort(~new, kind="stable")
+    message = found.message if worse else f"{found.message} ({entry.count} in the baseline)"
+    return replace(found, message=message, locations=tuple(found.locations[i] for i in order))
+
+
+def _new(found: Finding, entry: Entry, facts: Facts) -> Bools:
+    """Which of the finding's locations the entry does not have."""
+    places = found.locations
+    points = np.array([place.centre or (math.nan,) * 3 for place in places], float).reshape(-1, 3)
+    named = np.isnan(points[:, 0])
+    names = set(entry.names)
+    new = np.array([named[i] and _name(place) not in names for i, place in enumerate(places)], bool)
+    if not named.all():
+        new[~named] = ~_near(points[~named], np.array(entry.places, float).reshape(-1, 3), found.code, facts)
+    return new
+
+
+def _near(points: Floats, known: Floats, code: str, facts: Facts) -> Bools:
+    """Whether each point lies near a known one."""
+    if not len(known):
+        return np.zeros(len(points), bool)
+    from scipy.spatial import KDTree
+
+    box = np.array(facts.bbox_mm if facts.bbox_mm is not None else [known.min(axis=0), known.max(axis=0)])
+    size = float(np.linalg.norm(box[1] - box[0]))
+    reach = (NEAR_PRINTING if code.startswith("D") else NEAR) * size + 1e-6 * float(np.abs(box).max())
+    distance, _ = KDTree(known).query(points, distance_upper_bound=max(reach, 1e-9))
+    return np.isfinite(distance)

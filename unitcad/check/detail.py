@@ -1,0 +1,44 @@
+"""How much detail a report has: locations of a finding, and meshes to draw. Set for the time a file is judged."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from unitcad.check.mesh import Mesh
+
+SHOWN = 5
+"""Locations of a finding unless more are asked for; its count says how many there are."""
+MOST = 10_000
+"""Locations of a finding that are kept where all are asked for."""
+
+
+@dataclass(frozen=True)
+class Detail:
+    """`locations` a finding; `meshes`: where meshes with a finding are collected, None where nobody draws them."""
+
+    locations: int = SHOWN
+    meshes: list[Mesh] | None = None
+
+
+_DEFAULT = Detail()
+_DETAIL: ContextVar[Detail] = ContextVar("detail", default=_DEFAULT)
+
+
+def detail() -> Detail:
+    """What is kept now."""
+    return _DETAIL.get()
+
+
+@contextlib.contextmanager
+def detailed(locations: int, meshes: list[Mesh] | None = None) -> Iterator[None]:
+    """Keep so many locations, and meshes if a list is given, until the block ends."""
+    before = _DETAIL.set(Detail(locations, meshes))
+    try:
+        yield
+    finally:
+        _DETAIL.reset(before)

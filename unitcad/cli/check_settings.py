@@ -1,0 +1,145 @@
+"""The settings of `unitcad check` in a file: table [check] of unitcad.toml, or [tool.unitcad.check] of pyproject.toml.
+
+The nearest file with such a table, from the working directory upwards, is used; in one folder unitcad.toml comes first.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct, field
+
+from unitcad import files
+from unitcad.errors import Refusal, UnitcadError, unknown_key
+from unitcad.spec.convert import convert
+
+NAMES = ("unitcad.toml", "pyproject.toml")
+
+
+class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename="kebab"):
+    """What a file may set; None where it does not. The keys are the options' names."""
+
+    select: list[str] | None = None
+    ignore: list[str] | None = None
+    per_file_ignores: dict[str, list[str]] = {}
+    fail_on: Literal["error", "warning"] | None = None
+    printer: str | None = None
+    unit: str | None = None
+    strict_3mf: bool | None = field(default=None, name="3mf-strict")
+    max_faces: Annotated[int, Meta(ge=1)] | None = None
+    timeout: Annotated[float, Meta(ge=0.001)] | None = None
+    memory: Annotated[int, Meta(ge=200)] | None = None
+    baseline: str | None = None
+
+
+class Configuration(Struct, frozen=True, kw_only=True):
+    """Settings with the file they come from, None for none, and the table's name there."""
+
+    settings: Settings = Settings()
+    path: Path | None = None
+    table: str = ""
+
+    def name(self, key: str) -> str:
+        """How an error names a key: file, table and key."""
+        return f"{self.shown}: {self.table}.{key}"
+
+    @property
+    def shown(self) -> str | None:
+        """The file's path from the working directory."""
+        return None if self.path is None else _from_here(self.path)
+
+    @property
+    def baseline(self) -> Path | None:
+        """The baseline's path, which the file gives from its own folder."""
+        if self.path is None or self.settings.baseline is None:
+            return None
+        return Path(_from_here(self.path.parent / self.settings.baseline))
+
+    def ignored(self, path: str) -> list[str]:
+        """Prefixes of codes that per-file-ignores drops for a file; patterns are seen from the settings' folder."""
+        if self.path is None:
+            return []
+        whole = os.path.abspath(path)
+        try:
+            below = Path(os.path.relpath(whole, self.path.parent)).as_posix()
+        except ValueError:  # another drive of Windows
+            below = Path(whole).as_posix()
+        return [
+            code
+            for pattern, codes in self.settings.per_file_ignores.items()
+            if fnmatchcase(below, pattern) or ("/" not in pattern and fnmatchcase(Path(below).name, pattern))
+            for code in codes
+        ]
+
+
+def find(named: str | None = None, *, wanted: bool = True) -> Configuration:
+    """The settings of the file `named`, else of the nearest one that has any; without `wanted` none.
+
+    Raises UnitcadError for a file that can't be read, Refusal for a key or value that can't be.
+    """
+    if not wanted:
+        if named is not None:
+            raise UnitcadError("--config and --no-config exclude each other")
+        return Configuration()
+    if named is not None:
+        found = _read(Path(named))
+        if found is None:
+            raise UnitcadError(f"--config {named}: has no table [{_table(Path(named))}]")
+        return found
+    here = Path.cwd()
+    for folder in (here, *here.parents):
+        for name in NAMES:
+            if (folder / name).is_file() and (found := _read(folder / name)):
+                return found
+    return Configuration()
+
+
+def _table(path: Path) -> str:
+    return "tool.unitcad.check" if path.name == "pyproject.toml" else "check"
+
+
+def _read(path: Path) -> Configuration | None:
+    """What a file sets; None where it has no table for us. A unit's spec of the name unitcad.toml is no such file."""
+    shown = _from_here(path.absolute())
+    try:
+        data = tomllib.loads(files.read_text(path))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise UnitcadError(f"{shown}: not TOML: {error}") from None
+    table = _table(path)
+    *above, last = table.split(".")
+    if not above and "design" in data:
+        return None
+    for key in above:
+        data = data.get(key, {})
+        if not isinstance(data, Mapping):
+            return None
+    try:
+        if data and (above or path.name in NAMES):
+            for key in data:
+                if key != last:
+                    raise unknown_key(".".join([*above, key]), data[key], [last])
+        if last not in data:
+            return None
+        settings = convert(_mapping(table, data[last]), Settings, table)
+    except Refusal as error:
+        raise Refusal(f"{shown}: {error.field}", error.value, error.limit, error.nearest) from None
+    return Configuration(settings=settings, path=path.absolute(), table=table)
+
+
+def _mapping(table: str, data: Any) -> Mapping[str, Any]:
+    if isinstance(data, Mapping):
+        return data
+    raise Refusal(table, str(data)[:60], "takes a table")
+
+
+def _from_here(path: Path) -> str:
+    """A path as seen from the working directory; as it is where that is on another drive."""
+    try:
+        return Path(os.path.relpath(path)).as_posix()
+    except ValueError:
+        return str(path)
