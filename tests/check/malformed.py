@@ -310,6 +310,7 @@ def _geometry() -> list[tuple]:
         ("one-point.stl", "G007", stl(np.full((9, 3, 3), 5.0))),
         ("bow-tie.stl", "G008", stl(np.concatenate([_wedge(5)[:, ::-1], _wedge(-5)]))),
         ("fin-of-a-face.stl", "G009", stl(np.concatenate([cube, _fin()]))),
+        ("speck.stl", "G010", stl(np.concatenate([cube, box((0.002, 0.002, 0.002), (12, 0, 0))]))),
         ("metres.stl", "S001", stl(box((0.014, 0.014, 0.005)))),
         ("microns.stl", "S001", stl(box((14_000, 14_000, 5_000)))),
         ("inches.3mf", "S001", package(model_xml(attributes='unit="meter"'))),
@@ -373,6 +374,7 @@ def _printing() -> list[tuple]:
         ("hollow-plate.stl", "D004", stl(hollow), fdm),
         ("floating.stl", "D005", stl(box(at=(0, 0, 2))), fdm),
         ("on-its-tip.stl", "D005", stl(tip), fdm),
+        ("gap.stl", "D006", stl(np.concatenate([box(), box(at=(10.05, 0, 0))])), fdm),
     ]
 
 

@@ -162,6 +162,48 @@ def test_window_through_a_wall_is_a_bridge(judge) -> None:
     assert codes(judge, cup) == set()
 
 
+@pytest.mark.parametrize(
+    ("printer", "width", "found"),
+    [("fdm-0.4", 0.05, True), ("fdm-0.4", 0.149, True), ("fdm-0.4", 0.151, False), ("fdm-0.4", 0.5, False),
+     ("sla", 0.05, True), ("sla", 0.079, True), ("sla", 0.081, False)],
+)  # fmt: skip
+@pytest.mark.parametrize("shape", ["slot", "blind slot", "two bodies", "ring", "turned"])
+def test_a_gap_narrower_than_the_printers_play(printer: str, width: float, found: bool, shape: str, judge) -> None:
+    if shape == "slot":
+        solid = block(20, 20, 5) - block(width, 12, 5, (8, 4, 0))
+    elif shape == "blind slot":
+        solid = block(20, 20, 5) - block(12, width, 3, (4, 8, 2))
+    elif shape == "two bodies":
+        solid = block(20, 10, 5) + block(20, 10, 5, (0, 10 + width, 0))
+    elif shape == "ring":
+        n = 96
+        flat = 1 / np.cos(np.pi / n)
+        solid = tube(15, 8 * flat, 5, n) + Manifold.cylinder(5, (8 - width) * flat, (8 - width) * flat, n)
+    else:
+        solid = (block(20, 20, 5) - block(width, 12, 5, (8, 4, 0))).rotate([0, 0, 23.7])
+    report = judge(stl(triangles(solid)), printer=printer)
+    assert report.has("D006") == found
+    if found:
+        said = next(item for item in report.findings if item.code == "D006")
+        assert said.count == 1
+        assert float(said.message.split()[-2]) == pytest.approx(width, rel=0.02)
+
+
+@pytest.mark.parametrize(("height", "found"), [(0.05, True), (0.19, True), (0.21, False), (0.4, False)])
+def test_a_flat_gap_is_closed_below_a_layer(height: float, found: bool, judge) -> None:
+    solid = block(20, 20, 5) - block(21, 16, height, (-0.5, 2, 2))
+    assert judge(stl(triangles(solid)), **FDM).has("D006") == found
+
+
+def test_grooves_and_scratches_are_no_gaps(judge) -> None:
+    """A V-groove has no parallel sides; a scratch lower than the play reaches nowhere; touching shells have none."""
+    groove = Manifold.cylinder(20, 0.3, 0.3, 3).rotate([90, 0, 0]).translate([10, 20, 5])
+    assert "D006" not in codes(judge, block(20, 20, 5) - groove)
+    assert "D006" not in codes(judge, block(20, 20, 5) - block(0.1, 12, 0.1, (8, 4, 4.9)))
+    both = np.concatenate([box(), box(at=(10, 0, 0))])
+    assert not judge(stl(both), **FDM).has("D006")
+
+
 def test_bed(judge) -> None:
     assert judge(stl(box((219, 219, 219))), **FDM).findings == ()
     assert judge(stl(box((100, 100, 221))), **FDM).has("S002")

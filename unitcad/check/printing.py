@@ -1,4 +1,4 @@
-"""Fit and printability for a printer: S002 and D001 to D005. The mesh stands as it will be printed, z up.
+"""Fit and printability for a printer: S002 and D001 to D006. The mesh stands as it will be printed, z up.
 
 These rules look for what a printer cannot make, not for what is unusual: a wedge is no thin wall, the strip between two
 engraved strokes is no wall since it is lower than it is thick, a ceiling with support at both ends is a bridge.
@@ -32,6 +32,7 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline) -> list[Find
         with keeping(found):
             rays = walls.cast(topology, printer, deadline)
             found += walls.judge(topology, printer, rays)
+            found += walls.gaps(topology, printer, deadline)
             found += features.judge(topology, printer, rays, deadline)
             found += overhang.judge(topology, printer, deadline, float(low[2]))
             found += _trapped(topology)

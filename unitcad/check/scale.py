@@ -1,12 +1,16 @@
-"""Size rules that need no printer: S001."""
+"""Size rules that need no printer: S001, and G010 for specks."""
 
 from __future__ import annotations
 
-from unitcad.check.findings import Facts, Finding
+import numpy as np
+
+from unitcad.check.findings import Facts, Finding, Location, counted
+from unitcad.check.mesh import Bools, Floats
 from unitcad.check.rulebook import finding
 
 UNITS_MM = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
 SMALL, LARGE = 1.0, 2000.0  # mm; a printed part lies between
+SPECK = 0.02  # mm; a tenth of the least feature of the finest printer in the catalogue
 
 
 def judge(facts: Facts, unit: str | None) -> list[Finding]:
@@ -25,3 +29,15 @@ def judge(facts: Facts, unit: str | None) -> list[Finding]:
         guess = f"{side / 1000:.3g} mm if it was microns"
     named = f"with the unit {unit} that is named" if unit else "as millimetres"
     return [finding("S001", f"largest side {side:.6g} mm {named}; {guess}")]
+
+
+def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
+    """G010 for the bodies `asked` of those with these boxes, (n, 3) mm, where one of them is as large as a part."""
+    side = (high - low).max(axis=1, initial=0)
+    tiny = np.flatnonzero(asked & (side < SPECK))
+    if not len(tiny) or side.max() < SMALL:
+        return []
+    middle = ((low + high) / 2)[tiny].tolist()
+    places = [Location(xyz=(x, y, z)) for x, y, z in middle]
+    text = f"{counted(len(tiny), 'speck')}, the largest {side[tiny].max():.3g} mm across"
+    return [finding("G010", text, len(tiny), places)]

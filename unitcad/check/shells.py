@@ -1,4 +1,4 @@
-"""Shells against each other: volumes, inversion (T008), overlap (G002), cavities (G006), zero volume (G007)."""
+"""Shells against each other: inversion (T008), overlap (G002), cavities (G006), zero volume (G007), specks (G010)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Floats, Ints, solid_of
 from unitcad.check.rulebook import finding
+from unitcad.check.scale import specks
 from unitcad.check.topology import Topology, diagonals
 
 FLAT = 1e-6  # G007: a shell's volume over its area times its diagonal
@@ -44,6 +45,7 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
         text = f"volume {volumes[worst]:.3g} mm3 over {area[worst]:.3g} mm2 of surface"
         found.append(finding("G007", text, len(which), (_where(topology, low, high, i) for i in which.tolist())))
     sound = sound & ~flat
+    found += specks(low, high, sound & (volumes > 0))
     depth = np.zeros(n, int)
     overlaps: list[tuple[int, int]] = []
     if n > 1:

@@ -326,6 +326,7 @@ def _geometry(
         findings.append(finding("V001", f"an instance of object {worst} reaches beyond the float32 numbers"))
         return list(ending(findings)), Facts()
     findings += topology.too_far(corners, topology.diagonals(*np.swapaxes(np.stack(boxes), 0, 1)))
+    findings += scale.specks(corners[:, 0], corners[:, 1], np.ones(len(corners), bool))
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     facts = Facts(
         triangles,

@@ -1,4 +1,6 @@
-"""D001: thin walls, measured by short rays from points spread over the faces to the face behind them.
+"""D001 and D006: thin walls and narrow gaps, measured by short rays from points spread over the faces.
+
+A ray goes to the face behind, through material; for gaps to the face before, through air.
 
 A wall has two faces that are nearly parallel (PARALLEL), a thickness below the floor, and reaches farther than the
 floor in two directions; so bevels and wedges, tapered edges and the strips between engraved strokes are none.
@@ -29,7 +31,8 @@ _FINEST = 6  # a face has at most _FINEST (_FINEST + 1) / 2 points
 
 @dataclass(frozen=True)
 class Rays:
-    """Points inside the faces, the face of each, and how much material lies behind it, mm (inf beyond reach).
+    """Points inside the faces, the face of each, and how much material lies behind it, mm (inf beyond reach); for gaps
+    how much air before it.
 
     `thickness`: up to the first face that is nearly parallel, within the wall's floor; `behind`: up to the first face
     that looks the other way at all, within the larger of that floor and the least feature; `across`: the face that
@@ -45,26 +48,45 @@ class Rays:
 
 
 def cast(topology: Topology, printer: Printer, deadline: Deadline) -> Rays:
-    """Measure a closed mesh."""
-    upright, level = float(printer.least_wall_mm), float(printer.least_flat_wall_mm)
-    mesh = topology.mesh
-    corners = mesh.vertices[mesh.faces]
-    double = np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas))
-    longest = np.sqrt(max_side_squared(corners))
-    sound = double > 1e-3 * longest  # a height of a micrometre: below it a face has no direction worth following
-    points, owner = _spread_points(corners, longest, sound, upright)
-    normal = topology.areas / np.maximum(double, 1e-300)[:, None]
-    floor = (np.where(_lying(topology), level, upright) * _SLACK)[owner]
-    reach = np.maximum(floor, float(printer.least_feature_mm))
-    return Rays(points, owner, floor, *_behind(corners, normal, sound, points, owner, reach, deadline))
+    """Measure the material of a closed mesh."""
+    floors = float(printer.least_wall_mm), float(printer.least_flat_wall_mm)
+    return _cast(topology, floors, float(printer.least_feature_mm), deadline, side=1)
 
 
 def judge(topology: Topology, printer: Printer, rays: Rays) -> list[Finding]:
     """Apply D001."""
-    thin = np.flatnonzero(rays.thickness < rays.floor)
-    if not len(thin):
+    walls = _patches(topology, rays, float(printer.least_wall_mm) * _SLACK)
+    if not walls:
         return []
-    return _patches(topology, rays, thin, float(printer.least_wall_mm) * _SLACK)
+    text = f"{counted(len(walls), 'wall')} below the floor, the thinnest {walls[0][0]:.3g} mm"
+    return [finding("D001", text, len(walls), [place for _, place in walls])]
+
+
+def gaps(topology: Topology, printer: Printer, deadline: Deadline) -> list[Finding]:
+    """Apply D006: as walls, with the air between two faces in place of material."""
+    floors = float(printer.xy_play_mm), float(printer.layer_mm)
+    rays = _cast(topology, floors, 0.0, deadline, side=-1)
+    found = _patches(topology, rays, floors[0] * _SLACK)
+    if not found:
+        return []
+    text = f"{counted(len(found), 'gap')} that the printer closes, the narrowest {found[0][0]:.3g} mm"
+    return [finding("D006", text, len(found), [place for _, place in found])]
+
+
+def _cast(topology: Topology, floors: tuple[float, float], least: float, deadline: Deadline, *, side: int) -> Rays:
+    """Measure from each face, upright and lying floor of what is looked for; `side` is 1 for material, -1 for air."""
+    upright, level = floors
+    mesh = topology.mesh
+    corners = mesh.vertices[mesh.faces[:, ::side]]
+    double = np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas))
+    longest = np.sqrt(max_side_squared(corners))
+    sound = double > 1e-3 * longest  # a height of a micrometre: below it a face has no direction worth following
+    points, owner = _spread_points(corners, longest, sound, upright)
+    normal = side * topology.areas / np.maximum(double, 1e-300)[:, None]
+    floor = (np.where(_lying(topology), level, upright) * _SLACK)[owner]
+    return Rays(
+        points, owner, floor, *_behind(corners, normal, sound, points, owner, np.maximum(floor, least), deadline)
+    )
 
 
 def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float) -> tuple[Floats, Ints]:
@@ -131,11 +153,16 @@ def _hit(origin: Floats, along: Floats, corners: Floats, normal: Floats) -> Floa
     return np.where(inside, distance, np.inf)
 
 
-def _patches(topology: Topology, rays: Rays, thin: Ints, upright: float) -> list[Finding]:
-    """Thin points grouped by faces that share edges; groups that reach farther than the floor both ways are walls.
+def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float, Location]]:
+    """The least distance and its place for each wall or gap, the thinnest first.
+
+    Thin points grouped by faces that share edges; groups that reach farther than the floor both ways are walls.
 
     Groups that look at each other through the material are the two sides of one wall.
     """
+    thin = np.flatnonzero(rays.thickness < rays.floor)
+    if not len(thin):
+        return []
     points, owner, thickness = rays.points, rays.owner, rays.thickness
     faces = topology.mesh.faces
     edges = topology.edges
@@ -164,11 +191,7 @@ def _patches(topology: Topology, rays: Rays, thin: Ints, upright: float) -> list
         place = Location(face=int(topology.kept[owner[worst]]), xyz=xyz, region=region)  # type: ignore[arg-type]
         here = (float(thickness[worst]), place)
         found[int(wall[label])] = min(here, found.get(int(wall[label]), here), key=lambda item: item[0])
-    if not found:
-        return []
-    walls = sorted(found.values(), key=lambda item: item[0])
-    text = f"{counted(len(walls), 'wall')} below the floor, the thinnest {walls[0][0]:.3g} mm"
-    return [finding("D001", text, len(walls), [place for _, place in walls])]
+    return sorted(found.values(), key=lambda item: item[0])
 
 
 def _lying(topology: Topology) -> Bools:
