@@ -117,7 +117,7 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("layers.7.wall_mm=1.0", "index"),
         ("name=''", "must not be empty"),
         (f"name='{'x' * 121}'", "at most 120 characters"),
-        ("name=2026-01-01", "takes a text"),
+        ("name=2026-01-01", "date or time"),
         ("fpcb.tail=3", r"^fpcb\.tail = 3: takes a text"),
         ("moulds.cavities=[1]", r"^moulds\.cavities = .*2 entries"),
         ("moulds.cavities=[1, 1.5]", r"^moulds\.cavities\.1 = 1\.5: takes a whole number"),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal, cast
+from typing import Any, cast, get_args
 
 from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.estimate import Layered, estimate, frequency_table
-from unitcad.attenuation.inputs import Quantity, SiliconeLayer, TissueLayer, Variant
+from unitcad.attenuation.inputs import Design, Quantity, SiliconeLayer, TissueLayer, Variant
 from unitcad.attenuation.rheology import FractionalKelvinVoigt
 from unitcad.catalogue import Material, Tissue, Value, choose, materials, motors, tissue
 from unitcad.errors import Refusal
@@ -40,6 +40,10 @@ def frequency_table_of_spec(
 
 def variant_of(spec: Spec, frequency_hz: float | None = None) -> Variant:
     """A spec's unit on its body, in SI. `frequency_hz` overrides the spec's and the motor's."""
+    if spec.design not in get_args(Design):
+        raise Refusal(
+            "design", spec.design, "is a custom design, and the estimate knows embedded and encapsulating units"
+        )
     known = motors(spec.motors)
     motor = choose("motor.part", spec.motor.part, known) if spec.motor.part else None
     diameter = spec.motor.diameter_mm or (float(motor.diameter_mm) if motor else None)
@@ -60,7 +64,7 @@ def variant_of(spec: Spec, frequency_hz: float | None = None) -> Variant:
     silicones = materials(spec.materials)
     return Variant(
         name=spec.name,
-        design=cast("Literal['embedded', 'encapsulating']", spec.design),
+        design=cast("Design", spec.design),
         diameter=spec.diameter_mm * 1e-3,
         motor_diameter=diameter * 1e-3,
         layers=tuple(

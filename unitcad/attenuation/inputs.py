@@ -10,6 +10,8 @@ import numpy as np
 from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.rheology import KelvinVoigt, LossFactor
 
+Design = Literal["embedded", "encapsulating"]
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -76,7 +78,7 @@ class Variant:
     """A unit on a body: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known)."""
 
     name: str
-    design: Literal["embedded", "encapsulating"]
+    design: Design
     diameter: float
     motor_diameter: float
     layers: tuple[SiliconeLayer, ...]

@@ -12,8 +12,9 @@ from unitcad.spec import Spec
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
 
 
-def check_path(path: str, base: dict[str, Any]) -> None:
-    """Refuse a path that no spec has, or that names a list entry which `base` (a spec's data) lacks.
+def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
+    """Refuse a path that no spec has, or that names a list entry which `base` (a spec's data) lacks; it was typed in
+    the table `where`.
 
     "layers.0.wall_mm", "estimate.frequency_hz" and whole tables ("fpcb", "layers") are paths.
     """
@@ -24,7 +25,7 @@ def check_path(path: str, base: dict[str, Any]) -> None:
         table, entry = table_in(kind), entry_in(kind)
         if table is not None:
             if step not in fields_of(table):
-                raise _unknown(path, base)
+                raise _unknown(path, base, where)
             kind = fields_of(table)[step].type
         elif entry is not None:
             there = node if isinstance(node, list) else []
@@ -35,7 +36,7 @@ def check_path(path: str, base: dict[str, Any]) -> None:
         elif any(typing.get_origin(k) is dict or k is Any for k in alternatives(kind)):
             return
         else:
-            raise _unknown(path, base)
+            raise _unknown(path, base, where)
         node = node[int(step)] if isinstance(node, list) else node.get(step) if isinstance(node, dict) else None
 
 
@@ -55,7 +56,7 @@ def _walk(kind: Any, prefix: str, node: Any) -> Iterator[str]:
             yield from _walk(entry, f"{prefix}{i}.", below)
 
 
-def _unknown(path: str, base: dict[str, Any]) -> Refusal:
+def _unknown(path: str, base: dict[str, Any], where: str) -> Refusal:
     known = known_paths(base)
     close = difflib.get_close_matches(path, known, n=1, cutoff=0.0)
-    return Refusal(f"sweep.{path}", path, "there is no such path in a spec", close[0] if close else None)
+    return Refusal(f"{where}.{path}", path, "there is no such path in a spec", close[0] if close else None)

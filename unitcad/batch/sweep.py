@@ -26,7 +26,7 @@ from msgspec import Meta, Struct, field, structs
 from unitcad.batch.paths import check_path
 from unitcad.cache import digest
 from unitcad.errors import Refusal, unknown_name
-from unitcad.spec import Spec, convert, from_data, override, put, read, read_toml, templates
+from unitcad.spec import Spec, check_plain, convert, from_data, override, put, read, read_toml, templates
 from unitcad.spec.fields import fields_of
 
 T = TypeVar("T", bound=Struct)
@@ -139,7 +139,7 @@ class Sweep:
         axes = [
             (a.path, structs.asdict(a.values) if isinstance(a.values, Range) else list(a.values)) for a in self.axes
         ]
-        return digest(json.dumps([self.name, self.bases, self.mode, axes, self.cases], default=str).encode())
+        return digest(json.dumps([self.name, self.bases, self.mode, axes, self.cases]).encode())
 
     def values(self, index: int) -> tuple[str, dict[str, Any]]:
         """(base, value by path) of variant `index`: the last axis runs fastest, the bases slowest."""
@@ -173,7 +173,7 @@ class Sweep:
 
     @cached_property
     def _texts(self) -> dict[str, str]:
-        return {name: json.dumps(data, default=str) for name, data in self.bases}
+        return {name: json.dumps(data) for name, data in self.bases}
 
 
 def shipped() -> dict[str, Path]:
@@ -209,7 +209,7 @@ def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
     for base in dict.fromkeys(named):
         bases[base] = _read_base(base, folder)
         for path, value in file.fixed.items():
-            check_path(path, bases[base])
+            check_path(path, bases[base], "set")
             put(bases[base], path, value)
     axes = tuple(Axis(path, _values(path, given)) for path, given in values.items())
     cases = tuple(
@@ -233,11 +233,14 @@ def _parted(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[st
 
 def _read_base(base: str, folder: Path) -> dict[str, Any]:
     if os.sep in base or "/" in base or base.endswith(".toml"):
-        return read(folder / base)
-    try:
-        return read(base)
-    except Refusal as refusal:
-        raise Refusal("base", base, refusal.limit, refusal.nearest) from None
+        data = read(folder / base)
+    else:
+        try:
+            data = read(base)
+        except Refusal as refusal:
+            raise Refusal("base", base, refusal.limit, refusal.nearest) from None
+    check_plain(data)
+    return data
 
 
 def _values(path: str, given: Any) -> Sequence[Any] | Range:
@@ -251,7 +254,7 @@ def _values(path: str, given: Any) -> Sequence[Any] | Range:
         if values.num > 1 and values.start == values.stop:
             raise Refusal(f"sweep.{path}.num", values.num, "start and stop are the same value", 1)
         return values
-    seen = [json.dumps(value, default=str) for value in values]
+    seen = [json.dumps(value) for value in values]
     twice = next((value for value, text in zip(values, seen, strict=True) if seen.count(text) > 1), None)
     if len(set(seen)) < len(seen) and len(seen) <= 10_000:
         raise Refusal(f"sweep.{path}", twice, "is there twice")

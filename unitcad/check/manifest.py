@@ -69,8 +69,10 @@ def _listing(manifest: Path, data: Any) -> Listing:
                 outside.append(entry["path"])
                 continue
             path = os.path.abspath(manifest.parent / entry["path"])
-            volume = part.get("volume_mm3")
-            new = Part((part["name"],), part["role"] == "tool", entry.get("sha256"), volume, part.get("solids", 1))
+            sha256, volume, solids = entry.get("sha256"), part.get("volume_mm3"), part.get("solids", 1)
+            if not (isinstance(sha256, str | None) and isinstance(volume, int | float | None) and type(solids) is int):
+                raise TypeError
+            new = Part((part["name"],), part["role"] == "tool", sha256, volume, solids)
             old = files.get(path)
             files[path] = new if old is None else _together(old, new)
     printer = data.get("printer")

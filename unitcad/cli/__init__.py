@@ -21,7 +21,7 @@ from unitcad.cli.coupon import coupon
 from unitcad.cli.estimate import estimate
 from unitcad.cli.init import init
 from unitcad.cli.list import list_
-from unitcad.cli.output import say_error
+from unitcad.cli.output import say_error, speak_anywhere
 from unitcad.cli.report import report
 from unitcad.cli.schema import schema
 from unitcad.errors import UnitcadError
@@ -67,6 +67,7 @@ def _root(
 def main() -> None:
     """Entry point of `unitcad`: run a command, turn every error into one line and an exit code."""
     as_json = "--json" in sys.argv
+    speak_anywhere()
     try:
         app()
     except UnitcadError as error:

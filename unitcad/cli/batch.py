@@ -21,19 +21,22 @@ def batch(
         Path | None, typer.Option("-o", "--out", help="The batch's own folder; else out/<the sweep's name>.")
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option("-j", "--jobs", min=0, help="Worker processes; else one a core. 0: in this process.")
+        int | None,
+        typer.Option("-j", "--jobs", min=0, max=1024, help="Worker processes; else one a core. 0: in this process."),
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786.")
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there would be to make; make nothing.")] = False,
     keep_going: Annotated[bool, typer.Option("--keep-going", help="Go on after a variant that fails.")] = False,
-    timeout: Annotated[float | None, typer.Option(metavar="S", min=0.001, help="Seconds that a variant may take.")] = (
-        None
-    ),
+    timeout: Annotated[
+        float | None, typer.Option(metavar="S", min=0.001, max=1e7, help="Seconds that a variant may take.")
+    ] = (None),
     limit: Annotated[int | None, typer.Option(metavar="N", help="The first N variants only.")] = None,
     cache: Annotated[Path | None, typer.Option(help="Where distinct parts are kept; else in the user's cache.")] = None,
-    cache_limit: Annotated[float, typer.Option(metavar="MB", min=0, help="What the cache keeps at the end.")] = 4096,
+    cache_limit: Annotated[
+        float, typer.Option(metavar="MB", min=0, max=1e12, help="What the cache keeps at the end.")
+    ] = 4096,
     sets: Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="For every variant.")] = None,
     formats: Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb; else the specs'.")] = None,
     only: Annotated[

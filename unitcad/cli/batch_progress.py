@@ -38,7 +38,7 @@ def _line(summary: Summary, outcome: Outcome | None) -> None:
             "done": summary.done,
             "variants": summary.variants,
         }
-    sys.stdout.write(json.dumps(told, ensure_ascii=False) + "\n")
+    sys.stdout.write(json.dumps(told) + "\n")
     sys.stdout.flush()
 
 

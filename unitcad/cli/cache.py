@@ -25,7 +25,7 @@ def ls(where: Where = None, as_json: Json = False) -> None:
 @cache.command("gc")
 def gc(
     where: Where = None,
-    limit: Annotated[float, typer.Option(metavar="MB", min=0, help="What may stay; 0 empties it.")] = 4096,
+    limit: Annotated[float, typer.Option(metavar="MB", min=0, max=1e12, help="What may stay; 0 empties it.")] = 4096,
     as_json: Json = False,
 ) -> None:
     """Remove what was used longest ago, down to a size. Results keep their files: they are links."""

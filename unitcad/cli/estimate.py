@@ -70,11 +70,18 @@ def frequencies(text: str) -> list[float]:
     low, high, step = numbers
     if high < low:
         raise Refusal("--frequency", text, "TO must not be below FROM", f"{high:g}:{low:g}:{step:g}")
+    least = (high - low) / (_MOST_FREQUENCIES - 1)
+    if step < least * (1 - 1e-9):
+        limit = f"asks for more than {_MOST_FREQUENCIES} frequencies"
+        raise Refusal("--frequency", text, limit, f"{low:g}:{high:g}:{_up(least):g}")
     count = math.floor((high - low) / step * (1 + 1e-12) + 1e-9) + 1
-    if count > _MOST_FREQUENCIES:
-        limit = f"asks for {count} frequencies; the most is {_MOST_FREQUENCIES}"
-        raise Refusal("--frequency", text, limit, f"{low:g}:{high:g}:{(high - low) / (_MOST_FREQUENCIES - 1):.6g}")
     return [low + i * step for i in range(count)]
+
+
+def _up(number: float) -> float:
+    """The number to six digits, not below it."""
+    shown = float(f"{number:.6g}")
+    return shown if shown >= number else float(f"{number * (1 + 1e-5):.6g}")
 
 
 def level(found: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import sys
 from collections.abc import Callable, Iterator
@@ -17,7 +18,18 @@ if TYPE_CHECKING:
 
 def print_json(data: Any) -> None:
     """Write `data` as the one JSON object on standard output. Raises ValueError for NaN and infinity."""
-    sys.stdout.write(json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    sys.stdout.write(json.dumps(data, indent=2, allow_nan=False, ensure_ascii=not _unicode(sys.stdout)) + "\n")
+
+
+def speak_anywhere() -> None:
+    """Let a terminal that lacks a character show its code instead of an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _unicode(stream: Any) -> bool:
+    return (getattr(stream, "encoding", None) or "").lower().replace("-", "") in ("utf8", "utf16", "utf32")
 
 
 def say_error(error: UnitcadError, as_json: bool) -> None:

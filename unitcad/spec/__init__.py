@@ -1,6 +1,6 @@
 """What was asked for: the TOML spec, checked at the door, and the dimensions that follow from it."""
 
-from unitcad.spec.convert import convert
+from unitcad.spec.convert import check_plain, convert
 from unitcad.spec.dimensions import Dimensions, dimensions
 from unitcad.spec.door import printer_of, warnings
 from unitcad.spec.load import (
@@ -21,6 +21,7 @@ from unitcad.spec.models import Spec, with_formats
 __all__ = [
     "Dimensions",
     "Spec",
+    "check_plain",
     "convert",
     "dimensions",
     "from_data",

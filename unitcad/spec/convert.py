@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 import re
 import typing
@@ -28,6 +29,8 @@ _BOUND = re.compile(r"Expected `(?P<kind>\w+)`(?P<length> of length)? (?P<sign>[
 _LENGTH = re.compile(r"Expected `array` of length (?P<length>\d+)")
 _KIND = re.compile(r"Expected `(?P<kinds>[^`]+)`")
 _STEP = re.compile(r"\.([^.\[]+)|\[(\d+|\.\.\.)\]")
+_HALF_PAIR = re.compile(r"[\ud800-\udfff]")
+"""What stands for a byte that is not UTF-8."""
 _LARGEST_INT = 2**63 - 1
 _SIGNS = {">=": "at least", "<=": "at most"}
 SOURCE = "design_source"
@@ -53,15 +56,17 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
 
 
 def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
-    """Raise Refusal for a number in plain data that is not finite, for a text or key with characters that nobody sees,
-    and for tables that nest too deeply.
-    """
+    """Raise Refusal for what no key takes: huge numbers and NaN, dates, characters that nobody sees, deep nesting."""
     if isinstance(node, str) and SOURCE not in field.split("."):
         _check_text(node, field)
     if isinstance(node, float) and not math.isfinite(node):
         raise Refusal(field, node, "must be a finite number")
     if isinstance(node, int) and abs(node) > _LARGEST_INT:
         raise Refusal(field, node, "is too large for a number here")
+    if isinstance(node, str) and _HALF_PAIR.search(node):
+        raise Refusal(field, node, "is not text in UTF-8")
+    if isinstance(node, datetime.date | datetime.time):
+        raise Refusal(field, node, "is a date or time, which nothing here takes; put quotes round a text")
     if isinstance(node, Mapping | list | tuple):
         if depth > DEEPEST:
             raise Refusal(".".join(field.split(".")[:3]), "...", f"nests more than {DEEPEST} tables deep")

@@ -301,6 +301,7 @@ def _check_tooling(spec: Spec, dims: Dimensions) -> None:
         _at_least(f"moulds.{field}", getattr(moulds, field), wall, "the printer's least wall is")
     for field in ("engraving_stroke_mm", "groove_width_mm", "slot_height_mm"):
         _at_least(f"moulds.{field}", getattr(moulds, field), feature, "the printer's least feature is")
+    _check_engraving(spec, dims, printer)
     relief = moulds.seat_relief_mm or 0.0
     _at_most(
         "moulds.seat_relief_mm",
@@ -326,6 +327,24 @@ def _check_tooling(spec: Spec, dims: Dimensions) -> None:
                 "the core must hold the filament's hole with a wall round it, and the ledge",
                 _up(spec.diameter_mm + more) if not spec.motor.fill else None,
             )
+
+
+def _check_engraving(spec: Spec, dims: Dimensions, printer: catalogue.Printer) -> None:
+    """A floor stays under the lettering on the first cup and on the plate."""
+    depth, floor = spec.moulds.engraving_depth_mm or 0.0, float(printer.least_flat_wall_mm)
+    if spec.design == "embedded":
+        _at_least(
+            "motor.thickness_mm",
+            dims.motor_height,
+            min(depth, float(printer.engraving_depth_mm)) + floor,
+            f"the first cup is as high as the motor, and its lettering leaves a floor of {floor:g} from",
+        )
+    _at_most(
+        "moulds.engraving_depth_mm",
+        depth,
+        min(dims.heights[0], spec.moulds.plate_mm) - floor,
+        f"a floor of {floor:g} must stay under the lettering, so at most",
+    )
 
 
 def groove_depth(spec: Spec) -> float:

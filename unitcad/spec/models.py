@@ -96,7 +96,7 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     vents: Annotated[
         Vents | None, Meta(description="of each cavity under a lid; None takes as many as clear the air")
     ] = None
-    filament_mm: Annotated[float, Meta(ge=0.1, le=20)] = 1.75
+    filament_mm: Annotated[float, Meta(ge=0.2, le=20)] = 1.75
     plinth_height_mm: Annotated[float, Meta(ge=0.6, le=100)] = 2.0
     plate_mm: Annotated[float, Meta(ge=0.5, le=100)] = 4.0
     ledge_mm: Annotated[float, Meta(ge=0.1, le=100)] = 0.6

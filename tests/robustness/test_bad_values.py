@@ -1,0 +1,209 @@
+"""Thousands of forbidden values: each is refused with its field, in one line, with advice that is then accepted."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bad_values import bad_values, sample, toml, with_value
+
+from unitcad.batch.sweep import from_file
+from unitcad.cli import main
+from unitcad.errors import Refusal, UnitcadError, UnknownKey
+from unitcad.spec import from_data, load, to_data
+
+SEED = 13
+
+
+def _named(path: str, field: str) -> bool:
+    """Whether a refusal's field is the path, a table that it lies in, or something in what was put there."""
+    return f"{path}.".startswith(f"{field}.") or f"{field}.".startswith(f"{path}.")
+
+
+def _refused(path: str, value: Any, base: dict[str, Any]) -> Refusal:
+    with pytest.raises(Refusal) as refused:
+        from_data(with_value(base, path, value))
+    refusal = refused.value
+    assert _named(path, refusal.field), (path, value, str(refusal))
+    assert len(str(refusal).splitlines()) == 1, (path, value)
+    assert len(str(refusal)) < 1500, (path, value)
+    json.dumps(refusal.as_dict(), allow_nan=False).encode("ascii")
+    return refusal
+
+
+def _check_advice(refusal: Refusal, path: str, value: Any, base: dict[str, Any]) -> None:
+    """What is offered passes every check of that field."""
+    if refusal.nearest is None or isinstance(refusal, UnknownKey):
+        return
+    try:
+        from_data(with_value(with_value(base, path, value), refusal.field, refusal.nearest))
+    except Refusal as other:
+        assert other.field != refusal.field, (str(refusal), str(other))
+
+
+def _judge(found: list[tuple[str, Any]]) -> None:
+    bases = [to_data(load(name)) for name in ("encapsulating", "embedded", "no-fpcb")]
+    for i, (path, value) in enumerate(found):
+        base = bases[i % 3]
+        _check_advice(_refused(path, value, base), path, value, base)
+
+
+def test_a_thousand_bad_values_are_refused_with_their_field() -> None:
+    _judge(sample("spec", 1000, SEED))
+
+
+@pytest.mark.long
+def test_every_bad_value_is_refused_with_its_field() -> None:
+    found = bad_values("spec")
+    assert len(found) > 10_000
+    _judge(found)
+
+
+def test_bad_values_of_a_sweep_file_are_refused_with_their_field(tmp_path: Path) -> None:
+    good = {"base": "encapsulating", "name": "s", "sweep": {"diameter_mm": {"start": 14.0, "stop": 15.0, "num": 2}}}
+    from_file(good, tmp_path, "s")
+    cases = [(path, value) for path, value in bad_values("sweep")]
+    cases += [(f"sweep.diameter_mm.{path}", value) for path, value in bad_values("range")]
+    for path, value in cases:
+        if path in ("sweep.mode", "sweep.cases") and value in ([], "product"):
+            continue
+        with pytest.raises(UnitcadError) as refused:
+            sweep = from_file(with_value(good, path, value), tmp_path, "s")
+            sweep.spec(0)
+        assert len(str(refused.value).splitlines()) == 1
+        assert isinstance(refused.value, Refusal)
+        assert _named(path, refused.value.field) or _named(path, f"sweep.{refused.value.field}"), (path, value)
+        json.dumps(refused.value.as_dict(), allow_nan=False)
+
+
+def _run(words: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> tuple[int, str, str]:
+    monkeypatch.setattr(sys, "argv", ["unitcad", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    out, err = capsys.readouterr()
+    return int(ended.value.code or 0), out, err
+
+
+def _commands(words: list[tuple[str, Any]], tmp_path: Path, capsys: Any, monkeypatch: Any) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    base = to_data(load("encapsulating"))
+    for i, (path, value) in enumerate(words):
+        if value == {}:  # the writer leaves out empty tables
+            continue
+        try:
+            (tmp_path / "spec.toml").write_text(toml(with_value(base, path, value)), "utf-8")
+        except UnicodeEncodeError:  # no file holds half a surrogate pair
+            continue
+        (tmp_path / "sweep.toml").write_text(
+            'base = "./spec.toml"\n[sweep]\n"estimate.frequency_hz" = [100.0, 120.0]\n', "utf-8"
+        )
+        axis = toml({"base": "encapsulating", "sweep": {path: [value]}})
+        (tmp_path / "axis.toml").write_text(axis, "utf-8")
+        before = sorted(tmp_path.rglob("*"))
+        for command in (
+            ["build", "./spec.toml"],
+            ["estimate", "./spec.toml"],
+            ["batch", "./sweep.toml", "--dry-run"],
+            ["batch", "./axis.toml", "--dry-run"],
+        ):
+            as_json = (i + len(command)) % 2 == 0
+            code, out, err = _run([*command, *(["--json"] if as_json else [])], capsys, monkeypatch)
+            said = (command, path, value, out, err)
+            assert code == 2, said
+            assert "internal error" not in err, said
+            assert "Traceback" not in out + err, said
+            assert err.startswith("error: "), said
+            if as_json:
+                error = json.loads(out)["error"]
+                named = error.get("field") or error["message"]
+                assert any(_named(path, word) for word in (named, named.removeprefix("sweep."))) or path in named, said
+            else:
+                assert path.rpartition(".")[2] in err or path.partition(".")[0] in err, said
+        assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_commands_refuse_bad_values_in_one_line(tmp_path: Path, capsys: Any, monkeypatch: Any) -> None:
+    _commands(sample("spec", 20, SEED), tmp_path, capsys, monkeypatch)
+
+
+@pytest.mark.long
+def test_commands_refuse_a_thousand_bad_values_in_one_line(tmp_path: Path, capsys: Any, monkeypatch: Any) -> None:
+    _commands(sample("spec", 1000, SEED + 1), tmp_path, capsys, monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        (["estimate", "encapsulating", "--set", "layers.²=1"], "layers.²"),
+        (["estimate", "encapsulating", "--set", f"layers.{'9' * 5000}=1"], "layers."),
+        (["estimate", "encapsulating", "--set", f"diameter_mm={'9' * 5000}"], "diameter_mm"),
+        (["estimate", "encapsulating", "--set", f"{'.'.join('a' * 5000)}=1"], "a.a.a"),
+        (["estimate", "encapsulating", "--set", f"layers={'[' * 5000}"], "layers"),
+        (["estimate", "encapsulating", "--set", "name='\udcff'"], "name"),
+        (["estimate", "encapsulating", "--set", "estimate.models=[]"], "estimate.models"),
+        (["estimate", "encapsulating", "--set", "casting.waste=1e308"], "casting.waste"),
+        (["estimate", "encapsulating", "--set", "motor.diameter_mm=1e-12"], "motor.diameter_mm"),
+        (["estimate", "encapsulating", "--set", "moulds.filament_mm=0.001"], "moulds.filament_mm"),
+        (["estimate", "encapsulating", "--set", "fpcb.thickness_mm=1000"], "fpcb.thickness_mm"),
+        (["build", "embedded", "--set", "motor.thickness_mm=0.1"], "motor.thickness_mm"),
+        (["build", "embedded", "--set", "motor.thickness_mm=0.7"], "motor.thickness_mm"),
+        (["build", "encapsulating", "--set", "moulds.engraving_depth_mm=5"], "moulds.engraving_depth_mm"),
+        (["estimate", "encapsulating", "--frequency", "1:5000:5e-324"], "--frequency"),
+        (["estimate", "encapsulating", "--frequency", "1:5000:nan"], "--frequency"),
+        (["cache", "gc", "--limit", "inf"], "--limit"),
+        (["cache", "gc", "--limit", "nan"], "--limit"),
+        (["batch", "paper", "--cache-limit", "inf", "--dry-run"], "--cache-limit"),
+        (["batch", "paper", "--timeout", "inf", "--dry-run"], "--timeout"),
+        (["batch", "paper", "-j", "1000000"], "--jobs"),
+        (["init", "CON"], "NAME"),
+        (["init", "lpt1.mine"], "NAME"),
+        (["init", "ends."], "NAME"),
+        (["schema", "\udcff"], "schema"),
+        (["coupon", "\x00"], "PRINTER"),
+    ],
+)
+def test_words_that_can_not_be_are_refused(words: list[str], field: str, tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = _run(words, capsys, monkeypatch)
+    assert code == 2, (out, err)
+    assert field in err
+    assert "internal error" not in err
+    assert "Traceback" not in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "lines", ["diameter_mm = [1979-05-27, 14.0]", "diameter_mm = { start = 14.0, stop = 07:32:00, num = 2 }"]
+)
+def test_a_date_is_no_value_of_a_sweep(lines: str, tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.toml").write_text(f'base = "encapsulating"\n[sweep]\n{lines}\n')
+    for more in (["--dry-run"], ["-j", "0"], ["--json"]):
+        code, _, err = _run(["batch", "s.toml", *more], capsys, monkeypatch)
+        assert (code, "sweep.diameter_mm" in err, "date" in err) == (2, True, True), err
+        assert [path.name for path in tmp_path.iterdir()] == ["s.toml"]
+
+
+@pytest.mark.parametrize(
+    "text", ["name = 1979-05-27", f"diameter_mm = {'9' * 5000}", f"{'.'.join('a' * 5000)} = 1", "a = " + "[" * 5000]
+)
+def test_a_file_that_can_not_be_is_refused(text: str, tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.toml").write_text(text)
+    (tmp_path / "sweep.toml").write_text('base = "./s.toml"\n[sweep]\ndiameter_mm = [14.0, 15.0]\n')
+    for command in (["build", "./s.toml"], ["estimate", "./s.toml", "--json"], ["batch", "sweep.toml", "--dry-run"]):
+        code, _, err = _run(command, capsys, monkeypatch)
+        assert (code, err.count("\n")) == (2, 1), err
+
+
+def test_every_frequency_step_that_is_offered_is_accepted() -> None:
+    from unitcad.cli.estimate import frequencies
+
+    for text in ("1:5000:5e-324", "1:5000:0.001", "100:100.5:1e-9", "99.7:4999.3:1", "0.5:10:1", "10:5:1"):
+        with pytest.raises(Refusal) as refused:
+            frequencies(text)
+        assert 1 <= len(frequencies(str(refused.value.nearest))) <= 1000
