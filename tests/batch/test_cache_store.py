@@ -7,6 +7,7 @@ import importlib
 import json
 import multiprocessing
 import os
+import shutil
 import time
 from pathlib import Path
 
@@ -279,3 +280,108 @@ def test_a_bundle_spares_the_work_but_not_the_content(tmp_path: Path) -> None:
         second.data("ab2", lambda: pytest.fail("known"), intact=lambda d: all(map(second.has, d["files"]))) is not None
     )
     assert second.contents == {}
+
+
+FAR = 4_000_000_000  # seconds: in the year 2096
+
+
+def test_what_has_a_time_that_is_yet_to_come_is_collected(tmp_path: Path) -> None:
+    root = tmp_path / "c"
+    store = DiskStore(root)
+    for i in range(4):
+        store.file(f"k{i}", Made(bytes([i]) * 1000))
+    for path in (root / "files" / "k1" / "k1", *(root / "content").rglob("*")):
+        os.utime(path, (FAR, FAR), follow_symlinks=False)
+    # In use by somebody too: a time to come does not say that it was used just now.
+    entry = (root / "files" / "k1" / "k1").stat().st_size
+    assert collect(root, 3 * (1000 + entry)).entries == 1
+    assert not (root / "files" / "k1" / "k1").exists()
+    store.close()
+    assert collect(root, 0).entries == 3
+    assert usage(root).bytes == 0
+
+
+KINDS = ["link to the same", "link to another", "link to nothing", "folder", "full folder", "pipe"]
+
+
+def _replaced(path: Path, kind: str, outside: Path) -> None:
+    """Put something else in a file's place."""
+    content = path.read_bytes()
+    path.unlink()
+    match kind:
+        case "link to the same":
+            outside.write_bytes(content)
+            path.symlink_to(outside)
+        case "link to another":
+            outside.write_bytes(b"secret")
+            path.symlink_to(outside)
+        case "link to nothing":
+            path.symlink_to(outside / "nowhere")
+        case "folder":
+            path.mkdir()
+        case "full folder":
+            path.mkdir()
+            (path / "file").write_bytes(content)
+        case "pipe":
+            os.mkfifo(path)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("what", ["content", "entry"])
+@pytest.mark.parametrize("running", [True, False], ids=["running", "anew"])
+def test_what_is_not_a_regular_file_is_made_again(kind: str, what: str, running: bool, tmp_path: Path) -> None:
+    root, make = tmp_path / "c", Made()
+    store = DiskStore(root)
+    sha = store.file("ab1", make)
+    path = root / "content" / sha[:2] / sha if what == "content" else root / "files" / "ab" / "ab1"
+    _replaced(path, kind, tmp_path / "outside")
+    if not running:
+        store = DiskStore(root)
+    assert store.file("ab1", make) == sha
+    assert make.count == 2
+    store.place(sha, tmp_path / "result")
+    assert not (tmp_path / "result").is_symlink()
+    assert (tmp_path / "result").read_bytes() == b"content"
+    assert path.is_file()
+    assert not path.is_symlink()
+    assert usage(root).entries == 1
+    store.close()
+    _replaced(path, kind, tmp_path / "outside2")
+    collect(root, 0)
+    assert store.file("ab1", make) == sha
+
+
+@pytest.mark.parametrize("kind", ["data", "file"])
+def test_an_entry_under_another_key_does_not_count(kind: str, tmp_path: Path) -> None:
+    """Moved by hand or by a damaged file system: whole in itself, and the verdict on another part."""
+    store = DiskStore(tmp_path / "c")
+    if kind == "data":
+        store.data("ab1", lambda: {"status": "ok"})
+        store.data("ab2", lambda: {"status": "broken"})
+    else:
+        store.file("ab1", Made(b"one"))
+        store.file("ab2", Made(b"two"))
+    folder = tmp_path / "c" / ("data" if kind == "data" else "files") / "ab"
+    (folder / "ab2").write_bytes((folder / "ab1").read_bytes())
+    again = DiskStore(tmp_path / "c")
+    if kind == "data":
+        assert again.data("ab2", lambda: {"status": "broken"}) == {"status": "broken"}
+    else:
+        assert again.content(again.file("ab2", Made(b"two"))) == b"two"
+    assert dict(again.counts) == {f"{kind} built": 1, "damaged": 1}
+
+
+@pytest.mark.parametrize("what", ["", "tmp", "locks", "content", "files", "data", "unitcad-cache"])
+def test_what_is_cleared_away_under_a_store_comes_back(what: str, tmp_path: Path) -> None:
+    root, make = tmp_path / "c", Made()
+    store = DiskStore(root)
+    sha = store.file("ab1", make)
+    for _ in range(2):
+        shutil.rmtree(root / what) if (root / what).is_dir() else (root / what).unlink(missing_ok=True)
+        assert store.file("ab1", make) == sha
+        assert store.file("ab3", Made(b"more"))
+        store.place(sha, tmp_path / f"result{len(list(tmp_path.iterdir()))}")
+    store.close()
+    assert make.count == (3 if what in ("", "content", "files") else 1)
+    assert DiskStore(root).file("ab1", lambda: pytest.fail("is not kept")) == sha
+    assert collect(root, 0).contents == 2

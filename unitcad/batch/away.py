@@ -24,7 +24,7 @@ class Receiver:
         found = self.store.peek(_key(geometry))
         if found is None or not all(map(self.store.has, found["files"].values())):
             return None
-        return Bundle(found["data"], found["files"])
+        return Bundle(found["data"], found["files"], found["sizes"])
 
     def place(self, outcome: Outcome, geometry: str) -> Outcome:
         """Put a variant's files into its folder; the outcome without them. Raises OSError."""

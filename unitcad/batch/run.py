@@ -6,6 +6,7 @@ each. So no geometry is made twice, and at most WINDOW variants are held in memo
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -25,7 +26,7 @@ from unitcad.batch.task import Job, Outcome, Task
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline.build import OUTPUTS, checked_outputs
-from unitcad.pipeline.folder import clear_leftovers, folder_name
+from unitcad.pipeline.folder import clear_leftovers, folder_name, whole
 from unitcad.pipeline.geometry import geometry_key
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.spec import to_json
@@ -40,7 +41,9 @@ COLLECT_EVERY = 500
 
 @dataclass(frozen=True)
 class Options:
-    """How a sweep is run. `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end."""
+    """How a sweep is run. `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end;
+    `verify`: what is finished is held to its hashes, not only to its sizes.
+    """
 
     only: Sequence[str] = OUTPUTS
     check: bool = True
@@ -49,6 +52,7 @@ class Options:
     limit: int | None = None
     cache: Path | None = None
     cache_mb: float = DEFAULT_LIMIT_MB
+    verify: bool = False
 
 
 @dataclass
@@ -126,8 +130,9 @@ def run(
 
 
 def trim(options: Options) -> None:
-    """Bring the cache down to its limit, when the workers are gone."""
-    collect(options.cache or default_root(), int(options.cache_mb * 1e6))
+    """Bring the cache down to its limit. A cache that somebody has cleared away needs none, and fails no batch."""
+    with contextlib.suppress(UnitcadError, OSError):
+        collect(options.cache or default_root(), int(options.cache_mb * 1e6))
 
 
 def batch_head(sweep: Sweep, only: tuple[str, ...], options: Options) -> dict[str, Any]:
@@ -221,14 +226,17 @@ class _Batch:
                 self._finished(Outcome(index, tasks.OK), fresh=False)
                 continue
             key = geometry_key(spec, self.only, self.options.check)
-            self.groups.setdefault(key, _Group()).jobs.append(Job(index, to_json(spec)))
+            self.groups.setdefault(key, _Group()).jobs.append(Job(index, to_json(spec), anew=bool(entry and entry["folder"])))
             self.waiting += 1
 
     def _stands(self, entry: dict[str, Any]) -> bool:
         """Whether a variant is finished, with or without a broken law, and its folder is whole."""
         if entry["status"] not in (tasks.OK, tasks.BROKEN):
             return False
-        return not entry["folder"] or (self.out / entry["folder"] / "manifest.json").is_file()
+        folder, hashes = self.out / entry["folder"], self.options.verify
+        if whole(folder, hashes=hashes) is None:
+            return False
+        return not hashes or digest((folder / "manifest.json").read_bytes()) == entry["manifest"]
 
     def _give_out(self) -> None:
         """Keep every worker busy, and one task ahead for each."""
@@ -246,6 +254,7 @@ class _Batch:
                 None if self.receiver else self.out.absolute(),
                 None if self.receiver else self.store.root.absolute(),
                 self.receiver.known(key) if self.receiver else None,
+                self.options.verify,
             )
             self.running[self.executor.submit(tasks.work, task)] = task
 
@@ -288,7 +297,7 @@ class _Batch:
         self.made.add(_short(key))
         self.summary.geometries = len(self.made)
         if len(self.made) % COLLECT_EVERY == 0:
-            collect(self.store.root, int(self.options.cache_mb * 1e6))
+            trim(self.options)
 
     def _lost(self, task: Task, error: BaseException) -> None:
         """A task whose worker went: which of its variants did it is found out by trying each alone."""
@@ -328,6 +337,7 @@ class _Batch:
                     "folder": outcome.folder,
                     "values": self.sweep.values(outcome.index)[1],
                     "row": outcome.row,
+                    "manifest": outcome.manifest,
                 }
             )
         summary.done += 1

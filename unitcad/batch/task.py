@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import faulthandler
-import json
 import sys
 import time
 from collections import Counter
@@ -15,11 +14,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from unitcad import files
 from unitcad.batch.row import row
-from unitcad.cache import Bundle, DiskStore, MemoryStore
+from unitcad.cache import Bundle, DiskStore, MemoryStore, digest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import folder as folders
-from unitcad.pipeline.build import Product, build_into, make, possible_outputs
+from unitcad.pipeline.build import Product, build_into, json_bytes, make, possible_outputs
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import code_version
 from unitcad.spec import Spec, from_json, own
@@ -30,10 +30,14 @@ OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no
 
 @dataclass(frozen=True)
 class Job:
-    """One variant: its number in the sweep and its effective spec as JSON (a tenth of the object's size)."""
+    """One variant: its number in the sweep and its effective spec as JSON (a tenth of the object's size).
+
+    `anew`: what its folder holds is known not to stand.
+    """
 
     index: int
     spec: str
+    anew: bool = False
 
 
 @dataclass(frozen=True)
@@ -53,13 +57,17 @@ class Task:
     out: Path | None = None
     cache: Path | None = None
     known: Bundle | None = None
+    verify: bool = False
     code: str = field(default_factory=code_version)
     allowed: frozenset[str] = field(default_factory=own.allowed)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one variant. `product`, `contents` and `bundle` only where the caller is to place the files."""
+    """What became of one variant; `manifest` is the SHA-256 of its manifest.json.
+
+    `product`, `contents` and `bundle` are there only where the caller is to place the files.
+    """
 
     index: int
     status: str
@@ -69,6 +77,7 @@ class Outcome:
     seconds: float = 0.0
     built: int = 0
     reused: int = 0
+    manifest: str = ""
     product: Product | None = None
     contents: dict[str, bytes] = field(default_factory=dict)
     bundle: Bundle | None = None
@@ -109,7 +118,7 @@ def _here(job: Job, task: Task) -> Outcome:
     assert task.cache is not None
     spec = from_json(job.spec)
     folder = task.out / folders.folder_name(spec)
-    manifest = _finished(folder, spec, task)
+    manifest = None if job.anew else _finished(folder, spec, task)
     if manifest is not None:
         return _outcome(job, spec, folder.name, manifest, Counter({"file reused": 1}))
     store = _store(task.cache)
@@ -145,6 +154,7 @@ def _outcome(job: Job, spec: Spec, folder: str, manifest: dict[str, Any], counts
         folder,
         row(spec, manifest),
         "" if holds else f"broken: {', '.join(codes)}",
+        manifest=digest(json_bytes(manifest)),
         built=counts["file built"] + counts["data built"],
         reused=counts["file reused"] + counts["data reused"],
     )
@@ -162,16 +172,17 @@ def _finished(folder: Path, spec: Spec, task: Task) -> dict[str, Any] | None:
     if not folder.exists():
         return None
     formats = folders.earlier_formats(folder, spec)
+    manifest = folders.whole(folder, hashes=task.verify)
+    if manifest is None:
+        return None
     try:
-        manifest = json.loads((folder / "manifest.json").read_bytes())
-        timings = json.loads((folder / "timings.json").read_bytes())
         same = (
-            timings.get("code") == task.code
+            files.read_json(folder / "timings.json", links=False).get("code") == task.code
             and set(manifest["outputs"]) == set(possible_outputs(spec, task.only))
             and set(formats) == set(spec.output.formats)
             and task.check != any(left["why"] == "--no-check" for left in manifest["left_out"])
         )
-    except (OSError, ValueError, KeyError, TypeError):
+    except (UnitcadError, KeyError, TypeError, AttributeError):
         return None
     return manifest if same else None
 

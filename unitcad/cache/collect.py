@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from unitcad.cache.disk import GATE, MARK, let_go, lock
+from unitcad.cache.disk import GATE, MARK, let_go, lock, read, remove
 from unitcad.errors import UnitcadError
 
 DEFAULT_LIMIT_MB = 4096
@@ -43,11 +43,10 @@ def collect(root: Path, limit_bytes: int) -> Usage:
     _expect(root)
     with contextlib.ExitStack() as held:
         alone = _alone(root, held)
-        newest = time.time() - (0.0 if alone else GRACE_S)
         if alone:
             for left in (root / "tmp").glob("*"):
-                left.unlink(missing_ok=True)
-        return _collect(root, limit_bytes, newest)
+                remove(left)
+        return _collect(root, limit_bytes, None if alone else time.time() - GRACE_S)
 
 
 def _alone(root: Path, held: contextlib.ExitStack) -> bool:
@@ -75,7 +74,7 @@ def _alone(root: Path, held: contextlib.ExitStack) -> bool:
     return alone
 
 
-def _collect(root: Path, limit: int, newest: float) -> Usage:
+def _collect(root: Path, limit: int, newest: float | None) -> Usage:
     contents = {path.name: (path, size, used) for path, size, used in _scan(root, "content")}
     entries = sorted(_scan(root, "data") + _scan(root, "files"), key=lambda entry: (entry[2], entry[0]))
     held: dict[Path, list[str]] = {path: _contents_of(path) for path, _, _ in entries}
@@ -85,18 +84,18 @@ def _collect(root: Path, limit: int, newest: float) -> Usage:
 
     def drop(sha: str) -> int:
         path, size, used = contents.get(sha, (None, 0, 0.0))
-        if path is None or used > newest:
+        if path is None or (newest is not None and used > newest):
             return 0
-        path.unlink(missing_ok=True)
+        remove(path)
         return size
 
     for sha in [sha for sha in contents if sha not in holders]:
         size = drop(sha)
         gone_contents, gone = gone_contents + bool(size), gone + size
     for path, size, used in entries:
-        if total - gone <= limit or used > newest:
+        if total - gone <= limit or (newest is not None and used > newest):
             break
-        path.unlink(missing_ok=True)
+        remove(path)
         gone_entries, gone = gone_entries + 1, gone + size
         for sha in held[path]:
             holders[sha] -= 1
@@ -111,19 +110,20 @@ def _contents_of(entry: Path) -> list[str]:
     if entry.parent.parent.name != "files":
         return []
     try:
-        return [json.loads(entry.read_bytes().partition(b"\n")[2])["sha256"]]
-    except (OSError, ValueError, KeyError, TypeError):
+        return [json.loads(read(entry).partition(b"\n")[2])["sha256"]]
+    except (OSError, UnitcadError, ValueError, KeyError, TypeError):
         return []
 
 
 def _scan(root: Path, kind: str) -> list[tuple[Path, int, float]]:
-    found = []
+    """Files of a kind: path, size, when it was used last; the oldest are those whose time is yet to come."""
+    found, latest = [], time.time() + GRACE_S
     for folder, _, names in os.walk(root / kind):
         for name in names:
             path = Path(folder) / name
             with contextlib.suppress(OSError):
-                stat = path.stat()
-                found.append((path, stat.st_size, stat.st_mtime))
+                stat = path.lstat()
+                found.append((path, stat.st_size, stat.st_mtime if stat.st_mtime <= latest else 0.0))
     return found
 
 

@@ -22,10 +22,12 @@ from filelock import FileLock
 
 from unitcad.cache.store import Intact, Make, MissingContent, digest
 from unitcad.errors import UnitcadError
+from unitcad.files import regular, write_new
 
 MARK = "unitcad-cache"
 GATE = "unitcad-cache.lock"
 """Held while a store comes in, and while one process collects alone."""
+FOLDERS = ("data", "files", "content", "locks", "tmp")
 _POLL_S = 0.01
 
 
@@ -45,10 +47,10 @@ class DiskStore:
         self._held: dict[str, bytes] = {}
         _claim(self.root)
         # Held while the store lives: see `collect`.
-        held = lock(self.root / "locks" / f"open-{uuid.uuid4().hex}")
+        taken = lock(self.root / "locks" / f"open-{uuid.uuid4().hex}")
         with contextlib.suppress(OSError), lock(self.root / GATE):
-            held.acquire()
-        self._let_go = weakref.finalize(self, let_go, held)
+            taken.acquire()
+        self._let_go = weakref.finalize(self, let_go, taken)
 
     def close(self) -> None:
         """Let go of the folder: others may collect everything."""
@@ -75,13 +77,15 @@ class DiskStore:
             now = _signature(path)
             if self._verified.get(sha256) == now:
                 return True
-            if digest(path.read_bytes()) == sha256:
+            if digest(read(path)) == sha256:
                 self._verified[sha256] = now
                 return True
         except OSError:
             return False
+        except UnitcadError:  # a link, a pipe, a folder: nothing of ours
+            pass
         self._verified.pop(sha256, None)
-        path.unlink(missing_ok=True)
+        remove(path)
         self.counts["damaged"] += 1
         return False
 
@@ -91,25 +95,35 @@ class DiskStore:
         if not self.has(sha256):
             path = self._content_path(sha256)
             try:
-                self._write(path, content, read_only=True)
+                self._write(path, content, shared=True)
                 self._verified[sha256] = _signature(path)
             except OSError:
                 self._held[sha256] = content
         return sha256
 
+    def size(self, sha256: str) -> int:
+        if not self.has(sha256):
+            raise self._missing(sha256)
+        if sha256 in self._held:
+            return len(self._held[sha256])
+        return self._verified[sha256][1]
+
     def content(self, sha256: str) -> bytes:
         if not self.has(sha256):
-            raise MissingContent(f"content {sha256[:12]} is not in {self.root}")
+            raise self._missing(sha256)
         if sha256 in self._held:
             return self._held[sha256]
-        return self._content_path(sha256).read_bytes()
+        try:
+            return read(self._content_path(sha256))
+        except (OSError, UnitcadError):
+            raise self._missing(sha256) from None
 
     def place(self, sha256: str, target: Path) -> None:
         """A hard link at `target`; a copy where links fail (other disk, no right, no support)."""
         if not self.has(sha256):
-            raise MissingContent(f"content {sha256[:12]} is not in {self.root}")
+            raise self._missing(sha256)
         if sha256 in self._held:
-            target.write_bytes(self._held[sha256])
+            write_new(target, self._held[sha256], sync=True)
             return
         source = self._content_path(sha256)
         try:
@@ -118,54 +132,57 @@ class DiskStore:
         except FileNotFoundError:
             if not target.parent.is_dir():
                 raise
-            raise MissingContent(f"content {sha256[:12]} is not in {self.root}") from None
+            raise self._missing(sha256) from None
         except OSError as error:
             if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EEXIST):
                 raise
             full = error.errno == errno.EMLINK
-        shutil.copyfile(source, target)
+        write_new(target, self.content(sha256), sync=True)
         if full:
             # As many links as the file system allows: a fresh file takes the entry's place and the next ones.
             with contextlib.suppress(OSError):
-                self._write(source, target.read_bytes(), read_only=True)
+                self._write(source, target.read_bytes(), shared=True)
                 self._verified[sha256] = _signature(source)
 
     def peek(self, key: str) -> Any:
         """The data under `key`, or None."""
-        return self._read(self._path("data", key), lambda data: True)
+        return self._read("data", key, lambda data: True)
 
     def forget(self, key: str) -> None:
         """Remove the entry of a key."""
         for kind in ("data", "file"):
-            self._path(kind, key).unlink(missing_ok=True)
+            remove(self._path(kind, key))
 
     def _entry(self, kind: str, key: str, make: Make, intact: Intact) -> Any:
         path = self._path(kind, key)
-        found = self._read(path, intact)
+        found = self._read(kind, key, intact)
         if found is None:
-            with self._lock(key):
-                found = self._read(path, intact)  # somebody may have made it while we waited
+            with held(self.root / "locks" / key):
+                found = self._read(kind, key, intact)  # somebody may have made it while we waited
                 if found is None:
                     made = make()
                     payload = json.dumps(made, ensure_ascii=False, allow_nan=False).encode()
                     with contextlib.suppress(OSError):
-                        self._write(path, digest(payload).encode() + b"\n" + payload)
+                        self._write(path, _checksum(kind, key, payload) + b"\n" + payload)
                     self.counts[f"{kind} built"] += 1
                     return json.loads(payload)
         self.counts[f"{kind} reused"] += 1
         self._touch(path)
         return found
 
-    def _read(self, path: Path, intact: Intact) -> Any:
-        """An entry's data, or None; what is damaged is removed."""
+    def _read(self, kind: str, key: str, intact: Intact) -> Any:
+        """An entry's data, or None; what is damaged, or was written for another key, is removed."""
+        path = self._path(kind, key)
         try:
-            checksum, _, payload = path.read_bytes().partition(b"\n")
+            checksum, _, payload = read(path).partition(b"\n")
         except OSError:
             return None
-        if digest(payload).encode() == checksum:
+        except UnitcadError:
+            checksum = payload = b""
+        if _checksum(kind, key, payload) == checksum:
             data = json.loads(payload)
             return data if intact(data) else None
-        path.unlink(missing_ok=True)
+        remove(path)
         self.counts["damaged"] += 1
         return None
 
@@ -177,31 +194,34 @@ class DiskStore:
             with contextlib.suppress(OSError):
                 os.utime(path)
 
-    def _write(self, path: Path, content: bytes, read_only: bool = False) -> None:
+    def _write(self, path: Path, content: bytes, shared: bool = False) -> None:
+        """Write a file whole; what results share is read-only, and on the disk when this ends. Raises OSError."""
+        try:
+            self._put(path, content, shared)
+        except (FileNotFoundError, NotADirectoryError):  # somebody has cleared the cache away
+            with contextlib.suppress(UnitcadError):
+                _claim(self.root)
+            self._put(path, content, shared)
+
+    def _put(self, path: Path, content: bytes, shared: bool) -> None:
         fresh = self.root / "tmp" / f"{path.name[:20]}-{os.getpid()}-{threading.get_ident()}"
         try:
-            fresh.write_bytes(content)
-            if read_only and sys.platform != "win32":  # Windows neither replaces nor removes a read-only file
+            remove(fresh)
+            with open(fresh, "xb") as file:
+                file.write(content)
+                if shared:
+                    file.flush()
+                    os.fsync(file.fileno())
+            if shared and sys.platform != "win32":  # Windows neither replaces nor removes a read-only file
                 fresh.chmod(fresh.stat().st_mode & 0o444)
             path.parent.mkdir(exist_ok=True)
             fresh.replace(path)
         except OSError:
-            fresh.unlink(missing_ok=True)
+            remove(fresh)
             raise
 
-    @contextlib.contextmanager
-    def _lock(self, key: str) -> Iterator[None]:
-        """Held by one thread of one process at a time; a process that dies lets go of it."""
-        held = lock(self.root / "locks" / key)
-        try:
-            held.acquire()
-        except OSError:  # read-only, or no space: better twice than not at all
-            yield
-            return
-        try:
-            yield
-        finally:
-            let_go(held)
+    def _missing(self, sha256: str) -> MissingContent:
+        return MissingContent(f"content {sha256[:12]} is not in {self.root}")
 
     def _path(self, kind: str, key: str) -> Path:
         return self.root / ("data" if kind == "data" else "files") / key[:2] / key
@@ -224,8 +244,28 @@ def default_root() -> Path:
         raise UnitcadError("there is no home folder; choose the cache's with --cache or UNITCAD_CACHE") from None
 
 
+def read(path: Path) -> bytes:
+    """The content of a regular file of the cache. Raises OSError; UnitcadError for a link, a pipe, a folder."""
+    with open(path, "rb", opener=regular(links=False)) as file:
+        return file.read()
+
+
+def remove(path: Path) -> None:
+    """Remove a file, a link or a whole folder where one of the cache's files belongs; nothing where that fails."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        if not path.is_symlink() and path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _checksum(kind: str, key: str, payload: bytes) -> bytes:
+    """Of an entry, bound to what it was written for: another one's entry under this key does not match."""
+    return digest(f"{kind} {key}\n".encode() + payload).encode()
+
+
 def _signature(path: Path) -> tuple[int, int, int]:
-    stat = path.stat()
+    stat = path.lstat()
     return stat.st_ino, stat.st_size, stat.st_mtime_ns
 
 
@@ -235,10 +275,11 @@ def _claim(root: Path) -> None:
         root.mkdir(parents=True, exist_ok=True)
         if not (root / MARK).exists():
             # Whoever claims the folder at the same time as we do writes the mark first.
-            if any(path.name != MARK for path in root.iterdir()) and not (root / MARK).exists():
+            others = {path.name for path in root.iterdir()} - {MARK, GATE}
+            if others not in (set(), set(FOLDERS)) and not (root / MARK).exists():
                 raise UnitcadError(f"{root}: is not a cache of unitcad, and not empty; choose another with --cache")
             (root / MARK).write_text("unitcad keeps shared results here; it may be deleted at any time\n", "utf-8")
-        for name in ("data", "files", "content", "locks", "tmp"):
+        for name in FOLDERS:
             (root / name).mkdir(exist_ok=True)
     except (FileExistsError, NotADirectoryError):
         raise UnitcadError(f"{root}: is a file, not a folder; choose another with --cache") from None
@@ -251,9 +292,25 @@ def lock(path: Path) -> FileLock:
     return FileLock(path, thread_local=False, poll_interval=_POLL_S)
 
 
-def let_go(held: FileLock) -> None:
+@contextlib.contextmanager
+def held(path: Path) -> Iterator[None]:
+    """Hold a lock by one thread of one process at a time; a process that dies lets go of it, and no file stays.
+
+    Where there can be no lock (read-only, no space, no folder) the block runs without: better twice than not at all.
+    """
+    taken = lock(path)
+    if path.parent.is_dir():  # else the lock would make it, and a cache that was cleared away look like somebody else's
+        with contextlib.suppress(OSError):
+            taken.acquire()
+    try:
+        yield
+    finally:
+        let_go(taken)
+
+
+def let_go(taken: FileLock) -> None:
     """Release a lock and remove its file: whoever waits on it makes a new one."""
-    if held.is_locked:
+    if taken.is_locked:
         with contextlib.suppress(OSError):  # Windows: an open file stays until the lock itself removes it
-            os.unlink(held.lock_file)
-        held.release()
+            os.unlink(taken.lock_file)
+        taken.release()

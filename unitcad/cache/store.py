@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from unitcad.errors import UnitcadError
+from unitcad.files import write_new
 
 Make = Callable[[], Any]
 Intact = Callable[[Any], bool]
@@ -39,6 +40,10 @@ class Store(Protocol):
         """Whether that content is there and whole."""
         ...
 
+    def size(self, sha256: str) -> int:
+        """Bytes of a content by its SHA-256. Raises MissingContent."""
+        ...
+
     def content(self, sha256: str) -> bytes:
         """Content by its SHA-256. Raises MissingContent."""
         ...
@@ -50,10 +55,13 @@ class Store(Protocol):
 
 @dataclass(frozen=True)
 class Bundle:
-    """What a store holds, to be handed to another one: data by key, the SHA-256 of files by key, no content."""
+    """What a store holds, to be handed to another one: data and the SHA-256 of files by key, their bytes by SHA-256,
+    no content.
+    """
 
     data: dict[str, Any] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
+    sizes: dict[str, int] = field(default_factory=dict)
 
 
 class MemoryStore:
@@ -66,11 +74,11 @@ class MemoryStore:
         self.contents: dict[str, bytes] = {}
         self._data: dict[str, Any] = dict(known.data) if known else {}
         self._files: dict[str, str] = dict(known.files) if known else {}
-        self._elsewhere = frozenset(self._files.values())
+        self._elsewhere = dict(known.sizes) if known else {}
 
     def bundle(self) -> Bundle:
         """What is here now."""
-        return Bundle(dict(self._data), dict(self._files))
+        return Bundle(dict(self._data), dict(self._files), {sha: self.size(sha) for sha in self._files.values()})
 
     def data(self, key: str, make: Make, intact: Intact = lambda data: True) -> Any:
         there = key in self._data and intact(self._data[key])
@@ -91,13 +99,16 @@ class MemoryStore:
     def has(self, sha256: str) -> bool:
         return sha256 in self.contents or sha256 in self._elsewhere
 
+    def size(self, sha256: str) -> int:
+        return len(self.contents[sha256]) if sha256 in self.contents else self._elsewhere[sha256]
+
     def content(self, sha256: str) -> bytes:
         if sha256 not in self.contents:
             raise MissingContent(f"content {sha256[:12]} is not here")
         return self.contents[sha256]
 
     def place(self, sha256: str, target: Path) -> None:
-        target.write_bytes(self.content(sha256))
+        write_new(target, self.content(sha256), sync=True)
 
 
 def digest(content: bytes) -> str:

@@ -28,6 +28,10 @@ def batch(
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786.")
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there would be to make; make nothing.")] = False,
+    verify: Annotated[
+        bool,
+        typer.Option("--verify", help="Hold finished variants to their hashes, not only to their sizes."),
+    ] = False,
     keep_going: Annotated[bool, typer.Option("--keep-going", help="Go on after a variant that fails.")] = False,
     timeout: Annotated[
         float | None, typer.Option(metavar="S", min=0.001, max=1e7, help="Seconds that a variant may take.")
@@ -67,7 +71,7 @@ def batch(
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
     wanted = load_sweep(sweep).overridden([*(sets or []), *chosen_formats(formats)])
     allow_code(code, nothing_else=dry_run)
-    options = Options(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit)
+    options = Options(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify)
     if dry_run:
         found = preview(wanted, options)
         print_json(found) if as_json or json_lines else _tell_preview(found)

@@ -36,7 +36,7 @@ def build(
     from unitcad.cli.output import print_json, progress
     from unitcad.pipeline.build import OUTPUTS
     from unitcad.pipeline.build import build as run
-    from unitcad.pipeline.folder import PAGE
+    from unitcad.pipeline.folder import PAGE, held
     from unitcad.pipeline.slicing import slice_tools
     from unitcad.spec import load
 
@@ -55,7 +55,8 @@ def build(
                 from unitcad.report import write_report
 
                 say("page")
-                write_report(results[-1].folder)
+                with held(results[-1].folder):
+                    write_report(results[-1].folder)
     if as_json:
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
     else:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad import __version__, files
-from unitcad.cache import MemoryStore, Store, digest
+from unitcad.cache import MemoryStore, MissingContent, Store, digest
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.geometry import findings_count, geometry, pictures
@@ -26,6 +26,8 @@ from unitcad.spec.own import is_own
 
 OUTPUTS = ("unit", "moulds", "estimate", "casting")
 OWN_DESIGN = "a design of one's own: tooling and estimate are known for the shipped designs only"
+TRIES = 5
+"""How often a result is made when what it shares vanishes from the cache meanwhile."""
 FORMATS = ("step", "stl", "3mf", "svg", "png", "glb")
 
 
@@ -51,13 +53,16 @@ class Product:
     shared: dict[str, str]
 
     def place(self, folder: Path, store: Store) -> None:
-        """Write it into an empty folder. Raises OSError, or MissingContent where the store has lost something."""
+        """Write it into an empty folder, contents on the disk at the end.
+
+        Raises OSError, or MissingContent where the store has lost something.
+        """
         for parent in sorted({str(Path(path).parent) for path in (*self.own, *self.shared)}):
             (folder / parent).mkdir(parents=True, exist_ok=True)
         for path, sha256 in self.shared.items():
             store.place(sha256, folder / path)
         for path, content in self.own.items():
-            files.write_new(folder / path, content)
+            files.write_new(folder / path, content, sync=True)
 
 
 def build(
@@ -80,28 +85,57 @@ def build(
     if out.exists() and not out.is_dir():
         raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o")
     folder = out / folders.folder_name(spec)
+    store = store or MemoryStore()
     folders.clear_leftovers(out)
-    spec = _with_formats(spec, (*folders.earlier_formats(folder, spec), *spec.output.formats))
-    only = checked_outputs((*only, *folders.earlier_outputs(folder)))
-    check = check or folders.earlier_checked(folder)
-    return build_into(folder, spec, only=only, check=check, store=store or MemoryStore(), say=say)
+    while True:
+        earlier = folders.earlier(folder, spec)
+        wanted = _with_formats(spec, (*earlier.formats, *spec.output.formats))
+        outputs = checked_outputs((*only, *earlier.outputs))
+        try:
+            return build_into(
+                folder, wanted, only=outputs, check=check or earlier.checked, store=store, say=say, earlier=earlier
+            )
+        except _Changed:  # another build has put a result there meanwhile: what it has is made too
+            continue
+
+
+class _Changed(Exception):
+    """A folder that holds something else than it did when the work began."""
 
 
 def build_into(
-    folder: Path, spec: Spec, *, only: Sequence[str], check: bool, store: Store, say: Say = lambda message: None
+    folder: Path,
+    spec: Spec,
+    *,
+    only: Sequence[str],
+    check: bool,
+    store: Store,
+    say: Say = lambda message: None,
+    earlier: folders.Earlier | None = None,
 ) -> Built:
-    """Build into a folder, in place of what it holds; files of the old result that the new one lacks stay."""
-    stages, before = Stages(say), Counter(store.counts)
-    product = make(spec, only, check, store, stages)
-    timings = {
-        "code": code_version(),
-        "seconds": {stage: round(seconds, 4) for stage, seconds in stages.seconds.items()},
-        "store": dict(sorted((store.counts - before).items())),
-    }
-    with folders.replacing(folder) as fresh:
-        product.place(fresh, store)
-        files.write_new(fresh / "timings.json", _json(timings))
-    return Built(folder, product.manifest)
+    """Build into a folder, in place of what it holds; files of the old result that the new one lacks stay.
+
+    Raises _Changed where the folder does not hold `earlier` any more.
+    """
+    for left in reversed(range(TRIES)):
+        stages, before = Stages(say), Counter(store.counts)
+        try:
+            product = make(spec, only, check, store, stages)
+            timings = {
+                "code": code_version(),
+                "seconds": {stage: round(seconds, 4) for stage, seconds in stages.seconds.items()},
+                "store": dict(sorted((store.counts - before).items())),
+            }
+            with folders.replacing(folder) as fresh:
+                if earlier is not None and folders.earlier(folder, spec) != earlier:
+                    raise _Changed
+                product.place(fresh, store)
+                files.write_new(fresh / "timings.json", json_bytes(timings))
+            return Built(folder, product.manifest)
+        except MissingContent:  # somebody clears the cache away while we work
+            if not left:
+                raise
+    raise AssertionError
 
 
 def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
@@ -143,7 +177,7 @@ class _Making:
     def all(self) -> Product:
         spec = self.spec
         shape = geometry(spec, self.only, self.check, self.store, self.stages)
-        files = {**shape["files"], **self._pictures()}
+        shared = {**shape["files"], **self._pictures()}
         self.own["spec.toml"] = to_toml(spec).encode()
         manifest: dict[str, Any] = {
             "name": spec.name,
@@ -165,13 +199,20 @@ class _Making:
             "laws": self._laws(shape),
             "estimate": self._estimate(),
             "check": findings_count(shape["check"]),
-            "pictures": [path for path in files if path.endswith(".png")],
+            "pictures": [path for path in shared if path.endswith(".png")],
             "casting": self._casting(shape),
             "left_out": self._left_out(),
             "versions": {"unitcad": __version__, **kernel_versions(spec.output.formats)},
         }
-        self.own["manifest.json"] = _json(manifest)
-        return Product(manifest, self.own, files)
+        manifest["files"] = self._files(shared)
+        self.own["manifest.json"] = json_bytes(manifest)
+        return Product(manifest, self.own, shared)
+
+    def _files(self, shared: dict[str, str]) -> dict[str, dict[str, Any]]:
+        """Bytes and SHA-256 of every file but the manifest itself, by path."""
+        found = {path: {"bytes": len(content), "sha256": digest(content)} for path, content in self.own.items()}
+        found |= {path: {"bytes": self.store.size(sha256), "sha256": sha256} for path, sha256 in shared.items()}
+        return dict(sorted(found.items()))
 
     def _laws(self, shape: dict[str, Any]) -> list[dict[str, Any]]:
         """The geometry's laws and its strains against this variant's silicones, by code."""
@@ -198,7 +239,7 @@ class _Making:
 
         with self.stages("estimate"):
             estimated = estimate_spec(self.spec, layered=shared)
-        self.own["estimate.json"] = _json(estimated)
+        self.own["estimate.json"] = json_bytes(estimated)
         return summary(estimated)
 
     def _casting(self, shape: dict[str, Any]) -> list[str] | None:
@@ -280,7 +321,7 @@ def _left(what: str, why: str) -> dict[str, str]:
     return {"what": what, "why": why}
 
 
-def _json(data: dict[str, Any]) -> bytes:
+def json_bytes(data: dict[str, Any]) -> bytes:
     """JSON with a line a key, and a line an entry of a list or table: legible, and ten times as fast as indented."""
 
     def short(value: Any) -> str:

@@ -7,12 +7,16 @@ import hashlib
 import os
 import re
 import shutil
+import stat
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from msgspec import structs
 
-from unitcad import files
+from unitcad import cache, files
+from unitcad.cache import digest
 from unitcad.errors import UnitcadError
 from unitcad.spec import Spec, read_toml, to_json, with_formats
 
@@ -54,27 +58,51 @@ def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:
     return tuple(there.output.formats)
 
 
-def earlier_checked(folder: Path) -> bool:
-    """Whether an existing result has laws judged and files checked: a later build keeps them up."""
-    try:
-        left_out = files.read_json(folder / "manifest.json", links=False)["left_out"]
-        return all(entry["why"] != UNCHECKED for entry in left_out)
-    except (UnitcadError, KeyError, TypeError):
-        return False
+@dataclass(frozen=True)
+class Earlier:
+    """What an existing result has, for a later build to keep up: formats, outputs, whether it was checked."""
+
+    formats: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    checked: bool = False
 
 
-def earlier_outputs(folder: Path) -> tuple[str, ...]:
-    """The outputs that an existing result has."""
+def earlier(folder: Path, spec: Spec) -> Earlier:
+    """What is in a folder already. Raises UnitcadError where that is something else than this spec's result."""
+    formats = earlier_formats(folder, spec)
     try:
-        outputs = files.read_json(folder / "manifest.json", links=False)["outputs"]
-        return tuple(name for name in outputs if isinstance(name, str))
+        manifest = files.read_json(folder / "manifest.json", links=False)
+        outputs = tuple(name for name in manifest["outputs"] if isinstance(name, str))
+        return Earlier(formats, outputs, all(entry["why"] != UNCHECKED for entry in manifest["left_out"]))
     except (UnitcadError, KeyError, TypeError):
-        return ()
+        return Earlier(formats)
+
+
+def whole(folder: Path, *, hashes: bool = False) -> dict[str, Any] | None:
+    """The manifest of a result whose files are all there with the sizes that it lists, with `hashes` also with their
+    content; else None.
+    """
+    try:
+        manifest = files.read_json(folder / "manifest.json", links=False)
+        for path, listed in manifest["files"].items():
+            found = (folder / path).lstat()
+            if not stat.S_ISREG(found.st_mode) or found.st_size != listed["bytes"]:
+                return None
+            if hashes and digest((folder / path).read_bytes()) != listed["sha256"]:
+                return None
+    except (OSError, UnitcadError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+    return manifest
+
+
+def held(folder: Path) -> contextlib.AbstractContextManager[None]:
+    """A lock on a result's folder, so that one process at a time changes it."""
+    return cache.held(folder.parent / f".{folder.name}.lock")
 
 
 @contextlib.contextmanager
 def replacing(folder: Path) -> Iterator[Path]:
-    """A fresh folder that takes `folder`'s place when the block ends well, and goes when it does not.
+    """A fresh folder that takes `folder`'s place when the block ends well, and goes when it does not; held meanwhile.
 
     Files of the old result that the new one lacks are kept. An interruption at any point leaves the old result whole:
     at its place, or in a marked scratch folder from which the next run takes it back. Raises UnitcadError where a link
@@ -82,7 +110,7 @@ def replacing(folder: Path) -> Iterator[Path]:
     """
     expect_folder(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with files.scratch(folder.parent, folder.name) as scratch:
+    with held(folder), files.scratch(folder.parent, folder.name) as scratch:
         fresh, aside = scratch / files.NEW, scratch / files.OLD
         fresh.mkdir()
         try:

@@ -9,6 +9,7 @@ from typing import Any
 from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.export import slicer
+from unitcad.pipeline.folder import held
 from unitcad.pipeline.stages import Say
 from unitcad.spec import Spec, printer_of
 
@@ -29,13 +30,14 @@ def slice_tools(folder: Path, manifest: dict[str, Any], spec: Spec, say: Say = l
     if not tools:
         return ""
     there = folder / SLICED
-    try:
-        found = slicer.report(tools, printer_of(spec), _earlier(there), say)
-    except UnitcadError as error:
-        return f"not sliced: {error}"
-    if found is None:
-        return ""
-    files.write(there, (json.dumps(found, indent=2) + "\n").encode())
+    with held(folder):
+        try:
+            found = slicer.report(tools, printer_of(spec), _earlier(there), say)
+        except UnitcadError as error:
+            return f"not sliced: {error}"
+        if found is None:
+            return ""
+        files.write(there, (json.dumps(found, indent=2) + "\n").encode())
     if repaired := [piece["file"] for piece in found["pieces"] if piece["repaired"]]:
         return f"{found['slicer']} had to repair {', '.join(repaired)}"
     hours, minutes = divmod(round(found["print_s"] / 60), 60)

@@ -1,0 +1,51 @@
+"""Builds of one spec into one folder at the same time: none fails, and what each was asked for is there at the end."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from unitcad.pipeline.folder import whole
+
+FORMATS = ("stl", "3mf", "svg", "glb")
+OUTPUTS = ("unit", "estimate", "casting")
+
+
+def _build_at_once(folder: Path, count: int, seed: int) -> None:
+    dice = random.Random(seed)
+    asked = [(dice.choice(FORMATS), dice.choice(OUTPUTS), dice.random() < 0.5) for _ in range(count)]
+    children = [
+        subprocess.Popen(
+            [sys.executable, "-P", "-m", "unitcad", "build", "single-embedded", "-o", folder, "--formats", form]
+            + ["--only", only, *(["--report"] if page else []), "--set", "output.tolerance_mm=0.1"],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "UNITCAD_TRACEBACK": "1"},
+        )
+        for form, only, page in asked
+    ]  # fmt: skip
+    for child in children:
+        _, errors = child.communicate(timeout=500)
+        assert child.returncode == 0, errors
+    (result,) = folder.iterdir()
+    manifest = whole(result, hashes=True)
+    assert manifest is not None
+    assert set(manifest["outputs"]) == {only for _, only, _ in asked}
+    spec = (result / "spec.toml").read_text()
+    formats = json.loads(next(line for line in spec.splitlines() if line.startswith("formats")).partition("=")[2])
+    assert set(formats) == {form for form, _, _ in asked}
+    assert (result / "report.html").exists() == any(page for _, _, page in asked)
+
+
+def test_builds_of_one_spec_at_the_same_time(tmp_path: Path) -> None:
+    _build_at_once(tmp_path / "out", 4, 2)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(4))
+def test_many_builds_of_one_spec_at_the_same_time(seed: int, tmp_path: Path) -> None:
+    _build_at_once(tmp_path / "out", 18, seed)
