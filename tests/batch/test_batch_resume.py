@@ -1,4 +1,4 @@
-"""What an earlier run finished is held to what was made: sizes always, hashes with --verify; contents are on the disk."""
+"""What an earlier run finished is held to what was made: sizes always, hashes with --verify; contents are synced."""
 
 from __future__ import annotations
 

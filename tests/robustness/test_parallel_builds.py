@@ -20,10 +20,10 @@ OUTPUTS = ("unit", "estimate", "casting")
 def _build_at_once(folder: Path, count: int, seed: int) -> None:
     dice = random.Random(seed)
     asked = [(dice.choice(FORMATS), dice.choice(OUTPUTS), dice.random() < 0.5) for _ in range(count)]
+    build = [sys.executable, "-P", "-m", "unitcad", "build", "single-embedded", "--set", "output.tolerance_mm=0.1"]
     children = [
         subprocess.Popen(
-            [sys.executable, "-P", "-m", "unitcad", "build", "single-embedded", "-o", folder, "--formats", form]
-            + ["--only", only, *(["--report"] if page else []), "--set", "output.tolerance_mm=0.1"],
+            [*build, "-o", folder, "--formats", form, "--only", only, *(["--report"] if page else [])],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "UNITCAD_TRACEBACK": "1"},
         )
         for form, only, page in asked

@@ -226,7 +226,8 @@ class _Batch:
                 self._finished(Outcome(index, tasks.OK), fresh=False)
                 continue
             key = geometry_key(spec, self.only, self.options.check)
-            self.groups.setdefault(key, _Group()).jobs.append(Job(index, to_json(spec), anew=bool(entry and entry["folder"])))
+            damaged = entry["manifest"] if entry else ""
+            self.groups.setdefault(key, _Group()).jobs.append(Job(index, to_json(spec), damaged))
             self.waiting += 1
 
     def _stands(self, entry: dict[str, Any]) -> bool:

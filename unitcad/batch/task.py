@@ -32,12 +32,12 @@ OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no
 class Job:
     """One variant: its number in the sweep and its effective spec as JSON (a tenth of the object's size).
 
-    `anew`: what its folder holds is known not to stand.
+    `damaged` is the SHA-256 of the manifest that an earlier run made, if its folder has not stayed whole.
     """
 
     index: int
     spec: str
-    anew: bool = False
+    damaged: str = ""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def _here(job: Job, task: Task) -> Outcome:
     assert task.cache is not None
     spec = from_json(job.spec)
     folder = task.out / folders.folder_name(spec)
-    manifest = None if job.anew else _finished(folder, spec, task)
+    manifest = _finished(folder, spec, task, job.damaged)
     if manifest is not None:
         return _outcome(job, spec, folder.name, manifest, Counter({"file reused": 1}))
     store = _store(task.cache)
@@ -164,12 +164,18 @@ def _timed(outcome: Outcome, seconds: float) -> Outcome:
     return Outcome(**{**vars(outcome), "seconds": seconds})
 
 
-def _finished(folder: Path, spec: Spec, task: Task) -> dict[str, Any] | None:
+def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> dict[str, Any] | None:
     """The manifest of a result that an earlier, interrupted run has completed, if it is what is asked for now.
 
     Raises UnitcadError for a folder that holds something else.
     """
     if not folder.exists():
+        return None
+    if damaged:
+        with contextlib.suppress(UnitcadError):
+            if digest(files.read(folder / "manifest.json", links=False)) == damaged:
+                return None
+        folders.earlier_formats(folder, spec, ours=True)
         return None
     formats = folders.earlier_formats(folder, spec)
     manifest = folders.whole(folder, hashes=task.verify)

@@ -36,8 +36,8 @@ def spec_hash(spec: Spec) -> str:
     return hashlib.sha256(to_json(structs.replace(with_formats(spec), name="")).encode()).hexdigest()
 
 
-def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:
-    """The formats that an existing result has, to be kept.
+def earlier_formats(folder: Path, spec: Spec, *, ours: bool = False) -> tuple[str, ...]:
+    """The formats that an existing result has, to be kept. `ours`: it is known to be one, perhaps damaged since.
 
     Raises UnitcadError for a folder that holds something else: no spec.toml of ours, or another spec.
     """
@@ -46,12 +46,16 @@ def earlier_formats(folder: Path, spec: Spec) -> tuple[str, ...]:
         return ()
     file = folder / "spec.toml"
     if not file.is_file():
+        if ours:
+            return ()
         raise UnitcadError(f"{folder}: is not a result of unitcad (no spec.toml); choose another folder with -o")
     try:
         from unitcad.spec import from_data
 
         there = from_data(read_toml(file, links=False))
     except UnitcadError as error:
+        if ours:
+            return ()
         raise UnitcadError(f"{folder}: its spec.toml can't be read ({error}); move the folder away") from None
     if spec_hash(there) != spec_hash(spec):
         raise UnitcadError(f"{folder}: holds the result of another spec (spec.toml differs); move it away or use -o")
