@@ -12,7 +12,7 @@ from manifold3d import CrossSection, Manifold
 
 from unitcad.catalogue import Printer
 from unitcad.check.edges import components
-from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Floats, Ints, solid_of
 from unitcad.check.rulebook import finding
@@ -38,7 +38,7 @@ def judge(topology: Topology, printer: Printer, rays: Rays, deadline: Deadline) 
     places += _lying(topology, solid, rays, least, deadline)
     if not places:
         return []
-    text = f"{counted(len(places), 'section')} smaller than {least:g} mm both ways"
+    text = f"{counted(len(places), 'section')} smaller than {number(least)} mm both ways"
     return [finding("D002", text, len(places), places)]
 
 

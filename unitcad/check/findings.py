@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from unitcad.check.detail import detail
 
@@ -167,11 +167,12 @@ def said(found: Finding, places: int) -> str:
     return f"{found.message}{f' (at {shown})' if shown else ''}"
 
 
-def number(value: float, digits: int = 6) -> str:
+def number(length: SupportsFloat, digits: int = 6) -> str:
     """A length, area or volume in a message: never -0, and no power of ten where digits can say it.
 
     What is below a millionth of a mm is 0.
     """
+    value = float(length)
     if not 1e-6 <= abs(value) < 1e15:
         return "0" if abs(value) < 1e-6 else f"{value:.{digits}g}"
     places = max(0, digits - 1 - math.floor(math.log10(abs(value))))

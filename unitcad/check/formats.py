@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
-from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, counted, said
+from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, counted, number, said
 from unitcad.check.rulebook import rules
 
 FORMATS = ("text", "json", "github", "sarif", "junit")
@@ -31,7 +33,17 @@ def render(
         "sarif": lambda: _dump(sarif(reports)),
         "junit": lambda: junit(reports, fail_on),
     }
-    return makers[format_]()
+    return _SURROGATE.sub(partial(_escaped, format_ in ("json", "sarif")), makers[format_]())
+
+
+_SURROGATE = re.compile("[\ud800-\udfff]")
+
+
+def _escaped(quoted: bool, match: re.Match[str]) -> str:
+    """What UTF-8 cannot hold, such as a byte of a file's name that is no text, as \\xe4; quoted for JSON's strings."""
+    code = ord(match.group())
+    text = f"\\x{code - 0xDC00:02x}" if 0xDC80 <= code <= 0xDCFF else f"\\u{code:04x}"
+    return text.replace("\\", "\\\\") if quoted else text
 
 
 def _dump(data: Any) -> str:
@@ -83,9 +95,9 @@ def _size(facts: Facts) -> str:
     parts = []
     if facts.bbox_mm is not None:
         sides = [high - low for low, high in zip(*facts.bbox_mm, strict=True)]
-        parts.append(" x ".join(f"{side:.6g}" for side in sides) + " mm")
+        parts.append(" x ".join(number(side) for side in sides) + " mm")
     if facts.volume_mm3 is not None:
-        parts.append(f"{facts.volume_mm3:.6g} mm3")
+        parts.append(f"{number(facts.volume_mm3)} mm3")
     if facts.shells is not None:
         parts.append(counted(facts.shells, "shell"))
     if facts.triangles is not None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from unitcad import catalogue, files
 from unitcad.check.check import Options
-from unitcad.check.findings import FileReport, Finding, counted, merge
+from unitcad.check.findings import FileReport, Finding, counted, merge, number
 from unitcad.check.rulebook import finding
 from unitcad.errors import UnitcadError
 
@@ -167,6 +167,6 @@ def judge(part: Part, report: FileReport) -> list[Finding]:
     if facts.volume_mm3 is not None and part.volume_mm3:
         off = facts.volume_mm3 / part.volume_mm3 - 1
         if abs(off) > VOLUME:
-            text = f"{facts.volume_mm3:.6g} mm3, {part.volume_mm3:.6g} in the manifest ({off:+.2%})"
+            text = f"{number(facts.volume_mm3)} mm3, {number(part.volume_mm3)} in the manifest ({off:+.2%})"
             found.append(finding("M001", text))
     return found

@@ -10,7 +10,7 @@ import numpy as np
 
 from unitcad.catalogue import Printer
 from unitcad.check.edges import components
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, number
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Floats, Ints
 from unitcad.check.rulebook import finding
@@ -58,7 +58,8 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline, bed: float) 
     if not bad:
         return []
     bad.sort(key=lambda item: -item[0])
-    text = f"{sum(area for area, _ in bad):.3g} mm2 lean out beyond {float(printer.overhang_deg):g} degrees unsupported"
+    area = number(sum(area for area, _ in bad), 3)
+    text = f"{area} mm2 lean out beyond {number(printer.overhang_deg)} degrees unsupported"
     return [finding("D003", text, len(bad), [place for _, place in bad])]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from unitcad.catalogue import Printer
 from unitcad.check import features, overhang, walls
-from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline, keeping
 from unitcad.check.mesh import Floats, extent
 from unitcad.check.rulebook import finding
@@ -44,20 +44,20 @@ def _fits(size: Floats, printer: Printer) -> list[Finding]:
     upright = size[2] <= z
     if upright and ((size[0] <= x and size[1] <= y) or (size[0] <= y and size[1] <= x)):
         return []
-    shown = " x ".join(f"{side:.4g}" for side in size)
-    return [finding("S002", f"{shown} mm does not fit {printer.name}: {x:g} x {y:g} x {z:g}")]
+    shown = " x ".join(number(side, 4) for side in size)
+    return [finding("S002", f"{shown} mm does not fit {printer.name}: {number(x)} x {number(y)} x {number(z)}")]
 
 
 def _stands(topology: Topology, low: Floats) -> list[Finding]:
     """D005: lowest point at z = 0, and a flat there that faces down."""
     vertices, faces = topology.mesh.vertices, topology.mesh.faces
     if abs(low[2]) > ON_BED:
-        return [finding("D005", f"lowest point at z = {low[2]:.4g} mm")]
+        return [finding("D005", f"lowest point at z = {number(low[2], 4)} mm")]
     lying = (vertices[faces, 2] < low[2] + ON_BED).all(axis=1) & (topology.areas[:, 2] < 0)
     flat = float(np.abs(topology.areas[lying, 2]).sum()) / 2
     if flat >= STAND:
         return []
-    return [finding("D005", f"only {flat:.3g} mm2 of flat on the bed")]
+    return [finding("D005", f"only {number(flat, 3)} mm2 of flat on the bed")]
 
 
 def _trapped(topology: Topology) -> list[Finding]:

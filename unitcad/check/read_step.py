@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from unitcad import children
-from unitcad.check.findings import Facts, Finding, counted
+from unitcad.check.findings import Facts, Finding, counted, number
 from unitcad.check.limits import Limits, Unreadable, over_limit
 from unitcad.check.rulebook import finding
 
@@ -42,7 +42,7 @@ def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Fin
     if not solids:
         findings.append(finding("G007", "no solid in the file"))
     elif volume < 0:
-        findings.append(finding("T008", f"volume {volume:.6g} mm3"))
+        findings.append(finding("T008", f"volume {number(volume)} mm3"))
     if options.shells is not None and solids != options.shells:
         text = f"{counted(solids, 'solid')}, {options.shells} expected"
         findings.append(finding("G005", text, abs(solids - options.shells)))

@@ -50,7 +50,7 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
         findings += overlap.judge(found)
         judged = shells.judge(found, crossings.crossed, crossings.touching, deadline)
     findings += judged.findings
-    if found.watertight:
+    if found.watertight and found.oriented:
         facts = replace(facts, volume_mm3=float(judged.volumes.sum()))
     return Judged(in_file(findings, mesh), facts, found)
 

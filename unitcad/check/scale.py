@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from unitcad.check.findings import Facts, Finding, Location, counted
+from unitcad.check.findings import Facts, Finding, Location, counted, number
 from unitcad.check.mesh import Bools, Floats
 from unitcad.check.rulebook import finding
 
@@ -22,13 +22,13 @@ def judge(facts: Facts, unit: str | None) -> list[Finding]:
         return []
     factor = UNITS_MM.get(unit or "millimeter", 1.0)
     if factor != 1.0:
-        guess = f"{side / factor:.6g} mm if the numbers are millimetres"
+        guess = f"{number(side / factor)} mm if the numbers are millimetres"
     elif side < SMALL:
-        guess = f"{side * 1000:.3g} mm if it was metres, {side * 25.4:.3g} mm if inches"
+        guess = f"{number(side * 1000, 3)} mm if it was metres, {number(side * 25.4, 3)} mm if inches"
     else:
-        guess = f"{side / 1000:.3g} mm if it was microns"
+        guess = f"{number(side / 1000, 3)} mm if it was microns"
     named = f"with the unit {unit} that is named" if unit else "as millimetres"
-    return [finding("S001", f"largest side {side:.6g} mm {named}; {guess}")]
+    return [finding("S001", f"largest side {number(side)} mm {named}; {guess}")]
 
 
 def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
@@ -39,5 +39,5 @@ def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
         return []
     middle = ((low + high) / 2)[tiny].tolist()
     places = [Location(xyz=(x, y, z)) for x, y, z in middle]
-    text = f"{counted(len(tiny), 'speck')}, the largest {side[tiny].max():.3g} mm across"
+    text = f"{counted(len(tiny), 'speck')}, the largest {number(side[tiny].max(), 3)} mm across"
     return [finding("G010", text, len(tiny), places)]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Floats, Ints, solid_of
 from unitcad.check.rulebook import finding
@@ -42,7 +42,7 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
     which = np.flatnonzero(sound & flat)
     if len(which):
         worst = which[np.argmax(area[which])]
-        text = f"volume {volumes[worst]:.3g} mm3 over {area[worst]:.3g} mm2 of surface"
+        text = f"volume {number(volumes[worst], 3)} mm3 over {number(area[worst], 3)} mm2 of surface"
         found.append(finding("G007", text, len(which), (_where(topology, low, high, i) for i in which.tolist())))
     sound = sound & ~flat
     found += specks(low, high, sound & (volumes > 0))

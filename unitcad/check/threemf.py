@@ -283,7 +283,7 @@ def _geometry(
     boxes, shifts, placed = list[Floats](), list[Floats](), list[int]()
     triangles = vertices = shells = 0
     volume = area = 0.0
-    watertight = bool(instances)
+    watertight = known = bool(instances)
     compared, solids = options.cross and len(instances) > 1, list[placement.Placed]()
     for instance in instances:
         found = models[instance.key[0]].resources[instance.key[1]]
@@ -311,6 +311,7 @@ def _geometry(
         volume += size
         area += one.area
         watertight = watertight and bool(facts.watertight)
+        known = known and facts.volume_mm3 is not None
         if compared and facts.watertight and size > 0 and len(solids) <= placement.MOST:
             with np.errstate(all="ignore"):
                 mesh = mesh_of(found, instance.key[0], factor, instance.matrix)
@@ -332,7 +333,7 @@ def _geometry(
         triangles,
         vertices,
         shells,
-        volume if watertight else None,
+        volume if known else None,
         area,
         (tuple(low.tolist()), tuple(high.tolist())),
         watertight,

@@ -12,7 +12,7 @@ import numpy as np
 from unitcad.check import edges as mesh_edges
 from unitcad.check import volumes
 from unitcad.check.edges import Edges
-from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline, keeping
 from unitcad.check.mesh import Bools, Floats, Ints, Mesh, area_vectors, extent, extents, float32_step, float32_steps
 from unitcad.check.rulebook import finding
@@ -194,7 +194,9 @@ def too_far(corners: Floats, size: Floats) -> list[Finding]:
     if not len(far):
         return []
     worst = far[np.argmax(step[far] / size[far])]
-    text = f"coordinates are {step[worst]:.3g} mm apart in float32, the part is {size[worst]:.3g} mm across"
+    text = (
+        f"coordinates are {number(step[worst], 3)} mm apart in float32, the part is {number(size[worst], 3)} mm across"
+    )
     return [finding("V002", text, len(far))]
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from unitcad.catalogue import Printer
 from unitcad.check.edges import components
-from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Bools, Floats, Ints
 from unitcad.check.pairs import boxes_of, frame_of, meeting_between, morton_order
@@ -58,7 +58,7 @@ def judge(topology: Topology, printer: Printer, rays: Rays) -> list[Finding]:
     walls = _patches(topology, rays, float(printer.least_wall_mm) * _SLACK)
     if not walls:
         return []
-    text = f"{counted(len(walls), 'wall')} below the floor, the thinnest {walls[0][0]:.3g} mm"
+    text = f"{counted(len(walls), 'wall')} below the floor, the thinnest {number(walls[0][0], 3)} mm"
     return [finding("D001", text, len(walls), [place for _, place in walls])]
 
 
@@ -69,7 +69,7 @@ def gaps(topology: Topology, printer: Printer, deadline: Deadline) -> list[Findi
     found = _patches(topology, rays, floors[0] * _SLACK)
     if not found:
         return []
-    text = f"{counted(len(found), 'gap')} that the printer closes, the narrowest {found[0][0]:.3g} mm"
+    text = f"{counted(len(found), 'gap')} that the printer closes, the narrowest {number(found[0][0], 3)} mm"
     return [finding("D006", text, len(found), [place for _, place in found])]
 
 

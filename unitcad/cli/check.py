@@ -109,9 +109,21 @@ def check(
         sys.stdout.write(table)
     else:
         used = None if base is None else base.as_posix()
-        sys.stdout.write(formats.render(reports, output_format, fail_on, found.shown, used))
+        report = formats.render(reports, output_format, fail_on, found.shown, used)
+        _write(report, plain=output_format == "text")
         sys.stderr.write(table)
     raise typer.Exit(run.worst(reports, fail_on))
+
+
+def _write(text: str, *, plain: bool) -> None:
+    """Write a report. What programs read is UTF-8 with LF line ends, whatever the terminal's encoding is."""
+    raw = None if plain else getattr(sys.stdout, "buffer", None)  # which a stream in memory has not
+    if raw is None:
+        sys.stdout.write(text)
+        return
+    sys.stdout.flush()
+    raw.write(text.encode("utf-8"))
+    raw.flush()
 
 
 def _run(
