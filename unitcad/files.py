@@ -62,10 +62,8 @@ def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bo
 
 
 def read_json(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> Any:
-    """The data of a JSON file, all of its numbers finite and no NUL in its texts; else as `read`."""
+    """The data of a JSON file, all of its numbers finite; else as `read`."""
     text = read_text(path, largest=largest, links=links)
-    if "\\u0000" in text:
-        raise UnitcadError(f"{path}: not JSON: it holds a NUL")
     try:
         return json.loads(text, parse_constant=_no_number, parse_float=_finite)
     except (ValueError, RecursionError) as error:

@@ -194,3 +194,20 @@ def test_init_leaves_no_file_behind_when_it_fails(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", ["build {}", "estimate {}", "batch {}", "check --manifest {}"])
+@pytest.mark.parametrize("kind", ["pipe.toml", "/dev/zero", "large.toml"])
+def test_no_command_hangs_on_or_swallows_what_is_no_spec(arguments: str, kind: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.toml")
+    with open(tmp_path / "large.toml", "wb") as file:
+        file.truncate(10_000_000_000)
+    name = kind if kind.startswith("/") else str(tmp_path / kind)
+    started = f"import sys; sys.argv[1:] = {arguments.format(name).split()!r}; from unitcad.cli import main; main()"
+    limited = f"import resource; resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30)); {started}"
+    command = [sys.executable, "-P", "-c", limited]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert ("larger than 16 MB" if "large" in kind else "not a regular file") in done.stderr

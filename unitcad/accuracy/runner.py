@@ -10,6 +10,7 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+from unitcad import files
 from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Result, Say, from_dict, markdown
 from unitcad.errors import Refusal, UnitcadError
@@ -73,22 +74,22 @@ def write(results: Sequence[Result], folder: Path) -> None:
     known = {result.suite: result for result in (*ready(folder), *results)}
     ordered = [known[name] for name in SUITES if name in known]
     text = json.dumps({"suites": [result.as_dict() for result in ordered]}, indent=1, allow_nan=False)
-    (folder / "accuracy.json").write_bytes((text + "\n").encode())
+    files.write(folder / "accuracy.json", (text + "\n").encode())
     sections = [HEAD]
     for result in ordered:
         pictures = [f"accuracy-{result.suite}-{i + 1}.svg" for i in range(len(result.plots))]
         for file, plot in zip(pictures, result.plots, strict=True):
-            (folder / file).write_bytes(svg(plot).encode())
+            files.write(folder / file, svg(plot).encode())
         sections.append(markdown(result, pictures))
-    (folder / "accuracy.md").write_bytes("\n".join(sections).encode())
+    files.write(folder / "accuracy.md", "\n".join(sections).encode())
 
 
 def read(folder: Path) -> list[Result]:
     """The results in a folder's accuracy.json, none without such a file. Raises UnitcadError if it is not ours."""
     file = folder / "accuracy.json"
-    if not file.exists():
-        return []
     try:
-        return [from_dict(data) for data in json.loads(file.read_text("utf-8"))["suites"]]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        return [from_dict(data) for data in files.read_json(file)["suites"]]
+    except files.NotThere:
+        return []
+    except (UnitcadError, ValueError, KeyError, TypeError) as error:
         raise UnitcadError(f"{file}: is not a result of unitcad accuracy ({error}); write elsewhere with -o") from None

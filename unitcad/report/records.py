@@ -9,6 +9,7 @@ import msgspec
 from msgspec import Struct
 
 from unitcad.errors import UnitcadError
+from unitcad.report.pool import REFERENCE
 
 DEEPEST = 40
 """Lists and tables within each other that a result's file may have."""
@@ -98,24 +99,20 @@ class BatchFile(Struct):
 
 
 def expect(data: Any, kind: Any, path: Path) -> None:
-    """Raise UnitcadError, naming the file and the place, for data that is not of a kind or nested too deep."""
-    if _deeper(data, DEEPEST):
-        raise UnitcadError(f"{path}: nested deeper than {DEEPEST}")
+    """Raise UnitcadError, naming the file and the place, for data that is not of a kind, is nested too deep, or has a
+    key that the page keeps for itself.
+    """
+    level = [data]
+    for _ in range(DEEPEST):
+        tables = [node for node in level if isinstance(node, dict)]
+        if any(REFERENCE in table for table in tables):
+            raise UnitcadError(f"{path}: is not a result of unitcad: a key of it is a NUL")
+        level = [item for table in tables for item in table.values()] + [
+            item for node in level if isinstance(node, list) for item in node
+        ]
+    if level:
+        raise UnitcadError(f"{path}: is not a result of unitcad: nested deeper than {DEEPEST}")
     try:
         msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
         raise UnitcadError(f"{path}: is not a result of unitcad: {error}") from None
-
-
-def _deeper(data: Any, most: int) -> bool:
-    level = [data]
-    for _ in range(most):
-        level = [
-            item
-            for node in level
-            if isinstance(node, dict | list)
-            for item in (node.values() if isinstance(node, dict) else node)
-        ]
-        if not level:
-            return False
-    return True
