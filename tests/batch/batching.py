@@ -90,7 +90,7 @@ def calls(folder: Path) -> list[str]:
 def unitcad(*words: object, **more: Any) -> subprocess.CompletedProcess[str]:
     """Run the command line in a process of its own."""
     return subprocess.run(
-        command(*words), capture_output=True, text=True, check=False, timeout=300, env=environment(), **more
+        command(*words), capture_output=True, text=True, check=False, timeout=300, **{"env": environment(), **more}
     )
 
 

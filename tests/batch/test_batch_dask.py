@@ -22,16 +22,14 @@ pytest.importorskip("distributed")
 class Cluster:
     """Processes of the `dask` command; workers keep nothing on this disk but their own scratch folder."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *tls: str, workers: int = 2) -> None:
         self.folder, self.workers = folder, []
-        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
-        self.address = self._read(self.scheduler, r"Scheduler at:\s+(tcp://\S+)")
-        for _ in range(2):
-            self.workers.append(
-                self._start(
-                    "worker", self.address, "--no-nanny", "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1"
-                )
-            )
+        scheme = "tls" if tls else "tcp"
+        here = ("--host", f"{scheme}://127.0.0.1", "--no-dashboard", *tls)
+        self.scheduler = self._start("scheduler", "--port", "0", *here)
+        self.address = self._read(self.scheduler, rf"Scheduler at:\s+({scheme}://\S+)")
+        for _ in range(workers):
+            self.workers.append(self._start("worker", self.address, "--no-nanny", "--nthreads", "1", *here))
             self._read(self.workers[-1], r"(Registered to)")
 
     def _start(self, kind: str, *words: str) -> subprocess.Popen[str]:
@@ -106,7 +104,10 @@ def test_ctrl_c_takes_the_work_back_and_leaves_the_cluster(cluster: Cluster, tmp
     words = ("batch", sweep, "-o", out, "--scheduler", cluster.address)
     child = subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True, env=environment())
     end = time.monotonic() + 60
-    while len(list(out.glob("ring-*"))) < 2 and time.monotonic() < end:
+    journal = out / "journal.jsonl"
+    while (
+        not journal.exists() or journal.read_bytes().count(b"\n") < 3
+    ) and time.monotonic() < end:  # its head, two done
         time.sleep(0.02)
     child.send_signal(signal.SIGINT)
     _, errors = child.communicate(timeout=30)
@@ -127,7 +128,7 @@ def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening: 
         address = f"tcp://127.0.0.1:{mute.getsockname()[1]}"
         sweep = ring_sweep(tmp_path / "s")
         code = (
-            "import time, sys; import unitcad.batch.executors as e; from unitcad.errors import UnitcadError\n"
+            "import time, sys; import unitcad.batch.cluster as e; from unitcad.errors import UnitcadError\n"
             "import distributed; start = time.monotonic()\n"
             f"try: e.dask_executor({address!r})\n"
             "except UnitcadError as error: print(error, file=sys.stderr)\n"
@@ -155,7 +156,7 @@ def test_an_address_that_is_none(address: str, tmp_path: Path) -> None:
     "said", [b"SSH-2.0-OpenSSH_9.6p1\r\n" + b"x" * 40, b"HTTP/1.1 400 Bad Request\r\n\r\n" + b"a" * 99, b"\xff" * 64]
 )
 def test_an_answer_that_is_no_schedulers(said: bytes) -> None:
-    from unitcad.batch.executors import dask_executor
+    from unitcad.batch.cluster import dask_executor
     from unitcad.errors import UnitcadError
 
     with socket.socket() as other:

@@ -8,9 +8,7 @@ main module is needed.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import logging
 import os
 import pickle
 import queue
@@ -19,20 +17,18 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from importlib.resources import files
 from typing import IO, Any
 
+from unitcad.batch.cluster import FROM_DASK, Certificates, check_certificates, dask_executor
 from unitcad.batch.frames import receive, send
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import Refusal
 
 _START = "import sys; sys.path[:] = {path!r}; from unitcad.batch.worker import serve; serve({preload!r})"
 WARM = ("unitcad.pipeline.build", "unitcad.moulds.laws", "unitcad.check", "unitcad.kernels.mesh")
 """What a worker imports before its first task."""
-DASK_SECONDS = 6.0
-"""How long a scheduler may take to answer; with what is loaded and started all is said within ten."""
 
 
 class WorkerDied(Exception):
@@ -142,17 +138,21 @@ class ProcessExecutor(Executor):
 
 @contextlib.contextmanager
 def open_executor(
-    jobs: int | None, scheduler: str | None = None, timeout: float | None = None
+    jobs: int | None,
+    scheduler: str | None = None,
+    timeout: float | None = None,
+    certificates: Certificates = FROM_DASK,
 ) -> Iterator[tuple[Executor, int]]:
     """An executor and how many tasks it runs at once: Dask's with a `scheduler`, else `jobs` worker processes (one a
     core by default), with 0 this process. Whatever ends the block ends the workers that were started for it.
 
     Raises Refusal or UnitcadError for a combination that can't be, or a scheduler that does not answer.
     """
+    check_certificates(certificates, scheduler)
     if scheduler is not None:
         if jobs is not None:
             raise Refusal("--jobs", jobs, "the scheduler knows its workers; leave it out with --scheduler")
-        executor, workers = dask_executor(scheduler)
+        executor, workers = dask_executor(scheduler, certificates)
         try:
             yield executor, workers
         finally:
@@ -175,57 +175,6 @@ def _cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def dask_executor(address: str) -> tuple[Executor, int]:
-    """A Dask cluster's executor, and how many tasks it runs at once.
-
-    Raises UnitcadError without the extra, or where no scheduler answers in time.
-    """
-    try:
-        from distributed import Client
-        from distributed.comm.addressing import parse_address, parse_host_port
-        from distributed.comm.core import connect
-        from distributed.comm.registry import get_backend
-    except ImportError:
-        raise UnitcadError("--scheduler needs Dask: pip install 'unitcad[dask]'") from None
-
-    try:
-        scheme, place = parse_address(address)
-        get_backend(scheme)
-        parse_host_port(place)
-    except (ValueError, TypeError) as error:
-        raise UnitcadError(f"--scheduler {address}: not a scheduler's address ({error})") from None
-
-    async def ask() -> Any:
-        comm = await connect(address, timeout=DASK_SECONDS)
-        await comm.write({"op": "identity", "reply": True})
-        answer = await comm.read()
-        await comm.close()
-        return answer
-
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    # Asked before there is a client, since one that finds nobody takes long to give up.
-    start = time.monotonic()
-    try:
-        answer = asyncio.run(asyncio.wait_for(ask(), DASK_SECONDS))
-    except (OSError, TimeoutError) as error:
-        waited = time.monotonic() - start > DASK_SECONDS - 1
-        why = f" ({error})" if str(error) else ""
-        raise UnitcadError(
-            f"--scheduler {address}: no answer{f' within {DASK_SECONDS:g} s' if waited else ''}{why}"
-        ) from None
-    except Exception:  # bytes that are not Dask's end in anything: a length read from them in a MemoryError
-        answer = None
-    if not isinstance(answer, dict) or answer.get("type") != "Scheduler":
-        raise UnitcadError(f"--scheduler {address}: what answers there is not a Dask scheduler")
-    client = Client(address, timeout=DASK_SECONDS, set_as_default=False)
-    cores: Any = client.ncores()
-    threads = sum(cores.values())
-    if not threads:
-        client.close()
-        raise UnitcadError(f"--scheduler {address}: it has no workers")
-    return client.get_executor(pure=False), threads
 
 
 def _obituary(child: subprocess.Popen[bytes], log: IO[bytes]) -> str:

@@ -25,7 +25,16 @@ def batch(
         typer.Option("-j", "--jobs", min=0, max=1024, help="Worker processes; else one a core. 0: in this process."),
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tcp://host:8786.")
+        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tls://host:8786.")
+    ] = None,
+    tls_ca_file: Annotated[
+        Path | None, typer.Option(metavar="PEM", help="For tls://, who may vouch for the cluster; else as Dask has it.")
+    ] = None,
+    tls_cert: Annotated[
+        Path | None, typer.Option(metavar="PEM", help="For tls://, our certificate; else as Dask has it.")
+    ] = None,
+    tls_key: Annotated[
+        Path | None, typer.Option(metavar="PEM", help="For tls://, its key; else as Dask has it.")
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there would be to make; make nothing.")] = False,
     verify: Annotated[
@@ -58,6 +67,7 @@ def batch(
     from dataclasses import asdict
 
     from unitcad.batch import Options, load_sweep, run
+    from unitcad.batch.cluster import Certificates
     from unitcad.batch.executors import open_executor
     from unitcad.batch.preview import preview
     from unitcad.batch.run import trim
@@ -81,7 +91,9 @@ def batch(
         if chosen == ("estimate",):
             summary = estimate_table(wanted, folder, options)
         else:
-            with open_executor(jobs, scheduler, timeout) as (executor, workers), watching(json_lines) as watch:
+            certificates = Certificates(tls_ca_file, tls_cert, tls_key)
+            opened = open_executor(jobs, scheduler, timeout, certificates)
+            with opened as (executor, workers), watching(json_lines) as watch:
                 away = scheduler is not None
                 summary = run(wanted, folder, options, executor, workers=workers, away=away, watch=watch)
             trim(options)
