@@ -23,6 +23,8 @@ from unitcad.errors import UnitcadError
 
 LARGEST = 16_000_000
 """Bytes that a spec, a sweep, a manifest or another file of one variant may have."""
+LARGEST_TABLE = 256_000_000
+"""Bytes that a batch's table may have."""
 TEMPORARY = ".tmp-"
 MARK = "unitcad-scratch"
 """The file in every scratch folder: locked while its maker lives, it holds FORMAT, the folder's token, a name."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import stat
 import subprocess
 import sys
@@ -135,6 +136,24 @@ def test_a_link_planted_in_a_batchs_folder_is_not_written_through(name: str, tmp
     if not name.startswith("."):
         assert (out / name).read_text() != "keep"
         assert not (out / name).is_symlink()
+
+
+@pytest.mark.parametrize("name", ["journal.jsonl", "batch.json", "batch.lock", "timings.json", "variants.csv"])
+@pytest.mark.parametrize("lost", ["nothing", "journal"])
+def test_a_pipe_planted_in_a_batchs_folder_holds_nothing_up(name: str, lost: str, tmp_path: Path) -> None:
+    sweep, out = load_sweep("thickness"), tmp_path / "out"
+    options = Options(only=("estimate",), limit=1, cache=tmp_path / "cache")
+    run(sweep, out, options, SerialExecutor(), workers=1)
+    if lost == "journal":
+        (out / "journal.jsonl").unlink()
+    (out / name).unlink(missing_ok=True)
+    os.mkfifo(out / name)
+    signal.alarm(60)
+    try:
+        with contextlib.suppress(UnitcadError):
+            run(sweep, out, options, SerialExecutor(), workers=1)
+    finally:
+        signal.alarm(0)
 
 
 def test_a_link_planted_in_a_results_place_is_not_written_through(tmp_path: Path) -> None:

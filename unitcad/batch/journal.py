@@ -211,9 +211,9 @@ def _check_free(out: Path, head: dict[str, Any]) -> None:
     if not (out / LOCK).exists():
         raise UnitcadError(f"{out}: holds something that is no batch's result; choose another folder with -o")
     try:
-        there = json.loads((out / TABLE).read_bytes())
+        there = files.read_json(out / TABLE, largest=files.LARGEST_TABLE, links=False)
         name, same = there["name"], there["batch"] == head["batch"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    except (UnitcadError, KeyError, TypeError):
         return  # it was interrupted before there was a table
     if not same:
         raise _another(out, name)

@@ -26,8 +26,8 @@ TIMINGS = "timings.json"
 OF_EVERY_BATCH = ("index", "status", "reason", "folder")
 """Columns that batch.json has before those that were swept, which end at `name`."""
 DAMAGED = "damaged"
-LARGEST_BATCH, LARGEST_DRAWING = 256_000_000, 4_000_000
-"""Bytes of a batch.json and of a drawing."""
+LARGEST_DRAWING = 4_000_000
+"""Bytes of a drawing."""
 MOST_FILES = 2000
 """Files of a variant that the page lists."""
 
@@ -154,7 +154,7 @@ def _in_order(columns: list[str]) -> list[str]:
 def batch(folder: Path) -> dict[str, Any] | None:
     """batch.json of a folder, None without one. Raises UnitcadError where it can't be read."""
     try:
-        said = files.read_json(folder / "batch.json", largest=LARGEST_BATCH, links=False)
+        said = files.read_json(folder / "batch.json", largest=files.LARGEST_TABLE, links=False)
     except files.NotThere:
         return None
     expect(said, BatchFile, folder / "batch.json")
