@@ -8,6 +8,7 @@ from __future__ import annotations
 import stat
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -117,10 +118,12 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
     if not data:
         raise Unreadable(finding("F001", "the file is empty"))
     strange = sniff.foreign(data[:2048])
-    if strange and (kind, strange) not in {("3mf", "zip"), ("step", "step")}:
+    if strange and (kind, strange) not in {("3mf", "zip"), ("step", "step"), ("glb", "glb")}:
         raise Unreadable(finding("F005", f"named {path.suffix}, but the content is {strange}"))
     if kind == "3mf" and strange != "zip":
         raise Unreadable(finding("F005", f"named {path.suffix}, but the content is no zip"))
+    if kind == "glb" and strange != "glb":
+        raise Unreadable(finding("F005", f"named {path.suffix}, but the content is no binary glTF"))
     view = memoryview(data)
     if kind == "3mf":
         from unitcad.check.threemf import check_3mf
@@ -130,11 +133,13 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
         from unitcad.check.read_step import check_step
 
         return check_step(path, view, options)
-    meshes, findings = _reader(kind)(view, options.limits, deadline)
+    if kind == "glb" and options.unit is None:
+        options = replace(options, unit="meter")  # as the format says
+    meshes, findings = _reader(kind, options.unit)(view, options.limits, deadline)
     del view, data
     if not meshes:
         return list(ending(findings)), Facts()
-    factor = UNITS_MM[options.unit] if options.unit else 1.0
+    factor = UNITS_MM[options.unit] if options.unit and kind != "glb" else 1.0
     if factor != 1.0:
         meshes = [replace(mesh, vertices=mesh.vertices * factor) for mesh in meshes]
     with keeping(findings):
@@ -142,14 +147,21 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
     return findings + list(judged.findings), judged.facts
 
 
-def _reader(kind: str) -> Reader:
-    """The reader of a format that holds one mesh; its module is loaded by the first file that needs it."""
+def _reader(kind: str, unit: str | None = None) -> Reader:
+    """The reader of a format that holds one mesh; its module is loaded by the first file that needs it.
+
+    A GLB's numbers are turned into mm where they are read, so its reader takes the unit.
+    """
     if kind == "stl":
         from unitcad.check.read_stl import read_stl as read
     elif kind == "ply":
         from unitcad.check.read_ply import read_ply as read
     elif kind == "obj":
         from unitcad.check.read_obj import read_obj as read
+    elif kind == "glb":
+        from unitcad.check.read_glb import read_glb
+
+        return partial(read_glb, unit_mm=UNITS_MM[unit or "meter"])
     else:
         from unitcad.check.read_off import read_off as read
     return read

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import PurePath
 
-SUFFIXES = {".stl", ".3mf", ".obj", ".ply", ".off", ".step", ".stp"}
+SUFFIXES = {".stl", ".3mf", ".obj", ".ply", ".off", ".glb", ".step", ".stp"}
 _MAGIC = (
     (b"PK\x03\x04", "zip"),
     (b"PK\x05\x06", "zip"),
@@ -40,7 +40,7 @@ def foreign(head: bytes) -> str | None:
 
 
 def kind_of(path: str, head: bytes) -> str:
-    """The reader for a file: stl, 3mf, obj, ply, off, step, or "" for a suffix that none reads."""
+    """The reader for a file: stl, 3mf, obj, ply, off, glb, step, or "" for a suffix that none reads."""
     suffix = PurePath(path).suffix.lower()
     if suffix not in SUFFIXES:
         return ""

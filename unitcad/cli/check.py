@@ -63,7 +63,7 @@ def check(
         str | None, typer.Option(help="Say what a code means, why it matters and how to fix it.")
     ] = None,
 ) -> None:
-    """Judge mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, and STEP with a B-rep extra."""
+    """Judge mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB, and STEP with a B-rep extra."""
     from unitcad.check import detail, formats, rulebook, run
     from unitcad.cli import check_settings
 
