@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from exact_pairs import cross, dot, minus, point, reference
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.check import check_mesh
@@ -15,52 +16,6 @@ from unitcad.check.limits import Deadline
 from unitcad.check.pairs import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
 from unitcad.check.rulebook import explain
 from unitcad.check.triangles import common_point, coplanar, meet
-
-
-def _point(p) -> list[Fraction]:
-    return [Fraction(float(x)) for x in p]
-
-
-def _minus(a, b):
-    return [x - y for x, y in zip(a, b, strict=True)]
-
-
-def _cross(a, b):
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def _dot(a, b):
-    return sum(x * y for x, y in zip(a, b, strict=True))
-
-
-def _cut(triangle, other):
-    """Where a triangle's border meets the other's plane, and its corners' heights over it."""
-    normal = _cross(_minus(other[1], other[0]), _minus(other[2], other[0]))
-    height = [_dot(normal, _minus(p, other[0])) for p in triangle]
-    points = [triangle[k] for k in range(3) if height[k] == 0]
-    for k in range(3):
-        a, b = height[k], height[(k + 1) % 3]
-        if a * b < 0:
-            t = a / (a - b)
-            points.append([x + t * (y - x) for x, y in zip(triangle[k], triangle[(k + 1) % 3], strict=True)])
-    return points, height
-
-
-def reference(a, b) -> tuple[bool, bool] | None:
-    """(crosses, touches) by intersecting both triangles with the line of their planes; None if coplanar."""
-    a, b = [_point(p) for p in a], [_point(p) for p in b]
-    points_a, height_a = _cut(a, b)
-    points_b, height_b = _cut(b, a)
-    if all(h == 0 for h in height_a):
-        return None
-    if not points_a or not points_b:
-        return False, False
-    normals = [_cross(_minus(t[1], t[0]), _minus(t[2], t[0])) for t in (a, b)]
-    line = _cross(*normals)
-    on_a, on_b = [_dot(line, p) for p in points_a], [_dot(line, p) for p in points_b]
-    low, high = max(min(on_a), min(on_b)), min(max(on_a), max(on_b))
-    through = all(min(h) < 0 < max(h) for h in (height_a, height_b))
-    return low < high and through, low <= high
 
 
 @pytest.mark.parametrize("kind", ["grid", "grid sharing a corner", "random", "random sharing a corner"])
@@ -103,10 +58,10 @@ def test_orientation_is_never_wrong(scale: str) -> None:
     found = orient3d(*p)
     flat = orient2d(p[0, :, :2], p[1, :, :2], p[3, :, :2])
     for i in range(400):
-        a, b, c, d = (_point(p[k, i]) for k in range(4))
-        u, v, w = _minus(a, d), _minus(b, d), _minus(c, d)
-        assert found[i] == _sign(_dot(_cross(u, v), w))
-        s, t = _minus(a, d), _minus(b, d)
+        a, b, c, d = (point(p[k, i]) for k in range(4))
+        u, v, w = minus(a, d), minus(b, d), minus(c, d)
+        assert found[i] == _sign(dot(cross(u, v), w))
+        s, t = minus(a, d), minus(b, d)
         assert flat[i] == _sign(s[0] * t[1] - s[1] * t[0])
     if scale == "eighths on a plane":
         assert not found.any()

@@ -36,6 +36,32 @@ def orient2d(a: Floats, b: Floats, c: Floats) -> Ints:
     return _signs(a, b, c)
 
 
+def sides(a: Floats, b: Floats) -> Ints:
+    """The side of the plane of each triangle `a` (corner, axis, n) that each corner of `b` lies on, int8 (corner, n).
+
+    Positive where `a` is seen anticlockwise; zero for all corners where `a` has no area.
+    """
+    one, two = a[1] - a[0], a[2] - a[0]
+    normal, size = np.empty_like(one), np.empty_like(one)
+    for axis in range(3):
+        y, z = (axis + 1) % 3, (axis + 2) % 3
+        left, right = one[y] * two[z], one[z] * two[y]
+        np.subtract(left, right, out=normal[axis])
+        np.add(np.abs(left, out=left), np.abs(right, out=right), out=size[axis])
+    sign = np.empty((3, a.shape[2]), np.int8)
+    for k in range(3):
+        offset = b[k] - a[0]
+        value = offset[0] * normal[0] + offset[1] * normal[1] + offset[2] * normal[2]
+        np.abs(offset, out=offset)
+        terms = offset[0] * size[0] + offset[1] * size[1] + offset[2] * size[2]
+        sign[k] = np.sign(value)
+        unsure = np.flatnonzero(np.abs(value) <= _BOUND[3] * terms + _TINY)
+        if len(unsure):
+            points = np.stack([corner.take(unsure, axis=1) for corner in (b[k], a[1], a[2], a[0])])
+            sign[k, unsure] = _exact(points, terms[unsure])
+    return sign
+
+
 def _signs(*points: Floats) -> Ints:
     axes = len(points) - 1
     sign = np.empty(len(points[0]), np.int8)

@@ -6,7 +6,7 @@ components and objects be, and says what is filled, so this is a warning.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -127,11 +127,17 @@ def printed(
         if alike not in judged:
             mesh = mesh_of(thing, instance.key[0], factor, instance.matrix)
             with keeping(found), keeping(change=lambda kept, mesh=mesh: in_file(kept, mesh)):
-                of = printing.judge(topology.judge(mesh, deadline), printer, deadline)
+                with keeping(change=_last):  # what the topology rules found was reported with the object
+                    shape = topology.judge(mesh, deadline)
+                of = printing.judge(shape, printer, deadline)
             judged[alike] = instance.matrix[3], in_file(of, mesh)
         begin, of = judged[alike]
         found += _shifted(of, (instance.matrix[3] - begin) * factor)
     return found
+
+
+def _last(findings: Iterable[Finding]) -> Iterator[Finding]:
+    return (item for item in findings if item.ends)
 
 
 def _shifted(findings: Sequence[Finding], by: Floats) -> Iterator[Finding]:

@@ -72,6 +72,45 @@ def boxes_of(steps: list[Ints], *corners: Ints) -> Ints:
     return boxes
 
 
+@dataclass(frozen=True)
+class Slabs:
+    """The steps along each diagonal of space between which faces lie: words of four low ones, of four high ones."""
+
+    low: Ints
+    high: Ints
+
+    def meeting(self, i: Ints, j: Ints) -> tuple[Ints, Ints]:
+        """The pairs i, j of faces whose slabs meet along all diagonals."""
+        meet = self._reach(i, j)
+        meet &= self._reach(j, i)
+        keep = np.flatnonzero(meet.reshape(-1, 4).all(axis=1))
+        return i[keep], j[keep]
+
+    def _reach(self, i: Ints, j: Ints) -> Bools:
+        return self.low.take(i, mode="clip").view(np.uint16) <= self.high.take(j, mode="clip").view(np.uint16)
+
+
+def slabs_of(points: Floats, *corners: Ints) -> Slabs:
+    """The slabs of faces, as `boxes_of` makes their boxes.
+
+    They are a step wider on both sides; a step is a million times what rounding takes, so they touch where faces do.
+    """
+    first, last = extent(points)
+    low, high = np.empty((2, len(corners[0]), 4), np.uint16)
+    for k, signs in enumerate(((1, 1, 1), (1, 1, -1), (1, -1, 1), (-1, 1, 1))):
+        along = (points - first) @ np.array(signs, float)
+        span = max(np.ptp(along), 1e-6 * (last - first).max(), 1e-300)
+        steps = ((along - along.min()) * ((_TOP - 2) / span)).astype(np.uint16) + np.uint16(1)
+        low[:, k] = high[:, k] = steps[corners[0]]
+        for corner in corners[1:]:
+            at = steps[corner]
+            np.minimum(low[:, k], at, out=low[:, k])
+            np.maximum(high[:, k], at, out=high[:, k])
+    low -= np.uint16(1)
+    high += np.uint16(1)
+    return Slabs(low.view(np.uint64)[:, 0], high.view(np.uint64)[:, 0])
+
+
 def meeting_pairs(boxes: Ints, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
     """Blocks of pairs i, j of different rows of `boxes` whose boxes meet, each pair once.
 

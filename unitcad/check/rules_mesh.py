@@ -63,12 +63,14 @@ def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
 
 def _drawn(place: Location, mesh: Mesh) -> Location:
     """The location with the middle of its triangles and, where somebody draws, the number of their mesh."""
-    if place.centre is not None:
+    if place.mesh is not None or (place.centre is not None and place.region is None):
         return place
     whole, meshes = place.region is not None, detail().meshes
     region = place.region if whole else np.array(place.faces, np.int64)
     centre = place.xyz
-    if len(region) and (whole or len(region) > 1 or centre is None):
+    if place.centre is not None:
+        centre = place.centre
+    elif len(region) and (whole or len(region) > 1 or centre is None):
         low, high = extent(mesh.vertices[mesh.faces[region]].reshape(-1, 3))
         x, y, z = ((low + high) / 2).tolist()
         centre = (x, y, z)

@@ -11,8 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.exact import orient2d, orient3d
+from unitcad.check.exact import orient2d, orient3d, sides
 from unitcad.check.mesh import Bools, Floats, Ints
+
+_BLOCK = 1 << 12  # pairs whose corners stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -51,11 +53,22 @@ _ALONE, _FLIP = _table()
 
 
 def meet(a: Floats, b: Floats) -> Meeting:
-    """Decide for rows of corners (n, 3, 3); no triangle may be without area."""
+    """Decide for rows of corners (n, 3, 3); no triangle may be without area.
+
+    Where one triangle lies wholly on one side of the other's plane, the other's `side` is not worked out, and 1.
+    """
     n = len(a)
-    side_a = np.stack([-orient3d(b[:, 0], b[:, 1], b[:, 2], a[:, k]) for k in range(3)], axis=1)
-    side_b = np.stack([-orient3d(a[:, 0], a[:, 1], a[:, 2], b[:, k]) for k in range(3)], axis=1)
-    flat = (side_a == 0).all(axis=1) | (side_b == 0).all(axis=1)
+    side_a, side_b = np.ones((2, n, 3), np.int8)
+    for start in range(0, n, _BLOCK):
+        left = np.arange(start, min(start + _BLOCK, n))
+        one, other = (np.ascontiguousarray(corners[left].transpose(1, 2, 0)) for corners in (a, b))
+        for into in (side_b, side_a):
+            side = sides(one, other)
+            into[left] = side.T
+            near = np.flatnonzero(~((side > 0).all(axis=0) | (side < 0).all(axis=0)))
+            left = left[near]
+            one, other = other.take(near, axis=2), one.take(near, axis=2)
+    flat = (side_b == 0).all(axis=1)
     apart = _one_side(side_a) | _one_side(side_b)
     crosses, touches, overlaps = np.zeros(n, bool), np.zeros(n, bool), np.zeros(n, bool)
     rest = np.flatnonzero(~flat & ~apart)

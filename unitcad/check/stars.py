@@ -1,0 +1,103 @@
+"""Vertices whose faces can meet nowhere but in that vertex and their common edges, since their star is a height field.
+
+Most pairs of faces whose boxes meet are neighbours round such a vertex, and need no look.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from unitcad.check.mesh import Bools, Floats, Ints
+
+_BLOCK = 1 << 14  # faces whose coordinates stay in the processor's cache
+_ROUNDING = 1e-15  # of the squared longest side: more than rounding takes from twice an area
+_SOUND = 1e-9  # of the squared longest side: faces with less area have no direction worth adding to a mean
+_FACING = 0.01  # cosine to the mean direction
+
+
+def height_fields(vertices: Floats, corners: tuple[Ints, ...], areas: Floats, surrounded: Bools) -> Bools:
+    """Which vertices have such a star, of those that are `surrounded` by faces wound alike.
+
+    `corners` are three columns of vertices of the faces, `areas` (m, 3) twice their area vectors.
+    """
+    columns = [np.ascontiguousarray(vertices[:, axis]) for axis in range(3)]
+    found = _along_axes(columns, corners, areas) & surrounded
+    return found | _along_means(columns, corners, areas, surrounded & ~found)
+
+
+def _along_axes(columns: list[Floats], corners: tuple[Ints, ...], areas: Floats) -> Bools:
+    """Vertices whose faces all face one way along some axis and go round once.
+
+    Seen along the axis each face then turns the same way by less than half a turn, so turns are counted by the
+    neighbours that pass the line of one coordinate: comparisons only, hence exact.
+    """
+    n, m = len(columns[0]), len(areas)
+    ways = np.zeros(m, np.uint8)  # bits 0 to 2: faces up along x, y, z; 3 to 5: down
+    rises, falls = np.zeros((2, 3, m), np.uint8)  # a bit an axis, for each side
+    for start in range(0, m, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        sides = _sides(columns, [corner[block] for corner in corners])
+        least = _ROUNDING * _longest(sides)
+        for axis in range(3):
+            up = np.ascontiguousarray(areas[block, axis])
+            ways[block] |= (up > least).view(np.uint8) << axis
+            ways[block] |= (up < -least).view(np.uint8) << (axis + 3)
+            for k in range(3):
+                rises[k, block] |= (sides[k][axis] > 0).view(np.uint8) << axis
+                falls[k, block] |= (sides[k][axis] < 0).view(np.uint8) << axis
+    common = np.full(n, 63, np.uint8)
+    for corner in corners:
+        np.bitwise_and.at(common, corner, ways)
+    common = (common | (common >> 3)) & 7
+    axis_bit = common & (~common + np.uint8(1))
+    # The coordinate to count by is the one after the axis: bits move round by one.
+    line = ((axis_bit << 1) | (axis_bit >> 2)) & 7
+    turns = np.zeros(n, np.int64)
+    for k, corner in enumerate(corners):
+        passes = (rises[k] & ~falls[k - 1] & line.take(corner, mode="clip")) != 0
+        turns += np.bincount(corner[passes], minlength=n)
+    return (common != 0) & (turns == 1)
+
+
+def _along_means(columns: list[Floats], corners: tuple[Ints, ...], areas: Floats, asked: Bools) -> Bools:
+    """The same for the vertices `asked`, along the mean normal of each one's faces: rims and corners.
+
+    Rounding moves a face's turn by 2e-5 at most, and turns are whole.
+    """
+    n = len(asked)
+    some = np.flatnonzero(asked[corners[0]] | asked[corners[1]] | asked[corners[2]])
+    if not len(some):
+        return np.zeros(n, bool)
+    ids = [corner.take(some) for corner in corners]
+    sides = _sides(columns, ids)
+    area = [areas[:, axis].take(some) for axis in range(3)]
+    size = np.sqrt(_dot(area, area))
+    sound = size > _SOUND * _longest(sides)
+    share = 1 / np.where(sound, size, np.inf)
+    along = [np.add.reduce([np.bincount(corner, share * part, n) for corner in ids]) for part in area]
+    length = np.maximum(np.sqrt(_dot(along, along)), 1e-300)
+    along = [part / length for part in along]
+    turns = np.zeros(n)
+    for k, corner in enumerate(ids):
+        up = [part.take(corner) for part in along]
+        double = _dot(area, up)
+        flat = _dot(sides[k], up) * _dot(sides[k - 1], up) - _dot(sides[k], sides[k - 1])
+        asked[corner[double * share <= _FACING]] = False
+        turns += np.bincount(corner, np.arctan2(double, flat), n)
+    return asked & (np.abs(turns - 2 * np.pi) < 0.1)
+
+
+def _sides(columns: list[Floats], ids: list[Ints]) -> list[list[Floats]]:
+    """The sides of faces from each corner to the next, by axis."""
+    at = [[column.take(corner, mode="clip") for column in columns] for corner in ids]
+    return [[at[(k + 1) % 3][axis] - at[k][axis] for axis in range(3)] for k in range(3)]
+
+
+def _longest(sides: list[list[Floats]]) -> Floats:
+    """The squared longest side."""
+    one, two, three = (_dot(side, side) for side in sides)
+    return np.maximum(np.maximum(one, two), three)
+
+
+def _dot(a: list[Floats], b: list[Floats]) -> Floats:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
