@@ -12,6 +12,7 @@ import errno
 import json
 import math
 import os
+import re
 import secrets
 import shutil
 import stat
@@ -26,10 +27,13 @@ LARGEST = 16_000_000
 LARGEST_TABLE = 256_000_000
 """Bytes that a batch's table may have."""
 TEMPORARY = ".tmp-"
-MARK = "unitcad-scratch"
-"""The file in every scratch folder: locked while its maker lives, it holds FORMAT, the folder's token, a name."""
+MARK, LOCK = "unitcad-scratch", "unitcad-lock"
+"""The files in every scratch folder: the mark holds FORMAT, the folder's token, a name; the lock is held while its
+maker lives. They are two, since Windows lets nobody read a locked file.
+"""
 FORMAT = "unitcad scratch 1"
 OLD, NEW = "old", "new"
+_DEVICE = re.compile(r"con|prn|aux|nul|com[0-9]|lpt[0-9]", re.IGNORECASE)
 
 
 class NotThere(UnitcadError):
@@ -139,6 +143,19 @@ def write_new(path: Path, content: bytes, *, sync: bool = False) -> None:
             raise
 
 
+def seen_from(path: str | os.PathLike[str], folder: str | os.PathLike[str] = ".") -> str:
+    """A path as seen from a folder, with slashes; the whole path where that is on another drive of Windows."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return Path(os.path.abspath(path)).as_posix()
+
+
+def names_device(name: str) -> bool:
+    """Whether a file of this name would be a device on Windows, whatever its ending."""
+    return _DEVICE.fullmatch(name.partition(".")[0].rstrip()) is not None
+
+
 def sync_folder(folder: Path) -> None:
     """Bring a folder's names to the disk; nothing where the system can't. Raises OSError."""
     if os.name != "posix":
@@ -165,11 +182,10 @@ def scratch(parent: Path, name: str = "") -> Iterator[Path]:
     except OSError as error:
         error.filename = str(parent)  # the name that the person knows
         raise
-    lock = FileLock(folder / MARK, thread_local=False)
+    lock = FileLock(folder / LOCK, thread_local=False)
     try:
         lock.acquire(blocking=False)
-        with open(folder / MARK, "r+b", opener=regular(links=False)) as mark:
-            mark.write(f"{FORMAT}\n{token}\n{name}\n".encode())
+        write_new(folder / MARK, f"{FORMAT}\n{token}\n{name}\n".encode())
         yield folder
     finally:
         lock.release()
@@ -187,7 +203,7 @@ def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
         name = _marked(folder)
         if name is None:
             continue
-        lock = FileLock(folder / MARK, thread_local=False)
+        lock = FileLock(folder / LOCK, thread_local=False)
         try:
             lock.acquire(blocking=False)
         except OSError:  # it is held (Timeout is an OSError), or can't be

@@ -46,6 +46,17 @@ def test_no_tool_needs_a_repair(source: tuple[str, ...], tmp_path: Path) -> None
     assert [file.name for file in files if slicer.needs_repair(file)] == []
 
 
+@pytest.mark.parametrize("locale", ["xx_YY.UTF-8", "de_DE.UTF-8", ""])
+def test_a_locale_that_is_not_installed_does_no_harm(locale: str, tmp_path: Path, monkeypatch) -> None:
+    for name in ("LANG", "LC_ALL", "LC_NUMERIC"):
+        monkeypatch.setenv(name, locale)
+    folder = tmp_path / "größe"
+    folder.mkdir()
+    file = written(folder, "single-embedded")[0]
+    assert not slicer.needs_repair(file)
+    assert slicer.slice_file(file, printers()["fdm-0.4"]).print_s > 60
+
+
 def test_a_broken_mesh_needs_one(tmp_path: Path) -> None:
     """A facet left out: the check sees what it should."""
     content = written(tmp_path, "single-embedded")[0].read_bytes()

@@ -98,9 +98,8 @@ def _commands(words: list[tuple[str, Any]], tmp_path: Path, capsys: Any, monkeyp
             (tmp_path / "spec.toml").write_text(toml(with_value(base, path, value)), "utf-8")
         except UnicodeEncodeError:  # no file holds half a surrogate pair
             continue
-        (tmp_path / "sweep.toml").write_text(
-            'base = "./spec.toml"\n[sweep]\n"estimate.frequency_hz" = [100.0, 120.0]\n', "utf-8"
-        )
+        swept = "casting.room_c" if path.startswith("estimate") else "estimate.frequency_hz"
+        (tmp_path / "sweep.toml").write_text(f'base = "./spec.toml"\n[sweep]\n"{swept}" = [20.0, 25.0]\n', "utf-8")
         axis = toml({"base": "encapsulating", "sweep": {path: [value]}})
         (tmp_path / "axis.toml").write_text(axis, "utf-8")
         before = sorted(tmp_path.rglob("*"))

@@ -26,6 +26,7 @@ from msgspec import Meta, Struct, field, structs
 from unitcad.batch.paths import check_path
 from unitcad.cache import digest
 from unitcad.errors import Refusal, unknown_name
+from unitcad.files import names_device
 from unitcad.spec import Spec, check_plain, convert, from_data, override, put, read, read_toml, templates
 from unitcad.spec.fields import fields_of
 
@@ -105,7 +106,8 @@ class Sweep:
     @property
     def slug(self) -> str:
         """The name as a folder's."""
-        return re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-") or "batch"
+        slug = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-") or "batch"
+        return f"{slug}-batch" if names_device(slug) else slug
 
     def overridden(self, overrides: Sequence[str]) -> Sweep:
         """The sweep with each "path=value" put into every base; what is swept stays swept. Raises Refusal."""

@@ -85,12 +85,7 @@ def apply(baseline: Baseline, path: Path, report: FileReport, shown: int) -> Fil
 
 def _key(path: Path, file: str) -> str:
     """A file's name in the baseline at `path`."""
-    whole = os.path.abspath(file)
-    try:
-        relative = Path(os.path.relpath(whole, os.path.abspath(path.parent))).as_posix()
-    except ValueError:  # another drive of Windows
-        relative = Path(whole).as_posix()
-    return relative.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    return files.seen_from(file, path.parent).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def _may_be(found: Finding) -> bool:

@@ -105,7 +105,7 @@ def work(listing: Listing, paths: Sequence[str], options: Choice, printer_named:
 
     `options` gives those of a path.
     """
-    chosen = list(paths) or [os.path.relpath(path) for path in listing.files if path.lower().endswith(_MESHES)]
+    chosen = list(paths) or [files.seen_from(path) for path in listing.files if path.lower().endswith(_MESHES)]
     known = catalogue.printers()
     found = []
     for path in chosen:
@@ -134,9 +134,9 @@ def unjudged(listing: Listing, judged: Sequence[str], options: Choice) -> list[F
     One of the manifest itself comes last where it lists paths outside its folder (M005): nothing there is read.
     """
     seen = {os.path.abspath(path) for path in judged}
-    left = [os.path.relpath(path) for path in listing.files if path not in seen]
+    left = [files.seen_from(path) for path in listing.files if path not in seen]
     reports = [compare(listing, FileReport(path), options(path)) for path in left]
-    name = os.path.relpath(listing.path)
+    name = files.seen_from(listing.path)
     if listing.outside and options(name).wants("M005"):
         shown = ", ".join(repr(path[:80]) for path in listing.outside[:3]) + (
             ", ..." if len(listing.outside) > 3 else ""

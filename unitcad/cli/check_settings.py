@@ -5,7 +5,6 @@ The nearest file with such a table, from the working directory upwards, is used;
 
 from __future__ import annotations
 
-import os
 import tomllib
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
@@ -16,6 +15,7 @@ from msgspec import Meta, Struct, field
 
 from unitcad import files
 from unitcad.errors import Refusal, UnitcadError, unknown_key
+from unitcad.files import seen_from
 from unitcad.spec.convert import convert
 
 NAMES = ("unitcad.toml", "pyproject.toml")
@@ -51,24 +51,20 @@ class Configuration(Struct, frozen=True, kw_only=True):
     @property
     def shown(self) -> str | None:
         """The file's path from the working directory."""
-        return None if self.path is None else _from_here(self.path)
+        return None if self.path is None else seen_from(self.path)
 
     @property
     def baseline(self) -> Path | None:
         """The baseline's path, which the file gives from its own folder."""
         if self.path is None or self.settings.baseline is None:
             return None
-        return Path(_from_here(self.path.parent / self.settings.baseline))
+        return Path(seen_from(self.path.parent / self.settings.baseline))
 
     def ignored(self, path: str) -> list[str]:
         """Prefixes of codes that per-file-ignores drops for a file; patterns are seen from the settings' folder."""
         if self.path is None:
             return []
-        whole = os.path.abspath(path)
-        try:
-            below = Path(os.path.relpath(whole, self.path.parent)).as_posix()
-        except ValueError:  # another drive of Windows
-            below = Path(whole).as_posix()
+        below = seen_from(path, self.path.parent)
         return [
             code
             for pattern, codes in self.settings.per_file_ignores.items()
@@ -105,7 +101,7 @@ def _table(path: Path) -> str:
 
 def _read(path: Path) -> Configuration | None:
     """What a file sets; None where it has no table for us. A unit's spec of the name unitcad.toml is no such file."""
-    shown = _from_here(path.absolute())
+    shown = seen_from(path.absolute())
     try:
         data = tomllib.loads(files.read_text(path))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
@@ -135,11 +131,3 @@ def _mapping(table: str, data: Any) -> Mapping[str, Any]:
     if isinstance(data, Mapping):
         return data
     raise Refusal(table, str(data)[:60], "takes a table")
-
-
-def _from_here(path: Path) -> str:
-    """A path as seen from the working directory; as it is where that is on another drive."""
-    try:
-        return Path(os.path.relpath(path)).as_posix()
-    except ValueError:
-        return str(path)

@@ -8,8 +8,6 @@ from typing import Annotated
 
 import typer
 
-_RESERVED = re.compile(r"con|prn|aux|nul|com[0-9]|lpt[0-9]", re.IGNORECASE)
-
 
 def init(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Of the variant and of the file, NAME.toml.")],
@@ -19,14 +17,14 @@ def init(
     """Write a commented spec to start from. The last line printed is the file."""
     from unitcad.cli.output import print_json
     from unitcad.errors import Refusal, UnitcadError
-    from unitcad.files import write_new
+    from unitcad.files import names_device, write_new
     from unitcad.spec.starter import starter
 
     stem = name.removesuffix(".toml")
     if not re.fullmatch(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,58}[A-Za-z0-9_-])?", stem):
         near = re.sub(r"[^A-Za-z0-9._-]+", "-", stem)[:60].strip("-._") or "my-unit"
         raise Refusal("NAME", name, "is a file's name of letters, digits, dots, dashes", near)
-    if _RESERVED.fullmatch(stem.partition(".")[0]):
+    if names_device(stem):
         raise Refusal("NAME", name, "is the name of a device on Windows", f"my-{stem}")
     path = Path(f"{stem}.toml")
     text = starter(stem, template)

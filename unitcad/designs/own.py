@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import Any, get_args
 
 from unitcad.errors import UnitcadError
+from unitcad.files import names_device
 from unitcad.shape import ProfileError, Shape
 from unitcad.spec import Spec
 from unitcad.spec.own import expect_allowed, function_of
@@ -36,6 +37,8 @@ def shapes(spec: Spec) -> dict[str, Shape]:
     for name, shape in made.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
             raise UnitcadError(f"design {spec.design}: {name!r} is no name for a body (a letter, then a-z 0-9 -)")
+        if names_device(name):
+            raise UnitcadError(f"design {spec.design}: {name!r} is no name for a body: on Windows it is a device")
         if not isinstance(shape, get_args(Shape)):
             raise UnitcadError(f"design {spec.design}: {name} is a {type(shape).__name__}, not a shape tree")
     return dict(made)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -18,7 +20,16 @@ from unitcad.catalogue import Printer
 from unitcad.errors import UnitcadError
 
 Say = Callable[[str], None]
-PROGRAM = "prusa-slicer"
+PROGRAMS = ("prusa-slicer", "prusa-slicer-console", "PrusaSlicer")
+"""What it is called on Linux, Windows and macOS, where it is on the path."""
+PLACES = {
+    "darwin": (
+        "/Applications/PrusaSlicer.app/Contents/MacOS/PrusaSlicer",
+        "/Applications/Original Prusa Drivers/PrusaSlicer.app/Contents/MacOS/PrusaSlicer",
+    ),
+    "win32": (r"C:\Program Files\Prusa3D\PrusaSlicer\prusa-slicer-console.exe",),
+}
+"""Where its installers put it without naming it on the path, by `sys.platform`."""
 NOZZLES_MM = {"fdm-0.25": 0.25}
 TIMEOUT_S = 300
 FILAMENT_MM = 1.75
@@ -36,9 +47,14 @@ class Sliced:
     filament_cm3: float
 
 
+def program() -> str | None:
+    """PrusaSlicer's command: on the path, or where its installer puts it; None where there is none."""
+    return next((found for name in (*PROGRAMS, *PLACES.get(sys.platform, ())) if (found := shutil.which(name))), None)
+
+
 def installed() -> bool:
-    """Whether PrusaSlicer is on the path."""
-    return shutil.which(PROGRAM) is not None
+    """Whether PrusaSlicer is on this machine."""
+    return program() is not None
 
 
 def needs_repair(path: Path) -> bool:
@@ -113,16 +129,18 @@ def report(
 def _version() -> str:
     """The slicer's own name and version."""
     found = re.search(r"^(PrusaSlicer-\S+)", _run("--help"), re.M)
-    return found.group(1) if found else PROGRAM
+    return found.group(1) if found else "PrusaSlicer"
 
 
 def _run(*arguments: str) -> str:
+    command = program()
+    if command is None:
+        raise UnitcadError("PrusaSlicer is not installed")
     try:
-        done = children.run([PROGRAM, *arguments], timeout=TIMEOUT_S)
-    except FileNotFoundError:
-        raise UnitcadError(f"{PROGRAM} is not installed") from None
+        # It ends at once where the person's locale is not installed; this one always is.
+        done = children.run([command, *arguments], timeout=TIMEOUT_S, env={**os.environ, "LC_ALL": "C"})
     except subprocess.TimeoutExpired:
-        raise UnitcadError(f"{PROGRAM} took more than {TIMEOUT_S} s") from None
+        raise UnitcadError(f"PrusaSlicer took more than {TIMEOUT_S} s") from None
     return (done.stdout + done.stderr).decode("utf-8", "replace")
 
 

@@ -21,9 +21,9 @@ def code_version() -> str:
     """The version and twelve digits over the package's own files: a changed line makes nothing of before reusable."""
     digest = hashlib.sha256()
     root = Path(str(files("unitcad")))
-    for file in sorted(root.rglob("*")):
-        if file.suffix in (".py", ".toml"):
-            digest.update(f"{file.relative_to(root)}\n".encode() + file.read_bytes())
+    named = {file.relative_to(root).as_posix(): file for file in root.rglob("*") if file.suffix in (".py", ".toml")}
+    for name, file in sorted(named.items()):
+        digest.update(f"{name}\n".encode() + file.read_bytes())
     return f"{__version__}+{digest.hexdigest()[:12]}"
 
 

@@ -1,0 +1,160 @@
+"""What differs between Linux, macOS and Windows, tried here by standing in for the other system's calls."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path, PureWindowsPath
+
+import filelock
+import pytest
+
+from unitcad import files
+from unitcad.errors import UnitcadError
+from unitcad.export import slicer
+from unitcad.pipeline import versions
+
+
+class OneReader(filelock.FileLock):
+    """A lock as Windows has it: while it is held nobody reads, writes or removes its file."""
+
+    def acquire(self, *args, **kwargs):
+        got = super().acquire(*args, **kwargs)
+        os.unlink(self.lock_file)
+        os.mkdir(self.lock_file)  # what is opened or unlinked by this name now fails
+        return got
+
+    def release(self, *args, **kwargs) -> None:
+        held = self.is_locked
+        super().release(*args, **kwargs)
+        if held:
+            os.rmdir(self.lock_file)
+
+
+def test_nobody_reads_or_removes_a_file_that_is_locked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(filelock, "FileLock", OneReader)
+    with files.scratch(tmp_path, "mine") as folder:
+        assert (folder / files.MARK).read_text().splitlines()[-1] == "mine"
+    assert list(tmp_path.iterdir()) == []
+    left = tmp_path / f"{files.TEMPORARY}0123456789abcdef"
+    left.mkdir()
+    (left / files.MARK).write_text(f"{files.FORMAT}\n0123456789abcdef\nmine\n")
+    assert list(files.leftovers(tmp_path)) == [(left, "mine")]
+    files.write(tmp_path / "whole", b"content")
+    assert (tmp_path / "whole").read_bytes() == b"content"
+
+
+def test_the_cache_lives_with_locks_that_nobody_removes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from unitcad.cache import DiskStore, collect
+    from unitcad.cache import disk as module
+
+    monkeypatch.setattr(module, "FileLock", OneReader)
+    store = DiskStore(tmp_path / "c")
+    sha = store.file("ab1", lambda: b"content")
+    assert store.file("ab1", lambda: pytest.fail("there")) == sha
+    store.close()
+    assert collect(tmp_path / "c", 0).entries == 1
+
+
+def test_a_path_on_another_drive_is_shown_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert files.seen_from("a/../b/c.stl") == "b/c.stl"
+    assert files.seen_from("/x/b/c.stl", "/x/d") == "../b/c.stl"
+
+    def other_drive(path: str, start: str = ".") -> str:
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    monkeypatch.setattr(os.path, "relpath", other_drive)
+    assert files.seen_from("/x/b/c.stl") == "/x/b/c.stl"
+
+
+@pytest.mark.parametrize("name", ["con", "CON", "Nul.toml", "com1", "lpt9.tar.gz", "aux "])
+def test_names_of_devices_are_known(name: str) -> None:
+    assert files.names_device(name)
+
+
+@pytest.mark.parametrize("name", ["cone", "com", "com10", "my-con", "null", "lpt"])
+def test_other_names_are_no_devices(name: str) -> None:
+    assert not files.names_device(name)
+
+
+def test_a_batch_s_folder_is_no_device() -> None:
+    from unitcad.batch.sweep import from_file
+
+    data = {"base": "encapsulating", "name": "Con", "sweep": {"diameter_mm": [14.0, 15.0]}}
+    assert from_file(data, Path(), "x").slug == "con-batch"
+    assert from_file({**data, "name": "Cone"}, Path(), "x").slug == "cone"
+
+
+def test_the_version_of_the_code_is_the_same_on_every_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same files by another separator, in the order in which another system sorts them."""
+    for name in ("a/b.py", "a.py", "B.py", "a-b/c.toml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(name)
+    monkeypatch.setattr(versions, "files", lambda package: tmp_path)
+    here = versions.code_version.__wrapped__()
+
+    class Windows(PureWindowsPath):
+        def rglob(self, pattern: str):
+            return sorted(Windows(path) for path in tmp_path.rglob(pattern) if path.is_file())
+
+        def read_bytes(self) -> bytes:
+            return Path(self.as_posix()).read_bytes()
+
+    monkeypatch.setattr(versions, "Path", Windows)
+    assert versions.code_version.__wrapped__() == here
+
+
+@pytest.mark.parametrize(
+    ("system", "on_path", "there", "found"),
+    [
+        ("linux", ["prusa-slicer"], [], "prusa-slicer"),
+        ("win32", ["prusa-slicer-console"], [], "prusa-slicer-console"),
+        ("darwin", ["PrusaSlicer"], [], "PrusaSlicer"),
+        ("darwin", [], [slicer.PLACES["darwin"][1]], slicer.PLACES["darwin"][1]),
+        ("win32", [], list(slicer.PLACES["win32"]), slicer.PLACES["win32"][0]),
+        ("linux", [], list(slicer.PLACES["darwin"]), None),
+        ("linux", [], [], None),
+    ],
+)
+def test_the_slicer_is_found_under_each_system_s_name(system, on_path, there, found, monkeypatch) -> None:
+    monkeypatch.setattr(slicer.sys, "platform", system)
+    monkeypatch.setattr(slicer.shutil, "which", lambda name: name if name in (*on_path, *there) else None)
+    assert slicer.program() == found
+    assert slicer.installed() == (found is not None)
+    if found is None:
+        with pytest.raises(UnitcadError, match="not installed"):
+            slicer.needs_repair(Path("x.stl"))
+
+
+def test_what_is_written_has_the_same_line_ends_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A result's texts are written as bytes: a system whose lines end otherwise changes none of them."""
+    monkeypatch.setattr(os, "linesep", "\r\n")
+    monkeypatch.chdir(tmp_path)
+    from unitcad.pipeline.build import build
+    from unitcad.spec import load
+
+    folder = build(load("embedded", ["output.formats=['stl']"]), tmp_path / "out", check=False).folder
+    texts = [file for file in folder.rglob("*") if file.suffix in (".toml", ".json", ".md", ".csv", ".svg")]
+    assert len(texts) >= 6
+    assert [file.name for file in texts if b"\r" in file.read_bytes()] == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a terminal of Windows takes any character")
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+@pytest.mark.parametrize("words", [["estimate"], ["estimate", "--json"], ["build", "--no-slice", "--formats", "stl"]])
+def test_a_name_that_the_terminal_lacks_is_shown_by_its_code(encoding: str, words: list[str], tmp_path: Path) -> None:
+    import json
+    import subprocess
+
+    done = subprocess.run(
+        [sys.executable, "-m", "unitcad", words[0], "embedded", *words[1:], "--set", 'name="Größe Ω"'],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONIOENCODING": encoding, "XDG_CACHE_HOME": str(tmp_path / "cache")},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    if "--json" in words:
+        assert json.loads(done.stdout.decode(encoding))["variant"]["name"] == "Größe Ω"
+    else:  # click writes UTF-8 to a stream that claims to be ASCII
+        assert any(name in done.stdout for name in ("Größe Ω".encode(encoding, "backslashreplace"), "Größe Ω".encode()))
