@@ -14,7 +14,7 @@ contents are kept once. `MemoryStore` keeps them for one build, `DiskStore` for 
 """
 
 from unitcad.cache.collect import DEFAULT_LIMIT_MB, Usage, collect, usage
-from unitcad.cache.disk import DiskStore, default_root, held
+from unitcad.cache.disk import DiskStore, default_root, free, held
 from unitcad.cache.store import Bundle, MemoryStore, MissingContent, Store, digest
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "collect",
     "default_root",
     "digest",
+    "free",
     "held",
     "usage",
 ]

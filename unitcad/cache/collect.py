@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from unitcad.cache.disk import GATE, MARK, let_go, lock, read, remove
+from unitcad.cache.disk import GATE, MARK, free, lock, read, remove
 from unitcad.errors import UnitcadError
 
 DEFAULT_LIMIT_MB = 4096
@@ -59,14 +59,7 @@ def _alone(root: Path, held: contextlib.ExitStack) -> bool:
         gate.acquire(blocking=False)
     except OSError:
         return False
-    alone = True
-    for path in (root / "locks").glob("*"):
-        other = lock(path)
-        try:
-            other.acquire(blocking=False)
-        except OSError:
-            alone = False
-        let_go(other)
+    alone = all([free(path) for path in (root / "locks").glob("*")])
     if alone:
         held.callback(gate.release)
     else:

@@ -308,6 +308,17 @@ def held(path: Path) -> Iterator[None]:
         let_go(taken)
 
 
+def free(path: Path) -> bool:
+    """Whether nobody holds the lock on a file, which is removed then: it was left by a process that died."""
+    taken = lock(path)
+    try:
+        taken.acquire(blocking=False)
+    except OSError:
+        return False
+    let_go(taken)
+    return True
+
+
 def let_go(taken: FileLock) -> None:
     """Release a lock and remove its file: whoever waits on it makes a new one."""
     if taken.is_locked:

@@ -21,6 +21,7 @@ from unitcad.errors import UnitcadError
 from unitcad.spec import Spec, read_toml, to_json, with_formats
 
 UNCHECKED = "--no-check"
+LOCK = re.compile(r"\.[a-z0-9-]+-[0-9a-f]{12}\.lock")
 PAGE = "report.html"
 """The page of a folder, made on request and kept up by every later build into it."""
 
@@ -84,10 +85,12 @@ def earlier(folder: Path, spec: Spec) -> Earlier:
 
 def whole(folder: Path, *, hashes: bool = False) -> dict[str, Any] | None:
     """The manifest of a result whose files are all there with the sizes that it lists, with `hashes` also with their
-    content; else None.
+    content; else None. Links count as nothing.
     """
     try:
         manifest = files.read_json(folder / "manifest.json", links=False)
+        if any((folder / parent).is_symlink() for parent in {Path(path).parent for path in manifest["files"]}):
+            return None
         for path, listed in manifest["files"].items():
             found = (folder / path).lstat()
             if not stat.S_ISREG(found.st_mode) or found.st_size != listed["bytes"]:
@@ -131,12 +134,17 @@ def replacing(folder: Path) -> Iterator[Path]:
 def clear_leftovers(out: Path) -> None:
     """Remove what processes that are gone left half written in `out`, and put back what they had moved aside.
 
-    Only scratch folders that carry our mark are touched.
+    Only scratch folders that carry our mark are touched, and empty files of the name that a result's lock has.
     """
     for scratch, name in files.leftovers(out):
         if name:
             _restore(scratch / files.OLD, out / name)
         shutil.rmtree(scratch, ignore_errors=True)
+    for path in out.glob(".*.lock"):
+        with contextlib.suppress(OSError):  # it has been released meanwhile
+            found = path.lstat()
+            if LOCK.fullmatch(path.name) and stat.S_ISREG(found.st_mode) and not found.st_size:
+                cache.free(path)
 
 
 def expect_folder(folder: Path) -> None:
@@ -154,11 +162,12 @@ def _restore(aside: Path, folder: Path) -> None:
 
 
 def _keep_others(old: Path, new: Path) -> None:
-    """Copy what the new folder lacks: files, and links as links."""
+    """Copy what the new folder lacks: files, and links as links; not what lies in a folder where it has a file."""
     for here, below, names in os.walk(old):
+        place = new / Path(here).relative_to(old)
         for name in (*below, *names):
-            file = Path(here, name)
-            copy = new / file.relative_to(old)
+            file, copy = Path(here, name), place / name
             if (file.is_file() or file.is_symlink()) and not os.path.lexists(copy):
-                copy.parent.mkdir(parents=True, exist_ok=True)
+                place.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(file, copy, follow_symlinks=False)
+        below[:] = [name for name in below if not (place / name).is_file()]

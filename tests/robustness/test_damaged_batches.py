@@ -1,0 +1,259 @@
+"""Damage to a batch's cache and results: the next run ends with the same bytes, or with one clear error about it."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+sys.path.append(str(Path(__file__).parent.parent / "batch"))
+from batching import bytes_of, leftovers, ring_sweep
+
+from unitcad.batch import Options, Summary, load_sweep, run
+from unitcad.batch.executors import SerialExecutor
+from unitcad.batch.journal import JOURNAL
+from unitcad.errors import UnitcadError
+
+FAR = 4_000_000_000
+Change = Callable[[Path, random.Random], None]
+
+
+class Batch:
+    """A finished batch with its cache, as a folder to be copied."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.out, self.cache = folder, folder / "out", folder / "cache"
+
+    def run(self, sweep: Path) -> Summary:
+        options = Options(("unit",), verify=True, cache=self.cache)
+        return run(load_sweep(sweep), self.out, options, SerialExecutor(), workers=1)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Batch, Path]:
+    folder = tmp_path_factory.mktemp("made")
+    sweep = ring_sweep(folder / "s", heights=[2.0, 3.0], materials=2)
+    batch = Batch(folder / "batch")
+    assert batch.run(sweep).ok == 4
+    return batch, sweep
+
+
+def _emptied(file: Path, dice: random.Random) -> None:
+    _anew(file, b"")
+
+
+def _cut(file: Path, dice: random.Random) -> None:
+    content = file.read_bytes()
+    _anew(file, content[: dice.randrange(len(content))])
+
+
+def _flipped(file: Path, dice: random.Random) -> None:
+    content = bytearray(file.read_bytes())
+    content[dice.randrange(len(content))] ^= 1 << dice.randrange(8)
+    _anew(file, bytes(content))
+
+
+def _zeroed(file: Path, dice: random.Random) -> None:
+    _anew(file, b"\0" * file.stat().st_size)
+
+
+def _longer(file: Path, dice: random.Random) -> None:
+    _anew(file, file.read_bytes() + dice.randbytes(1000))
+
+
+def _nonsense(file: Path, dice: random.Random) -> None:
+    _anew(file, b'[{"a": 1e999}]')
+
+
+def _gone(file: Path, dice: random.Random) -> None:
+    shutil.rmtree(file) if file.is_dir() and not file.is_symlink() else file.unlink()
+
+
+def _linked(file: Path, dice: random.Random) -> None:
+    aside = next(parent.parent for parent in file.parents if parent.name in ("out", "cache")) / "aside"
+    aside = aside.with_name(f"aside{len(list(aside.parent.iterdir()))}")
+    shutil.move(file, aside)
+    file.symlink_to(aside)
+
+
+def _dangling(file: Path, dice: random.Random) -> None:
+    _gone(file, dice)
+    file.symlink_to("nowhere")
+
+
+def _folder(file: Path, dice: random.Random) -> None:
+    _gone(file, dice)
+    file.mkdir()
+    (file / "file").touch()
+
+
+def _pipe(file: Path, dice: random.Random) -> None:
+    _gone(file, dice)
+    os.mkfifo(file)
+
+
+def _file(folder: Path, dice: random.Random) -> None:
+    _gone(folder, dice)
+    folder.write_text("something else")
+
+
+def _future(file: Path, dice: random.Random) -> None:
+    os.utime(file, (FAR, FAR))
+
+
+def _anew(file: Path, content: bytes) -> None:
+    """As a new file: a result is a link to the cache."""
+    file.unlink()
+    file.write_bytes(content)
+
+
+ANY: dict[str, Change] = {
+    "emptied": _emptied, "cut": _cut, "flipped": _flipped, "zeros": _zeroed, "longer": _longer, "nonsense": _nonsense,
+    "gone": _gone, "linked": _linked, "dangling": _dangling, "a folder": _folder, "a pipe": _pipe,
+    "of the future": _future,
+}  # fmt: skip
+
+
+def _swapped(folder: Path, dice: random.Random) -> None:
+    """Each file of a folder of entries under the name of another one."""
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    contents = [path.read_bytes() for path in paths]
+    for path, content in zip(paths, contents[1:] + contents[:1], strict=True):
+        _anew(path, content)
+
+
+def _each(change: Change) -> Change:
+    def changed(folder: Path, dice: random.Random) -> None:
+        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+            change(path, dice)
+
+    return changed
+
+
+IN_CACHE: dict[str, tuple[str, Change]] = {
+    **{
+        f"{kind}: each {how}": (kind, _each(change))
+        for kind in ("data", "files", "content")
+        for how, change in ANY.items()
+    },
+    **{f"{kind}: swapped": (kind, _swapped) for kind in ("data", "files")},
+    **{f"{kind}: gone": (kind, _gone) for kind in ("data", "files", "content", "tmp", "locks", "unitcad-cache", "")},
+    "mark: emptied": ("unitcad-cache", _emptied),
+    "a lock is a folder": ("locks/x", lambda path, dice: path.mkdir()),
+    "tmp holds a folder": ("tmp/x", lambda path, dice: path.mkdir()),
+    "tmp holds a pipe": ("tmp/x", lambda path, dice: os.mkfifo(path)),
+    "tmp is a file": ("tmp", _file),
+    "the cache is a file": ("", _file),
+}
+REFUSED_CACHE = {"tmp is a file", "the cache is a file"}
+
+IN_RESULTS: dict[str, tuple[str, Change]] = {
+    **{
+        f"{file}: {how}": (f"VARIANT/{file}", change)
+        for file in ("manifest.json", "spec.toml", "timings.json", "unit/layer1.stl")
+        for how, change in ANY.items()
+    },
+    "the variant: gone": ("VARIANT", _gone),
+    "the variant: a file": ("VARIANT", _file),
+    "the variant: linked": ("VARIANT", _linked),
+    "the variant's folder of files: a file": ("VARIANT/unit", _file),
+    "the variant's folder of files: linked": ("VARIANT/unit", _linked),
+    "the variant's lock: left behind": ("LOCK", lambda path, dice: path.touch()),
+    **{f"{file}: {how}": (file, ANY[how]) for file in ("batch.json", "variants.csv", "timings.json") for how in ANY},
+    **{f"{JOURNAL}: {how}": (JOURNAL, ANY[how]) for how in ANY},
+    **{f"batch.lock: {how}": ("batch.lock", ANY[how]) for how in ("gone", "linked", "dangling", "a folder", "a pipe")},
+}
+REFUSED = {
+    *(f"{JOURNAL}: {how}" for how in ("linked", "a folder", "a pipe")),
+    *(f"batch.lock: {how}" for how in ("linked", "dangling", "a folder")),
+    *(f"{file}: a folder" for file in ("batch.json", "variants.csv", "timings.json")),
+    f"{JOURNAL}: nonsense",
+}
+FAILED = {"the variant: a file", "the variant: linked"}
+"""A variant whose place is taken by something that is not ours fails with that reason; nothing is overwritten."""
+
+
+def _copied(made: Batch, folder: Path) -> Batch:
+    shutil.copytree(made.folder, folder, symlinks=True)
+    return Batch(folder)
+
+
+def _attack_cache(kind: str, made: tuple[Batch, Path], folder: Path, seed: int) -> None:
+    """The damage, then the batch into a new folder: all comes out of the cache, or is made again."""
+    batch, sweep = _copied(made[0], folder), made[1]
+    shutil.rmtree(batch.out)
+    place, change = IN_CACHE[kind]
+    change(batch.cache / place, random.Random(f"{kind} {seed}"))
+    if kind in REFUSED_CACHE:
+        with pytest.raises(UnitcadError, match="choose another with --cache"):
+            batch.run(sweep)
+        return
+    for _ in range(2):
+        summary = batch.run(sweep)
+        assert (summary.ok, summary.failed, summary.stopped) == (4, 0, "")
+        assert bytes_of(batch.out) == bytes_of(made[0].out)
+        assert not any(path.is_symlink() for path in batch.out.rglob("*"))
+        shutil.rmtree(batch.out)
+
+
+def _attack_results(kind: str, made: tuple[Batch, Path], folder: Path, seed: int) -> None:
+    batch, sweep = _copied(made[0], folder), made[1]
+    variant = json.loads((batch.out / "batch.json").read_text())["variants"][1]["folder"]
+    place, change = IN_RESULTS[kind]
+    place = place.replace("VARIANT", variant).replace("LOCK", f".{variant}.lock")
+    change(batch.out / place, random.Random(f"{kind} {seed}"))
+    if kind in REFUSED:
+        with pytest.raises((UnitcadError, OSError)) as error:
+            batch.run(sweep)
+        assert place.partition("/")[0] in str(error.value) or str(batch.out) in str(error.value)
+        return
+    try:
+        summary = batch.run(sweep)
+    except UnitcadError as error:
+        # A journal of which nothing is left is not begun anew without a word.
+        assert place == JOURNAL
+        assert "no journal of a batch" in str(error)
+        return
+    if kind in FAILED:
+        assert (summary.ok, summary.failed) == (3, 1)
+        assert f"{variant}: is a" in summary.failures[0]["reason"]
+        return
+    assert (summary.ok, summary.failed, summary.stopped) == (4, 0, "")
+    assert bytes_of(batch.out) == bytes_of(made[0].out)
+    assert not any(path.is_symlink() for path in batch.out.rglob("*"))
+    assert not leftovers(batch.out)
+    assert batch.run(sweep).taken_up == 4
+
+
+def _share(kinds: dict[str, tuple[str, Change]], count: int) -> list[str]:
+    return random.Random(1).sample(sorted(kinds), count)
+
+
+@pytest.mark.parametrize("kind", _share(IN_CACHE, 8))
+def test_a_damaged_cache(kind: str, made: tuple[Batch, Path], tmp_path: Path) -> None:
+    _attack_cache(kind, made, tmp_path / "batch", 0)
+
+
+@pytest.mark.parametrize("kind", _share(IN_RESULTS, 12))
+def test_damaged_results(kind: str, made: tuple[Batch, Path], tmp_path: Path) -> None:
+    _attack_results(kind, made, tmp_path / "batch", 0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", IN_CACHE)
+def test_every_damage_to_a_cache(kind: str, seed: int, made: tuple[Batch, Path], tmp_path: Path) -> None:
+    _attack_cache(kind, made, tmp_path / "batch", seed)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", IN_RESULTS)
+def test_every_damage_to_results(kind: str, seed: int, made: tuple[Batch, Path], tmp_path: Path) -> None:
+    _attack_results(kind, made, tmp_path / "batch", seed)

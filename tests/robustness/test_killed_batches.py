@@ -1,0 +1,113 @@
+"""Batches killed at random moments: what was done stays as it is, nothing runs on, and the end is the same bytes."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+import pytest
+
+sys.path.append(str(Path(__file__).parent.parent / "batch"))
+from batching import bytes_of, command, environment, leftovers, ring_sweep, rows
+
+from unitcad.batch.journal import JOURNAL
+from unitcad.pipeline.folder import whole
+
+HEIGHTS = [float(height) for height in range(2, 10)]
+MATERIALS = 3
+VARIANTS = len(HEIGHTS) * MATERIALS
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A batch that nobody disturbed: its sweep, what it wrote, seconds that it took."""
+
+    sweep: Path
+    bytes: dict[str, str]
+    seconds: float
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
+    folder = tmp_path_factory.mktemp("reference")
+    sweep = ring_sweep(folder / "s", heights=HEIGHTS, materials=MATERIALS)
+    start = time.monotonic()
+    child = _start(sweep, folder / "out", folder / "cache")
+    child.communicate(timeout=300)
+    assert child.returncode == 0
+    return Reference(sweep, bytes_of(folder / "out"), time.monotonic() - start)
+
+
+def _start(sweep: Path, out: Path, cache: Path) -> subprocess.Popen[bytes]:
+    words = ("batch", sweep, "-o", out, "-j", 2, "--cache", cache, "--json")
+    # A group of its own, so that a kill can be for the whole of it.
+    return subprocess.Popen(command(*words), stdout=subprocess.PIPE, env=environment(), start_new_session=True)
+
+
+def _noted(out: Path) -> dict[int, str]:
+    """The variants that the journal has, and the folders that it names."""
+    if not (out / JOURNAL).exists():
+        return {}
+    lines = (out / JOURNAL).read_bytes().split(b"\n")[1:-1]
+    return {found["index"]: found["folder"] for found in map(json.loads, lines)}
+
+
+def _kill(child: subprocess.Popen[bytes], dice: random.Random) -> None:
+    """By SIGKILL: the parent, the whole group, or a worker and then the parent."""
+    below = psutil.Process(child.pid).children(recursive=True) if child.poll() is None else []
+    match dice.choice(("parent", "group", "worker")):
+        case "parent":
+            child.kill()
+        case "group":
+            os.killpg(child.pid, signal.SIGKILL)
+        case "worker":
+            if below:
+                dice.choice(sorted(below, key=lambda process: process.pid)).kill()
+                time.sleep(dice.random() * 0.2)
+            child.kill()
+    child.communicate()
+    _, alive = psutil.wait_procs(below, timeout=30)
+    assert not [process for process in alive if process.status() != psutil.STATUS_ZOMBIE]
+
+
+def _trial(reference: Reference, folder: Path, kills: int, seed: int) -> None:
+    dice, out, cache = random.Random(seed), folder / "out", folder / "cache"
+    for _ in range(kills):
+        child = _start(reference.sweep, out, cache)
+        time.sleep(dice.uniform(0.05, 1.05) * reference.seconds)
+        if child.poll() is not None:
+            assert child.returncode == 0
+        _kill(child, dice)
+        # Whoever has a name is whole, in the journal or not; the next run leaves it where it is.
+        before = {path.name: path.stat().st_ino for path in out.glob("ring-*")}
+        assert all(whole(out / name, hashes=True) for name in before)
+        noted = _noted(out)
+        assert set(noted.values()) <= set(before)
+    child = _start(reference.sweep, out, cache)
+    told, _ = child.communicate(timeout=300)
+    assert child.returncode == 0
+    summary = json.loads(told)
+    assert (summary["ok"], summary["failed"], summary["warnings"]) == (VARIANTS, 0, [])
+    assert {name: (out / name).stat().st_ino for name in before} == before
+    assert summary["taken_up"] == len(noted)
+    assert bytes_of(out) == reference.bytes
+    assert len(rows(out)) == VARIANTS
+    assert not leftovers(out)
+
+
+def test_a_batch_that_is_killed_again_and_again(reference: Reference, tmp_path: Path) -> None:
+    _trial(reference, tmp_path, 3, 1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(2, 14))
+def test_batches_that_are_killed_again_and_again(seed: int, reference: Reference, tmp_path: Path) -> None:
+    _trial(reference, tmp_path, 5, seed)
