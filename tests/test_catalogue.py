@@ -67,7 +67,7 @@ def test_the_shipped_body_passes_the_validation_of_a_own_entries() -> None:
         ("materials", "mix_ratio", 0, 0.001),
         ("materials", "youngs_modulus_kpa", "soft", None),
         ("materials", "shore", 30, None),
-        ("printers", "bed_x_mm", 0, 10),
+        ("printers", "bed_x_mm", 0, 20),
         ("printers", "technology", "fmd", "fdm"),
         ("motors", "diameter_mm", -7, 1),
         ("motors", "rpm", 1e9, 300000),

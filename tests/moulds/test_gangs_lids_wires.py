@@ -52,10 +52,11 @@ def test_without_tails_any_number_of_columns() -> None:
     assert len(MouldSet.of("no-fpcb", "moulds.cavities=[4,2]").plan.layout.cells) == 8
 
 
-def test_a_piece_higher_than_the_printer() -> None:
+@pytest.mark.parametrize("set_by_hand", [("moulds.bed_z_mm=8",), ("moulds.plate_mm=30", "moulds.bed_z_mm=25")])
+def test_a_piece_higher_than_the_printer(set_by_hand: tuple[str, ...]) -> None:
     with pytest.raises(Refusal, match=r"moulds\.bed_z_mm") as refused:
-        MouldSet.of("encapsulating", "moulds.bed_z_mm=8")
-    MouldSet.of("encapsulating", f"moulds.bed_z_mm={refused.value.nearest}")
+        MouldSet.of("encapsulating", *set_by_hand)
+    MouldSet.of("encapsulating", *set_by_hand, f"moulds.bed_z_mm={refused.value.nearest}")
 
 
 def test_cells_are_numbered_and_numbers_keep_off_grooves_and_each_other() -> None:

@@ -47,7 +47,7 @@ Voltage = Annotated[float, Meta(ge=0.01, le=1000, description="rated")]
 Current = Annotated[float, Meta(ge=0.01, le=1e5, description="at the rated voltage")]
 Acceleration = Annotated[float, Meta(ge=0.001, le=1000, description="of the maker's test mass")]
 
-Bed = Annotated[float, Meta(ge=10, le=LONGEST_MM, description="side of the space that the printer fills")]
+Bed = Annotated[float, Meta(ge=20, le=LONGEST_MM, description="side of the space that the printer fills")]
 LayerHeight = Annotated[float, Meta(ge=0.005, le=2, description="height of a printed layer")]
 Play = Annotated[float, Meta(ge=0, le=2, description="how far the machine's axes miss, per side")]
 PlinthClearance = Annotated[float, Meta(ge=0.01, le=2, description="between a cup and its plinth, per side")]
