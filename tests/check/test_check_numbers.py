@@ -14,7 +14,8 @@ import pytest
 from conftest import Judge
 from hypothesis import given
 from hypothesis import strategies as st
-from shapes import box, mesh_xml, model_xml, package, stl
+from polygon_files import ply
+from shapes import CUBE_CORNERS, CUBE_FACES, box, mesh_xml, model_xml, package, stl
 
 from unitcad.check.findings import Location, number
 
@@ -64,7 +65,7 @@ def test_machine_formats_are_utf8_for_any_name(format_: str, tmp_path: Path) -> 
     for name in (b"k\xe4se\xff\\.stl", "Käse.stl".encode(), b"line\nbreak.stl"):
         (tmp_path / os.fsdecode(name)).write_bytes(stl(box()[1:]))
     command = [sys.executable, "-m", "unitcad", "check", ".", "--output-format", format_]
-    for encoding in ("utf-8", "latin-1", "ascii"):
+    for encoding in ("utf-8", "ascii") if format_ == "json" else ("latin-1",):
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=60,
                               env={**os.environ, "PYTHONIOENCODING": encoding})  # fmt: skip
         assert (done.returncode, done.stderr) == (1, b"")
@@ -81,3 +82,13 @@ def test_machine_formats_are_utf8_for_any_name(format_: str, tmp_path: Path) -> 
                     "k\\xe4se\\xff\\.stl",
                     "line\nbreak.stl",
                 ]
+
+
+def test_numbers_that_float32_has_none_for_are_zero(judge: Judge) -> None:
+    """Their products are beyond what doubles hold, too."""
+    points = CUBE_CORNERS * 10
+    points[points == 0] = 1e-312
+    assert judge(ply(points, CUBE_FACES.tolist()), "a.ply").findings == ()
+    report = judge(ply(CUBE_CORNERS * 1e-311, CUBE_FACES.tolist()), "a.ply")
+    assert report.verdict == "error"
+    assert not report.has("F011")

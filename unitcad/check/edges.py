@@ -174,7 +174,8 @@ def around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Int
     ends = faces[face, side] == edges.low[many][group]
     origin = vertices[edges.low[many]]
     axis = vertices[edges.high[many]] - origin
-    axis /= np.sqrt(np.einsum("ij,ij->i", axis, axis))[:, None]
+    length = np.sqrt(np.einsum("ij,ij->i", axis, axis))
+    axis /= np.where(length > 0, length, 1.0)[:, None]  # two vertices of one place have an edge without direction
     axis = axis[group]
     out = vertices[faces[face, (side + 2) % 3]] - origin[group]
     out -= axis * np.einsum("ij,ij->i", out, axis)[:, None]

@@ -25,6 +25,9 @@ Bools = NDArray[Any]
 LARGEST = float(np.finfo(np.float32).max)
 """Coordinates beyond this, and NaN, are no numbers of a mesh (V001), in whatever precision a file has them."""
 
+SMALLEST = float(np.finfo(np.float32).smallest_subnormal)
+"""Coordinates below this are 0 as float32, and are taken for it: even doubles do not hold their products."""
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -60,6 +63,13 @@ def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDAr
     return packed, order
 
 
+def representable(points: Floats) -> Floats:
+    """The points with 0 for each coordinate below SMALLEST; the same array where there is none."""
+    size = np.abs(points)
+    tiny = (size < SMALLEST) & (size > 0)
+    return np.where(tiny, 0.0, points) if tiny.any() else points
+
+
 def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
     """Vertices and faces of a triangle soup (m, 3, 3), welded by `weld_points`."""
     vertices, index = weld_points(corners.reshape(-1, 3))
@@ -71,7 +81,7 @@ def weld_points(points: Floats) -> tuple[Floats, Ints]:
 
     Points with the same three numbers are one; -0.0 is 0.0. Their order is that of a hash, the same on every run.
     """
-    flat = np.ascontiguousarray(points)
+    flat = np.ascontiguousarray(points if points.dtype == np.float32 else representable(points))
     bits = (flat + np.zeros(1, flat.dtype)).view(np.uint32 if flat.dtype == np.float32 else np.uint64)
     kept = 64 - max(len(flat) - 1, 1).bit_length()
     key, order = sorted_with_order(_mix(bits) >> np.uint64(64 - kept), kept)

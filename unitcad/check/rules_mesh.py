@@ -11,7 +11,7 @@ from unitcad.check import crossing, overlap, shells, topology
 from unitcad.check.detail import detail
 from unitcad.check.findings import Facts, Finding, Location, counted, ending
 from unitcad.check.limits import Deadline, keeping
-from unitcad.check.mesh import LARGEST, Mesh, extent
+from unitcad.check.mesh import LARGEST, Mesh, extent, representable
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology
 
@@ -28,6 +28,7 @@ class Judged:
 def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
     """Apply the V, T and G rules to one mesh; `cross=False` leaves self-crossing out."""
     facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
+    mesh = replace(mesh, vertices=representable(mesh.vertices))
     finite = np.asarray((np.abs(mesh.vertices) <= LARGEST).all(axis=1))
     if not finite.all():
         bad = np.flatnonzero(~finite[mesh.faces].all(axis=1))

@@ -1,0 +1,115 @@
+"""Damaged meshes, from seeds: every reader gives a verdict, in time, and no face is lost without a word.
+
+The body is one closed shell, so that a file of which some faces are lost has a hole: without an error it must have all.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "check"))
+
+from glb_files import packed, scene
+from polygon_files import every_way
+from shapes import mesh_xml, model_xml, package, stl, text_stl
+
+from unitcad.check import Limits, Options, check_bytes
+
+OUTLINE = [(0.0, 0.0), (9.0, 0.0), (9.0, 4.0), (4.0, 4.0), (4.0, 9.0), (0.0, 9.0)]
+LIMITS = Limits(max_faces=100_000, seconds=20)
+TRIANGLES = 20
+
+
+def body() -> tuple[np.ndarray, list[list[int]]]:
+    """A prism over an L: two concave caps of six corners and six quads."""
+    n = len(OUTLINE)
+    points = np.array([(x, y, z) for z in (0.0, 5.0) for x, y in OUTLINE])
+    faces = [list(range(n))[::-1], list(range(n, 2 * n))]
+    return points, faces + [[i, (i + 1) % n, n + (i + 1) % n, n + i] for i in range(n)]
+
+
+def files() -> dict[str, bytes]:
+    """The body in every format by a name with the format's suffix."""
+    points, faces = body()
+    made = every_way(points, faces)
+    caps = [(0, 1, 2), (0, 2, 3), (0, 3, 5), (3, 4, 5)]
+    rows = [row[::-1] for row in caps] + [tuple(6 + i for i in row) for row in caps]
+    rows += [row for a, b, c, d in faces[2:] for row in ((a, b, c), (a, c, d))]
+    triangles = np.array(rows)
+    made |= {"binary.stl": stl(points[triangles]), "text.stl": text_stl(points[triangles]).encode()}
+    model = model_xml(f'<object id="1">{mesh_xml(points, triangles)}</object>')
+    made |= {"packed.3mf": package(model), "stored.3mf": package(model, compression=zipfile.ZIP_STORED)}
+    small = (points * 0.001).astype("<f4")
+    made["a.glb"] = packed(*scene(small, triangles.astype("<u2"), [{"mesh": 0, "rotation": [0.6, 0.0, 0.0, 0.8]}]))
+    return made
+
+
+FILES = files()
+
+
+def damaged(data: bytes, rng: np.random.Generator) -> bytes:
+    """The bytes after one to three kinds of damage."""
+    for _ in range(int(rng.integers(1, 4))):
+        size = max(len(data), 1)
+        at, width = int(rng.integers(size)), int(rng.integers(1, 40))
+        kind = int(rng.integers(9))
+        some = rng.integers(0, 256, width, np.uint8).tobytes()
+        if kind == 0:  # flipped bit
+            data = data[:at] + bytes([data[at] ^ (1 << int(rng.integers(8)))]) + data[at + 1 :] if data else data
+        elif kind == 1:  # lost
+            data = data[:at] + data[at + width :]
+        elif kind == 2:  # cut short
+            data = data[:at]
+        elif kind == 3:  # put in
+            data = data[:at] + some + data[at:]
+        elif kind == 4:  # repeated
+            data = data[:at] + data[max(0, at - width) : at] + data[at:]
+        elif kind == 5:  # written over
+            data = data[:at] + some + data[at + width :]
+        elif kind == 6:  # another digit, sign or space
+            data = data[:at] + bytes([int(rng.choice(list(b"0123456789-+.e \n#/\\,")))]) + data[at + 1 :]
+        else:  # a line is lost, or goes elsewhere
+            lines = data.split(b"\n")
+            line = lines.pop(int(rng.integers(len(lines))))
+            if kind == 8:
+                lines.insert(int(rng.integers(len(lines) + 1)), line)
+            data = b"\n".join(lines)
+    return data
+
+
+def attack(name: str, seeds: range) -> None:
+    for seed in seeds:
+        data = damaged(FILES[name], np.random.default_rng([seed, sorted(FILES).index(name)]))
+        begin = time.monotonic()
+        report = check_bytes(data, name, Options(limits=LIMITS))
+        assert time.monotonic() - begin < 30, (name, seed)
+        facts = report.facts
+        assert facts.triangles is not None or report.verdict == "error", (name, seed)
+        if report.verdict != "error":
+            assert facts.watertight, (name, seed)
+            assert (facts.triangles or 0) >= TRIANGLES, (name, seed)
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_the_body_itself_is_sound(name: str) -> None:
+    report = check_bytes(FILES[name], name)
+    assert report.findings == ()
+    assert report.facts.triangles == TRIANGLES
+    assert report.facts.volume_mm3 == pytest.approx(5 * 56, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_damage_is_never_silent(name: str) -> None:
+    attack(name, range(25))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_damage_is_never_silent_in_the_long_run(name: str) -> None:
+    attack(name, range(25, 3000))
