@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from manifold3d import triangulate
 from shapes import FORMATS, box, in_format, obj, stl, text_ply, turned
 
 from unitcad.check import check_bytes, check_mesh
@@ -175,6 +176,48 @@ def test_every_winding_number_but_0_and_1_is_an_error(seed: int, values: tuple[i
     report = check_bytes(stl(body), "a.stl")
     errors = {found.code for found in report.findings if found.severity == "error"}
     assert bool(errors) == (not {0, 1} >= set(field.ravel().tolist())), (errors, field)
+
+
+@settings(max_examples=40, deadline=None)
+@given(n=st.integers(4, 12), seed=st.integers(0, 10**6), turn=st.booleans(), scale=st.sampled_from([0.3, 1.0, 40.0]))
+def test_faces_of_one_concave_polygon_are_not_accused(n: int, seed: int, turn: bool, scale: float) -> None:
+    """Top and bottom of a prism are one concave polygon each, cut into triangles that do not overlap."""
+    rng = np.random.default_rng(seed)
+    angle = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
+    radius = 10 * np.where(np.arange(n) % 2, rng.uniform(0.15, 0.5, n), 1.0)
+    outline = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1).astype(np.float32).astype(float)
+    low, high = (np.column_stack([outline, np.full(n, z)]) for z in (0.0, 5.0))
+    cut = np.array(triangulate([outline]))
+    sides = [[[low[k], low[k - n + 1], high[k - n + 1]], [low[k], high[k - n + 1], high[k]]] for k in range(n)]
+    body = np.concatenate([high[cut], low[cut][:, ::-1], np.array(sides).reshape(-1, 3, 3)])
+    body = turned(body, seed, scale, 3 * scale, bool(seed % 2)) if turn else body
+    for name in ("binary.stl", "part.ply"):
+        content = in_format(body, name)
+        report = check_bytes(content if isinstance(content, bytes) else content.encode(), name)
+        assert codes(report) == set()
+
+
+@pytest.mark.parametrize("form", ["ply", "obj", "off"])
+@pytest.mark.parametrize("first", range(4))
+def test_a_solid_of_concave_quads_passes_as_polygons(form: str, first: int, judge) -> None:
+    """An arrow head of quads, read from polygons, whichever corner of the concave ones is listed first."""
+    outline = [(0, 0), (10, -10), (0, 20), (-10, -10)]
+    points = [(x, y, z) for z in (0, 5) for x, y in outline]
+    caps = [[0, 3, 2, 1], [4, 5, 6, 7]]
+    faces = [cap[first:] + cap[:first] for cap in caps] + [[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
+    rows = "".join(f"{x} {y} {z}\n" for x, y, z in points)
+    listed = "".join(f"4 {' '.join(map(str, face))}\n" for face in faces)
+    if form == "ply":
+        head = "ply\nformat ascii 1.0\nelement vertex 8\n" + "".join(f"property float {axis}\n" for axis in "xyz")
+        text = f"{head}element face 6\nproperty list uchar int vertex_indices\nend_header\n{rows}{listed}"
+    elif form == "off":
+        text = f"OFF\n8 6 0\n{rows}{listed}"
+    else:
+        text = "".join(f"v {x} {y} {z}\n" for x, y, z in points)
+        text += "".join(f"f {' '.join(str(k + 1) for k in face)}\n" for face in faces)
+    report = judge(text, f"part.{form}")
+    assert report.findings == ()
+    assert report.facts.volume_mm3 == pytest.approx(5 * 200)
 
 
 def fin(*, other_diagonals: bool, cells: int = 1) -> np.ndarray:

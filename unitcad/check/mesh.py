@@ -102,7 +102,9 @@ def weld_points(points: Floats) -> tuple[Floats, Ints]:
 
 def same_place(points: Floats) -> Ints:
     """For each of (n, 3) points the first one that is in the same place."""
-    _, index = weld_points(points)
+    distinct, index = weld_points(points)
+    if len(distinct) == len(points):
+        return np.arange(len(points), dtype=np.int32)
     _, first = np.unique(index, return_index=True)
     return first[index].astype(np.int32)
 
