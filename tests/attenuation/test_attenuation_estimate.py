@@ -297,3 +297,14 @@ def test_a_range_stays_a_range_in_the_papers_details():
     ratio = reading["hierarchical_over_control"][0]
     assert ratio["s"] is None
     assert ratio["s_low"] < ratio["s_high"]
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+def test_a_custom_design_has_no_estimate(layers: int) -> None:
+    from unitcad.spec import from_data, read
+
+    own = {**read("embedded"), "design": "d.py:f", "design_source": "def f(spec): ..."}
+    own["layers"] = own["layers"][:layers]
+    with pytest.raises(Refusal, match="custom design") as refused:
+        estimate_spec(from_data(own))
+    assert refused.value.field == "design"
