@@ -76,11 +76,11 @@ def write(path: Path, old: Baseline, reports: Sequence[FileReport]) -> Baseline:
     return found
 
 
-def apply(baseline: Baseline, path: Path, report: FileReport, shown: int) -> FileReport:
-    """The report with what the baseline at `path` lists marked as known, and at most `shown` locations a finding."""
+def apply(baseline: Baseline, path: Path, report: FileReport) -> FileReport:
+    """The report with what the baseline at `path` lists marked as known."""
     known = {entry.code: entry for entry in baseline.files.get(_key(path, report.path), [])}
-    found = [_compared(item, known.get(item.code), report.facts) for item in report.findings]
-    return replace(report, findings=tuple(replace(item, locations=item.locations[:shown]) for item in found))
+    found = tuple(_compared(item, known.get(item.code), report.facts) for item in report.findings)
+    return replace(report, findings=found)
 
 
 def _key(path: Path, file: str) -> str:

@@ -146,6 +146,11 @@ class FileReport:
         """Whether a finding of that code is there."""
         return any(finding.code == code for finding in self.findings)
 
+    def shortened(self, locations: int) -> FileReport:
+        """The report with so many locations a finding at most."""
+        kept = tuple(replace(item, locations=item.locations[:locations]) for item in self.findings)
+        return replace(self, findings=kept)
+
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready; without the time, so that the same file gives the same text."""
         return {

@@ -12,6 +12,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, counted, number, said
 from unitcad.check.rulebook import rules
+from unitcad.text import printable
 
 FORMATS = ("text", "json", "github", "sarif", "junit")
 
@@ -75,7 +76,7 @@ def text(reports: Sequence[FileReport]) -> str:
                 codes.add(found.code)
             lines.append(_line(report, found))
         if report.verdict == "pass" and (size := _size(report.facts)):
-            lines.append(f"{_plain(report.path)}: passed: {size}")
+            lines.append(f"{printable(report.path)}: passed: {size}")
     fixes = [f"  {code} {rule.title}: {rule.mend}" for code, rule in rules().items() if code in codes]
     if fixes:
         lines += ["How to fix:", *fixes, _EXPLAIN]
@@ -84,7 +85,7 @@ def text(reports: Sequence[FileReport]) -> str:
 
 def _line(report: FileReport, found: Finding) -> str:
     known = " (known)" if found.known else ""
-    return f"{_plain(report.path)}: {found.code} {found.severity}{known}: {_plain(said(found, 3))}"
+    return f"{printable(report.path)}: {found.code} {found.severity}{known}: {printable(said(found, 3))}"
 
 
 _EXPLAIN = "`unitcad check --explain CODE` says what a code means and why it matters."
@@ -114,11 +115,6 @@ def _summary(reports: Sequence[FileReport]) -> str:
     if known := sum(found.known for report in reports for found in report.findings):
         parts.append(counted(known, "known finding"))
     return f"{counted(len(reports), 'file')}: {', '.join(parts)}"
-
-
-def _plain(text: str) -> str:
-    """Text from a file made safe for a terminal: control characters are shown, not sent."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 _SIZES = {"F002", "F006", "G005"}  # their count is a number of bytes, facets or shells by which the file is wrong
@@ -161,7 +157,7 @@ def github(reports: Sequence[FileReport]) -> str:
 def _data(text: str) -> str:
     """Text of a workflow command: line breaks as the runner decodes them, other control characters shown, not sent."""
     lines = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-    return _plain(lines)
+    return printable(lines)
 
 
 def _property(text: str) -> str:

@@ -58,6 +58,9 @@ def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
 
 def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
     """The findings with the faces of each location as the file has them, and their line and object where known."""
+    meshes = detail().meshes
+    if meshes is not None and not any(known is mesh for known in meshes):
+        meshes.append(mesh)
     drawn = tuple(replace(item, locations=tuple(_drawn(place, mesh) for place in item.locations)) for item in findings)
     return drawn if mesh.source is None else tuple(mesh.source.located(item) for item in drawn)
 
@@ -77,6 +80,5 @@ def _drawn(place: Location, mesh: Mesh) -> Location:
         centre = (x, y, z)
     if meshes is None or (not len(region) and centre is None):
         return replace(place, region=None, centre=centre)
-    number = next((i for i, known in enumerate(meshes) if known is mesh), len(meshes))
-    meshes[number:] = meshes[number:] or [mesh]
+    number = next(i for i, known in enumerate(meshes) if known is mesh)
     return replace(place, region=region, mesh=number, centre=centre)

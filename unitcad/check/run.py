@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -24,6 +24,9 @@ from unitcad.check.rulebook import finding
 from unitcad.check.sniff import SUFFIXES
 
 _GRACE = 5.0  # s, beyond half of the limit more, until code that never looks at the clock is interrupted
+
+
+Then = Callable[[FileReport], FileReport]
 
 
 def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
@@ -83,22 +86,29 @@ def _once(paths: Iterable[str]) -> list[str]:
 
 
 def check_files(
-    work: Sequence[tuple[str, Options]], jobs: int = 1, memory_mb: int | None = None
+    work: Sequence[tuple[str, Options]],
+    jobs: int = 1,
+    memory_mb: int | None = None,
+    then: Then | None = None,
 ) -> Iterator[FileReport]:
-    """A report for each (path, options), in order. `memory_mb` bounds each process's address space (POSIX only)."""
+    """A report for each (path, options), in order. `memory_mb` bounds each process's address space (POSIX only).
+
+    `then` takes each report where it was made, with its meshes, and gives the one that is passed on.
+    """
     if jobs <= 1 or len(work) <= 1:
         with _bounded(memory_mb):
             for path, options in work:
-                yield guarded(path, options)
+                yield guarded(path, options, then)
         return
-    yield from _in_processes(work, min(jobs, len(work)), memory_mb)
+    yield from _in_processes(work, min(jobs, len(work)), memory_mb, then)
 
 
-def guarded(path: str, options: Options) -> FileReport:
+def guarded(path: str, options: Options, then: Then | None = None) -> FileReport:
     """`check_file` with an alarm behind its clock and a net below it: an inner fault is a finding, not a crash."""
     begin = time.perf_counter()
     report = _guarded(path, options)
-    return replace(report, seconds=time.perf_counter() - begin)
+    report = replace(report, seconds=time.perf_counter() - begin)
+    return then(report) if then else report
 
 
 def _guarded(path: str, options: Options) -> FileReport:
@@ -119,12 +129,14 @@ def _stopped(path: str, why: str) -> FileReport:
     return FileReport(path, (finding("F011", why),))
 
 
-def _in_processes(work: Sequence[tuple[str, Options]], jobs: int, memory_mb: int | None) -> Iterator[FileReport]:
+def _in_processes(
+    work: Sequence[tuple[str, Options]], jobs: int, memory_mb: int | None, then: Then | None
+) -> Iterator[FileReport]:
     left = list(work)
     while left:
         with children.safe_path():
             pool = ProcessPoolExecutor(jobs, get_context("spawn"), _limit_memory, (memory_mb,))
-            futures = [pool.submit(guarded, path, options) for path, options in left]
+            futures = [pool.submit(guarded, path, options, then) for path, options in left]
         done = 0
         try:
             for future in futures:
@@ -133,17 +145,17 @@ def _in_processes(work: Sequence[tuple[str, Options]], jobs: int, memory_mb: int
         except BrokenProcessPool:
             # A worker died (killed for its memory, or a crash in native code). Which file it was is found by
             # judging the first unfinished one alone.
-            yield _alone(*left[done], memory_mb)
+            yield _alone(*left[done], memory_mb, then)
             done += 1
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
         left = left[done:]
 
 
-def _alone(path: str, options: Options, memory_mb: int | None) -> FileReport:
+def _alone(path: str, options: Options, memory_mb: int | None, then: Then | None) -> FileReport:
     with children.safe_path(), ProcessPoolExecutor(1, get_context("spawn"), _limit_memory, (memory_mb,)) as pool:
         try:
-            return pool.submit(guarded, path, options).result()
+            return pool.submit(guarded, path, options, then).result()
         except BrokenProcessPool:
             return _stopped(path, "the process that judged it died (memory, or a fault in native code)")
 

@@ -13,6 +13,7 @@ from urllib.parse import quote
 from unitcad import __version__
 from unitcad.check.findings import FileReport, Finding, said
 from unitcad.check.rulebook import Rule, rules
+from unitcad.text import markdown
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 _LEVELS = {"error": "error", "warning": "warning", "info": "note"}
@@ -51,15 +52,10 @@ def _rule(rule: Rule) -> dict[str, Any]:
         "fullDescription": {"text": rule.cause},
         "help": {
             "text": f"{rule.cause} Fix: {rule.mend}",
-            "markdown": f"{_markdown(rule.cause)}\n\n**Fix:** {_markdown(rule.mend)}",
+            "markdown": f"{markdown(rule.cause)}\n\n**Fix:** {markdown(rule.mend)}",
         },
         "defaultConfiguration": {"level": _LEVELS[rule.severity]},
     }
-
-
-def _markdown(text: str) -> str:
-    """Plain text as Markdown: what would be markup is escaped."""
-    return re.sub(r"([\\`*_{}\[\]<>#|~])", r"\\\1", text)
 
 
 def _result(report: FileReport, found: Finding, index: dict[str, int]) -> dict[str, Any]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -52,6 +53,10 @@ def check(
     all_locations: Annotated[bool, typer.Option(help="List every location of a finding, up to 10000.")] = False,
     baseline: Annotated[str | None, typer.Option(help="File of known findings; they do not fail.")] = None,
     write_baseline: Annotated[bool, typer.Option(help="Write what is found to the baseline.")] = False,
+    show: Annotated[
+        str | None,
+        typer.Option(help="Folder for pictures: each finding near and on the whole part, and coloured 3MF files."),
+    ] = None,
     config: Annotated[
         str | None, typer.Option(help="Settings: a TOML file with a table [check]; else the nearest is found.")
     ] = None,
@@ -92,18 +97,19 @@ def check(
         shells=shells,
         strict_3mf=bool(settings.strict_3mf if strict_3mf is None else strict_3mf),
         limits=_limits(found, max_faces, timeout),
-        locations=detail.MOST if all_locations or base is not None else detail.SHOWN,
+        locations=detail.MOST if all_locations or base is not None or show is not None else detail.SHOWN,
+        draw=show is not None,
     )
     if not files and manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
     per_file = _per_file(found, options)
-    reports = _run(
-        files or [], per_file, manifest, options.printer is not None, jobs, memory or settings.memory or 8000
-    )
+    check_all = partial(run.check_files, jobs=jobs, memory_mb=memory or settings.memory or 8000, then=_drawn(show))
+    reports = _run(files or [], per_file, manifest, options.printer is not None, check_all)
+    shown = detail.MOST if all_locations else detail.SHOWN
     if base is not None:
         known = baselines.write(base, known, reports) if write_baseline else known
-        shown = detail.MOST if all_locations else detail.SHOWN
-        reports = [baselines.apply(known, base, report, shown) for report in reports]
+        reports = [baselines.apply(known, base, report) for report in reports]
+    reports = [report.shortened(shown) for report in reports]
     table = formats.statistics(reports) if statistics else ""
     if statistics and output_format == "text":
         sys.stdout.write(table)
@@ -131,22 +137,30 @@ def _run(
     options: Callable[[str], Options],
     manifest: str | None,
     printer_named: bool,
-    jobs: int,
-    memory: int,
+    check_all: Callable[[list[tuple[str, Options]]], Iterator[FileReport]],
 ) -> list[FileReport]:
     from unitcad.check import run
 
     paths, reports = run.expand(names)
     if manifest is None:
         work = [(path, options(path)) for path in paths]
-        return reports + list(run.check_files(work, jobs, memory))
+        return reports + list(check_all(work))
     from unitcad.check import manifest as listing
 
     listed = listing.read(manifest)
     work = listing.work(listed, paths, options, printer_named)
-    judged = list(run.check_files(work, jobs, memory))
+    judged = list(check_all(work))
     compared = [listing.compare(listed, report, options(report.path)) for report in judged]
     return reports + compared + listing.unjudged(listed, [path for path, _ in work], options)
+
+
+def _drawn(show: str | None) -> Callable[[FileReport], FileReport] | None:
+    """What draws the findings of a report into the folder `show`."""
+    if show is None:
+        return None
+    from unitcad.export import finding_pictures
+
+    return partial(finding_pictures.write, Path(show))
 
 
 def _filters(

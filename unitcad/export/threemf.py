@@ -33,12 +33,17 @@ _RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
 
 @dataclass(frozen=True)
 class MeshPart:
-    """A named mesh in print attitude: vertices (n, 3) float32 in mm, faces (m, 3), colour as three numbers 0 to 1."""
+    """A named mesh in print attitude: vertices (n, 3) float32 in mm, faces (m, 3), colour as three numbers 0 to 1.
+
+    Faces of several colours have a `palette`, of which `paint` (m,) is each face's index.
+    """
 
     name: str
     colour: tuple[float, float, float]
     vertices: np.ndarray
     faces: np.ndarray
+    palette: tuple[tuple[float, float, float], ...] = ()
+    paint: np.ndarray | None = None
 
 
 def write(path: Path, parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220.0)) -> None:
@@ -94,27 +99,45 @@ def _model(parts: Sequence[MeshPart], bed_mm: tuple[float, float]) -> str:
         '<metadata name="Application">unitcad</metadata>',
         "<resources>",
         '<basematerials id="1">',
-        *(f"<base name={quoteattr(part.name)} displaycolor={quoteattr(colour_hex(part.colour))}/>" for part in parts),
+        *(
+            f"<base name={quoteattr(part.name)} displaycolor={quoteattr(colour_hex(colour))}/>"
+            for part in parts
+            for colour in part.palette or (part.colour,)
+        ),
         "</basematerials>",
     ]
+    base = 0
     for index, part in enumerate(parts):
         lines += [
-            f'<object id="{index + 2}" type="model" name={quoteattr(part.name)} pid="1" pindex="{index}">',
+            f'<object id="{index + 2}" type="model" name={quoteattr(part.name)} pid="1" pindex="{base}">',
             "<mesh>",
             "<vertices>",
             *_rows('<vertex x="%s" y="%s" z="%s"/>', np.asarray(part.vertices, np.float32).astype(str)),
             "</vertices>",
             "<triangles>",
-            *_rows('<triangle v1="%s" v2="%s" v3="%s"/>', part.faces),
+            *_triangles(part, base),
             "</triangles>",
             "</mesh>",
             "</object>",
         ]
+        base += len(part.palette) or 1
     lines += ["</resources>", "<build>"]
     for index, (x, y) in enumerate(places):
         move = " ".join(f"{value + 0.0:.6f}" for value in (x, y, 0.0) - low[index])
         lines.append(f'<item objectid="{index + 2}" transform="1 0 0 0 1 0 0 0 1 {move}"/>')
     return "\n".join([*lines, "</build>", "</model>", ""])
+
+
+def _triangles(part: MeshPart, base: int) -> list[str]:
+    """The faces; those of another colour than the palette's first one name theirs."""
+    if part.paint is None:
+        return _rows('<triangle v1="%s" v2="%s" v3="%s"/>', part.faces)
+    return [
+        f'<triangle v1="{a}" v2="{b}" v3="{c}"/>'
+        if not colour
+        else f'<triangle v1="{a}" v2="{b}" v3="{c}" pid="1" p1="{base + colour}"/>'
+        for (a, b, c), colour in zip(part.faces.tolist(), part.paint.tolist(), strict=True)
+    ]
 
 
 def _rows(form: str, table: np.ndarray) -> list[str]:

@@ -1,0 +1,219 @@
+"""Shaded pictures of triangle meshes by numpy alone: parallel projection, a depth buffer, PNG. No display, no GPU.
+
+Whatever a mesh is, it is drawn as it is: open, turned inside out or passing through itself.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+BACKGROUND = (1.0, 1.0, 1.0)
+INSIDE = (0.62, 0.50, 0.40)
+"""Faces seen from behind: the inside of a part, through a hole or a cut."""
+CUT = (0.93, 0.87, 0.76)
+LINE = (0.10, 0.10, 0.12)
+_FRAGMENTS = 200_000  # a block's, which stay in the processor's cache
+_FACES = 100_000
+_PIXELS = 50_000
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A parallel view: unit vectors to the right, up and towards the eye (3,), the point in the middle (3,) mm, pixels
+    a mm, and the picture's size (width, height) in pixels.
+    """
+
+    right: np.ndarray
+    up: np.ndarray
+    eye: np.ndarray
+    middle: np.ndarray
+    scale: float
+    size: tuple[int, int]
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Points (n, 3) mm as pixels from the left, pixels from the top, and mm towards the eye."""
+        seen = (np.asarray(points, float).reshape(-1, 3) - self.middle) @ np.stack([self.right, self.up, self.eye]).T
+        seen[:, 0] = self.size[0] / 2 + seen[:, 0] * self.scale
+        seen[:, 1] = self.size[1] / 2 - seen[:, 1] * self.scale
+        return seen
+
+
+def camera(
+    towards_eye: tuple[float, float, float],
+    middle: np.ndarray,
+    reach: float | np.ndarray,
+    size: tuple[int, int],
+) -> Camera:
+    """A view that holds a ball of radius `reach` mm round `middle`; given points (n, 3) in place of it, all of them."""
+    eye = np.array(towards_eye, float) / np.linalg.norm(towards_eye)
+    upwards = np.array([0.0, 0.0, 1.0]) if abs(eye[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(upwards, eye)
+    right /= np.linalg.norm(right)
+    up = np.cross(eye, right)
+    if isinstance(reach, np.ndarray):
+        plan = (reach - middle) @ np.stack([right, up]).T
+        low, high = plan.min(axis=0), plan.max(axis=0)
+        middle = middle + np.stack([right, up]).T @ ((low + high) / 2)
+        half = np.maximum((high - low) / 2, 1e-12) * 1.1
+    else:
+        half = np.full(2, max(reach, 1e-12))
+    return Camera(right, up, eye, middle, float((np.array(size) / 2 / half).min()), size)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a picture's pixels show: the index of a face (height, width), -1 for none, and its depth in mm."""
+
+    face: np.ndarray
+    depth: np.ndarray
+
+
+def look(
+    vertices: np.ndarray, faces: np.ndarray, view: Camera, cut: float = np.inf, first: np.ndarray | None = None
+) -> Seen:
+    """What is seen of a mesh (n, 3) mm, (m, 3), without what is nearer to the eye than `cut` (mm from the middle).
+
+    Faces that `first` (m,) marks are seen before others of the same depth.
+    """
+    width, height = view.size
+    nearest = np.full(width * height, -np.inf)
+    shown = np.full(width * height, -1, np.int64)
+    points = view.project(vertices)
+    for face, pixel, depth in _fragments(points, faces, width, height):
+        kept = depth <= cut
+        if first is not None:
+            depth = depth + first[face] * (0.25 / view.scale)
+        kept &= depth > nearest[pixel]
+        face, pixel, depth = face[kept], pixel[kept], depth[kept]
+        order = np.argsort(depth, kind="stable")
+        nearest[pixel[order]] = depth[order]
+        shown[pixel[order]] = face[order]
+    return Seen(shown.reshape(height, width), nearest.reshape(height, width))
+
+
+def _fragments(
+    points: np.ndarray, faces: np.ndarray, width: int, height: int
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Face, pixel and depth of every pixel's middle that lies in a face, in blocks."""
+    for begin in range(0, len(faces), _FACES):
+        corners = points[faces[begin : begin + _FACES]]
+        low = np.ceil(corners[:, :, :2].min(axis=1) - 0.5)
+        high = np.floor(corners[:, :, :2].max(axis=1) - 0.5)
+        low, high = np.clip(low, 0, [width, height]).astype(int), np.clip(high, -1, [width - 1, height - 1]).astype(int)
+        span = np.maximum(high - low + 1, 0)
+        (x0, y0), (x1, y1), (x2, y2) = (corners[:, k, :2].T for k in range(3))
+        area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+        count = np.where(np.abs(area) > 1e-12, span[:, 0] * span[:, 1], 0)
+        which = np.flatnonzero(count)
+        ends = np.cumsum(count[which])
+        full = np.arange(_FRAGMENTS, ends[-1] if len(ends) else 0, _FRAGMENTS)
+        for block in np.split(which, np.searchsorted(ends, full)):
+            if not len(block):
+                continue
+            number = count[block]
+            face = np.repeat(block, number)
+            local = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
+            row, column = np.divmod(local, span[face, 0])
+            x, y = low[face, 0] + column, low[face, 1] + row
+            weights = _weights(corners[face], x + 0.5, y + 0.5)
+            inside = (weights >= 0).all(axis=1)
+            face, weights = face[inside], weights[inside]
+            depth = np.einsum("ij,ij->i", weights, corners[face, :, 2])
+            yield face + begin, (y * width + x)[inside], depth
+
+
+def _weights(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates (n, 3) of points in plan in triangles (n, 3, 3)."""
+    (x0, y0), (x1, y1), (x2, y2) = (corners[:, k, :2].T for k in range(3))
+    area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+    one = ((x2 - x) * (y0 - y) - (x0 - x) * (y2 - y)) / area
+    two = ((x0 - x) * (y1 - y) - (x1 - x) * (y0 - y)) / area
+    return np.stack([1 - one - two, one, two], axis=1)
+
+
+def shade(
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    colours: np.ndarray,
+    plain: np.ndarray,
+    seen: Seen,
+    view: Camera,
+    lines: np.ndarray,
+    cut: bool = False,
+) -> np.ndarray:
+    """Pixels (height, width, 3), 0 to 1: faces in their `colours` (m, 3), lighter towards the light.
+
+    From behind, `plain` faces (m,) have the colour INSIDE, others their own one, darker. `lines` (m, 3): how wide, in
+    pixels, the side from corner k to the next is drawn on its face. Where the part is `cut`, what lies behind the cut
+    and is seen from behind is solid: it is hatched.
+    """
+    height, width = seen.face.shape
+    which, index = np.unique(seen.face, return_inverse=True)
+    none = int(which[0] < 0)  # the first one stands for no face
+    corners = vertices[faces[which[none:]]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    light = view.eye + 0.45 * view.up - 0.35 * view.right
+    behind = np.asarray(normal @ view.eye < 0)
+    bright = np.abs(normal @ (light / np.linalg.norm(light)))
+    bright = np.where(plain[which[none:]], 0.45 + 0.55 * bright, 0.7 + 0.3 * bright)
+    own, bare = colours[which[none:]], plain[which[none:], None]
+    back = (
+        np.where(bare, np.array(CUT), (own + np.array(CUT)) / 2)
+        if cut
+        else np.where(bare, np.array(INSIDE), own * 0.78)
+    )
+    tint = np.where(behind[:, None], back, own) * np.where(behind & cut, 1.0, bright)[:, None]
+    wide = np.where((behind & cut)[:, None], 0.0, lines[which[none:]])
+    tint = np.concatenate([np.array([BACKGROUND] * none).reshape(-1, 3), tint])
+    away = np.concatenate([np.zeros((none, 3, 3)), _side_lines(view.project(corners).reshape(-1, 3, 3))])
+    wide = np.concatenate([np.zeros((none, 3)), wide])
+    hatched = np.concatenate([np.zeros(none, bool), behind & cut])
+    picture = np.empty((height * width, 3))
+    index = index.reshape(-1)
+    for begin in range(0, height * width, _PIXELS):
+        pixel = np.arange(begin, min(begin + _PIXELS, height * width))
+        at = index[pixel]
+        row, column = np.divmod(pixel, width)
+        found = tint[at]
+        stripe = hatched[at] & ((row + column) % 16 < 3)
+        found[stripe] *= 0.72
+        form = away[at]
+        distance = form[:, :, 0] * (column + 0.5)[:, None] + form[:, :, 1] * (row + 0.5)[:, None] + form[:, :, 2]
+        near = np.clip(wide[at] - np.abs(distance), 0, 1).max(axis=1)[:, None]
+        picture[pixel] = found + near * (np.array(LINE) - found)
+    return picture.reshape(height, width, 3)
+
+
+def _side_lines(corners: np.ndarray) -> np.ndarray:
+    """Of each side of triangles (n, 3, 3) in px: the numbers (a, b, c) by which a x + b y + c is the distance to it."""
+    along = (np.roll(corners, -1, axis=1) - corners)[:, :, :2]
+    length = np.maximum(np.linalg.norm(along, axis=2), 1e-9)
+    a, b = -along[:, :, 1] / length, along[:, :, 0] / length
+    return np.stack([a, b, -a * corners[:, :, 0] - b * corners[:, :, 1]], axis=2)
+
+
+def shrunk(picture: np.ndarray, times: int) -> np.ndarray:
+    """A picture of which every pixel is the mean of `times` by `times`."""
+    height, width, _ = picture.shape
+    return picture.reshape(height // times, times, width // times, times, 3).mean(axis=(1, 3))
+
+
+def png(picture: np.ndarray) -> bytes:
+    """A picture (height, width, 3), 0 to 1, as a PNG file (ISO/IEC 15948): the same bytes for the same pixels."""
+    height, width, _ = picture.shape
+    pixels = np.clip(np.round(picture * 255), 0, 255).astype(np.uint8).reshape(height, width * 3)
+    up = pixels.copy()
+    up[1:] -= pixels[:-1]
+    rows = np.concatenate([np.full((height, 1), 2, np.uint8), up], axis=1)
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b""))
+    body = b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    )
+    return b"\x89PNG\r\n\x1a\n" + body
