@@ -63,9 +63,9 @@ def judge(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
     low, high = np.array([box[0] for box in boxes]), np.array([box[1] for box in boxes])
     solids: dict[int, Manifold] = {}
     found: list[Location] = []
-    pairs = box_pairs(low, high)
+    pairs = box_pairs(low, high, deadline)
     try:
-        for a, b in pairs[:_PAIRS]:
+        for a, b in pairs[:_PAIRS].tolist():
             deadline.tick()
             least = min(some[a].volume, some[b].volume)
             room = float(np.prod(np.minimum(high[a], high[b]) - np.maximum(low[a], low[b])))

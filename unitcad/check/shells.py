@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, number
-from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Floats, Ints, solid_of
+from unitcad.check.limits import Deadline, Unreadable
+from unitcad.check.mesh import Bools, Floats, Ints, solid_of
+from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
 from unitcad.check.rulebook import finding
 from unitcad.check.scale import specks
 from unitcad.check.topology import Topology, diagonals
 
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
 FLAT = 1e-6  # G007: a shell's volume over its area times its diagonal
+_SHARE = 1e-6  # of the smaller shell's volume: shells that share no more only touch
 _BLOCK = 500_000
 
 
@@ -29,8 +35,7 @@ class Shells:
 
 def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline) -> Shells:
     """Apply the rules; `crossed`: some faces cross; `touching` (k, 2): pairs of shells whose faces meet."""
-    mesh, labels, n = topology.mesh, topology.shells, topology.n_shells
-    vertices, faces = mesh.vertices, mesh.faces
+    labels, n = topology.shells, topology.n_shells
     volumes, low, high, sound = topology.volumes, topology.low, topology.high, topology.closed
     found: list[Finding] = []
     if n == 0:
@@ -46,46 +51,68 @@ def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline)
         found.append(finding("G007", text, len(which), (_where(topology, low, high, i) for i in which.tolist())))
     sound = sound & ~flat
     found += specks(low, high, sound & (volumes > 0))
-    depth = np.zeros(n, int)
-    overlaps: list[tuple[int, int]] = []
-    if n > 1:
-        first = np.full(n, -1)
-        first[labels[::-1]] = np.arange(len(labels))[::-1]
-        pairs = box_pairs(low, high)
-        meeting = {(int(a), int(b)) for a, b in touching} | {(int(b), int(a)) for a, b in touching}
-        groups = _faces_by_shell(labels, n)
-        for a, b in pairs:
-            deadline.tick()
-            if not (sound[a] and sound[b]):
-                continue
-            if (a, b) in meeting:
-                least = min(abs(volumes[a]), abs(volumes[b]))
-                common = _shared(topology, groups, a, b, volumes)
-                if volumes[a] * volumes[b] > 0 and common > 1e-6 * least:
-                    overlaps.append((a, b))
-                elif common > (1 - 1e-6) * least:  # a cavity that touches the wall
-                    depth[a if abs(volumes[a]) < abs(volumes[b]) else b] += 1
-                continue
-            for inner, outer in ((a, b), (b, a)):
-                if (low[inner] >= low[outer]).all() and (high[inner] <= high[outer]).all():
-                    point = vertices[faces[groups[inner][0], 0]]
-                    depth[inner] += winding_number(vertices, faces[groups[outer]], point) != 0
-    for a in range(n):
-        if sound[a] and depth[a] % 2 and volumes[a] > 0:
-            overlaps.append((a, a))
-    if overlaps:
-        places = (_where(topology, low, high, *pair) for pair in overlaps)
-        text = f"{counted(len(overlaps), 'pair')} of shells that share volume"
-        found.append(finding("G002", text, len(overlaps), places))
-    inverted = [i for i in range(n) if depth[i] % 2 == 0 and volumes[i] < 0 and sound[i]]
-    if inverted and not (crossed and n == 1):
-        places = (_where(topology, low, high, i) for i in inverted)
-        found.append(finding("T008", counted(len(inverted), "inverted shell"), len(inverted), places))
-    hollow = [i for i in range(n) if depth[i] % 2 and volumes[i] < 0 and sound[i]]
-    if hollow:
-        places = (_where(topology, low, high, i) for i in hollow)
-        found.append(finding("G006", counted(len(hollow), "closed cavity", "closed cavities"), len(hollow), places))
+    depth, overlaps = np.zeros(n, int), list[tuple[int, int]]()
+    try:
+        if n > 1:
+            _relate(topology, np.asarray(sound), touching, depth, overlaps, deadline)
+    except Unreadable as stop:
+        stop.findings = (*found, *_overlapping(topology, overlaps), *stop.findings)
+        raise
+    overlaps += [(i, i) for i in np.flatnonzero(sound & (depth % 2 == 1) & (volumes > 0)).tolist()]
+    found += _overlapping(topology, overlaps)
+    inwards = sound & (volumes < 0)
+    for code, which, one, many in (
+        ("T008", np.flatnonzero(inwards & (depth % 2 == 0)), "inverted shell", ""),
+        ("G006", np.flatnonzero(inwards & (depth % 2 == 1)), "closed cavity", "closed cavities"),
+    ):
+        if len(which) and not (code == "T008" and crossed and n == 1):
+            places = (_where(topology, low, high, i) for i in which.tolist())
+            found.append(finding(code, counted(len(which), one, many), len(which), places))
     return Shells(volumes, low, high, tuple(found))
+
+
+def _overlapping(topology: Topology, overlaps: list[tuple[int, int]]) -> list[Finding]:
+    if not overlaps:
+        return []
+    places = (_where(topology, topology.low, topology.high, *pair) for pair in overlaps)
+    return [finding("G002", f"{counted(len(overlaps), 'pair')} of shells that share volume", len(overlaps), places)]
+
+
+def _relate(
+    topology: Topology, sound: Bools, touching: Ints, depth: Ints, overlaps: list[tuple[int, int]], deadline: Deadline
+) -> None:
+    """Add to `depth` how many sound shells each one lies in, and to `overlaps` the pairs that touch and share volume.
+
+    Shells that touch are given to manifold3d, unless their boxes have too little room in common.
+    """
+    vertices, faces, volumes = topology.mesh.vertices, topology.mesh.faces, topology.volumes
+    low, high, n = topology.low, topology.high, topology.n_shells
+    pairs = box_pairs(low, high, deadline)
+    pairs = pairs[sound[pairs].all(axis=1)]
+    one, other = pairs.T
+    touch = np.isin(one * n + other, np.sort(touching.astype(np.int64), axis=1) @ np.array([n, 1]))
+    groups = _faces_by_shell(topology.shells, n)
+    sides = np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])
+    least = np.minimum(np.abs(volumes[one]), np.abs(volumes[other]))
+    close = np.flatnonzero(touch & (sides.prod(axis=1) > _SHARE * least))
+    solids: dict[int, Manifold] = {}
+    before = -1
+    for at in close.tolist():
+        deadline.tick()
+        a, b = pairs[at].tolist()
+        if a != before:  # pairs are sorted: what comes before it comes no more
+            before, solids = a, {i: solid for i, solid in solids.items() if i >= a}
+        common = _shared(topology, groups, a, b, solids)
+        if volumes[a] * volumes[b] > 0 and common > _SHARE * least[at]:
+            overlaps.append((a, b))
+        elif common > (1 - _SHARE) * least[at]:  # a cavity that touches the wall
+            depth[a if abs(volumes[a]) < abs(volumes[b]) else b] += 1
+    for inner, outer in ((one, other), (other, one)):
+        within = (low[inner] >= low[outer]).all(axis=1) & (high[inner] <= high[outer]).all(axis=1)
+        for at in np.flatnonzero(within & ~touch).tolist():
+            deadline.tick()
+            point = vertices[faces[groups[inner[at]][0], 0]]
+            depth[inner[at]] += winding_number(vertices, faces[groups[outer[at]]], point) != 0
 
 
 def winding_number(vertices: Floats, faces: Ints, point: Floats) -> int:
@@ -114,32 +141,29 @@ def _faces_by_shell(labels: Ints, n: int) -> list[Ints]:
     return np.split(order, np.cumsum(np.bincount(labels, minlength=n))[:-1])
 
 
-def box_pairs(low: Floats, high: Floats) -> list[tuple[int, int]]:
-    """Pairs of shells whose boxes meet, by a sweep along x; at most a few for parts that were laid out apart."""
-    order = np.argsort(low[:, 0], kind="stable")
-    pairs = []
-    for place, i in enumerate(order):
-        later = order[place + 1 :]
-        later = later[: np.searchsorted(low[later, 0], high[i, 0], side="right")]
-        meet = ((low[later] <= high[i]) & (high[later] >= low[i])).all(axis=1)
-        pairs += [(min(int(i), int(j)), max(int(i), int(j))) for j in later[meet]]
-    return sorted(pairs)
+def box_pairs(low: Floats, high: Floats, deadline: Deadline) -> Ints:
+    """Pairs of boxes that meet (k, 2), the smaller number first, sorted; low and high corners (n, 3)."""
+    n = len(low)
+    corners = np.concatenate([low, high])
+    steps = frame_of(corners).steps(corners)
+    order = morton_order(steps, np.arange(n))
+    found = [np.empty((0, 2), np.int64)]
+    for i, j in meeting_pairs(boxes_of(steps, order, order + n), deadline):
+        pair = np.sort(np.stack([order[i], order[j]], axis=1), axis=1).astype(np.int64)
+        one, other = pair.T
+        found.append(pair[((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)])
+    pairs = np.concatenate(found)
+    return pairs[np.lexsort(pairs.T[::-1])]
 
 
-def _shared(topology: Topology, groups: list[Ints], a: int, b: int, volumes: Floats) -> float:
-    """The volume that two shells share, mm3, by manifold3d's boolean.
+def _shared(topology: Topology, groups: list[Ints], a: int, b: int, solids: dict[int, Manifold]) -> float:
+    """The volume that two shells share, mm3, by manifold3d's boolean; `solids` keeps what it has made.
 
     Shells that face inwards are turned first; one that manifold3d refuses gives 0 (its own faults are reported).
     """
-    solids = []
     for i in (a, b):
-        faces = topology.mesh.faces[groups[i]]
-        used, local = np.unique(faces, return_inverse=True)
-        local = local.reshape(-1, 3)
-        if volumes[i] < 0:
-            local = local[:, ::-1]
-        solid = solid_of(topology.mesh.vertices[used], local)
-        if solid.is_empty():
-            return 0.0
-        solids.append(solid)
-    return (solids[0] ^ solids[1]).volume()
+        if i not in solids:
+            used, local = np.unique(topology.mesh.faces[groups[i]], return_inverse=True)
+            local = local.reshape(-1, 3)
+            solids[i] = solid_of(topology.mesh.vertices[used], local[:, ::-1] if topology.volumes[i] < 0 else local)
+    return (solids[a] ^ solids[b]).volume()
