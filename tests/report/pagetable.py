@@ -22,7 +22,16 @@ def column(visit: Visit, name: str) -> list[str]:
 
 def table_page(folder: Path, columns: list[str], rows: list[list[Any]], **more: Any) -> Path:
     """A page with a table of our own: each row the variant's folder and its cells."""
-    data = {"title": "many", "version": "0", "variants": [], "pool": [], "models": {}, "batch": None, **more}
+    data = {
+        "title": "many",
+        "version": "0",
+        "variants": [],
+        "pool": [],
+        "models": {},
+        "batch": None,
+        "damaged": [],
+        **more,
+    }
     file = folder / "table.html"
     file.write_text(pages.page({**data, "table": {"columns": columns, "rows": rows}}, "many"), "utf-8")
     return file
