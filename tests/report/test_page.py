@@ -219,8 +219,8 @@ def test_budget_of_a_batch(built: Path) -> None:
             model(load("three-layer", [f"layers.0.wall_mm={1.2 + i / 100}"])) if i < 5 else models[f"geometry{i - 5}"]
         )
     data = {
-        "title": "t", "version": "0", "variants": variants, "pool": pool.entries, "models": models, "batch": None, "damaged": [],
-        "table": {"columns": [f"column {c}" for c in range(24)], "rows": rows},
+        "title": "t", "version": "0", "variants": variants, "pool": pool.entries, "models": models,
+        "batch": None, "damaged": [], "table": {"columns": [f"column {c}" for c in range(24)], "rows": rows},
     }  # fmt: skip
     assert len(page.page(data, "t").encode()) <= 25_000_000
 
