@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -62,7 +64,7 @@ def _noted(out: Path) -> dict[int, str]:
 
 def _kill(child: subprocess.Popen[bytes], dice: random.Random) -> None:
     """By SIGKILL: the parent, the whole group, or a worker and then the parent."""
-    below = psutil.Process(child.pid).children(recursive=True) if child.poll() is None else []
+    below = psutil.Process(child.pid).children(recursive=True)
     match dice.choice(("parent", "group", "worker")):
         case "parent":
             child.kill()
@@ -70,7 +72,8 @@ def _kill(child: subprocess.Popen[bytes], dice: random.Random) -> None:
             os.killpg(child.pid, signal.SIGKILL)
         case "worker":
             if below:
-                dice.choice(sorted(below, key=lambda process: process.pid)).kill()
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    dice.choice(sorted(below, key=lambda process: process.pid)).kill()
                 time.sleep(dice.random() * 0.2)
             child.kill()
     child.communicate()
@@ -80,17 +83,29 @@ def _kill(child: subprocess.Popen[bytes], dice: random.Random) -> None:
 
 def _trial(reference: Reference, folder: Path, kills: int, seed: int) -> None:
     dice, out, cache = random.Random(seed), folder / "out", folder / "cache"
-    for _ in range(kills):
+    noted: dict[int, str] = {}
+    before: dict[str, int] = {}
+    while kills:
         child = _start(reference.sweep, out, cache)
-        time.sleep(dice.uniform(0.05, 1.05) * reference.seconds)
-        if child.poll() is not None:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            child.communicate(timeout=dice.uniform(0.05, 0.9) * reference.seconds)
+        if child.poll() is not None:  # it was done before it could be killed: from the start again
             assert child.returncode == 0
+            assert bytes_of(out) == reference.bytes
+            shutil.rmtree(out)
+            shutil.rmtree(cache)
+            noted, before = {}, {}
+            continue
         _kill(child, dice)
-        # Whoever has a name is whole, in the journal or not; the next run leaves it where it is.
-        before = {path.name: path.stat().st_ino for path in out.glob("ring-*")}
-        assert all(whole(out / name, hashes=True) for name in before)
-        noted = _noted(out)
-        assert set(noted.values()) <= set(before)
+        kills -= 1
+        # Whoever has a name is whole, in the journal or not; no later run touches it.
+        there = {path.name: path.stat().st_ino for path in out.glob("ring-*")}
+        assert all(whole(out / name, hashes=True) for name in there)
+        assert before.items() <= there.items()
+        now = _noted(out)
+        assert noted.items() <= now.items()
+        assert set(now.values()) <= set(there)
+        noted, before = now, there
     child = _start(reference.sweep, out, cache)
     told, _ = child.communicate(timeout=300)
     assert child.returncode == 0
