@@ -90,3 +90,8 @@ def test_every_pair_is_what_fractions_say(kind: str, monkeypatch: pytest.MonkeyP
 def test_every_pair_of_thousands_of_meshes(kind: str) -> None:
     for seed in range(100, 500):
         _compare(kind, seed)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("about a vertex", 100), ("two heights", 104), ("one tilted plane", 397)])
+def test_shells_that_share_no_more_than_an_edge_touch(kind: str, seed: int) -> None:
+    _compare(kind, seed)

@@ -161,6 +161,10 @@ def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> N
     if faces.doubled:
         open_[open_] = ~overlap.run_alike(ids_a[open_], ids_b[open_])
     if open_.any():
+        if faces.several:  # shells that share an edge touch
+            edge = np.flatnonzero(open_ & (faces.shell[i] != faces.shell[j]))
+            keys = found.contact.keys(faces.shell[i[edge]], faces.shell[j[edge]])
+            found.contact.add(keys, np.stack([i[edge], j[edge]], axis=1))
         i, j, ids_a, ids_b, shared = (array[~open_] for array in (i, j, ids_a, ids_b, shared))
     a, b = faces.vertices.take(ids_a, axis=0), faces.vertices.take(ids_b, axis=0)
     apart, flush = contact.by_boxes(a, b)
