@@ -5,7 +5,8 @@
 Topology rules against trimesh's is_volume on the same arrays; all rules (topology, self-crossing, shells) against
 pymeshlab's compute_selection_by_self_intersections_per_face, which is GPL and runs in an environment of its own
 (`--peer`); a whole file by `check_file` beside the admesh command, which knows no crossing; and the peak memory of a
-process that judges the file.
+process that judges the file. With `--peer`, an environment that also has meshlib (non-commercial), the crossing test
+alone on five shapes.
 """
 
 from __future__ import annotations
@@ -52,6 +53,58 @@ before = peak()
 report = check_file(sys.argv[1])
 print(before, peak(), report.verdict)
 """
+
+
+SHAPES = ("torus", "plate", "gyroid", "scan", "cubes")
+CROSSING = """
+import sys, time
+sys.path.insert(0, {here!r})
+import meshes
+v, f = getattr(meshes, {shape!r})({size})
+def pymeshlab():
+    import pymeshlab
+    mesh = pymeshlab.MeshSet()
+    mesh.add_mesh(pymeshlab.Mesh(v, f))
+    return mesh.compute_selection_by_self_intersections_per_face
+def meshlib():
+    from meshlib import mrmeshnumpy, mrmeshpy
+    mesh = mrmeshnumpy.meshFromFacesVerts(f, v)
+    return lambda: mrmeshpy.findSelfCollidingTriangles(mrmeshpy.MeshPart(mesh))
+for line in sys.stdin:
+    work = globals()[line.strip()]()
+    start = time.process_time()
+    work()
+    print(time.process_time() - start, flush=True)
+"""
+
+
+def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
+    """Processor seconds of the crossing test alone, and of ours over those of pymeshlab and MeshLib, interleaved."""
+    import meshes
+
+    from unitcad.check import crossing, topology
+    from unitcad.check.limits import Deadline
+    from unitcad.check.mesh import Mesh
+
+    vertices, faces = getattr(meshes, shape)(size)
+    found = topology.judge(Mesh(vertices, faces), Deadline(600)).as_stored()
+    code = CROSSING.format(here=str(Path(__file__).parent), shape=shape, size=size)
+    other = subprocess.Popen([peer, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert other.stdin is not None
+    assert other.stdout is not None
+    times: dict[str, list[float]] = {"ours": [], "pymeshlab": [], "meshlib": []}
+    for _ in range(rounds):
+        start = time.process_time()
+        crossing.judge(found, Deadline(600))
+        times["ours"].append(time.process_time() - start)
+        for name in ("pymeshlab", "meshlib"):
+            other.stdin.write(f"{name}\n")
+            other.stdin.flush()
+            times[name].append(float(other.stdout.readline() or "nan"))
+    other.kill()
+    middle = {name: sorted(of)[rounds // 2] for name, of in times.items()}
+    ratios = ", ".join(f"{middle['ours'] / middle[name]:.2f} of {name}" for name in ("pymeshlab", "meshlib"))
+    return f"crossing test, {shape}, {len(faces)} faces: {middle['ours']:.3f} s, {ratios} (1 wanted)"
 
 
 def timed(work: Callable[[], object]) -> float:
@@ -108,13 +161,15 @@ def measure(size: int, peer: str | None, rounds: int, folder: Path) -> list[str]
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--peer", help="a python that has pymeshlab")
+    parser.add_argument("--peer", help="a python that has pymeshlab, meshlib and manifold3d")
     parser.add_argument("--sizes", default="10000,100000,1000000")
     parser.add_argument("--rounds", type=int, default=5)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         for size in given.sizes.split(","):
             print("\n".join(measure(int(size), given.peer, given.rounds, Path(folder))), flush=True)
+            for shape in SHAPES if given.peer else ():
+                print(crossing_test(shape, int(size), given.peer, given.rounds), flush=True)
 
 
 if __name__ == "__main__":
