@@ -30,7 +30,7 @@ _TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_NODES, _DEGREE - 
 _DENSE, _DENSE_WEIGHTS = np.polynomial.legendre.leggauss(32)
 _DENSE_TABLE = np.polynomial.legendre.legvander(_DENSE, _DEGREE - 1)
 _DEEPEST = 60  # halvings of a panel
-_MOST_POINTS = 20_000_000
+_MOST_POINTS = 3_000_000
 _FINE = 1e-12
 _LEAST_LOSS = 1e-3  # tan delta from which the poles are far enough from the real axis
 

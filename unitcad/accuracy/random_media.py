@@ -130,6 +130,19 @@ def _undamped(rng: np.random.Generator) -> LayeredMedium:
     return LayeredMedium(layers, HalfSpace(below.density, below.youngs_modulus, below.poisson_ratio))
 
 
+def _wide_contrast(rng: np.random.Generator) -> LayeredMedium:
+    """1 kPa to 1 GPa in any order, from 3 micrometres on, damped or not."""
+    damped = rng.random() < 0.7
+
+    def part() -> tuple[float, float, float, Damping]:
+        nu = float(rng.choice([0.0, 0.3, 0.45, 0.49, 0.4999999, 0.5]))
+        law = LossFactor(_between(rng, 0.01, 0.5)) if damped else None
+        return float(rng.uniform(900, 2000)), _between(rng, 1e3, 1e9), nu, law
+
+    layers = [Layer(_between(rng, 3e-6, 0.02), *part()) for _ in range(rng.integers(1, 5))]
+    return LayeredMedium(layers, HalfSpace(*part()))
+
+
 _MEDIA: dict[str, Callable[[np.random.Generator], LayeredMedium]] = {
     "ordinary": _ordinary,
     "film on the forearm": _film_on_the_forearm,
@@ -138,5 +151,6 @@ _MEDIA: dict[str, Callable[[np.random.Generator], LayeredMedium]] = {
     "zero thickness": _zero_thickness,
     "large k a": _large,
     "undamped": _undamped,
+    "wide contrast": _wide_contrast,
 }
 CLASSES = tuple(_MEDIA)

@@ -21,6 +21,12 @@ def bessel(order: int, x: Any) -> Any:
     return special.j0(x) if order == 0 else special.j1(x)
 
 
+def envelope(x: Any) -> Any:
+    """A bound of |J0| and |J1| for real x >= 0, shape of x."""
+    with np.errstate(divide="ignore"):
+        return np.minimum(1.0, 1.01 * np.sqrt(2.0 / (np.pi * x)))
+
+
 def moment(x: Any) -> Any:
     """Integral of t J1(x t) over t from 0 to 1, for real or complex x with Re x >= 0, any shape.
 

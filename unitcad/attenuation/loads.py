@@ -43,6 +43,11 @@ class Point:
     def reach(self) -> float:
         return 0.0
 
+    @property
+    def weight(self) -> float:
+        """Total weight of the e^{ikx}, |x| up to `reach`, that the transform is a mean of."""
+        return 1.0 / (2.0 * np.pi)
+
     def transform(self, k: Any) -> Any:
         """q(k) per newton: 1 / (2 pi)."""
         return np.full(np.shape(k), 1.0 / (2.0 * np.pi))
@@ -72,6 +77,11 @@ class UniformDisc:
     @property
     def reach(self) -> float:
         return self.radius
+
+    @property
+    def weight(self) -> float:
+        """Total weight of the e^{ikx}, |x| up to `reach`, that the transform is a mean of (Poisson's integrals)."""
+        return self.radius**2 * (0.5 if self.direction == "normal" else 1.0 / np.pi)
 
     def transform(self, k: Any) -> Any:
         """q(k) in m2 per pascal: a J1(ka) / k, or the integral of J1(kr) r dr up to a."""

@@ -14,9 +14,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.special import factorial2
 
 from unitcad.attenuation import waves as w
-from unitcad.attenuation.bessel import bessel
+from unitcad.attenuation.bessel import bessel, envelope
 from unitcad.attenuation.loads import Load
 from unitcad.attenuation.medium import LayeredMedium
 from unitcad.attenuation.rheology import finite
@@ -24,11 +25,13 @@ from unitcad.attenuation.tail import measure_tail
 from unitcad.errors import Refusal, UnitcadError
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
-_LAST = np.array([(2 * j + 1) / 2.0 * _WEIGHTS * np.polynomial.legendre.Legendre.basis(j)(_NODES) for j in (14, 15)])
-_PHASE = 4.0 * np.pi  # of the fastest Bessel product over one panel
-_MAX_PANELS = 60_000
-_MOST_PANELS = 5_000  # up to the last pole: a few seconds
+_TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_NODES, _NODES.size - 1))
+_ODD_FACTORIALS = np.array([float(factorial2(2 * (2 * _NODES.size - j) - 1)) for j in range(_NODES.size)])
+_PHASE = 8.0 * np.pi  # of the fastest Bessel product over one panel
+_MAX_PANELS = 40_000
+_MOST_PANELS = 2_500  # up to the last pole: a few seconds
 _MAX_ROUNDS = 40
+_MOST_ATTEMPTS = 3
 _CHUNK = 200_000  # integrand values held at once
 
 
@@ -109,17 +112,27 @@ def respond(medium: LayeredMedium, load: Load, omega: float, r: Any, z: float = 
 
 
 def _solve(bare: _Problem, materials: tuple[w.Material, ...], end: float, rtol: float) -> _Found:
-    """The best that is reached: where the panels do not suffice for rtol, a larger one may spend them better."""
-    best, count = None, 0
-    while True:
-        found = _integrate(bare, materials, end, rtol)
+    """The best that is reached, in a few attempts.
+
+    What was integrated first may have been accepted beside a largest |u| that the rest then took away: again, beside
+    the one that came out. Where the panels do not suffice for rtol, a larger one may spend them better.
+    """
+    best, size, count = None, np.inf, 0
+    for _ in range(_MOST_ATTEMPTS):
+        found = _integrate(bare, materials, end, rtol, size)
         count += found.wavenumbers
         if best is None or np.max(found.error) < np.max(best.error):
             best = found
-        reached = float(np.max(best.error)) / (float(np.max(np.abs(best.total))) or 1.0)
-        if reached <= rtol or found.cut_short or 10.0 * rtol > min(reached, 0.1):
-            return replace(best, wavenumbers=count)
-        rtol = max(10.0 * rtol, 0.3 * reached)
+        before, size = size, float(np.max(np.abs(best.total))) or 1.0
+        reached = float(np.max(best.error)) / size
+        if reached <= rtol or found.cut_short:
+            break
+        if found.exhausted:
+            rtol = float(np.sqrt(rtol * min(reached, 0.1)))
+        elif before <= 2.0 * size:
+            break
+    assert best is not None
+    return replace(best, wavenumbers=count)
 
 
 def _check_size(end: float, span: float, omega: float) -> None:
@@ -139,13 +152,19 @@ def _static_part(problem: _Problem) -> np.ndarray:
 
 
 def _last_pole(medium: LayeredMedium, materials: tuple[w.Material, ...], omega: float) -> float:
-    """A wavenumber above every pole and branch point (1/m): slow surface waves, and bending of the layers as plates."""
+    """A wavenumber above every pole and branch point (1/m): slow surface waves, and bending of the layers as plates.
+
+    The softest layer bends with what it lies on, not as a plate.
+    """
     shear = max(abs(m.ks2) ** 0.5 for m in materials)
+    softest = min(abs(m.shear) for m in materials)
     mass = sum(layer.thickness * layer.density for layer in medium.layers)
     bending = [
-        (12.0 * mass * omega**2 / (layer.youngs_modulus * layer.thickness**3)) ** 0.25 for layer in medium.layers
+        (6.0 * mass * omega**2 / ((1.0 + layer.poisson_ratio) * abs(material.shear) * layer.thickness**3)) ** 0.25
+        for layer, material in zip(medium.layers, materials, strict=False)
+        if abs(material.shear) > softest
     ]
-    floor = min(max(bending, default=0.0), 20.0 * shear) if medium.layers else 0.0
+    floor = min(max(bending, default=0.0), 20.0 * shear)
     return 1.5 * max(1.5 * shear, floor)
 
 
@@ -165,12 +184,16 @@ def _graded(panels: np.ndarray, materials: tuple[w.Material, ...]) -> np.ndarray
 
 @dataclass(frozen=True)
 class _Found:
-    """(u_r, u_z) at each radius, shape (2, n), a bound of its error, and whether that is mostly the tail's."""
+    """(u_r, u_z) at each radius, shape (2, n), and a bound of its error.
+
+    cut_short: most of it is the tail's beyond what can be afforded; exhausted: there were panels left to be halved.
+    """
 
     total: np.ndarray
     error: np.ndarray
     wavenumbers: int
     cut_short: bool
+    exhausted: bool
 
 
 def _path(end: float, reach: float, thickness: float) -> list[complex]:
@@ -209,6 +232,12 @@ def _panels(corners: list[complex], stop: float, span: float) -> np.ndarray:
     return np.concatenate([np.stack([e[:-1], e[1:]], axis=1) for e in edges])
 
 
+def _cut(panels: np.ndarray, pieces: int) -> np.ndarray:
+    """Each panel in so many equal pieces."""
+    edges = panels[:, :1] + (panels[:, 1:] - panels[:, :1]) * (np.arange(pieces + 1) / pieces)
+    return np.stack([edges[:, :-1].ravel(), edges[:, 1:].ravel()], axis=1)
+
+
 def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
     """Of the `bad` panels the `room` worst ones."""
     if np.count_nonzero(bad) <= room:
@@ -218,43 +247,45 @@ def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
     return found
 
 
-def _integrate(bare: _Problem, materials: tuple[w.Material, ...], end: float, rtol: float) -> _Found:
+def _integrate(bare: _Problem, materials: tuple[w.Material, ...], end: float, rtol: float, largest: float) -> _Found:
+    """To rtol times the largest |u| that is met on the way, or times `largest`, where that is less."""
     load, r, z = bare.load, bare.r, bare.z
     r_max = float(r.max())
     span = r_max + load.reach + 2.0 * z
     far = _PHASE / span * _MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
-    tail = measure_tail(bare.kernel, static_kernel, materials, load, r, z, end, far, rtol)
+    tail = measure_tail(bare.kernel, static_kernel, materials, load, r, z, end, far, rtol, largest)
+    least = float(tail.bounds[-1].max())
+    rtol = max(rtol, 0.3 * least / (tail.scale or 1.0))  # what the tail leaves anyway is worth no halving
     problem = replace(bare, reference=tail.reference)
     known = _static_part(problem)
     corners = _path(end, max(r_max, load.reach), sum(layer.thickness for layer in bare.medium.layers))
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
-    count = done = 0
+    count, done, exhausted = 0, 0, False
     stop = tail.start(tail.scale, rtol)
     pending = _graded(_panels(corners, stop, span), materials)
     for _ in range(_MAX_ROUNDS):
         parts, errors, absolute = _evaluate(problem, pending)
         count += pending.shape[0] * _NODES.size
-        scale = float(np.max(np.abs(known + total + parts.sum(0)))) or 1.0
+        scale = min(float(np.max(np.abs(known + total + parts.sum(0)))) or 1.0, largest)
         done += pending.shape[0]
         worst = errors.max(axis=(1, 2))
-        bad = worst > 0.3 * rtol * scale / max(done, 1)
+        limit = 0.3 * rtol * scale / max(done, 1)
+        bad = worst > limit
         if np.max(quadrature + errors.sum(0)) <= 0.4 * rtol * scale:
             bad[:] = False
-        bad = _worst(worst, bad, (_MAX_PANELS - done) // 4)  # halves of at most half of what is left
+        room = (_MAX_PANELS - done) // 4  # quarters of them are what is left
+        exhausted |= np.count_nonzero(bad) > room
+        bad = _worst(worst, bad, room)
         total = total + parts[~bad].sum(0)
         quadrature += errors[~bad].sum(0)
         size += absolute[~bad].sum(0)
         if np.any(bad):
-            middle = pending[bad].mean(1)
-            pending = np.concatenate(
-                [
-                    np.stack([pending[bad, 0], middle], axis=1),
-                    np.stack([middle, pending[bad, 1]], axis=1),
-                ]
-            )
+            far_off = bad & (worst > 1e3 * limit)
+            pending = np.concatenate([_cut(pending[bad & ~far_off], 2), _cut(pending[far_off], 4)])
             continue
-        wanted = tail.start(float(np.max(np.abs(known + total))), rtol)
-        if wanted <= stop or done > _MAX_PANELS:
+        wanted = tail.start(min(float(np.max(np.abs(known + total))), largest), rtol)
+        exhausted |= wanted > stop and done > _MAX_PANELS
+        if wanted <= stop or exhausted:
             break
         pending = _panels([complex(stop)], wanted, span)
         stop = wanted
@@ -263,7 +294,7 @@ def _integrate(bare: _Problem, materials: tuple[w.Material, ...], end: float, rt
         total, quadrature, size = total + parts.sum(0), quadrature + errors.sum(0), size + absolute.sum(0)
     rest = tail.bound(stop)
     error = quadrature + rest + 4e-15 * size + 4e-16 * np.abs(known)
-    return _Found(known + total, error, count, bool(np.max(rest) > 0.5 * np.max(error)))
+    return _Found(known + total, error, count, least > 0.5 * float(np.max(error)), exhausted)
 
 
 def _evaluate(problem: _Problem, panels: w.Array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -281,21 +312,45 @@ def _evaluate(problem: _Problem, panels: w.Array) -> tuple[np.ndarray, np.ndarra
             if not lifted[part[0]]:  # real Bessel functions cost a tenth of complex ones
                 k = k.real
             phase = k[:, None] * problem.r
-            waves = np.stack([bessel(1, phase), bessel(0, phase)])
-            values = waves * (kernel * problem.load.transform(k))[:, :, None]
-            values = values.reshape(2, part.size, _NODES.size, -1) * half[:, None, None]
-            parts[part] = np.einsum("n,cpnr->pcr", _WEIGHTS, values)
-            errors[part], sizes[part] = _panel_errors(values)
+            shape = (2, part.size, _NODES.size, -1)
+            waves = np.stack([bessel(1, phase), bessel(0, phase)]) * problem.load.transform(k)[:, None]
+            waves = waves.reshape(shape) * half[:, None, None]
+            kernel = kernel.reshape(2, part.size, _NODES.size)
+            parts[part] = ((kernel * _WEIGHTS)[:, :, None] @ waves)[:, :, 0].swapaxes(0, 1)
+            sizes[part], errors[part] = _sizes_and_errors(problem, panels[part], kernel, np.abs(waves))
     return parts, errors, sizes
 
 
-def _panel_errors(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Per panel a bound of the error, from how far its last Legendre coefficients have died, and its absolute size.
+def _sizes_and_errors(
+    problem: _Problem, panels: w.Array, kernel: w.Array, waves: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Per panel, component and radius: the absolute size of the integral and a bound of its error.
 
-    Gauss-Legendre with n nodes is exact to degree 2n - 1: its error is what the coefficients from degree 2n on give,
-    each at most twice over. Twice the last two that were seen, n - 2 and n - 1, is more than that as soon as the
-    coefficients halve within n degrees or so. (To count on the rate at which they seem to fall was too bold:
-    a pole of small residue next to the panel shows in the last ones only.)
+    kernel (2, panels, nodes), waves (2, panels, nodes, radii): the rest of the integrand, absolute.
+
+    The kernel is its Legendre series to degree n - 1 and a rest. The rest is at most twice the last two coefficients
+    that were seen, as soon as they halve within n degrees or so (to count on the rate at which they seem to fall was
+    too bold: a pole of small residue next to the panel shows in the last ones only); it enters the integral and the
+    rule. The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `weight`: their coefficient of degree m is
+    at most weight e^{|Im k| span} phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
+    meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
+    six halves: there their envelope takes the place of the weight.
     """
-    last = np.abs(np.einsum("jn,cpnr->jpcr", _LAST, values)).sum(axis=0)
-    return 2.0 * last, np.einsum("n,cpnr->pcr", _WEIGHTS, np.abs(values))
+    n, span = _NODES.size, float(problem.r.max()) + problem.load.reach
+    coefficients = np.abs(kernel @ _TO_LEGENDRE.T)
+    rest = 2.0 * coefficients[..., -2:].sum(axis=-1)
+    half = np.abs(panels[:, 1] - panels[:, 0]) / 2.0
+    phi = half * span
+    swing = np.zeros_like(rest)
+    for j in range(n):  # Horner
+        swing = (swing + coefficients[..., j] / _ODD_FACTORIALS[j]) * phi
+    swing *= 3.0 * half * phi**n * np.exp(np.abs(panels.imag).max(axis=1) * span)
+    least = np.abs(panels).min(axis=1)
+    far = (least > 6.0 * half)[:, None]
+    at = np.maximum(least, half)[:, None] / 2.0
+    wave = 2.0 * problem.load.envelope(at) * envelope(at * problem.r)
+    weight = np.where(far, wave, problem.load.weight)
+    size = np.abs(kernel) * _WEIGHTS
+    found = np.stack([size, np.broadcast_to(_WEIGHTS, size.shape)], axis=2) @ waves
+    sizes, covered = np.moveaxis(found, (2, 0), (0, 2))
+    return sizes, 2.0 * rest.T[..., None] * covered + swing.T[..., None] * weight[:, None]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.attenuation import waves as w
+from unitcad.attenuation.bessel import envelope
 from unitcad.attenuation.loads import Load
 
 _PER_DECADE = 16
@@ -46,12 +47,13 @@ def measure_tail(
     end: float,
     far: float,
     rtol: float,
+    largest: float = np.inf,
 ) -> Tail:
     """Sample k C(k) beyond the last pole on a geometric grid; choose the static half-space that leaves the least.
 
-    kernel(k): with nothing taken out; far: the last wavenumber (1/m) that can be afforded. Two bounds, the lower one
-    counts: the envelope of the Bessel functions, and, where the kernel falls off, integration by parts against their
-    oscillation.
+    kernel(k): with nothing taken out; far: the last wavenumber (1/m) that can be afforded; largest: displacement, if
+    known. Two bounds, the lower one counts: the envelope of the Bessel functions, and, where the kernel falls off,
+    integration by parts against their oscillation.
     """
     lengths = [x for x in (load.reach, z, float(r.max())) if x > 0]
     first = max(1.4 * end, 1e-3 / max(lengths))
@@ -62,10 +64,10 @@ def measure_tail(
     within = max(1, int(np.searchsorted(k, far)))
     if z > 0:
         bounds = _bounds(k, raw, load, r)[:within]
-        return Tail(k[:within], bounds, None, float(bounds[0].max()))
+        return Tail(k[:within], bounds, None, min(float(bounds[0].max()), largest))
     # As on a half-space of the compliance at the wavenumber of the load's size: a film is not what the disc rests on.
     at = min(int(np.searchsorted(k, 1.0 / max(load.reach, float(r.min())))), k.size - 1)
-    scale = float(np.max(np.abs(load.static(r)[0])) * np.abs(raw[column, at]))
+    scale = min(float(np.max(np.abs(load.static(r)[0])) * np.abs(raw[column, at])), largest)
     found = [
         Tail(k[:within], _bounds(k, raw - static_kernel(material, column)[:, None], load, r)[:within], material, scale)
         for material in dict.fromkeys(reversed(materials))
@@ -82,20 +84,14 @@ def measure_tail(
 
 def _bounds(k: np.ndarray, kernel: w.Array, load: Load, r: np.ndarray) -> np.ndarray:
     size = np.abs(kernel).T[:, :, None]  # axes: wavenumbers, components, radii
-    envelope = load.envelope(k)[:, None, None] * _wave(k[:, None] * r)[:, None]
-    by_envelope = _from_right(k, size * envelope)
+    waves = load.envelope(k)[:, None, None] * envelope(k[:, None] * r)[:, None]
+    by_envelope = _from_right(k, size * waves)
     steps = np.abs(np.diff(kernel, axis=1)).T[:, :, None]
     variation = size + np.concatenate([np.cumsum(steps[::-1], axis=0)[::-1], np.zeros((1, 2, 1))])
     distance = np.maximum(np.abs(r - load.reach), 1e-12 * (r + load.reach) + 1e-300)
-    by_parts = variation * envelope * (4.0 / distance)
+    by_parts = variation * waves * (4.0 / distance)
     oscillating = (k[:, None] * r > 3.0) & ((k * load.reach > 3.0) | (load.reach == 0.0))[:, None]
     return _MARGIN * np.minimum(by_envelope, np.where(oscillating[:, None], by_parts, np.inf))
-
-
-def _wave(x: np.ndarray) -> np.ndarray:
-    """A bound of |J0| and |J1|."""
-    with np.errstate(divide="ignore"):
-        return np.minimum(1.0, 1.01 * np.sqrt(2.0 / (np.pi * x)))
 
 
 def _from_right(k: np.ndarray, f: np.ndarray) -> np.ndarray:
