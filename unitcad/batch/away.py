@@ -9,7 +9,7 @@ from unitcad.batch import task as tasks
 from unitcad.batch.task import Outcome
 from unitcad.cache import Bundle, DiskStore, digest
 from unitcad.files import write_new
-from unitcad.pipeline.folder import replacing
+from unitcad.pipeline.folder import replacing, sync
 from unitcad.pipeline.versions import code_version
 
 
@@ -40,6 +40,7 @@ class Receiver:
             with replacing(folder) as fresh:
                 outcome.product.place(fresh, self.store)
                 write_new(fresh / "timings.json", (json.dumps(timings) + "\n").encode())
+            sync([folder])
         except OSError:
             raise
         except Exception as error:

@@ -255,7 +255,6 @@ class _Batch:
                 None if self.receiver else self.out.absolute(),
                 None if self.receiver else self.store.root.absolute(),
                 self.receiver.known(key) if self.receiver else None,
-                self.options.verify,
             )
             self.running[self.executor.submit(tasks.work, task)] = task
 

@@ -57,7 +57,6 @@ class Task:
     out: Path | None = None
     cache: Path | None = None
     known: Bundle | None = None
-    verify: bool = False
     code: str = field(default_factory=code_version)
     allowed: frozenset[str] = field(default_factory=own.allowed)
 
@@ -99,6 +98,9 @@ def work(task: Task) -> list[Outcome]:
             outcome = failure(job.index, error)
         outcomes.append(_timed(outcome, time.perf_counter() - start))
         known = outcome.bundle or known
+    if task.out:
+        # Before anybody notes them as done: what is noted is on the disk.
+        folders.sync(task.out / outcome.folder for outcome in outcomes if outcome.folder)
     return outcomes
 
 
@@ -178,7 +180,7 @@ def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> dict[str, A
         folders.earlier_formats(folder, spec, ours=True)
         return None
     formats = folders.earlier_formats(folder, spec)
-    manifest = folders.whole(folder, hashes=task.verify)
+    manifest = folders.whole(folder, hashes=True)  # nobody has noted it: it may not have reached the disk
     if manifest is None:
         return None
     try:

@@ -28,6 +28,7 @@ from unitcad.catalogue.entries import (
     TissueEntry,
     Value,
     kinds_of,
+    required_of,
 )
 from unitcad.errors import Refusal, unknown_name
 
@@ -151,7 +152,7 @@ def _sourced(kind: type[Struct], table: Mapping[str, Any]) -> dict[str, Any]:
 
 def _entry(kind: type[Struct], name: str, table: Mapping[str, Any], path: str) -> Any:
     """An entry from its table. Raises `Refusal` for values left out, or that lie outside their own range."""
-    missing = [f.name for f in msgspec.structs.fields(kind) if f.required and f.name not in ("name", *table)]
+    missing = [key for key in required_of(kind) if key not in ("name", *table)]
     if missing:
         others = f" with {', '.join(missing[1:])}" if missing[1:] else ""
         like = "" if kind is Tissue else ", or like with the name of a shipped entry"

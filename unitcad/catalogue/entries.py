@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import typing
-from collections.abc import Iterator
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
 
 import msgspec
@@ -167,12 +167,21 @@ class Tissue(Struct, frozen=True, kw_only=True):
     viscosity_pa_s: Value[TissueViscosity] | None = None
 
 
-def kinds_of(entry: type[Struct]) -> Iterator[tuple[str, Any]]:
-    """The keys of an entry and the kind of value that each takes."""
-    for field in msgspec.structs.fields(entry):
-        for kind in (field.type, *typing.get_args(field.type)):
-            if typing.get_origin(kind) is Value:
-                yield field.name, typing.get_args(kind)[0]
+@cache
+def required_of(entry: type[Struct]) -> tuple[str, ...]:
+    """The keys that an entry can't do without; worked out once, as the next."""
+    return tuple(field.name for field in msgspec.structs.fields(entry) if field.required)
+
+
+@cache
+def kinds_of(entry: type[Struct]) -> tuple[tuple[str, Any], ...]:
+    """The keys of an entry and the kind of value that each takes; worked out once, since types are slow to read."""
+    return tuple(
+        (field.name, typing.get_args(kind)[0])
+        for field in msgspec.structs.fields(entry)
+        for kind in (field.type, *typing.get_args(field.type))
+        if typing.get_origin(kind) is Value
+    )
 
 
 def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:

@@ -53,16 +53,13 @@ class Product:
     shared: dict[str, str]
 
     def place(self, folder: Path, store: Store) -> None:
-        """Write it into an empty folder, contents on the disk at the end.
-
-        Raises OSError, or MissingContent where the store has lost something.
-        """
+        """Write it into an empty folder. Raises OSError, or MissingContent where the store has lost something."""
         for parent in sorted({str(Path(path).parent) for path in (*self.own, *self.shared)}):
             (folder / parent).mkdir(parents=True, exist_ok=True)
         for path, sha256 in self.shared.items():
             store.place(sha256, folder / path)
         for path, content in self.own.items():
-            files.write_new(folder / path, content, sync=True)
+            files.write_new(folder / path, content)
 
 
 def build(
