@@ -47,8 +47,9 @@ class UnknownKey(Refusal):
 def unknown_name(field: str, value: str, known: Iterable[str]) -> Refusal:
     """A refusal of a name that is not in `known`, with the closest names that are."""
     known = sorted(known)
-    close = difflib.get_close_matches(value, known, n=3, cutoff=0.4) or known[:8]
-    return Refusal(field, value, f"not known; closest: {', '.join(close)}", close[0] if close else None)
+    close = difflib.get_close_matches(value, known, n=3, cutoff=0.4)
+    names = f"closest: {', '.join(close)}" if close else f"known: {', '.join(known)}"
+    return Refusal(field, value, f"not known; {names}", close[0] if close else next(iter(known), None))
 
 
 def unknown_key(field: str, value: object, known: Iterable[str]) -> UnknownKey:

@@ -218,6 +218,7 @@ def test_dry_run_tells_what_can_not_be() -> None:
         (["paper", "--formats", "stp"], "--formats"),
         (["paper", "--set", "diametr_mm=3"], "diameter_mm"),
         (["paper", "-j", "0", "--timeout", "3"], "--timeout"),
+        (["paper", "--only", "estimate", "--scheduler", "tcp://127.0.0.1:9"], "--scheduler"),
         (["no/such.toml"], "no such file"),
     ],
 )

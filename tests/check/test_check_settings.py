@@ -21,12 +21,18 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+TOOL = "[tool.unitcad.check]"
+
+
 def codes(result: Result) -> dict[str, list[str]]:
     files = json.loads(result.stdout)["files"]
     return {Path(entry["path"]).name: [found["code"] for found in entry["findings"]] for entry in files}
 
 
-@pytest.mark.parametrize(("name", "head"), [("unitcad.toml", "[check]"), ("pyproject.toml", "[tool.unitcad.check]")])
+@pytest.mark.parametrize(
+    ("name", "head"),
+    [(f"{where}.toml", head) for where, head in [("unitcad", "[check]"), ("unitcad", TOOL), ("pyproject", TOOL)]],
+)
 def test_the_nearest_file_upwards_is_used_and_named(folder: Path, name: str, head: str) -> None:
     (folder / name).write_text(f'{head}\nselect = ["F007"]\n')
     result = run(".", "--json", cwd=folder / "sub" / "deep")

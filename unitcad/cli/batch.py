@@ -75,6 +75,7 @@ def batch(
     from unitcad.cli.batch_progress import watching
     from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json
+    from unitcad.errors import Refusal
     from unitcad.pipeline.build import OUTPUTS
     from unitcad.pipeline.folder import PAGE
 
@@ -89,6 +90,8 @@ def batch(
     folder = out or Path("out") / wanted.slug
     try:
         if chosen == ("estimate",):
+            if scheduler is not None:
+                raise Refusal("--scheduler", scheduler, "estimates alone are computed in this process: leave it out")
             summary = estimate_table(wanted, folder, options)
         else:
             certificates = Certificates(tls_ca_file, tls_cert, tls_key)

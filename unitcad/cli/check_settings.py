@@ -85,7 +85,7 @@ def find(named: str | None = None, *, wanted: bool = True) -> Configuration:
     if named is not None:
         found = _read(Path(named))
         if found is None:
-            raise UnitcadError(f"--config {named}: has no table [{_table(Path(named))}]")
+            raise UnitcadError(f"--config {named}: has no table [{_table(Path(named), {})}]")
         return found
     here = Path.cwd()
     for folder in (here, *here.parents):
@@ -95,8 +95,9 @@ def find(named: str | None = None, *, wanted: bool = True) -> Configuration:
     return Configuration()
 
 
-def _table(path: Path) -> str:
-    return "tool.unitcad.check" if path.name == "pyproject.toml" else "check"
+def _table(path: Path, data: Mapping[str, Any]) -> str:
+    """Name the table: unitcad.toml takes pyproject.toml's name for it as well."""
+    return "tool.unitcad.check" if path.name == "pyproject.toml" or "tool" in data else "check"
 
 
 def _read(path: Path) -> Configuration | None:
@@ -106,7 +107,7 @@ def _read(path: Path) -> Configuration | None:
         data = tomllib.loads(files.read_text(path))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise UnitcadError(f"{shown}: not TOML: {error}") from None
-    table = _table(path)
+    table = _table(path, data)
     *above, last = table.split(".")
     if not above and "design" in data:
         return None

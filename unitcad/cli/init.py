@@ -23,7 +23,7 @@ def init(
     stem = name.removesuffix(".toml")
     if not re.fullmatch(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,58}[A-Za-z0-9_-])?", stem):
         near = re.sub(r"[^A-Za-z0-9._-]+", "-", stem)[:60].strip("-._") or "my-unit"
-        raise Refusal("NAME", name, "is a file's name of letters, digits, dots, dashes", near)
+        raise Refusal("NAME", name, "must be letters, digits, dots and dashes", near)
     if names_device(stem):
         raise Refusal("NAME", name, "is the name of a device on Windows", f"my-{stem}")
     path = Path(f"{stem}.toml")

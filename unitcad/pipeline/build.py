@@ -157,7 +157,9 @@ def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
     """
     found = tuple(name for name in only if name == "unit" or not is_own(spec.design))
     if not found:
-        raise Refusal("--only", ",".join(only), f"{spec.design} is a design of one's own and has only", "unit")
+        raise Refusal(
+            "--only", ",".join(only), f"{spec.design} is a custom design, of which only the unit is made", "unit"
+        )
     return found
 
 
