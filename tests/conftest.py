@@ -1,6 +1,25 @@
 """Settings for every test: hypothesis draws the same examples each time and is not hurried by a loaded machine."""
 
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile("unitcad", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("unitcad")
+sys.path.append(str(Path(__file__).parent / "report"))
+
+
+@pytest.fixture(scope="session")
+def running() -> Iterator[Any]:
+    """Chromium. Its absence is a failure in CI and a reason to skip elsewhere."""
+    import chromium
+
+    if chromium.executable() is None and not os.environ.get("CI"):
+        pytest.skip("no chromium on this machine (Debian's package of that name)")
+    with chromium.browser() as browser:
+        yield browser

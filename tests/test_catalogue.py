@@ -78,7 +78,7 @@ def test_a_value_that_can_not_be_is_refused(table: str, key: str, value: object,
     """Alone, in a table and as an end of the range; what is offered is accepted in the same place."""
     if form == "low" and (isinstance(value, str) or key == "shore"):
         pytest.skip("words have no range")
-    possible = {"poisson_ratio": 0.4, "rpm": 1000.0}.get(key, 10.0)
+    possible = {"poisson_ratio": 0.4, "rpm": 1000.0, "bed_x_mm": 100.0}.get(key, 10.0)
     data = read("encapsulating")
 
     def give(value: object) -> None:

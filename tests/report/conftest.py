@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-import chromium
 import pytest
 from msgspec.structs import replace
 
@@ -51,12 +47,3 @@ def sweep(tmp_path_factory: pytest.TempPathFactory, hostile: str) -> Path:
 def page(built: Path) -> Path:
     """The page of one variant."""
     return write_report(built)
-
-
-@pytest.fixture(scope="session")
-def running() -> Iterator[Any]:
-    """Chromium. Its absence is a failure in CI and a reason to skip elsewhere."""
-    if chromium.executable() is None and not os.environ.get("CI"):
-        pytest.skip("no chromium on this machine (Debian's package of that name)")
-    with chromium.browser() as browser:
-        yield browser

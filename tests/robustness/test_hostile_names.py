@@ -6,9 +6,7 @@ import csv
 import io
 import itertools
 import json
-import os
 import re
-import sys
 import unicodedata
 import xml.etree.ElementTree as ElementTree
 import zipfile
@@ -16,6 +14,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import chromium
 import numpy as np
 import pytest
 from markdown_it import MarkdownIt
@@ -30,9 +29,6 @@ from unitcad.export import drawing, threemf
 from unitcad.pipeline.build import build
 from unitcad.report import write_report
 from unitcad.spec import Spec, from_data, read, to_toml
-
-sys.path.append(str(Path(__file__).parent.parent / "report"))
-import chromium
 
 SHOWN = [
     "<script>window.hit=1</script>",
@@ -201,25 +197,22 @@ def test_a_bodys_name_is_text_in_meshes_and_drawings(name: str) -> None:
     assert ElementTree.fromstring(marked).text == name
 
 
-def test_a_page_of_all_names_runs_no_script_and_asks_for_nothing(folders: dict[str, Path]) -> None:
-    if chromium.executable() is None and not os.environ.get("CI"):
-        pytest.skip("no chromium on this machine (Debian's package of that name)")
+def test_a_page_of_all_names_runs_no_script_and_asks_for_nothing(folders: dict[str, Path], running: Any) -> None:
     root = next(iter(folders.values())).parent
     page = write_report(root)
-    with chromium.browser() as running:
-        for name in ["", *SHOWN[:4]]:
-            visit = chromium.Visit(running, page, fragment=folders[name].name if name else "")
-            visit.page.on("dialog", lambda dialog, errors=visit.errors: errors.append(dialog.message))
-            visit.page.wait_for_timeout(100)
-            asked = [url.partition("#")[0] for url in visit.requests if not url.startswith(("data:", "blob:"))]
-            assert asked == [page.resolve().as_uri()]
-            assert visit.errors == []
-            assert visit.page.evaluate("window.hit") is None
-            shown = visit.page.inner_text("main")
-            assert all(" ".join(each.split()) in " ".join(shown.split()) for each in ([name] if name else SHOWN))
-            if name:
-                assert visit.page.title() == name
-            visit.close()
+    for name in ["", *SHOWN[:4]]:
+        visit = chromium.Visit(running, page, fragment=folders[name].name if name else "")
+        visit.page.on("dialog", lambda dialog, errors=visit.errors: errors.append(dialog.message))
+        visit.page.wait_for_timeout(100)
+        asked = [url.partition("#")[0] for url in visit.requests if not url.startswith(("data:", "blob:"))]
+        assert asked == [page.resolve().as_uri()]
+        assert visit.errors == []
+        assert visit.page.evaluate("window.hit") is None
+        shown = visit.page.inner_text("main")
+        assert all(" ".join(each.split()) in " ".join(shown.split()) for each in ([name] if name else SHOWN))
+        if name:
+            assert visit.page.title() == name
+        visit.close()
 
 
 def test_a_terminal_gets_names_as_text(tmp_path: Path) -> None:

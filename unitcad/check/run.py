@@ -148,7 +148,8 @@ def _in_processes(
             yield _alone(*left[done], memory_mb, then)
             done += 1
         finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+            # Workers with nothing left to do are waited for, or their pipes close under the interpreter's own exit.
+            pool.shutdown(wait=done == len(futures), cancel_futures=True)
         left = left[done:]
 
 

@@ -19,7 +19,7 @@ LEAST_TAIL = 0.4
 Length = Annotated[float, Meta(ge=0.1, le=kinds.LONGEST_MM)]
 Thickness = Annotated[float, Meta(ge=LEAST_LAYER, le=kinds.LONGEST_MM)]
 CircuitThickness = Annotated[float, Meta(ge=0.01, le=5)]
-Cavities = Annotated[int, Meta(ge=1, le=200)]
+Cavities = Annotated[int, Meta(ge=1)]
 Vents = Annotated[int, Meta(ge=1, le=1000)]
 TailWidth = Annotated[float, Meta(ge=LEAST_TAIL, le=kinds.LONGEST_MM)]
 Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
