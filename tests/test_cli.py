@@ -78,6 +78,17 @@ def test_a_folder_that_can_not_be_written_is_one_line(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(("setting", "field"), [("layers.0.cap_mm=500", "layers.0.cap_mm"), ("diameter_mm=900",) * 2])
+def test_estimate_says_that_build_would_refuse_the_moulds(setting: str, field: str, tmp_path: Path) -> None:
+    estimated = _run("estimate", "encapsulating", "--set", setting, "--model", "fitted", "--json")
+    built = _run("build", "encapsulating", "--set", setting, cwd=tmp_path)
+    assert (estimated.returncode, built.returncode) == (0, 2)
+    reason = built.stderr.removeprefix("error: ")
+    assert reason.startswith(field.partition("=")[0] + " = ")
+    assert estimated.stderr == f"warning: encapsulating: its moulds can't be made: {reason}"
+    assert json.loads(estimated.stdout)["models"]["fitted"]
+
+
 def test_help_and_version() -> None:
     assert "build" in _run("--help").stdout
     assert _run("--version").stdout.startswith("unitcad 0.")

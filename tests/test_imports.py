@@ -26,7 +26,8 @@ FLOORS = [
     {"check"},
     {"catalogue"},
     {"files"},
-    {"errors", "children", "text"},
+    {"errors", "children"},
+    {"text"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 CAD = ("OCP", "build123d", "cadquery")

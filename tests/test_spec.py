@@ -126,7 +126,13 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("tissue.arm.skin=1", r"^tissue\.arm\.skin = 1: takes a table"),
         ("diameter_mm=1e400", "finite"),
         ("materials.mine.density_g_cm3=inf", r"^materials\.mine\.density_g_cm3 = inf: must be a finite"),
-        ("wires={ count = 2 }", r"^wires\.diameter_mm = 'nothing': is required"),
+        ("wires={ count = 2 }", r"^wires\.diameter_mm: is required"),
+        ("tissue.arm={}", r"^tissue\.arm = \{\}: must not be empty: needs one layer or more by name, .*density_kg_m3"),
+        ("layers=[]", r"^layers = \[\]: must not be empty: needs one \[\[layers\]\] table or more"),
+        ("estimate.models=[]", r"^estimate\.models = \[\]: .* one or more of paper, consistent, fitted$"),
+        ("materials.mine.mix_ratio=[]", r"mix_ratio = \[\]: takes a number, or a table with value and, where wanted, "),
+        ("motor=['a', 2.5]", r'^motor = \["a", 2.5\]: takes a table, with keys such as part, diameter_mm,'),
+        ("motor.fill={ b = true }", r"^motor\.fill = \{ b = true \}: takes true or false$"),
         ("nonsense", "path=value"),
         ("name.x=1", "table"),
     ],
@@ -145,6 +151,21 @@ def test_a_key_is_named_whatever_it_looks_like(key: str) -> None:
             from_data(data)
         assert refused.value.field == place + key
         del table[key]
+
+
+def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are() -> None:
+    with pytest.raises(
+        Refusal, match=r"known here: diameter_mm, (\w+, ){3}\w+ and 12 more \(`unitcad schema` lists all\)"
+    ):
+        load("encapsulating", ["diametre_mm=1"])
+    with pytest.raises(Refusal, match=r"known here: wall_mm, cap_mm, material; nearest"):
+        load("encapsulating", ["layers.0.walls_mm=1"])
+
+
+def test_a_missing_value_is_null_in_json() -> None:
+    with pytest.raises(Refusal) as refused:
+        load("encapsulating", ["wires={ count = 2 }"])
+    assert refused.value.as_dict()["value"] is None
 
 
 def test_json_is_the_same_spec_and_plain_data_too() -> None:

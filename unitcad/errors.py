@@ -6,6 +6,8 @@ import difflib
 import math
 from collections.abc import Iterable
 
+from unitcad.text import toml
+
 
 class UnitcadError(Exception):
     """Asked wrongly, or the machine lacks something: exit code 2, no traceback."""
@@ -21,11 +23,12 @@ class Refusal(UnitcadError):
     """A value that can't be: which field, its value, the limit it breaks and the nearest accepted value.
 
     `nearest` is a value that may be typed in `field`'s place and that meets this limit (it may then meet another one).
+    `value` is None for a field that is missing.
     """
 
     def __init__(self, field: str, value: object, limit: str, nearest: object = None) -> None:
         self.field, self.value, self.limit, self.nearest = field, value, limit, nearest
-        text = f"{field} = {_shown(value)}: {limit}"
+        text = f"{field}: {limit}" if value is None else f"{field} = {_shown(value)}: {limit}"
         if nearest is not None:
             text += f"; nearest accepted: {_shown(nearest)}"
         super().__init__(text)
@@ -52,20 +55,26 @@ def unknown_name(field: str, value: str, known: Iterable[str]) -> Refusal:
     return Refusal(field, value, f"not known; {names}", close[0] if close else next(iter(known), None))
 
 
-def unknown_key(field: str, value: object, known: Iterable[str]) -> UnknownKey:
-    """A refusal of a key that no table has; `field` is its whole path, `known` the keys of that table."""
+def unknown_key(field: str, value: object, known: Iterable[str], lists: str = "") -> UnknownKey:
+    """A refusal of a key that no table has; `field` is its whole path, `known` the keys of that table.
+
+    The limit names the most similar keys first, and the command `lists`, which prints all, where it leaves any out.
+    """
     table, _, key = field.rpartition(".")
     known = list(known)
     close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
     nearest = f"{table}.{close[0]}" if table and close else close[0] if close else None
-    return UnknownKey(field, value, f"unknown key; known here: {', '.join(known)}", nearest)
+    alike = sorted(known, key=lambda name: -difflib.SequenceMatcher(None, key, name).ratio())
+    more = len(known) - _MOST_KEYS
+    rest = f" and {more} more{f' ({lists} lists all)' if lists else ''}" if more > 0 else ""
+    return UnknownKey(field, value, f"unknown key; known here: {', '.join(alike[:_MOST_KEYS])}{rest}", nearest)
 
 
 def _shown(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
-    value = _plain(value)
-    return repr(value) if isinstance(value, str) else str(value)
+    plain = _plain(value)
+    return repr(plain) if isinstance(value, str) else toml(plain) if isinstance(plain, bool) else str(plain)
 
 
 def _plain(value: object) -> bool | int | float | str | None:
@@ -82,10 +91,12 @@ def _plain(value: object) -> bool | int | float | str | None:
 
 def _text(value: object) -> str:
     try:
-        return str(value)
+        return toml(value)
     except (ValueError, RecursionError):  # a number of thousands of digits in it, or it is deeply nested
         return f"a {type(value).__name__}"
 
 
+_MOST_KEYS = 5
+"""Keys of a table that are named for one that it does not have."""
 _LONGEST = 200
 """Characters of a value that are shown."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+from typing import Any
 
 _INVISIBLE = re.compile(
     "[\x00-\x1f\x7f-\x9f"  # control characters, escape among them
@@ -38,3 +40,20 @@ def markdown(text: str) -> str:
 def cell(text: str) -> str:
     """A text for a cell of a CSV table: one that begins like a formula is one to a spreadsheet, so it gets a quote."""
     return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
+
+
+def toml_key(key: str) -> str:
+    """Write a key as TOML has it: in quotes where it must be."""
+    plain = key.isascii() and key.replace("-", "").replace("_", "").isalnum()
+    return key if plain else toml(key)
+
+
+def toml(value: Any) -> str:
+    """Write a value as TOML has it, in one line: tables and lists inline; what TOML lacks as its text."""
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{toml_key(str(k))} = {toml(v)}' for k, v in value.items())} }}" if value else "{}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml, value))}]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return str(value).lower() if isinstance(value, bool) else repr(value) if isinstance(value, float) else str(value)

@@ -237,7 +237,9 @@ def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path: P
         ("from unitcad.shape import ring\ndef unit(spec): return {'Bad name': ring(1, 2, 0, 1)}", "is no name"),
         ("from unitcad.shape import ring\ndef unit(spec): return ring(2, 1, 0, 1)", "line 2"),
         ("import nonsense_there_is_not", "ModuleNotFoundError"),
-        ("raise SystemExit(3)", "SystemExit"),
+        ("raise SystemExit(3)", r"line 1\): ends the program \(SystemExit\); it must return"),
+        ("import sys\ndef unit(spec): sys.exit()", r"line 2\): ends the program \(SystemExit\)"),
+        ("def unit(spec): assert False", r"line 1\): AssertionError without a message"),
     ],
 )
 def test_a_design_that_does_not_work_says_where(code: str, said: str, tmp_path: Path) -> None:

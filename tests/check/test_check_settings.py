@@ -113,7 +113,7 @@ def test_per_file_ignores_hide_no_file_that_was_not_judged(folder: Path) -> None
 
 
 BAD = [
-    ('[check]\nselct = ["T"]', "unitcad.toml: check.selct = \"['T']\": unknown key; ", "'check.select'"),
+    ('[check]\nselct = ["T"]', "unitcad.toml: check.selct = [\"T\"]: unknown key; ", "'check.select'"),
     ("[check]\nfail_on = 'error'", "unitcad.toml: check.fail_on = 'error': unknown key; ", "'check.fail-on'"),
     ('[check]\nselect = "T"', "unitcad.toml: check.select = 'T': takes a list", ""),
     ("[check]\nselect = [1]", "unitcad.toml: check.select.0 = 1: takes a text", ""),
@@ -131,9 +131,9 @@ BAD = [
     ("[check]\n3mf-strict = 1", "unitcad.toml: check.3mf-strict = 1: takes true or false", ""),
     ("[check.per-file-ignores]\n'*.stl' = 'T'", "unitcad.toml: check.per-file-ignores.*.stl = 'T': takes a list", ""),
     ("[check.per-file-ignores]\n'a' = ['X']", "unitcad.toml: check.per-file-ignores.a = 'X': begins no rule's", ""),
-    ("check = 3", "unitcad.toml: check = '3': takes a table", ""),
-    ("[chekc]\nselect = []", "unitcad.toml: chekc = \"{'select': []}\": unknown key; ", "'check'"),
-    ("select = ['T']", "unitcad.toml: select = \"['T']\": unknown key; known here: check", ""),
+    ("check = 3", "unitcad.toml: check = 3: takes a table", ""),
+    ("[chekc]\nselect = []", "unitcad.toml: chekc = { select = [] }: unknown key; ", "'check'"),
+    ("select = ['T']", "unitcad.toml: select = [\"T\"]: unknown key; known here: check", ""),
     ("[check\n", "unitcad.toml: not TOML: ", ""),
     ("[check]\nbaseline = 'none.json'", "none.json: no such file", ""),
 ]  # fmt: skip

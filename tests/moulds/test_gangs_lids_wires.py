@@ -59,6 +59,13 @@ def test_a_piece_higher_than_the_printer(set_by_hand: tuple[str, ...]) -> None:
     MouldSet.of("encapsulating", *set_by_hand, f"moulds.bed_z_mm={refused.value.nearest}")
 
 
+def test_a_length_beyond_the_printer_s_height_is_the_one_refused() -> None:
+    with pytest.raises(Refusal, match=r"the tallest piece has .* \(moulds\.bed_z_mm\) is 220 mm") as refused:
+        MouldSet.of("encapsulating", "layers.1.cap_mm=500")
+    assert refused.value.field == "layers.1.cap_mm"
+    MouldSet.of("encapsulating", f"layers.1.cap_mm={refused.value.nearest}")
+
+
 def test_cells_are_numbered_and_numbers_keep_off_grooves_and_each_other() -> None:
     moulds = MouldSet.of("no-fpcb", "moulds.cavities=[5,4]")
     names = [cell.name for cell in moulds.plan.layout.cells]

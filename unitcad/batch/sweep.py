@@ -273,7 +273,7 @@ def _check_mode(mode: str, axes: tuple[Axis, ...], cases: tuple[Any, ...]) -> No
     if cases:
         raise Refusal("sweep.mode", mode, "[[sweep.cases]] goes with another mode", "cases")
     if not axes:
-        raise Refusal("sweep", "nothing", 'the sweep is empty: it needs a path with values, such as "diameter_mm"')
+        raise Refusal("sweep", None, 'the sweep is empty: it needs a path with values, such as "diameter_mm"')
     lengths = {axis.path: len(axis) for axis in axes if len(axis) > 1}
     if mode == "zip" and len(set(lengths.values())) > 1:
         told = ", ".join(f"{path} has {count}" for path, count in lengths.items())

@@ -89,9 +89,9 @@ def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] |
     for layer in layers:
         path = f"tissue.{name}.{layer.name}"
         if layer.shear_modulus_kpa is None and layer.youngs_modulus_kpa is None:
-            raise Refusal(f"{path}.youngs_modulus_kpa", "nothing", "is required, or shear_modulus_kpa")
+            raise Refusal(f"{path}.youngs_modulus_kpa", None, "is required, or shear_modulus_kpa")
         if layer is not layers[-1] and layer.thickness_mm is None:
-            raise Refusal(f"{path}.thickness_mm", "nothing", "is required: only the last layer is a half-space")
+            raise Refusal(f"{path}.thickness_mm", None, "is required: only the last layer is a half-space")
         if layer is layers[-1] and layer.thickness_mm is not None:
             raise Refusal(
                 f"{path}.thickness_mm", float(layer.thickness_mm), "the last layer is a half-space; leave it out"
@@ -156,7 +156,7 @@ def _entry(kind: type[Struct], name: str, table: Mapping[str, Any], path: str) -
     if missing:
         others = f" with {', '.join(missing[1:])}" if missing[1:] else ""
         like = "" if kind is Tissue else ", or like with the name of a shipped entry"
-        raise Refusal(f"{path}.{missing[0]}", "nothing", f"is required{others}{like}")
+        raise Refusal(f"{path}.{missing[0]}", None, f"is required{others}{like}")
     entry = msgspec.convert({"name": name, **_sourced(kind, table)}, kind)
     for key, _ in kinds_of(kind):
         value = getattr(entry, key)

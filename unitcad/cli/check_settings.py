@@ -131,4 +131,4 @@ def _read(path: Path) -> Configuration | None:
 def _mapping(table: str, data: Any) -> Mapping[str, Any]:
     if isinstance(data, Mapping):
         return data
-    raise Refusal(table, str(data)[:60], "takes a table")
+    raise Refusal(table, data, "takes a table")

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from unitcad.cli.output import print_json
+from unitcad.cli.output import print_json, warn
 from unitcad.errors import Refusal, unknown_name
+
+if TYPE_CHECKING:
+    from unitcad.spec import Spec
 
 _MOST_FREQUENCIES = 1000
 
@@ -36,6 +39,8 @@ def estimate(
     models = None if not model else MODELS if model == "all" else (model,)
     hertz = frequencies(frequency) if frequency else []
     loaded = [load(name, set_ or []) for name in specs]
+    for spec in loaded:
+        _warn_of_moulds(spec)
     if ":" in frequency:
         found = [frequency_table_of_spec(spec, hertz, models) for spec in loaded]
     else:
@@ -47,6 +52,19 @@ def estimate(
 
     for one in found:
         (print_frequencies if ":" in frequency else print_estimate)(one)
+
+
+def _warn_of_moulds(spec: Spec) -> None:
+    """Say on standard error that `build` would refuse the moulds of a unit that can be estimated."""
+    from unitcad.moulds.plan import plan
+    from unitcad.spec.own import is_own
+
+    if is_own(spec.design):
+        return
+    try:
+        plan(spec)
+    except Refusal as refusal:
+        warn(f"warning: {spec.name}: its moulds can't be made: {refusal}")
 
 
 def frequencies(text: str) -> list[float]:

@@ -61,12 +61,17 @@ def _function(design: str, source: str) -> Any:
 
 
 def _failed(design: str, error: BaseException) -> UnitcadError:
-    """What went wrong, in whose words, and where in the design's file."""
+    """The error of a design's code, with its line in the design's file."""
     file, line, trace = design.rpartition(":")[0], getattr(error, "lineno", None), error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == file:
             line = trace.tb_lineno
         trace = trace.tb_next
     where = f" (line {line})" if line else ""
-    kind = "" if isinstance(error, ProfileError) else f"{type(error).__name__}: "
-    return UnitcadError(f"design {design}{where}: {kind}{error}")
+    if isinstance(error, SystemExit):
+        text = "ends the program (SystemExit); it must return a shape tree, or raise an error that says what is wrong"
+    elif isinstance(error, ProfileError):
+        text = str(error)
+    else:
+        text = f"{type(error).__name__}: {error}" if str(error) else f"{type(error).__name__} without a message"
+    return UnitcadError(f"design {design}{where}: {text}")

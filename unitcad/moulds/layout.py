@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from unitcad.catalogue import printers
 from unitcad.errors import Refusal
 from unitcad.shape.lettering import HEIGHT, text_width
 from unitcad.spec import Dimensions, Spec
@@ -66,10 +67,9 @@ def layout(spec: Spec, dims: Dimensions) -> Layout:
     over = _excess(spec, found)
     if max(over) > 1e-9:
         raise _too_large(spec, dims, found, columns, rows, over)
-    tallest = max(spec.moulds.plinth_height_mm + spec.moulds.plate_mm + dims.heights[-1], BLADE_HEIGHT)
+    tallest = spec.moulds.plinth_height_mm + spec.moulds.plate_mm + dims.heights[-1]
     if tallest > (spec.moulds.bed_z_mm or 0.0) + 1e-9:
-        nearest = math.ceil(tallest * 100) / 100
-        raise Refusal("moulds.bed_z_mm", spec.moulds.bed_z_mm, f"the tallest piece has {tallest:.4g} mm", nearest)
+        raise _too_tall(spec, tallest)
     return found
 
 
@@ -143,6 +143,21 @@ def _corner_for_label(radius: float, width: float, height: float) -> float:
     while math.hypot(max(half - TEXT_MARGIN - width, 0), max(half - TEXT_MARGIN - height, 0)) < radius:
         half += 1 / 64
     return half
+
+
+def _too_tall(spec: Spec, tallest: float) -> Refusal:
+    """The refusal of a piece higher than the printer prints: of the largest length in it, or of a lowered bed_z_mm."""
+    lengths = {"motor.thickness_mm": spec.motor.thickness_mm or 0.0, "moulds.plate_mm": spec.moulds.plate_mm}
+    lengths |= {f"layers.{i}.cap_mm": layer.cap_mm or 0.0 for i, layer in enumerate(spec.layers)}
+    lengths["moulds.plinth_height_mm"] = spec.moulds.plinth_height_mm
+    bed = spec.moulds.bed_z_mm or 0.0
+    if bed < float(printers(spec.printers)[spec.moulds.printer].bed_z_mm):
+        nearest = math.ceil(tallest * 100) / 100
+        return Refusal("moulds.bed_z_mm", bed, f"the tallest piece has {tallest:.4g} mm", nearest)
+    field = max(lengths, key=lambda name: lengths[name])
+    nearest = math.floor((lengths[field] - (tallest - bed)) * 100 + 1e-6) / 100
+    limit = f"the tallest piece has {tallest:.4g} mm, and the printer's height (moulds.bed_z_mm) is {bed:g} mm"
+    return Refusal(field, lengths[field], limit, nearest if nearest > 0 else None)
 
 
 def _too_large(spec: Spec, dims: Dimensions, found: Layout, columns: int, rows: int, over: list[float]) -> Refusal:

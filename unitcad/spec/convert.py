@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from unitcad.errors import Refusal, unknown_key, unknown_name
-from unitcad.spec.fields import alternatives, entry_in, fields_of, named_in, table_in
+from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, named_in, table_in
 from unitcad.text import invisible, printable, without_invisible
 
 T = TypeVar("T")
@@ -31,6 +31,8 @@ _KIND = re.compile(r"Expected `(?P<kinds>[^`]+)`")
 _STEP = re.compile(r"\.([^.\[]+)|\[(\d+|\.\.\.)\]")
 _HALF_PAIR = re.compile(r"[\ud800-\udfff]")
 """What stands for a byte that is not UTF-8."""
+_MOST_KEYS = 5
+"""Keys of a table that a refusal names."""
 _LARGEST_INT = 2**63 - 1
 _SIGNS = {">=": "at least", "<=": "at most"}
 SOURCE = "design_source"
@@ -97,7 +99,7 @@ def _unknown(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
             if key in fields:
                 yield from _unknown(below, fields[key].type, place)
             else:
-                yield unknown_key(place, below, fields)
+                yield unknown_key(place, below, fields, "`unitcad schema`")
     elif isinstance(node, Mapping):
         for key, below in node.items():
             yield from _unknown(below, named_in(kind), _below(field, key))
@@ -114,7 +116,7 @@ def _refusal(what: str, path: str, data: Any, kind: Any, above: str) -> Refusal:
     if what.startswith("Object ") and table:
         fields = fields_of(table)
         missing = next(name for name, entry in fields.items() if entry.required and name not in value)
-        return Refusal(_below(field, missing), "nothing", "is required")
+        return Refusal(_below(field, missing), None, "is required")
     if what.startswith("Invalid enum value"):
         return unknown_name(field, value, _words(kind))
     if bound := _BOUND.match(what):
@@ -123,14 +125,35 @@ def _refusal(what: str, path: str, data: Any, kind: Any, above: str) -> Refusal:
         if bound["length"]:
             of = "characters" if bound["kind"] == "str" else "entries"
             empty = bound["sign"] == ">="
-            return Refusal(field, value, "must not be empty" if empty else f"must have at most {limit} {of}")
+            return Refusal(field, value, _needs(kind) if empty else f"must have at most {limit} {of}")
         return Refusal(field, value, f"must be {_SIGNS[bound['sign']]} {limit:g}", limit)
     if length := _LENGTH.match(what):
         return Refusal(field, value, f"must have {length['length']} entries")
     if kinds := _KIND.match(what):
-        names = [_NAMES.get(name, name) for name in kinds["kinds"].split(" | ") if name != "null"]
-        return Refusal(field, value, f"takes {' or '.join(names)}")
+        names = [_name(name, kind) for name in kinds["kinds"].split(" | ") if name != "null"]
+        return Refusal(field, value, f"takes {', or '.join(names) if table else ' or '.join(names)}")
     return Refusal(field, value, what.lower())
+
+
+def _name(plain: str, kind: Any) -> str:
+    """A kind of plain data in words, with a table's keys: those it requires, else the first ones."""
+    table = table_in(kind)
+    if plain != "object" or not table:
+        return _NAMES.get(plain, plain)
+    fields = fields_of(table)
+    required = [name for name, entry in fields.items() if entry.required]
+    optional = [name for name in fields if name not in required][:_MOST_KEYS]
+    if not required:
+        return f"a table, with keys such as {', '.join(optional)}"
+    return f"a table with {', '.join(required)}{' and, where wanted, ' if optional else ''}{', '.join(optional)}"
+
+
+def _needs(kind: Any) -> str:
+    """What an empty text, list or table must hold."""
+    entry = named_in(kind) or entry_in(kind)
+    words = f"one or more of {', '.join(_words(entry))}" if entry and _words(entry) else ""
+    needed = meaning(kind) or words or ("one entry or more" if entry else "one character or more")
+    return f"must not be empty: needs {needed}"
 
 
 def _followed(path: str, node: Any, kind: Any) -> tuple[list[str], Any, Any]:

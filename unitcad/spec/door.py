@@ -57,7 +57,7 @@ def checked(spec: Spec) -> Spec:
 def _checked_own(spec: Spec) -> Spec:
     """A spec whose shapes a function of its own draws: what that function makes of its lengths is not for us to say."""
     if spec.design_source is None:
-        raise Refusal("design_source", "nothing", f"is required with design = {spec.design!r}")
+        raise Refusal("design_source", None, f"is required with design = {spec.design!r}")
     return _with_defaults(spec)
 
 
@@ -127,7 +127,7 @@ def _with_defaults(spec: Spec) -> Spec:
         )
     for field in ("diameter_mm", "thickness_mm"):
         if getattr(motor, field) is None:
-            raise Refusal(f"motor.{field}", "nothing", "is required where no part is named")
+            raise Refusal(f"motor.{field}", None, "is required where no part is named")
     known = catalogue.materials(spec.materials)
     for i, layer in enumerate(spec.layers):
         catalogue.choose(f"layers.{i}.material", layer.material, known)
@@ -169,7 +169,7 @@ def _check_layers(spec: Spec) -> None:
                 f"layers.{i}.cap_mm", layer.cap_mm, "an embedded layer is an open ring and has no cap; leave it out"
             )
         if spec.design == "encapsulating" and layer.cap_mm is None:
-            raise Refusal(f"layers.{i}.cap_mm", "nothing", "every encapsulating layer has a cap", layer.wall_mm)
+            raise Refusal(f"layers.{i}.cap_mm", None, "every encapsulating layer has a cap", layer.wall_mm)
 
 
 def _check_motor(spec: Spec, dims: Dimensions) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 import os
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -20,6 +19,7 @@ from unitcad.spec.door import checked
 from unitcad.spec.fields import index_in
 from unitcad.spec.models import Spec
 from unitcad.spec.own import with_source
+from unitcad.text import toml, toml_key
 
 _MOST_LIMITS = 5
 """Limits of one field that are tried out in turn for a value to offer."""
@@ -168,29 +168,14 @@ def _table(data: Mapping[str, Any], path: tuple[str, ...]) -> str:
     def is_tables(value: Any) -> bool:
         return isinstance(value, list) and bool(value) and all(map(is_table, value))
 
-    lines = [f"{_key(k)} = {_toml(v)}\n" for k, v in data.items() if not is_table(v) and not is_tables(v)]
+    lines = [f"{toml_key(k)} = {toml(v)}\n" for k, v in data.items() if not is_table(v) and not is_tables(v)]
     for key, value in data.items():
-        name = ".".join(map(_key, (*path, key)))
+        name = ".".join(map(toml_key, (*path, key)))
         if is_table(value) and value:
             lines.append(f"\n[{name}]\n" + _table(value, (*path, key)))
         elif is_tables(value):
             lines += [f"\n[[{name}]]\n" + _table(item, (*path, key)) for item in value]
     return "".join(lines)
-
-
-def _key(key: str) -> str:
-    plain = key.isascii() and key.replace("-", "").replace("_", "").isalnum()
-    return key if plain else _toml(key)
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def _parsed(raw: str) -> Any:

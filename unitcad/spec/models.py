@@ -23,6 +23,8 @@ Cavities = Annotated[int, Meta(ge=1)]
 Vents = Annotated[int, Meta(ge=1, le=1000)]
 TailWidth = Annotated[float, Meta(ge=LEAST_TAIL, le=kinds.LONGEST_MM)]
 Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
+_LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
+_TISSUE = "one layer or more by name, skin first, each a table with density_kg_m3, poisson_ratio and a modulus"
 Model = Literal["paper", "consistent", "fitted"]
 
 
@@ -141,7 +143,7 @@ class Spec(Table, frozen=True, kw_only=True):
     motor: MotorTable = MotorTable(part="LCM0720A3463F")
     fpcb: FpcbTable | None = None
     wires: WiresTable | None = None
-    layers: Annotated[tuple[LayerTable, ...], Meta(min_length=1, max_length=15)]
+    layers: Annotated[tuple[LayerTable, ...], Meta(min_length=1, max_length=15, description=_LAYERS)]
     moulds: MouldsTable = MouldsTable()
     casting: CastingTable = CastingTable()
     estimate: EstimateTable = EstimateTable()
@@ -149,7 +151,7 @@ class Spec(Table, frozen=True, kw_only=True):
     materials: dict[str, MaterialEntry] = {}
     motors: dict[str, MotorEntry] = {}
     printers: dict[str, PrinterEntry] = {}
-    tissue: dict[str, Annotated[dict[str, TissueEntry], Meta(min_length=1)]] = {}
+    tissue: dict[str, Annotated[dict[str, TissueEntry], Meta(min_length=1, description=_TISSUE)]] = {}
     parameters: Annotated[
         dict[str, bool | int | float | str], Meta(description="what a design of one's own wants to know besides")
     ] = {}
