@@ -27,7 +27,7 @@ FLOORS = [
     {"catalogue"},
     {"files"},
     {"errors", "children"},
-    {"text"},
+    {"text", "geometry"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 CAD = ("OCP", "build123d", "cadquery")
@@ -65,7 +65,52 @@ def test_imports_run_downward_only() -> None:
 def test_attenuation_and_check_know_nothing_of_cad() -> None:
     for room, below, file in _edges():
         if room in ("attenuation", "check"):
-            assert below in ("catalogue", "children", "files", "text", "errors"), f"{file} imports {below}"
+            assert below in ("catalogue", "children", "files", "geometry", "text", "errors"), f"{file} imports {below}"
+
+
+def _file_imports(folder: Path) -> dict[str, set[str]]:
+    """The files below `folder` and those of them that each imports, at its top or within a function, for types too."""
+    names = {
+        file: ".".join(["unitcad", *file.relative_to(PACKAGE).with_suffix("").parts]) for file in folder.rglob("*.py")
+    }
+    modules = {name.removesuffix(".__init__"): str(file.relative_to(PACKAGE)) for file, name in names.items()}
+    graph: dict[str, set[str]] = {}
+    for file in names:
+        wanted: set[str] = set()
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                wanted |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                whole = {alias.name: f"{node.module}.{alias.name}" for alias in node.names}
+                wanted |= {name if name in modules else node.module for name in whole.values()}
+        graph[names[file]] = {modules[name] for name in wanted if name in modules}
+    return graph
+
+
+def _circles(graph: dict[str, set[str]]) -> dict[str, set[str]]:
+    """What is left of a graph once all that import nothing, or that nothing imports, are taken away again and again."""
+    left, before = dict(graph), None
+    while left != before:
+        before, imported = left, set().union(*left.values())
+        kept = {file: below & left.keys() for file, below in left.items() if file in imported}
+        left = {file: below for file, below in kept.items() if below}
+    return left
+
+
+def test_a_circle_of_files_is_seen() -> None:
+    assert _circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}) == {"b": {"c"}, "c": {"b"}}
+    assert _circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == {}
+
+
+def test_no_files_of_check_import_each_other_in_a_circle() -> None:
+    graph = _file_imports(PACKAGE / "check")
+    assert len(graph) > 40
+    assert _circles(graph) == {}
+
+
+def test_no_basename_occurs_twice_in_check() -> None:
+    names = [file.name for file in (PACKAGE / "check").rglob("*.py") if file.name != "__init__.py"]
+    assert sorted(names) == sorted(set(names))
 
 
 def test_no_file_is_past_400_lines() -> None:

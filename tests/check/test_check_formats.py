@@ -17,10 +17,10 @@ from shapes import box, stl, text_stl
 from unitcad.check import FileReport, Options, check_file, check_mesh, formats
 from unitcad.check.findings import SEVERITIES, Finding, Location, merge
 from unitcad.check.limits import Deadline
+from unitcad.check.many_files import check_files
 from unitcad.check.mesh import Mesh
 from unitcad.check.rulebook import FAMILIES, check_prefixes, explain, finding, markdown, rules
 from unitcad.check.rules_mesh import in_file, judge_mesh
-from unitcad.check.run import check_files
 from unitcad.check.source import Source
 from unitcad.errors import Refusal
 

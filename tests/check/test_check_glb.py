@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import CUBE_CORNERS, CUBE_FACES
 
-from unitcad.check.check import _reader
 from unitcad.check.limits import Deadline, Limits
+from unitcad.check.readers.sniff import reader_of
 from unitcad.export import glb
 
 CUBE = (CUBE_CORNERS * 0.01).astype("<f4")  # metres
@@ -25,7 +25,7 @@ FACES = CUBE_FACES.astype("<u2")
 
 
 def soup(content: bytes) -> np.ndarray:
-    (mesh,), findings = _reader("glb")(memoryview(content), Limits(), Deadline(60))
+    (mesh,), findings = reader_of("glb")(memoryview(content), Limits(), Deadline(60))
     assert findings == []
     return mesh.vertices[mesh.faces]
 

@@ -161,6 +161,6 @@ def test_text_stl_is_blamed_where_it_breaks(
     text: str, expected: list, block: int, judge, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The first word that breaks the grammar, and nothing of the mesh that came before it."""
-    monkeypatch.setattr("unitcad.check.read_stl._BLOCK", block)
+    monkeypatch.setattr("unitcad.check.readers.read_stl._BLOCK", block)
     found = judge(text).findings
     assert [(item.code, item.message, item.locations[0].line) for item in found] == expected

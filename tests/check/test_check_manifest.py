@@ -14,7 +14,7 @@ from shapes import box, stl
 
 from unitcad.check import FileReport, Options
 from unitcad.check import manifest as listing
-from unitcad.check.run import check_files
+from unitcad.check.many_files import check_files
 from unitcad.errors import UnitcadError
 
 BASE = stl(box((20, 20, 5)))

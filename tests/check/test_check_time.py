@@ -8,9 +8,9 @@ from shapes import CUBE_CORNERS, CUBE_FACES, mesh_xml, model_xml, package, stl
 
 from unitcad.catalogue import printers
 from unitcad.check import check_bytes, crossing, pairs
-from unitcad.check.check import Options
 from unitcad.check.findings import Facts, FileReport
 from unitcad.check.limits import Deadline, OutOfTime, Unreadable
+from unitcad.check.options import Options
 
 
 def _open_and_crossing() -> tuple[np.ndarray, np.ndarray]:
@@ -113,16 +113,16 @@ def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.Mon
     import signal
     import time
 
-    from unitcad.check import run, shells
+    from unitcad.check import many_files, shells
     from unitcad.check.limits import Limits
 
     if not hasattr(signal, "setitimer"):
         pytest.skip("no interval timer")
-    monkeypatch.setattr(run, "_GRACE", 0.1)
+    monkeypatch.setattr(many_files, "_GRACE", 0.1)
     monkeypatch.setattr(shells, "judge", lambda *_: time.sleep(60))
     path = tmp_path / "a.stl"
     path.write_bytes(_stl())
-    report = run.guarded(str(path), Options(limits=Limits(seconds=1.0)))
+    report = many_files.guarded(str(path), Options(limits=Limits(seconds=1.0)))
     assert {"F011", "T001", "G001"} <= {item.code for item in report.findings}
-    with pytest.raises(Unreadable), run._alarm(0.01):
+    with pytest.raises(Unreadable), many_files._alarm(0.01):
         time.sleep(60)

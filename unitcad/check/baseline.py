@@ -18,8 +18,8 @@ import numpy as np
 
 from unitcad import files
 from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, Location
-from unitcad.check.mesh import Bools, Floats
 from unitcad.errors import UnitcadError
+from unitcad.geometry.arrays import Bools, Floats
 
 NEAR = 1e-4
 """Known places lie within this part of the file's size."""

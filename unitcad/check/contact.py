@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check.mesh import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _TRIES = 3  # pairs of faces tried one by one for each pair of shells before all are
 _BLOCK = 1 << 12  # pairs whose corners stay in the processor's cache

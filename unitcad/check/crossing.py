@@ -18,11 +18,12 @@ from unitcad.check.detail import detail
 from unitcad.check.edges import balanced
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Unreadable
-from unitcad.check.mesh import Bools, Floats, Ints, float32_step
+from unitcad.check.mesh import float32_step
 from unitcad.check.pairs import Slabs, boxes_of, frame_of, meeting_pairs, morton_order, slabs_of
 from unitcad.check.rulebook import finding
 from unitcad.check.stars import height_fields
 from unitcad.check.topology import Topology
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _BLOCK = 1 << 17
 _LISTED = 16  # pairs whose places are computed, unless more are kept: some fall together

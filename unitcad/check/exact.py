@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.check.mesh import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _EPS = np.finfo(np.float64).eps / 2
 _BOUND = {2: (3.0 + 16.0 * _EPS) * _EPS, 3: (7.0 + 56.0 * _EPS) * _EPS}  # of the sum of the terms' sizes, by axes

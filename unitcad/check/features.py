@@ -14,10 +14,11 @@ from unitcad.catalogue import Printer
 from unitcad.check.edges import components
 from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Floats, Ints, solid_of
+from unitcad.check.mesh import solid_of
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology
 from unitcad.check.walls import Rays
+from unitcad.geometry.arrays import Floats, Ints
 
 _LEVELS = 40
 _GROUPS = 40  # thin places looked at

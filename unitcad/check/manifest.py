@@ -10,8 +10,8 @@ from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from unitcad import catalogue, files
-from unitcad.check.check import Options
 from unitcad.check.findings import FileReport, Finding, counted, merge, number
+from unitcad.check.options import Options
 from unitcad.check.rulebook import finding
 from unitcad.errors import UnitcadError
 

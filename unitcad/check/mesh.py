@@ -6,21 +6,16 @@ Readers give a triangle soup or an indexed mesh; `weld_exact` makes the one into
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from unitcad.check.source import Source
+from unitcad.geometry.arrays import Floats, Ints
+
 if TYPE_CHECKING:
     from manifold3d import Manifold
-
-    from unitcad.check.source import Source
-
-# What an array holds; numpy's own generic types make every sum and mask a union that a type checker cannot follow.
-Floats = NDArray[Any]
-Ints = NDArray[Any]
-Bools = NDArray[Any]
-
 
 LARGEST = float(np.finfo(np.float32).max)
 """Coordinates beyond this, and NaN, are no numbers of a mesh (V001), in whatever precision a file has them."""

@@ -12,9 +12,9 @@ from unitcad.catalogue import Printer
 from unitcad.check.edges import components
 from unitcad.check.findings import Finding, Location, number
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Floats, Ints
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology
+from unitcad.geometry.arrays import Floats, Ints
 
 _ANGLES = 16
 _POINTS = 300  # sample points a region

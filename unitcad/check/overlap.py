@@ -13,10 +13,11 @@ from unitcad.check import edges as mesh_edges
 from unitcad.check.edges import Edges
 from unitcad.check.exact import orient3d
 from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.mesh import Bools, Floats, Ints, area_vectors, float32_steps, same_place
+from unitcad.check.mesh import area_vectors, float32_steps, same_place
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology, max_side_squared
 from unitcad.check.volumes import side_by_side
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _FLAT = 2.0  # float32 steps: a fold thinner than that has no thickness
 _WIDE = 64.0  # float32 steps: a face lower than that may be thin by rounding

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Bools, Floats, Ints, extent, sorted_with_order
+from unitcad.check.mesh import extent, sorted_with_order
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _FAN = 4
 _STEP_BITS = 12

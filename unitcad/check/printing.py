@@ -12,10 +12,11 @@ from unitcad.catalogue import Printer
 from unitcad.check import features, overhang, walls
 from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline, keeping
-from unitcad.check.mesh import Floats, extent
+from unitcad.check.mesh import extent
 from unitcad.check.rulebook import finding
 from unitcad.check.shells import winding_number
 from unitcad.check.topology import Topology
+from unitcad.geometry.arrays import Floats
 
 ON_BED = 0.02  # mm; an STL rounds to less, a layer is ten times more
 STAND = 1.0  # mm2 of flat that a part needs to stand on

@@ -13,6 +13,7 @@ from unitcad.check.findings import Facts, Finding, Location, counted, ending
 from unitcad.check.limits import Deadline, keeping
 from unitcad.check.mesh import LARGEST, Mesh, extent, representable
 from unitcad.check.rulebook import finding
+from unitcad.check.source import Source
 from unitcad.check.topology import Topology
 
 
@@ -62,7 +63,10 @@ def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
     if meshes is not None and not any(known is mesh for known in meshes):
         meshes.append(mesh)
     drawn = tuple(replace(item, locations=tuple(_drawn(place, mesh) for place in item.locations)) for item in findings)
-    return drawn if mesh.source is None else tuple(mesh.source.located(item) for item in drawn)
+    source = mesh.source
+    if source is None:
+        return drawn
+    return tuple(replace(item, locations=tuple(_located(place, source) for place in item.locations)) for item in drawn)
 
 
 def _drawn(place: Location, mesh: Mesh) -> Location:
@@ -82,3 +86,20 @@ def _drawn(place: Location, mesh: Mesh) -> Location:
         return replace(place, region=None, centre=centre)
     number = next(i for i, known in enumerate(meshes) if known is mesh)
     return replace(place, region=region, mesh=number, centre=centre)
+
+
+def _located(place: Location, source: Source) -> Location:
+    """The location with its triangles' faces, line, part and object as the file has them."""
+    part = place.part or source.part
+    if place.face is None:
+        return replace(place, part=part)
+    faces = [face if source.polygons is None else int(source.polygons[face]) for face in place.faces]
+    names = dict.fromkeys(name for face in faces if (name := source.object(face)))
+    return replace(
+        place,
+        face=faces[0],
+        faces=tuple(dict.fromkeys(faces)),
+        line=source.line(faces[0]) if place.line is None else place.line,
+        part=part,
+        object=place.object or " and ".join(names) or None,
+    )

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from unitcad.check.findings import Facts, Finding, Location, counted, number
-from unitcad.check.mesh import Bools, Floats
+from unitcad.check.options import UNITS_MM
 from unitcad.check.rulebook import finding
+from unitcad.geometry.arrays import Bools, Floats
 
-UNITS_MM = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
 SMALL, LARGE = 1.0, 2000.0  # mm; a printed part lies between
 SPECK = 0.02  # mm; a tenth of the least feature of the finest printer in the catalogue
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.check.edges import components, half_edges
-from unitcad.check.mesh import Bools, Floats, Ints, extents, float32_steps, same_place
+from unitcad.check.mesh import extents, float32_steps, same_place
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 WELD = 1e-5  # of the shell's diagonal
 NARROW = 0.1  # of the shortest edge at a vertex

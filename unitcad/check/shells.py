@@ -9,11 +9,12 @@ import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline, Unreadable
-from unitcad.check.mesh import Bools, Floats, Ints, solid_of
+from unitcad.check.mesh import solid_of
 from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
 from unitcad.check.rulebook import finding
 from unitcad.check.scale import specks
 from unitcad.check.topology import Topology, diagonals
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 if TYPE_CHECKING:
     from manifold3d import Manifold

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location
-from unitcad.check.mesh import Ints
+from unitcad.geometry.arrays import Ints
 
 _NO_INDEX = np.empty(0, np.int64)
 
@@ -30,25 +29,6 @@ class Source:
     @cached_property
     def _names(self) -> list[str]:
         return [name.strip() for name in self.names.decode("utf-8", "replace").split("\n")]
-
-    def located(self, found: Finding) -> Finding:
-        """The finding with its triangles' places as the file has them."""
-        return replace(found, locations=tuple(self._place(place) for place in found.locations))
-
-    def _place(self, place: Location) -> Location:
-        part = place.part or self.part
-        if place.face is None:
-            return replace(place, part=part)
-        faces = [face if self.polygons is None else int(self.polygons[face]) for face in place.faces]
-        names = dict.fromkeys(name for face in faces if (name := self.object(face)))
-        return replace(
-            place,
-            face=faces[0],
-            faces=tuple(dict.fromkeys(faces)),
-            line=self.line(faces[0]) if place.line is None else place.line,
-            part=part,
-            object=place.object or " and ".join(names) or None,
-        )
 
     def line(self, polygon: int) -> int | None:
         """The line on which a polygon stands."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from unitcad.check.mesh import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _BLOCK = 1 << 14  # faces whose coordinates stay in the processor's cache
 _ROUNDING = 1e-15  # of the squared longest side: more than rounding takes from twice an area

@@ -14,9 +14,10 @@ from unitcad.check import volumes
 from unitcad.check.edges import Edges
 from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline, keeping
-from unitcad.check.mesh import Bools, Floats, Ints, Mesh, area_vectors, extent, extents, float32_step, float32_steps
+from unitcad.check.mesh import Mesh, area_vectors, extent, extents, float32_step, float32_steps
 from unitcad.check.rulebook import finding
 from unitcad.check.seams import connected, join, t_junctions
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 FAR = 1e-4  # V002: float32 step over the bounding box's diagonal
 SLIVER = 1e-3  # T011: shortest length of a sliver, as part of the diagonal

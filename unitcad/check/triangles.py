@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.check.exact import orient2d, orient3d, sides
-from unitcad.check.mesh import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _BLOCK = 1 << 12  # pairs whose corners stay in the processor's cache
 

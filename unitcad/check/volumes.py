@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from unitcad.check.edges import Edges, balanced
-from unitcad.check.mesh import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 
 def closed(faces: Ints, edges: Edges, shells: Ints, n: int) -> Bools:

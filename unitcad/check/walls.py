@@ -16,10 +16,10 @@ from unitcad.catalogue import Printer
 from unitcad.check.edges import components
 from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Bools, Floats, Ints
 from unitcad.check.pairs import boxes_of, frame_of, meeting_between, morton_order
 from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology, max_side_squared
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 PARALLEL = float(np.cos(np.radians(12.0)))  # two sides of a wall
 AWAY = 0.3  # two sides of a whisker, which may have three

@@ -69,7 +69,7 @@ def check(
     ] = None,
 ) -> None:
     """Judge mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB, and STEP with a B-rep extra."""
-    from unitcad.check import detail, formats, rulebook, run
+    from unitcad.check import detail, formats, many_files, rulebook
     from unitcad.cli import check_settings
 
     if explain is not None:
@@ -103,7 +103,9 @@ def check(
     if not files and manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
     per_file = _per_file(found, options)
-    check_all = partial(run.check_files, jobs=jobs, memory_mb=memory or settings.memory or 8000, then=_drawn(show))
+    check_all = partial(
+        many_files.check_files, jobs=jobs, memory_mb=memory or settings.memory or 8000, then=_drawn(show)
+    )
     reports = _run(files or [], per_file, manifest, options.printer is not None, check_all)
     shown = detail.MOST if all_locations else detail.SHOWN
     if base is not None:
@@ -118,7 +120,7 @@ def check(
         report = formats.render(reports, output_format, fail_on, found.shown, used)
         _write(report, plain=output_format == "text")
         sys.stderr.write(table)
-    raise typer.Exit(run.worst(reports, fail_on))
+    raise typer.Exit(many_files.worst(reports, fail_on))
 
 
 def _write(text: str, *, plain: bool) -> None:
@@ -139,9 +141,9 @@ def _run(
     printer_named: bool,
     check_all: Callable[[list[tuple[str, Options]]], Iterator[FileReport]],
 ) -> list[FileReport]:
-    from unitcad.check import run
+    from unitcad.check import many_files
 
-    paths, reports = run.expand(names)
+    paths, reports = many_files.expand(names)
     if manifest is None:
         work = [(path, options(path)) for path in paths]
         return reports + list(check_all(work))

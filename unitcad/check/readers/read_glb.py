@@ -16,9 +16,10 @@ import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
-from unitcad.check.mesh import Floats, Ints, Mesh
-from unitcad.check.polygons import Polygons, mesh_of
+from unitcad.check.mesh import Mesh
+from unitcad.check.readers.polygons import Polygons, mesh_of
 from unitcad.check.rulebook import finding
+from unitcad.geometry.arrays import Floats, Ints
 
 _MOST_JSON = 100_000_000  # bytes
 _JSON, _BIN = 0x4E4F534A, 0x004E4942

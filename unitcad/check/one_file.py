@@ -7,24 +7,20 @@ from __future__ import annotations
 
 import stat
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.check import sniff
-from unitcad.check.detail import SHOWN, detailed
+from unitcad.check.detail import detailed
 from unitcad.check.findings import Facts, FileReport, Finding, counted, ending, merge
 from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
-from unitcad.check.mesh import Floats, Ints, Mesh
+from unitcad.check.mesh import Mesh
+from unitcad.check.options import UNITS_MM, Options
+from unitcad.check.readers import sniff
 from unitcad.check.rulebook import finding
 from unitcad.check.rules_mesh import Judged, in_file, judge_mesh
-from unitcad.check.scale import UNITS_MM
-
-if TYPE_CHECKING:
-    from unitcad.catalogue import Printer
+from unitcad.geometry.arrays import Floats, Ints
 
 _KINDS = {
     stat.S_IFDIR: "a folder",
@@ -33,38 +29,6 @@ _KINDS = {
     stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
 }
-Reader = Callable[[memoryview, Limits, Deadline], tuple[list[Mesh], list[Finding]]]
-
-
-@dataclass(frozen=True)
-class Options:
-    """What to judge and against what.
-
-    `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all. An error
-    that ended the judgement of a file (not readable, a limit reached, no mesh) is kept whatever they say.
-    `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
-    `shells`: the number of shells expected (G005). `cross`: judge self-crossing. `strict_3mf`: what the 3MF
-    specification forbids and common programs write all the same is an error, not a warning. `unwanted`: prefixes of
-    codes that no select brings back. `locations`: how many are kept of a finding; `draw`: keep meshes with the report.
-    """
-
-    select: tuple[str, ...] = ()
-    ignore: tuple[str, ...] = ()
-    unit: str | None = None
-    printer: Printer | None = None
-    shells: int | None = None
-    cross: bool = True
-    strict_3mf: bool = False
-    limits: Limits = field(default_factory=Limits)
-    unwanted: tuple[str, ...] = ()
-    locations: int = SHOWN
-    draw: bool = False
-
-    def wants(self, code: str) -> bool:
-        """Whether findings of `code` are reported, unless they ended the judgement: those always are."""
-        chosen = max((len(p) for p in self.select if code.startswith(p)), default=-1 if self.select else 0)
-        dropped = max((len(p) for p in self.ignore if code.startswith(p)), default=-1)
-        return chosen >= 0 and chosen > dropped and not code.startswith(self.unwanted or ("-",))
 
 
 def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) -> FileReport:
@@ -126,16 +90,16 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
         raise Unreadable(finding("F005", f"named {path.suffix}, but the content is no binary glTF"))
     view = memoryview(data)
     if kind == "3mf":
-        from unitcad.check.threemf import check_3mf
+        from unitcad.check.threemf_build import check_3mf
 
         return check_3mf(view, options, deadline)
     if kind == "step":
-        from unitcad.check.read_step import check_step
+        from unitcad.check.readers.read_step import check_step
 
         return check_step(path, view, options)
     if kind == "glb" and options.unit is None:
         options = replace(options, unit="meter")  # as the format says
-    meshes, findings = _reader(kind, options.unit)(view, options.limits, deadline)
+    meshes, findings = sniff.reader_of(kind, options.unit)(view, options.limits, deadline)
     del view, data
     if not meshes:
         return list(ending(findings)), Facts()
@@ -145,26 +109,6 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
     with keeping(findings):
         judged = _judge_all(meshes, options, deadline)
     return findings + list(judged.findings), judged.facts
-
-
-def _reader(kind: str, unit: str | None = None) -> Reader:
-    """The reader of a format that holds one mesh; its module is loaded by the first file that needs it.
-
-    A GLB's numbers are turned into mm where they are read, so its reader takes the unit.
-    """
-    if kind == "stl":
-        from unitcad.check.read_stl import read_stl as read
-    elif kind == "ply":
-        from unitcad.check.read_ply import read_ply as read
-    elif kind == "obj":
-        from unitcad.check.read_obj import read_obj as read
-    elif kind == "glb":
-        from unitcad.check.read_glb import read_glb
-
-        return partial(read_glb, unit_mm=UNITS_MM[unit or "meter"])
-    else:
-        from unitcad.check.read_off import read_off as read
-    return read
 
 
 def _bytes_of(path: Path, limits: Limits) -> bytes:

@@ -14,8 +14,8 @@ import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Unreadable
-from unitcad.check.mesh import Bools, Floats, Ints
 from unitcad.check.rulebook import finding
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
 _NOT_FINITE = re.compile(rb"[+-]?(?:nan|inf(?:inity)?)", re.IGNORECASE)

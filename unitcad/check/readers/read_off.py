@@ -6,12 +6,12 @@ import re
 
 import numpy as np
 
-from unitcad.check import rows
 from unitcad.check.findings import Finding, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.mesh import Mesh
-from unitcad.check.polygons import Polygons, mesh_of
-from unitcad.check.rows import Rows
+from unitcad.check.readers import rows
+from unitcad.check.readers.polygons import Polygons, mesh_of
+from unitcad.check.readers.rows import Rows
 from unitcad.check.rulebook import finding
 
 _START = re.compile(rb"(?:\s|#[^\n]*\n)*([A-Z0-9]*)OFF(?![A-Z])", re.IGNORECASE)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from unitcad.check.findings import Finding, Location
-from unitcad.check.mesh import Floats, Ints
 from unitcad.check.rulebook import finding
+from unitcad.geometry.arrays import Floats, Ints
 
 LINE = 7  # column of a triangle's line
 _NOTED = 200  # findings kept of one part

@@ -1,10 +1,26 @@
-"""What a file's first bytes say it is, whatever its name says."""
+"""Which reader a file is for, by its suffix, and what its first bytes say it is.
+
+The reader of a format is the function of its module's name in this folder: `.stl` is read by read_stl.read_stl.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
 from pathlib import PurePath
+from pkgutil import iter_modules
 
-SUFFIXES = {".stl", ".3mf", ".obj", ".ply", ".off", ".glb", ".step", ".stp"}
+from unitcad.check import readers
+from unitcad.check.findings import Finding
+from unitcad.check.limits import Deadline, Limits
+from unitcad.check.mesh import Mesh
+from unitcad.check.options import UNITS_MM
+
+Reader = Callable[[memoryview, Limits, Deadline], tuple[list[Mesh], list[Finding]]]
+_READ = "read_"
+SUFFIXES = {f".{name.removeprefix(_READ)}" for _, name, _ in iter_modules(readers.__path__) if name.startswith(_READ)}
+SUFFIXES |= {".3mf", ".stp"}
 _MAGIC = (
     (b"PK\x03\x04", "zip"),
     (b"PK\x05\x06", "zip"),
@@ -45,3 +61,13 @@ def kind_of(path: str, head: bytes) -> str:
     if suffix not in SUFFIXES:
         return ""
     return {".stp": "step"}.get(suffix, suffix[1:])
+
+
+def reader_of(kind: str, unit: str | None = None) -> Reader:
+    """The reader of a format that holds one mesh; its module is loaded by the first file that needs it.
+
+    The numbers of a GLB, in `unit` or metres, become mm where they are read.
+    """
+    name = f"{_READ}{kind}"
+    read = getattr(import_module(f"{readers.__name__}.{name}"), name)
+    return partial(read, unit_mm=UNITS_MM[unit or "meter"]) if kind == "glb" else read

@@ -7,16 +7,16 @@ from functools import partial
 
 import numpy as np
 
-from unitcad.check import schema
 from unitcad.check.findings import Location, counted
-from unitcad.check.mesh import Ints
-from unitcad.check.model_data import LINE, Model, Object, Resource, Use
+from unitcad.check.readers.threemf import elements
+from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Use
+from unitcad.geometry.arrays import Ints
 
 _MATERIALS = ("basematerials", "compositematerials")
 _GROUPS = (*_MATERIALS, "colorgroup", "texture2dgroup", "multiproperties")
 _TEXTURED = ("speculartextureid", "glossinesstextureid", "metallictextureid", "roughnesstextureid")
 _SOLID = ("model", "solidsupport")
-_STACK = f"{schema.SLICE} slicestackid"
+_STACK = f"{elements.SLICE} slicestackid"
 
 
 def judge(model: Model) -> None:
@@ -32,7 +32,7 @@ def judge(model: Model) -> None:
         if not item.path:
             _used(model, item.object, item.rank, "a build item")
     model.where = Location
-    if schema.PRODUCTION in (model.namespaces.get(prefix) for prefix in model.required):
+    if elements.PRODUCTION in (model.namespaces.get(prefix) for prefix in model.required):
         _uuids(model)
 
 
@@ -204,7 +204,7 @@ def _multi(model: Model, found: Resource) -> None:
 def _solid_stacks(model: Model) -> set[int]:
     """Slice stacks of objects that must be solids: their polygons must be closed."""
     named = (thing.attributes.get(_STACK, "") for thing in model.objects().values() if thing.type in _SOLID)
-    return {int(said) for said in named if schema.resource_id(said)}
+    return {int(said) for said in named if elements.resource_id(said)}
 
 
 def _slicestack(model: Model, found: Resource, solid: bool) -> None:
@@ -248,12 +248,12 @@ def _slicestack(model: Model, found: Resource, solid: bool) -> None:
 
 def _sliced(model: Model, found: Object) -> None:
     stack = found.attributes.get(_STACK)
-    resolution = found.attributes.get(f"{schema.SLICE} meshresolution", "fullres")
+    resolution = found.attributes.get(f"{elements.SLICE} meshresolution", "fullres")
     who = f"object {found.id}"
     if resolution not in ("fullres", "lowres"):
         model.say("P017", f"mesh resolution {resolution[:40]!r} of {who}")
     if stack is not None:
-        if not schema.resource_id(stack):
+        if not elements.resource_id(stack):
             model.say("P017", f"slice stack {stack[:40]!r} of {who} is no id")
         else:
             _earlier(model, int(stack), found.rank, who, "slicestack")
@@ -309,7 +309,7 @@ def _uuids(model: Model) -> None:
     if any(not item.uuid for item in model.items):
         missing.append("an item")
     for found in model.objects().values():
-        if f"{schema.PRODUCTION} UUID" not in found.attributes:
+        if f"{elements.PRODUCTION} UUID" not in found.attributes:
             missing.append(f"object {found.id}")
         if any(not use.uuid for use in found.components):
             missing.append(f"a component of object {found.id}")

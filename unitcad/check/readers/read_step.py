@@ -8,15 +8,13 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from unitcad import children
 from unitcad.check.findings import Facts, Finding, counted, number
 from unitcad.check.limits import Limits, Unreadable, over_limit
+from unitcad.check.options import Options
 from unitcad.check.rulebook import finding
-
-if TYPE_CHECKING:
-    from unitcad.check.check import Options
 
 NEEDS = "STEP needs the extra build123d or cadquery: pip install 'unitcad[build123d]'"
 
@@ -65,7 +63,7 @@ def _from_child(path: Path, seconds: float) -> dict[str, Any]:
     raise Unreadable(finding("F003", f"the STEP reader died of the file (exit code {done.returncode})"))
 
 
-_CHILD = "import sys; from unitcad.check.read_step import measure; measure(sys.argv[1], sys.argv[2])"
+_CHILD = "import sys; from unitcad.check.readers.read_step import measure; measure(sys.argv[1], sys.argv[2])"
 
 
 def measure(path: str, out: str) -> None:

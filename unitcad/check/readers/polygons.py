@@ -12,9 +12,10 @@ import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
-from unitcad.check.mesh import LARGEST, Bools, Floats, Ints, Mesh, weld_points
+from unitcad.check.mesh import LARGEST, Mesh, weld_points
 from unitcad.check.rulebook import finding
 from unitcad.check.source import Source
+from unitcad.geometry.arrays import Bools, Floats, Ints
 
 FLAT = 1e-3  # F013: distance of a corner from the polygon's plane, as part of the polygon's size
 _CHUNK = 50_000  # corners looked at together

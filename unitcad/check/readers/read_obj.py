@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check import rows
 from unitcad.check.findings import Finding, Location
 from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
-from unitcad.check.mesh import Floats, Ints, Mesh
-from unitcad.check.polygons import Polygons, mesh_of
-from unitcad.check.rows import BLANK, JOINED, NEWLINE, SLASH, SPACE
+from unitcad.check.mesh import Mesh
+from unitcad.check.readers import rows
+from unitcad.check.readers.polygons import Polygons, mesh_of
+from unitcad.check.readers.rows import BLANK, JOINED, NEWLINE, SLASH, SPACE
 from unitcad.check.rulebook import finding
+from unitcad.geometry.arrays import Floats, Ints
 
 _ANY = re.compile(rb"(?m)^[ \t]*(?:v|f|o|g|mtllib|usemtl|#)\s")
 

@@ -16,8 +16,8 @@ from urllib.parse import unquote
 
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, OutOfTime, Unreadable, over_limit
+from unitcad.check.readers.threemf.xml_stream import Element, read_small
 from unitcad.check.rulebook import finding
-from unitcad.check.xml_stream import Element, read_small
 
 CONTENT_TYPES = "[Content_Types].xml"
 _PACKAGE = "http://schemas.openxmlformats.org/package/2006/"
@@ -121,7 +121,7 @@ class Package:
     def xml(self, name: str, code: str) -> Element | None:
         """A small XML part as a tree, or None with a finding (rule `code`, or what the XML itself breaks)."""
         try:
-            root, findings = read_small(self.chunks(name), self.shown(name))
+            return read_small(self.chunks(name), self.shown(name))
         except OutOfTime:
             raise
         except Unreadable as stop:
@@ -130,8 +130,6 @@ class Package:
                 for item in stop.findings
             ]
             return None
-        self.findings += findings
-        return root
 
     def _read_relations(self, root: Element, folder: str, rels: str) -> Iterator[Relation]:
         ids: set[str] = set()

@@ -14,9 +14,10 @@ import numpy as np
 from unitcad.check.detail import SHOWN
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
-from unitcad.check.mesh import Floats, Mesh, weld_exact
-from unitcad.check.rows import NUMBER
+from unitcad.check.mesh import Mesh, weld_exact
+from unitcad.check.readers.rows import NUMBER
 from unitcad.check.rulebook import finding
+from unitcad.geometry.arrays import Floats
 
 RECORD = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _TOKENS = 21  # facet normal x y z outer loop (vertex x y z) x 3 endloop endfacet

@@ -11,13 +11,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check import schema
 from unitcad.check.findings import Location
 from unitcad.check.limits import Limits, Unreadable, over_limit
-from unitcad.check.mesh import LARGEST, Floats, Ints
-from unitcad.check.model_data import LINE, Model, Object, Resource, Use
+from unitcad.check.mesh import LARGEST
+from unitcad.check.readers.threemf import elements
+from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Use
+from unitcad.check.readers.threemf.xml_stream import forbidden, new_parser, stream
 from unitcad.check.rulebook import finding
-from unitcad.check.xml_stream import forbidden, new_parser, stream
+from unitcad.geometry.arrays import Floats, Ints
 
 _BATCH = 50_000
 _DEPTH = 60
@@ -30,7 +31,7 @@ class _Open:
 
     space: str
     name: str
-    rules: schema.Rules | None
+    rules: elements.Rules | None
     counts: dict[str, int] = field(default_factory=dict)
     last: int = -1
 
@@ -73,7 +74,7 @@ class _Reader:
                 raise over_limit(f"elements nest deeper than {_DEPTH}")
             return
         above = self.stack[-1]
-        if name == _VERTEX and flat[::2] == _XYZ and above.name == "vertices" and above.space == schema.CORE:
+        if name == _VERTEX and flat[::2] == _XYZ and above.name == "vertices" and above.space == elements.CORE:
             self.numbers += flat[1::2]
             self.lines.append(self.parser.CurrentLineNumber)
             self.stack.append(_LEAF)
@@ -84,7 +85,7 @@ class _Reader:
             raise over_limit(f"elements nest deeper than {_DEPTH}")
         space, _, local = name.rpartition(" ")
         attributes = dict(zip(flat[::2], flat[1::2], strict=True))
-        rules = schema.ELEMENTS.get(space, {}).get(local)
+        rules = elements.ELEMENTS.get(space, {}).get(local)
         self._child(space, local, rules)
         if rules is None:
             if space in _SHAPES and isinstance(self.resource, Object):
@@ -112,11 +113,11 @@ class _Reader:
         for child, least, _most in done.rules.children:
             if done.counts.get(child, 0) < least and not (child == "triangles" and self._lattice()):
                 self.model.say("P017", f"<{done.name}> lacks <{child}>")
-        if done.space == schema.CORE and done.name == "vertices":
+        if done.space == elements.CORE and done.name == "vertices":
             self._flush_vertices()
-        elif done.space == schema.CORE and done.name == "triangles":
+        elif done.space == elements.CORE and done.name == "triangles":
             self._flush_triangles()
-        elif done.space == schema.CORE and done.name == "mesh":
+        elif done.space == elements.CORE and done.name == "mesh":
             self._close_mesh()
         elif done.name == "object" and isinstance(self.resource, Object):
             self._close_object(self.resource)
@@ -126,14 +127,14 @@ class _Reader:
     def _lattice(self) -> bool:
         return isinstance(self.resource, Object) and self.resource.lattice is not None
 
-    def _child(self, space: str, local: str, rules: schema.Rules | None) -> None:
+    def _child(self, space: str, local: str, rules: elements.Rules | None) -> None:
         """Whether this child may stand here, and in this order."""
         parent = self.stack[-1]
         if parent is _LEAF:
             self.model.say("P017", f"<{local}> inside <vertex>")
             return
         if not parent.name:
-            if (space, local) != (schema.CORE, "model"):
+            if (space, local) != (elements.CORE, "model"):
                 raise Unreadable(
                     finding("P017", f"the root is <{local}> in {space or 'no namespace'!r}, not the core's <model>",
                             places=[Location(part=self.model.part)])
@@ -142,7 +143,7 @@ class _Reader:
         if space != parent.space:
             if not space:
                 self.model.say("P017", f"<{local}> without a namespace")
-            elif space == schema.CORE:
+            elif space == elements.CORE:
                 self.model.say("P017", f"<{local}> inside <{parent.name}>")
             return
         assert parent.rules is not None
@@ -156,12 +157,12 @@ class _Reader:
                 self.model.say("P017", f"<{local}> is out of order in <{parent.name}>")
             parent.last = max(parent.last, place)
             return
-        if space in (schema.CORE, schema.MATERIAL, schema.SLICE, schema.BEAM) and not (
+        if space in (elements.CORE, elements.MATERIAL, elements.SLICE, elements.BEAM) and not (
             rules is not None and parent.name == "resources"
         ):
             self.model.say("P017", f"<{local}> inside <{parent.name}>")
 
-    def _attributes(self, local: str, rules: schema.Rules, attributes: dict[str, str]) -> bool:
+    def _attributes(self, local: str, rules: elements.Rules, attributes: dict[str, str]) -> bool:
         """Check them; whether all required ones are there and well typed."""
         good = True
         for name in rules.required:
@@ -192,14 +193,14 @@ class _Reader:
     def _take(self, space: str, local: str, attributes: dict[str, str]) -> None:
         """Keep what the element says."""
         parent = self.stack[-2].name
-        if space == schema.CORE:
+        if space == elements.CORE:
             take = getattr(self, f"_take_{local}", None)
             if take is not None:
                 take(attributes)
                 return
         if "id" in attributes and parent == "resources":
             self._resource(Resource(local, int(attributes["id"]), self.rank, attributes))
-        elif space == schema.BEAM or space == schema.BALLS:
+        elif space == elements.BEAM or space == elements.BALLS:
             self._take_lattice(local, attributes)
         elif self.resource is not None and not isinstance(self.resource, Object):
             self.resource.count += 1
@@ -216,14 +217,14 @@ class _Reader:
 
     def _take_model(self, attributes: dict[str, str]) -> None:
         self.model.unit = attributes.get("unit", "millimeter")
-        if self.model.unit not in schema.UNITS:
+        if self.model.unit not in elements.UNITS:
             self.model.say("P010", f"unit {self.model.unit[:40]!r}")
         self.model.required = attributes.get("requiredextensions", "").split()
         for prefix in self.model.required:
             uri = self.model.namespaces.get(prefix)
             if uri is None:
                 self.model.say("P016", f"required extension {prefix!r} has no namespace")
-            elif uri not in schema.KNOWN:
+            elif uri not in elements.KNOWN:
                 self.model.say("P016", f"required extension {uri!r} is not known")
 
     def _take_metadata(self, attributes: dict[str, str]) -> None:
@@ -267,16 +268,16 @@ class _Reader:
 
     def _take_build(self, attributes: dict[str, str]) -> None:
         self.model.has_build = True
-        self.model.build_uuid = f"{schema.PRODUCTION} UUID" in attributes
+        self.model.build_uuid = f"{elements.PRODUCTION} UUID" in attributes
 
     def _use(self, attributes: dict[str, str]) -> Use:
         self.uses += 1
         if self.uses > self.limits.max_instances:
             raise over_limit(f"more items and components than the limit of {self.limits.max_instances} instances")
-        uuid = attributes.get(f"{schema.PRODUCTION} UUID")
-        if uuid is not None and not schema.uuid(uuid):
+        uuid = attributes.get(f"{elements.PRODUCTION} UUID")
+        if uuid is not None and not elements.uuid(uuid):
             self.model.say("P017", f"UUID {uuid[:40]!r} is none")
-        path = attributes.get(f"{schema.PRODUCTION} path", "")
+        path = attributes.get(f"{elements.PRODUCTION} path", "")
         matrix = self._matrix(attributes.get("transform"))
         return Use(
             int(attributes["objectid"]), path, matrix, self.rank, uuid is not None, self.parser.CurrentLineNumber
@@ -288,7 +289,7 @@ class _Reader:
         if said is None:
             return identity
         parts = said.split()
-        if len(parts) == 12 and all(schema.number(part) for part in parts):
+        if len(parts) == 12 and all(elements.number(part) for part in parts):
             found = np.array([float(part) for part in parts]).reshape(4, 3)
             if not (np.abs(found) <= LARGEST).all():
                 self.model.say("P013", f'transform="{said[:60]}" is not twelve float32 numbers')
@@ -342,7 +343,7 @@ class _Reader:
 
     def _number(self, said: str, line: int) -> float:
         said = said.strip()
-        if schema.number(said):
+        if elements.number(said):
             return float(said)
         if said.lower() in _NAMES:
             return math.nan
@@ -370,10 +371,10 @@ class _Reader:
 
 
 # Extensions whose elements take the place of an object's mesh.
-_SHAPES = {schema.BOOLEAN, schema.DISPLACEMENT, schema.OLD_DISPLACEMENT, schema.IMPLICIT}
+_SHAPES = {elements.BOOLEAN, elements.DISPLACEMENT, elements.OLD_DISPLACEMENT, elements.IMPLICIT}
 _XYZ = ["x", "y", "z"]
-_LEAF = _Open(schema.CORE, "vertex", None)
-_VERTEX = f"{schema.CORE} vertex"
+_LEAF = _Open(elements.CORE, "vertex", None)
+_VERTEX = f"{elements.CORE} vertex"
 
 
 def read_model(

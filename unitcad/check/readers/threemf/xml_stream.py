@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 from xml.parsers import expat
 
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Location
 from unitcad.check.limits import Unreadable, over_limit
 from unitcad.check.rulebook import finding
 
@@ -117,7 +117,7 @@ def forbidden(name: str) -> str | None:
     return None
 
 
-def read_small(chunks: Iterable[bytes], part: str) -> tuple[Element, list[Finding]]:
+def read_small(chunks: Iterable[bytes], part: str) -> Element:
     """A whole small part as a tree. Raises `Unreadable` as `stream` does, and for parts over 5 MB."""
     stack: list[Element] = [Element("", {})]
 
@@ -137,4 +137,4 @@ def read_small(chunks: Iterable[bytes], part: str) -> tuple[Element, list[Findin
             yield chunk
 
     stream(bounded(), part, start, lambda _: stack.pop())
-    return stack[0].children[0], []
+    return stack[0].children[0]

@@ -13,13 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check import rows
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
-from unitcad.check.mesh import Floats, Ints, Mesh
-from unitcad.check.polygons import Polygons, mesh_of
-from unitcad.check.rows import Rows
+from unitcad.check.mesh import Mesh
+from unitcad.check.readers import rows
+from unitcad.check.readers.polygons import Polygons, mesh_of
+from unitcad.check.readers.rows import Rows
 from unitcad.check.rulebook import finding
+from unitcad.geometry.arrays import Floats, Ints
 
 _TYPES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}
 _TYPES |= {"int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I"}
@@ -61,9 +62,11 @@ def read_ply(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
             raise over_limit(f"{largest} vertices or faces promised")
         if largest > len(raw):
             raise Unreadable(finding("F002", f"{largest} vertices or faces promised in {len(raw)} bytes"))
-        tables, lines, more = (
-            _text(raw, at, elements, deadline) if order == "ascii" else _binary(raw, at, order, elements, deadline)
-        )
+        lines = None
+        if order == "ascii":
+            tables, lines, more = _text(raw, at, elements, deadline)
+        else:
+            tables, more = _binary(raw, at, order, elements, deadline)
         findings += more
         meshes, more = mesh_of(_polygons(elements, tables, lines), limits, deadline)
     return meshes, findings + more
@@ -165,7 +168,8 @@ def _refuse(wrong: Ints, element: _Element, lines: Ints) -> None:
 
 def _binary(
     raw: bytes, at: int, order: str, elements: list[_Element], deadline: Deadline
-) -> tuple[dict[str, dict[str, Column]], None, list[Finding]]:
+) -> tuple[dict[str, dict[str, Column]], list[Finding]]:
+    """The wanted columns of each element, and findings."""
     tables = {}
     for element in elements:
         if element.lists and not _alike(raw, at, element, order):
@@ -174,7 +178,7 @@ def _binary(
             tables[element.name], at = _records(raw, at, element, order)
     extra = len(raw) - at
     more = [finding("F006", f"{counted(extra, 'byte')} after the last element", extra)] if extra else []
-    return tables, None, more
+    return tables, more
 
 
 def _layout(raw: bytes, at: int, element: _Element, order: str) -> np.dtype | None:

@@ -1,0 +1,1 @@
+"""3MF: an OPC package of XML parts, read against the consortium's schemas."""

@@ -1,0 +1,106 @@
+"""Instances of a 3MF build: which object stands where, counted before anything is expanded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from unitcad.check.findings import Finding
+from unitcad.check.limits import Limits, Unreadable, over_limit
+from unitcad.check.mesh import Mesh
+from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Use
+from unitcad.check.rulebook import finding
+from unitcad.check.source import Source
+from unitcad.geometry.arrays import Floats
+
+Key = tuple[str, int]
+"""A part of the package and the id of an object in it."""
+
+
+@dataclass(frozen=True)
+class Instance:
+    """An object of the build with its whole transform (4, 3), in the model's unit."""
+
+    key: Key
+    matrix: Floats
+
+
+def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list[Finding]) -> list[Instance]:
+    """The meshes of the build with their transforms; faces are counted before anything is expanded."""
+    counts: dict[Key, tuple[int, int]] = {}
+    objects = {(part, id_): found for part, model in models.items() for id_, found in model.objects().items()}
+
+    def key_of(part: str, use: Use) -> Key:
+        return (use.path.lower().lstrip("/") if use.path else part, use.object)
+
+    def size(key: Key, trail: tuple[Key, ...]) -> tuple[int, int]:
+        """Faces and nodes under an object; depth and recursion are bounded here."""
+        if key in counts:
+            return counts[key]
+        found = objects.get(key)
+        if found is None:
+            return 0, 0
+        if key in trail:
+            raise Unreadable(finding("P012", f"object {key[1]} contains itself"))
+        if len(trail) >= limits.max_depth:
+            raise Unreadable(finding("P009", f"components nest deeper than {limits.max_depth}"))
+        faces, nodes = (0 if found.triangles is None else len(found.triangles)), 1
+        for use in found.components:
+            more, below = size(key_of(key[0], use), (*trail, key))
+            faces, nodes = faces + more, nodes + below
+        counts[key] = faces, nodes
+        return counts[key]
+
+    total = nodes = 0
+    for item in root.items:
+        faces, below = size(key_of(root.part, item), ())
+        total, nodes = total + faces, nodes + below
+    if total > limits.max_faces:
+        text = f"{_large(total)} faces in {_large(nodes)} instances, more than --max-faces {limits.max_faces}"
+        raise Unreadable(finding("P009", text))
+    if nodes > limits.max_instances:
+        raise over_limit(f"{_large(nodes)} instances, more than the limit of {limits.max_instances}")
+    instances: list[Instance] = []
+
+    def place(key: Key, matrix: Floats, depth: int) -> None:
+        found = objects.get(key)
+        if found is None or depth > limits.max_depth:
+            return
+        if found.type == "other" and not found.components:
+            findings.append(finding("P012", f"the build uses object {key[1]} of type other"))
+        if found.vertices is not None:
+            instances.append(Instance(key, matrix))
+        for use in found.components:
+            place(key_of(key[0], use), _times(use.matrix, matrix), depth + 1)
+
+    for item in root.items:
+        key = key_of(root.part, item)
+        if item.path and key not in objects and key[0] in models:
+            findings.append(finding("P012", f"a build item names object {key[1]} of {item.path}, which is not there"))
+        place(key, item.matrix, 0)
+    return instances
+
+
+def _large(n: int) -> str:
+    """A count in digits that can be read: whole up to 1e15, else its power of ten."""
+    return str(n) if n < 10**15 else f"more than 1e{math.floor(math.log10(n))}"
+
+
+def _times(first: Floats, then: Floats) -> Floats:
+    """The transform `first` followed by `then`, rows as 3MF writes them."""
+    with np.errstate(all="ignore"):  # what comes out too large is found where it is used
+        return np.vstack([first[:3] @ then[:3], first[3] @ then[:3] + then[3]])
+
+
+def mesh_of(found: Object, part: str, factor: float, matrix: Floats | None = None) -> Mesh:
+    """The object, of a part of the package, in its own place or that of an instance; `factor` mm a unit."""
+    assert found.vertices is not None
+    assert found.triangles is not None
+    points = found.vertices if matrix is None else found.vertices @ matrix[:3] + matrix[3]
+    faces = found.triangles[:, :3].astype(np.int32)
+    if matrix is not None and np.linalg.det(matrix[:3]) < 0:
+        faces = faces[:, ::-1]
+    source = Source(lines=found.triangles[:, LINE], part=part)
+    return Mesh(points * factor, np.ascontiguousarray(faces), name=str(found.id), source=source)
