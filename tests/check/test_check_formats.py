@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 from shapes import box, stl, text_stl
 
-from unitcad.check import FileReport, Options, check_file, check_mesh, formats
+from unitcad.check import FileReport, Options, check_file, check_mesh
 from unitcad.check.findings import SEVERITIES, Finding, Location, merge
 from unitcad.check.limits import Deadline
 from unitcad.check.many_files import check_files
 from unitcad.check.mesh import Mesh
+from unitcad.check.output import as_text
+from unitcad.check.output.render import FORMATS, render
 from unitcad.check.rulebook import FAMILIES, check_prefixes, explain, finding, markdown, rules
 from unitcad.check.rules_mesh import in_file, judge_mesh
 from unitcad.check.source import Source
@@ -39,7 +41,7 @@ def reports(tmp_path: Path) -> list[FileReport]:
 
 
 def test_json_has_the_promised_shape(reports: list[FileReport]) -> None:
-    data = json.loads(formats.render(reports, "json"))
+    data = json.loads(render(reports, "json"))
     assert list(data) == ["files", "config", "baseline"]
     for entry, report in zip(data["files"], reports, strict=True):
         assert list(entry) == ["path", "verdict", "findings", "facts"]
@@ -54,7 +56,7 @@ def test_json_has_the_promised_shape(reports: list[FileReport]) -> None:
 
 
 def test_sarif_is_valid_and_complete(reports: list[FileReport]) -> None:
-    data = json.loads(formats.render(reports, "sarif"))
+    data = json.loads(render(reports, "sarif"))
     schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
     jsonschema.Draft202012Validator.check_schema(schema)
     jsonschema.validate(data, schema, jsonschema.Draft202012Validator)
@@ -76,7 +78,7 @@ def test_the_sarif_schema_refuses_what_sarif_does(reports: list[FileReport]) -> 
         lambda data: data["runs"][0]["tool"].pop("driver"),
         lambda data: data["runs"][0]["results"][0].update(partialFingerprints={"a": 1}),
     ):
-        data = json.loads(formats.render(reports, "sarif"))
+        data = json.loads(render(reports, "sarif"))
         spoil(data)
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(data, schema, jsonschema.Draft202012Validator)
@@ -86,14 +88,14 @@ def test_fingerprints_stay_when_counts_and_places_change(tmp_path: Path) -> None
     def prints(content: bytes) -> set[str]:
         path = tmp_path / "a.stl"
         path.write_bytes(content)
-        data = json.loads(formats.render([check_file(path)], "sarif"))
+        data = json.loads(render([check_file(path)], "sarif"))
         return {result["partialFingerprints"]["pathAndRule/v1"] for result in data["runs"][0]["results"]}
 
     assert prints(stl(box()[2:])) == prints(stl(box((20, 20, 20))[4:])) != set()
 
 
 def test_github_annotations_are_escaped(reports: list[FileReport]) -> None:
-    *lines, last = formats.render(reports, "github").splitlines()
+    *lines, last = render(reports, "github").splitlines()
     assert last == "4 files: 2 failed, 1 warned, 1 passed"
     assert len(lines) == sum(len(report.findings) for report in reports)
     assert lines[0].startswith("::error file=hole & <b>.stl,title=T001 boundary edge::4 boundary edges")
@@ -102,16 +104,16 @@ def test_github_annotations_are_escaped(reports: list[FileReport]) -> None:
 
 
 def test_junit_parses_and_counts(reports: list[FileReport]) -> None:
-    suite = ET.fromstring(formats.render(reports, "junit"))[0]
+    suite = ET.fromstring(render(reports, "junit"))[0]
     assert (suite.get("tests"), suite.get("failures")) == ("4", "2")
-    strict = ET.fromstring(formats.render(reports, "junit", "warning"))[0]
+    strict = ET.fromstring(render(reports, "junit", "warning"))[0]
     assert strict.get("failures") == "3"
     assert [case.get("name") for case in suite] == [report.path for report in reports]
 
 
 def test_text_is_one_line_a_finding_and_holds_no_control_characters() -> None:
     odd = FileReport("a\x1b[31m\n.stl", (Finding("F003", "error", "bad \x07 text", 1, (Location(line=3),)),))
-    lines = formats.render([odd], "text").splitlines()
+    lines = render([odd], "text").splitlines()
     assert lines == [
         "a\\x1b[31m\\n.stl: F003 error: bad \\x07 text (at line 3)",
         "How to fix:",
@@ -119,11 +121,11 @@ def test_text_is_one_line_a_finding_and_holds_no_control_characters() -> None:
         "`unitcad check --explain CODE` says what a code means and why it matters.",
         "1 file: 1 failed, 0 passed",
     ]
-    assert formats.render([FileReport("a.stl")], "text") == "1 file: 1 passed\n"
+    assert render([FileReport("a.stl")], "text") == "1 file: 1 passed\n"
 
 
 def test_github_says_of_a_clean_run_that_it_ran() -> None:
-    assert formats.render([FileReport("::error::.stl")], "github") == "1 file: 1 passed\n"
+    assert render([FileReport("::error::.stl")], "github") == "1 file: 1 passed\n"
 
 
 def test_junit_failures_have_a_body_and_cases_a_time(reports: list[FileReport]) -> None:
@@ -132,10 +134,10 @@ def test_junit_failures_have_a_body_and_cases_a_time(reports: list[FileReport]) 
     assert report.seconds >= 0
     assert "seconds" not in report.as_dict()
     timed = [replace(reports[0], seconds=1.25), replace(reports[1], seconds=0.5), *reports[2:]]
-    suite = ET.fromstring(formats.render(timed, "junit"))[0]
+    suite = ET.fromstring(render(timed, "junit"))[0]
     assert [case.get("time") for case in suite] == ["1.250", "0.500", None, None]
     assert suite.get("time") == "1.750"
-    assert "time" not in ET.fromstring(formats.render(reports, "junit"))[0].attrib
+    assert "time" not in ET.fromstring(render(reports, "junit"))[0].attrib
     failure = suite[1].find("failure")
     assert failure is not None
     assert failure.text is not None
@@ -147,24 +149,24 @@ def test_junit_failures_have_a_body_and_cases_a_time(reports: list[FileReport]) 
 
 def test_every_format_says_how_to_fix_what_was_found(reports: list[FileReport]) -> None:
     for code in {found.code for report in reports for found in report.findings}:
-        for format_ in formats.FORMATS:
-            strict = formats.render(reports, format_, "warning")
+        for format_ in FORMATS:
+            strict = render(reports, format_, "warning")
             assert (
                 json.dumps(rules()[code].mend)[1:-1] if format_ in ("json", "sarif") else rules()[code].mend
             ) in strict
-    rule = json.loads(formats.render(reports, "sarif"))["runs"][0]["tool"]["driver"]["rules"][0]
+    rule = json.loads(render(reports, "sarif"))["runs"][0]["tool"]["driver"]["rules"][0]
     assert rule["help"]["text"].endswith(f" Fix: {rules()[rule['id']].mend}")
     assert "**Fix:**" in rule["help"]["markdown"]
 
 
 def test_text_says_what_a_file_that_passed_holds(reports: list[FileReport]) -> None:
-    first = formats.render(reports, "text").splitlines()[0]
+    first = render(reports, "text").splitlines()[0]
     assert first == "good.stl: passed: 10 x 10 x 10 mm, 1000 mm3, 1 shell, 12 triangles"
 
 
 def test_sarif_names_objects_as_logical_locations() -> None:
     found = Finding("G001", "error", "x", 2, (Location(face=1, object="bolt"), Location(face=2, object="nut")))
-    data = json.loads(formats.render([FileReport("a.obj", (found,))], "sarif"))
+    data = json.loads(render([FileReport("a.obj", (found,))], "sarif"))
     schema = json.loads((HERE / "sarif-2.1.0-subset.schema.json").read_text("utf-8"))
     jsonschema.validate(data, schema, jsonschema.Draft202012Validator)
     (place,) = data["runs"][0]["results"][0]["locations"]
@@ -174,7 +176,7 @@ def test_sarif_names_objects_as_logical_locations() -> None:
 def test_sarif_says_the_first_place_in_words_and_the_line_as_a_region() -> None:
     places = (Location(line=7, part="3D/a.model"), Location(line=9))
     said = FileReport("a.3mf", (Finding("P017", "error", "bad", 2, places),))
-    (result,) = json.loads(formats.render([said], "sarif"))["runs"][0]["results"]
+    (result,) = json.loads(render([said], "sarif"))["runs"][0]["results"]
     assert result["message"]["text"] == f"bad (at 3D/a.model line 7). Fix: {rules()['P017'].mend}"
     assert result["locations"][0]["physicalLocation"]["region"] == {"startLine": 7}
 
@@ -202,8 +204,8 @@ def test_both_faces_of_a_crossing_are_named_in_every_format() -> None:
         assert one < 12 <= other  # one of each box
     named = "faces {} and {} (".format(*crossing.locations[0].faces)
     for format_ in ("text", "github", "junit"):
-        assert named in formats.render([report], format_)
-    for result in json.loads(formats.render([report], "sarif"))["runs"][0]["results"]:
+        assert named in render([report], format_)
+    for result in json.loads(render([report], "sarif"))["runs"][0]["results"]:
         if result["ruleId"] == "G001":
             assert named in result["message"]["text"]
             assert [tuple(place["faces"]) for place in result["properties"]["places"]] == [
@@ -231,7 +233,7 @@ def test_fingerprints_are_those_of_the_file_however_it_is_named(
     monkeypatch.chdir(tmp_path)
 
     def print_of(path: str) -> str:
-        data = json.loads(formats.render([FileReport(path, (Finding("T001", "error", "x"),))], "sarif"))
+        data = json.loads(render([FileReport(path, (Finding("T001", "error", "x"),))], "sarif"))
         return data["runs"][0]["results"][0]["partialFingerprints"]["pathAndRule/v1"]
 
     names = ["sub/a.stl", "./sub/a.stl", str(tmp_path / "sub" / "a.stl"), "sub/../sub/a.stl"]
@@ -258,10 +260,10 @@ def test_an_unknown_code_names_one_nearest_at_most() -> None:
         check_prefixes("--select", ["boundary"])
 
 
-@pytest.mark.parametrize("format_", formats.FORMATS)
+@pytest.mark.parametrize("format_", FORMATS)
 def test_every_format_survives_odd_names(format_: str) -> None:
     odd = FileReport("\udce4 \x00 <&>\"'.stl", (Finding("T001", "error", "x \ud800 \x01"),))
-    assert formats.render([odd], format_)
+    assert render([odd], format_)
 
 
 def test_merge_adds_counts_and_keeps_the_worst() -> None:
@@ -275,7 +277,7 @@ def test_merge_adds_counts_and_keeps_the_worst() -> None:
 
 def test_statistics_count_files_and_findings() -> None:
     once = FileReport("a.stl", (Finding("T001", "error", "x", 2), Finding("T004", "warning", "y")))
-    lines = formats.statistics([once, FileReport("b.stl", once.findings[:1])]).splitlines()
+    lines = as_text.statistics([once, FileReport("b.stl", once.findings[:1])]).splitlines()
     assert [line.split() for line in lines] == [
         ["2", "files", "4", "x", "T001", "boundary", "edge"],
         ["1", "file", "1", "x", "T004", "pinch", "vertex"],

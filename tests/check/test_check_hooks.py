@@ -15,7 +15,7 @@ from shapes import box, stl
 from test_check_command import run
 from typer.main import get_command
 
-from unitcad.check.formats import as_dict
+from unitcad.check.output.as_json import as_dict
 from unitcad.cli import app, check_settings
 
 needs_bash = pytest.mark.skipif(sys.platform == "win32", reason="the action's script is bash")

@@ -10,7 +10,8 @@ from malformed import Case, cases, options
 from malformed_files import good_text_meshes
 from shapes import box, model_xml, package, prism, stl, text_stl
 
-from unitcad.check import check_bytes, formats
+from unitcad.check import check_bytes
+from unitcad.check.output.render import FORMATS, render
 from unitcad.check.rulebook import rules
 
 CASES = cases()
@@ -29,8 +30,8 @@ def test_malformed_file_gives_its_code(case: Case, judge) -> None:
     encoding_of_a_part = case.code == "F009" and case.name.endswith(".3mf")
     filled = case.code in ("G001", "G002") and case.name.endswith(".3mf")
     assert severity == ("error" if encoding_of_a_part else "warning" if filled else expected)
-    for format_ in formats.FORMATS:
-        assert formats.render([report], format_)
+    for format_ in FORMATS:
+        assert render([report], format_)
     for found in report.findings:
         assert not ONE_OF_MANY.search(found.message), found.message
 

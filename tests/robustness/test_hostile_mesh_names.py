@@ -13,8 +13,9 @@ from urllib.parse import unquote_to_bytes
 import pytest
 
 from unitcad import text
-from unitcad.check import baseline, check_file, formats
+from unitcad.check import baseline, check_file
 from unitcad.check.findings import FileReport, Finding, Location
+from unitcad.check.output.render import render
 from unitcad.export import finding_pictures
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such names")
@@ -44,21 +45,21 @@ def judge(folder: Path, name: str) -> None:
     said = FileReport(
         str(path), (*report.findings, Finding("P017", "warning", f"says {name}", 1, (place,))), report.facts
     )
-    lines = formats.render([said], "text").splitlines()
+    lines = render([said], "text").splitlines()
     assert len(lines) == len(said.findings) + 5
     assert all(text.invisible(line) is None for line in lines)
-    commands = formats.render([said], "github").split("\n")
+    commands = render([said], "github").split("\n")
     assert [line.startswith("::") for line in commands] == [True] * len(said.findings) + [False, False]
     for line in commands[: len(said.findings)]:
         assert "\r" not in line
         assert "\x1b" not in line
         head = line.removeprefix("::").partition("::")[0]
         assert re.fullmatch(r"(error|warning) file=[^,:]*(,line=\d+)?,title=[^,:]*", head, re.DOTALL), line
-    suite = ElementTree.fromstring(formats.render([said], "junit").encode("utf-8", "replace"))
+    suite = ElementTree.fromstring(render([said], "junit").encode("utf-8", "replace"))
     assert {element.tag for element in suite.iter()} <= {"testsuites", "testsuite", "testcase", "failure", "system-out"}
-    shown = json.loads(formats.render([said], "json").encode("utf-8"))["files"][0]["path"]
+    shown = json.loads(render([said], "json").encode("utf-8"))["files"][0]["path"]
     assert shown == str(path) or not str(path).isprintable()
-    for result in json.loads(formats.render([said], "sarif"))["runs"][0]["results"]:
+    for result in json.loads(render([said], "sarif"))["runs"][0]["results"]:
         uri = result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
         assert re.fullmatch(r"file:///[A-Za-z0-9._~/!$&'()*+,;=:@%-]+", uri)
         assert unquote_to_bytes(uri.removeprefix("file://")) == bytes(path)

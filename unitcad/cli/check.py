@@ -69,15 +69,17 @@ def check(
     ] = None,
 ) -> None:
     """Judge mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB, and STEP with a B-rep extra."""
-    from unitcad.check import detail, formats, many_files, rulebook
+    from unitcad.check import detail, many_files, rulebook
+    from unitcad.check.output import as_text
+    from unitcad.check.output.render import FORMATS, render
     from unitcad.cli import check_settings
 
     if explain is not None:
         typer.echo(rulebook.explain(explain))
         return
     output_format = "json" if as_json else output_format
-    if output_format not in formats.FORMATS:
-        raise unknown_name("--output-format", output_format, formats.FORMATS)
+    if output_format not in FORMATS:
+        raise unknown_name("--output-format", output_format, FORMATS)
     found = check_settings.find(config, wanted=not no_config)
     settings = found.settings
     fail_on = fail_on or settings.fail_on or "error"
@@ -112,12 +114,12 @@ def check(
         known = baselines.write(base, known, reports) if write_baseline else known
         reports = [baselines.apply(known, base, report) for report in reports]
     reports = [report.shortened(shown) for report in reports]
-    table = formats.statistics(reports) if statistics else ""
+    table = as_text.statistics(reports) if statistics else ""
     if statistics and output_format == "text":
         sys.stdout.write(table)
     else:
         used = None if base is None else base.as_posix()
-        report = formats.render(reports, output_format, fail_on, found.shown, used)
+        report = render(reports, output_format, fail_on, found.shown, used)
         _write(report, plain=output_format == "text")
         sys.stderr.write(table)
     raise typer.Exit(many_files.worst(reports, fail_on))

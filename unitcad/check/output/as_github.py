@@ -1,0 +1,38 @@
+"""Reports as workflow commands of GitHub Actions: annotations on a pull request."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from unitcad.check.findings import FileReport, said
+from unitcad.check.output.as_text import line, summary
+from unitcad.check.rulebook import rules
+from unitcad.text import printable
+
+_GITHUB = {"error": "error", "warning": "warning", "info": "notice"}
+
+
+def github(reports: Sequence[FileReport]) -> str:
+    """Workflow commands: an annotation a finding that is not known, then a line for the log that counts."""
+    lines = []
+    for report in reports:
+        for found in report.findings:
+            if found.known:
+                lines.append(f"known: {line(report, found)}")
+                continue
+            title = f"{found.code} {rules()[found.code].title}"
+            first = next((place.line for place in found.locations if place.line is not None), None)
+            where = f"file={_property(report.path)}" + (f",line={first}" if first is not None else "")
+            text = f"{said(found, 3)}. Fix: {rules()[found.code].mend}"
+            lines.append(f"::{_GITHUB[found.severity]} {where},title={_property(title)}::{_data(text)}")
+    return "\n".join([*lines, summary(reports)]) + "\n"
+
+
+def _data(text: str) -> str:
+    """Text of a workflow command: line breaks as the runner decodes them, other control characters shown, not sent."""
+    lines = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return printable(lines)
+
+
+def _property(text: str) -> str:
+    return _data(text).replace(":", "%3A").replace(",", "%2C")

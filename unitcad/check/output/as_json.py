@@ -1,0 +1,24 @@
+"""Reports as JSON for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from unitcad.check.findings import FileReport
+from unitcad.check.rulebook import rules
+
+
+def as_dict(reports: Sequence[FileReport], config: str | None = None, baseline: str | None = None) -> dict[str, Any]:
+    """The JSON object: {files: [{path, verdict, findings, facts}], config, baseline}.
+
+    A finding also says how to fix it, and whether the baseline lists it.
+    """
+    return {"files": [_entry(report) for report in reports], "config": config, "baseline": baseline}
+
+
+def _entry(report: FileReport) -> dict[str, Any]:
+    entry = report.as_dict()
+    for shown, found in zip(entry["findings"], report.findings, strict=True):
+        shown |= {"fix": rules()[found.code].mend, "known": found.known}
+    return entry

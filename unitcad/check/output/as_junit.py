@@ -1,0 +1,53 @@
+"""Reports as JUnit XML, which CI servers show as test results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.sax.saxutils import escape, quoteattr
+
+from unitcad.check.findings import SEVERITIES, FileReport, Finding, said
+from unitcad.check.rulebook import rules
+
+
+def junit(reports: Sequence[FileReport], fail_on: str) -> str:
+    """JUnit XML: a test case a file, a failure a finding at or above `fail_on`, the others in system-out."""
+    least = SEVERITIES.index(fail_on)
+    cases, failed = [], 0
+    for report in reports:
+        bad = [found for found in report.findings if not found.known and SEVERITIES.index(found.severity) >= least]
+        rest = [found for found in report.findings if found not in bad]
+        failed += bool(bad)
+        inner = "".join(_failure(found) for found in bad)
+        if rest:
+            told = "\n".join(
+                f"{found.code} {found.severity}{' (known)' if found.known else ''}: {said(found, 3)}" for found in rest
+            )
+            inner += f"<system-out>{escape(_xml(told))}</system-out>"
+        name = f"name={quoteattr(_xml(report.path))}" + _time(report.seconds)
+        cases.append(f'<testcase classname="unitcad.check" {name}>{inner}</testcase>')
+    known = [report.seconds for report in reports if report.seconds is not None]
+    total = sum(known) if known else None
+    head = f'<testsuite name="unitcad check" tests="{len(reports)}" failures="{failed}" errors="0"{_time(total)}>'
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        + "\n".join([f"<testsuites>{head}", *cases])
+        + ("\n</testsuite></testsuites>\n")
+    )
+
+
+def _time(seconds: float | None) -> str:
+    return "" if seconds is None else f' time="{seconds:.3f}"'
+
+
+def _failure(found: Finding) -> str:
+    rule = rules()[found.code]
+    places = [f"at {text}" for place in found.locations if (text := str(place))]
+    body = "\n".join([f"{found.code} {rule.title}: {found.message}", *places, f"Fix: {rule.mend}"])
+    head = f"type={quoteattr(found.code)} message={quoteattr(_xml(said(found, 3)))}"
+    return f"<failure {head}>{escape(_xml(body))}</failure>"
+
+
+def _xml(text: str) -> str:
+    """Without the characters that XML 1.0 cannot hold."""
+    return "".join(c if c in "\t\n\r" or (c >= " " and not 0xD800 <= ord(c) <= 0xDFFF and c not in "\ufffe\uffff")
+                   else "\ufffd" for c in text)  # fmt: skip

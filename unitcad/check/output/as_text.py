@@ -1,0 +1,81 @@
+"""Reports as text for a person: a line a finding, how to fix what was found, and a count."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from unitcad.check.findings import Facts, FileReport, Finding, counted, number, said
+from unitcad.check.rulebook import rules
+from unitcad.text import printable
+
+
+def text(reports: Sequence[FileReport]) -> str:
+    """A line a finding, one with the size of each file that passed, how to fix what was found, then a count."""
+    lines = []
+    codes: set[str] = set()
+    for report in reports:
+        for found in report.findings:
+            if not found.known:
+                codes.add(found.code)
+            lines.append(line(report, found))
+        if report.verdict == "pass" and (size := _size(report.facts)):
+            lines.append(f"{printable(report.path)}: passed: {size}")
+    fixes = [f"  {code} {rule.title}: {rule.mend}" for code, rule in rules().items() if code in codes]
+    if fixes:
+        lines += ["How to fix:", *fixes, _EXPLAIN]
+    return "\n".join([*lines, summary(reports)]) + "\n"
+
+
+def line(report: FileReport, found: Finding) -> str:
+    """A finding in one line: file, code, severity, message and its first places."""
+    known = " (known)" if found.known else ""
+    return f"{printable(report.path)}: {found.code} {found.severity}{known}: {printable(said(found, 3))}"
+
+
+_EXPLAIN = "`unitcad check --explain CODE` says what a code means and why it matters."
+
+
+def _size(facts: Facts) -> str:
+    """Sides of the box, volume, shells and triangles, as far as they are known."""
+    parts = []
+    if facts.bbox_mm is not None:
+        sides = [high - low for low, high in zip(*facts.bbox_mm, strict=True)]
+        parts.append(" x ".join(number(side) for side in sides) + " mm")
+    if facts.volume_mm3 is not None:
+        parts.append(f"{number(facts.volume_mm3)} mm3")
+    if facts.shells is not None:
+        parts.append(counted(facts.shells, "shell"))
+    if facts.triangles is not None:
+        parts.append(counted(facts.triangles, "triangle"))
+    return ", ".join(parts)
+
+
+def summary(reports: Sequence[FileReport]) -> str:
+    """How many files failed, gave warnings and passed."""
+    verdicts = Counter(report.verdict for report in reports)
+    parts = [
+        f"{verdicts[name]} {word}" for name, word in (("error", "failed"), ("warning", "warned")) if verdicts[name]
+    ]
+    parts.append(f"{verdicts['pass']} passed")
+    if known := sum(found.known for report in reports for found in report.findings):
+        parts.append(counted(known, "known finding"))
+    return f"{counted(len(reports), 'file')}: {', '.join(parts)}"
+
+
+_SIZES = {"F002", "F006", "G005"}  # their count is a number of bytes, facets or shells by which the file is wrong
+
+
+def statistics(reports: Sequence[FileReport]) -> str:
+    """How many files each rule hit and how often, most files first. A finding that counts bytes is one occurrence."""
+    files: Counter[str] = Counter()
+    times: Counter[str] = Counter()
+    for report in reports:
+        for found in report.findings:
+            files[found.code] += 1
+            times[found.code] += 1 if found.code in _SIZES else found.count
+    lines = [
+        f"{counted(n, 'file ', 'files'):>12} {times[code]:9d} x  {code} {rules()[code].title}"
+        for code, n in files.most_common()
+    ]
+    return "\n".join(lines) + "\n" if lines else "no findings\n"
