@@ -7,8 +7,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from typer.main import get_command
+from typer.testing import CliRunner
+
+from unitcad.cli import app
 
 
 def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -87,6 +92,49 @@ def test_estimate_says_that_build_would_refuse_the_moulds(setting: str, field: s
     assert reason.startswith(field.partition("=")[0] + " = ")
     assert estimated.stderr == f"warning: encapsulating: its moulds can't be made: {reason}"
     assert json.loads(estimated.stdout)["models"]["fitted"]
+
+
+WRONG = {
+    "build --nope": "No such option: --nope",
+    "build": "Missing argument 'SPEC'",
+    "bild": "No such command 'bild'",
+    "batch x -j abc": "Invalid value for '-j' / '--jobs'",
+    "batch a b": "Got unexpected extra argument",
+    "build a --out": "Option '--out' requires an argument",
+    "check --jobs 0": "Invalid value for '--jobs' / '-j'",
+}
+
+
+@pytest.mark.parametrize("words", WRONG)
+def test_a_wrong_command_line_is_one_plain_line_and_json_where_asked(words: str) -> None:
+    command, *rest = words.split()
+    plain, as_json = _run(command, *rest), _run(command, "--json", *rest)
+    assert plain.returncode == as_json.returncode == 2
+    assert plain.stdout == ""
+    (line,) = plain.stderr.splitlines()
+    assert line.startswith(f"error: {WRONG[words]}")
+    assert line.endswith(" --help")
+    assert f"error: {json.loads(as_json.stdout)['error']['message']}" == line
+
+
+def _commands() -> dict[str, Any]:
+    found = get_command(app).commands  # pyright: ignore
+    return {
+        "": get_command(app),
+        **found,
+        **{f"cache {name}": below for name, below in found["cache"].commands.items()},
+    }
+
+
+@pytest.mark.parametrize("command", _commands())
+def test_help_cuts_no_option_s_name_and_no_square_bracket(command: str) -> None:
+    lines = CliRunner().invoke(app, [*command.split(), "--help"], env={"COLUMNS": "80"}).stdout.splitlines()
+    assert not [line for line in lines[1:] if line.endswith(("\u2026", "..."))], "a summary is cut"
+    shown = " ".join(" ".join(lines[1:]).split())
+    for parameter in _commands()[command].params:
+        for option in (*parameter.opts, *parameter.secondary_opts):
+            assert not option.startswith("-") or option in shown.replace(",", " ").split()
+        assert " ".join((getattr(parameter, "help", None) or "").split()) in shown
 
 
 def test_help_and_version() -> None:

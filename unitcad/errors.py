@@ -10,7 +10,7 @@ from unitcad.text import toml
 
 
 class UnitcadError(Exception):
-    """Asked wrongly, or the machine lacks something: exit code 2, no traceback."""
+    """A request that can't be met, or something that the machine lacks: exit code 2, no traceback."""
 
     exit_code = 2
 

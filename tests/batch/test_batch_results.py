@@ -120,6 +120,17 @@ def test_refused_variants_are_rows_too(tmp_path: Path) -> None:
     assert (summary.failed, summary.retried) == (2, 0)
 
 
+def test_the_last_line_s_sums_and_plurals(tmp_path: Path) -> None:
+    sweep = ring_sweep(tmp_path / "s", "fails", heights=[2.0, 3.0], materials=2)
+    done = unitcad("batch", sweep, "-o", tmp_path / "out", "-j", 0, "--keep-going")
+    assert done.returncode == 1
+    made = done.stdout.splitlines()[0].rpartition("; ")[0]
+    assert made == "2 of 4 variants made; 2 failed; 1 geometry new, 1 variant from known ones"
+    again = unitcad("batch", sweep, "-o", tmp_path / "out", "-j", 0, "--limit", 1)
+    made = again.stdout.splitlines()[0].rpartition("; ")[0]
+    assert made == "1 of 1 variant made (1 from before); 0 failed; 0 geometries new, 0 variants from known ones"
+
+
 def test_variants_that_are_equal_share_a_folder(tmp_path: Path) -> None:
     file = tmp_path / "twice.toml"
     file.write_text(

@@ -145,6 +145,8 @@ def test_what_is_no_baseline_is_one_error_and_stays(tmp_path: Path, content: byt
     result = run("a.stl", *KNOWN, *more, cwd=tmp_path)
     assert (result.returncode, result.stdout, len(result.stderr.splitlines())) == (2, "", 1)
     assert (tmp_path / "known.json").read_bytes() == content
+    # In this program's words, not those of the library that reads it.
+    assert not any(word in result.stderr for word in ("Expected", "Object", "malformed", "$", "`int`"))
 
 
 def test_all_locations_are_listed_on_request(tmp_path: Path) -> None:

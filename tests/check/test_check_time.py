@@ -124,5 +124,6 @@ def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.Mon
     path.write_bytes(_stl())
     report = many_files.guarded(str(path), Options(limits=Limits(seconds=1.0)))
     assert {"F011", "T001", "G001"} <= {item.code for item in report.findings}
+    assert next(item.message for item in report.findings if item.code == "F011") == "not finished within --timeout 1 s"
     with pytest.raises(Unreadable), many_files._alarm(0.01):
         time.sleep(60)

@@ -60,7 +60,8 @@ def _data(page: Path) -> dict[str, Any]:
 
 def test_one_damaged_result_does_not_keep_the_others_from_the_page(good: Path, tmp_path: Path) -> None:
     root = _spoilt(good, tmp_path, list(KINDS))
-    data = _data(write_report(root))
+    warnings: list[str] = []
+    data = _data(write_report(root, warnings.append))
     text = json.dumps(data)
     assert SECRET not in text
     assert not (tmp_path / "RAN").exists()
@@ -70,6 +71,12 @@ def test_one_damaged_result_does_not_keep_the_others_from_the_page(good: Path, t
         folder = re.sub(r"\W+", "-", kind)
         assert (folder in shown, folder in damaged) == (is_shown, not is_shown), kind
     assert "good" in shown
+    # The terminal says how many and which; those that are damaged in part are on the page as well.
+    named = {line.split(":")[0].strip() for line in warnings[1:] if not line.startswith("  and ")}
+    partly = {folder for folder, at in data["variants"] if data["pool"][at["\0"]]["damaged"]}
+    assert warnings[0] == f"warning: {len(damaged) + len(partly)} of {len(KINDS) + 1} results are damaged:"
+    assert set(damaged) <= named <= set(damaged) | partly
+    assert len(named) == min(20, len(damaged) + len(partly))
     columns = ["folder", *data["table"]["columns"]]
     rows = [dict(zip(columns, row, strict=True)) for row in data["table"]["rows"]]
     assert {row["name"] for row in rows if row["status"] == "damaged"} == set(damaged)
@@ -101,6 +108,20 @@ def test_a_damaged_batch_json_is_named_and_the_variants_are_shown(content: str, 
     data = _data(write_report(root))
     assert dict(data["damaged"]).keys() == {"batch.json", "manifest-json-is-torn"}
     assert [row[0] for row in data["table"]["rows"]] == ["good", ""]
+
+
+def test_the_command_names_damaged_results_on_standard_error(
+    good: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from unitcad.cli import app
+
+    root = _spoilt(good, tmp_path, ["manifest.json is torn"])
+    assert app(["report", str(root)], standalone_mode=False) is None
+    shown = capsys.readouterr()
+    first, second = shown.err.splitlines()
+    assert first == "warning: 1 of 2 results is damaged:"
+    assert second.startswith("  manifest-json-is-torn: ")
+    assert shown.out.splitlines() == [str(root / "report.html")]
 
 
 def test_a_damaged_variant_of_a_batch_is_named_in_its_table(good: Path, tmp_path: Path) -> None:

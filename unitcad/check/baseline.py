@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -47,6 +48,20 @@ class Baseline(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename="
 
 
 EMPTY = Baseline(1, {})
+_AGAIN = "remove it, and make it again with --write-baseline"
+
+
+def _fault(error: Exception) -> str:
+    """Where a baseline differs from what this program writes."""
+    if not isinstance(error, msgspec.ValidationError):
+        byte = re.search(r"byte (\d+)", str(error))
+        return f"it is not JSON (byte {byte[1]})" if byte else "it is not JSON"
+    what, _, place = str(error).partition(" - at `$")
+    key = re.search(r"(missing|unknown)[^`]*`([^`]*)`", what)
+    place = place.rstrip("`").lstrip(".").replace("[...]", ".*") or "its top level"
+    if not key:
+        return f"{place} has a value of the wrong kind"
+    return f"{place} {'lacks the' if key[1] == 'missing' else 'has an unknown'} key {key[2]!r}"
 
 
 def read(path: Path) -> Baseline:
@@ -55,7 +70,7 @@ def read(path: Path) -> Baseline:
     try:
         found = msgspec.json.decode(content, type=Baseline)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UnitcadError(f"{path}: not a baseline of `unitcad check`: {error}") from None
+        raise UnitcadError(f"{path}: not a baseline of `unitcad check`: {_fault(error)}; {_AGAIN}") from None
     if found.unitcad_baseline != 1:
         raise UnitcadError(f"{path}: a baseline of form {found.unitcad_baseline}; this version reads form 1")
     return found

@@ -42,7 +42,7 @@ class OutOfTime(Unreadable):
     """The time is up: no fault of the part that was being read, so nothing is concluded from it."""
 
     def __init__(self, seconds: float) -> None:
-        super().__init__(finding("F011", f"not finished within {seconds:g} s"))
+        super().__init__(finding("F011", f"not finished within --timeout {seconds:g} s"))
 
 
 def over_limit(what: str) -> Unreadable:
@@ -66,7 +66,7 @@ def keeping(
         if isinstance(error, Unreadable):
             stop = error
         else:
-            stop = over_limit("out of memory" if isinstance(error, MemoryError) else "nested too deeply")
+            stop = over_limit("out of memory (--memory)" if isinstance(error, MemoryError) else "nested too deeply")
         stop.findings = tuple(change((*found, *stop.findings)))
         if facts is not None and stop.facts == Facts():
             stop.facts = facts

@@ -119,7 +119,7 @@ def _guarded(path: str, options: Options) -> FileReport:
     except Unreadable as stop:
         return FileReport(path, stop.findings)
     except MemoryError:
-        return _stopped(path, "out of memory")
+        return _stopped(path, "out of memory (--memory)")
     except Exception as error:
         if os.environ.get("UNITCAD_TRACEBACK"):
             raise

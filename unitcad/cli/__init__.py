@@ -1,13 +1,14 @@
 """The command line. Each command parses, calls one function, prints; what is heavy is imported inside it.
 
-Exit 0 done; 1 a finding or a failed variant; 2 asked wrongly; 130 interrupted. No traceback reaches a user.
+Exit 0 done; 1 a finding or a failed variant; 2 a wrong argument, option or input; 130 interrupted. No traceback reaches
+a user.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -32,8 +33,14 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # boxes cut long option names, and markup swallows square brackets
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+INTERRUPTED = 130
+WrongArguments = typer.BadParameter.__mro__[2]
+"""Typer's error of the command line itself, such as an unknown option: ClickException, its own or click's."""
 
 
 def _version(wanted: bool) -> None:
@@ -69,13 +76,19 @@ def main() -> None:
     as_json = "--json" in sys.argv
     speak_anywhere()
     try:
-        app()
+        code = app(standalone_mode=False)
+        if code == INTERRUPTED:
+            typer.echo("interrupted", err=True)
+        sys.exit(code or 0)
+    except WrongArguments as error:
+        _refuse(error, as_json)
+        sys.exit(error.exit_code)
     except UnitcadError as error:
         say_error(error, as_json)
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
         typer.echo("interrupted", err=True)
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
@@ -91,3 +104,14 @@ def main() -> None:
             as_json,
         )
         sys.exit(1)
+
+
+def _refuse(error: Any, as_json: bool) -> None:
+    """Print an error of Typer's as one line, with the command whose help says more."""
+    context = getattr(error, "ctx", None)
+    message = error.format_message()
+    if context and message == context.get_help() and not as_json:  # a command alone that needs another one after it
+        error.show()
+        return
+    line = " ".join(message.partition("\n")[0].split()).rstrip(".")
+    say_error(UnitcadError(f"{line}; see {context.command_path if context else 'unitcad'} --help"), as_json)

@@ -11,7 +11,7 @@ import typer
 
 
 def accuracy(
-    suites: Annotated[list[str] | None, typer.Argument(metavar="[SUITE]...", help="Which suites; else all.")] = None,
+    suites: Annotated[list[str] | None, typer.Argument(metavar="SUITE", help="Which suites; else all.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer cases: what CI runs.")] = False,
     specs: Annotated[
         int | None,

@@ -106,7 +106,7 @@ def batch(
     if page or (folder / PAGE).is_file():
         from unitcad.report import write_report
 
-        write_report(folder)
+        write_report(folder, warn)
     if as_json:
         print_json({"folder": str(folder), **asdict(summary)})
     elif not json_lines:
@@ -116,6 +116,8 @@ def batch(
 
 
 def _tell(summary: Summary, folder: Path) -> None:
+    from unitcad.check.findings import counted
+
     for warning in summary.warnings:
         warn(f"warning: {warning}")
     for failure in summary.failures:
@@ -124,20 +126,29 @@ def _tell(summary: Summary, folder: Path) -> None:
         typer.echo(f"and {summary.failed - len(summary.failures)} more: see variants.csv", err=True)
     if summary.stopped:
         warn(f"stopped: {summary.stopped}; the next run takes up the rest")
-    taken_up = f", {summary.taken_up} from before" if summary.taken_up else ""
-    typer.echo(
-        f"{summary.done} of {summary.variants} variants{taken_up}, {summary.geometries} geometries made, "
-        f"{summary.reused} reused, {summary.failed} failed, {summary.seconds:.1f} s"
-    )
+    before = f" ({summary.taken_up} from before)" if summary.taken_up else ""
+    left = summary.variants - summary.done
+    parts = [
+        f"{summary.ok} of {counted(summary.variants, 'variant')} made{before}",
+        f"{summary.failed} failed",
+        *([f"{left} not tried"] if left else []),
+        f"{counted(summary.geometries, 'geometry', 'geometries')} new, "
+        f"{counted(summary.reused, 'variant')} from known ones",
+        f"{summary.seconds:.1f} s",
+    ]
+    typer.echo("; ".join(parts))
     typer.echo(str(folder))
 
 
 def _tell_preview(found: dict) -> None:
+    from unitcad.check.findings import counted
+
     about = "" if found["exact"] else "about "
-    typer.echo(f"{found['variants']} variants of {about}{found['geometries']} geometries")
-    typer.echo(f"{about}{found['parts']} distinct parts")
+    geometries = counted(found["geometries"], "geometry", "geometries")
+    typer.echo(f"{counted(found['variants'], 'variant')} of {about}{geometries}")
+    typer.echo(f"{about}{counted(found['parts'], 'distinct part')}")
     sizes = f"{found['stored_mb']:.1f} MB stored, {found['linked_mb']:.1f} MB with every link counted"
-    typer.echo(f"about {found['files']} files, {sizes}")
+    typer.echo(f"about {counted(found['files'], 'file')}, {sizes}")
     for refused in found["refused"]:
         warn(f"variant {refused['index']} can't be: {refused['reason']}")
     if found["refused_count"] > len(found["refused"]):

@@ -11,7 +11,7 @@ import typer
 from unitcad.cli.code import AllowCode, allow_code
 from unitcad.cli.output import warn
 
-Specs = Annotated[list[str], typer.Argument(metavar="SPEC...", help="A spec file, or the name of a template.")]
+Specs = Annotated[list[str], typer.Argument(metavar="SPEC", help="A spec file, or the name of a template.")]
 Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the spec.")]
 
 
@@ -56,7 +56,7 @@ def build(
 
                 say("page")
                 with held(results[-1].folder):
-                    write_report(results[-1].folder)
+                    write_report(results[-1].folder, warn)
     if as_json:
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
     else:

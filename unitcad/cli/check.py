@@ -35,7 +35,7 @@ def check(
     extend_select: Annotated[list[str] | None, typer.Option(help="Prefixes added to --select.")] = None,
     fail_on: Annotated[str | None, typer.Option(help="error (default) or warning: what makes the exit code 1.")] = None,
     printer: Annotated[str | None, typer.Option(help="Judge fit and printability (S002, D) for this printer.")] = None,
-    unit: Annotated[str | None, typer.Option(help="Unit of files that have none: mm, cm, m, in, ft ...")] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit of files that have none: mm, cm, m, in, ft and so on")] = None,
     shells: Annotated[int | None, typer.Option(min=0, help="Number of shells expected (G005).")] = None,
     strict_3mf: Annotated[
         bool | None,
@@ -68,7 +68,10 @@ def check(
         str | None, typer.Option(help="Say what a code means, why it matters and how to fix it.")
     ] = None,
 ) -> None:
-    """Judge mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB, and STEP with a B-rep extra."""
+    """Check mesh files as they are, before any repair.
+
+    Reads STL, 3MF, OBJ, PLY, OFF and GLB, and STEP where an extra with a B-rep kernel is installed.
+    """
     from unitcad.check import detail, many_files, rulebook
     from unitcad.check.output import as_text
     from unitcad.check.output.render import FORMATS, render

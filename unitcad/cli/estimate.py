@@ -17,7 +17,7 @@ _MOST_FREQUENCIES = 1000
 
 
 def estimate(
-    specs: Annotated[list[str], typer.Argument(metavar="SPEC...", help="a template's name or a path to a TOML file")],
+    specs: Annotated[list[str], typer.Argument(metavar="SPEC", help="a template's name or a path to a TOML file")],
     model: Annotated[
         str, typer.Option(help="paper, consistent, fitted or all; the spec's own models if not given")
     ] = "",
@@ -29,7 +29,11 @@ def estimate(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="one JSON object on standard output")] = False,
 ) -> None:
-    """How much of the motor's vibration reaches the unit's edge and the skin beyond, by each model, with its error."""
+    """Estimate the vibration at the unit's edge.
+
+    Each model gives the part of the motor's amplitude that reaches the edge, and the decay on the skin beyond it, with
+    the model's error.
+    """
     from unitcad.attenuation.models import MODELS
     from unitcad.estimating import estimate_spec, frequency_table_of_spec
     from unitcad.spec import load

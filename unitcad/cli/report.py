@@ -16,13 +16,13 @@ def report(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
     """Write one offline page for what a folder holds. The last line printed is the page."""
-    from unitcad.cli.output import print_json, progress
+    from unitcad.cli.output import print_json, progress, warn
     from unitcad.report import write_report
 
     allow_code(code)
     with progress(str(folder)) as say:
         say("page")
-        page = write_report(folder)
+        page = write_report(folder, warn)
     if as_json:
         print_json({"page": str(page), "bytes": page.stat().st_size})
     else:

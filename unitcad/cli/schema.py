@@ -13,7 +13,7 @@ def schema(
     kind: Annotated[str, typer.Argument(help="spec or sweep.")] = "spec",
     as_json: Annotated[bool, typer.Option("--json", help="The schema is JSON in any case.")] = False,
 ) -> None:
-    """Print the JSON Schema of a spec or of a sweep file, for editors and programs."""
+    """Print the JSON Schema of a spec or sweep file."""
     import msgspec
 
     from unitcad.batch.sweep import SweepFile

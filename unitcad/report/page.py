@@ -12,17 +12,19 @@ import hashlib
 import html
 import json
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from unitcad import __version__
+from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
 from unitcad.files import write
 from unitcad.pipeline.folder import PAGE
 from unitcad.report import collect
+from unitcad.report.collect import DAMAGED
 from unitcad.report.models import model
 from unitcad.report.pool import Pool
 from unitcad.spec import Spec
@@ -32,22 +34,34 @@ PROGRAMS = (
     "dom.js", "glb.js", "viewer.js", "controls.js", "plots.js", "estimate.js", "sections.js", "casting.js",
     "filters.js", "table.js", "main.js",
 )  # fmt: skip
+MOST_DAMAGED = 20
+"""Damaged results that are named when a page is written; the page names all."""
 STYLES = ("vendor/uplot.min.css", "app/page.css", "app/print.css")
 
 
-def write_report(folder: Path) -> Path:
+def write_report(folder: Path, warn: Callable[[str], None] = lambda line: None) -> Path:
     """Write `folder`/report.html for the variant or the batch in `folder`; returns its path.
 
-    Raises UnitcadError where the folder holds neither.
+    `warn` gets lines that say which results are damaged, and why. Raises UnitcadError where the folder holds none.
     """
-    data, title = page_data(folder)
+    data, title, damage = page_data(folder)
     target = folder / PAGE
+    if damage:
+        of = max(len(data["variants"]), len(data["table"]["rows"]) if data["table"] else 0)
+        warn(f"warning: {len(damage)} of {counted(of, 'result')} {'is' if len(damage) == 1 else 'are'} damaged:")
+        for name, why in list(damage.items())[:MOST_DAMAGED]:
+            warn(f"  {name}: {why}")
+        if len(damage) > MOST_DAMAGED:
+            warn(f"  and {len(damage) - MOST_DAMAGED} more: see the page")
     write(target, page(data, title).encode("utf-8", "replace"))
     return target
 
 
-def page_data(folder: Path) -> tuple[dict[str, Any], str]:
-    """The page's data and title. Raises UnitcadError where the folder holds no result."""
+def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
+    """Collect the page's data, its title, and why a result is damaged by its folder's name.
+
+    Raises UnitcadError where the folder holds no result.
+    """
     if not folder.is_dir():
         raise UnitcadError(f"{folder}: is not a folder")
     damaged: dict[str, str] = {}
@@ -87,7 +101,8 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str]:
         "pool": pool.entries,
         "models": models,
     }
-    return data, title
+    partly = {record["folder"] or folder.name: record[DAMAGED] for record in records if record[DAMAGED]}
+    return data, title, damaged | {name: whys[0] for name, whys in partly.items()}
 
 
 def _models(records: list[dict[str, Any]], specs: Iterable[Spec | None]) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def _from_child(path: Path, seconds: float) -> dict[str, Any]:
         try:
             done = children.run([sys.executable, "-P", "-c", _CHILD, str(path), str(out)], timeout=seconds)
         except subprocess.TimeoutExpired as error:
-            raise over_limit(f"not finished within {seconds:g} s") from error
+            raise over_limit(f"not finished within --timeout {seconds:g} s") from error
         if done.returncode == 0 and out.exists():
             return json.loads(out.read_text("utf-8"))
     last = done.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
