@@ -321,7 +321,7 @@ def test_touching_shells_are_placed_pair_by_pair() -> None:
 )
 @pytest.mark.parametrize("scale", [1.0, 1e38, 1e-150])
 def test_the_middle_of_what_two_triangles_share(other: list, expected: tuple | None, scale: float) -> None:
-    found = common_point(scale * np.array([[0, 0, 0], [6, 0, 0], [0, 6, 0]]), scale * np.array(other))
+    found = common_point(*(scale * np.array(corners) for corners in ([[0, 0, 0], [6, 0, 0], [0, 6, 0]], other)))
     assert (found is None) == (expected is None)
     if found is not None and expected is not None:
-        assert found / scale == pytest.approx(expected, abs=1e-7)
+        assert np.array(found) / scale == pytest.approx(expected, abs=1e-7)

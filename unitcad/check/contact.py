@@ -14,47 +14,38 @@ import numpy as np
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _TRIES = 3  # pairs of faces tried one by one for each pair of shells before all are
-_BLOCK = 1 << 12  # pairs whose corners stay in the processor's cache
 
 
 def by_boxes(a: Floats, b: Floats) -> tuple[Bools, Bools]:
-    """For pairs of triangles (n, 3, 3): whether they are apart, and whether all they can do is touch.
+    """For pairs of triangles (corner, axis, n): whether their boxes are apart, and whether all they can do is touch.
 
-    The first by their boxes, or those of the parts that they have in the plane where these touch; the second where such
-    a plane holds neither.
+    They can where their boxes do, and the plane between these holds no side of one and all of the other.
     """
-    apart, flush = np.zeros((2, len(a)), bool)
-    for start in range(0, len(a), _BLOCK):
-        block = slice(start, start + _BLOCK)
-        apart[block], flush[block] = _by_boxes(
-            np.ascontiguousarray(a[block].transpose(1, 2, 0)), np.ascontiguousarray(b[block].transpose(1, 2, 0))
-        )
-    return apart, flush
-
-
-def _by_boxes(a: Floats, b: Floats) -> tuple[Bools, Bools]:
-    """The same for corners (corner, axis, n)."""
     (low_a, high_a), (low_b, high_b) = _box(a), _box(b)
     apart = np.asarray(((low_a > high_b) | (low_b > high_a)).any(axis=0))
     flush = np.zeros(a.shape[2], bool)
     for axis in range(3):
-        for plane, touch in (
-            (high_a[axis], high_a[axis] == low_b[axis]),
-            (low_a[axis], low_a[axis] == high_b[axis]),
-        ):
-            rows = np.flatnonzero(touch)
-            if not len(rows):
-                continue
-            parts = []
-            for corners in (a, b):
-                some = corners.take(rows, axis=2)
-                out = some[:, axis] != plane[rows]
-                parts.append((some, out))
-            (one, out_one), (other, out_other) = parts
-            flush[rows] |= out_one.any(axis=0) & out_other.any(axis=0)
-            (low_one, high_one), (low_other, high_other) = _box(one, out_one), _box(other, out_other)
-            apart[rows] |= ((low_one > high_other) | (low_other > high_one)).any(axis=0)
+        for plane, other in ((high_a[axis], low_b[axis]), (low_a[axis], high_b[axis])):
+            rows = np.flatnonzero((plane == other) & ~(apart | flush))
+            if len(rows):
+                at = plane[rows]
+                one, two = ((corners[:, axis].take(rows, axis=1) == at).sum(axis=0) for corners in (a, b))
+                flush[rows] = one + two < 5
     return apart, flush
+
+
+def parts_apart(a: Floats, b: Floats) -> Bools:
+    """Whether the boxes of those parts are apart that pairs of triangles have in a plane where their boxes touch."""
+    (low_a, high_a), (low_b, high_b) = _box(a), _box(b)
+    apart = np.zeros(a.shape[2], bool)
+    for axis in range(3):
+        for plane, other in ((high_a[axis], low_b[axis]), (low_a[axis], high_b[axis])):
+            rows = np.flatnonzero((plane == other) & ~apart)
+            if len(rows):
+                one, two = (corners.take(rows, axis=2) for corners in (a, b))
+                (low, high), (low_two, high_two) = (_box(part, part[:, axis] != plane[rows]) for part in (one, two))
+                apart[rows] = ((low > high_two) | (low_two > high)).any(axis=0)
+    return apart
 
 
 def _box(corners: Floats, out: Bools | None = None) -> tuple[Floats, Floats]:
@@ -82,6 +73,10 @@ class Contacts:
         """Rows of the first of each key that is not known."""
         rows = np.flatnonzero(~np.isin(keys, self.known))
         return rows[np.unique(keys[rows], return_index=True)[1]]
+
+    def open(self, keys: Ints) -> Bools:
+        """Which keys are still asked for."""
+        return np.ones(len(keys), bool) if self.every else ~np.isin(keys, self.known)
 
     def add(self, keys: Ints, pairs: Ints) -> None:
         """Note pairs of faces that meet, one for each pair of shells that is not known."""

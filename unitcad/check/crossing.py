@@ -1,7 +1,7 @@
 """Self-crossing (G001), touching shells (G003) and coplanar overlap (G004, G008, G009), decided exactly.
 
 Three sieves, each a whole block of pairs at a time: boxes; faces round a vertex whose star is a height field, which can
-meet in that vertex only; slabs square to the diagonals of space. What is left is decided by exact signs.
+meet in that vertex only; planes that set faces apart. What is left is decided by exact signs.
 A crossing is one of: two faces pass through each other; an edge lies in a face and its two faces leave to both sides.
 """
 
@@ -18,14 +18,17 @@ from unitcad.check.detail import detail
 from unitcad.check.edges import balanced
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Unreadable
-from unitcad.check.mesh import float32_step
-from unitcad.check.pairs import Slabs, boxes_of, frame_of, meeting_pairs, morton_order, slabs_of
+from unitcad.check.mesh import float32_step, same_place
+from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
+from unitcad.check.planes import Planes, planes_of
 from unitcad.check.rulebook import finding
 from unitcad.check.stars import height_fields
 from unitcad.check.topology import Topology
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _BLOCK = 1 << 17
+_PAIRS = 1 << 12  # pairs whose corners stay in the processor's cache
+_OPEN, _APART, _FLUSH = 0, 1, 2  # undecided; no point but common corners; nothing but perhaps touching
 _LISTED = 16  # pairs whose places are computed, unless more are kept: some fall together
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
@@ -52,13 +55,16 @@ class _Found:
 
 @dataclass(frozen=True)
 class _Faces:
-    """Faces in Morton order and what the sieves need of them."""
+    """Faces in Morton order and what the sieves need of them.
+
+    `normal` (3, m) is twice their area vectors; the vertices of `planes` are the first in each place.
+    """
 
     vertices: Floats
-    corners: tuple[Ints, Ints, Ints]
+    corners: Ints
     normal: Floats
-    safe: tuple[Ints, Ints, Ints]
-    slabs: Slabs
+    safe: Ints
+    planes: Planes
     shell: Ints
     original: Ints
     several: bool
@@ -71,10 +77,10 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
     steps = frame_of(mesh.vertices).steps(mesh.vertices)
     order = morton_order(steps, mesh.faces[:, 0])
     ordered = np.ascontiguousarray(mesh.faces[order])
-    normal = topology.areas[order]
-    solid = (normal[:, 0] != 0) | (normal[:, 1] != 0) | (normal[:, 2] != 0)
+    normal = np.stack([topology.areas[:, axis].take(order) for axis in range(3)])
+    solid = (normal != 0).any(axis=0)
     if not solid.all():
-        order, ordered, normal = order[solid], ordered[solid], normal[solid]
+        order, ordered, normal = order[solid], ordered[solid], normal[:, solid]
     if len(order) < 2:
         return Crossings()
     deadline.tick()
@@ -86,7 +92,7 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
     count = 0
     try:
         for i, j in meeting_pairs(boxes, deadline):
-            i, j = faces.slabs.meeting(*_strangers(faces, i, j))
+            i, j = _strangers(faces, i, j)
             waiting.append((i, j))
             count += len(i)
             if count > _BLOCK:
@@ -104,20 +110,20 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
 
 
 def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) -> _Faces:
-    vertices = topology.mesh.vertices
-    corners = tuple(np.ascontiguousarray(ordered[:, k]) for k in range(3))
-    smooth = height_fields(vertices, corners, normal, _surrounded(topology))
-    safe = tuple(np.where(smooth[corner], corner, -1) for corner in corners)
+    vertices, several = topology.mesh.vertices, topology.n_shells > 1
+    columns, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(ordered.T)
+    smooth = height_fields(columns, corners, normal, _surrounded(topology))
+    places = same_place(vertices).take(corners) if several else corners
     return _Faces(
         vertices,
-        corners,  # type: ignore[arg-type]
+        corners,
         normal,
-        safe,  # type: ignore[arg-type]
-        slabs_of(vertices, *corners),
+        np.where(smooth.take(corners), corners, np.int32(-1)),
+        planes_of(columns, places, normal),
         topology.shells[order],
         topology.kept[order],
-        topology.n_shells > 1,
-        not topology.edges.closed,
+        several,
+        several or not topology.edges.closed,
     )
 
 
@@ -146,61 +152,122 @@ def _strangers(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
 
 
 def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> None:
-    """Exact answers for the pairs that came through the sieves."""
-    i = np.concatenate([pair[0] for pair in waiting]) if waiting else np.empty(0, np.int32)
-    j = np.concatenate([pair[1] for pair in waiting]) if waiting else np.empty(0, np.int32)
-    if not len(i) or found.kept > _FEW:
+    """Answers for pairs of faces that are near each other: planes and boxes first, then exact signs."""
+    if not waiting or found.kept > _FEW:
         return
-    ids_a = np.stack([corner[i] for corner in faces.corners], axis=1)
-    ids_b = np.stack([corner[j] for corner in faces.corners], axis=1)
+    i = np.concatenate([pair[0] for pair in waiting])
+    j = np.concatenate([pair[1] for pair in waiting])
+    state, shared = np.empty((2, len(i)), np.int8)
+    for start in range(0, len(i), _PAIRS):
+        rows = slice(start, start + _PAIRS)
+        state[rows], shared[rows] = _sieved(faces, i[rows], j[rows])
+    if faces.several:
+        some = np.flatnonzero(np.where(shared > 0, state != _OPEN, state == _FLUSH))
+        some = some[faces.shell[i[some]] != faces.shell[j[some]]]
+        _contacts(faces, i[some], j[some], shared[some] > 0, found)
+    left = np.flatnonzero(state == _OPEN)
+    _decide_exactly(faces, i[left], j[left], shared[left], found)
+
+
+def _sieved(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
+    """What planes and boxes say of pairs, and how many corners the faces of each share."""
+    planes = faces.planes
+    ids_a, ids_b = (planes.vertices(f) for f in (i, j))
     shared = np.zeros(len(i), np.int8)
     for k in range(3):
         for m in range(3):
-            shared += ids_a[:, k] == ids_b[:, m]
+            shared += ids_a[k] == ids_b[m]
+    apart = planes.one_side(i, ids_b, shared)
+    left = np.flatnonzero(~apart)
+    apart[left] = planes.one_side(j[left], ids_a.take(left, axis=1), shared[left])
     # Neighbours across an edge meet elsewhere only if one is folded flat onto the other.
-    open_ = (shared >= 2) & (np.einsum("ij,ij->i", faces.normal[i], faces.normal[j]) > 0)
-    if faces.doubled:
-        open_[open_] = ~overlap.run_alike(ids_a[open_], ids_b[open_])
-    if open_.any():
-        if faces.several:  # shells that share an edge touch
-            edge = np.flatnonzero(open_ & (faces.shell[i] != faces.shell[j]))
-            keys = found.contact.keys(faces.shell[i[edge]], faces.shell[j[edge]])
-            found.contact.add(keys, np.stack([i[edge], j[edge]], axis=1))
-        i, j, ids_a, ids_b, shared = (array[~open_] for array in (i, j, ids_a, ids_b, shared))
-    a, b = faces.vertices.take(ids_a, axis=0), faces.vertices.take(ids_b, axis=0)
-    apart, flush = contact.by_boxes(a, b)
-    if faces.several:
-        some = np.flatnonzero(flush & ~apart & (faces.shell[i] != faces.shell[j]))
-        keys, pair = found.contact.keys(faces.shell[i[some]], faces.shell[j[some]]), np.stack([i, j], axis=1)[some]
-        found.contact.add(keys[shared[some] > 0], pair[shared[some] > 0])
-        found.contact.look(keys, pair, lambda rows: triangles.meet(a[some[rows]], b[some[rows]]).touches)
-    rest = ~(apart | flush)
-    i, j, ids_a, ids_b, shared, a, b = (array[rest] for array in (i, j, ids_a, ids_b, shared, a, b))
-    meeting = triangles.meet(a, b)
-    pair = np.stack([i, j], axis=1)
-    crossing = meeting.crosses & (shared < 2)
-    found.crossing.append(pair[crossing])
-    wide = np.flatnonzero(meeting.overlaps & (shared < 3))
+    edge = np.flatnonzero((shared >= 2) & ~apart)
+    if len(edge):
+        open_ = _facing(faces, i[edge], j[edge]) > 0
+        if faces.doubled:
+            open_ &= ~overlap.run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
+        apart[edge] = open_
+    state = apart.astype(np.int8)
+    left = np.flatnonzero(~apart)
+    a, b = (planes.corners(ids.take(left, axis=1)) for ids in (ids_a, ids_b))
+    clear, flush = contact.by_boxes(a, b)
+    rest = np.flatnonzero(~(clear | flush) & (shared.take(left) < 3))
+    clear[rest] = planes.seen_apart(i[left[rest]], a.take(rest, axis=2), b.take(rest, axis=2), shared[left[rest]])
+    state[left[flush]] = _FLUSH
+    state[left[clear]] = _APART
+    return state, shared
+
+
+def _contacts(faces: _Faces, i: Ints, j: Ints, sharing: Bools, found: _Found) -> None:
+    """Note the shells that meet, of pairs of faces that can do no more than touch; those `sharing` a corner do."""
+    keys, pair = found.contact.keys(faces.shell[i], faces.shell[j]), np.stack([i, j], axis=1)
+    found.contact.add(keys[sharing], pair[sharing])
+    asked = np.flatnonzero(~sharing & found.contact.open(keys))
+    a, b = (faces.planes.corners(faces.planes.vertices(f[asked])) for f in (i, j))
+    near = np.flatnonzero(~contact.parts_apart(a, b))
+    asked = asked[near]
+
+    def meet(rows: Ints) -> Bools:
+        return triangles.meet(*(corners[:, :, near[rows]].transpose(2, 0, 1) for corners in (a, b))).touches
+
+    found.contact.look(keys[asked], pair[asked], meet)
+
+
+def _decide_exactly(faces: _Faces, i: Ints, j: Ints, shared: Ints, found: _Found) -> None:
+    """Answers by exact signs; `shared` corners (n,)."""
+    if not len(i):
+        return
+    pair, overlaps, meets = np.stack([i, j], axis=1), shared == 3, shared > 0
+    a, b = (faces.vertices[faces.corners[:, f].T] for f in (i, j))
+    some = np.flatnonzero(~overlaps)  # others are in one place
+    meeting = triangles.meet(a[some], b[some])
+    overlaps[some] = meeting.overlaps
+    wide = np.flatnonzero(overlaps)
+    wide = wide[~_same_corners(faces, i[wide], j[wide])]
     found.overlap.append(pair[wide[overlap.wide(a[wide], b[wide])]])
     if faces.several:
-        meets = (meeting.touches | meeting.crosses | (shared > 0)) & (faces.shell[i] != faces.shell[j])
+        meets[some] |= meeting.touches | meeting.crosses
+        meets &= faces.shell[i] != faces.shell[j]
         found.contact.add(found.contact.keys(faces.shell[i[meets]], faces.shell[j[meets]]), pair[meets])
-    for one, other, ids, sides, flip in (
-        (a, b, ids_a, meeting.side_a, False),
-        (b, a, ids_b, meeting.side_b, True),
-    ):
-        lies = np.flatnonzero(((sides == 0).sum(axis=1) == 2) & (shared < 2))
-        if not len(lies):
-            continue
-        free = np.argmax(sides[lies] != 0, axis=1)
-        u, v = (free + 1) % 3, (free + 2) % 3
-        inside = triangles.segment_inside(one[lies, u], one[lies, v], other[lies])
-        kept, u, v, free = lies[inside], u[inside], v[inside], free[inside]
-        ends = np.sort(np.stack([ids[kept, u], ids[kept, v]], axis=1), axis=1)
-        face, holder = (j[kept], i[kept]) if flip else (i[kept], j[kept])
-        side = sides[kept, free]
-        found.leaning.append(np.column_stack([holder, ends, side, face]).astype(np.int64))
-    found.kept += int(crossing.sum()) + len(wide)
+    crossing = some[meeting.crosses & (shared[some] < 2)]
+    found.crossing.append(pair[crossing])
+    found.kept += len(crossing) + len(wide)
+    in_b, in_a = (
+        np.flatnonzero(((side == 0).sum(axis=1) == 2) & (shared[some] < 2)) for side in (meeting.side_a, meeting.side_b)
+    )
+    if len(in_a) or len(in_b):
+        sides = np.concatenate([meeting.side_a[in_b], meeting.side_b[in_a]])
+        in_a, in_b = some[in_a], some[in_b]
+        face, holder = np.concatenate([i[in_b], j[in_a]]), np.concatenate([j[in_b], i[in_a]])
+        one, other = np.concatenate([a[in_b], b[in_a]]), np.concatenate([b[in_b], a[in_a]])
+        found.leaning.append(_edges_inside(faces, face, holder, one, other, sides))
+
+
+def _facing(faces: _Faces, i: Ints, j: Ints) -> Floats:
+    """The product of both faces' normals: positive where they look the same way."""
+    return np.einsum("ij,ij->j", faces.normal.take(i, axis=1), faces.normal.take(j, axis=1))
+
+
+def _same_corners(faces: _Faces, i: Ints, j: Ints) -> Bools:
+    """Which pairs i, j are one face that is listed twice, with the same vertices."""
+    one, other = (np.sort(np.stack([corner[f] for corner in faces.corners]), axis=0) for f in (i, j))
+    return np.asarray((one == other).all(axis=0))
+
+
+def _edges_inside(faces: _Faces, face: Ints, holder: Ints, one: Floats, other: Floats, sides: Ints) -> Ints:
+    """Edges of `face` (corners `one`) within `holder` (corners `other`), of faces with one corner off its plane.
+
+    Rows of holder, both vertices of the edge, the side that its face leaves to, and that face.
+    """
+    free = np.argmax(sides != 0, axis=1)
+    rows = np.arange(len(face))
+    u, v = (free + 1) % 3, (free + 2) % 3
+    kept = np.flatnonzero(triangles.segment_inside(one[rows, u], one[rows, v], other))
+    face, holder = face[kept], holder[kept]
+    ids = np.stack([corner[face] for corner in faces.corners], axis=1)
+    rows = rows[: len(kept)]
+    ends = np.sort(np.stack([ids[rows, u[kept]], ids[rows, v[kept]]], axis=1), axis=1)
+    return np.column_stack([holder, ends, sides[kept, free[kept]], face]).astype(np.int64)
 
 
 def _leaning(faces: _Faces, found: _Found) -> None:
@@ -219,7 +286,7 @@ def _leaning(faces: _Faces, found: _Found) -> None:
 def _said(topology: Topology, faces: _Faces, found: _Found) -> Crossings:
     findings: list[Finding] = []
     crossing, covering = _joined(found.crossing), _joined(found.overlap)
-    opposite = np.einsum("ij,ij->i", faces.normal[covering[:, 0]], faces.normal[covering[:, 1]]) < 0
+    opposite = _facing(faces, covering[:, 0], covering[:, 1]) < 0
     twice, thin = overlap.kinds(topology, faces.shell[covering], opposite)
     for code, pairs, what in (
         ("G001", crossing, "that cross"),
@@ -265,18 +332,17 @@ def _places(
     named: set[int] = set()
     grid = 4 * max(float32_step(faces.vertices), 1e-300)
     listed = max(_LISTED, detail().locations)
-    for at in range(0, len(pairs), max(1, len(pairs) // listed))[:listed]:
-        pair = pairs[at].tolist()
-        a, b = (faces.vertices[[int(corner[i]) for corner in faces.corners]] for i in pair)
-        point = triangles.common_point(a, b)
-        point = a.mean(axis=0) if point is None else point + 0.0
-        near = tuple(round(float(v) / grid) for v in point)
+    chosen = np.arange(0, len(pairs), max(1, len(pairs) // listed))[:listed]
+    corners = faces.vertices[faces.corners[:, pairs[chosen]].transpose(1, 2, 0)].tolist()
+    names = np.sort(faces.original[pairs[chosen]], axis=1).tolist()
+    for at, (a, b), (one, other) in zip(chosen.tolist(), corners, names, strict=True):
+        x, y, z = triangles.common_point(a, b) or (sum(values) / 3 for values in zip(*a, strict=True))
+        xyz = x + 0.0, y + 0.0, z + 0.0  # no -0
+        near = tuple(round(v / grid) for v in xyz)
         if near in found:
             continue
-        one, other = sorted(int(faces.original[i]) for i in pair)
         first, second = (other, one) if one in named else (one, other)
         named.add(first)
-        xyz = (float(point[0]), float(point[1]), float(point[2]))
         drawn, centre = region(at) if region else (None, None)
         found[near] = Location(faces=(first, second), xyz=xyz, object=topology.mesh.name, region=drawn, centre=centre)
     return sorted(found.values(), key=lambda place: place.face or 0)

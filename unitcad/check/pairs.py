@@ -38,6 +38,11 @@ class Frame:
             found.append(np.clip(value, 0, _TOP - 1).astype(np.uint16) + np.uint16(1))
         return found
 
+    def even(self, steps: list[Ints]) -> list[Ints]:
+        """The same in steps of about one length, by powers of two: cells of a space-filling curve are near cubes."""
+        shift = np.round(np.log2(self.scale / self.scale.min())).clip(0, 15).astype(np.uint16)
+        return [step >> bits for step, bits in zip(steps, shift, strict=True)]
+
 
 def frame_of(points: Floats) -> Frame:
     """A frame round (n, 3) points."""
@@ -71,45 +76,6 @@ def boxes_of(steps: list[Ints], *corners: Ints) -> Ints:
         boxes[:, axis] = low
         np.subtract(np.uint16(65_535), high, out=boxes[:, axis + 3])
     return boxes
-
-
-@dataclass(frozen=True)
-class Slabs:
-    """The steps along each diagonal of space between which faces lie: words of four low ones, of four high ones."""
-
-    low: Ints
-    high: Ints
-
-    def meeting(self, i: Ints, j: Ints) -> tuple[Ints, Ints]:
-        """The pairs i, j of faces whose slabs meet along all diagonals."""
-        meet = self._reach(i, j)
-        meet &= self._reach(j, i)
-        keep = np.flatnonzero(meet.reshape(-1, 4).all(axis=1))
-        return i[keep], j[keep]
-
-    def _reach(self, i: Ints, j: Ints) -> Bools:
-        return self.low.take(i, mode="clip").view(np.uint16) <= self.high.take(j, mode="clip").view(np.uint16)
-
-
-def slabs_of(points: Floats, *corners: Ints) -> Slabs:
-    """The slabs of faces, as `boxes_of` makes their boxes.
-
-    They are a step wider on both sides; a step is a million times what rounding takes, so they touch where faces do.
-    """
-    first, last = extent(points)
-    low, high = np.empty((2, len(corners[0]), 4), np.uint16)
-    for k, signs in enumerate(((1, 1, 1), (1, 1, -1), (1, -1, 1), (-1, 1, 1))):
-        along = (points - first) @ np.array(signs, float)
-        span = max(np.ptp(along), 1e-6 * (last - first).max(), 1e-300)
-        steps = ((along - along.min()) * ((_TOP - 2) / span)).astype(np.uint16) + np.uint16(1)
-        low[:, k] = high[:, k] = steps[corners[0]]
-        for corner in corners[1:]:
-            at = steps[corner]
-            np.minimum(low[:, k], at, out=low[:, k])
-            np.maximum(high[:, k], at, out=high[:, k])
-    low -= np.uint16(1)
-    high += np.uint16(1)
-    return Slabs(low.view(np.uint64)[:, 0], high.view(np.uint64)[:, 0])
 
 
 def meeting_pairs(boxes: Ints, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:

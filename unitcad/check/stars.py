@@ -15,23 +15,22 @@ _SOUND = 1e-9  # of the squared longest side: faces with less area have no direc
 _FACING = 0.01  # cosine to the mean direction
 
 
-def height_fields(vertices: Floats, corners: tuple[Ints, ...], areas: Floats, surrounded: Bools) -> Bools:
-    """Which vertices have such a star, of those that are `surrounded` by faces wound alike.
+def height_fields(columns: Floats, corners: Ints, areas: Floats, surrounded: Bools) -> Bools:
+    """Which vertices (3, n) have such a star, of those that are `surrounded` by faces wound alike.
 
-    `corners` are three columns of vertices of the faces, `areas` (m, 3) twice their area vectors.
+    `corners` (3, m) are the vertices of the faces, `areas` (3, m) twice their area vectors.
     """
-    columns = [np.ascontiguousarray(vertices[:, axis]) for axis in range(3)]
     found = _along_axes(columns, corners, areas) & surrounded
     return found | _along_means(columns, corners, areas, surrounded & ~found)
 
 
-def _along_axes(columns: list[Floats], corners: tuple[Ints, ...], areas: Floats) -> Bools:
+def _along_axes(columns: Floats, corners: Ints, areas: Floats) -> Bools:
     """Vertices whose faces all face one way along some axis and go round once.
 
     Seen along the axis each face then turns the same way by less than half a turn, so turns are counted by the
     neighbours that pass the line of one coordinate: comparisons only, hence exact.
     """
-    n, m = len(columns[0]), len(areas)
+    n, m = columns.shape[1], corners.shape[1]
     ways = np.zeros(m, np.uint8)  # bits 0 to 2: faces up along x, y, z; 3 to 5: down
     rises, falls = np.zeros((2, 3, m), np.uint8)  # a bit an axis, for each side
     for start in range(0, m, _BLOCK):
@@ -39,7 +38,7 @@ def _along_axes(columns: list[Floats], corners: tuple[Ints, ...], areas: Floats)
         sides = _sides(columns, [corner[block] for corner in corners])
         least = _ROUNDING * _longest(sides)
         for axis in range(3):
-            up = np.ascontiguousarray(areas[block, axis])
+            up = areas[axis, block]
             ways[block] |= (up > least).view(np.uint8) << axis
             ways[block] |= (up < -least).view(np.uint8) << (axis + 3)
             for k in range(3):
@@ -59,7 +58,7 @@ def _along_axes(columns: list[Floats], corners: tuple[Ints, ...], areas: Floats)
     return (common != 0) & (turns == 1)
 
 
-def _along_means(columns: list[Floats], corners: tuple[Ints, ...], areas: Floats, asked: Bools) -> Bools:
+def _along_means(columns: Floats, corners: Ints, areas: Floats, asked: Bools) -> Bools:
     """The same for the vertices `asked`, along the mean normal of each one's faces: rims and corners.
 
     Rounding moves a face's turn by 2e-5 at most, and turns are whole.
@@ -70,7 +69,7 @@ def _along_means(columns: list[Floats], corners: tuple[Ints, ...], areas: Floats
         return np.zeros(n, bool)
     ids = [corner.take(some) for corner in corners]
     sides = _sides(columns, ids)
-    area = [areas[:, axis].take(some) for axis in range(3)]
+    area = [part.take(some) for part in areas]
     size = np.sqrt(_dot(area, area))
     sound = size > _SOUND * _longest(sides)
     share = 1 / np.where(sound, size, np.inf)
@@ -87,7 +86,7 @@ def _along_means(columns: list[Floats], corners: tuple[Ints, ...], areas: Floats
     return asked & (np.abs(turns - 2 * np.pi) < 0.1)
 
 
-def _sides(columns: list[Floats], ids: list[Ints]) -> list[list[Floats]]:
+def _sides(columns: Floats, ids: list[Ints]) -> list[list[Floats]]:
     """The sides of faces from each corner to the next, by axis."""
     at = [[column.take(corner, mode="clip") for column in columns] for corner in ids]
     return [[at[(k + 1) % 3][axis] - at[k][axis] for axis in range(3)] for k in range(3)]

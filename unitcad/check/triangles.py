@@ -7,6 +7,8 @@ negative: the intervals share a length. One zero: they share a point, which is t
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +16,7 @@ import numpy as np
 from unitcad.check.exact import orient2d, orient3d, sides
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
+_Point = Sequence[float]
 _BLOCK = 1 << 12  # pairs whose corners stay in the processor's cache
 
 
@@ -104,7 +107,9 @@ def _compared(a: Floats, b: Floats, side_a: Ints, side_b: Ints) -> tuple[Ints, I
     flip_b, flip_a = _FLIP[index_a][:, None], _FLIP[index_b][:, None]
     q2, r2 = np.where(flip_b, r2, q2), np.where(flip_b, q2, r2)
     q1, r1 = np.where(flip_a, r1, q1), np.where(flip_a, q1, r1)
-    return orient3d(p2, p1, q2, q1), orient3d(p2, r1, r2, p1)
+    both = ((p2, p2), (p1, r1), (q2, r2), (q1, p1))
+    one, two = orient3d(*(np.concatenate(points) for points in both)).reshape(2, -1)
+    return one, two
 
 
 def flattened(a: Floats, *others: Floats) -> list[Floats]:
@@ -118,59 +123,82 @@ def flattened(a: Floats, *others: Floats) -> list[Floats]:
 
 def coplanar(a: Floats, b: Floats) -> tuple[Bools, Bools]:
     """Whether coplanar triangles share area, and whether they share a point: no side of either separates them."""
-    flat_a, flat_b = flattened(a, b)
-    share, meet_ = np.ones(len(a), bool), np.ones(len(a), bool)
-    for one, other in ((flat_a, flat_b), (flat_b, flat_a)):
-        turn = orient2d(one[:, 0], one[:, 1], one[:, 2])
-        for k in range(3):
-            side = [turn * orient2d(one[:, k], one[:, (k + 1) % 3], other[:, j]) for j in range(3)]
-            largest = np.max(side, axis=0)
-            share &= largest > 0
-            meet_ &= largest >= 0
-    return share, meet_
+    flat = flattened(a, b)
+    sides = np.concatenate([_off_sides(flat[0], flat[1]), _off_sides(flat[1], flat[0])])
+    largest = sides.max(axis=1)
+    return (largest > 0).all(axis=0), (largest >= 0).all(axis=0)
+
+
+def _off_sides(corners: Floats, points: Floats) -> Ints:
+    """For triangles (n, 3, 2) and points (n, k, 2): 1 where a point is inward of a side, -1 outward: (side, k, n)."""
+    n, count = len(corners), points.shape[1]
+    whole = [corners[:, k] for k in range(3)]
+    start = [corner for corner in whole for _ in range(count)]
+    end = [corner for corner in (*whole[1:], whole[0]) for _ in range(count)]
+    there = [points[:, k] for k in range(count)] * 3
+    rows = ([*start, whole[0]], [*end, whole[1]], [*there, whole[2]])
+    sign = orient2d(*(np.concatenate(part) for part in rows)).reshape(-1, n)
+    return sign[:-1].reshape(3, count, n) * sign[-1]
 
 
 def segment_inside(u: Floats, v: Floats, b: Floats) -> Bools:
     """Whether the open segment u v (n, 3), which lies in the plane of triangle b, passes through b's inside."""
     flat, ends = flattened(b, np.stack([u, v], axis=1))
-    turn = orient2d(flat[:, 0], flat[:, 1], flat[:, 2])
-    inside = np.ones(len(u), bool)
-    for k in range(3):
-        side = [turn * orient2d(flat[:, k], flat[:, (k + 1) % 3], ends[:, j]) for j in range(2)]
-        inside &= np.max(side, axis=0) > 0
-    across = np.stack([orient2d(ends[:, 0], ends[:, 1], flat[:, k]) for k in range(3)], axis=1)
-    return inside & (across > 0).any(axis=1) & (across < 0).any(axis=1)
+    inside = (_off_sides(flat, ends).max(axis=1) > 0).all(axis=0)
+    across = orient2d(
+        np.tile(ends[:, 0], (3, 1)), np.tile(ends[:, 1], (3, 1)), np.concatenate([flat[:, k] for k in range(3)])
+    ).reshape(3, -1)
+    return inside & (across > 0).any(axis=0) & (across < 0).any(axis=0)
 
 
-def common_point(a: Floats, b: Floats) -> Floats | None:
-    """A point (3,) of two triangles (3, 3) that meet: the middle of the point, segment or polygon that they share.
+def common_point(a: Sequence[_Point], b: Sequence[_Point]) -> tuple[float, float, float] | None:
+    """A point of two triangles that meet: the middle of the point, segment or polygon that they share.
 
     `a` is cut to the prism over `b` that is as high as rounding, so it is exact to rounding only; None where nothing is
-    left.
+    left. In plain numbers: arrays of three take five times as long.
     """
     shift = b[0]
-    size = float(np.abs([a - shift, b - shift]).max())
-    near = 1e-9 + 8 * float(np.spacing(np.abs([a, b]).max())) / size
-    a, b = (a - shift) / size, (b - shift) / size
-    normal = np.cross(b[1] - b[0], b[2] - b[0])
-    normal /= max(np.sqrt(normal @ normal), 1e-150)
-    planes = [(normal, b[0]), (-normal, b[0])]
-    for k in range(3):
-        inward = np.cross(normal, b[(k + 1) % 3] - b[k])
-        planes.append((inward / max(np.sqrt(inward @ inward), 1e-150), b[k]))
-    left = list(a)
+    left, corners = ([_minus(point, shift) for point in points] for points in (a, b))
+    size = max(abs(x) for point in (*left, *corners) for x in point)
+    near = 1e-9 + 8 * math.ulp(max(abs(x) for point in (*a, *b) for x in point)) / size
+    left, corners = ([[x / size for x in point] for point in points] for points in (left, corners))
+    ahead = [_minus(corners[(k + 1) % 3], corners[k]) for k in range(3)]
+    normal = _unit(_cross(ahead[0], _minus(corners[2], corners[0])))
+    planes: list[tuple[_Point, _Point]] = [(normal, corners[0]), ([-x for x in normal], corners[0])]
+    planes += [(_unit(_cross(normal, ahead[k])), corners[k]) for k in range(3)]
     for inward, origin in planes:
-        height = [float((point - origin) @ inward) + near for point in left]
+        height = [_dot(_minus(point, origin), inward) + near for point in left]
         cut = []
         for k, point in enumerate(left):
             before, low, high = left[k - 1], height[k - 1], height[k]
             if (low < 0) != (high < 0):
-                cut.append(before + (point - before) * (low / (low - high)))
+                part = low / (low - high)
+                cut.append([x + (y - x) * part for x, y in zip(before, point, strict=True)])
             if high >= 0:
                 cut.append(point)
         left = cut
-    apart: list[Floats] = []
+    apart: list[_Point] = []
     for point in left:
-        if all(np.abs(point - other).max() > 4 * near for other in apart):
+        if all(max(map(abs, _minus(point, other))) > 4 * near for other in apart):
             apart.append(point)
-    return np.mean(apart, axis=0) * size + shift if apart else None
+    if not apart:
+        return None
+    x, y, z = (sum(point[axis] for point in apart) / len(apart) * size + shift[axis] for axis in range(3))
+    return x, y, z
+
+
+def _minus(a: _Point, b: _Point) -> list[float]:
+    return [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+
+
+def _cross(a: _Point, b: _Point) -> list[float]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def _dot(a: _Point, b: _Point) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _unit(a: _Point) -> list[float]:
+    length = max(math.sqrt(_dot(a, a)), 1e-150)
+    return [a[0] / length, a[1] / length, a[2] / length]
