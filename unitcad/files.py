@@ -189,6 +189,17 @@ def scratch(parent: Path, name: str = "") -> Iterator[Path]:
         yield folder
     finally:
         lock.release()
+        _remove_scratch(folder)
+
+
+def _remove_scratch(folder: Path) -> None:
+    """Remove a scratch folder: quickly where its work has left nothing but lock and mark."""
+    try:
+        for name in (LOCK, MARK):
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(folder / name)
+        os.rmdir(folder)
+    except OSError:
         shutil.rmtree(folder, ignore_errors=True)
 
 

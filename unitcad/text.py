@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from functools import lru_cache
 from typing import Any
 
 _INVISIBLE = re.compile(
@@ -12,6 +13,7 @@ _INVISIBLE = re.compile(
     "\u2028\u2029\ufeff\ufff9-\ufffb\ufffe\uffff"
     "\ud800-\udfff\U000e0000-\U000e007f]"  # halves of characters, tags
 )
+_quoted = json.JSONEncoder(ensure_ascii=False).encode
 _MARKUP = re.compile(r"[\\`*_\[\]|~]")
 
 
@@ -42,6 +44,7 @@ def cell(text: str) -> str:
     return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
 
 
+@lru_cache(maxsize=4096)
 def toml_key(key: str) -> str:
     """Write a key as TOML has it: in quotes where it must be."""
     plain = key.isascii() and key.replace("-", "").replace("_", "").isalnum()
@@ -55,5 +58,5 @@ def toml(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(toml, value))}]"
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        return _quoted(value).replace("\x7f", "\\u007f")
     return str(value).lower() if isinstance(value, bool) else repr(value) if isinstance(value, float) else str(value)

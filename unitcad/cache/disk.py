@@ -41,6 +41,7 @@ class DiskStore:
 
     def __init__(self, root: Path) -> None:
         self.root = Path(root)
+        self._contents = str(self.root / "content")
         self.counts: Counter[str] = Counter()
         self._verified: dict[str, tuple[int, int, int]] = {}
         self._touched: dict[Path, float] = {}
@@ -72,11 +73,11 @@ class DiskStore:
     def has(self, sha256: str) -> bool:
         if sha256 in self._held:
             return True
-        path = self._content_path(sha256)
         try:
-            now = _signature(path)
+            now = _signature(self._content_name(sha256))
             if self._verified.get(sha256) == now:
                 return True
+            path = self._content_path(sha256)
             if digest(read(path)) == sha256:
                 self._verified[sha256] = now
                 return True
@@ -85,7 +86,7 @@ class DiskStore:
         except UnitcadError:  # a link, a pipe, a folder: nothing of ours
             pass
         self._verified.pop(sha256, None)
-        remove(path)
+        remove(self._content_path(sha256))
         self.counts["damaged"] += 1
         return False
 
@@ -96,16 +97,17 @@ class DiskStore:
             path = self._content_path(sha256)
             try:
                 self._write(path, content, shared=True)
-                self._verified[sha256] = _signature(path)
+                self._verified[sha256] = _signature(str(path))
             except OSError:
                 self._held[sha256] = content
         return sha256
 
     def size(self, sha256: str) -> int:
-        if not self.has(sha256):
-            raise self._missing(sha256)
         if sha256 in self._held:
             return len(self._held[sha256])
+        # What was verified before is not looked at again here: who places it does, and content has one size.
+        if sha256 not in self._verified and not self.has(sha256):
+            raise self._missing(sha256)
         return self._verified[sha256][1]
 
     def content(self, sha256: str) -> bytes:
@@ -125,9 +127,9 @@ class DiskStore:
         if sha256 in self._held:
             write_new(target, self._held[sha256], sync=True)
             return
-        source = self._content_path(sha256)
+        name = self._content_name(sha256)
         try:
-            os.link(source, target)
+            os.link(name, target)
             return
         except FileNotFoundError:
             if not target.parent.is_dir():
@@ -141,8 +143,8 @@ class DiskStore:
         if full:
             # As many links as the file system allows: a fresh file takes the entry's place and the next ones.
             with contextlib.suppress(OSError):
-                self._write(source, target.read_bytes(), shared=True)
-                self._verified[sha256] = _signature(source)
+                self._write(Path(name), target.read_bytes(), shared=True)
+                self._verified[sha256] = _signature(name)
 
     def peek(self, key: str) -> Any:
         """The data under `key`, or None."""
@@ -227,7 +229,11 @@ class DiskStore:
         return self.root / ("data" if kind == "data" else "files") / key[:2] / key
 
     def _content_path(self, sha256: str) -> Path:
-        return self.root / "content" / sha256[:2] / sha256
+        return Path(self._content_name(sha256))
+
+    def _content_name(self, sha256: str) -> str:
+        """Return a content's path as text: a variant asks for some thirty, and a Path costs more than the look."""
+        return f"{self._contents}{os.sep}{sha256[:2]}{os.sep}{sha256}"
 
 
 def default_root() -> Path:
@@ -264,8 +270,8 @@ def _checksum(kind: str, key: str, payload: bytes) -> bytes:
     return digest(f"{kind} {key}\n".encode() + payload).encode()
 
 
-def _signature(path: Path) -> tuple[int, int, int]:
-    stat = path.lstat()
+def _signature(path: str) -> tuple[int, int, int]:
+    stat = os.lstat(path)
     return stat.st_ino, stat.st_size, stat.st_mtime_ns
 
 

@@ -7,6 +7,7 @@ shares with others by their SHA-256 in a store. `build` puts a product in its pl
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -54,7 +55,7 @@ class Product:
 
     def place(self, folder: Path, store: Store) -> None:
         """Write it into an empty folder. Raises OSError, or MissingContent where the store has lost something."""
-        for parent in sorted({str(Path(path).parent) for path in (*self.own, *self.shared)}):
+        for parent in sorted({os.path.dirname(path) for path in (*self.own, *self.shared)}):
             (folder / parent).mkdir(parents=True, exist_ok=True)
         for path, sha256 in self.shared.items():
             store.place(sha256, folder / path)
@@ -320,12 +321,13 @@ def _left(what: str, why: str) -> dict[str, str]:
     return {"what": what, "why": why}
 
 
+_ENCODER = json.JSONEncoder(allow_nan=False, ensure_ascii=False)
+
+
 def json_bytes(data: dict[str, Any]) -> bytes:
     """JSON with a line a key, and a line an entry of a list or table: legible, and ten times as fast as indented."""
 
-    def short(value: Any) -> str:
-        return json.dumps(value, allow_nan=False, ensure_ascii=False)
-
+    short = _ENCODER.encode
     lines = []
     for key, value in data.items():
         if isinstance(value, list) and value:

@@ -108,16 +108,24 @@ def sync(results: Iterable[Path]) -> None:
 
     Many at once: the file system then writes its log a few times and not once a file.
     """
-    paths = [Path(here, name) for result in results for here, _, names in os.walk(result) for name in names]
+    paths = [path for result in results for path in _own_files(result)]
     with ThreadPoolExecutor(16) as pool:
         list(pool.map(_sync, paths))
 
 
-def _sync(path: Path) -> None:
-    found = path.lstat()
-    if stat.S_ISREG(found.st_mode) and found.st_nlink == 1:
-        with open(path, "r+b") as file:
-            os.fsync(file.fileno())
+def _own_files(folder: str | os.PathLike[str]) -> Iterator[str]:
+    """Yield the regular files below a folder that no other folder shares."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                yield from _own_files(entry.path)
+            elif entry.is_file(follow_symlinks=False) and entry.stat(follow_symlinks=False).st_nlink == 1:
+                yield entry.path
+
+
+def _sync(path: str) -> None:
+    with open(path, "r+b") as file:
+        os.fsync(file.fileno())
 
 
 def held(folder: Path) -> contextlib.AbstractContextManager[None]:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import types
 import typing
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import Annotated, Any
 
 import msgspec
 
 _UNIONS = (typing.Union, types.UnionType)
-Fields = dict[str, msgspec.structs.FieldInfo]
+Fields = Mapping[str, msgspec.structs.FieldInfo]
 
 
+@cache
 def fields_of(table: type[msgspec.Struct]) -> Fields:
-    """The keys of a table as typed in a file, in the order of its class."""
+    """Return the keys of a table as typed in a file, in the order of its class; worked out once, since it is slow."""
     return {field.encode_name: field for field in msgspec.structs.fields(table)}
 
 
