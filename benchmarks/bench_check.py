@@ -25,7 +25,7 @@ from meshes import torus, write_stl
 from unitcad.accuracy.timing import timing
 
 PAIRS = (
-    ("topology rules", "trimesh is_volume", " (4 wanted at 1,000,000)"),
+    ("topology", "trimesh is_volume", " (4 wanted at 1,000,000)"),
     ("all rules", "pymeshlab crossing", " (1 wanted)"),
     ("check_file", "admesh", ""),
 )
@@ -82,12 +82,13 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     """Processor seconds of the crossing test alone, and of ours over those of pymeshlab and MeshLib, interleaved."""
     import meshes
 
-    from unitcad.check import crossing, topology
+    from unitcad.check import crossing
     from unitcad.check.limits import Deadline
     from unitcad.check.mesh import Mesh
+    from unitcad.check.topology import topology_of
 
     vertices, faces = getattr(meshes, shape)(size)
-    found = topology.judge(Mesh(vertices, faces), Deadline(600)).as_stored()
+    found = topology_of(Mesh(vertices, faces), Deadline(600)).as_stored()
     code = CROSSING.format(here=str(Path(__file__).parent), shape=shape, size=size)
     other = subprocess.Popen([peer, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert other.stdin is not None
@@ -118,9 +119,10 @@ def measure(size: int, peer: str | None, rounds: int, folder: Path) -> list[str]
     """The lines to print on a torus of about `size` faces."""
     import trimesh
 
-    from unitcad.check import check_file, check_mesh, topology
+    from unitcad.check import check_file, check_mesh
     from unitcad.check.limits import Deadline
     from unitcad.check.mesh import Mesh
+    from unitcad.check.topology import topology_of
 
     vertices, faces = torus(size)
     path = folder / f"torus-{size}.stl"
@@ -137,7 +139,7 @@ def measure(size: int, peer: str | None, rounds: int, folder: Path) -> list[str]
     for _ in range(rounds):
         mesh = trimesh.Trimesh(vertices, faces, process=False)
         note("trimesh is_volume", timed(lambda mesh=mesh: mesh.is_volume))
-        note("topology rules", timed(lambda: topology.judge(Mesh(vertices, faces), Deadline(600))))
+        note("topology", timed(lambda: topology_of(Mesh(vertices, faces), Deadline(600))))
         note("all rules", timed(lambda: check_mesh(vertices, faces)))
         if other and other.stdin and other.stdout:
             other.stdin.write("go\n")

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from unitcad.check.rulebook import markdown
+from unitcad.check.rules.registry import markdown
 
 if __name__ == "__main__":
     Path(__file__).with_name("checks.md").write_text(markdown(), "utf-8")

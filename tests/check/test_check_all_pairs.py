@@ -7,9 +7,10 @@ import pytest
 from exact_pairs import counts
 from shapes import CUBE_CORNERS, CUBE_FACES
 
-from unitcad.check import crossing, pairs, topology
+from unitcad.check import crossing, pairs
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import Mesh, weld_exact
+from unitcad.check.topology import topology_of
 
 KINDS = ["lattice", "lattice of tenths", "random", "one tilted plane", "sheared lattice", "slivers", "about a vertex",
          "two heights", "boxes", "turned boxes", "far away"]  # fmt: skip
@@ -54,7 +55,7 @@ def _compare(kind: str, seed: int) -> tuple[int, int, int]:
         vertices, faces = weld_exact(soup)
     else:
         vertices, faces = soup.reshape(-1, 3), np.arange(3 * len(soup), dtype=np.int32).reshape(-1, 3)
-    top = topology.judge(Mesh(vertices, faces), Deadline(60)).as_stored()
+    top = topology_of(Mesh(vertices, faces), Deadline(60)).as_stored()
     faces, vertices = top.mesh.faces, top.mesh.vertices
     faces = faces[(top.areas != 0).any(axis=1)]
     labels = top.shells[(top.areas != 0).any(axis=1)]

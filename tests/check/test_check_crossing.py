@@ -14,7 +14,7 @@ from unitcad.check import check_mesh
 from unitcad.check.exact import integers, orient2d, orient3d
 from unitcad.check.limits import Deadline
 from unitcad.check.pairs import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
-from unitcad.check.rulebook import explain
+from unitcad.check.rules.registry import explain
 from unitcad.check.triangles import common_point, coplanar, meet
 
 

@@ -19,10 +19,10 @@ from unitcad.check.findings import SEVERITIES, Finding, Location, merge
 from unitcad.check.limits import Deadline
 from unitcad.check.many_files import check_files
 from unitcad.check.mesh import Mesh
+from unitcad.check.one_mesh import check_surface, in_file
 from unitcad.check.output import as_text
 from unitcad.check.output.render import FORMATS, render
-from unitcad.check.rulebook import FAMILIES, check_prefixes, explain, finding, markdown, rules
-from unitcad.check.rules_mesh import in_file, judge_mesh
+from unitcad.check.rules.registry import FAMILIES, check_prefixes, explain, markdown, rules
 from unitcad.check.source import Source
 from unitcad.errors import Refusal
 
@@ -51,7 +51,7 @@ def test_json_has_the_promised_shape(reports: list[FileReport]) -> None:
         ]  # fmt: skip
         for found in entry["findings"]:
             assert list(found) == ["code", "severity", "message", "count", "locations", "fix", "known"]
-            assert found["fix"] == rules()[found["code"]].mend
+            assert found["fix"] == rules()[found["code"]].fix
     assert [entry["verdict"] for entry in data["files"]] == ["pass", "error", "error", "warning"]
 
 
@@ -144,7 +144,7 @@ def test_junit_failures_have_a_body_and_cases_a_time(reports: list[FileReport]) 
     lines = failure.text.splitlines()
     assert lines[0] == "T001 boundary edge: 4 boundary edges"
     assert lines[1].startswith("at ")
-    assert lines[-1] == f"Fix: {rules()['T001'].mend}"
+    assert lines[-1] == f"Fix: {rules()['T001'].fix}"
 
 
 def test_every_format_says_how_to_fix_what_was_found(reports: list[FileReport]) -> None:
@@ -152,10 +152,10 @@ def test_every_format_says_how_to_fix_what_was_found(reports: list[FileReport]) 
         for format_ in FORMATS:
             strict = render(reports, format_, "warning")
             assert (
-                json.dumps(rules()[code].mend)[1:-1] if format_ in ("json", "sarif") else rules()[code].mend
+                json.dumps(rules()[code].fix)[1:-1] if format_ in ("json", "sarif") else rules()[code].fix
             ) in strict
     rule = json.loads(render(reports, "sarif"))["runs"][0]["tool"]["driver"]["rules"][0]
-    assert rule["help"]["text"].endswith(f" Fix: {rules()[rule['id']].mend}")
+    assert rule["help"]["text"].endswith(f" Fix: {rules()[rule['id']].fix}")
     assert "**Fix:**" in rule["help"]["markdown"]
 
 
@@ -177,7 +177,7 @@ def test_sarif_says_the_first_place_in_words_and_the_line_as_a_region() -> None:
     places = (Location(line=7, part="3D/a.model"), Location(line=9))
     said = FileReport("a.3mf", (Finding("P017", "error", "bad", 2, places),))
     (result,) = json.loads(render([said], "sarif"))["runs"][0]["results"]
-    assert result["message"]["text"] == f"bad (at 3D/a.model line 7). Fix: {rules()['P017'].mend}"
+    assert result["message"]["text"] == f"bad (at 3D/a.model line 7). Fix: {rules()['P017'].fix}"
     assert result["locations"][0]["physicalLocation"]["region"] == {"startLine": 7}
 
 
@@ -217,12 +217,12 @@ def test_line_and_object_of_a_face_come_from_its_mesh() -> None:
     points = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]], float)
     mesh = Mesh(points, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3]]), source=Source(
         lines=np.array([7, 8, 11]), starts=np.array([0, 1, 2]), names=b"bolt\nnut\n"))  # fmt: skip
-    found = judge_mesh(mesh, Deadline(60)).findings
+    found = check_surface(mesh, Deadline(60)).findings
     assert {(place.face, place.line, place.object) for item in found for place in item.locations} <= {
         (0, 7, "bolt"), (1, 8, "nut"), (2, 11, None)
     }  # fmt: skip
     assert {item.code for item in found} == {"T001"}
-    (two,) = in_file([finding("G001", "x", places=[Location(faces=(1, 0))])], mesh)
+    (two,) = in_file([rules()["G001"].finding("x", places=[Location(faces=(1, 0))])], mesh)
     assert (two.locations[0].line, two.locations[0].object) == (8, "nut and bolt")
 
 
@@ -291,12 +291,14 @@ def test_rules_are_whole() -> None:
         assert code[0] in FAMILIES
         assert rule.title
         assert rule.cause.endswith(".")
-        assert rule.mend
+        assert rule.example.endswith(".")
+        assert rule.fix
         assert rule.cause in explain(code)
-        assert rule.mend in explain(code.lower())
+        assert rule.fix in explain(code.lower())
+        assert rule.example in explain(code)
 
 
-def test_the_page_is_what_the_table_makes() -> None:
+def test_the_page_is_made_of_the_rules() -> None:
     docs = HERE.parent.parent / "docs"
     assert (docs / "checks.md").read_text("utf-8") == markdown()
     for code in rules():

@@ -10,7 +10,7 @@ from shapes import CUBE_CORNERS, CUBE_FACES, FORMATS, box, in_format, stl, turne
 
 from unitcad.check import check_bytes, check_mesh
 from unitcad.check.mesh import weld_exact
-from unitcad.check.rulebook import explain
+from unitcad.check.rules.registry import explain
 
 BEAM = box((30_000, 10, 10), (0, 5, 0))
 

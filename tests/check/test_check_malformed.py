@@ -12,7 +12,7 @@ from shapes import box, model_xml, package, prism, stl, text_stl
 
 from unitcad.check import check_bytes
 from unitcad.check.output.render import FORMATS, render
-from unitcad.check.rulebook import rules
+from unitcad.check.rules.registry import rules
 
 CASES = cases()
 # Rules whose files need more than bytes under a name: test_check_manifest.py and test_check_command.py have them.

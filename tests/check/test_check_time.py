@@ -113,13 +113,14 @@ def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.Mon
     import signal
     import time
 
-    from unitcad.check import many_files, shells
+    from unitcad.check import many_files
     from unitcad.check.limits import Limits
+    from unitcad.check.rules import g_shells
 
     if not hasattr(signal, "setitimer"):
         pytest.skip("no interval timer")
     monkeypatch.setattr(many_files, "_GRACE", 0.1)
-    monkeypatch.setattr(shells, "judge", lambda *_: time.sleep(60))
+    monkeypatch.setattr(g_shells, "check_mesh", lambda *_: time.sleep(60))
     path = tmp_path / "a.stl"
     path.write_bytes(_stl())
     report = many_files.guarded(str(path), Options(limits=Limits(seconds=1.0)))

@@ -12,7 +12,7 @@ from shapes import CUBE_CORNERS, CUBE_FACES, box, stl
 from unitcad.check import check_mesh
 from unitcad.check import edges as mesh_edges
 from unitcad.check.mesh import weld_exact
-from unitcad.check.shells import winding_number
+from unitcad.check.volumes import winding_number
 
 
 def _random_faces(seed: int, n_vertices: int, n_faces: int) -> np.ndarray:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from unitcad.check.findings import Facts, Finding, ending
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F011
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,12 @@ class OutOfTime(Unreadable):
     """The time is up: no fault of the part that was being read, so nothing is concluded from it."""
 
     def __init__(self, seconds: float) -> None:
-        super().__init__(finding("F011", f"not finished within --timeout {seconds:g} s"))
+        super().__init__(F011.finding(f"not finished within --timeout {seconds:g} s"))
 
 
 def over_limit(what: str) -> Unreadable:
     """The limit `what` is reached."""
-    return Unreadable(finding("F011", what))
+    return Unreadable(F011.finding(what))
 
 
 @contextlib.contextmanager

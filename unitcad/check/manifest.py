@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -10,25 +9,13 @@ from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from unitcad import catalogue, files
-from unitcad.check.findings import FileReport, Finding, counted, merge, number
+from unitcad.check.findings import FileReport, counted, merge
 from unitcad.check.options import Options
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.m_manifest import M004, M005, ListedFile, check_listed
 from unitcad.errors import UnitcadError
 
-VOLUME = 1e-3  # M001: a mesh's share of a B-rep's volume that tessellation may cost
 _MESHES = ("stl", "3mf")
 Choice = Callable[[str], Options]
-
-
-@dataclass(frozen=True)
-class Part:
-    """What the manifest says of one file: the parts in it (several for an assembly file)."""
-
-    names: tuple[str, ...]
-    tool: bool
-    sha256: str | None
-    volume_mm3: float | None
-    solids: int
 
 
 @dataclass(frozen=True)
@@ -39,7 +26,7 @@ class Listing:
     """
 
     path: Path
-    files: dict[str, Part]
+    files: dict[str, ListedFile]
     printer: str | None
     outside: tuple[str, ...] = ()
 
@@ -61,7 +48,7 @@ def read(where: str) -> Listing:
 
 
 def _listing(manifest: Path, data: Any) -> Listing:
-    files: dict[str, Part] = {}
+    files: dict[str, ListedFile] = {}
     outside: list[str] = []
     for part in data["parts"]:
         for entry in part["files"].values():
@@ -72,7 +59,7 @@ def _listing(manifest: Path, data: Any) -> Listing:
             sha256, volume, solids = entry.get("sha256"), part.get("volume_mm3"), part.get("solids", 1)
             if not (isinstance(sha256, str | None) and isinstance(volume, int | float | None) and type(solids) is int):
                 raise TypeError
-            new = Part((part["name"],), part["role"] == "tool", sha256, volume, solids)
+            new = ListedFile((part["name"],), part["role"] == "tool", sha256, volume, solids)
             old = files.get(path)
             files[path] = new if old is None else _together(old, new)
     printer = data.get("printer")
@@ -95,9 +82,9 @@ def leads_outside(folder: Path, listed: str) -> bool:
     return not real.startswith(os.path.join(home, ""))
 
 
-def _together(old: Part, new: Part) -> Part:
+def _together(old: ListedFile, new: ListedFile) -> ListedFile:
     volume = None if old.volume_mm3 is None or new.volume_mm3 is None else old.volume_mm3 + new.volume_mm3
-    return Part(old.names + new.names, old.tool and new.tool, old.sha256, volume, old.solids + new.solids)
+    return ListedFile(old.names + new.names, old.tool and new.tool, old.sha256, volume, old.solids + new.solids)
 
 
 def work(listing: Listing, paths: Sequence[str], options: Choice, printer_named: bool) -> list[tuple[str, Options]]:
@@ -123,7 +110,7 @@ def work(listing: Listing, paths: Sequence[str], options: Choice, printer_named:
 def compare(listing: Listing, report: FileReport, options: Options) -> FileReport:
     """The report with what the manifest adds to it."""
     part = listing.files.get(os.path.abspath(report.path))
-    found = [finding("M004", "the manifest does not list this file")] if part is None else judge(part, report)
+    found = [M004.finding("the manifest does not list this file")] if part is None else list(check_listed(part, report))
     added = [item for item in found if options.wants(item.code)]
     return replace(report, findings=merge([*report.findings, *added]))
 
@@ -142,31 +129,6 @@ def unjudged(listing: Listing, judged: Sequence[str], options: Choice) -> list[F
             ", ..." if len(listing.outside) > 3 else ""
         )
         text = f"{counted(len(listing.outside), 'path')} outside the manifest's folder: {shown}"
-        found = finding("M005", text, len(listing.outside))
+        found = M005.finding(text, len(listing.outside))
         reports.append(FileReport(name, (found,)))
     return [report for report in reports if report.findings]
-
-
-def judge(part: Part, report: FileReport) -> list[Finding]:
-    """M001 to M004 for one file."""
-    path = Path(report.path)
-    if not os.path.isfile(path):
-        return [finding("M004", f"listed for {', '.join(part.names)}")]
-    found = []
-    if part.sha256 is not None:
-        try:
-            with path.open("rb") as file:
-                digest = hashlib.file_digest(file, "sha256").hexdigest()
-        except OSError as error:
-            return [finding("M003", f"cannot be read: {error.strerror or error}")]
-        if digest != part.sha256.lower():
-            found.append(finding("M003", f"{digest[:12]} instead of {part.sha256[:12]}"))
-    facts = report.facts
-    if facts.shells is not None and facts.shells != part.solids:
-        found.append(finding("M002", f"{counted(facts.shells, 'solid')}, {part.solids} in the manifest"))
-    if facts.volume_mm3 is not None and part.volume_mm3:
-        off = facts.volume_mm3 / part.volume_mm3 - 1
-        if abs(off) > VOLUME:
-            text = f"{number(facts.volume_mm3)} mm3, {number(part.volume_mm3)} in the manifest ({off:+.2%})"
-            found.append(finding("M001", text))
-    return found

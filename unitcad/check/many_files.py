@@ -22,7 +22,7 @@ from unitcad.check.one_file import check_file
 from unitcad.check.options import Options
 from unitcad.check.readers import read_step
 from unitcad.check.readers.sniff import SUFFIXES
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F011, F012
 
 _GRACE = 5.0  # s, beyond half of the limit more, until code that never looks at the clock is interrupted
 
@@ -42,14 +42,14 @@ def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
         if path.is_dir():
             inside = _inside(_walked(path))
             if not inside:
-                empty.append(FileReport(name, (finding("F012", "no mesh file in this folder"),)))
+                empty.append(FileReport(name, (F012.finding("no mesh file in this folder"),)))
             able, unable = _readable(inside)
             files += able
             empty += unable
         elif not path.exists() and glob.has_magic(name):
             inside = _inside(p for p in glob.glob(name, recursive=True) if os.path.isfile(p))
             if not inside:
-                empty.append(FileReport(name, (finding("F012", "no file matches"),)))
+                empty.append(FileReport(name, (F012.finding("no file matches"),)))
             files += inside
         else:
             files.append(name)
@@ -69,7 +69,7 @@ def _walked(folder: Path) -> Iterator[str]:
 def _readable(paths: list[str]) -> tuple[list[str], list[FileReport]]:
     """Files of a folder that can be judged here, and for those that only an extra reads a report with a warning."""
     step = [] if read_step.installed() else [path for path in paths if Path(path).suffix.lower() in (".step", ".stp")]
-    said = finding("F012", f"{read_step.NEEDS}; not judged", severity="warning")
+    said = F012.finding(f"{read_step.NEEDS}; not judged", severity="warning")
     return [path for path in paths if path not in step], [FileReport(path, (said,)) for path in step]
 
 
@@ -127,7 +127,7 @@ def _guarded(path: str, options: Options) -> FileReport:
 
 
 def _stopped(path: str, why: str) -> FileReport:
-    return FileReport(path, (finding("F011", why),))
+    return FileReport(path, (F011.finding(why),))
 
 
 def _in_processes(

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from unitcad.check.detail import detailed
-from unitcad.check.findings import Facts, FileReport, Finding, counted, ending, merge
+from unitcad.check.findings import Facts, FileReport, Finding, ending, merge
 from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.mesh import Mesh
 from unitcad.check.options import UNITS_MM, Options
 from unitcad.check.readers import sniff
-from unitcad.check.rulebook import finding
-from unitcad.check.rules_mesh import Judged, in_file, judge_mesh
+from unitcad.check.rules.f_file import F001, F005, F012
+from unitcad.check.rules.p_package import P011
 from unitcad.geometry.arrays import Floats, Ints
 
 _KINDS = {
@@ -39,10 +39,9 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
 
     def work(deadline: Deadline) -> tuple[Sequence[Finding], Facts]:
         if triangles.size and (triangles.min() < 0 or triangles.max() >= len(points)):
-            raise Unreadable(finding("P011", "a face names a vertex that is not there"))
+            raise Unreadable(P011.finding("a face names a vertex that is not there"))
         mesh = Mesh(points, np.ascontiguousarray(triangles, dtype=np.int32))
-        judged = _judge_all([mesh], options, deadline)
-        return judged.findings, judged.facts
+        return _check_all([mesh], options, deadline)
 
     return _guarded("", options, work)
 
@@ -78,16 +77,16 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
     kind = sniff.kind_of(path.name, data[:64])
     if not kind:
         known = ", ".join(sorted(sniff.SUFFIXES))
-        raise Unreadable(finding("F005", f"suffix {path.suffix!r} is no mesh's; known: {known}"))
+        raise Unreadable(F005.finding(f"suffix {path.suffix!r} is no mesh's; known: {known}"))
     if not data:
-        raise Unreadable(finding("F001", "the file is empty"))
+        raise Unreadable(F001.finding("the file is empty"))
     strange = sniff.foreign(data[:2048])
     if strange and (kind, strange) not in {("3mf", "zip"), ("step", "step"), ("glb", "glb")}:
-        raise Unreadable(finding("F005", f"named {path.suffix}, but the content is {strange}"))
+        raise Unreadable(F005.finding(f"named {path.suffix}, but the content is {strange}"))
     if kind == "3mf" and strange != "zip":
-        raise Unreadable(finding("F005", f"named {path.suffix}, but the content is no zip"))
+        raise Unreadable(F005.finding(f"named {path.suffix}, but the content is no zip"))
     if kind == "glb" and strange != "glb":
-        raise Unreadable(finding("F005", f"named {path.suffix}, but the content is no binary glTF"))
+        raise Unreadable(F005.finding(f"named {path.suffix}, but the content is no binary glTF"))
     view = memoryview(data)
     if kind == "3mf":
         from unitcad.check.threemf_build import check_3mf
@@ -107,8 +106,8 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
     if factor != 1.0:
         meshes = [replace(mesh, vertices=mesh.vertices * factor) for mesh in meshes]
     with keeping(findings):
-        judged = _judge_all(meshes, options, deadline)
-    return findings + list(judged.findings), judged.facts
+        more, facts = _check_all(meshes, options, deadline)
+    return findings + more, facts
 
 
 def _bytes_of(path: Path, limits: Limits) -> bytes:
@@ -117,36 +116,33 @@ def _bytes_of(path: Path, limits: Limits) -> bytes:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             raise Unreadable(
-                finding("F012", f"{_KINDS.get(stat.S_IFMT(status.st_mode), 'a special file')}, not a regular file")
+                F012.finding(f"{_KINDS.get(stat.S_IFMT(status.st_mode), 'a special file')}, not a regular file")
             )
         if status.st_size > limits.max_bytes:
             raise over_limit(f"{status.st_size} bytes, more than the limit of {limits.max_bytes}")
         with path.open("rb") as file:
             return file.read(status.st_size)
     except FileNotFoundError as error:
-        raise Unreadable(finding("F012", "no such file")) from error
+        raise Unreadable(F012.finding("no such file")) from error
     except (OSError, ValueError) as error:
-        raise Unreadable(finding("F012", f"cannot be read: {getattr(error, 'strerror', None) or error}")) from error
+        raise Unreadable(F012.finding(f"cannot be read: {getattr(error, 'strerror', None) or error}")) from error
 
 
-def _judge_all(meshes: Sequence[Mesh], options: Options, deadline: Deadline) -> Judged:
-    """Judge the meshes of a file that has no instances: each by itself, facts of the last one that has any."""
-    from unitcad.check import scale
+def _check_all(meshes: Sequence[Mesh], options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
+    """Check the meshes of a file that has no instances, each by itself; the facts are those of the last one."""
+    from unitcad.check.one_mesh import check_on_bed, check_surface
+    from unitcad.check.rules import g_shells, s_scale
 
     findings: list[Finding] = []
-    facts, topology = Facts(), None
+    facts = Facts()
     for mesh in meshes:
         with keeping(findings):
-            judged = judge_mesh(mesh, deadline, cross=options.cross)
-        findings += judged.findings
-        facts, topology = judged.facts, judged.topology
-        findings += scale.judge(judged.facts, options.unit)
-        if options.printer is not None and topology is not None:
-            from unitcad.check import printing
-
-            with keeping(findings, facts), keeping(change=lambda found, mesh=mesh: in_file(found, mesh)):
-                findings += in_file(printing.judge(topology, options.printer, deadline), mesh)
-    if options.shells is not None and facts.shells is not None and facts.shells != options.shells:
-        text = f"{counted(facts.shells, 'shell')}, {options.shells} expected"
-        findings.append(finding("G005", text, abs(facts.shells - options.shells)))
-    return Judged(tuple(findings), facts, topology)
+            checked = check_surface(mesh, deadline, cross=options.cross)
+        facts = checked.facts
+        findings += checked.findings
+        findings += s_scale.likely_unit(facts, options.unit)
+        if options.printer is not None and checked.inspection is not None:
+            with keeping(findings, facts):
+                findings += check_on_bed(checked.inspection, options.printer)
+    findings += g_shells.expected(facts.shells, options.shells)
+    return findings, facts

@@ -12,24 +12,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.catalogue import Printer
-from unitcad.check import scale, topology
 from unitcad.check.findings import Facts, Finding, Location, counted, ending
 from unitcad.check.limits import Deadline, Unreadable, keeping
 from unitcad.check.mesh import LARGEST, cross, extent, solid_of
+from unitcad.check.one_mesh import CheckedMesh, check_on_bed, check_surface
 from unitcad.check.options import UNITS_MM, Options
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import Model, Object
 from unitcad.check.readers.threemf.opc import Package, open_package
 from unitcad.check.readers.threemf.placement import Instance, Key, mesh_of
 from unitcad.check.readers.threemf.read_3mf import Build, read_build
-from unitcad.check.rulebook import finding
-from unitcad.check.rules_mesh import Judged, in_file, judge_mesh
-from unitcad.check.shells import box_pairs
+from unitcad.check.rules import g_shells, s_scale, v_values
+from unitcad.check.rules.g_shells import G002
+from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.v_values import V001
+from unitcad.check.topology import diagonals, topology_of
 from unitcad.geometry.arrays import Floats, Ints
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
+
+    from unitcad.catalogue import Printer
 
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
 _FILLED = {"G001", "G002", "G008"}
@@ -86,7 +89,7 @@ def _geometry(
 ) -> tuple[list[Finding], Facts]:
     """Add what the geometry rules find in the objects that are built, and in their instances beside each other."""
     models, instances = build.models, build.instances
-    judged: dict[Key, Judged] = {}
+    checked: dict[Key, CheckedMesh] = {}
     turned: dict[tuple[Key, bytes], _Turned] = {}
     broken = any(item.code in ("P011", "V001", "F004") for item in findings)
     if broken or not models:
@@ -104,10 +107,10 @@ def _geometry(
         if not len(found.triangles):
             continue
         factor = UNITS_MM.get(models[instance.key[0]].unit, 1.0)
-        if instance.key not in judged:
-            judged[instance.key] = _judge(found, instance.key[0], factor, options, deadline)
-            findings += judged[instance.key].findings
-        facts = judged[instance.key].facts
+        if instance.key not in checked:
+            checked[instance.key] = _check_object(found, instance.key[0], factor, options, deadline)
+            findings += checked[instance.key].findings
+        facts = checked[instance.key].facts
         linear = instance.key, instance.matrix[:3].tobytes()
         if linear not in turned:
             turned[linear] = _turned(found, instance.matrix[:3], factor)
@@ -135,10 +138,10 @@ def _geometry(
     beyond = ~(np.abs(corners) <= LARGEST).all(axis=(1, 2))
     if beyond.any():
         worst = placed[int(beyond.argmax())]
-        findings.append(finding("V001", f"an instance of object {worst} reaches beyond the float32 numbers"))
+        findings.append(V001.finding(f"an instance of object {worst} reaches beyond the float32 numbers"))
         return list(ending(findings)), Facts()
-    findings += topology.too_far(corners, topology.diagonals(*np.swapaxes(np.stack(boxes), 0, 1)))
-    findings += scale.specks(corners[:, 0], corners[:, 1], np.ones(len(corners), bool))
+    findings += v_values.too_far(corners, diagonals(*np.swapaxes(np.stack(boxes), 0, 1)))
+    findings += g_shells.specks(corners[:, 0], corners[:, 1], np.ones(len(corners), bool))
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     facts = Facts(
         triangles,
@@ -149,25 +152,23 @@ def _geometry(
         (tuple(low.tolist()), tuple(high.tolist())),
         watertight,
     )
-    findings += judge(solids, deadline) + scale.judge(facts, next(iter(models.values())).unit)
-    if options.shells is not None and shells != options.shells:
-        findings.append(
-            finding("G005", f"{counted(shells, 'shell')}, {options.shells} expected", abs(shells - options.shells))
-        )
+    findings += overlapping(solids, deadline)
+    findings += s_scale.likely_unit(facts, next(iter(models.values())).unit)
+    findings += g_shells.expected(shells, options.shells)
     if options.printer is not None:
         findings += printed(models, instances, options.printer, deadline)
     return findings, facts
 
 
-def _judge(found: Object, part: str, factor: float, options: Options, deadline: Deadline) -> Judged:
+def _check_object(found: Object, part: str, factor: float, options: Options, deadline: Deadline) -> CheckedMesh:
     """The geometry rules for one object; only model and solidsupport objects must be solids, unless slices stand in."""
     mesh = mesh_of(found, part, factor)
     stand_in = found.attributes.get(f"{elements.SLICE} meshresolution") == "lowres"
     if found.type not in ("model", "solidsupport") or stand_in:
-        return Judged((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)), None)
+        return CheckedMesh((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)))
     with keeping(change=_filled):
-        judged = judge_mesh(mesh, deadline, cross=options.cross)
-    return replace(judged, findings=tuple(_filled(judged.findings)))
+        checked = check_surface(mesh, deadline, cross=options.cross)
+    return replace(checked, findings=tuple(_filled(checked.findings)))
 
 
 def _filled(findings: Iterable[Finding]) -> Iterator[Finding]:
@@ -189,7 +190,7 @@ class Placed:
     name: str
 
 
-def judge(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
+def overlapping(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
     """G002 as a warning for the pairs that share volume, by manifold3d's boolean of those whose boxes do."""
     some = placed[:MOST]
     if len(some) < 2:
@@ -198,7 +199,7 @@ def judge(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
     low, high = np.array([box[0] for box in boxes]), np.array([box[1] for box in boxes])
     solids: dict[int, Manifold] = {}
     found: list[Location] = []
-    pairs = box_pairs(low, high, deadline)
+    pairs = g_shells.box_pairs(low, high, deadline)
     try:
         for a, b in pairs[:_PAIRS].tolist():
             deadline.tick()
@@ -220,8 +221,7 @@ def _said(found: list[Location], *, among: bool) -> list[Finding]:
     if not found:
         return []
     text = f"{counted(len(found), 'pair')} of instances that share volume{' among those compared' if among else ''}"
-    said = finding("G002", f"{text} (3MF's fill rule says what is solid)", len(found), found)
-    return [Finding(said.code, "warning", said.message, said.count, said.locations)]
+    return [G002.finding(f"{text} (3MF's fill rule says what is solid)", len(found), found, "warning")]
 
 
 def _shared(a: int, b: int, some: Sequence[Placed], solids: dict[int, Manifold]) -> float:
@@ -236,10 +236,8 @@ def printed(
     models: dict[str, Model], instances: Sequence[Instance], printer: Printer, deadline: Deadline
 ) -> list[Finding]:
     """The printer's rules for each instance; those that differ by their place on the bed alone are judged once."""
-    from unitcad.check import printing
-
     found: list[Finding] = []
-    judged: dict[tuple[Key, bytes, float], tuple[Floats, tuple[Finding, ...]]] = {}
+    checked: dict[tuple[Key, bytes, float], tuple[Floats, tuple[Finding, ...]]] = {}
     for instance in instances:
         thing = models[instance.key[0]].resources[instance.key[1]]
         assert isinstance(thing, Object)
@@ -247,20 +245,14 @@ def printed(
             continue
         factor = UNITS_MM.get(models[instance.key[0]].unit, 1.0)
         alike = instance.key, instance.matrix[:3].tobytes(), float(instance.matrix[3, 2])
-        if alike not in judged:
+        if alike not in checked:
             mesh = mesh_of(thing, instance.key[0], factor, instance.matrix)
-            with keeping(found), keeping(change=lambda kept, mesh=mesh: in_file(kept, mesh)):
-                with keeping(change=_last):  # what the topology rules found was reported with the object
-                    shape = topology.judge(mesh, deadline)
-                of = printing.judge(shape, printer, deadline)
-            judged[alike] = instance.matrix[3], in_file(of, mesh)
-        begin, of = judged[alike]
+            with keeping(found):
+                part = Inspection(mesh, topology_of(mesh, deadline), deadline)
+                checked[alike] = instance.matrix[3], check_on_bed(part, printer)
+        begin, of = checked[alike]
         found += _shifted(of, (instance.matrix[3] - begin) * factor)
     return found
-
-
-def _last(findings: Iterable[Finding]) -> Iterator[Finding]:
-    return (item for item in findings if item.ends)
 
 
 def _shifted(findings: Sequence[Finding], by: Floats) -> Iterator[Finding]:

@@ -1,37 +1,46 @@
-"""Topology rules, T001 to T013, and V002: edges, winding, pinches, duplicates, degenerate faces, stored normals."""
+"""The topology of a mesh: edges, shells, what is open, wound wrongly or pinched. What the rules judge a mesh by."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from fractions import Fraction
-from itertools import chain
+from functools import cached_property
 
 import numpy as np
 
 from unitcad.check import edges as mesh_edges
 from unitcad.check import volumes
 from unitcad.check.edges import Edges
-from unitcad.check.findings import Finding, Location, counted, number
-from unitcad.check.limits import Deadline, keeping
-from unitcad.check.mesh import Mesh, area_vectors, extent, extents, float32_step, float32_steps
-from unitcad.check.rulebook import finding
+from unitcad.check.limits import Deadline
+from unitcad.check.mesh import Mesh, area_vectors, extent, extents
 from unitcad.check.seams import connected, join, t_junctions
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
-FAR = 1e-4  # V002: float32 step over the bounding box's diagonal
-SLIVER = 1e-3  # T011: shortest length of a sliver, as part of the diagonal
-NORMAL_COS = float(np.cos(np.radians(15.0)))  # T013
-_EXACT = 2000  # faces looked at with exact arithmetic before the float verdict is taken
+
+@dataclass(frozen=True)
+class OpenEdges:
+    """Edges of one face, before vertices were welded and after it.
+
+    `edges` are those before, of the faces `kept`; of them `shut` are the ones that welding closes. `left` are edges of
+    the welded faces that are open still; `split` says which of those have a vertex in between.
+    """
+
+    edges: Edges
+    kept: Ints
+    shut: Ints
+    left: Ints
+    split: Bools
 
 
 @dataclass(frozen=True)
 class Topology:
-    """What the topology rules found out; `mesh` is without degenerate faces, and its open edges are welded.
+    """A mesh without degenerate faces whose open edges are welded, and what follows from that.
 
     `kept` maps its faces to the file's; `areas` are twice the area vectors, mm2; `shells` labels faces. `stored` are
     the faces before welding moved any, with vertices in one place joined. `low` and `high`: each shell's box, mm;
-    `volumes`: what it holds, mm3, below zero where its faces look inwards; `closed`: whether it has an inside.
+    `volumes`: what it encloses, mm3, below zero where its faces look inwards; `closed`: whether it has an inside.
+    `repeated` are the file's faces that use a vertex twice, `unused` counts vertices that no face uses, `opened` has
+    the edges of one face, if any. `pinched` are vertices of several fans, `twice` faces with the vertices of another
+    one, `unbalanced` edges of an even number of faces along which more run one way than the other.
     """
 
     mesh: Mesh
@@ -40,34 +49,46 @@ class Topology:
     shells: Ints
     n_shells: int
     areas: Floats
-    watertight: bool
-    oriented: bool
-    findings: tuple[Finding, ...]
     stored: Ints
     low: Floats
     high: Floats
     volumes: Floats
     closed: Bools
+    repeated: Ints
+    unused: int
+    opened: OpenEdges | None
+    pinched: Ints
+    twice: Ints
+    unbalanced: Ints
+
+    @cached_property
+    def watertight(self) -> bool:
+        """Whether every edge has an even number of faces."""
+        return bool(len(self.mesh.faces)) and bool((self.edges.size % 2 == 0).all())
+
+    @property
+    def oriented(self) -> bool:
+        """Whether neighbours are wound alike."""
+        return not len(self.unbalanced)
+
+    @cached_property
+    def stored_areas(self) -> Floats:
+        """Twice the area vectors of the faces as stored, mm2."""
+        if self.stored is self.mesh.faces:
+            return self.areas
+        return area_vectors(self.mesh.vertices, self.stored)
 
     def as_stored(self) -> Topology:
         """The same with every face where the file has it."""
         if self.stored is self.mesh.faces:
             return self
         edges = mesh_edges.edges_of(self.stored, len(self.mesh.vertices))
-        areas = area_vectors(self.mesh.vertices, self.stored)
-        return replace(self, mesh=replace(self.mesh, faces=self.stored), edges=edges, areas=areas)
+        return replace(self, mesh=replace(self.mesh, faces=self.stored), edges=edges, areas=self.stored_areas)
 
 
-def judge(mesh: Mesh, deadline: Deadline) -> Topology:
-    """Apply the topology rules to a mesh with finite vertices."""
-    found: list[Finding] = []
-    if mesh.indexed:
-        mesh, found = _referenced(mesh)
-    with keeping(found):
-        return _judged(mesh, deadline, found)
-
-
-def _judged(mesh: Mesh, deadline: Deadline, found: list[Finding]) -> Topology:
+def topology_of(mesh: Mesh, deadline: Deadline) -> Topology:
+    """Work out the topology of a mesh with finite vertices."""
+    mesh, unused = _referenced(mesh) if mesh.indexed else (mesh, 0)
     faces, vertices = mesh.faces, mesh.vertices
     repeated = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
     kept = np.arange(len(faces), dtype=np.int32)
@@ -76,17 +97,11 @@ def _judged(mesh: Mesh, deadline: Deadline, found: list[Finding]) -> Topology:
         faces = faces[kept]
     edges = mesh_edges.edges_of(faces, len(vertices))
     deadline.tick()
-    stored = faces
+    stored, opened = faces, None
     if not edges.closed and (edges.size == 1).any():
-        faces, stored, kept, edges, extra = _open_edges(mesh, faces, kept, edges)
-        found += extra
-    areas = stored_areas = area_vectors(vertices, stored)
-    if mesh.normals is not None:
-        found += _stored_normals(mesh, kept, areas)
-    if stored is not faces:
-        areas = area_vectors(vertices, faces)
+        faces, stored, kept, edges, opened = _welded(vertices, faces, kept, edges)
+    areas = area_vectors(vertices, faces)
     deadline.tick()
-    found += _many_faces(mesh, faces, kept, edges)
     across = mesh_edges.opposite(edges, 3 * len(faces)) if edges.closed else None
     if across is not None:
         pinched = mesh_edges.pinched_closed(faces, across, len(vertices))
@@ -99,32 +114,12 @@ def _judged(mesh: Mesh, deadline: Deadline, found: list[Finding]) -> Topology:
     low, high = _boxes(vertices, faces, shells)
     volume = volumes.signed(vertices, faces, areas, shells, len(low))
     closed = volumes.closed(faces, edges, shells, len(low))
-    size = diagonals(low, high)
-    found += too_far(np.stack([low, high], axis=1), size)
-    found += _thin(mesh, stored, kept, stored_areas, np.flatnonzero(repeated), size[shells])
     if across is None and len(twice):
         twice = np.setdiff1d(twice, _facing(faces, areas, shells, volume * closed))
     deadline.tick()
-    if len(pinched):
-        found.append(
-            finding(
-                "T004",
-                counted(len(pinched), "pinch vertex", "pinch vertices"),
-                len(pinched),
-                _points(mesh, vertices[pinched]),
-            )
-        )
-    if len(twice):
-        found.append(
-            finding("T009", counted(len(twice), "duplicate face"), len(twice), _at_faces(mesh, kept, faces, twice))
-        )
-    wrong = np.empty(0, int)
+    unbalanced = np.empty(0, int)
     if not edges.closed:
-        wrong = np.flatnonzero((edges.size % 2 == 0) & ~mesh_edges.balanced(faces, edges))
-    if len(wrong):
-        text = f"{counted(len(wrong), 'edge')} along which more faces run one way than the other"
-        found.append(finding("T007", text, len(wrong), _at_edges(mesh, edges, kept, wrong)))
-    watertight = bool(len(faces)) and bool((edges.size % 2 == 0).all())
+        unbalanced = np.flatnonzero((edges.size % 2 == 0) & ~mesh_edges.balanced(faces, edges))
     return Topology(
         replace(mesh, faces=faces, normals=None),
         kept,
@@ -132,45 +127,51 @@ def _judged(mesh: Mesh, deadline: Deadline, found: list[Finding]) -> Topology:
         shells,
         len(low),
         areas,
-        watertight,
-        not len(wrong),
-        tuple(found),
         stored,
         low,
         high,
         volume,
         closed,
+        np.flatnonzero(repeated),
+        unused,
+        opened,
+        pinched,
+        twice,
+        unbalanced,
     )
 
 
-def _points(mesh: Mesh, points: Floats) -> Iterator[Location]:
-    for point in points:
-        yield Location(xyz=(float(point[0]), float(point[1]), float(point[2])), object=mesh.name)
-
-
-def _at_faces(mesh: Mesh, kept: Ints, faces: Ints, which: Ints) -> Iterator[Location]:
-    for i in which:
-        centre = mesh.vertices[faces[i]].mean(axis=0)
-        yield Location(face=int(kept[i]), xyz=tuple(float(v) for v in centre), object=mesh.name)  # type: ignore[arg-type]
-
-
-def _at_edges(mesh: Mesh, edges: Edges, kept: Ints, which: Ints) -> Iterator[Location]:
-    for i in which:
-        middle = (mesh.vertices[edges.low[i]] + mesh.vertices[edges.high[i]]) / 2
-        face = int(kept[edges.order[edges.first[i]] // 3])
-        yield Location(face=face, xyz=tuple(float(v) for v in middle), object=mesh.name)  # type: ignore[arg-type]
-
-
-def _referenced(mesh: Mesh) -> tuple[Mesh, list[Finding]]:
-    """The mesh without the vertices that no face uses (T012): they have no part in its size."""
+def _referenced(mesh: Mesh) -> tuple[Mesh, int]:
+    """The mesh without the vertices that no face uses, which have no part in its size, and how many there are."""
     used = np.zeros(len(mesh.vertices), bool)
     used[mesh.faces.reshape(-1)] = True
     n = len(used) - int(np.count_nonzero(used))
     if not n:
-        return mesh, []
+        return mesh, 0
     place = np.cumsum(used, dtype=np.int32) - np.int32(1)
-    said = finding("T012", f"{counted(n, 'vertex', 'vertices')} that no face uses", n)
-    return replace(mesh, vertices=mesh.vertices[used], faces=place[mesh.faces]), [said]
+    return replace(mesh, vertices=mesh.vertices[used], faces=place[mesh.faces]), n
+
+
+def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints, Ints, Ints, Edges, OpenEdges]:
+    """The faces welded and as stored, what they are in the file, the edges of the former, and the open edges."""
+    open_ = np.flatnonzero(edges.size == 1)
+    seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])))
+    joined, stored, whole = seams.joined, seams.stored, seams.whole
+    if not whole.all():
+        joined, stored, whole_kept = joined[whole], stored[whole], kept[whole]
+    else:
+        whole_kept = kept
+    if np.array_equal(joined, stored):
+        stored = joined
+    after = mesh_edges.edges_of(joined, len(vertices))
+    left = np.flatnonzero(after.size == 1)
+    shut, split = open_, np.zeros(len(left), bool)
+    if len(left):  # only what belongs to shells without a boundary left
+        part = connected(joined, len(vertices))
+        at = seams.joined[edges.order[edges.first[open_]] // 3, 0]
+        shut = open_[~np.isin(part[at], part[after.low[left]])]
+        split = t_junctions(vertices, after.low[left], after.high[left], seams.reach)
+    return joined, stored, whole_kept, after, OpenEdges(edges, kept, shut, left, split)
 
 
 def _boxes(vertices: Floats, faces: Ints, shells: Ints) -> tuple[Floats, Floats]:
@@ -186,69 +187,6 @@ def diagonals(low: Floats, high: Floats) -> Floats:
     """The diagonals of boxes, mm."""
     sides = high - low
     return np.sqrt(np.einsum("ij,ij->i", sides, sides))
-
-
-def too_far(corners: Floats, size: Floats) -> list[Finding]:
-    """V002 for shells or instances: the low and high corner of each one's box, (n, 2, 3) mm, and its diagonal, mm."""
-    step = float32_steps(corners)
-    far = np.flatnonzero((step > FAR * size) & (size > 0))
-    if not len(far):
-        return []
-    worst = far[np.argmax(step[far] / size[far])]
-    text = (
-        f"coordinates are {number(step[worst], 3)} mm apart in float32, the part is {number(size[worst], 3)} mm across"
-    )
-    return [finding("V002", text, len(far))]
-
-
-def _open_edges(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints, Ints, Ints, Edges, list[Finding]]:
-    """Boundary edges: closed by welding (T006), or T-junctions (T005) and boundaries (T001).
-
-    Returns the faces welded and as stored, what they are in the file, and the edges of the former.
-    """
-    vertices = mesh.vertices
-    open_ = np.flatnonzero(edges.size == 1)
-    seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])))
-    joined, stored, whole = seams.joined, seams.stored, seams.whole
-    if not whole.all():
-        joined, stored, whole_kept = joined[whole], stored[whole], kept[whole]
-    else:
-        whole_kept = kept
-    if np.array_equal(joined, stored):
-        stored = joined
-    after = mesh_edges.edges_of(joined, len(vertices))
-    left = np.flatnonzero(after.size == 1)
-    found = []
-    shut = open_
-    if len(left):  # only what belongs to shells without a boundary left
-        part = connected(joined, len(vertices))
-        at = seams.joined[edges.order[edges.first[open_]] // 3, 0]
-        shut = open_[~np.isin(part[at], part[after.low[left]])]
-    if len(shut):
-        text = f"{counted(len(shut), 'open edge')} that welding within the tolerance closes"
-        found.append(finding("T006", text, len(shut), _at_edges(mesh, edges, kept, shut)))
-    if len(left):
-        n = len(left)
-        split = t_junctions(vertices, after.low[left], after.high[left], seams.reach)
-        if split.any():
-            which = left[split]
-            places = _at_edges(mesh, after, whole_kept, which)
-            text = f"{counted(len(which), 'open edge')} with a vertex in between"
-            found.append(finding("T005", text, len(which), places))
-        found.append(finding("T001", counted(n, "boundary edge"), n, _at_edges(mesh, after, whole_kept, left)))
-    return joined, stored, whole_kept, after, found
-
-
-def _many_faces(mesh: Mesh, faces: Ints, kept: Ints, edges: Edges) -> list[Finding]:
-    if edges.closed:
-        return []
-    found = []
-    for code, odd, word in (("T002", 1, "odd"), ("T003", 0, "even")):
-        which = np.flatnonzero((edges.size > 2) & (edges.size % 2 == odd))
-        if len(which):
-            text = f"{counted(len(which), 'edge')} with more than two faces, an {word} number"
-            found.append(finding(code, text, len(which), _at_edges(mesh, edges, kept, which)))
-    return found
 
 
 def _same_vertices(faces: Ints) -> tuple[Ints, Bools]:
@@ -279,32 +217,6 @@ def _facing(faces: Ints, areas: Floats, shells: Ints, volume: Floats) -> Ints:
     return np.concatenate([one[touching], other[touching]])
 
 
-def _thin(mesh: Mesh, faces: Ints, kept: Ints, areas: Floats, repeated: Ints, size: Floats) -> list[Finding]:
-    """Degenerate faces (T010) and slivers (T011); `size` is the diagonal of each face's shell.
-
-    A sliver harms where it is long: its height is below the float32 step, so rounding alone decides where it faces,
-    and it is longer than SLIVER of its shell. Short ones vanish in a slicer's own resolution.
-    """
-    found, vertices = [], mesh.vertices
-    double = np.abs(areas[:, 0]) + np.abs(areas[:, 1]) + np.abs(areas[:, 2])
-    whole, step = float(size.max(initial=0)), float32_step(vertices)
-    suspect = np.flatnonzero(double < 8 * max(step, 1e-7 * whole) * whole)
-    corners = vertices[faces[suspect]]
-    longest = np.sqrt(max_side_squared(corners))
-    flat = _exactly_flat(corners, areas[suspect])
-    lines = suspect[flat]
-    n = len(repeated) + len(lines)
-    if n:
-        places = (Location(face=int(i), object=mesh.name) for i in repeated)
-        text = f"{counted(n, 'face')} without area"
-        found.append(finding("T010", text, n, chain(places, _at_faces(mesh, kept, faces, lines))))
-    height = np.sqrt(np.einsum("ij,ij->i", areas[suspect], areas[suspect])) / np.maximum(longest, 1e-300)
-    thin = suspect[~flat & (height < float32_steps(corners)) & (longest > SLIVER * size[suspect])]
-    if len(thin):
-        found.append(finding("T011", counted(len(thin), "sliver"), len(thin), _at_faces(mesh, kept, faces, thin)))
-    return found
-
-
 def max_side_squared(corners: Floats) -> Floats:
     """The squared length of each triangle's longest side; corners (n, 3, 3)."""
     found = np.zeros(len(corners))
@@ -312,42 +224,3 @@ def max_side_squared(corners: Floats) -> Floats:
         side = corners[:, k] - corners[:, k - 1]
         np.maximum(found, np.einsum("ij,ij->i", side, side), out=found)
     return found
-
-
-def _exactly_flat(corners: Floats, double: Floats) -> Bools:
-    """Whether three points lie on one line: the float answer where its error bound decides, fractions on the rest."""
-    first = np.abs(corners[:, 1] - corners[:, 0])
-    second = np.abs(corners[:, 2] - corners[:, 0])
-    bound = 8 * np.finfo(float).eps * (_abs_cross(first, second) + np.abs(corners).max(axis=(1, 2), initial=0)[:, None]
-                                       * (first + second + second[:, [1, 2, 0]] + first[:, [1, 2, 0]]))  # fmt: skip
-    maybe = (np.abs(double) <= bound).all(axis=1)
-    for i in np.flatnonzero(maybe)[:_EXACT]:
-        a, b, c = ([Fraction(float(v)) for v in point] for point in corners[i])
-        u = [q - p for p, q in zip(a, b, strict=True)]
-        v = [q - p for p, q in zip(a, c, strict=True)]
-        maybe[i] = all(u[j] * v[k] == u[k] * v[j] for j, k in ((0, 1), (1, 2), (2, 0)))
-    return maybe
-
-
-def _abs_cross(a: Floats, b: Floats) -> Floats:
-    pairs = ((1, 2), (2, 0), (0, 1))
-    return np.stack([a[:, i] * b[:, j] + a[:, j] * b[:, i] for i, j in pairs], axis=1)
-
-
-def _stored_normals(mesh: Mesh, kept: Ints, areas: Floats) -> list[Finding]:
-    """T013; a stored normal of zeros means none, and a face lower than a thousandth of its length has none worth it."""
-    assert mesh.normals is not None
-    stored = mesh.normals[kept]
-    lengths = np.sqrt(np.einsum("ij,ij->i", stored, stored, dtype=np.float64))
-    dot = np.einsum("ij,ij->i", stored, areas)
-    real = np.sqrt(np.einsum("ij,ij->i", areas, areas))
-    off = np.flatnonzero(~(dot >= NORMAL_COS * lengths * real * (1 - 1e-6)))
-    if not len(off):
-        return []
-    corners = mesh.vertices[mesh.faces[kept[off]]]
-    sound = real[off] > 1e-3 * max_side_squared(corners)
-    wrong = off[(sound & (lengths[off] > 0)) | ~np.isfinite(lengths[off])]
-    if not len(wrong):
-        return []
-    text = f"{counted(len(wrong), 'stored normal')} unlike the face's own"
-    return [finding("T013", text, len(wrong), (Location(face=int(kept[i]), object=mesh.name) for i in wrong))]

@@ -7,6 +7,8 @@ import numpy as np
 from unitcad.check.edges import Edges, balanced
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
+_BLOCK = 500_000
+
 
 def closed(faces: Ints, edges: Edges, shells: Ints, n: int) -> Bools:
     """Whether each of `n` shells has an inside: at all its edges as many faces run one way as the other."""
@@ -41,3 +43,16 @@ def side_by_side(one: Floats, other: Floats) -> Bools:
     cavity has less volume than the cavity, whose volume is below zero. 0 stands for a shell that is not closed.
     """
     return np.asarray((one * other > 0) | ((one * other < 0) & (one + other < -1e-9 * np.abs(one))))
+
+
+def winding_number(vertices: Floats, faces: Ints, point: Floats) -> int:
+    """How often the closed surface winds round `point`: the sum of solid angles over 4 pi (Van Oosterom, 1983)."""
+    total = 0.0
+    for start in range(0, len(faces), _BLOCK):
+        a, b, c = (vertices[faces[start : start + _BLOCK, k]] - point for k in range(3))
+        la, lb, lc = (np.sqrt(np.einsum("ij,ij->i", v, v)) for v in (a, b, c))
+        top = np.einsum("ij,ij->i", a, np.cross(b, c))
+        dot = np.einsum
+        low = la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb
+        total += float(np.arctan2(top, low).sum())
+    return round(total / (2 * np.pi))

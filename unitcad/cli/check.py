@@ -72,13 +72,14 @@ def check(
 
     Reads STL, 3MF, OBJ, PLY, OFF and GLB, and STEP where an extra with a B-rep kernel is installed.
     """
-    from unitcad.check import detail, many_files, rulebook
+    from unitcad.check import detail, many_files
     from unitcad.check.output import as_text
     from unitcad.check.output.render import FORMATS, render
+    from unitcad.check.rules import registry
     from unitcad.cli import check_settings
 
     if explain is not None:
-        typer.echo(rulebook.explain(explain))
+        typer.echo(registry.explain(explain))
         return
     output_format = "json" if as_json else output_format
     if output_format not in FORMATS:
@@ -175,7 +176,7 @@ def _filters(
 ) -> Options:
     """Which codes are wanted: those of the command line, else those of the settings."""
     from unitcad.check import Options
-    from unitcad.check.rulebook import check_prefixes
+    from unitcad.check.rules.registry import check_prefixes
 
     settings = found.settings
     wanted = check_prefixes("--select", _split(select))
@@ -190,7 +191,7 @@ def _filters(
 
 def _per_file(found: Configuration, options: Options) -> Callable[[str], Options]:
     """The options of a path: `options` without what the settings ignore for it."""
-    from unitcad.check.rulebook import check_prefixes
+    from unitcad.check.rules.registry import check_prefixes
 
     for pattern, codes in found.settings.per_file_ignores.items():
         check_prefixes(found.name(f"per-file-ignores.{pattern}"), codes)
@@ -202,7 +203,7 @@ def _per_file(found: Configuration, options: Options) -> Callable[[str], Options
 
 
 def _unit(field: str, unit: str | None) -> str | None:
-    from unitcad.check.scale import UNITS_MM
+    from unitcad.check.options import UNITS_MM
 
     if unit is None:
         return None

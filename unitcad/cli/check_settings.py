@@ -16,7 +16,6 @@ from msgspec import Meta, Struct, field
 from unitcad import files
 from unitcad.errors import Refusal, UnitcadError, unknown_key
 from unitcad.files import seen_from
-from unitcad.spec.convert import convert
 
 NAMES = ("unitcad.toml", "pyproject.toml")
 
@@ -122,6 +121,8 @@ def _read(path: Path) -> Configuration | None:
                     raise unknown_key(".".join([*above, key]), data[key], [last])
         if last not in data:
             return None
+        from unitcad.spec.convert import convert  # most runs have no settings
+
         settings = convert(_mapping(table, data[last]), Settings, table)
     except Refusal as error:
         raise Refusal(f"{shown}: {error.field}", error.value, error.limit, error.nearest) from None

@@ -48,7 +48,7 @@ def _entries(kind: str) -> dict[str, Any]:
     if kind == "designs":
         return dict.fromkeys(DESIGNS, "")
     if kind == "rules":
-        from unitcad.check.rulebook import rules
+        from unitcad.check.rules.registry import rules
 
         return {code: rule.title for code, rule in rules().items()}
     found = {"materials": catalogue.materials, "motors": catalogue.motors, "printers": catalogue.printers}[kind]()

@@ -20,7 +20,7 @@ import numpy as np
 from unitcad import files
 from unitcad.check.findings import SEVERITIES, FileReport, Finding, Location
 from unitcad.check.mesh import LARGEST, Mesh, weld_exact
-from unitcad.check.rulebook import rules
+from unitcad.check.rules.registry import rules
 from unitcad.export import drawing, raster, threemf
 from unitcad.export.marks import Marks, marks_of
 from unitcad.text import printable
@@ -313,7 +313,7 @@ _STYLE = (
 
 def _page(title: str, found: Finding, views: Sequence[_View], place: Location | None) -> str:
     """Title and message, the views side by side, and below them what each shows."""
-    lines = [*_wrapped(found.message), *_wrapped(f"Fix: {rules()[found.code].mend}")]
+    lines = [*_wrapped(found.message), *_wrapped(f"Fix: {rules()[found.code].fix}")]
     top = 2 * _MARGIN + 20 + 17 * len(lines)
     width = _MARGIN + len(views) * (SIZE[0] + _MARGIN)
     height = top + SIZE[1] + 46

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from unitcad.check.findings import FileReport, said
 from unitcad.check.output.as_text import line, summary
-from unitcad.check.rulebook import rules
+from unitcad.check.rules.registry import rules
 from unitcad.text import printable
 
 _GITHUB = {"error": "error", "warning": "warning", "info": "notice"}
@@ -23,7 +23,7 @@ def github(reports: Sequence[FileReport]) -> str:
             title = f"{found.code} {rules()[found.code].title}"
             first = next((place.line for place in found.locations if place.line is not None), None)
             where = f"file={_property(report.path)}" + (f",line={first}" if first is not None else "")
-            text = f"{said(found, 3)}. Fix: {rules()[found.code].mend}"
+            text = f"{said(found, 3)}. Fix: {rules()[found.code].fix}"
             lines.append(f"::{_GITHUB[found.severity]} {where},title={_property(title)}::{_data(text)}")
     return "\n".join([*lines, summary(reports)]) + "\n"
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from unitcad.check.findings import FileReport
-from unitcad.check.rulebook import rules
+from unitcad.check.rules.registry import rules
 
 
 def as_dict(reports: Sequence[FileReport], config: str | None = None, baseline: str | None = None) -> dict[str, Any]:
@@ -20,5 +20,5 @@ def as_dict(reports: Sequence[FileReport], config: str | None = None, baseline: 
 def _entry(report: FileReport) -> dict[str, Any]:
     entry = report.as_dict()
     for shown, found in zip(entry["findings"], report.findings, strict=True):
-        shown |= {"fix": rules()[found.code].mend, "known": found.known}
+        shown |= {"fix": rules()[found.code].fix, "known": found.known}
     return entry

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from xml.sax.saxutils import escape, quoteattr
 
 from unitcad.check.findings import SEVERITIES, FileReport, Finding, said
-from unitcad.check.rulebook import rules
+from unitcad.check.rules.registry import rules
 
 
 def junit(reports: Sequence[FileReport], fail_on: str) -> str:
@@ -42,7 +42,7 @@ def _time(seconds: float | None) -> str:
 def _failure(found: Finding) -> str:
     rule = rules()[found.code]
     places = [f"at {text}" for place in found.locations if (text := str(place))]
-    body = "\n".join([f"{found.code} {rule.title}: {found.message}", *places, f"Fix: {rule.mend}"])
+    body = "\n".join([f"{found.code} {rule.title}: {found.message}", *places, f"Fix: {rule.fix}"])
     head = f"type={quoteattr(found.code)} message={quoteattr(_xml(said(found, 3)))}"
     return f"<failure {head}>{escape(_xml(body))}</failure>"
 

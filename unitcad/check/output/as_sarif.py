@@ -12,7 +12,8 @@ from urllib.parse import quote
 
 from unitcad import __version__
 from unitcad.check.findings import FileReport, Finding, said
-from unitcad.check.rulebook import Rule, rules
+from unitcad.check.rules.registry import rules
+from unitcad.check.rules.rule import Rule
 from unitcad.text import markdown
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -51,8 +52,8 @@ def _rule(rule: Rule) -> dict[str, Any]:
         "shortDescription": {"text": rule.title},
         "fullDescription": {"text": rule.cause},
         "help": {
-            "text": f"{rule.cause} Fix: {rule.mend}",
-            "markdown": f"{markdown(rule.cause)}\n\n**Fix:** {markdown(rule.mend)}",
+            "text": f"{rule.cause} Fix: {rule.fix}",
+            "markdown": f"{markdown(rule.cause)}\n\n**Fix:** {markdown(rule.fix)}",
         },
         "defaultConfiguration": {"level": _LEVELS[rule.severity]},
     }
@@ -72,7 +73,7 @@ def _result(report: FileReport, found: Finding, index: dict[str, int]) -> dict[s
         "ruleId": found.code,
         "ruleIndex": index[found.code],
         "level": _LEVELS[found.severity],
-        "message": {"text": f"{said(found, 1)}. Fix: {rules()[found.code].mend}"},
+        "message": {"text": f"{said(found, 1)}. Fix: {rules()[found.code].fix}"},
         "locations": [{"physicalLocation": physical, **logical}],
         "partialFingerprints": {"pathAndRule/v1": fingerprint},
         "properties": {"count": found.count, "places": [place.as_dict() for place in found.locations]},

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from unitcad.check.findings import Facts, FileReport, Finding, counted, number, said
-from unitcad.check.rulebook import rules
+from unitcad.check.rules.registry import rules
 from unitcad.text import printable
 
 
@@ -21,7 +21,7 @@ def text(reports: Sequence[FileReport]) -> str:
             lines.append(line(report, found))
         if report.verdict == "pass" and (size := _size(report.facts)):
             lines.append(f"{printable(report.path)}: passed: {size}")
-    fixes = [f"  {code} {rule.title}: {rule.mend}" for code, rule in rules().items() if code in codes]
+    fixes = [f"  {code} {rule.title}: {rule.fix}" for code, rule in rules().items() if code in codes]
     if fixes:
         lines += ["How to fix:", *fixes, _EXPLAIN]
     return "\n".join([*lines, summary(reports)]) + "\n"

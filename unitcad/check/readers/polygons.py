@@ -13,7 +13,10 @@ import numpy as np
 from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import LARGEST, Mesh, weld_points
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F001, F008, F013
+from unitcad.check.rules.p_package import P011
+from unitcad.check.rules.rule import Rule
+from unitcad.check.rules.v_values import V001
 from unitcad.check.source import Source
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
@@ -50,9 +53,9 @@ def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline) -> tuple[lis
     short = np.flatnonzero(sizes < 3)
     if len(short):
         text = f"{counted(len(short), 'face')} with fewer than three vertices"
-        findings.append(_at("F008", text, short, source))
+        findings.append(_at(F008, text, short, source))
     if not len(sizes) - len(short):
-        raise Unreadable(*findings, finding("F001", "the file has no face"))
+        raise Unreadable(*findings, F001.finding("the file has no face"))
     triangles = int(sizes.sum()) - 2 * len(sizes) + int((2 - sizes[short]).sum())
     if triangles > limits.max_faces:
         raise Unreadable(
@@ -64,7 +67,7 @@ def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline) -> tuple[lis
         polygon = np.searchsorted(np.cumsum(sizes), wrong, "right")
         counting = "" if polygons.counts_from else ", counted from 0"
         text = f"a face names vertex {corners[wrong] + polygons.counts_from} of {len(vertices)}{counting}"
-        raise Unreadable(*findings, _at("P011", text, np.array([polygon]), source))
+        raise Unreadable(*findings, _at(P011, text, np.array([polygon]), source))
     used = np.zeros(len(vertices), bool)
     used[corners] = True
     finite = np.ones(len(vertices), bool)
@@ -72,10 +75,10 @@ def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline) -> tuple[lis
     if not finite.all():
         bad = np.unique(np.searchsorted(np.cumsum(sizes), np.flatnonzero(~finite[corners]), "right"))
         text = f"{counted(len(bad), 'face')} with a vertex that is not finite"
-        return [], [*findings, _at("V001", text, bad, source)]
+        return [], [*findings, _at(V001, text, bad, source)]
     faces, of, bent = _in_triangles(vertices, corners, sizes, deadline)
     if bent is not None and bent.any():
-        findings.append(_at("F013", _bent(bent), np.flatnonzero(bent), source))
+        findings.append(_at(F013, _bent(bent), np.flatnonzero(bent), source))
     points, index = weld_points(vertices[used])  # OBJ splits vertices along texture seams
     place = np.zeros(len(vertices), np.int32)
     place[used] = index
@@ -83,9 +86,9 @@ def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline) -> tuple[lis
     return [Mesh(points, place[faces], indexed=False, source=source)], findings
 
 
-def _at(code: str, message: str, polygons: Ints, source: Source) -> Finding:
+def _at(rule: Rule, message: str, polygons: Ints, source: Source) -> Finding:
     places = [Location(face=int(i), line=source.line(int(i)), object=source.object(int(i))) for i in polygons[:_PLACES]]
-    return finding(code, message, len(polygons), places)
+    return rule.finding(message, len(polygons), places)
 
 
 def _bent(bent: Floats) -> str:

@@ -18,7 +18,8 @@ from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.mesh import Mesh
 from unitcad.check.readers.polygons import Polygons, mesh_of
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F001, F002, F003, F004, F006, F008
+from unitcad.check.rules.p_package import P007, P009, P011, P012, P013, P016
 from unitcad.geometry.arrays import Floats, Ints
 
 _MOST_JSON = 100_000_000  # bytes
@@ -52,7 +53,7 @@ def read_glb(
         for name in _list(document, "extensionsRequired"):
             if not (isinstance(name, str) and name.startswith(_HARMLESS)):
                 text = f"the file needs the extension {str(name)[:60]!r}, which cannot be read; export without it"
-                raise Unreadable(finding("P016", text))
+                raise Unreadable(P016.finding(text))
         parts = list(_parts(document, limits, findings))
         polygons = _polygons(document, binary, parts, unit_mm, limits, deadline)
         meshes, more = mesh_of(polygons, limits, deadline)
@@ -62,21 +63,21 @@ def read_glb(
 def _chunks(data: memoryview, findings: list[Finding]) -> tuple[dict[str, Any], memoryview]:
     """The document and the binary chunk."""
     if len(data) < 20:
-        raise Unreadable(finding("F001", f"{counted(len(data), 'byte')}: shorter than a GLB's header"))
+        raise Unreadable(F001.finding(f"{counted(len(data), 'byte')}: shorter than a GLB's header"))
     version, length = (int.from_bytes(data[i : i + 4], "little") for i in (4, 8))
     if version != 2:
-        raise Unreadable(finding("F003", f"glTF of version {version} cannot be read, only 2"))
+        raise Unreadable(F003.finding(f"glTF of version {version} cannot be read, only 2"))
     if length > len(data):
-        raise Unreadable(finding("F002", f"the header promises {length} bytes, the file has {len(data)}"))
+        raise Unreadable(F002.finding(f"the header promises {length} bytes, the file has {len(data)}"))
     if length < len(data):
         extra = len(data) - length
-        findings.append(finding("F006", f"{counted(extra, 'byte')} after the last chunk", extra))
+        findings.append(F006.finding(f"{counted(extra, 'byte')} after the last chunk", extra))
     chunks: dict[int, memoryview] = {}
     at = 12
     while at + 8 <= length:
         size, kind = (int.from_bytes(data[i : i + 4], "little") for i in (at, at + 4))
         if at + 8 + size > length:
-            raise Unreadable(finding("F002", f"a chunk promises {size} bytes, the file has {length - at - 8}"))
+            raise Unreadable(F002.finding(f"a chunk promises {size} bytes, the file has {length - at - 8}"))
         chunks.setdefault(kind, data[at + 8 : at + 8 + size])
         at += 8 + size
     text = chunks.get(_JSON, memoryview(b""))
@@ -85,9 +86,9 @@ def _chunks(data: memoryview, findings: list[Finding]) -> tuple[dict[str, Any], 
     try:
         document = json.loads(bytes(text), parse_constant=_no_number)
     except ValueError as error:
-        raise Unreadable(finding("F003", f"its JSON cannot be read: {str(error)[:100]}")) from error
+        raise Unreadable(F003.finding(f"its JSON cannot be read: {str(error)[:100]}")) from error
     if not isinstance(document, dict):
-        raise Unreadable(finding("F003", "its JSON is no object"))
+        raise Unreadable(F003.finding("its JSON is no object"))
     return document, chunks.get(_BIN, memoryview(b""))
 
 
@@ -103,7 +104,7 @@ def _list(holder: dict[str, Any], key: str) -> list[Any]:
 
 
 def _wrong(what: str, value: Any, wanted: str) -> Unreadable:
-    return Unreadable(finding("F003", f"{what} is {str(value)[:40]!r}, not {wanted}"))
+    return Unreadable(F003.finding(f"{what} is {str(value)[:40]!r}, not {wanted}"))
 
 
 def _count(holder: dict[str, Any], key: str, default: int | None = None) -> int:
@@ -118,7 +119,7 @@ def _entry(document: dict[str, Any], key: str, index: Any, who: str) -> dict[str
     """The object with that index in one of the document's lists. Raises `Unreadable` (P011) where it is not there."""
     held = _list(document, key)
     if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(held):
-        raise Unreadable(finding("P011", f"{who} names {key} {str(index)[:20]}, the list has {len(held)}"))
+        raise Unreadable(P011.finding(f"{who} names {key} {str(index)[:20]}, the list has {len(held)}"))
     if not isinstance(held[index], dict):
         raise _wrong(f"{key} {index}", held[index], "an object")
     return held[index]
@@ -139,10 +140,10 @@ def _parts(document: dict[str, Any], limits: Limits, findings: list[Finding]) ->
         index, above, depth = waiting.pop()
         node = _entry(document, "nodes", index, "a node or scene")
         if index in seen:
-            raise Unreadable(finding("P012", f"node {index} has two parents or contains itself"))
+            raise Unreadable(P012.finding(f"node {index} has two parents or contains itself"))
         seen.add(index)
         if depth > limits.max_depth:
-            raise Unreadable(finding("P009", f"nodes nest deeper than {limits.max_depth}"))
+            raise Unreadable(P009.finding(f"nodes nest deeper than {limits.max_depth}"))
         if len(seen) > limits.max_instances:
             raise over_limit(f"more nodes than the limit of {limits.max_instances} instances")
         name = str(node.get("name") or f"node {index}")[:_NAME]
@@ -171,7 +172,7 @@ def _matrix(node: dict[str, Any], name: str, findings: list[Finding]) -> Floats:
             raise _wrong(f"{key} of {name}", values, f"{len(default)} numbers")
         if not all(isinstance(v, (int, float)) and abs(v) < 1e30 for v in values):
             text = f"{key} of {name} is not of {len(default)} finite numbers"
-            raise Unreadable(finding("P013", text, places=[Location(object=name)]))
+            raise Unreadable(P013.finding(text, places=[Location(object=name)]))
         return np.array(values, float)
 
     if "matrix" in node:
@@ -192,7 +193,7 @@ def _matrix(node: dict[str, Any], name: str, findings: list[Finding]) -> Floats:
         determinant = float(np.linalg.det(found[:3, :3]))
         size = float(np.prod(np.linalg.norm(found[:3, :3], axis=0)))
     if not abs(determinant) > 1e-12 * size:
-        findings.append(finding("P013", f"the matrix of {name} has determinant zero", places=[Location(object=name)]))
+        findings.append(P013.finding(f"the matrix of {name} has determinant zero", places=[Location(object=name)]))
     return found
 
 
@@ -244,7 +245,7 @@ def _promised(document: dict[str, Any], primitive: dict[str, Any]) -> tuple[int,
     """Triangles (at most) and vertices of a primitive."""
     attributes = primitive.get("attributes")
     if not isinstance(attributes, dict) or "POSITION" not in attributes:
-        raise Unreadable(finding("F003", "a primitive of triangles has no POSITION"))
+        raise Unreadable(F003.finding("a primitive of triangles has no POSITION"))
     points = _count(_entry(document, "accessors", attributes["POSITION"], "a primitive"), "count")
     corners = points
     if "indices" in primitive:
@@ -260,17 +261,17 @@ def _primitive(document: dict[str, Any], binary: memoryview, part: _Part) -> tup
     if "indices" in primitive:
         corners = _accessor(document, binary, primitive["indices"], "SCALAR", 1)[:, 0]
         if corners.dtype.kind == "f":
-            raise Unreadable(finding("F004", "indices are not whole numbers", places=[Location(object=part.name)]))
+            raise Unreadable(F004.finding("indices are not whole numbers", places=[Location(object=part.name)]))
         corners = corners.astype(np.int64)
         if len(corners) and not 0 <= corners.min() <= corners.max() < len(points):
             wrong = int(corners[(corners < 0) | (corners >= len(points))][0])
             text = f"a face names vertex {wrong} of {len(points)}, counted from 0"
-            raise Unreadable(finding("P011", text, places=[Location(object=part.name)]))
+            raise Unreadable(P011.finding(text, places=[Location(object=part.name)]))
     mode = primitive.get("mode", _TRIANGLES)
     if mode == _TRIANGLES:
         if len(corners) % 3:
             text = f"{len(corners)} corners of triangles, which is no multiple of three"
-            raise Unreadable(finding("F008", text, places=[Location(object=part.name)]))
+            raise Unreadable(F008.finding(text, places=[Location(object=part.name)]))
         return points.astype(np.float64), corners.reshape(-1, 3)
     if mode not in (_STRIP, _FAN):
         raise _wrong("the mode of a primitive", mode, "0 to 6")
@@ -288,14 +289,14 @@ def _accessor(document: dict[str, Any], binary: memoryview, index: Any, kind: st
     who = f"accessor {index}"
     if "sparse" in accessor or "bufferView" not in accessor:
         what = "sparse" if "sparse" in accessor else "without a buffer view"
-        raise Unreadable(finding("F003", f"{who} is {what}, which cannot be read; export without compression"))
+        raise Unreadable(F003.finding(f"{who} is {what}, which cannot be read; export without compression"))
     if accessor.get("type") != kind or accessor.get("componentType") not in _TYPES:
         found = f"{accessor.get('type')} of {accessor.get('componentType')}"
         raise _wrong(who, found, f"{kind} of a known type of numbers")
     view = _entry(document, "bufferViews", accessor["bufferView"], who)
     buffer = _entry(document, "buffers", view.get("buffer"), f"buffer view {accessor['bufferView']}")
     if "uri" in buffer or view.get("buffer") != 0:
-        raise Unreadable(finding("P007", f"the numbers of {who} are not in the file's own binary chunk"))
+        raise Unreadable(P007.finding(f"the numbers of {who} are not in the file's own binary chunk"))
     dtype = np.dtype(_TYPES[accessor["componentType"]])
     count, size = _count(accessor, "count"), width * dtype.itemsize
     stride = _count(view, "byteStride", size) or size
@@ -306,7 +307,7 @@ def _accessor(document: dict[str, Any], binary: memoryview, index: Any, kind: st
         raise _wrong(f"byteStride of {who}", stride, f"{size} or more")
     if count and (room < size or (room - size) // stride + 1 < count):
         text = f"{who} promises {counted(count, 'number')} of {size} bytes, its buffer has {max(room, 0)} bytes"
-        raise Unreadable(finding("F002", text))
+        raise Unreadable(F002.finding(text))
     if not count:
         return np.empty((0, width))
     numbers = np.ndarray((count, width), dtype, binary, begin + first, (stride, dtype.itemsize))

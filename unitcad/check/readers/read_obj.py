@@ -16,7 +16,8 @@ from unitcad.check.mesh import Mesh
 from unitcad.check.readers import rows
 from unitcad.check.readers.polygons import Polygons, mesh_of
 from unitcad.check.readers.rows import BLANK, JOINED, NEWLINE, SLASH, SPACE
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F005
+from unitcad.check.rules.p_package import P011
 from unitcad.geometry.arrays import Floats, Ints
 
 _ANY = re.compile(rb"(?m)^[ \t]*(?:v|f|o|g|mtllib|usemtl|#)\s")
@@ -41,7 +42,7 @@ def read_obj(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
     """The mesh of an OBJ file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh remains."""
     raw, findings = rows.plain(bytes(data))
     if not _ANY.search(raw):
-        raise Unreadable(finding("F005", "named .obj, but has no line of one"))
+        raise Unreadable(F005.finding("named .obj, but has no line of one"))
     raw = raw.replace(b"\\\n", b" \v")
     found = _Read()
     with keeping(findings):
@@ -118,7 +119,7 @@ def _take_faces(text: Ints, line: int, faces: Ints, above: Ints, found: _Read) -
         at = int(refs.lines[np.searchsorted(refs.starts, wrong[0], "right") - 1])
         said = ids[wrong[0]]
         why = f"vertex {said}, of {before[wrong[0]]} above it" if said else "vertex 0; OBJ counts from 1"
-        raise Unreadable(finding("P011", f"a face names {why}", places=[Location(line=at)]))
+        raise Unreadable(P011.finding(f"a face names {why}", places=[Location(line=at)]))
     found.corners.append(np.where(ids > 0, ids - 1, before + ids))
     found.sizes.append(sizes)
     found.lines.append(refs.lines)

@@ -12,7 +12,7 @@ from unitcad.check.mesh import Mesh
 from unitcad.check.readers import rows
 from unitcad.check.readers.polygons import Polygons, mesh_of
 from unitcad.check.readers.rows import Rows
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F002, F003, F005, F006
 
 _START = re.compile(rb"(?:\s|#[^\n]*\n)*([A-Z0-9]*)OFF(?![A-Z])", re.IGNORECASE)
 _KINDS = re.compile(rb"(?:ST)?C?N?", re.IGNORECASE)
@@ -23,11 +23,11 @@ def read_off(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
     raw, findings = rows.plain(bytes(data))
     start = _START.match(raw[:100_000])
     if start is None:
-        raise Unreadable(finding("F005", "named .off, but does not begin with OFF"))
+        raise Unreadable(F005.finding("named .off, but does not begin with OFF"))
     kind = start.group(1).decode("ascii").upper()
     if not _KINDS.fullmatch(start.group(1)) or raw[start.end() : start.end() + 40].split()[:1] == [b"BINARY"]:
         what = f"{kind}OFF" if kind else "binary OFF"
-        raise Unreadable(finding("F003", f"{what} cannot be read; OFF, COFF, NOFF, CNOFF and STOFF in text can"))
+        raise Unreadable(F003.finding(f"{what} cannot be read; OFF, COFF, NOFF, CNOFF and STOFF in text can"))
     with keeping(findings):
         found = rows.all_rows(raw, start.end(), raw.count(b"\n", 0, start.end()) + 1, deadline, comments=True)
         polygons, more = _polygons(found, len(raw), limits)
@@ -40,20 +40,20 @@ def _polygons(found: Rows, size: int, limits: Limits) -> tuple[Polygons, list[Fi
     sizes = found.sizes
     head = found.values[: sizes[0]] if len(found) else found.values
     if len(head) not in (2, 3) or (head != np.floor(head)).any() or (head < 0).any():
-        raise Unreadable(finding("F003", "the counts of vertices, faces and edges are missing"))
+        raise Unreadable(F003.finding("the counts of vertices, faces and edges are missing"))
     n, m = int(head[0]), int(head[1])
     if max(n, m) > 3 * limits.max_faces:
         raise over_limit(f"{max(n, m)} vertices or faces promised")
     if max(n, m) > size:
-        raise Unreadable(finding("F002", f"{max(n, m)} vertices or faces promised in {size} bytes"))
+        raise Unreadable(F002.finding(f"{max(n, m)} vertices or faces promised in {size} bytes"))
     lines = len(found) - 1
     if lines < n + m:
         text = f"the header promises {counted(n + m, 'line')} of vertices and faces, not {lines}"
-        raise Unreadable(finding("F002", text, n + m - lines))
+        raise Unreadable(F002.finding(text, n + m - lines))
     findings = []
     if lines > n + m:
         extra = lines - n - m
-        findings.append(finding("F006", f"{counted(extra, 'line')} after the last element", extra))
+        findings.append(F006.finding(f"{counted(extra, 'line')} after the last element", extra))
     points, faces = slice(1, n + 1), slice(n + 1, n + m + 1)
     begins, lines = found.starts[:-1][faces], found.lines[faces]
     numbers = rows.lengths(found.values[begins], sizes[faces] - 1, lines)

@@ -19,7 +19,7 @@ from unitcad.check.mesh import Mesh
 from unitcad.check.readers import rows
 from unitcad.check.readers.polygons import Polygons, mesh_of
 from unitcad.check.readers.rows import Rows
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F001, F002, F003, F005, F006
 from unitcad.geometry.arrays import Floats, Ints
 
 _TYPES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}
@@ -52,16 +52,16 @@ def read_ply(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
     if _TEXT.search(raw[:1000]):
         raw, findings = rows.plain(raw)
     if not raw.startswith(b"ply"):
-        raise Unreadable(finding("F005", "named .ply, but does not begin with ply"))
+        raise Unreadable(F005.finding("named .ply, but does not begin with ply"))
     if b"end_header" not in raw[:_HEADER]:
-        raise Unreadable(finding("F003", "the header has no end"))
+        raise Unreadable(F003.finding("the header has no end"))
     with keeping(findings):
         order, elements, at = _header(raw)
         largest = max((element.count for element in elements), default=0)
         if largest > 3 * limits.max_faces:
             raise over_limit(f"{largest} vertices or faces promised")
         if largest > len(raw):
-            raise Unreadable(finding("F002", f"{largest} vertices or faces promised in {len(raw)} bytes"))
+            raise Unreadable(F002.finding(f"{largest} vertices or faces promised in {len(raw)} bytes"))
         lines = None
         if order == "ascii":
             tables, lines, more = _text(raw, at, elements, deadline)
@@ -74,11 +74,11 @@ def read_ply(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
 
 def _polygons(elements: list[_Element], tables: dict[str, dict[str, Column]], lines: Ints | None) -> Polygons:
     if not any(element.name == "face" and element.count for element in elements):
-        raise Unreadable(finding("F001", "the file has no face"))
+        raise Unreadable(F001.finding("the file has no face"))
     points = [tables.get("vertex", {}).get(axis, (None, None)) for axis in "xyz"]
     sizes, corners = next(iter(tables["face"].values()), (None, None))
     if sizes is None or corners is None or any(column is None or of is not None for of, column in points):
-        raise Unreadable(finding("F003", "cannot be read as PLY: its elements are not those of a mesh"))
+        raise Unreadable(F003.finding("cannot be read as PLY: its elements are not those of a mesh"))
     vertices = np.stack([np.asarray(column, np.float64) for _, column in points], axis=1)
     indices = rows.integers(corners) if corners.dtype.kind == "f" else corners.astype(np.int64)
     return Polygons(vertices, indices, sizes, lines)
@@ -99,21 +99,21 @@ def _header(raw: bytes) -> tuple[str, list[_Element], int]:
             if len(words) != 3 or not words[2].isdecimal():
                 raise _no("element and count", words)
             if any(element.name == words[1] for element in elements):
-                raise Unreadable(finding("F003", f"the header names element {words[1][:30]} twice"))
+                raise Unreadable(F003.finding(f"the header names element {words[1][:30]} twice"))
             elements.append(_Element(words[1], int(words[2][:18]), []))
         elif words[:1] == ["property"] and elements:
             kinds = words[2:4] if words[1:2] == ["list"] else ["", *words[1:2]]
             if len(kinds) < 2 or any(kind not in _TYPES for kind in kinds if kind):
                 text = f"the header's line {' '.join(words)[:60]!r} is no property"
-                raise Unreadable(finding("F003", text))
+                raise Unreadable(F003.finding(text))
             elements[-1].properties.append((" ".join(words[-1:]), _TYPES.get(kinds[0], ""), _TYPES[kinds[1]]))
     if not order:
-        raise Unreadable(finding("F003", "the header names no format that is known"))
+        raise Unreadable(F003.finding("the header names no format that is known"))
     return order, elements, end + 1 if end >= 0 else len(raw)
 
 
 def _no(what: str, words: list[str]) -> Unreadable:
-    return Unreadable(finding("F003", f"the header's line {' '.join(words)[:60]!r} names no {what}"))
+    return Unreadable(F003.finding(f"the header's line {' '.join(words)[:60]!r} names no {what}"))
 
 
 def _text(
@@ -126,7 +126,7 @@ def _text(
         text = (
             f"the header promises {counted(promised, 'line')} of vertices, faces and other elements, not {len(found)}"
         )
-        raise Unreadable(finding("F002", text, promised - len(found)))
+        raise Unreadable(F002.finding(text, promised - len(found)))
     extra, longer, tables, lines, row = len(found) - promised, 0, {}, None, 0
     for element in elements:
         which = slice(row, row + element.count)
@@ -134,11 +134,9 @@ def _text(
         longer += more
         lines = found.lines[which] if element.name == "face" else lines
         row += element.count
-    findings = [finding("F006", f"{counted(extra, 'line')} after the last element", extra)] if extra else []
+    findings = [F006.finding(f"{counted(extra, 'line')} after the last element", extra)] if extra else []
     if longer:  # as MeshLab writes, which announces colours of faces and writes a list
-        findings.append(
-            finding("F006", f"{counted(longer, 'line')} with more numbers than the properties take", longer)
-        )
+        findings.append(F006.finding(f"{counted(longer, 'line')} with more numbers than the properties take", longer))
     return tables, lines, findings
 
 
@@ -163,7 +161,7 @@ def _refuse(wrong: Ints, element: _Element, lines: Ints) -> None:
     """Raises `Unreadable` (F003) where a record of the element has more or fewer numbers than its properties."""
     if wrong.any():
         text = f"a {element.name} with more or fewer numbers than its properties take"
-        raise Unreadable(finding("F003", text, int(wrong.sum()), [Location(line=int(lines[int(np.argmax(wrong))]))]))
+        raise Unreadable(F003.finding(text, int(wrong.sum()), [Location(line=int(lines[int(np.argmax(wrong))]))]))
 
 
 def _binary(
@@ -177,7 +175,7 @@ def _binary(
         else:
             tables[element.name], at = _records(raw, at, element, order)
     extra = len(raw) - at
-    more = [finding("F006", f"{counted(extra, 'byte')} after the last element", extra)] if extra else []
+    more = [F006.finding(f"{counted(extra, 'byte')} after the last element", extra)] if extra else []
     return tables, more
 
 
@@ -263,4 +261,4 @@ def _walked(raw: bytes, at: int, element: _Element, order: str, deadline: Deadli
 
 def _short(element: _Element, room: int) -> Unreadable:
     text = f"the header promises {counted(element.count, f'{element.name} record')}, the file has room for {room}"
-    return Unreadable(finding("F002", text, max(element.count - room, 1)))
+    return Unreadable(F002.finding(text, max(element.count - room, 1)))

@@ -11,10 +11,12 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from unitcad import children
-from unitcad.check.findings import Facts, Finding, counted, number
+from unitcad.check.findings import Facts, Finding, number
 from unitcad.check.limits import Limits, Unreadable, over_limit
 from unitcad.check.options import Options
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F003, F005, F011, F012
+from unitcad.check.rules.g_crossing import G001
+from unitcad.check.rules.g_shells import G007, T008, expected
 
 NEEDS = "STEP needs the extra build123d or cadquery: pip install 'unitcad[build123d]'"
 
@@ -28,22 +30,20 @@ def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Fin
     """Findings about a STEP file's text and, with OCP there, about its solids."""
     _text(data, options.limits)
     if not installed():
-        raise Unreadable(finding("F012", NEEDS))
+        raise Unreadable(F012.finding(NEEDS))
     said = _from_child(path, options.limits.seconds)
     if not said:
-        raise Unreadable(finding("F003", "the STEP file holds no shape that can be read"))
+        raise Unreadable(F003.finding("the STEP file holds no shape that can be read"))
     solids, volume = said["solids"], said["volume"]
     findings: list[Finding] = []
     if not said["valid"]:
-        findings.append(finding("G001", "the B-rep is not valid by BRepCheck"))
+        findings.append(G001.finding("the B-rep is not valid by BRepCheck"))
     facts = Facts(shells=solids, volume_mm3=volume, area_mm2=said["area"], bbox_mm=said["box"], watertight=solids > 0)
     if not solids:
-        findings.append(finding("G007", "no solid in the file"))
+        findings.append(G007.finding("no solid in the file"))
     elif volume < 0:
-        findings.append(finding("T008", f"volume {number(volume)} mm3"))
-    if options.shells is not None and solids != options.shells:
-        text = f"{counted(solids, 'solid')}, {options.shells} expected"
-        findings.append(finding("G005", text, abs(solids - options.shells)))
+        findings.append(T008.finding(f"volume {number(volume)} mm3"))
+    findings += expected(solids, options.shells, "solid")
     return findings, facts
 
 
@@ -59,8 +59,8 @@ def _from_child(path: Path, seconds: float) -> dict[str, Any]:
             return json.loads(out.read_text("utf-8"))
     last = done.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
     if last.startswith(("ImportError", "ModuleNotFoundError")):
-        raise Unreadable(finding("F012", f"{NEEDS} ({last[:200]})"))
-    raise Unreadable(finding("F003", f"the STEP reader died of the file (exit code {done.returncode})"))
+        raise Unreadable(F012.finding(f"{NEEDS} ({last[:200]})"))
+    raise Unreadable(F003.finding(f"the STEP reader died of the file (exit code {done.returncode})"))
 
 
 _CHILD = "import sys; from unitcad.check.readers.read_step import measure; measure(sys.argv[1], sys.argv[2])"
@@ -107,8 +107,8 @@ def _box(shape: Any) -> tuple[tuple[float, float, float], tuple[float, float, fl
 def _text(data: memoryview, limits: Limits) -> None:
     """Begin and end of ISO 10303-21, before OCCT sees the file: it must not be handed a fragment."""
     if bytes(data[:12]) != b"ISO-10303-21":
-        raise Unreadable(finding("F005", "named STEP, but does not begin with ISO-10303-21"))
+        raise Unreadable(F005.finding("named STEP, but does not begin with ISO-10303-21"))
     if b"END-ISO-10303-21" not in bytes(data[-2000:]):
-        raise Unreadable(finding("F003", "the text ends before END-ISO-10303-21"))
+        raise Unreadable(F003.finding("the text ends before END-ISO-10303-21"))
     if len(data) > limits.max_bytes:
-        raise Unreadable(finding("F011", f"more than {limits.max_bytes} bytes"))
+        raise Unreadable(F011.finding(f"more than {limits.max_bytes} bytes"))

@@ -16,7 +16,9 @@ from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.mesh import Mesh, weld_exact
 from unitcad.check.readers.rows import NUMBER
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F001, F002, F003, F004, F005, F006, F007, F008, F009, F010
+from unitcad.check.rules.rule import Rule
+from unitcad.check.rules.v_values import V001
 from unitcad.geometry.arrays import Floats
 
 RECORD = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -33,33 +35,31 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
     """The mesh of an STL file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh remains."""
     size = len(data)
     if size == 0:
-        raise Unreadable(finding("F001", "the file is empty"))
+        raise Unreadable(F001.finding("the file is empty"))
     head = bytes(data[: min(size, 2048)])
     if _is_text(head, data):
         return _read_text(data, limits, deadline)
     if not head.translate(None, _PRINTABLE) and size != 84 + 50 * int.from_bytes(data[80:84], "little"):
         first = head.split(None, 1)[0][:20].decode("utf-8", "replace") if head.strip() else ""
-        raise Unreadable(finding("F005", f"text that does not begin with solid but with {first!r}"))
+        raise Unreadable(F005.finding(f"text that does not begin with solid but with {first!r}"))
     if size < 84:
-        raise Unreadable(finding("F001", f"{counted(size, 'byte')}: shorter than a binary STL's header of 84"))
+        raise Unreadable(F001.finding(f"{counted(size, 'byte')}: shorter than a binary STL's header of 84"))
     count = int.from_bytes(data[80:84], "little")
     findings: list[Finding] = []
     if head[:5].lower() == b"solid":
-        findings.append(finding("F007", "the binary header starts with 'solid'"))
+        findings.append(F007.finding("the binary header starts with 'solid'"))
     room, rest = divmod(size - 84, 50)
     if count > room:
         findings.append(
-            finding(
-                "F002", f"the header promises {counted(count, 'facet')}, the file has room for {room}", count - room
-            )
+            F002.finding(f"the header promises {counted(count, 'facet')}, the file has room for {room}", count - room)
         )
     elif count < room and (rest == 0 and any(data[84 + 50 * count : 84 + 50 * count + 100])):
         findings.append(
-            finding("F002", f"the header promises {counted(count, 'facet')}, the file holds {room}", room - count)
+            F002.finding(f"the header promises {counted(count, 'facet')}, the file holds {room}", room - count)
         )
     elif size > 84 + 50 * count:
         extra = size - 84 - 50 * count
-        findings.append(finding("F006", f"{counted(extra, 'byte')} after the last facet", extra))
+        findings.append(F006.finding(f"{counted(extra, 'byte')} after the last facet", extra))
     facets = min(count, room)
     if count > room and room:
         raise Unreadable(*findings)  # a geometry of what is left would only blame the wrong thing
@@ -68,7 +68,7 @@ def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
             *findings, over_limit(f"{counted(facets, 'face')}, more than --max-faces {limits.max_faces}").findings[0]
         )
     if facets == 0:
-        raise Unreadable(*findings, finding("F001", "the file has no facet"))
+        raise Unreadable(*findings, F001.finding("the file has no facet"))
     records = np.frombuffer(data, RECORD, facets, 84)
     deadline.tick()
     corners = records["corners"]
@@ -95,8 +95,7 @@ def _is_text(head: bytes, data: memoryview) -> bool:
 
 def _not_finite(good: Floats) -> Finding:
     bad = np.flatnonzero(~good)
-    return finding(
-        "V001",
+    return V001.finding(
         f"{counted(len(bad), 'face')} with a vertex that is not finite",
         len(bad),
         (Location(face=int(i)) for i in bad),
@@ -122,11 +121,11 @@ def _read_text(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[li
     _walk(raw, found, limits, deadline)
     if found.nested:  # one finding for all of them: a file may have a hundred thousand
         places = [Location(line=line) for line in found.nested_at]
-        found.findings.append(finding("F003", "solid begins before the last one ended", found.nested, places))
+        found.findings.append(F003.finding("solid begins before the last one ended", found.nested, places))
     if not found.facets:
-        raise Unreadable(*found.findings, finding("F001", "the file has no facet"))
+        raise Unreadable(*found.findings, F001.finding("the file has no facet"))
     if found.solids > 1:
-        found.findings.append(finding("F010", f"{found.solids} solids in one file", found.solids))
+        found.findings.append(F010.finding(f"{found.solids} solids in one file", found.solids))
     corners = np.concatenate(found.corners) if found.corners else np.empty((0, 3, 3))
     normals = np.concatenate(found.normals) if found.normals else np.empty((0, 3))
     if not len(corners) or any(item.code == "F004" for item in found.findings):
@@ -145,19 +144,19 @@ def _read_text(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[li
 def _decoded(raw: bytes, findings: list[Finding]) -> bytes:
     """The text as bytes with LF line ends, whatever it was stored as; oddities become findings."""
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        findings.append(finding("F009", "UTF-16 text with a byte order mark"))
+        findings.append(F009.finding("UTF-16 text with a byte order mark"))
         raw = raw.decode("utf-16", "replace").encode("utf-8")
     elif raw[:3] == b"\xef\xbb\xbf":
-        findings.append(finding("F009", "a UTF-8 byte order mark at the start"))
+        findings.append(F009.finding("a UTF-8 byte order mark at the start"))
         raw = raw[3:]
     if not raw.isascii():
         try:
             raw.decode("utf-8")
         except UnicodeDecodeError as error:
-            findings.append(finding("F009", f"bytes that are not UTF-8, first at {error.start}"))
+            findings.append(F009.finding(f"bytes that are not UTF-8, first at {error.start}"))
     if b"\r" in raw:
         if b"\n" not in raw:
-            findings.append(finding("F009", "CR-only line ends"))
+            findings.append(F009.finding("CR-only line ends"))
         raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return raw
 
@@ -185,21 +184,21 @@ def _walk(raw: bytes, found: _Text, limits: Limits, deadline: Deadline) -> None:
         elif word == b"facet":
             if not inside:
                 what = "after endsolid" if found.solids else "without a solid line"
-                found.findings.append(_at("F003", f"facets {what}", raw, at))
+                found.findings.append(_at(F003, f"facets {what}", raw, at))
                 found.solids, inside = found.solids + 1, True
             at = _facets(raw, at, found, limits, deadline)
             if at < 0:
                 return
         else:
-            code, what = ("F003", "unexpected") if inside else ("F006", "after endsolid:")
-            if code == "F006" and found.facets:
-                found.findings.append(_at(code, f"{counted(end - at, 'byte')} after endsolid", raw, at))
+            rule, what = (F003, "unexpected") if inside else (F006, "after endsolid:")
+            if rule is F006 and found.facets:
+                found.findings.append(_at(rule, f"{counted(end - at, 'byte')} after endsolid", raw, at))
                 return
             shown = raw[at : min(line_end, at + 30)].decode("utf-8", "replace")
-            found.findings.append(_at("F003", f"{what} {shown!r}", raw, at))
+            found.findings.append(_at(F003, f"{what} {shown!r}", raw, at))
             return
     if inside:
-        found.findings.append(_at("F003", "the text ends before endsolid", raw, end))
+        found.findings.append(_at(F003, "the text ends before endsolid", raw, end))
 
 
 def _skip_blank(raw: bytes, at: int) -> int:
@@ -260,7 +259,7 @@ def _slow_numbers(texts: list[bytes], found: _Text) -> Floats:
             shown = text[:30].decode("utf-8", "replace")
             why = " (a decimal comma)" if b"," in text else ""
             place = [Location(face=found.facets + i)]
-            found.findings.append(finding("F004", f"{shown!r} is not a number{why}", places=place))
+            found.findings.append(F004.finding(f"{shown!r} is not a number{why}", places=place))
     return values
 
 
@@ -283,16 +282,16 @@ def _explain(raw: bytes, at: int, cut: int, found: _Text, limits: Limits) -> int
             shown = word[:30].decode("utf-8", "replace")
             if wanted or word in _KEYWORDS:
                 said = b" or ".join(wanted).decode() or "a number"
-                found.findings.append(_at("F003", f"{shown!r} where {said} belongs", raw, here))
+                found.findings.append(_at(F003, f"{shown!r} where {said} belongs", raw, here))
                 return -1
             why = " (a decimal comma)" if b"," in word else ""
-            found.findings.append(_at("F004", f"{shown!r} is not a number{why}", raw, here))
+            found.findings.append(_at(F004, f"{shown!r} is not a number{why}", raw, here))
         if place == 0:
             start, vertices = here, 0
             found.facets += 1
         vertices += place == _VERTEX
         if place == _LOOP_END and vertices != 3:
-            found.findings.append(_at("F008", f"a facet with {counted(vertices, 'vertex', 'vertices')}", raw, start))
+            found.findings.append(_at(F008, f"a facet with {counted(vertices, 'vertex', 'vertices')}", raw, start))
         place = (place + 1) % len(_GRAMMAR)
         if len(found.findings) > 50 or found.facets > limits.max_faces:
             return -1
@@ -300,10 +299,10 @@ def _explain(raw: bytes, at: int, cut: int, found: _Text, limits: Limits) -> int
         if place == 0:
             return -1
     if raw[cut:].strip():
-        found.findings.append(_at("F003", "the solid ends inside a facet", raw, _skip_blank(raw, cut)))
+        found.findings.append(_at(F003, "the solid ends inside a facet", raw, _skip_blank(raw, cut)))
     else:
         inside = "inside a facet" if place else "before endsolid"
-        found.findings.append(_at("F003", f"the text ends {inside}", raw, len(raw.rstrip())))
+        found.findings.append(_at(F003, f"the text ends {inside}", raw, len(raw.rstrip())))
     return -1
 
 
@@ -325,5 +324,5 @@ def _is_number(word: bytes) -> bool:
     return bool(NUMBER.fullmatch(word) or _NAN_SPELLINGS.match(word))
 
 
-def _at(code: str, message: str, raw: bytes, place: int) -> Finding:
-    return finding(code, message, places=[Location(line=raw.count(b"\n", 0, place) + 1)])
+def _at(rule: Rule, message: str, raw: bytes, place: int) -> Finding:
+    return rule.finding(message, places=[Location(line=raw.count(b"\n", 0, place) + 1)])

@@ -14,7 +14,7 @@ import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Unreadable
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F003, F004, F009
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
@@ -58,11 +58,11 @@ def plain(raw: bytes) -> tuple[bytes, list[Finding]]:
     """A text with LF line ends and without a byte order mark; what had to be changed is a finding."""
     found = []
     if raw[:3] == b"\xef\xbb\xbf":
-        found.append(finding("F009", "a UTF-8 byte order mark at the start"))
+        found.append(F009.finding("a UTF-8 byte order mark at the start"))
         raw = raw[3:]
     if b"\r" in raw:
         if b"\n" not in raw:
-            found.append(finding("F009", "CR-only line ends"))
+            found.append(F009.finding("CR-only line ends"))
         raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return raw.replace(b"\v", b" "), found
 
@@ -147,7 +147,7 @@ def columns(found: Rows, which: slice, most: int) -> Floats:
     short = np.flatnonzero(sizes < most)
     if len(short):
         text = f"a vertex with {counted(int(sizes[short[0]]), 'number')}"
-        raise Unreadable(finding("F003", text, len(short), [Location(line=int(lines[short[0]]))]))
+        raise Unreadable(F003.finding(text, len(short), [Location(line=int(lines[short[0]]))]))
     return found.values[found.starts[:-1][which, None] + np.arange(most)]
 
 
@@ -158,7 +158,7 @@ def lengths(counts: Floats, room: Ints, lines: Ints, what: str = "face") -> Ints
         row = int(bad[0])
         of = f"{counts[row]:.15g}"
         text = f"a {what} of {of} {'vertex' if of == '1' else 'vertices'} names {max(int(room[row]), 0)}"
-        raise Unreadable(finding("F003", text, len(bad), [Location(line=int(lines[row]))]))
+        raise Unreadable(F003.finding(text, len(bad), [Location(line=int(lines[row]))]))
     return counts.astype(np.int64)
 
 
@@ -166,7 +166,7 @@ def integers(values: Floats) -> Ints:
     """Indices from numbers. Raises `Unreadable` (F004) for one that is no integer."""
     bad = np.flatnonzero(~((values == np.floor(values)) & (np.abs(values) < 2**53)))
     if len(bad):
-        raise Unreadable(finding("F004", f"'{values[bad[0]]:.15g}' is not a vertex's index", len(bad)))
+        raise Unreadable(F004.finding(f"'{values[bad[0]]:.15g}' is not a vertex's index", len(bad)))
     return values.astype(np.int64)
 
 
@@ -208,6 +208,6 @@ def _slowly(block: Ints, line: int, integers: bool) -> Floats:
             shown = word[:30].decode("utf-8", "replace")
             why = "a vertex's index" if integers else "a number (a decimal comma)" if b"," in word else "a number"
             at = line + sum(text.count(mark, 0, match.start()) for mark in (b"\n", b"\v"))
-            raise Unreadable(finding("F004", f"{shown!r} is not {why}", places=[Location(line=at)]))
+            raise Unreadable(F004.finding(f"{shown!r} is not {why}", places=[Location(line=at)]))
         values.append(int(word) if integers else float(word))
     return np.array(values, np.int64 if integers else np.float64)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from unitcad.check.findings import Finding, Location
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Floats, Ints
 
 LINE = 7  # column of a triangle's line
@@ -73,16 +73,16 @@ class Model:
     strict: bool = False
     where: Callable[[], Location] = Location
 
-    def say(self, code: str, message: str, severity: str | None = None, line: int | None = None) -> None:
+    def say(self, rule: Rule, message: str, severity: str | None = None, line: int | None = None) -> None:
         """Add a finding about this part, placed by `where`, or at `line`."""
         if len(self.findings) < _NOTED:
             place = replace(self.where(), part=self.part)
             place = place if line is None else replace(place, line=line)
-            self.findings.append(finding(code, message, 1, [place], severity))
+            self.findings.append(rule.finding(message, 1, [place], severity))
 
-    def say_lenient(self, code: str, message: str) -> None:
+    def say_lenient(self, rule: Rule, message: str) -> None:
         """Add a finding that real programs' files have: a warning unless the model is judged strictly."""
-        self.say(code, message, None if self.strict else "warning")
+        self.say(rule, message, None if self.strict else "warning")
 
     def objects(self) -> dict[int, Object]:
         """The object resources by id."""

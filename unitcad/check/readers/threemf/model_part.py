@@ -17,7 +17,9 @@ from unitcad.check.mesh import LARGEST
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Use
 from unitcad.check.readers.threemf.xml_stream import forbidden, new_parser, stream
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F004
+from unitcad.check.rules.p_package import P010, P013, P015, P016, P017, P018
+from unitcad.check.rules.v_values import V001
 from unitcad.geometry.arrays import Floats, Ints
 
 _BATCH = 50_000
@@ -94,7 +96,7 @@ class _Reader:
                 self._foreign(int(attributes["id"]))
             for attribute in attributes:
                 if why := forbidden(attribute):
-                    self.model.say("P017", f"{why} in <{local}>")
+                    self.model.say(P017, f"{why} in <{local}>")
             self.skip = 1
             return
         good = self._attributes(local, rules, attributes)
@@ -112,7 +114,7 @@ class _Reader:
             return
         for child, least, _most in done.rules.children:
             if done.counts.get(child, 0) < least and not (child == "triangles" and self._lattice()):
-                self.model.say("P017", f"<{done.name}> lacks <{child}>")
+                self.model.say(P017, f"<{done.name}> lacks <{child}>")
         if done.space == elements.CORE and done.name == "vertices":
             self._flush_vertices()
         elif done.space == elements.CORE and done.name == "triangles":
@@ -131,20 +133,20 @@ class _Reader:
         """Whether this child may stand here, and in this order."""
         parent = self.stack[-1]
         if parent is _LEAF:
-            self.model.say("P017", f"<{local}> inside <vertex>")
+            self.model.say(P017, f"<{local}> inside <vertex>")
             return
         if not parent.name:
             if (space, local) != (elements.CORE, "model"):
                 raise Unreadable(
-                    finding("P017", f"the root is <{local}> in {space or 'no namespace'!r}, not the core's <model>",
+                    P017.finding(f"the root is <{local}> in {space or 'no namespace'!r}, not the core's <model>",
                             places=[Location(part=self.model.part)])
                 )  # fmt: skip
             return
         if space != parent.space:
             if not space:
-                self.model.say("P017", f"<{local}> without a namespace")
+                self.model.say(P017, f"<{local}> without a namespace")
             elif space == elements.CORE:
-                self.model.say("P017", f"<{local}> inside <{parent.name}>")
+                self.model.say(P017, f"<{local}> inside <{parent.name}>")
             return
         assert parent.rules is not None
         for place, (name, _, most) in enumerate(parent.rules.children):
@@ -152,42 +154,42 @@ class _Reader:
                 continue
             parent.counts[name] = parent.counts.get(name, 0) + 1
             if parent.counts[name] == most + 1:
-                self.model.say("P017", f"<{parent.name}> has <{local}> more than once")
+                self.model.say(P017, f"<{parent.name}> has <{local}> more than once")
             if parent.rules.ordered and place < parent.last:
-                self.model.say("P017", f"<{local}> is out of order in <{parent.name}>")
+                self.model.say(P017, f"<{local}> is out of order in <{parent.name}>")
             parent.last = max(parent.last, place)
             return
         if space in (elements.CORE, elements.MATERIAL, elements.SLICE, elements.BEAM) and not (
             rules is not None and parent.name == "resources"
         ):
-            self.model.say("P017", f"<{local}> inside <{parent.name}>")
+            self.model.say(P017, f"<{local}> inside <{parent.name}>")
 
     def _attributes(self, local: str, rules: elements.Rules, attributes: dict[str, str]) -> bool:
         """Check them; whether all required ones are there and well typed."""
         good = True
         for name in rules.required:
             if name not in attributes:
-                self.model.say("P017", f"<{local}> lacks {name}")
+                self.model.say(P017, f"<{local}> lacks {name}")
                 good = False
         for name, value in attributes.items():
             test = rules.required.get(name) or rules.optional.get(name)
             if test is not None:
                 if not test(value):
-                    self.model.say("P017", f'{name}="{value[:40]}" of <{local}> is not of its type')
+                    self.model.say(P017, f'{name}="{value[:40]}" of <{local}> is not of its type')
                     good = good and name not in rules.required
             elif why := forbidden(name):
-                self.model.say("P017", f"{why} in <{local}>")
+                self.model.say(P017, f"{why} in <{local}>")
             elif name.startswith("http://www.w3.org/XML/1998/namespace ") and local != "model":
-                self.model.say("P017", f"attribute xml:lang in <{local}>")
+                self.model.say(P017, f"attribute xml:lang in <{local}>")
             elif " " not in name:
-                self.model.say_lenient("P017", f"unknown attribute {name!r} of <{local}>")
+                self.model.say_lenient(P017, f"unknown attribute {name!r} of <{local}>")
             elif not rules.open_ and " " in name:
-                self.model.say("P017", f"attribute {name.split()[-1]!r} of <{local}>, which takes none of others")
+                self.model.say(P017, f"attribute {name.split()[-1]!r} of <{local}>, which takes none of others")
         return good
 
     def _foreign(self, id_: int) -> None:
         if id_ in self.model.resources or id_ in self.model.foreign:
-            self.model.say("P018", f"id {id_} twice")
+            self.model.say(P018, f"id {id_} twice")
         self.model.foreign.add(id_)
 
     def _take(self, space: str, local: str, attributes: dict[str, str]) -> None:
@@ -210,7 +212,7 @@ class _Reader:
 
     def _resource(self, resource: Resource) -> None:
         if resource.id in self.model.resources or resource.id in self.model.foreign:
-            self.model.say("P018", f"id {resource.id} twice")
+            self.model.say(P018, f"id {resource.id} twice")
         resource.line = self.parser.CurrentLineNumber
         self.model.resources.setdefault(resource.id, resource)
         self.resource = resource
@@ -218,25 +220,25 @@ class _Reader:
     def _take_model(self, attributes: dict[str, str]) -> None:
         self.model.unit = attributes.get("unit", "millimeter")
         if self.model.unit not in elements.UNITS:
-            self.model.say("P010", f"unit {self.model.unit[:40]!r}")
+            self.model.say(P010, f"unit {self.model.unit[:40]!r}")
         self.model.required = attributes.get("requiredextensions", "").split()
         for prefix in self.model.required:
             uri = self.model.namespaces.get(prefix)
             if uri is None:
-                self.model.say("P016", f"required extension {prefix!r} has no namespace")
+                self.model.say(P016, f"required extension {prefix!r} has no namespace")
             elif uri not in elements.KNOWN:
-                self.model.say("P016", f"required extension {uri!r} is not known")
+                self.model.say(P016, f"required extension {uri!r} is not known")
 
     def _take_metadata(self, attributes: dict[str, str]) -> None:
         name = attributes["name"]
         prefix, colon, _ = name.partition(":")
         if not name.strip() or name.lower() in _PLACEHOLDERS:
-            self.model.say("P017", f"metadata without a name ({name!r})")
+            self.model.say(P017, f"metadata without a name ({name!r})")
         elif colon and prefix not in self.model.namespaces:
-            self.model.say("P017", f"metadata name {name!r} has no namespace")
+            self.model.say(P017, f"metadata name {name!r} has no namespace")
         if self.stack[-2].name == "model":
             if name in self.names:
-                self.model.say_lenient("P017", f"metadata {name!r} twice")
+                self.model.say_lenient(P017, f"metadata {name!r} twice")
             self.names.add(name)
 
     def _take_basematerials(self, attributes: dict[str, str]) -> None:
@@ -276,7 +278,7 @@ class _Reader:
             raise over_limit(f"more items and components than the limit of {self.limits.max_instances} instances")
         uuid = attributes.get(f"{elements.PRODUCTION} UUID")
         if uuid is not None and not elements.uuid(uuid):
-            self.model.say("P017", f"UUID {uuid[:40]!r} is none")
+            self.model.say(P017, f"UUID {uuid[:40]!r} is none")
         path = attributes.get(f"{elements.PRODUCTION} path", "")
         matrix = self._matrix(attributes.get("transform"))
         return Use(
@@ -292,20 +294,20 @@ class _Reader:
         if len(parts) == 12 and all(elements.number(part) for part in parts):
             found = np.array([float(part) for part in parts]).reshape(4, 3)
             if not (np.abs(found) <= LARGEST).all():
-                self.model.say("P013", f'transform="{said[:60]}" is not twelve float32 numbers')
+                self.model.say(P013, f'transform="{said[:60]}" is not twelve float32 numbers')
                 return identity
             if (linear := tuple(parts[:9])) not in self.regular:  # most items of a build differ by their shift only
                 det = float(np.linalg.det(found[:3]))
                 scale = float(np.prod(np.linalg.norm(found[:3], axis=1)))
                 if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
-                    self.model.say("P013", "a transform has determinant zero")
+                    self.model.say(P013, "a transform has determinant zero")
                 elif det < 0:
-                    self.model.say("P015", "a transform mirrors")
+                    self.model.say(P015, "a transform mirrors")
                 else:
                     self.regular.add(linear)
             return found
-        code = "P013" if len(parts) == 12 and any(part.lower() in _NAMES for part in parts) else "P017"
-        self.model.say(code, f'transform="{said[:60]}" is not twelve numbers')
+        rule = P013 if len(parts) == 12 and any(part.lower() in _NAMES for part in parts) else P017
+        self.model.say(rule, f'transform="{said[:60]}" is not twelve numbers')
         return identity
 
     def _take_lattice(self, local: str, attributes: dict[str, str]) -> None:
@@ -334,7 +336,7 @@ class _Reader:
             values = np.array([self._number(said, self.lines[i // 3]) for i, said in enumerate(self.numbers)])
         bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if len(bad):
-            self.model.say("V001", "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
+            self.model.say(V001, "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
             values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
         self.vertices.append(values.reshape(-1, 3))
         self.numbers, self.lines = [], []
@@ -348,7 +350,7 @@ class _Reader:
         if said.lower() in _NAMES:
             return math.nan
         why = " (a decimal comma)" if "," in said else ""
-        self.model.say("F004", f"{said[:40]!r} is not a number{why}", line=line)
+        self.model.say(F004, f"{said[:40]!r} is not a number{why}", line=line)
         return 0.0
 
     def _flush_triangles(self) -> None:
@@ -365,9 +367,9 @@ class _Reader:
 
     def _close_object(self, found: Object) -> None:
         if found.vertices is None and not found.components and not found.other_shape:
-            self.model.say("P017", f"object {found.id} has neither mesh nor components")
+            self.model.say(P017, f"object {found.id} has neither mesh nor components")
         if found.vertices is not None and found.components:
-            self.model.say("P017", f"object {found.id} has a mesh and components")
+            self.model.say(P017, f"object {found.id} has a mesh and components")
 
 
 # Extensions whose elements take the place of an object's mesh.

@@ -17,7 +17,9 @@ from urllib.parse import unquote
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Limits, OutOfTime, Unreadable, over_limit
 from unitcad.check.readers.threemf.xml_stream import Element, read_small
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F003, F006
+from unitcad.check.rules.p_package import P001, P002, P003, P004, P005, P007, P008
+from unitcad.check.rules.rule import Rule
 
 CONTENT_TYPES = "[Content_Types].xml"
 _PACKAGE = "http://schemas.openxmlformats.org/package/2006/"
@@ -60,21 +62,21 @@ class Package:
     spent: int = 0
     strict: bool = False
 
-    def say(self, code: str, message: str, part: str | None = None, severity: str | None = None) -> None:
-        """Add a finding of rule `code` about a part."""
+    def say(self, rule: Rule, message: str, part: str | None = None, severity: str | None = None) -> None:
+        """Add a finding about a part."""
         places = [Location(part=self.shown(part))] if part else ()
-        self.findings.append(finding(code, message, places=places, severity=severity))
+        self.findings.append(rule.finding(message, places=places, severity=severity))
 
-    def say_lenient(self, code: str, message: str, part: str | None = None) -> None:
+    def say_lenient(self, rule: Rule, message: str, part: str | None = None) -> None:
         """Add a finding that real programs' files have: a warning unless the package is judged strictly."""
-        self.say(code, message, part, None if self.strict else "warning")
+        self.say(rule, message, part, None if self.strict else "warning")
 
     def chunks(self, name: str) -> Iterator[bytes]:
         """A part's bytes, inflated piece by piece within the limits. Raises `Unreadable`."""
         info = self.parts[name]
         if info.flag_bits & 1 or info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             what = "encrypted" if info.flag_bits & 1 else f"packed with method {info.compress_type}"
-            raise Unreadable(finding("P008", f"{info.filename} is {what}", places=[Location(part=info.filename)]))
+            raise Unreadable(P008.finding(f"{info.filename} is {what}", places=[Location(part=info.filename)]))
         try:
             with self.archive.open(info) as stream:
                 while piece := stream.read(_CHUNK):
@@ -93,7 +95,7 @@ class Package:
             ValueError,
         ) as error:
             text = f"{info.filename} cannot be unpacked: {error}"
-            raise Unreadable(finding("F003", text, places=[Location(part=info.filename)])) from error
+            raise Unreadable(F003.finding(text, places=[Location(part=info.filename)])) from error
 
     def shown(self, name: str) -> str:
         """A part's name as the package writes it; `parts` has it in lower case, since OPC compares names so."""
@@ -110,23 +112,23 @@ class Package:
         rels = posixpath.join(folder, "_rels", f"{base}.rels")
         if rels not in self.parts:
             return []
-        root = self.xml(rels, "P002")
+        root = self.xml(rels, P002)
         if root is None:
             return []
         if root.name != f"{_PACKAGE}relationships Relationships":
-            self.say("P002", "the root is not Relationships", rels)
+            self.say(P002, "the root is not Relationships", rels)
             return []
         return list(self._read_relations(root, folder, rels))
 
-    def xml(self, name: str, code: str) -> Element | None:
-        """A small XML part as a tree, or None with a finding (rule `code`, or what the XML itself breaks)."""
+    def xml(self, name: str, rule: Rule) -> Element | None:
+        """A small XML part as a tree, or None with a finding (of `rule`, or what the XML itself breaks)."""
         try:
             return read_small(self.chunks(name), self.shown(name))
         except OutOfTime:
             raise
         except Unreadable as stop:
             self.findings += [
-                finding(code, item.message, places=item.locations) if item.code == "F003" else item
+                rule.finding(item.message, places=item.locations) if item.code == F003.code else item
                 for item in stop.findings
             ]
             return None
@@ -137,20 +139,20 @@ class Package:
             attributes = child.attributes
             kind, target, id_ = (attributes.get(key, "") for key in ("Type", "Target", "Id"))
             if child.name != f"{_PACKAGE}relationships Relationship" or not (kind and target and id_):
-                self.say("P002", "a relationship needs Id, Type and Target", rels)
+                self.say(P002, "a relationship needs Id, Type and Target", rels)
                 continue
             if id_ in ids:
-                self.say("P002", f"relationship Id {id_!r} twice", rels)
+                self.say(P002, f"relationship Id {id_!r} twice", rels)
             ids.add(id_)
             if attributes.get("TargetMode", "Internal") != "Internal" or _SCHEME.match(target) or target[:2] == "//":
-                self.say("P007", f"target {target!r}", rels)
+                self.say(P007, f"target {target!r}", rels)
                 continue
             path = target if target.startswith("/") else posixpath.join("/", folder, target)
             part = posixpath.normpath(unquote(path)).lstrip("/").lower()
             if kind in KNOWN and part not in self.parts:
-                code = "P003" if kind == START and rels == "_rels/.rels" else "P002"
+                rule = P003 if kind == START and rels == "_rels/.rels" else P002
                 say = self.say_lenient if kind == THUMBNAIL else self.say
-                say(code, f"target {target!r} is not in the package", rels)
+                say(rule, f"target {target!r} is not in the package", rels)
                 continue
             yield Relation(kind, part, target)
 
@@ -160,28 +162,28 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError) as error:
-        raise Unreadable(finding("F003", f"the zip cannot be read: {error}")) from error
+        raise Unreadable(F003.finding(f"the zip cannot be read: {error}")) from error
     package = Package(archive, limits, deadline, strict=strict)
     if extra := _after_the_end(data):
-        package.findings.append(finding("F006", f"{counted(extra, 'byte')} after the zip's end record", extra))
+        package.findings.append(F006.finding(f"{counted(extra, 'byte')} after the zip's end record", extra))
     entries = archive.infolist()
     if len(entries) > limits.max_entries:
         raise over_limit(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
     bombs = []
     for info in entries:
         if why := _unsafe(info.filename):
-            package.say("P005", f"{info.filename!r} {why}", info.filename)
+            package.say(P005, f"{info.filename!r} {why}", info.filename)
         if info.is_dir():
             continue
         key = unquote(info.filename).lower().lstrip("/")
         if key in package.parts:
-            package.say("P004", f"{info.filename!r} is there twice", info.filename)
+            package.say(P004, f"{info.filename!r} is there twice", info.filename)
             continue
         package.parts[key] = info
         if info.file_size > _FREE and info.file_size > limits.ratio * max(info.compress_size, 1):
             bombs.append(f"{info.filename} inflates {info.file_size / max(info.compress_size, 1):.0f} to one")
     if bombs:
-        raise Unreadable(*package.findings, finding("P008", bombs[0], len(bombs)))
+        raise Unreadable(*package.findings, P008.finding(bombs[0], len(bombs)))
     _content_types(package)
     return package
 
@@ -217,33 +219,33 @@ def _unsafe(name: str) -> str | None:
 def _content_types(package: Package) -> None:
     key = CONTENT_TYPES.lower()
     if key not in package.parts:
-        package.say("P001", f"{CONTENT_TYPES} is missing")
+        package.say(P001, f"{CONTENT_TYPES} is missing")
         return
-    root = package.xml(key, "P001")
+    root = package.xml(key, P001)
     if root is None:
         return
     space = f"{_PACKAGE}content-types "
     if root.name != f"{space}Types":
-        package.say("P001", "the root is not Types", CONTENT_TYPES)
+        package.say(P001, "the root is not Types", CONTENT_TYPES)
         return
     for child in root.children:
         kind = child.attributes.get("ContentType", "")
         if not _MEDIA.match(kind):
-            package.say("P001", f"content type {kind!r} is none", CONTENT_TYPES)
+            package.say(P001, f"content type {kind!r} is none", CONTENT_TYPES)
         if child.name == f"{space}Default":
             name, table = child.attributes.get("Extension", "").lower(), package.defaults
         elif child.name == f"{space}Override":
             name, table = unquote(child.attributes.get("PartName", "")).lower(), package.overrides
             if not name.startswith("/"):
-                package.say("P001", f"part name {name!r} does not begin with a slash", CONTENT_TYPES)
+                package.say(P001, f"part name {name!r} does not begin with a slash", CONTENT_TYPES)
             name = name.lstrip("/")
         else:
-            package.say("P001", f"unknown element {child.name.split()[-1]!r}", CONTENT_TYPES)
+            package.say(P001, f"unknown element {child.name.split()[-1]!r}", CONTENT_TYPES)
             continue
         if not name:
-            package.say("P001", "an entry without Extension or PartName", CONTENT_TYPES)
+            package.say(P001, "an entry without Extension or PartName", CONTENT_TYPES)
         elif name in table:
-            package.say("P001", f"{name!r} has a type twice", CONTENT_TYPES)
+            package.say(P001, f"{name!r} has a type twice", CONTENT_TYPES)
         table[name] = kind
     if "_rels/.rels" in package.parts and package.content_type("_rels/.rels") not in (RELS_TYPE, None):
-        package.say("P001", "the extension rels has another type than relationships", CONTENT_TYPES)
+        package.say(P001, "the extension rels has another type than relationships", CONTENT_TYPES)

@@ -11,7 +11,7 @@ from unitcad.check.findings import Finding
 from unitcad.check.limits import Limits, Unreadable, over_limit
 from unitcad.check.mesh import Mesh
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Use
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.p_package import P009, P012
 from unitcad.check.source import Source
 from unitcad.geometry.arrays import Floats
 
@@ -43,9 +43,9 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         if found is None:
             return 0, 0
         if key in trail:
-            raise Unreadable(finding("P012", f"object {key[1]} contains itself"))
+            raise Unreadable(P012.finding(f"object {key[1]} contains itself"))
         if len(trail) >= limits.max_depth:
-            raise Unreadable(finding("P009", f"components nest deeper than {limits.max_depth}"))
+            raise Unreadable(P009.finding(f"components nest deeper than {limits.max_depth}"))
         faces, nodes = (0 if found.triangles is None else len(found.triangles)), 1
         for use in found.components:
             more, below = size(key_of(key[0], use), (*trail, key))
@@ -59,7 +59,7 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         total, nodes = total + faces, nodes + below
     if total > limits.max_faces:
         text = f"{_large(total)} faces in {_large(nodes)} instances, more than --max-faces {limits.max_faces}"
-        raise Unreadable(finding("P009", text))
+        raise Unreadable(P009.finding(text))
     if nodes > limits.max_instances:
         raise over_limit(f"{_large(nodes)} instances, more than the limit of {limits.max_instances}")
     instances: list[Instance] = []
@@ -69,7 +69,7 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         if found is None or depth > limits.max_depth:
             return
         if found.type == "other" and not found.components:
-            findings.append(finding("P012", f"the build uses object {key[1]} of type other"))
+            findings.append(P012.finding(f"the build uses object {key[1]} of type other"))
         if found.vertices is not None:
             instances.append(Instance(key, matrix))
         for use in found.components:
@@ -78,7 +78,7 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
     for item in root.items:
         key = key_of(root.part, item)
         if item.path and key not in objects and key[0] in models:
-            findings.append(finding("P012", f"a build item names object {key[1]} of {item.path}, which is not there"))
+            findings.append(P012.finding(f"a build item names object {key[1]} of {item.path}, which is not there"))
         place(key, item.matrix, 0)
     return instances
 

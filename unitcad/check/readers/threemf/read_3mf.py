@@ -12,7 +12,9 @@ from unitcad.check.readers.threemf.model_data import Model
 from unitcad.check.readers.threemf.model_part import read_model
 from unitcad.check.readers.threemf.opc import Package, Relation
 from unitcad.check.readers.threemf.placement import Instance, expand
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F003
+from unitcad.check.rules.p_package import P001, P002, P003, P012, P014, P019, P020
+from unitcad.check.rules.rule import Rule
 
 _IMAGES = {"image/png": "png", "image/jpeg": "jpeg", "image/jpg": "jpeg"}
 _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
@@ -39,7 +41,7 @@ def read_build(package: Package, limits: Limits) -> Build:
         return Build({}, [])
     root = next(iter(models.values()))
     if not root.items and root.has_build:
-        package.findings.append(replace(finding("P014", "the build has no item"), ends=True))
+        package.findings.append(replace(P014.finding("the build has no item"), ends=True))
     return Build(models, expand(models, root, limits, package.findings))
 
 
@@ -47,12 +49,12 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
     """The start part's model first, then those that it reaches by path, each with its relationships checked."""
     relations = package.relations("")
     if "_rels/.rels" not in package.parts:
-        package.say("P002", "_rels/.rels is missing")
+        package.say(P002, "_rels/.rels is missing")
     starts = [relation for relation in relations if relation.kind == opc.START]
     _singletons(package, relations, "the package", (opc.THUMBNAIL, opc.PROPERTIES))
     if len(starts) != 1:
         if not any(item.code in ("P003", "F003", "P007") for item in package.findings):
-            package.say("P003", counted(len(starts), "start part"))
+            package.say(P003, counted(len(starts), "start part"))
         if not starts:
             return {}
     models: dict[str, Model] = {}
@@ -62,7 +64,7 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
         if part in models:
             continue
         if package.content_type(part) != opc.MODEL_TYPE:
-            package.say("P001", f"{package.shown(part)} has type {package.content_type(part)!r}, not the model's", part)
+            package.say(P001, f"{package.shown(part)} has type {package.content_type(part)!r}, not the model's", part)
         try:
             model = read_model(package.chunks(part), part, limits, faces, strict=package.strict)
         except OutOfTime:
@@ -95,27 +97,27 @@ def _singletons(package: Package, relations: list[Relation], who: str, kinds: tu
         of = [relation for relation in relations if relation.kind == kind]
         name = kind.rsplit("/", 1)[-1]
         if len(of) > 1:
-            package.say("P020", f"{len(of)} parts of type {name} for {who}")
+            package.say(P020, f"{len(of)} parts of type {name} for {who}")
         for relation in of:
             said = package.content_type(relation.target)
             if kind == opc.THUMBNAIL:
-                _image(package, relation.target, "P020")
+                _image(package, relation.target, P020)
             elif kind == opc.TICKET and said != _TICKET_TYPE:
                 text = f"{package.shown(relation.target)} has type {said!r}, not a print ticket's"
-                package.say("P020", text, relation.target)
+                package.say(P020, text, relation.target)
             elif kind == opc.PROPERTIES:
-                package.xml(relation.target, "F003")
+                package.xml(relation.target, F003)
 
 
-def _image(package: Package, part: str, code: str) -> None:
+def _image(package: Package, part: str, rule: Rule) -> None:
     said = package.content_type(part)
     if said is None:
-        package.say("P001", f"{package.shown(part)} has no content type", part)
+        package.say(P001, f"{package.shown(part)} has no content type", part)
         return
     if said not in _IMAGES and not (
-        code == "P019" and said == "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
+        rule is P019 and said == "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
     ):
-        package.say(code, f"{package.shown(part)} has type {said!r}, not PNG's or JPEG's", part)
+        package.say(rule, f"{package.shown(part)} has type {said!r}, not PNG's or JPEG's", part)
         return
     try:
         kind, why = image_kind(package.chunks(part))
@@ -125,9 +127,9 @@ def _image(package: Package, part: str, code: str) -> None:
         package.findings += stop.findings
         return
     if why:
-        package.say(code, f"{package.shown(part)}: {why}", part)
+        package.say(rule, f"{package.shown(part)}: {why}", part)
     elif said in _IMAGES and kind != _IMAGES[said]:
-        package.say(code, f"{package.shown(part)} is {kind or 'no image'}, its type says {said}", part)
+        package.say(rule, f"{package.shown(part)} is {kind or 'no image'}, its type says {said}", part)
 
 
 def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
@@ -140,17 +142,17 @@ def _paths(package: Package, model: Model, related: list[Relation], *, is_root: 
             continue
         part = path.lower().lstrip("/")
         if part not in package.parts:
-            code, say = ("P019", package.say) if found.kind == "texture2d" else ("P002", package.say_lenient)
-            say(code, f"{path} of {found.kind} {found.id} is not in the package", model.part)
+            rule, say = (P019, package.say) if found.kind == "texture2d" else (P002, package.say_lenient)
+            say(rule, f"{path} of {found.kind} {found.id} is not in the package", model.part)
         elif part not in (by_kind[opc.TEXTURE] if found.kind == "texture2d" else images):
             say = package.say if found.kind == "texture2d" else package.say_lenient
-            say("P002", f"{path} of {found.kind} {found.id} has no relationship", model.part)
+            say(P002, f"{path} of {found.kind} {found.id} has no relationship", model.part)
         else:
-            _image(package, part, "P019" if found.kind == "texture2d" else "P020")
+            _image(package, part, P019 if found.kind == "texture2d" else P020)
     for part, written in sorted(_reached(model).items()):
         if part not in package.parts:
-            package.say("P012", f"{written} is not in the package", model.part)
+            package.say(P012, f"{written} is not in the package", model.part)
         elif part not in by_kind[opc.START]:
-            package.say("P002", f"{written} has no relationship of the model type", model.part)
+            package.say(P002, f"{written} has no relationship of the model type", model.part)
         elif not is_root and any(use.path for found in model.objects().values() for use in found.components):
-            package.say("P012", "a part other than the root one refers to objects by path", model.part)
+            package.say(P012, "a part other than the root one refers to objects by path", model.part)

@@ -10,6 +10,7 @@ import numpy as np
 from unitcad.check.findings import Location, counted
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Use
+from unitcad.check.rules.p_package import P011, P012, P017, P019
 from unitcad.geometry.arrays import Ints
 
 _MATERIALS = ("basematerials", "compositematerials")
@@ -44,9 +45,9 @@ def _used(model: Model, id_: int, rank: int, who: str) -> None:
     found = model.resources.get(id_)
     if not isinstance(found, Object):
         if id_ not in model.foreign:
-            model.say("P012", f"{who} names object {id_}, which is not there")
+            model.say(P012, f"{who} names object {id_}, which is not there")
     elif found.rank > rank:
-        model.say("P012", f"{who} names object {id_}, which is defined later or is itself")
+        model.say(P012, f"{who} names object {id_}, which is defined later or is itself")
 
 
 def _object(model: Model, found: Object) -> None:
@@ -56,9 +57,9 @@ def _object(model: Model, found: Object) -> None:
             _used(model, use.object, found.rank - (use.object == found.id), f"a component of {who}")
     pid = found.attributes.get("pid")
     if found.components and pid is not None:
-        model.say_lenient("P019", f"{who} has components and a pid")
+        model.say_lenient(P019, f"{who} has components and a pid")
     if "pindex" in found.attributes and pid is None:
-        model.say("P019", f"{who} has a pindex without a pid")
+        model.say(P019, f"{who} has a pindex without a pid")
     group = _group(model, int(pid), found.rank, who) if pid is not None else None
     if group is not None and "pindex" in found.attributes:
         _in_range(model, int(found.attributes["pindex"]), group.count, f"pindex of {who}")
@@ -74,19 +75,19 @@ def _group(model: Model, id_: int, rank: int, who: str) -> Resource | None:
     found = model.resources.get(id_)
     if found is None:
         if id_ not in model.foreign:
-            model.say("P019", f"{who} names property group {id_}, which is not there")
+            model.say(P019, f"{who} names property group {id_}, which is not there")
         return None
     if found.kind not in _GROUPS:
-        model.say("P019", f"{who} names resource {id_}, a {found.kind}, as property group")
+        model.say(P019, f"{who} names resource {id_}, a {found.kind}, as property group")
         return None
     if found.rank > rank:
-        model.say("P019", f"{who} names property group {id_}, which is defined later")
+        model.say(P019, f"{who} names property group {id_}, which is defined later")
     return found
 
 
 def _in_range(model: Model, index: int, count: int, what: str) -> None:
     if index >= count:
-        model.say("P011", f"{what} is {index}, the list has {count}")
+        model.say(P011, f"{what} is {index}, the list has {count}")
 
 
 def _mesh(model: Model, found: Object, has_default: bool) -> None:
@@ -95,20 +96,20 @@ def _mesh(model: Model, found: Object, has_default: bool) -> None:
     who, rows = f"object {found.id}", found.triangles
     solid = found.type in _SOLID and found.lattice is None
     if len(found.vertices) < 3 and not found.other_shape:
-        model.say("P017", f"the mesh of {who} has {counted(len(found.vertices), 'vertex', 'vertices')}")
+        model.say(P017, f"the mesh of {who} has {counted(len(found.vertices), 'vertex', 'vertices')}")
     if len(rows) < (4 if solid and found.type == "model" else 1) and found.lattice is None:
-        model.say("P017", f"the mesh of {who} has {counted(len(rows), 'triangle')}")
+        model.say(P017, f"the mesh of {who} has {counted(len(rows), 'triangle')}")
     corners = rows[:, :3]
     outside = (corners >= len(found.vertices)).any(axis=1)
     if outside.any():
         first = int(np.flatnonzero(outside)[0])
         some = counted(int(outside.sum()), "triangle")
         line = int(rows[first, LINE])
-        model.say("P011", f"{some} of {who} (first {first}) with a vertex that is not there", line=line)
+        model.say(P011, f"{some} of {who} (first {first}) with a vertex that is not there", line=line)
     same = (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2]) | (corners[:, 2] == corners[:, 0])
     if same.any():
         line = int(rows[same.argmax(), LINE])
-        model.say("P017", f"{counted(int(same.sum()), 'triangle')} of {who} with one vertex twice", line=line)
+        model.say(P017, f"{counted(int(same.sum()), 'triangle')} of {who} with one vertex twice", line=line)
     _triangle_properties(model, found, rows, has_default)
 
 
@@ -119,9 +120,9 @@ def _triangle_properties(model: Model, found: Object, rows: Ints, has_default: b
         return
     rows = rows[used]
     if not has_default:
-        model.say_lenient("P019", f"triangles of {who} have properties, the object has no pid as default")
+        model.say_lenient(P019, f"triangles of {who} have properties, the object has no pid as default")
     if ((rows[:, 3] < 0) & (rows[:, 4:6] >= 0).any(axis=1)).any():
-        model.say("P019", f"a triangle of {who} has p2 or p3 without p1")
+        model.say(P019, f"a triangle of {who} has p2 or p3 without p1")
     default = int(found.attributes.get("pid", -1))
     pids = np.where(rows[:, 6] >= 0, rows[:, 6], default)
     for pid in np.unique(pids):
@@ -135,7 +136,7 @@ def _triangle_properties(model: Model, found: Object, rows: Ints, has_default: b
         _in_range(model, largest, group.count, f"a property index in {who}")
         p1 = of[:, 3:4]
         if group.kind == "basematerials" and ((of[:, 4:6] >= 0) & (of[:, 4:6] != p1)).any():
-            model.say("P019", f"a triangle of {who} blends base materials")
+            model.say(P019, f"a triangle of {who} blends base materials")
 
 
 def _property(model: Model, found: Resource) -> None:
@@ -164,10 +165,10 @@ def _earlier(model: Model, id_: int, rank: int, who: str, kind: str) -> Resource
     if found is None and id_ in model.foreign:
         return None
     if found is None or not found.kind.endswith(kind):
-        model.say("P019", f"{who} names {id_} as {kind}, which is not there")
+        model.say(P019, f"{who} names {id_} as {kind}, which is not there")
         return None
     if found.rank > rank:
-        model.say("P019", f"{who} names {kind} {id_}, which is defined later")
+        model.say(P019, f"{who} names {kind} {id_}, which is defined later")
     return found
 
 
@@ -178,24 +179,24 @@ def _multi(model: Model, found: Resource) -> None:
     textures = [id_ for id_ in ids if id_ in model.resources and model.resources[id_].kind == "texture2d"]
     if textures:
         # Drafts allowed it and the consortium's own MUSTPASS files do it, so it does not fail a file.
-        model.say("P019", f"{who} names texture {textures[0]} itself, not a group of its coordinates", "warning")
+        model.say(P019, f"{who} names texture {textures[0]} itself, not a group of its coordinates", "warning")
     groups = [None if id_ in textures else _group(model, id_, found.rank, who) for id_ in ids]
     kinds = [group.kind if group else "" for group in groups]
     materials = [place for place, kind in enumerate(kinds) if kind in _MATERIALS]
     if len(materials) > 1:
-        model.say("P019", f"{who} names two materials")
+        model.say(P019, f"{who} names two materials")
     elif materials and materials[0] != 0:
-        model.say("P019", f"{who} names its material after a colour")
+        model.say(P019, f"{who} names its material after a colour")
     if kinds.count("colorgroup") > 1:
-        model.say("P019", f"{who} names two colour groups")
+        model.say(P019, f"{who} names two colour groups")
     if "multiproperties" in kinds:
-        model.say("P019", f"{who} names multiproperties")
+        model.say(P019, f"{who} names multiproperties")
     if len(found.attributes.get("blendmethods", "").split()) > len(ids) - 1:
-        model.say("P019", f"{who} has more blend methods than layers less one")
+        model.say(P019, f"{who} has more blend methods than layers less one")
     for member in found.members if not textures else ():
         indices = [int(said) for said in member["pindices"].split()]
         if len(indices) > len(ids):
-            model.say("P019", f"{who} has more indices than groups")
+            model.say(P019, f"{who} has more indices than groups")
         for index, group in zip(indices, groups, strict=False):
             if group is not None:
                 _in_range(model, index, group.count, f"an index of {who}")
@@ -212,13 +213,13 @@ def _slicestack(model: Model, found: Resource, solid: bool) -> None:
     who = f"slicestack {found.id}"
     kinds = {member[""] for member in found.members}
     if {"slice", "sliceref"} <= kinds:
-        model.say("P017", f"{who} has slices and references")
+        model.say(P017, f"{who} has slices and references")
     height = float(found.attributes.get("zbottom", 0))
     count, start, last = 0, -1, -1
 
     def close_polygon() -> None:
         if solid and start >= 0 and last != start:
-            model.say("P017", f"a polygon of {who} is open")
+            model.say(P017, f"a polygon of {who} is open")
 
     for member in found.members:
         kind = member[""]
@@ -226,7 +227,7 @@ def _slicestack(model: Model, found: Resource, solid: bool) -> None:
             close_polygon()
             top = float(member["ztop"])
             if top < height or (top == height and count):
-                model.say("P017", f"the heights of {who} do not rise")
+                model.say(P017, f"the heights of {who} do not rise")
             height, count, start = top, 0, -1
         elif kind == "vertex":
             count += 1
@@ -236,13 +237,13 @@ def _slicestack(model: Model, found: Resource, solid: bool) -> None:
             _in_range(model, start, count, f"a start vertex of {who}")
         elif kind == "segment":
             if int(member["v2"]) == last:
-                model.say("P017", f"a segment of {who} has no length")
+                model.say(P017, f"a segment of {who} has no length")
             last = int(member["v2"])
             _in_range(model, last, count, f"a segment's vertex in {who}")
         elif kind == "sliceref":
             path = member.get("slicepath", "")
             if path.lower().lstrip("/") == model.part:
-                model.say("P019", f"{who} refers to its own part")
+                model.say(P019, f"{who} refers to its own part")
     close_polygon()
 
 
@@ -251,10 +252,10 @@ def _sliced(model: Model, found: Object) -> None:
     resolution = found.attributes.get(f"{elements.SLICE} meshresolution", "fullres")
     who = f"object {found.id}"
     if resolution not in ("fullres", "lowres"):
-        model.say("P017", f"mesh resolution {resolution[:40]!r} of {who}")
+        model.say(P017, f"mesh resolution {resolution[:40]!r} of {who}")
     if stack is not None:
         if not elements.resource_id(stack):
-            model.say("P017", f"slice stack {stack[:40]!r} of {who} is no id")
+            model.say(P017, f"slice stack {stack[:40]!r} of {who} is no id")
         else:
             _earlier(model, int(stack), found.rank, who, "slicestack")
 
@@ -264,28 +265,28 @@ def _lattice(model: Model, found: Object) -> None:
     assert found.lattice is not None
     who, count = f"the lattice of object {found.id}", 0 if found.vertices is None else len(found.vertices)
     if found.type not in _SOLID:
-        model.say("P017", f"{who} is in an object of type {found.type}")
+        model.say(P017, f"{who} is in an object of type {found.type}")
     for beam in found.beams:
         ends = int(beam["v1"]), int(beam["v2"])
         if ends[0] == ends[1]:
-            model.say("P017", f"a beam of {who} ends where it begins")
+            model.say(P017, f"a beam of {who} ends where it begins")
         _in_range(model, max(ends), count, f"a beam's end in {who}")
         if "r2" in beam and "r1" not in beam:
-            model.say("P017", f"a beam of {who} has r2 without r1")
+            model.say(P017, f"a beam of {who} has r2 without r1")
     for ball in found.balls:
         _in_range(model, int(ball["vindex"]), count, f"a ball's vertex in {who}")
     for index in found.beam_refs:
         _in_range(model, index, len(found.beams), f"a beam set's index in {who}")
     if found.lattice.get("clippingmode", "none") != "none" and "clippingmesh" not in found.lattice:
-        model.say("P019", f"{who} clips without a clipping mesh")
+        model.say(P019, f"{who} clips without a clipping mesh")
     for name in ("clippingmesh", "representationmesh"):
         if name not in found.lattice:
             continue
         other = model.resources.get(int(found.lattice[name]))
         if not isinstance(other, Object) or other.rank >= found.rank:
-            model.say("P019", f"the {name} of {who} is no earlier object")
+            model.say(P019, f"the {name} of {who} is no earlier object")
         elif other.lattice is not None or other.components:
-            model.say("P019", f"the {name} of {who} is no plain mesh")
+            model.say(P019, f"the {name} of {who} is no plain mesh")
     for holder, index in _lattice_properties(found):
         group = _group(model, holder, found.rank, who)
         if group is not None and index is not None:
@@ -314,4 +315,4 @@ def _uuids(model: Model) -> None:
         if any(not use.uuid for use in found.components):
             missing.append(f"a component of object {found.id}")
     if missing:
-        model.say_lenient("P017", f"no UUID for {', '.join(missing[:3])}")
+        model.say_lenient(P017, f"no UUID for {', '.join(missing[:3])}")

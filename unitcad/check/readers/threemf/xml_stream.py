@@ -10,7 +10,8 @@ from xml.parsers import expat
 
 from unitcad.check.findings import Location
 from unitcad.check.limits import Unreadable, over_limit
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.f_file import F003, F009
+from unitcad.check.rules.p_package import P006
 
 XML_SPACE = "http://www.w3.org/XML/1998/namespace "
 XSI = "http://www.w3.org/2001/XMLSchema-instance "
@@ -59,7 +60,7 @@ def stream(
     parser = parser or new_parser()
 
     def refuse(*_: object) -> None:
-        raise Unreadable(finding("P006", "a document type declaration", places=place))
+        raise Unreadable(P006.finding("a document type declaration", places=place))
 
     parser.StartDoctypeDeclHandler = refuse
     parser.EntityDeclHandler = refuse
@@ -80,8 +81,8 @@ def stream(
         said = expat.ErrorString(error.code)
         at = parser.ErrorByteIndex - seen
         if 0 <= at < len(chunk) and any(byte > 127 for byte in chunk[at : at + 4]):
-            raise Unreadable(finding("F009", "bytes that are not UTF-8", places=line, severity="error")) from error
-        raise Unreadable(finding("F003", f"XML not well formed: {said}", places=line)) from error
+            raise Unreadable(F009.finding("bytes that are not UTF-8", places=line, severity="error")) from error
+        raise Unreadable(F003.finding(f"XML not well formed: {said}", places=line)) from error
 
 
 def _with_head(chunks: Iterable[bytes]) -> Iterator[bytes]:
@@ -101,11 +102,11 @@ def _with_head(chunks: Iterable[bytes]) -> Iterator[bytes]:
 
 def _utf8_only(head: bytes, place: list[Location]) -> None:
     if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:8]:
-        raise Unreadable(finding("F009", "UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error"))
+        raise Unreadable(F009.finding("UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error"))
     match = _ENCODING.match(head)
     if match and match.group(1).lower() != b"utf-8":
         named = match.group(1).decode("ascii", "replace")
-        raise Unreadable(finding("F009", f"encoding {named!r} instead of UTF-8", places=place, severity="error"))
+        raise Unreadable(F009.finding(f"encoding {named!r} instead of UTF-8", places=place, severity="error"))
 
 
 def forbidden(name: str) -> str | None:

@@ -1,4 +1,4 @@
-"""D002: parts of a solid that are narrower than the printer's least feature in both directions across.
+"""Small features, D002: parts of a solid that are narrower than the printer's least feature in both directions across.
 
 Two searches. Level sections half-way between the heights at which the mesh has vertices find what stands: pins, tips.
 What lies or stands out sideways has faces with material less than the floor behind them all over; a section across such
@@ -7,18 +7,38 @@ faces shows whether it is a whisker, or a rib or a wall, which goes on into the 
 
 from __future__ import annotations
 
-import numpy as np
-from manifold3d import CrossSection, Manifold
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
-from unitcad.catalogue import Printer
+import numpy as np
+
 from unitcad.check.edges import components
 from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline
 from unitcad.check.mesh import solid_of
-from unitcad.check.rulebook import finding
+from unitcad.check.rays import Rays
+from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.rule import Rule
 from unitcad.check.topology import Topology
-from unitcad.check.walls import Rays
 from unitcad.geometry.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from manifold3d import CrossSection, Manifold
+
+    from unitcad.catalogue import Printer
+
+D002 = Rule(
+    "D002",
+    "warning",
+    "feature below the printer's floor",
+    cause=(
+        "A pin, a tip or a whisker, standing, lying or sticking out, is narrower than the printer's least feature "
+        "in both directions across: it will not be printed. Ribs that are joined to the body along their length "
+        "are none."
+    ),
+    example="A pin of 0.2 mm in diameter.",
+    fix="Make it larger, or leave it out.",
+)
 
 _LEVELS = 40
 _GROUPS = 40  # thin places looked at
@@ -28,19 +48,20 @@ _LEAST_MM2 = 1e-4
 _SLACK = 0.999
 
 
-def judge(topology: Topology, printer: Printer, rays: Rays, deadline: Deadline) -> list[Finding]:
-    """Apply D002 to a closed mesh."""
-    mesh, least = topology.mesh, float(printer.least_feature_mm)
+def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
+    """Apply D002 to a mesh that has an inside."""
+    if not part.solid:
+        return
+    mesh, least = part.topology.mesh, float(printer.least_feature_mm)
     solid = solid_of(mesh.vertices, mesh.faces)
     if solid.is_empty():
-        return []
-    places = _standing(topology, solid, least, float(printer.layer_mm))
-    deadline.tick()
-    places += _lying(topology, solid, rays, least, deadline)
-    if not places:
-        return []
-    text = f"{counted(len(places), 'section')} smaller than {number(least)} mm both ways"
-    return [finding("D002", text, len(places), places)]
+        return
+    places = _standing(part.topology, solid, least, float(printer.layer_mm))
+    part.deadline.tick()
+    places += _lying(part.topology, solid, part.material, least, part.deadline)
+    if places:
+        text = f"{counted(len(places), 'section')} smaller than {number(least)} mm both ways"
+        yield D002.finding(text, len(places), places)
 
 
 def _standing(topology: Topology, solid: Manifold, least: float, layer: float) -> list[Location]:

@@ -1,4 +1,4 @@
-"""D003: faces that lean out too far, by region; a region that is bridged everywhere is left aside.
+"""Overhangs, D003: faces that lean out too far, by region; a region that is bridged everywhere is left aside.
 
 A region's border is supported where the face beyond it goes down. A point of the region is bridged if a line through it
 meets supported borders on both sides within the printer's bridge; a free ledge may be as wide as one extrusion.
@@ -6,15 +6,31 @@ meets supported borders on both sides within the printer's bridge; a free ledge 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from unitcad.catalogue import Printer
 from unitcad.check.edges import components
 from unitcad.check.findings import Finding, Location, number
-from unitcad.check.limits import Deadline
-from unitcad.check.rulebook import finding
+from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.rule import Rule
 from unitcad.check.topology import Topology
 from unitcad.geometry.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from unitcad.catalogue import Printer
+
+D003 = Rule(
+    "D003",
+    "warning",
+    "overhang",
+    cause=(
+        "Faces lean out further than the printer can hold without support, and no bridge of its span reaches across."
+    ),
+    example="A level arm reaches 10 mm out of a wall.",
+    fix="Turn the part, chamfer the overhang, or print with support.",
+)
 
 _ANGLES = 16
 _POINTS = 300  # sample points a region
@@ -23,15 +39,19 @@ _SLACK = 1.0  # degree beyond the printer's angle, for tessellated cones of just
 _BORDER = 4000  # border edges a region may have; more is taken as not bridged
 
 
-def judge(topology: Topology, printer: Printer, deadline: Deadline, bed: float) -> list[Finding]:
-    """Apply D003 to a closed mesh that stands at z = `bed`."""
+def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
+    """Apply D003 to a mesh that has an inside, which stands on its lowest point."""
+    if not part.solid:
+        return
+    topology = part.topology
     mesh, areas = topology.mesh, topology.areas
+    bed = float(mesh.vertices[np.unique(mesh.faces), 2].min())
     double = np.sqrt(np.einsum("ij,ij->i", areas, areas))
     steep = -np.sin(np.radians(min(float(printer.overhang_deg) + _SLACK, 89.0)))
     leaning = areas[:, 2] < steep * double
     leaning &= mesh.vertices[mesh.faces, 2].max(axis=1) > bed + float(printer.layer_mm) / 2
     if not leaning.any():
-        return []
+        return
     edges = topology.edges
     pairs = edges.first[edges.size == 2]
     one, other = edges.order[pairs], edges.order[pairs + 1]
@@ -46,7 +66,7 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline, bed: float) 
     for label in np.unique(region[leaning]):
         faces = np.flatnonzero(leaning & (region == label))
         area = float(double[faces].sum()) / 2
-        deadline.tick()
+        part.deadline.tick()
         if area < _LEAST:
             continue
         own = owner == label
@@ -56,11 +76,11 @@ def judge(topology: Topology, printer: Printer, deadline: Deadline, bed: float) 
         xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
         bad.append((area, Location(face=int(topology.kept[faces[0]]), xyz=xyz, region=topology.kept[faces])))
     if not bad:
-        return []
+        return
     bad.sort(key=lambda item: -item[0])
     area = number(sum(area for area, _ in bad), 3)
     text = f"{area} mm2 lean out beyond {number(printer.overhang_deg)} degrees unsupported"
-    return [finding("D003", text, len(bad), [place for _, place in bad])]
+    yield D003.finding(text, len(bad), [place for _, place in bad])
 
 
 def _border(topology: Topology, beyond: Ints, bed: float) -> tuple[Floats, Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,72 +11,146 @@ from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline, Unreadable
 from unitcad.check.mesh import solid_of
 from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
-from unitcad.check.rulebook import finding
-from unitcad.check.scale import specks
+from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.rule import Rule
 from unitcad.check.topology import Topology, diagonals
+from unitcad.check.volumes import winding_number
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
+G002 = Rule(
+    "G002",
+    "error",
+    "shells overlap",
+    cause=(
+        "Two shells share volume: one faces outwards inside the other, or where their faces meet, they share more "
+        "than a millionth of the smaller one. Fill rules decide what is solid, and they differ between slicers. "
+        "In a 3MF file a warning, since the core specification (4.1) says what is solid."
+    ),
+    example="A box lies inside a larger one, and both face outwards.",
+    fix="Unite the bodies with a boolean.",
+)
+
+G005 = Rule(
+    "G005",
+    "warning",
+    "shell count other than expected",
+    cause="The file has more or fewer shells than --shells or the manifest says: a loose chip, or a lost piece.",
+    example="`--shells 1` for a file that holds a part and a chip beside it.",
+    fix="Look for loose pieces.",
+)
+
+G006 = Rule(
+    "G006",
+    "warning",
+    "closed cavity",
+    cause=(
+        "A shell lies inside another one and faces inwards: a hollow with no way in or out. Resin and support "
+        "stay inside."
+    ),
+    example="A box has a bubble inside.",
+    fix="Open it, or fill it.",
+)
+
+G007 = Rule(
+    "G007",
+    "error",
+    "volume about zero",
+    cause="A shell encloses less than a millionth of its area times its diagonal: a sheet without thickness.",
+    example="A sheet is drawn as two faces back to back.",
+    fix="Give it thickness.",
+)
+
+G010 = Rule(
+    "G010",
+    "warning",
+    "speck",
+    cause=(
+        "A closed shell or an instance is less than 0.02 mm across, a tenth of the least feature of the finest "
+        "printer in the catalogue, beside a body of 1 mm or more: what a boolean or a scan left over. No printer "
+        "makes it, and it counts as a shell."
+    ),
+    example="A closed shell of 0.005 mm lies beside a bracket of 40 mm.",
+    fix="Delete it.",
+)
+
+T008 = Rule(
+    "T008",
+    "error",
+    "inverted shell",
+    cause="An outermost shell encloses a negative volume: all its faces point inwards.",
+    example="All faces of a box are flipped.",
+    fix="Flip the normals.",
+)
+
 FLAT = 1e-6  # G007: a shell's volume over its area times its diagonal
+SPECK = 0.02  # G010, mm; a tenth of the least feature of the finest printer in the catalogue
+BODY = 1.0  # G010, mm; the size of a body beside which a speck is one
 _SHARE = 1e-6  # of the smaller shell's volume: shells that share no more only touch
-_BLOCK = 500_000
 
 
-@dataclass(frozen=True)
-class Shells:
-    """Signed volume (mm3) and box of each shell, and what the rules say of them."""
-
-    volumes: Floats
-    low: Floats
-    high: Floats
-    findings: tuple[Finding, ...]
-
-
-def judge(topology: Topology, crossed: bool, touching: Ints, deadline: Deadline) -> Shells:
-    """Apply the rules; `crossed`: some faces cross; `touching` (k, 2): pairs of shells whose faces meet."""
+def check_mesh(part: Inspection) -> Iterator[Finding]:
+    """Apply the rules but for G005, for which a number must be expected."""
+    topology, touching, crossed = part.topology, part.crossings.touching, part.crossings.crossed
     labels, n = topology.shells, topology.n_shells
     volumes, low, high, sound = topology.volumes, topology.low, topology.high, topology.closed
-    found: list[Finding] = []
     if n == 0:
-        found.append(finding("G007", "no face has an area"))
+        yield G007.finding("no face has an area")
     if not sound.any():
-        return Shells(volumes, low, high, tuple(found))
+        return
     area = np.bincount(labels, np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)), n) / 2
     flat = np.abs(volumes) <= FLAT * area * diagonals(low, high)
     which = np.flatnonzero(sound & flat)
     if len(which):
         worst = which[np.argmax(area[which])]
         text = f"volume {number(volumes[worst], 3)} mm3 over {number(area[worst], 3)} mm2 of surface"
-        found.append(finding("G007", text, len(which), (_where(topology, low, high, i) for i in which.tolist())))
+        yield G007.finding(text, len(which), (_where(topology, low, high, i) for i in which.tolist()))
     sound = sound & ~flat
-    found += specks(low, high, sound & (volumes > 0))
+    yield from specks(low, high, sound & (volumes > 0))
     depth, overlaps = np.zeros(n, int), list[tuple[int, int]]()
     try:
         if n > 1:
-            _relate(topology, np.asarray(sound), touching, depth, overlaps, deadline)
+            _relate(topology, np.asarray(sound), touching, depth, overlaps, part.deadline)
     except Unreadable as stop:
-        stop.findings = (*found, *_overlapping(topology, overlaps), *stop.findings)
+        stop.findings = (*_overlapping(topology, overlaps), *stop.findings)
         raise
     overlaps += [(i, i) for i in np.flatnonzero(sound & (depth % 2 == 1) & (volumes > 0)).tolist()]
-    found += _overlapping(topology, overlaps)
+    yield from _overlapping(topology, overlaps)
     inwards = sound & (volumes < 0)
-    for code, which, one, many in (
-        ("T008", np.flatnonzero(inwards & (depth % 2 == 0)), "inverted shell", ""),
-        ("G006", np.flatnonzero(inwards & (depth % 2 == 1)), "closed cavity", "closed cavities"),
+    for rule, which, one, many in (
+        (T008, np.flatnonzero(inwards & (depth % 2 == 0)), "inverted shell", ""),
+        (G006, np.flatnonzero(inwards & (depth % 2 == 1)), "closed cavity", "closed cavities"),
     ):
-        if len(which) and not (code == "T008" and crossed and n == 1):
+        if len(which) and not (rule is T008 and crossed and n == 1):
             places = (_where(topology, low, high, i) for i in which.tolist())
-            found.append(finding(code, counted(len(which), one, many), len(which), places))
-    return Shells(volumes, low, high, tuple(found))
+            yield rule.finding(counted(len(which), one, many), len(which), places)
+
+
+def expected(there: int | None, wanted: int | None, word: str = "shell") -> Iterator[Finding]:
+    """G005 where a number of shells is `wanted`, and the file has another one."""
+    if wanted is not None and there is not None and there != wanted:
+        yield G005.finding(f"{counted(there, word)}, {wanted} expected", abs(there - wanted))
+
+
+def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
+    """G010 for the bodies `asked` of those with these boxes, (n, 3) mm, where one of them is as large as a part."""
+    side = (high - low).max(axis=1, initial=0)
+    tiny = np.flatnonzero(asked & (side < SPECK))
+    if not len(tiny) or side.max() < BODY:
+        return []
+    middle = ((low + high) / 2)[tiny].tolist()
+    places = [Location(xyz=(x, y, z)) for x, y, z in middle]
+    text = f"{counted(len(tiny), 'speck')}, the largest {number(side[tiny].max(), 3)} mm across"
+    return [G010.finding(text, len(tiny), places)]
 
 
 def _overlapping(topology: Topology, overlaps: list[tuple[int, int]]) -> list[Finding]:
     if not overlaps:
         return []
     places = (_where(topology, topology.low, topology.high, *pair) for pair in overlaps)
-    return [finding("G002", f"{counted(len(overlaps), 'pair')} of shells that share volume", len(overlaps), places)]
+    return [G002.finding(f"{counted(len(overlaps), 'pair')} of shells that share volume", len(overlaps), places)]
 
 
 def _relate(
@@ -114,19 +188,6 @@ def _relate(
             deadline.tick()
             point = vertices[faces[groups[inner[at]][0], 0]]
             depth[inner[at]] += winding_number(vertices, faces[groups[outer[at]]], point) != 0
-
-
-def winding_number(vertices: Floats, faces: Ints, point: Floats) -> int:
-    """How often the closed surface winds round `point`: the sum of solid angles over 4 pi (Van Oosterom, 1983)."""
-    total = 0.0
-    for start in range(0, len(faces), _BLOCK):
-        a, b, c = (vertices[faces[start : start + _BLOCK, k]] - point for k in range(3))
-        la, lb, lc = (np.sqrt(np.einsum("ij,ij->i", v, v)) for v in (a, b, c))
-        top = np.einsum("ij,ij->i", a, np.cross(b, c))
-        dot = np.einsum
-        low = la * lb * lc + dot("ij,ij->i", a, b) * lc + dot("ij,ij->i", b, c) * la + dot("ij,ij->i", c, a) * lb
-        total += float(np.arctan2(top, low).sum())
-    return round(total / (2 * np.pi))
 
 
 def _where(topology: Topology, low: Floats, high: Floats, *shells: int) -> Location:

@@ -1,10 +1,4 @@
-"""D001 and D006: thin walls and narrow gaps, measured by short rays from points spread over the faces.
-
-A ray goes to the face behind, through material; for gaps to the face before, through air.
-
-A wall has two faces that are nearly parallel (PARALLEL), a thickness below the floor, and reaches farther than the
-floor in two directions; so bevels and wedges, tapered edges and the strips between engraved strokes are none.
-"""
+"""How much material lies behind the faces of a mesh, or air before them, by short rays from points spread over them."""
 
 from __future__ import annotations
 
@@ -12,19 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.catalogue import Printer
-from unitcad.check.edges import components
-from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.limits import Deadline
 from unitcad.check.pairs import boxes_of, frame_of, meeting_between, morton_order
-from unitcad.check.rulebook import finding
 from unitcad.check.topology import Topology, max_side_squared
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 PARALLEL = float(np.cos(np.radians(12.0)))  # two sides of a wall
 AWAY = 0.3  # two sides of a whisker, which may have three
 LEVEL = float(np.cos(np.radians(45.0)))  # normals steeper than this belong to a flat piece's wall
-_SLACK = 0.995  # of the floor: a wall drawn at the floor passes after rounding and tessellation
+SLACK = 0.995  # of the floor: a wall drawn at the floor passes after rounding and tessellation
 _SAMPLES = 40_000
 _FINEST = 6  # a face has at most _FINEST (_FINEST + 1) / 2 points
 
@@ -47,34 +37,8 @@ class Rays:
     across: Ints
 
 
-def cast(topology: Topology, printer: Printer, deadline: Deadline) -> Rays:
-    """Measure the material of a closed mesh."""
-    floors = float(printer.least_wall_mm), float(printer.least_flat_wall_mm)
-    return _cast(topology, floors, float(printer.least_feature_mm), deadline, side=1)
-
-
-def judge(topology: Topology, printer: Printer, rays: Rays) -> list[Finding]:
-    """Apply D001."""
-    walls = _patches(topology, rays, float(printer.least_wall_mm) * _SLACK)
-    if not walls:
-        return []
-    text = f"{counted(len(walls), 'wall')} below the floor, the thinnest {number(walls[0][0], 3)} mm"
-    return [finding("D001", text, len(walls), [place for _, place in walls])]
-
-
-def gaps(topology: Topology, printer: Printer, deadline: Deadline) -> list[Finding]:
-    """Apply D006: as walls, with the air between two faces in place of material."""
-    floors = float(printer.xy_play_mm), float(printer.layer_mm)
-    rays = _cast(topology, floors, 0.0, deadline, side=-1)
-    found = _patches(topology, rays, floors[0] * _SLACK)
-    if not found:
-        return []
-    text = f"{counted(len(found), 'gap')} that the printer closes, the narrowest {number(found[0][0], 3)} mm"
-    return [finding("D006", text, len(found), [place for _, place in found])]
-
-
-def _cast(topology: Topology, floors: tuple[float, float], least: float, deadline: Deadline, *, side: int) -> Rays:
-    """Measure from each face, upright and lying floor of what is looked for; `side` is 1 for material, -1 for air."""
+def cast(topology: Topology, floors: tuple[float, float], least: float, deadline: Deadline, *, side: int) -> Rays:
+    """Measure from each face; `floors`: of upright and of lying walls, mm; `side` is 1 for material, -1 for air."""
     upright, level = floors
     mesh = topology.mesh
     corners = mesh.vertices[mesh.faces[:, ::side]]
@@ -83,7 +47,7 @@ def _cast(topology: Topology, floors: tuple[float, float], least: float, deadlin
     sound = double > 1e-3 * longest  # a height of a micrometre: below it a face has no direction worth following
     points, owner = _spread_points(corners, longest, sound, upright)
     normal = side * topology.areas / np.maximum(double, 1e-300)[:, None]
-    floor = (np.where(_lying(topology), level, upright) * _SLACK)[owner]
+    floor = (np.where(lying(topology), level, upright) * SLACK)[owner]
     return Rays(
         points, owner, floor, *_behind(corners, normal, sound, points, owner, np.maximum(floor, least), deadline)
     )
@@ -153,57 +117,7 @@ def _hit(origin: Floats, along: Floats, corners: Floats, normal: Floats) -> Floa
     return np.where(inside, distance, np.inf)
 
 
-def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float, Location]]:
-    """The least distance and its place for each wall or gap, the thinnest first.
-
-    Thin points grouped by faces that share edges; groups that reach farther than the floor both ways are walls.
-
-    Groups that look at each other through the material are the two sides of one wall.
-    """
-    thin = np.flatnonzero(rays.thickness < rays.floor)
-    if not len(thin):
-        return []
-    points, owner, thickness = rays.points, rays.owner, rays.thickness
-    faces = topology.mesh.faces
-    edges = topology.edges
-    pairs = edges.first[edges.size == 2]
-    left, right = edges.order[pairs] // 3, edges.order[pairs + 1] // 3
-    n = len(faces)
-    marked = np.zeros(n, bool)
-    marked[owner[thin]] = True
-    whole = np.bincount(owner[thin], minlength=n) > 0.6 * np.maximum(np.bincount(owner, minlength=n), 1)
-    lying = _lying(topology)
-    both = marked[left] & marked[right] & (lying[left] == lying[right])
-    patch = components(n, left[both], right[both])
-    group = patch[owner[thin]]
-    through = thin[marked[rays.across[thin]]]
-    wall = components(n, patch[owner[through]], patch[rays.across[through]])
-    found: dict[int, tuple[float, Location]] = {}
-    for label in np.unique(group):
-        mine = thin[group == label]
-        of = owner[mine]
-        cloud = np.concatenate([points[mine], topology.mesh.vertices[faces[of[whole[of]]]].reshape(-1, 3)])
-        if _reach(cloud, bool(lying[of[0]])) < upright:
-            continue
-        worst = mine[np.argmin(thickness[mine])]
-        xyz = tuple(float(v) for v in points[worst])
-        region = topology.kept[np.unique(of)]
-        place = Location(face=int(topology.kept[owner[worst]]), xyz=xyz, region=region)  # type: ignore[arg-type]
-        here = (float(thickness[worst]), place)
-        found[int(wall[label])] = min(here, found.get(int(wall[label]), here), key=lambda item: item[0])
-    return sorted(found.values(), key=lambda item: item[0])
-
-
-def _lying(topology: Topology) -> Bools:
+def lying(topology: Topology) -> Bools:
     """Faces that belong to flat walls: their normals are nearer to the vertical than to the level."""
     areas = topology.areas
     return np.abs(areas[:, 2]) > LEVEL * np.sqrt(np.einsum("ij,ij->i", areas, areas))
-
-
-def _reach(cloud: Floats, lying: bool) -> float:
-    """How far a thin patch reaches across its longest direction, mm: its height, or its lesser extent in plan."""
-    if not lying:
-        return float(np.ptp(cloud[:, 2]))
-    plan = cloud[:, :2] - cloud[:, :2].mean(axis=0)
-    _, _, axes = np.linalg.svd(plan, full_matrices=False)
-    return float(np.ptp(plan @ axes.T, axis=0).min())

@@ -1,64 +1,77 @@
-"""All geometry rules on one mesh: values, topology, crossing, shells, and the facts that fall out on the way."""
+"""The rules on one mesh, and the facts that follow on the way."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.check import crossing, overlap, shells, topology
 from unitcad.check.detail import detail
-from unitcad.check.findings import Facts, Finding, Location, counted, ending
+from unitcad.check.findings import Facts, Finding, Location, ending
 from unitcad.check.limits import Deadline, keeping
-from unitcad.check.mesh import LARGEST, Mesh, extent, representable
-from unitcad.check.rulebook import finding
+from unitcad.check.mesh import Mesh, extent, representable
+from unitcad.check.rules import registry
+from unitcad.check.rules.f_file import F001
+from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.v_values import not_finite
 from unitcad.check.source import Source
-from unitcad.check.topology import Topology
+from unitcad.check.topology import topology_of
+
+if TYPE_CHECKING:
+    from unitcad.catalogue import Printer
 
 
 @dataclass(frozen=True)
-class Judged:
-    """One mesh's findings and facts; `topology` is None where the mesh has no face left."""
+class CheckedMesh:
+    """One mesh's findings and facts; `inspection` is None where the mesh could not be inspected."""
 
     findings: tuple[Finding, ...]
     facts: Facts
-    topology: Topology | None
+    inspection: Inspection | None = None
 
 
-def judge_mesh(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Judged:
-    """Apply the V, T and G rules to one mesh; `cross=False` leaves self-crossing out."""
+def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> CheckedMesh:
+    """Apply the rules that need no printer; `cross=False` leaves out what compares faces with each other."""
     facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
     mesh = replace(mesh, vertices=representable(mesh.vertices))
-    finite = np.asarray((np.abs(mesh.vertices) <= LARGEST).all(axis=1))
-    if not finite.all():
-        bad = np.flatnonzero(~finite[mesh.faces].all(axis=1))
-        places = (Location(face=int(i), object=mesh.name) for i in bad)
-        wrong = len(finite) - int(finite.sum())
-        text = counted(wrong, "non-finite vertex", "non-finite vertices")
-        return Judged(in_file(ending([finding("V001", text, len(bad) or 1, places)]), mesh), facts, None)
+    if found := not_finite(mesh):
+        return CheckedMesh(in_file(found, mesh), facts)
     if not len(mesh.faces):
-        return Judged(ending([finding("F001", "the mesh has no face")]), facts, None)
+        return CheckedMesh(ending([F001.finding("the mesh has no face")]), facts)
     low, high = extent(mesh.vertices)
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
+    findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):
-        found = topology.judge(mesh, deadline)
-    findings = list(found.findings)
-    area = float(np.sqrt(np.einsum("ij,ij->i", found.areas, found.areas)).sum()) / 2
-    facts = replace(facts, shells=found.n_shells, area_mm2=area, watertight=found.watertight)
+        part = Inspection(mesh, topology_of(mesh, deadline), deadline, cross)
+    topology = part.topology
+    area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
+    facts = replace(facts, shells=topology.n_shells, area_mm2=area, watertight=topology.watertight)
     with keeping(findings, facts, lambda kept: in_file(kept, mesh)):
-        crossings = crossing.judge(found.as_stored(), deadline) if cross and len(found.kept) else crossing.Crossings()
-        findings += crossings.findings
-        findings += overlap.judge(found)
-        judged = shells.judge(found, crossings.crossed, crossings.touching, deadline)
-    findings += judged.findings
-    if found.watertight and found.oriented:
-        facts = replace(facts, volume_mm3=float(judged.volumes.sum()))
-    return Judged(in_file(findings, mesh), facts, found)
+        for module in registry.modules():
+            if hasattr(module, "check_mesh"):
+                findings.extend(module.check_mesh(part))
+    if part.solid:
+        facts = replace(facts, volume_mm3=float(topology.volumes.sum()))
+    return CheckedMesh(in_file(findings, mesh), facts, part)
+
+
+def check_on_bed(part: Inspection, printer: Printer) -> tuple[Finding, ...]:
+    """Apply the rules for a printer to a mesh as it stands."""
+    if not len(part.topology.mesh.faces):
+        return ()
+    part = replace(part, printer=printer)
+    findings: list[Finding] = []
+    with keeping(findings, change=lambda kept: in_file(kept, part.mesh)):
+        for module in registry.modules():
+            if hasattr(module, "check_print"):
+                findings.extend(module.check_print(part, printer))
+    return in_file(findings, part.mesh)
 
 
 def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
-    """The findings with the faces of each location as the file has them, and their line and object where known."""
+    """Return the findings with each location's faces as the file has them, and their line and object where known."""
     meshes = detail().meshes
     if meshes is not None and not any(known is mesh for known in meshes):
         meshes.append(mesh)

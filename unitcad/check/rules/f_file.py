@@ -1,0 +1,155 @@
+"""Files, F001 to F013: what the readers find before there is a mesh."""
+
+from __future__ import annotations
+
+from unitcad.check.rules.rule import Rule
+
+F001 = Rule(
+    "F001",
+    "error",
+    "empty or short file",
+    cause=(
+        "The file has no bytes, no facet, or fewer bytes than its header needs. An export was interrupted or "
+        "nothing was selected."
+    ),
+    example="An interrupted download left a file of 0 bytes.",
+    fix="Export again and look at the size of the file.",
+)
+
+F002 = Rule(
+    "F002",
+    "error",
+    "facet count does not match the size",
+    cause=(
+        "The count in a binary STL's header asks for more or fewer 50-byte records than the file holds, or a PLY "
+        "or an OFF promises more elements than it has. A reader that trusts either number reads rubbish."
+    ),
+    example="A binary STL of 12 facets was cut after 400 bytes, which have room for 6.",
+    fix="Copy or export the file again; a file cut short in transfer cannot be repaired.",
+)
+
+F003 = Rule(
+    "F003",
+    "error",
+    "truncated text, XML or zip",
+    cause=(
+        "The text ends inside a facet or before endsolid, the XML is not well formed or ends early, or the zip "
+        "directory is missing or damaged."
+    ),
+    example="The last line of a text STL is `vertex 0 0`.",
+    fix="Copy or export the file again.",
+)
+
+F004 = Rule(
+    "F004",
+    "error",
+    "number that cannot be parsed",
+    cause=(
+        "A coordinate is not a number with a point as decimal sign. A comma means that a program wrote it under a "
+        "German or French locale."
+    ),
+    example="`vertex 1,5 0 0` in place of `vertex 1.5 0 0`.",
+    fix="Export with LC_NUMERIC=C, or replace the commas.",
+)
+
+F005 = Rule(
+    "F005",
+    "error",
+    "content is not what the name says",
+    cause="The bytes are a web page, a Git LFS pointer, a compressed file or another format than the suffix claims.",
+    example="part.stl begins with `version https://git-lfs`, since the repository was cloned without git lfs.",
+    fix="Fetch the real file (git lfs pull, gunzip, the download link behind the page), or rename it.",
+)
+
+F006 = Rule(
+    "F006",
+    "warning",
+    "trailing bytes",
+    cause=(
+        "Bytes follow the last facet, endsolid, the last element that a PLY or OFF promises, or a zip's end "
+        "record. Readers ignore them, or count facets from the size and disagree."
+    ),
+    example="A binary STL has 16 bytes of a checksum after its last facet.",
+    fix="Export again, or cut the file after its last facet.",
+)
+
+F007 = Rule(
+    "F007",
+    "warning",
+    "binary header starts with solid",
+    cause="Programs that look only at the first word take the file for text and refuse it.",
+    example="The header of a binary STL reads `solid part1`.",
+    fix="Write a header that starts with anything else.",
+)
+
+F008 = Rule(
+    "F008",
+    "error",
+    "facet without three vertices",
+    cause=(
+        "A facet of a text STL has fewer or more vertices than three, or a face of another format has fewer. STL "
+        "knows only triangles."
+    ),
+    example="A facet of a text STL has four `vertex` lines.",
+    fix="Triangulate before export.",
+)
+
+F009 = Rule(
+    "F009",
+    "warning",
+    "byte order mark, CR-only line ends or odd encoding",
+    cause=(
+        "Text with a byte order mark, old Macintosh line ends or an encoding other than UTF-8 is misread or hangs "
+        "some readers. In a 3MF part, which must be UTF-8, it is an error."
+    ),
+    example="An editor saved a text STL as UTF-8 with a byte order mark.",
+    fix="Save as UTF-8 without a byte order mark, with LF line ends.",
+)
+
+F010 = Rule(
+    "F010",
+    "info",
+    "several solids in one file",
+    cause="A text STL holds several solid blocks. Some readers take the first one only.",
+    example="`solid lid` to `endsolid lid`, then `solid box` to `endsolid box`.",
+    fix="Nothing, if the reader takes them all; else one file for each.",
+)
+
+F011 = Rule(
+    "F011",
+    "error",
+    "resource limit reached",
+    cause=(
+        "The file asks for more bytes, faces, time or memory than the limits allow, so it was not judged to its "
+        "end. Never read as a pass."
+    ),
+    example="A mesh has 12 million faces, and --max-faces is 10 million.",
+    fix=(
+        "If the file is meant to be so large, raise the limit that the message names: --timeout, --max-faces or "
+        "--memory. Limits without an option, such as 4 GB a file and 100,000 instances of a 3MF, are fixed."
+    ),
+)
+
+F012 = Rule(
+    "F012",
+    "error",
+    "no such file, or unreadable",
+    cause=(
+        "The path does not exist, is not a file, or may not be read; or it is STEP and no B-rep extra is "
+        "installed (a warning where a folder was named)."
+    ),
+    example="`unitcad check prat.stl` where the file is part.stl.",
+    fix="Check the path and its permissions; for STEP pip install 'unitcad[build123d]'.",
+)
+
+F013 = Rule(
+    "F013",
+    "warning",
+    "polygon that is not flat",
+    cause=(
+        "A face of four or more corners has one that lies off its plane by more than a thousandth of its size. "
+        "Programs fold it along different diagonals, so that its volume and its fit differ from one to the next."
+    ),
+    example="A quad of an OBJ is 10 mm wide, and one corner lies 0.5 mm above the plane of the others.",
+    fix="Triangulate before export, or move the corners into one plane.",
+)

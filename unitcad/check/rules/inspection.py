@@ -1,0 +1,50 @@
+"""What the rules are given: a mesh, and what several of them need of it, worked out once and when it is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from unitcad.check import crossing
+from unitcad.check.crossing import Crossings
+from unitcad.check.limits import Deadline
+from unitcad.check.mesh import Mesh
+from unitcad.check.rays import Rays, cast
+from unitcad.check.topology import Topology
+
+if TYPE_CHECKING:
+    from unitcad.catalogue import Printer
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """A mesh with finite vertices, as the file has it, with its topology.
+
+    `deadline` is asked now and then by what takes long; `cross`: whether faces are compared with each other.
+    """
+
+    mesh: Mesh
+    topology: Topology
+    deadline: Deadline
+    cross: bool = True
+    printer: Printer | None = None
+
+    @property
+    def solid(self) -> bool:
+        """Whether the mesh has an inside."""
+        return self.topology.watertight and self.topology.oriented
+
+    @cached_property
+    def crossings(self) -> Crossings:
+        """How its faces meet each other; nothing where they are not compared."""
+        if not self.cross or not len(self.topology.kept):
+            return Crossings()
+        return crossing.judge(self.topology.as_stored(), self.deadline)
+
+    @cached_property
+    def material(self) -> Rays:
+        """How much material lies behind points of its faces, as far as matters for the printer."""
+        assert self.printer is not None
+        floors = float(self.printer.least_wall_mm), float(self.printer.least_flat_wall_mm)
+        return cast(self.topology, floors, float(self.printer.least_feature_mm), self.deadline, side=1)

@@ -1,0 +1,89 @@
+"""All rules, found in the files of this folder: for the command line's --explain, docs/checks.md and SARIF's list."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Sequence
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from types import ModuleType
+
+from unitcad.check import rules as folder
+from unitcad.check.rules.rule import Rule
+from unitcad.errors import Refusal
+
+FAMILIES = {
+    "F": "File",
+    "P": "3MF package",
+    "V": "Values",
+    "T": "Topology",
+    "G": "Geometry",
+    "S": "Scale",
+    "D": "Printability",
+    "M": "Manifest",
+}
+_FAMILY_FILE = re.compile(f"[{''.join(FAMILIES).lower()}]_")
+
+
+@cache
+def modules() -> tuple[ModuleType, ...]:
+    """The files of rules, family by family; a file's name begins with the family's letter."""
+    names = sorted(name for _, name, _ in iter_modules(folder.__path__) if _FAMILY_FILE.match(name))
+    names.sort(key=lambda name: list(FAMILIES).index(name[0].upper()))
+    return tuple(import_module(f"{folder.__name__}.{name}") for name in names)
+
+
+@cache
+def rules() -> dict[str, Rule]:
+    """All rules by code, family by family. Raises ValueError where two have one code."""
+    every: dict[str, Rule] = {}
+    for rule in (value for module in modules() for value in vars(module).values() if isinstance(value, Rule)):
+        if every.setdefault(rule.code, rule) is not rule:
+            raise ValueError(f"two rules have the code {rule.code}")
+    return dict(sorted(every.items(), key=lambda item: (list(FAMILIES).index(item[0][0]), item[0])))
+
+
+def explain(codes: str) -> str:
+    """Explain rules: codes or prefixes of codes, split by commas. Raises `Refusal` for one that begins no code."""
+    chosen = check_prefixes("--explain", [part for part in codes.split(",") if part.strip()] or [codes])
+    return "\n\n".join(
+        f"{rule.code} {rule.title} ({rule.severity})\n\n"
+        f"Cause:   {rule.cause}\nExample: {rule.example}\nFix:     {rule.fix}"
+        for rule in rules().values()
+        if rule.code.startswith(chosen)
+    )
+
+
+def markdown() -> str:
+    """Write docs/checks.md: every rule by family."""
+    lines = [
+        "# Rules of `unitcad check`",
+        "",
+        "Made from the files of `unitcad/check/rules/` by `python docs/make_checks.py`; a test compares the two.",
+        "Severity: an error fails a run, a warning does with `--fail-on warning`, an info never does.",
+        "How to run it in CI: [checks-in-ci.md](checks-in-ci.md).",
+        "",
+    ]
+    head = ["| code | severity | rule | cause | example | fix |", "| --- | --- | --- | --- | --- | --- |"]
+    for letter, family in FAMILIES.items():
+        lines += [f"## {family}", "", *head]
+        for rule in rules().values():
+            if rule.code.startswith(letter):
+                cells = (rule.code, rule.severity, rule.title, rule.cause, rule.example, rule.fix)
+                lines.append(f"| {' | '.join(cells)} |")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def check_prefixes(option: str, prefixes: Sequence[str]) -> tuple[str, ...]:
+    """Return the prefixes in capitals. Raises `Refusal` for one that begins no code."""
+    kept = []
+    for prefix in prefixes:
+        wanted = prefix.strip().upper()
+        if not wanted or not any(code.startswith(wanted) for code in rules()):
+            near = difflib.get_close_matches(wanted, rules(), n=1, cutoff=0.5)
+            raise Refusal(option, prefix, "begins no rule's code", near[0] if near else None)
+        kept.append(wanted)
+    return tuple(kept)

@@ -1,0 +1,32 @@
+"""One rule: its text, and the findings made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import islice
+
+from unitcad.check.detail import detail
+from unitcad.check.findings import Finding, Location
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What is wrong (`title`), how bad it is, why it matters (`cause`), an example, and how to fix it.
+
+    The code is the family's letter and three digits; the severity is error, warning or info.
+    """
+
+    code: str
+    severity: str
+    title: str
+    cause: str
+    example: str
+    fix: str
+
+    def finding(
+        self, message: str, count: int = 1, places: Iterable[Location] = (), severity: str | None = None
+    ) -> Finding:
+        """Make a finding, with the rule's severity unless another one is given."""
+        kept = tuple(islice(places, detail().locations))
+        return Finding(self.code, severity or self.severity, message, int(count), kept)
