@@ -27,10 +27,10 @@ from typing import Any
 import psutil
 
 from unitcad.attenuation.edge import model_block
-from unitcad.batch import Options, run, table
+from unitcad.batch import BatchOptions, estimate_table, run
 from unitcad.batch.executors import ProcessExecutor, SerialExecutor
 from unitcad.batch.sweep import Sweep, from_file
-from unitcad.batch.task import Outcome
+from unitcad.batch.task import VariantOutcome
 from unitcad.cache import usage
 from unitcad.estimating import variant_of
 
@@ -87,7 +87,7 @@ class Bench:
         """Seconds of a batch, with a fresh cache if none is given."""
         self.count += 1
         self.last = self.scratch / f"out{self.count}"
-        options = Options(self.only, cache=cache or self.scratch / f"cache{self.count}", cache_mb=1e6)
+        options = BatchOptions(self.only, cache=cache or self.scratch / f"cache{self.count}", cache_mb=1e6)
         with self._warm() as executor:
             start = time.perf_counter()
             summary = run(sweep, self.last, options, executor, workers=self.workers)
@@ -184,7 +184,9 @@ class Nothing(Executor):
             "laws": 44,
             "laws_held": 44,
         }
-        future.set_result([Outcome(job.index, "ok", f"encapsulating-{job.index:012x}", row) for job in args[0].jobs])
+        future.set_result(
+            [VariantOutcome(job.index, "ok", f"encapsulating-{job.index:012x}", row) for job in args[0].jobs]
+        )
         return future
 
 
@@ -195,7 +197,7 @@ def costs(scratch: Path, variants: int) -> dict[str, Any]:
 
     def spent(sweep: Sweep, out: str, executor: Executor, only: tuple[str, ...] = ONLY) -> float:
         start = time.process_time()
-        run(sweep, scratch / out, Options(only, cache=scratch / "cache", cache_mb=1e6), executor, workers=1)
+        run(sweep, scratch / out, BatchOptions(only, cache=scratch / "cache", cache_mb=1e6), executor, workers=1)
         return time.process_time() - start
 
     everything = ("unit", "moulds", "estimate", "casting")
@@ -253,8 +255,8 @@ def estimates(scratch: Path, variants: int) -> dict[str, Any]:
             for model in models:
                 model_block(asked, model)["edge_level"]
 
-    arrays = timed(lambda: list(table.evaluate(sweep, sweep.count)))
-    written = timed(lambda: table.estimate_table(sweep, scratch / "table", Options(("estimate",))))
+    arrays = timed(lambda: list(estimate_table.evaluate(sweep, sweep.count)))
+    written = timed(lambda: estimate_table.write_estimates(sweep, scratch / "table", BatchOptions(("estimate",))))
     single = timed(loop)
     per_second = {
         "loop": len(some) / single,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -102,15 +103,22 @@ def test_a_circle_of_files_is_seen() -> None:
     assert _circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == {}
 
 
-def test_no_files_of_check_import_each_other_in_a_circle() -> None:
-    graph = _file_imports(PACKAGE / "check")
-    assert len(graph) > 40
+@pytest.mark.parametrize(("room", "least"), [("check", 40), ("cli", 15), ("batch", 10), ("report", 5)])
+def test_no_files_of_a_room_import_each_other_in_a_circle(room: str, least: int) -> None:
+    graph = _file_imports(PACKAGE / room)
+    assert len(graph) > least
     assert _circles(graph) == {}
 
 
 def test_no_basename_occurs_twice_in_check() -> None:
     names = [file.name for file in (PACKAGE / "check").rglob("*.py") if file.name != "__init__.py"]
     assert sorted(names) == sorted(set(names))
+
+
+@pytest.mark.parametrize("room", ["cli", "batch", "report"])
+def test_no_file_of_a_room_has_the_name_of_another_file(room: str) -> None:
+    names = Counter(file.name for file in PACKAGE.rglob("*.py") if file.name != "__init__.py")
+    assert [file.name for file in (PACKAGE / room).rglob("*.py") if names[file.name] > 1] == []
 
 
 def test_no_file_is_past_400_lines() -> None:

@@ -14,7 +14,7 @@ from unitcad.accuracy import runner
 from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Plot, Promise, Result, Table, fastest, frontier, markdown, shown
 from unitcad.accuracy.timing import interleaved, timing
-from unitcad.cli.accuracy import accuracy
+from unitcad.cli.accuracy_command import accuracy
 from unitcad.errors import Refusal, UnitcadError
 
 RESULT = Result(
@@ -111,7 +111,7 @@ def test_unknown_suite_names_the_known():
 
 
 def test_the_command_fails_on_a_broken_promise_alone(tmp_path: Path, monkeypatch, capsys):
-    from unitcad.cli.accuracy import accuracy
+    from unitcad.cli.accuracy_command import accuracy
 
     monkeypatch.setattr(runner, "run", lambda *_: RESULT)
     with pytest.raises(SystemExit) as stopped:

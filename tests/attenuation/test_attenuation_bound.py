@@ -7,7 +7,7 @@ from unitcad.attenuation.loads import Point, UniformDisc
 from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.response import Response
 from unitcad.attenuation.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
-from unitcad.cli.estimate import frequencies
+from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import load
 

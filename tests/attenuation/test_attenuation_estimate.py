@@ -15,7 +15,7 @@ from unitcad.attenuation.curve import NO_RATIO
 from unitcad.attenuation.edge import corners
 from unitcad.attenuation.models import edge_levels
 from unitcad.cli import app
-from unitcad.cli.estimate import frequencies
+from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_spec, frequency_table_of_spec, variant_of
 from unitcad.spec import load

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from batching import bytes_of, calls, ring_sweep, rows, unitcad
 
-from unitcad.batch import Options, load_sweep, run
+from unitcad.batch import BatchOptions, load_sweep, run
 from unitcad.batch.executors import SerialExecutor
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.build import build
@@ -37,7 +37,7 @@ def test_each_geometry_once_whatever_the_workers(tmp_path: Path) -> None:
 
 def test_a_variant_is_the_same_as_built_alone(tmp_path: Path) -> None:
     run(load_sweep("all-materials").overridden(['output.formats=["stl","3mf"]']), tmp_path / "b",
-        Options(("unit", "moulds"), limit=2), SerialExecutor(), workers=1)  # fmt: skip
+        BatchOptions(("unit", "moulds"), limit=2), SerialExecutor(), workers=1)  # fmt: skip
     spec = load("embedded", ['layers.1.material="ecoflex-00-30"', 'output.formats=["stl","3mf"]'])
     alone = build(spec, tmp_path / "a", only=("unit", "moulds")).folder
     together = tmp_path / "b" / alone.name
@@ -93,7 +93,7 @@ def test_the_table_has_a_row_a_variant_with_what_was_swept_and_what_came_out(tmp
 
 def test_laws_and_checks_are_in_the_table(tmp_path: Path) -> None:
     sweep = load_sweep("all-materials").overridden(['output.formats=["stl"]'])
-    run(sweep, tmp_path / "o", Options(("unit", "moulds"), limit=2), SerialExecutor(), workers=1)
+    run(sweep, tmp_path / "o", BatchOptions(("unit", "moulds"), limit=2), SerialExecutor(), workers=1)
     for row in rows(tmp_path / "o"):
         assert row["laws_held"] == row["laws"] > 20
         assert row["laws_broken"] == ""
@@ -109,11 +109,11 @@ def test_a_formula_stays_text_in_the_table(tmp_path: Path) -> None:
 
 def test_refused_variants_are_rows_too(tmp_path: Path) -> None:
     sweep = load_sweep("thickness").overridden(["diameter_mm=13.0"])
-    summary = run(sweep, tmp_path / "o", Options(("unit",), check=False, keep_going=True, limit=4),
+    summary = run(sweep, tmp_path / "o", BatchOptions(("unit",), check=False, keep_going=True, limit=4),
                   SerialExecutor(), workers=1)  # fmt: skip
     assert summary.failed == 0
     sweep = load_sweep("thickness").overridden(["diameter_mm=11.6", 'output.formats=["stl"]'])
-    summary = run(sweep, tmp_path / "p", Options(("unit",), check=False, keep_going=True, limit=4),
+    summary = run(sweep, tmp_path / "p", BatchOptions(("unit",), check=False, keep_going=True, limit=4),
                   SerialExecutor(), workers=1)  # fmt: skip
     assert [row["status"] for row in rows(tmp_path / "p")] == ["ok", "ok", "refused", "refused"]
     assert rows(tmp_path / "p")[2]["reason"].startswith("diameter_mm = 11.6:")
@@ -136,7 +136,7 @@ def test_variants_that_are_equal_share_a_folder(tmp_path: Path) -> None:
     file.write_text(
         'base = "no-fpcb"\n[sweep]\nmode = "cases"\n[[sweep.cases]]\n[[sweep.cases]]\n"diameter_mm" = 14.0\n'
     )
-    summary = run(load_sweep(file), tmp_path / "o", Options(("unit",), check=False), SerialExecutor(), workers=1)
+    summary = run(load_sweep(file), tmp_path / "o", BatchOptions(("unit",), check=False), SerialExecutor(), workers=1)
     assert (summary.ok, summary.geometries) == (2, 1)
     first, second = rows(tmp_path / "o")
     assert first["folder"] == second["folder"]

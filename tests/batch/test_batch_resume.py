@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from batching import bytes_of, ring_sweep, rows, unitcad
 
-from unitcad.batch import Options, Summary, load_sweep, run
+from unitcad.batch import BatchOptions, Summary, load_sweep, run
 from unitcad.batch.executors import SerialExecutor
 from unitcad.batch.journal import Journal
 from unitcad.cache import digest
@@ -61,7 +61,7 @@ FILES = ["manifest.json", "spec.toml", "unit/layer1.stl", "section.svg"]
 
 
 def _run(sweep: Path, out: Path, **more: object) -> Summary:
-    return run(load_sweep(sweep), out, Options(("unit",), **more), SerialExecutor(), workers=1)
+    return run(load_sweep(sweep), out, BatchOptions(("unit",), **more), SerialExecutor(), workers=1)
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 from batching import bytes_of, unitcad
 
 from unitcad.attenuation.estimate import summary
-from unitcad.batch import Options, table
+from unitcad.batch import BatchOptions, estimate_table
 from unitcad.batch.sweep import Sweep, from_file
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_spec
@@ -51,13 +51,13 @@ def _sweep(name: str) -> Sweep:
 
 
 def _rows(sweep: Sweep, out: Path) -> list[dict]:
-    table.estimate_table(sweep, out, Options(("estimate",)))
+    estimate_table.write_estimates(sweep, out, BatchOptions(("estimate",)))
     return json.loads((out / "batch.json").read_text())["variants"]
 
 
 @pytest.mark.parametrize("name", SWEEPS)
 def test_the_table_is_what_single_estimates_give(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table, "BLOCK", 7)  # so that blocks end in the middle of an axis
+    monkeypatch.setattr(estimate_table, "BLOCK", 7)  # so that blocks end in the middle of an axis
     sweep = _sweep(name)
     rows = _rows(sweep, tmp_path / "o")
     assert len(rows) == sweep.count
@@ -75,7 +75,7 @@ def test_the_table_is_what_single_estimates_give(name: str, tmp_path: Path, monk
                 numbers += 1
     assert numbers >= len(rows)  # not a table of nothing
     if name == "free axes":
-        assert table._free_axes(sweep) == [1, 2]
+        assert estimate_table._free_axes(sweep) == [1, 2]
 
 
 def test_what_the_door_refuses_is_refused_here(tmp_path: Path) -> None:
@@ -110,7 +110,7 @@ def test_the_command_writes_the_same_table_each_time_and_no_folders(tmp_path: Pa
 def test_a_hundred_thousand_variants_pass_the_door_a_handful_of_times() -> None:
     axes = {"layers.0.material": SILICONES, "estimate.frequency_hz": {"start": 50.0, "stop": 250.0, "num": 20_000}}
     sweep = from_file({"base": "encapsulating", "sweep": axes}, Path(), "test")
-    blocks = list(table.evaluate(sweep, sweep.count))
+    blocks = list(estimate_table.evaluate(sweep, sweep.count))
     assert sum(len(block.known) for block in blocks) == 100_000
     assert not any(isinstance(entry, UnitcadError) for block in blocks for entry in block.known)
     assert len({id(entry) for block in blocks for entry in block.known}) == 1

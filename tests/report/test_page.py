@@ -18,9 +18,9 @@ from unitcad.cache import MemoryStore
 from unitcad.cli import app
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.build import build
-from unitcad.report import collect, page, write_report
-from unitcad.report.models import model, model_key
+from unitcad.report import page, read_results, write_report
 from unitcad.report.pool import REFERENCE, Pool
+from unitcad.report.viewer_models import model, model_key
 from unitcad.spec import load, templates
 
 NAMESPACE = "http://www.w3.org/1999/xhtml"
@@ -157,7 +157,7 @@ def test_what_was_swept_and_the_levels_come_first(sweep: Path) -> None:
     columns = ["index", "status", "reason", "folder", "motor", "moulds.draft_deg", "name", "design", "diameter_mm",
                "layer1_volume_mm3", "layer1_mass_g", "laws", "edge_paper", "edge_fitted"]  # fmt: skip
     said = {"name": "s", "columns": columns, "variants": [dict.fromkeys(columns)]}
-    assert collect.table(said, [], {})["columns"] == [
+    assert read_results.results_table(said, [], {})["columns"] == [
         "name", "motor", "moulds.draft_deg", "design", "diameter_mm", "edge_paper", "edge_fitted",
         "index", "status", "reason", "layer1_volume_mm3", "layer1_mass_g", "laws",
     ]  # fmt: skip
@@ -187,7 +187,7 @@ def test_an_unreadable_spec_leaves_the_rest(built: Path, tmp_path: Path) -> None
     shutil.copytree(built, tmp_path / "a")
     (tmp_path / "a" / "spec.toml").write_text("diameter_mm = ", "utf-8")
     (tmp_path / "a" / "estimate.json").unlink()
-    record, spec = collect.variant(tmp_path / "a", tmp_path)
+    record, spec = read_results.read_variant(tmp_path / "a", tmp_path)
     assert spec is None
     assert record["model"] is None
     assert "spec.toml" in record["no_model"]
@@ -205,7 +205,7 @@ def test_materials_share_a_model_and_walls_do_not() -> None:
 
 def test_budget_of_a_batch(built: Path) -> None:
     """1,000 variants, each with numbers of its own, over 20 geometries."""
-    record, _ = collect.variant(built, built.parent)
+    record, _ = read_results.read_variant(built, built.parent)
     pool, variants, models, rows = Pool(), [], {}, []
     for i in range(1000):
         mine = {**record, "folder": f"variant-{i}", "model": f"geometry{i % 20}"}

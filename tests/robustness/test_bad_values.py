@@ -200,7 +200,7 @@ def test_a_file_that_can_not_be_is_refused(text: str, tmp_path: Path, capsys, mo
 
 
 def test_every_frequency_step_that_is_offered_is_accepted() -> None:
-    from unitcad.cli.estimate import frequencies
+    from unitcad.cli.estimate_command import frequencies
 
     for text in ("1:5000:5e-324", "1:5000:0.001", "100:100.5:1e-9", "99.7:4999.3:1", "0.5:10:1", "10:5:1"):
         with pytest.raises(Refusal) as refused:

@@ -15,7 +15,7 @@ import pytest
 sys.path.append(str(Path(__file__).parent.parent / "batch"))
 from batching import bytes_of, leftovers, ring_sweep
 
-from unitcad.batch import Options, Summary, load_sweep, run
+from unitcad.batch import BatchOptions, Summary, load_sweep, run
 from unitcad.batch.executors import SerialExecutor
 from unitcad.batch.journal import JOURNAL
 from unitcad.errors import UnitcadError
@@ -31,7 +31,7 @@ class Batch:
         self.folder, self.out, self.cache = folder, folder / "out", folder / "cache"
 
     def run(self, sweep: Path) -> Summary:
-        options = Options(("unit",), verify=True, cache=self.cache)
+        options = BatchOptions(("unit",), verify=True, cache=self.cache)
         return run(load_sweep(sweep), self.out, options, SerialExecutor(), workers=1)
 
 

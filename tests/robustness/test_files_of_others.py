@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from unitcad import files
-from unitcad.batch import Options, load_sweep, run
+from unitcad.batch import BatchOptions, load_sweep, run
 from unitcad.batch.executors import SerialExecutor
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.build import build
@@ -125,7 +125,7 @@ def _umask() -> int:
 @pytest.mark.parametrize("name", ["timings.json", "variants.csv", "batch.json", ".tmp-variants.csv", ".tmp-batch.json"])
 def test_a_link_planted_in_a_batchs_folder_is_not_written_through(name: str, tmp_path: Path) -> None:
     sweep, out = load_sweep("thickness"), tmp_path / "out"
-    options = Options(only=("estimate",), limit=1, cache=tmp_path / "cache")
+    options = BatchOptions(only=("estimate",), limit=1, cache=tmp_path / "cache")
     run(sweep, out, options, SerialExecutor(), workers=1)
     target = tmp_path / "target"
     target.write_text("keep")
@@ -142,7 +142,7 @@ def test_a_link_planted_in_a_batchs_folder_is_not_written_through(name: str, tmp
 @pytest.mark.parametrize("lost", ["nothing", "journal"])
 def test_a_pipe_planted_in_a_batchs_folder_holds_nothing_up(name: str, lost: str, tmp_path: Path) -> None:
     sweep, out = load_sweep("thickness"), tmp_path / "out"
-    options = Options(only=("estimate",), limit=1, cache=tmp_path / "cache")
+    options = BatchOptions(only=("estimate",), limit=1, cache=tmp_path / "cache")
     run(sweep, out, options, SerialExecutor(), workers=1)
     if lost == "journal":
         (out / "journal.jsonl").unlink()

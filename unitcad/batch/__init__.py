@@ -1,6 +1,6 @@
 """Many variants from one sweep file, each distinct part made once, on one machine or many."""
 
-from unitcad.batch.run import Options, Summary, run
+from unitcad.batch.run import BatchOptions, Summary, run
 from unitcad.batch.sweep import Sweep, load_sweep
 
-__all__ = ["Options", "Summary", "Sweep", "load_sweep", "run"]
+__all__ = ["BatchOptions", "Summary", "Sweep", "load_sweep", "run"]

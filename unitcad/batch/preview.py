@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from unitcad.batch.run import Options, counted
+from unitcad.batch.run import BatchOptions, counted
 from unitcad.batch.sweep import Sweep
 from unitcad.cache import MemoryStore
 from unitcad.errors import UnitcadError
@@ -22,7 +22,7 @@ DRAWN, BUILT = 24, 2
 REFUSED_TOLD = 20
 
 
-def preview(sweep: Sweep, options: Options) -> dict[str, Any]:
+def preview(sweep: Sweep, options: BatchOptions) -> dict[str, Any]:
     """Variants, distinct geometries and parts, files and megabytes; `exact` tells whether the first three are counts.
 
     Every variant that is looked at passes the door; `refused` tells the first ones that don't. Raises UnitcadError

@@ -17,12 +17,12 @@ from typing import Any
 
 from unitcad import __version__
 from unitcad.batch import task as tasks
-from unitcad.batch.away import Receiver
 from unitcad.batch.executors import ProcessExecutor
 from unitcad.batch.journal import JOURNAL, Journal
+from unitcad.batch.remote import Receiver
 from unitcad.batch.results import columns_of, write_results, write_timings
 from unitcad.batch.sweep import MOST, Sweep
-from unitcad.batch.task import Job, Outcome, Task
+from unitcad.batch.task import Job, Task, VariantOutcome
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline.build import OUTPUTS, checked_outputs
@@ -40,7 +40,7 @@ COLLECT_EVERY = 500
 
 
 @dataclass(frozen=True)
-class Options:
+class BatchOptions:
     """How a sweep is run. `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end;
     `verify`: what is finished is held to its hashes, not only to its sizes.
     """
@@ -73,14 +73,14 @@ class Summary:
     warnings: list[str] = field(default_factory=list)
 
 
-Watch = Callable[[Summary, Outcome | None], None]
+Watch = Callable[[Summary, VariantOutcome | None], None]
 MOST_FAILURES_TOLD = 20
 
 
 def run(
     sweep: Sweep,
     out: Path,
-    options: Options = Options(),
+    options: BatchOptions = BatchOptions(),
     executor: Executor | None = None,
     *,
     workers: int = 2,
@@ -129,13 +129,13 @@ def run(
     return summary
 
 
-def trim(options: Options) -> None:
+def trim(options: BatchOptions) -> None:
     """Bring the cache down to its limit. A cache that somebody has cleared away needs none, and fails no batch."""
     with contextlib.suppress(UnitcadError, OSError):
         collect(options.cache or default_root(), int(options.cache_mb * 1e6))
 
 
-def batch_head(sweep: Sweep, only: tuple[str, ...], options: Options) -> dict[str, Any]:
+def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> dict[str, Any]:
     """What says which batch this is, in its journal and in its tables."""
     return {
         "batch": digest(repr((sweep.hash, only, options.check)).encode())[:16],
@@ -170,7 +170,7 @@ class _Batch:
     """One run over one sweep."""
 
     def __init__(
-        self, sweep: Sweep, out: Path, only: tuple[str, ...], options: Options, executor: Executor, workers: int,
+        self, sweep: Sweep, out: Path, only: tuple[str, ...], options: BatchOptions, executor: Executor, workers: int,
         away: bool, watch: Watch, journal: Journal, store: DiskStore, summary: Summary,
     ) -> None:  # fmt: skip
         self.sweep, self.out, self.only, self.options, self.executor = sweep, out, only, options, executor
@@ -185,7 +185,7 @@ class _Batch:
         self.tried: dict[int, int] = {}
         self.made: set[int] = set()
         self.seen: dict[int, int] = {}
-        self.running: dict[Future[list[Outcome]], Task] = {}
+        self.running: dict[Future[list[VariantOutcome]], Task] = {}
 
     def all(self) -> Summary:
         while not self.summary.stopped:
@@ -208,7 +208,7 @@ class _Batch:
                 index, again = self.failed_before.popleft(), False
             entry = self.journal.entry(index)
             if entry is not None and self._stands(entry):
-                self._finished(Outcome(index, entry["status"]), fresh=False)
+                self._finished(VariantOutcome(index, entry["status"]), fresh=False)
                 continue
             if entry is not None and entry["status"] == tasks.FAILED and again:
                 # What failed before comes last: a batch that stops at a failure has made all others by then.
@@ -217,13 +217,13 @@ class _Batch:
             try:
                 spec = self.sweep.spec(index)
             except UnitcadError as error:
-                self._finished(Outcome(index, tasks.REFUSED, reason=tasks.failure(index, error).reason))
+                self._finished(VariantOutcome(index, tasks.REFUSED, reason=tasks.failure(index, error).reason))
                 continue
             identity = int(folder_name(spec)[-12:], 16)
             first = self.seen.setdefault(identity, index)
             if first != index:
                 self.journal.add({"index": index, "same_as": first, "values": self.sweep.values(index)[1]})
-                self._finished(Outcome(index, tasks.OK), fresh=False)
+                self._finished(VariantOutcome(index, tasks.OK), fresh=False)
                 continue
             key = geometry_key(spec, self.only, self.options.check)
             damaged = entry["manifest"] if entry else ""
@@ -310,9 +310,9 @@ class _Batch:
         reason = str(error) or type(error).__name__
         if reason == "timed out" and self.options.timeout:
             reason = f"timed out after {self.options.timeout:g} s"
-        self._outcome(Outcome(job.index, tasks.FAILED, reason=reason), task.geometry, job)
+        self._outcome(VariantOutcome(job.index, tasks.FAILED, reason=reason), task.geometry, job)
 
-    def _outcome(self, outcome: Outcome, key: str, job: Job) -> None:
+    def _outcome(self, outcome: VariantOutcome, key: str, job: Job) -> None:
         if outcome.status == tasks.NO_SPACE:
             self.summary.stopped = self.summary.stopped or outcome.reason
             return
@@ -326,7 +326,7 @@ class _Batch:
             outcome = self.receiver.place(outcome, key)
         self._finished(outcome)
 
-    def _finished(self, outcome: Outcome, fresh: bool = True) -> None:
+    def _finished(self, outcome: VariantOutcome, fresh: bool = True) -> None:
         summary = self.summary
         if fresh:
             self.journal.add(
@@ -361,7 +361,7 @@ def _short(key: str) -> int:
     return int(key[:16], 16)
 
 
-def _no_room(outcome: Outcome, out: Path, summary: Summary) -> UnitcadError:
+def _no_room(outcome: VariantOutcome, out: Path, summary: Summary) -> UnitcadError:
     error = UnitcadError(f"{out}: {outcome.reason}; {summary.done} variants are done, the next run takes up the rest")
     error.exit_code = 1
     return error

@@ -62,7 +62,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class VariantOutcome:
     """What became of one variant; `manifest` is the SHA-256 of its manifest.json.
 
     `product`, `contents` and `bundle` are there only where the caller is to place the files.
@@ -82,7 +82,7 @@ class Outcome:
     bundle: Bundle | None = None
 
 
-def work(task: Task) -> list[Outcome]:
+def work(task: Task) -> list[VariantOutcome]:
     """Make a task's variants. Whatever goes wrong with one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
@@ -104,17 +104,17 @@ def work(task: Task) -> list[Outcome]:
     return outcomes
 
 
-def failure(index: int, error: BaseException) -> Outcome:
+def failure(index: int, error: BaseException) -> VariantOutcome:
     """The outcome of a variant that raised."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return Outcome(index, NO_SPACE, reason=f"no space left ({error.filename or error.strerror})")
+        return VariantOutcome(index, NO_SPACE, reason=f"no space left ({error.filename or error.strerror})")
     if isinstance(error, Refusal):
-        return Outcome(index, REFUSED, reason=str(error))
+        return VariantOutcome(index, REFUSED, reason=str(error))
     text = str(error) if isinstance(error, UnitcadError) else f"{type(error).__name__}: {error}"
-    return Outcome(index, FAILED, reason=" ".join(text.split()))
+    return VariantOutcome(index, FAILED, reason=" ".join(text.split()))
 
 
-def _here(job: Job, task: Task) -> Outcome:
+def _here(job: Job, task: Task) -> VariantOutcome:
     """Make a variant into its folder, by way of the cache on this disk."""
     assert task.out is not None
     assert task.cache is not None
@@ -129,14 +129,14 @@ def _here(job: Job, task: Task) -> Outcome:
     return _outcome(job, spec, folder.name, built.manifest, store.counts - before)
 
 
-def _away(job: Job, task: Task, known: Bundle | None) -> Outcome:
+def _away(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
     """Make a variant in memory and hand it back: contents that the caller has are only named."""
     spec = from_json(job.spec)
     store = MemoryStore(known)
     product = make(spec, task.only, task.check, store, Stages())
     outcome = _outcome(job, spec, folders.folder_name(spec), product.manifest, store.counts)
     needed = set(product.shared.values()) & set(store.contents)
-    return Outcome(
+    return VariantOutcome(
         **{
             **vars(outcome),
             "product": product,
@@ -146,11 +146,11 @@ def _away(job: Job, task: Task, known: Bundle | None) -> Outcome:
     )
 
 
-def _outcome(job: Job, spec: Spec, folder: str, manifest: dict[str, Any], counts: Counter[str]) -> Outcome:
+def _outcome(job: Job, spec: Spec, folder: str, manifest: dict[str, Any], counts: Counter[str]) -> VariantOutcome:
     holds = all(law["ok"] for law in manifest["laws"]) and manifest["check"]["errors"] == 0
     codes = sorted({law["code"] for law in manifest["laws"] if not law["ok"]})
     codes += sorted({finding["code"] for finding in manifest["check"]["findings"] if finding["severity"] == "error"})
-    return Outcome(
+    return VariantOutcome(
         job.index,
         OK if holds else BROKEN,
         folder,
@@ -162,8 +162,8 @@ def _outcome(job: Job, spec: Spec, folder: str, manifest: dict[str, Any], counts
     )
 
 
-def _timed(outcome: Outcome, seconds: float) -> Outcome:
-    return Outcome(**{**vars(outcome), "seconds": seconds})
+def _timed(outcome: VariantOutcome, seconds: float) -> VariantOutcome:
+    return VariantOutcome(**{**vars(outcome), "seconds": seconds})
 
 
 def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> dict[str, Any] | None:

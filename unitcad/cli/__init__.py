@@ -8,23 +8,23 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
 from unitcad import __version__
-from unitcad.cli.accuracy import accuracy
-from unitcad.cli.batch import batch
-from unitcad.cli.build import build
-from unitcad.cli.cache import cache
-from unitcad.cli.check import check
-from unitcad.cli.coupon import coupon
-from unitcad.cli.estimate import estimate
-from unitcad.cli.init import init
-from unitcad.cli.list import list_
+from unitcad.cli.accuracy_command import accuracy
+from unitcad.cli.batch_command import batch
+from unitcad.cli.build_command import build
+from unitcad.cli.cache_command import cache
+from unitcad.cli.check_command import check
+from unitcad.cli.coupon_command import coupon
+from unitcad.cli.estimate_command import estimate
+from unitcad.cli.init_command import init
+from unitcad.cli.list_command import list_
 from unitcad.cli.output import say_error, speak_anywhere
-from unitcad.cli.report import report
-from unitcad.cli.schema import schema
+from unitcad.cli.report_command import report
+from unitcad.cli.schema_command import schema
 from unitcad.errors import UnitcadError
 
 app = typer.Typer(
@@ -39,7 +39,7 @@ app = typer.Typer(
 
 
 INTERRUPTED = 130
-WrongArguments = typer.BadParameter.__mro__[2]
+WrongArguments = cast(type[typer.BadParameter], typer.BadParameter.__mro__[2])
 """Typer's error of the command line itself, such as an unknown option: ClickException, its own or click's."""
 
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 
 from unitcad.batch.run import Summary, Watch
-from unitcad.batch.task import Outcome
+from unitcad.batch.task import VariantOutcome
 from unitcad.cli.output import console
 
 
@@ -24,7 +24,7 @@ def watching(json_lines: bool) -> Iterator[Watch]:
         yield lambda summary, outcome: None
 
 
-def _line(summary: Summary, outcome: Outcome | None) -> None:
+def _line(summary: Summary, outcome: VariantOutcome | None) -> None:
     if outcome is None:
         told = {"event": "end", **{k: v for k, v in vars(summary).items() if k != "failures"}}
     else:
@@ -55,7 +55,7 @@ def _bar() -> Iterator[Watch]:
     with Progress(*columns, console=console(stderr=True)) as progress:
         shown = progress.add_task("", total=None, rate=0.0, reused=0, failed=0)
 
-        def watch(summary: Summary, outcome: Outcome | None) -> None:
+        def watch(summary: Summary, outcome: VariantOutcome | None) -> None:
             speed = progress.tasks[0].speed or 0.0
             progress.update(
                 shown,

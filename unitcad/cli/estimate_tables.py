@@ -7,7 +7,6 @@ from typing import Any
 from rich.table import Table
 from rich.text import Text
 
-from unitcad.cli.estimate import level
 from unitcad.cli.output import console
 
 
@@ -129,3 +128,17 @@ def _curve(layered: dict[str, Any]) -> Table:
     for title, key in rows:
         table.add_row(title, *[f"{layered['u_z'][key][i]:.3g}" for i in picked])
     return table
+
+
+def level(found: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) -> str:
+    """A value with its spread, or what there is of it, for a person."""
+    if not found:
+        return "-"
+    value, low, high = (None if found.get(k) is None else f"{found[k] * factor:.{digits}g}" for k in _PARTS)
+    spread = f"{low} to {high}" if low and high and low != high else ""
+    if value:
+        return f"{value} ({spread})" if spread else value
+    return spread or "null"
+
+
+_PARTS = ("value", "low", "high")

@@ -23,10 +23,10 @@ from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
 from unitcad.files import write
 from unitcad.pipeline.folder import PAGE
-from unitcad.report import collect
-from unitcad.report.collect import DAMAGED
-from unitcad.report.models import model
+from unitcad.report import read_results
 from unitcad.report.pool import Pool
+from unitcad.report.read_results import DAMAGED
+from unitcad.report.viewer_models import model
 from unitcad.spec import Spec
 
 VENDORED = ("three.min.js", "uplot.min.js")
@@ -65,15 +65,15 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
     if not folder.is_dir():
         raise UnitcadError(f"{folder}: is not a folder")
     damaged: dict[str, str] = {}
-    if collect.is_variant(folder):
-        record, spec = collect.variant(folder, folder)
+    if read_results.is_variant(folder):
+        record, spec = read_results.read_variant(folder, folder)
         records, specs, table, batch = [record], [spec], None, None
         title = str(record["manifest"].get("name") or folder.resolve().name)
     else:
         records, specs, batch = [], [], None
-        folders = collect.variant_folders(folder)
+        folders = read_results.variant_folders(folder)
         try:
-            batch = collect.batch(folder)
+            batch = read_results.read_batch(folder)
         except UnitcadError as error:
             damaged["batch.json"] = str(error)
         if not folders and not batch:
@@ -81,13 +81,15 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
             raise UnitcadError(f"{folder}: holds no result of unitcad ({why})")
         for each in folders:
             try:
-                record, spec = collect.variant(each, folder)
+                record, spec = read_results.read_variant(each, folder)
             except UnitcadError as error:
                 damaged[each.name] = str(error)
                 continue
             records.append(record)
             specs.append(spec)
-        table = collect.table(batch, records, {name: why for name, why in damaged.items() if name != "batch.json"})
+        table = read_results.results_table(
+            batch, records, {name: why for name, why in damaged.items() if name != "batch.json"}
+        )
         title = f"{(batch or {}).get('name') or folder.resolve().name}: {len(table['rows'])} variants"
     models = _models(records, specs)
     pool = Pool()

@@ -66,12 +66,12 @@ def batch(
     """Make every variant of a sweep, each distinct part once. The last line printed is the folder."""
     from dataclasses import asdict
 
-    from unitcad.batch import Options, load_sweep, run
+    from unitcad.batch import BatchOptions, load_sweep, run
     from unitcad.batch.cluster import Certificates
+    from unitcad.batch.estimate_table import write_estimates
     from unitcad.batch.executors import open_executor
     from unitcad.batch.preview import preview
     from unitcad.batch.run import trim
-    from unitcad.batch.table import estimate_table
     from unitcad.cli.batch_progress import watching
     from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json
@@ -82,7 +82,7 @@ def batch(
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
     wanted = load_sweep(sweep).overridden([*(sets or []), *chosen_formats(formats)])
     allow_code(code, nothing_else=dry_run)
-    options = Options(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify)
+    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify)
     if dry_run:
         found = preview(wanted, options)
         print_json(found) if as_json or json_lines else _tell_preview(found)
@@ -92,7 +92,7 @@ def batch(
         if chosen == ("estimate",):
             if scheduler is not None:
                 raise Refusal("--scheduler", scheduler, "estimates alone are computed in this process: leave it out")
-            summary = estimate_table(wanted, folder, options)
+            summary = write_estimates(wanted, folder, options)
         else:
             certificates = Certificates(tls_ca_file, tls_cert, tls_key)
             opened = open_executor(jobs, scheduler, timeout, certificates)

@@ -16,8 +16,8 @@ from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.files import TEMPORARY
 from unitcad.pipeline.folder import PAGE
-from unitcad.report.models import model_key, spec_in
 from unitcad.report.records import BatchFile, Manifest, expect
+from unitcad.report.viewer_models import model_key, spec_in
 from unitcad.spec import Spec, to_data
 
 MANIFEST = "manifest.json"
@@ -43,7 +43,7 @@ def variant_folders(folder: Path) -> list[Path]:
     return sorted(path for path in there if not path.name.startswith(TEMPORARY) and is_variant(path))
 
 
-def variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]:
+def read_variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]:
     """What a variant's folder holds, and its spec (None where it can't be read). Paths are relative to `root`.
 
     Raises UnitcadError for a manifest that can't be read.
@@ -105,7 +105,9 @@ def _drawing(path: Path) -> str:
     return files.read_text(path, largest=LARGEST_DRAWING, links=False)
 
 
-def table(said: dict[str, Any] | None, variants: list[dict[str, Any]], damaged: dict[str, str]) -> dict[str, Any]:
+def results_table(
+    said: dict[str, Any] | None, variants: list[dict[str, Any]], damaged: dict[str, str]
+) -> dict[str, Any]:
     """A batch's table: `columns` and `rows`, each row with the folder of its variant first ("" for one that failed).
 
     As batch.json lists them where there is one (`said`), else from the manifests. What was chosen comes first, then the
@@ -151,7 +153,7 @@ def _in_order(columns: list[str]) -> list[str]:
     return sorted(columns, key=place)
 
 
-def batch(folder: Path) -> dict[str, Any] | None:
+def read_batch(folder: Path) -> dict[str, Any] | None:
     """batch.json of a folder, None without one. Raises UnitcadError where it can't be read."""
     try:
         said = files.read_json(folder / "batch.json", largest=files.LARGEST_TABLE, links=False)

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from unitcad.batch import task as tasks
-from unitcad.batch.task import Outcome
+from unitcad.batch.task import VariantOutcome
 from unitcad.cache import Bundle, DiskStore, digest
 from unitcad.files import write_new
 from unitcad.pipeline.folder import replacing, sync
@@ -26,7 +26,7 @@ class Receiver:
             return None
         return Bundle(found["data"], found["files"], found["sizes"])
 
-    def place(self, outcome: Outcome, geometry: str) -> Outcome:
+    def place(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
         """Put a variant's files into its folder; the outcome without them. Raises OSError."""
         assert outcome.product is not None
         try:
@@ -45,7 +45,7 @@ class Receiver:
             raise
         except Exception as error:
             return tasks.failure(outcome.index, error)
-        return Outcome(**{**vars(outcome), "product": None, "contents": {}, "bundle": None})
+        return VariantOutcome(**{**vars(outcome), "product": None, "contents": {}, "bundle": None})
 
 
 def _key(geometry: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -104,17 +104,3 @@ def _up(number: float) -> float:
     """The number to six digits, not below it."""
     shown = float(f"{number:.6g}")
     return shown if shown >= number else float(f"{number * (1 + 1e-5):.6g}")
-
-
-def level(found: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) -> str:
-    """A value with its spread, or what there is of it, for a person."""
-    if not found:
-        return "-"
-    value, low, high = (None if found.get(k) is None else f"{found[k] * factor:.{digits}g}" for k in _PARTS)
-    spread = f"{low} to {high}" if low and high and low != high else ""
-    if value:
-        return f"{value} ({spread})" if spread else value
-    return spread or "null"
-
-
-_PARTS = ("value", "low", "high")

@@ -22,7 +22,7 @@ from unitcad.attenuation.table import CROSSINGS
 from unitcad.batch import task as tasks
 from unitcad.batch.journal import Journal
 from unitcad.batch.results import FIRST, write_results, write_timings
-from unitcad.batch.run import MOST_FAILURES_TOLD, Options, Summary, batch_head, counted
+from unitcad.batch.run import MOST_FAILURES_TOLD, BatchOptions, Summary, batch_head, counted
 from unitcad.batch.sweep import Sweep
 from unitcad.batch.task import OK
 from unitcad.errors import UnitcadError
@@ -62,7 +62,7 @@ class Block:
     known: list[_Known | UnitcadError]
 
 
-def estimate_table(sweep: Sweep, out: Path, options: Options) -> Summary:
+def write_estimates(sweep: Sweep, out: Path, options: BatchOptions) -> Summary:
     """Write `variants.csv`, `batch.json` and `timings.json` of every variant's edge level by model into `out`.
 
     Raises UnitcadError for a folder that isn't ours.
