@@ -1,7 +1,8 @@
 """Self-crossing (G001), touching shells (G003) and coplanar overlap (G004, G008, G009), decided exactly.
 
-Three sieves, each a whole block of pairs at a time: boxes; faces round a vertex whose star is a height field, which can
-meet in that vertex only; planes that set faces apart. What is left is decided by exact signs.
+Sieves, each a whole block of pairs at a time: boxes; faces round a vertex whose star is a height field, which can
+meet in that vertex only; slabs square to the diagonals of space; planes that set faces apart. What is left is decided
+by exact signs.
 A crossing is one of: two faces pass through each other; an edge lies in a face and its two faces leave to both sides.
 """
 
@@ -19,7 +20,7 @@ from unitcad.check.edges import balanced
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.limits import Deadline, Unreadable
 from unitcad.check.mesh import float32_step, same_place
-from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
+from unitcad.check.pairs import box_order, boxes_of, frame_of, meeting_pairs, slabs_of
 from unitcad.check.planes import Planes, planes_of
 from unitcad.check.rulebook import finding
 from unitcad.check.stars import height_fields
@@ -55,7 +56,7 @@ class _Found:
 
 @dataclass(frozen=True)
 class _Faces:
-    """Faces in Morton order and what the sieves need of them.
+    """Faces in the order of a space-filling curve and what the sieves need of them.
 
     `normal` (3, m) is twice their area vectors; the vertices of `planes` are the first in each place.
     """
@@ -74,25 +75,26 @@ class _Faces:
 def judge(topology: Topology, deadline: Deadline) -> Crossings:
     """Apply the rules to a mesh that went through the topology rules."""
     mesh = topology.mesh
-    steps = frame_of(mesh.vertices).steps(mesh.vertices)
-    order = morton_order(steps, mesh.faces[:, 0])
-    ordered = np.ascontiguousarray(mesh.faces[order])
+    frame = frame_of(mesh.vertices)
+    steps = frame.steps(mesh.vertices)
+    boxes = boxes_of(steps, *mesh.faces.T)
+    order = box_order(boxes, frame)
     normal = np.stack([topology.areas[:, axis].take(order) for axis in range(3)])
     solid = (normal != 0).any(axis=0)
     if not solid.all():
-        order, ordered, normal = order[solid], ordered[solid], normal[:, solid]
+        order, normal = order[solid], normal[:, solid]
     if len(order) < 2:
         return Crossings()
     deadline.tick()
-    faces = _prepared(topology, order, ordered, normal)
-    boxes = boxes_of(steps, *faces.corners)
-    del ordered, normal, steps
+    faces = _prepared(topology, order, normal)
+    boxes, slabs = boxes.take(order, axis=0), slabs_of(steps, *faces.corners)
+    del normal, steps
     found = _Found(Contacts(topology.n_shells, every=detail().meshes is not None))
     waiting: list[tuple[Ints, Ints]] = []
     count = 0
     try:
         for i, j in meeting_pairs(boxes, deadline):
-            i, j = _strangers(faces, i, j)
+            i, j = slabs.meeting(*_strangers(faces, i, j))
             waiting.append((i, j))
             count += len(i)
             if count > _BLOCK:
@@ -109,9 +111,9 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
     return _said(topology, faces, found)
 
 
-def _prepared(topology: Topology, order: Ints, ordered: Ints, normal: Floats) -> _Faces:
+def _prepared(topology: Topology, order: Ints, normal: Floats) -> _Faces:
     vertices, several = topology.mesh.vertices, topology.n_shells > 1
-    columns, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(ordered.T)
+    columns, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(topology.mesh.faces.take(order, axis=0).T)
     smooth = height_fields(columns, corners, normal, _surrounded(topology))
     places = same_place(vertices).take(corners) if several else corners
     return _Faces(

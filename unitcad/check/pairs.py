@@ -17,6 +17,7 @@ from unitcad.check.mesh import extent, sorted_with_order
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _FAN = 4
+_ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked at
 _STEP_BITS = 12
 _STEP = 1 << _STEP_BITS  # pairs of nodes looked at together
 _TOP = 65_534  # largest step; 65,535 is an empty box's low corner
@@ -58,6 +59,12 @@ def morton_order(steps: list[Ints], corner: Ints | None = None) -> Ints:
     return sorted_with_order(key if corner is None else key[corner], 3 * _BITS)[1]
 
 
+def box_order(boxes: Ints, frame: Frame) -> Ints:
+    """The order of boxes in a frame by their middles, along a space-filling curve with cells that are near cubes."""
+    middle = [boxes[:, axis] // 2 + (np.uint16(65_535) - boxes[:, axis + 3]) // 2 for axis in range(3)]
+    return morton_order(frame.even(middle))
+
+
 def _spread(value: np.ndarray) -> np.ndarray:
     """Bits of `value` (up to 16) moved three apart."""
     for shift, mask in ((16, 0xFF0000FF), (8, 0x0F00F00F00F), (4, 0xC30C30C30C3), (2, 0x249249249249)):
@@ -78,6 +85,43 @@ def boxes_of(steps: list[Ints], *corners: Ints) -> Ints:
     return boxes
 
 
+@dataclass(frozen=True)
+class Slabs:
+    """The steps along each diagonal of space between which faces lie: words of four low ones, of four high ones."""
+
+    low: Ints
+    high: Ints
+
+    def meeting(self, i: Ints, j: Ints) -> tuple[Ints, Ints]:
+        """The pairs i, j of faces whose slabs meet along all diagonals."""
+        meet = self._reach(i, j)
+        meet &= self._reach(j, i)
+        keep = np.flatnonzero(meet.view(np.uint32) == 0x01010101)
+        return i[keep], j[keep]
+
+    def _reach(self, i: Ints, j: Ints) -> Bools:
+        return self.low.take(i, mode="clip").view(np.uint16) <= self.high.take(j, mode="clip").view(np.uint16)
+
+
+def slabs_of(steps: list[Ints], *corners: Ints) -> Slabs:
+    """The slabs of faces, by the steps of their corners along the axes, as `boxes_of` makes their boxes.
+
+    A sum of three steps is off by less than three of them, a fourth of it by one at most: so much are they wider.
+    """
+    x, y, z = (step.astype(np.int32) for step in steps)
+    along = np.empty((len(x), 4), np.uint16)
+    for k, value in enumerate((x + y + z, x + y - z + _TOP, x - y + z + _TOP, y + z - x + _TOP)):
+        np.right_shift(value, 2, out=along[:, k], casting="unsafe")
+    words = along.view(np.uint64)[:, 0]
+    first, *others = (words.take(corner, mode="clip").view(np.uint16) for corner in corners)
+    low, high = first.copy(), first
+    for other in others:
+        np.minimum(low, other, out=low)
+        np.maximum(high, other, out=high)
+    high += np.uint16(1)
+    return Slabs(low.view(np.uint64), high.view(np.uint64))
+
+
 def meeting_pairs(boxes: Ints, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
     """Blocks of pairs i, j of different rows of `boxes` whose boxes meet, each pair once.
 
@@ -96,9 +140,9 @@ def meeting_between(boxes: Ints, others: Ints, deadline: Deadline) -> Iterator[t
 
 
 def _levels(boxes: Ints, least: int) -> list[Ints]:
-    """The tree's levels from the leaves up, for `least` leaves or more; the uppermost has four boxes at most."""
+    """The tree's levels from the leaves up, for `least` leaves or more; the uppermost has few boxes."""
     levels = [_padded(boxes, max(least - len(boxes), 0))]
-    while len(levels) == 1 or len(levels[-1]) > _FAN:
+    while len(levels) == 1 or len(levels[-1]) > _ROOTS:
         below = levels[-1]
         pair = np.minimum(below[0::2], below[1::2])
         levels.append(_padded(np.minimum(pair[0::2], pair[1::2]), 0))
@@ -112,8 +156,12 @@ def _padded(boxes: Ints, more: int) -> Ints:
 
 
 def _packed(boxes: Ints) -> Ints:
-    """Every four rows in one column: six words of four coordinates each, (6, n / 4)."""
-    children = boxes.reshape(-1, _FAN, 6).transpose(2, 0, 1)
+    """Every four rows in one column: six words of four coordinates each, low then high, (6, n / 4).
+
+    They are signed, less half their range: such comparisons are the fastest.
+    """
+    children = boxes.reshape(-1, _FAN, 6).transpose(2, 0, 1) ^ np.uint16(0x8000)
+    np.invert(children[3:], out=children[3:])
     return np.ascontiguousarray(children).view(np.uint64).reshape(6, -1)
 
 
@@ -139,8 +187,8 @@ def _descend(
 def _children(rows: Ints, which: Ints) -> tuple[Ints, Ints]:
     """Low and high corners of the children of some nodes: (axis, child, node) each."""
     words = rows.take(which, axis=1, mode="clip")
-    corners = np.ascontiguousarray(words.view(np.uint16).reshape(6, -1, _FAN).transpose(0, 2, 1))
-    return corners[:3], np.uint16(65_535) - corners[3:]
+    corners = np.ascontiguousarray(words.view(np.int16).reshape(6, -1, _FAN).transpose(0, 2, 1))
+    return corners[:3], corners[3:]
 
 
 def _walk(
@@ -179,9 +227,7 @@ def _walk(
             meet.reshape(_FAN * _FAN, -1)[np.ix_(left_out, own)] = False
         found = np.flatnonzero(meet)
         which, pair = found >> _STEP_BITS, found & (_STEP - 1)
-        i, j = i.take(pair), j.take(pair)
-        i *= _FAN
-        j *= _FAN
-        i += grid_i.take(which)
-        j += grid_j.take(which)
+        i, j = (i * _FAN).take(pair), (j * _FAN).take(pair)
+        i += which >> 2
+        j += which & 3
         yield i, j
