@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from unitcad.cache import DiskStore
+
 PLANTED = "open({mark!r}, 'w').close()\nraise SystemExit('planted')\n"
 SCRIPT = shutil.which("unitcad", path=str(Path(sys.executable).parent)) or "unitcad"
 SWEEP = 'base = "single-embedded"\n[set]\n"output.formats" = ["stl"]\n[sweep]\ndiameter_mm = [14.0, 15.0]\n'
@@ -34,9 +36,9 @@ MORE = [
     "init mine",
     "list materials",
     "schema",
-    "coupon",
-    "cache ls",
-    "cache gc",
+    "coupon fdm-0.4",
+    "cache ls --cache cache",
+    "cache gc --cache cache",
     "accuracy --help",
 ]
 
@@ -58,6 +60,7 @@ def material(tmp_path_factory: pytest.TempPathFactory) -> Path:
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     (result,) = (folder / "out").iterdir()
     result.rename(folder / "result")
+    DiskStore(folder / "cache").close()
     stl = next((folder / "result").rglob("*.stl"))
     for name in ("a.stl", "b.stl", "a.step"):
         shutil.copy(stl, folder / name)

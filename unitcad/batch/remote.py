@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from unitcad.batch import task as tasks
@@ -45,8 +46,8 @@ class Receiver:
             raise
         except Exception as error:
             return tasks.failure(outcome.index, error)
-        return VariantOutcome(**{**vars(outcome), "product": None, "contents": {}, "bundle": None})
+        return replace(outcome, product=None, contents={}, bundle=None)
 
 
 def _key(geometry: str) -> str:
-    return digest(f"away {geometry}".encode())
+    return digest(f"remote {geometry}".encode())

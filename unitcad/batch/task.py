@@ -9,7 +9,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -96,7 +96,7 @@ def work(task: Task) -> list[VariantOutcome]:
                 outcome = _here(job, task) if task.out else _away(job, task, known)
         except Exception as error:
             outcome = failure(job.index, error)
-        outcomes.append(_timed(outcome, time.perf_counter() - start))
+        outcomes.append(replace(outcome, seconds=time.perf_counter() - start))
         known = outcome.bundle or known
     if task.out:
         # Before anybody notes them as done: what is noted is on the disk.
@@ -136,13 +136,11 @@ def _away(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
     product = make(spec, task.only, task.check, store, Stages())
     outcome = _outcome(job, spec, folders.folder_name(spec), product.manifest, store.counts)
     needed = set(product.shared.values()) & set(store.contents)
-    return VariantOutcome(
-        **{
-            **vars(outcome),
-            "product": product,
-            "contents": {sha: store.contents[sha] for sha in sorted(needed)},
-            "bundle": store.bundle() if outcome.built else None,
-        }
+    return replace(
+        outcome,
+        product=product,
+        contents={sha: store.contents[sha] for sha in sorted(needed)},
+        bundle=store.bundle() if outcome.built else None,
     )
 
 
@@ -160,10 +158,6 @@ def _outcome(job: Job, spec: Spec, folder: str, manifest: dict[str, Any], counts
         built=counts["file built"] + counts["data built"],
         reused=counts["file reused"] + counts["data reused"],
     )
-
-
-def _timed(outcome: VariantOutcome, seconds: float) -> VariantOutcome:
-    return VariantOutcome(**{**vars(outcome), "seconds": seconds})
 
 
 def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> dict[str, Any] | None:

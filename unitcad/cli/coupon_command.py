@@ -9,7 +9,9 @@ import typer
 
 
 def coupon(
-    printer: Annotated[str, typer.Argument(help="A printer of the catalogue (unitcad list printers).")],
+    printer: Annotated[
+        str, typer.Argument(metavar="PRINTER", help="A printer of the catalogue (unitcad list printers).")
+    ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Where the coupon's folder goes.")] = Path("out"),
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
