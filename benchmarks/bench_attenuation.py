@@ -20,7 +20,7 @@ from unitcad.attenuation.loads import UniformDisc
 from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.models import MODELS, edge_levels
 from unitcad.estimating import variant_of
-from unitcad.spec import load
+from unitcad.validation import load
 
 RADII = np.geomspace(1e-4, 50e-3, 13)
 A, OMEGA, RTOL = 3.5e-3, 2 * np.pi * 125, 1e-6

@@ -17,7 +17,7 @@ from unitcad.attenuation.closed_form import Units
 from unitcad.attenuation.models import STORED_FIT, edge_levels, judgements, one_constant, scales
 from unitcad.attenuation.table import judge, measured_table
 from unitcad.estimating import estimate_spec
-from unitcad.spec import load
+from unitcad.validation import load
 
 HERE = Path(__file__).parent
 TITLES = {

@@ -13,7 +13,8 @@ import pytest
 from unitcad import catalogue
 from unitcad.catalogue.entries import Value, kinds_of
 from unitcad.errors import Refusal
-from unitcad.spec import from_data, read, to_data, to_toml
+from unitcad.spec import to_data, to_toml
+from unitcad.validation import from_data, read
 
 ENTRIES = {
     "materials": (catalogue.Material, catalogue.materials, "ecoflex-00-30"),

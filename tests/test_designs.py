@@ -9,7 +9,7 @@ from manifold3d import Manifold
 from msgspec.structs import replace
 
 from unitcad.pipeline import Variant
-from unitcad.spec import templates
+from unitcad.validation import templates
 
 NAMES = sorted(templates())
 
@@ -69,7 +69,7 @@ def test_the_circuit_touches_what_the_design_says(name: str) -> None:
         assert all(_contact_area(circuit, solids[layer]) > 1 for layer in layers)
     else:
         cap = _contact_area(solids[layers[0]], circuit)
-        pad = math.pi * (variant.dimensions.pad_radius or 0) ** 2
+        pad = math.pi * (variant.dimensions.pad.radius if variant.dimensions.pad else 0) ** 2
         assert 0.85 * pad < cap <= pad
         for layer in layers[1:]:
             assert _contact_area(solids[layer], circuit) == 0

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.spec import from_data
+from unitcad.validation import from_data
 
 ROOT = Path(__file__).parent.parent
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)

@@ -11,7 +11,7 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import Cut, Revolve, Union, cylinder, moved, polygon, turned
 from unitcad.shape.body import Body
-from unitcad.spec.load import templates
+from unitcad.validation import templates
 
 occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
 step = pytest.importorskip("unitcad.export.step", exc_type=UnitcadError)

@@ -11,7 +11,7 @@ from unitcad.export import drawing, svg
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import box, moved
 from unitcad.shape.body import Body
-from unitcad.spec.load import templates
+from unitcad.validation import templates
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -63,8 +63,8 @@ def test_main_dimensions_and_every_layer_are_there(template):
     wanted |= {f"{dims.heights[-1]:g}"}
     wanted |= {"air"} if dims.air_ring > 0 else set()
     wanted |= {"fpcb"} if spec.fpcb else set()
-    if dims.slot_z:
-        wanted |= {f"slot {dims.slot_z[1] - dims.slot_z[0]:g} × {dims.slot_width:g}"}
+    if dims.exit:
+        wanted |= {f"slot {dims.exit.height:g} × {dims.exit.width:g}"}
     assert wanted <= said
 
 

@@ -29,7 +29,7 @@ from unitcad.shape import (
     turned,
 )
 from unitcad.shape.profile import ProfileError
-from unitcad.spec.load import templates
+from unitcad.validation import templates
 
 occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
 WITHOUT_SHRINKING = (Phase.explicit, Phase.reuse, Phase.generate)

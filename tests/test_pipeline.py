@@ -20,7 +20,7 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline import Variant
 from unitcad.pipeline.build import build
 from unitcad.pipeline.folder import folder_name, replacing
-from unitcad.spec import load, templates
+from unitcad.validation import load, templates
 
 NAMES = sorted(templates())
 
@@ -72,7 +72,7 @@ def test_every_template_builds_with_all_laws_kept(name: str, tmp_path: Path) -> 
 def test_the_same_spec_gives_the_same_bytes(tmp_path: Path) -> None:
     first = build(_mesh_only("chain"), tmp_path / "a")
     code = (
-        "from unitcad.pipeline.build import build; from unitcad.spec import load; from pathlib import Path;"
+        "from unitcad.pipeline.build import build; from unitcad.validation import load; from pathlib import Path;"
         f"build(load('chain', ['output.formats=[\"stl\",\"3mf\"]']), Path({str(tmp_path / 'b')!r}))"
     )
     subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONHASHSEED": "7"})

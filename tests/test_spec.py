@@ -8,20 +8,9 @@ from pathlib import Path
 import pytest
 
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.spec import (
-    Spec,
-    from_data,
-    from_json,
-    load,
-    override,
-    read,
-    templates,
-    to_data,
-    to_json,
-    to_toml,
-    warnings,
-)
+from unitcad.spec import Spec, from_json, to_data, to_json, to_toml
 from unitcad.spec.fields import fields_of, table_in
+from unitcad.validation import from_data, load, override, read, templates, warnings
 
 NAMES = sorted(templates())
 

@@ -131,7 +131,7 @@ def test_what_is_written_has_the_same_line_ends_everywhere(tmp_path: Path, monke
     monkeypatch.setattr(os, "linesep", "\r\n")
     monkeypatch.chdir(tmp_path)
     from unitcad.pipeline.build import build
-    from unitcad.spec import load
+    from unitcad.validation import load
 
     folder = build(load("embedded", ["output.formats=['stl']"]), tmp_path / "out", check=False).folder
     texts = [file for file in folder.rglob("*") if file.suffix in (".toml", ".json", ".md", ".csv", ".svg")]

@@ -46,27 +46,16 @@ def variant_of(spec: Spec, frequency_hz: float | None = None) -> Variant:
         )
     known = motors(spec.motors)
     motor = choose("motor.part", spec.motor.part, known) if spec.motor.part else None
-    diameter = spec.motor.diameter_mm or (float(motor.diameter_mm) if motor else None)
-    if diameter is None:
-        raise Refusal("motor.diameter_mm", None, "must be given when the motor has no part name")
-    asked = frequency_hz if frequency_hz is not None else spec.estimate.frequency_hz
-    if motor and motor.frequency_hz and asked in (None, float(motor.frequency_hz)) and frequency_hz is None:
-        frequency = _quantity(motor.frequency_hz)  # an effective spec writes the motor's value out: keep its range
-    elif asked is not None:
-        frequency = Quantity(asked)
-    elif motor and motor.rpm:
-        frequency = Quantity(float(motor.rpm) / 60.0, note="the motor's rated speed")
-    else:
-        raise Refusal(
-            "estimate.frequency_hz", None, "must be given: the catalogue has no frequency for this motor", 125.0
-        )
-    amplitude = spec.estimate.amplitude_um or (float(motor.amplitude_um) if motor and motor.amplitude_um else None)
+    asked = spec.estimate.frequency_hz if frequency_hz is None else frequency_hz
+    frequency = Quantity(asked)
+    if motor and motor.frequency_hz and frequency_hz is None and asked == float(motor.frequency_hz):
+        frequency = _quantity(motor.frequency_hz)  # the motor's own value: keep its range
     silicones = materials(spec.materials)
     return Variant(
         name=spec.name,
         design=cast("Design", spec.design),
         diameter=spec.diameter_mm * 1e-3,
-        motor_diameter=diameter * 1e-3,
+        motor_diameter=spec.motor.diameter_mm * 1e-3,
         layers=tuple(
             _silicone(choose(f"layers.{i}.material", layer.material, silicones), layer.wall_mm * 1e-3, frequency)
             for i, layer in enumerate(spec.layers)
@@ -74,7 +63,7 @@ def variant_of(spec: Spec, frequency_hz: float | None = None) -> Variant:
         tissue_name=spec.estimate.tissue,
         tissue=tuple(_tissue(layer) for layer in tissue(spec.estimate.tissue, spec.tissue)),
         frequency=frequency,
-        amplitude=None if amplitude is None else amplitude * 1e-6,
+        amplitude=spec.estimate.amplitude_um * 1e-6,
     )
 
 

@@ -11,13 +11,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from unitcad.designs.limits import filament_groove
 from unitcad.moulds.filament import FLARE, STUB_TAIL
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN
 from unitcad.moulds.tooling import BLADE_EDGE, BLADE_THICKNESS, GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
 from unitcad.pipeline import Variant
 from unitcad.shape import mm
 from unitcad.shape.lettering import HEIGHT, outlines, text_width
-from unitcad.spec.door import groove_depth
 
 
 def lengths() -> dict:
@@ -34,11 +34,11 @@ def lengths() -> dict:
         "radii": dims.radii,
         "core_height": dims.core_height,
         "heights": dims.heights,
-        "pad_radius": dims.pad_radius,
-        "circuit_z": dims.circuit_z,
+        "pad_radius": dims.pad.radius,
+        "circuit_z": (dims.pad.low, dims.pad.high),
         "tail": [spec.fpcb.tail_width_mm, dims.outer_radius + spec.fpcb.tail_length_mm],
-        "slot_z": dims.slot_z,
-        "slot_width": dims.slot_width,
+        "slot_z": (dims.exit.low, dims.exit.high),
+        "slot_width": dims.exit.width,
         "ledge": dims.ledge_radius,
         "plinth": lay.plinth[0],
         "plinth_height": moulds.plinth_height_mm,
@@ -57,7 +57,7 @@ def lengths() -> dict:
         "window": moulds.window_clearance_mm,
         "hole": moulds.filament_hole_mm / 2,
         "filament": moulds.filament_mm / 2,
-        "filament_groove": groove_depth(spec),
+        "filament_groove": filament_groove(spec),
         "flare": FLARE,
         "stub_tail": STUB_TAIL,
         "grip": [GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH],

@@ -28,7 +28,7 @@ from unitcad.pipeline import Variant  # noqa: E402
 from unitcad.pipeline.build import build  # noqa: E402
 from unitcad.pipeline.scenes import exploded, step_in_section, unit_cut_open  # noqa: E402
 from unitcad.report import write_report  # noqa: E402
-from unitcad.spec import load  # noqa: E402
+from unitcad.validation import load  # noqa: E402
 
 MOST_BYTES = 250_000
 LOOKS = (("light", 1280, 900, False), ("dark", 1280, 900, True), ("narrow", 390, 844, False))

@@ -14,7 +14,7 @@ from unitcad.attenuation.inputs import body
 from unitcad.attenuation.loads import UniformDisc
 from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.estimating import variant_of
-from unitcad.spec import load
+from unitcad.validation import load
 
 RADII = np.array([0, 2, 5, 7, 10, 15, 20, 30]) * 1e-3
 DISC, OMEGA = 3.5e-3, 2 * math.pi * 125

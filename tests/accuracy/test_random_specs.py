@@ -17,7 +17,7 @@ from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, LAW, REFUSED, Outcome
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, random_spec, seeded_spec
 from unitcad.accuracy.runner import JOURNAL
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.spec.load import text_of
+from unitcad.spec.toml import text_of
 
 EXAMPLES = int(os.environ.get("UNITCAD_RANDOM_SPECS", "60"))
 

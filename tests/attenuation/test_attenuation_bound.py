@@ -9,7 +9,7 @@ from unitcad.attenuation.response import Response
 from unitcad.attenuation.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.spec import load
+from unitcad.validation import load
 
 
 def _random_case(seed: int):

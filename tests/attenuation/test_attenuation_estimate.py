@@ -18,7 +18,7 @@ from unitcad.cli import app
 from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_spec, frequency_table_of_spec, variant_of
-from unitcad.spec import load
+from unitcad.validation import load
 
 SOFT, MEDIUM, STIFF = "ecoflex-00-10", "dragon-skin-10-medium", "dragon-skin-30"
 
@@ -245,7 +245,7 @@ def test_refusals_exit_2_in_one_line(arguments):
 
 def test_estimate_loads_no_cad_and_no_optimiser():
     code = (
-        "import sys; from unitcad.spec import load; from unitcad.estimating import estimate_spec; "
+        "import sys; from unitcad.validation import load; from unitcad.estimating import estimate_spec; "
         "estimate_spec(load('encapsulating')); "
         "print([m for m in ('OCP', 'build123d', 'cadquery', 'manifold3d', 'trimesh', 'scipy.optimize', 'matplotlib') "
         "if m in sys.modules])"
@@ -301,7 +301,7 @@ def test_a_range_stays_a_range_in_the_papers_details():
 
 @pytest.mark.parametrize("layers", [1, 2])
 def test_a_custom_design_has_no_estimate(layers: int) -> None:
-    from unitcad.spec import from_data, read
+    from unitcad.validation import from_data, read
 
     own = {**read("embedded"), "design": "d.py:f", "design_source": "def f(spec): ..."}
     own["layers"] = own["layers"][:layers]

@@ -15,7 +15,8 @@ from unitcad.batch import BatchOptions, load_sweep, run
 from unitcad.batch.executors import SerialExecutor
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.build import build
-from unitcad.spec import from_data, load, read, to_toml
+from unitcad.spec import to_toml
+from unitcad.validation import from_data, load, read
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 
@@ -274,7 +275,7 @@ def test_the_schema_holds_the_specs_and_sweeps_that_are_shipped() -> None:
 
     jsonschema = pytest.importorskip("jsonschema")
     from unitcad.batch.sweep import shipped
-    from unitcad.spec import templates
+    from unitcad.validation import templates
 
     for kind, files in (("spec", templates()), ("sweep", shipped())):
         done = unitcad("schema", kind)

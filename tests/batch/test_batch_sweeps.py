@@ -15,7 +15,7 @@ from unitcad.batch.run import counted
 from unitcad.batch.sweep import Range, from_file, shipped
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline.geometry import geometry_key
-from unitcad.spec import read
+from unitcad.validation import read
 
 SOFT, STIFF = "ecoflex-00-10", "dragon-skin-30"
 

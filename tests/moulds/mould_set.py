@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 
 from manifold3d import Manifold
 
-from unitcad.designs import unit_bodies
+from unitcad.designs import Dimensions, dimensions, unit_bodies
 from unitcad.kernels.mesh import realise, segment_count
 from unitcad.moulds.finding import Finding
 from unitcad.moulds.laws import judge
 from unitcad.moulds.plan import Plan, plan
 from unitcad.shape import Shape
 from unitcad.shape.body import Body
-from unitcad.spec import Dimensions, Spec, dimensions, load
+from unitcad.spec import Spec
+from unitcad.validation import load
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from unitcad.catalogue import materials
 from unitcad.moulds import casting, casting_text, figures
 from unitcad.moulds.casting import Procedure
 from unitcad.moulds.grid import off_grid
-from unitcad.spec import templates
+from unitcad.validation import templates
 
 
 def procedure(*source: str) -> Procedure:

@@ -15,7 +15,7 @@ from unitcad.catalogue import printers
 from unitcad.kernels.mesh import area_true, realise
 from unitcad.moulds import coupon
 from unitcad.shape import moved, turned
-from unitcad.spec import from_data, read
+from unitcad.validation import from_data, read
 
 GRID = 2 / 1024
 SEGMENTS = 64

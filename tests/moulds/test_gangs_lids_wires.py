@@ -12,7 +12,7 @@ from unitcad.accuracy.outcomes import door, put_in
 from unitcad.accuracy.random_specs import DOCUMENTED, Seeded, random_spec
 from unitcad.errors import Refusal
 from unitcad.moulds import air, fit, lid
-from unitcad.spec import from_data, read
+from unitcad.validation import from_data, read
 
 WIRES = {"diameter_mm": 0.3, "count": 2}
 

@@ -11,7 +11,7 @@ import pytest
 
 from unitcad.pipeline import Variant
 from unitcad.pipeline.build import build
-from unitcad.spec import load
+from unitcad.validation import load
 
 pytestmark = pytest.mark.skipif(shutil.which("gmsh") is None, reason="gmsh is not installed")
 pytest.importorskip("build123d")

@@ -12,7 +12,7 @@ from unitcad.errors import Refusal
 from unitcad.moulds import dents, fit, laws
 from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, ring, union
 from unitcad.shape.tree import Common, Revolve
-from unitcad.spec import from_data, templates
+from unitcad.validation import from_data, templates
 
 Fault = tuple[str, str, str, Callable[[Shape], Shape]]
 
@@ -177,7 +177,7 @@ def test_air_under_a_tongue_is_the_formulas() -> None:
     """The widest tail that the ledge leaves: the law measures what lengths say; on thin walls it is refused."""
     moulds = MouldSet.of("encapsulating", "fpcb.tail_width_mm=6.3", "output.tolerance_mm=0.001")
     measured = [f.value for f in moulds.judged() if f.code == "C400"]
-    expected = [dents.under_tongue(moulds.dims, layer) for layer in range(2)]
+    expected = [dents.under_tongue(moulds.dims, moulds.dims.exit, layer) for layer in range(2)]
     assert measured == pytest.approx(expected, rel=0.01)
     with pytest.raises(Refusal) as refused:
         MouldSet.of("encapsulating", "fpcb.tail_width_mm=6.3", "layers.0.wall_mm=0.6", "layers.1.wall_mm=1.9")

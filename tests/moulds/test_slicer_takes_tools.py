@@ -16,7 +16,7 @@ from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds import coupon
 from unitcad.pipeline.build import build
 from unitcad.pipeline.slicing import slice_tools
-from unitcad.spec import load, templates
+from unitcad.validation import load, templates
 
 pytestmark = [
     pytest.mark.slicer,

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from unitcad.cache import MemoryStore
 from unitcad.pipeline.build import build
 from unitcad.report import write_report
-from unitcad.spec import load
+from unitcad.validation import load
 
 
 @pytest.fixture(scope="session")

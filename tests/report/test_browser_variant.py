@@ -18,7 +18,7 @@ from unitcad.pipeline.build import build
 from unitcad.pipeline.scenes import moments
 from unitcad.pipeline.variant import Variant
 from unitcad.report import write_report
-from unitcad.spec import load
+from unitcad.validation import load
 
 Image = pytest.importorskip("PIL.Image", reason="reading the screenshots needs Pillow")
 

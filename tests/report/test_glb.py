@@ -16,7 +16,7 @@ from unitcad.kernels.mesh import arrays, realise
 from unitcad.pipeline.parts import glb_content
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import box, cylinder
-from unitcad.spec import templates
+from unitcad.validation import templates
 
 
 def chunks(content: bytes) -> tuple[dict[str, Any], bytes]:

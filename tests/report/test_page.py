@@ -21,7 +21,7 @@ from unitcad.pipeline.build import build
 from unitcad.report import page, read_results, write_report
 from unitcad.report.pool import REFERENCE, Pool
 from unitcad.report.viewer_models import model, model_key
-from unitcad.spec import load, templates
+from unitcad.validation import load, templates
 
 NAMESPACE = "http://www.w3.org/1999/xhtml"
 """Of HTML's elements: a name in three.js, which no browser opens."""

@@ -14,8 +14,9 @@ import msgspec
 
 from unitcad import catalogue
 from unitcad.batch.sweep import Range, SweepFile
-from unitcad.spec import Spec, put
-from unitcad.spec.load import text_of
+from unitcad.spec import Spec
+from unitcad.spec.toml import text_of
+from unitcad.validation import put
 
 SCHEMAS = {
     kind: msgspec.json.schema(table) for kind, table in {"spec": Spec, "sweep": SweepFile, "range": Range}.items()

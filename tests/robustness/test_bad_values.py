@@ -13,7 +13,8 @@ from bad_values import bad_values, sample, toml, with_value
 from unitcad.batch.sweep import from_file
 from unitcad.cli import main
 from unitcad.errors import Refusal, UnitcadError, UnknownKey
-from unitcad.spec import from_data, load, to_data
+from unitcad.spec import to_data
+from unitcad.validation import from_data, load
 
 SEED = 13
 

@@ -20,7 +20,7 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline.build import build
 from unitcad.pipeline.folder import clear_leftovers, folder_name, replacing
 from unitcad.report import write_report
-from unitcad.spec import load
+from unitcad.validation import load
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and pipes as POSIX has them")
 

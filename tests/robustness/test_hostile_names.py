@@ -28,7 +28,8 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.export import drawing, threemf
 from unitcad.pipeline.build import build
 from unitcad.report import write_report
-from unitcad.spec import Spec, from_data, read, to_toml
+from unitcad.spec import Spec, to_toml
+from unitcad.validation import from_data, read
 
 SHOWN = [
     "<script>window.hit=1</script>",

@@ -19,7 +19,7 @@ from hostile_results import KINDS, SECRET
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.build import build
 from unitcad.report import write_report
-from unitcad.spec import load
+from unitcad.validation import load
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and pipes as POSIX has them")
 SHOWN_IN_BROWSER = [

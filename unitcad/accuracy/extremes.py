@@ -18,7 +18,7 @@ from unitcad.accuracy.result import Promise, Result, Say, Table
 from unitcad.accuracy.timing import Timing, machine, timing
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.versions import code_version
-from unitcad.spec import override, read
+from unitcad.validation import override, read
 
 PATIENCE = 1800.0
 """Seconds after which a spec counts as hung."""

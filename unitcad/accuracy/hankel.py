@@ -17,7 +17,7 @@ from unitcad.attenuation.loads import UniformDisc
 from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.rheology import LossFactor
 from unitcad.estimating import variant_of
-from unitcad.spec import load
+from unitcad.validation import load
 
 OMEGA = 2 * math.pi * 125.0
 DISC = UniformDisc(3.5e-3)

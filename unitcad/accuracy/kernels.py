@@ -15,7 +15,7 @@ from unitcad.errors import Refusal
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline import Variant
 from unitcad.shape.body import Body
-from unitcad.spec import from_data, templates
+from unitcad.validation import from_data, templates
 
 _QUANTITIES: tuple[str, ...] = ("solids", "volume", "area", "box", "centre")
 

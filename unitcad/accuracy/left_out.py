@@ -11,7 +11,7 @@ from unitcad.cache import MemoryStore
 from unitcad.pipeline import parts
 from unitcad.pipeline.build import OUTPUTS, make
 from unitcad.pipeline.stages import Stages
-from unitcad.spec import load, templates
+from unitcad.validation import load, templates
 
 _ALL = ("step", "stl", "3mf", "svg", "glb")
 REQUESTS: dict[str, tuple[Sequence[str], Sequence[str], bool]] = {

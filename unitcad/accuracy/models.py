@@ -18,7 +18,8 @@ from unitcad.attenuation.models import STORED_FIT, edge_levels, fit_divider, jud
 from unitcad.attenuation.table import Fit, Judgement, judge, measured_table
 from unitcad.attenuation.table import Table as Measured
 from unitcad.estimating import variant_of
-from unitcad.spec import Spec, from_data, load
+from unitcad.spec import Spec
+from unitcad.validation import from_data, load
 
 _WALL = 1.25
 _DRAWN, _BARE = "finite elements, as drawn", "finite elements, without the circuit"

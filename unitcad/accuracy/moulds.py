@@ -12,7 +12,7 @@ from unitcad.errors import Refusal
 from unitcad.moulds.laws import CODES
 from unitcad.pipeline.build import make
 from unitcad.pipeline.stages import Stages
-from unitcad.spec import from_data
+from unitcad.validation import from_data
 
 
 def run(quick: bool, say: Say) -> Result:

@@ -38,7 +38,7 @@ class Outcome:
 def build_outcome(data: dict[str, Any]) -> Outcome:
     """Build unit and moulds of a spec's data into a folder that is thrown away: laws, mesh files and their checks."""
     from unitcad.pipeline.build import build
-    from unitcad.spec import from_data
+    from unitcad.validation import from_data
 
     start = time.perf_counter()
     try:
@@ -96,7 +96,7 @@ def outcome(data: dict[str, Any], follow: bool = True) -> Outcome:
 def door(data: dict[str, Any]) -> Refusal | None:
     """The refusal that a spec's data meets at the door or in the plan of its moulds; None if it passes both."""
     from unitcad.moulds.plan import plan
-    from unitcad.spec import from_data
+    from unitcad.validation import from_data
 
     try:
         plan(from_data(data))
@@ -107,7 +107,7 @@ def door(data: dict[str, Any]) -> Refusal | None:
 
 def put_in(data: dict[str, Any], where: str, value: object) -> dict[str, Any]:
     """`data` with `value` at the dotted path of a refusal."""
-    from unitcad.spec import put
+    from unitcad.validation import put
 
     changed = copy.deepcopy(data)
     put(changed, where, value)

@@ -15,8 +15,8 @@ from unitcad.accuracy.timing import Timing, interleaved, machine
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline import Variant
 from unitcad.shape import Shape
-from unitcad.spec import load
-from unitcad.spec.models import OutputTable
+from unitcad.spec.asked import OutputTable
+from unitcad.validation import load
 
 TOLERANCES = (0.1, 0.03, 0.01, 0.003, 0.001)
 ANGLE = 0.1
@@ -170,7 +170,7 @@ def _default(found: dict[str, list[_Row]], tolerances: tuple[float, ...]) -> str
             f"{here.time} (at {finer:g} mm: {shown(there.volume_error)}, {shown(there.distance)} mm, "
             f"{there.triangles}, {there.time})"
         )
-    play = load("encapsulating").moulds.plinth_clearance_mm or 0.0
+    play = load("encapsulating").moulds.plinth_clearance_mm
     return (
         f"The default of {DEFAULT:g} mm is 1/{play / DEFAULT:.0f} of the play between printed faces ({play:g} mm): "
         f"{'; '.join(said)}."

@@ -12,9 +12,10 @@ from unitcad.accuracy.fem import Block, Solid, Surface, solve
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.rheology import LossFactor, complex_shear_modulus
+from unitcad.designs import dimensions
 from unitcad.errors import UnitcadError
 from unitcad.estimating import variant_of
-from unitcad.spec import Spec, dimensions
+from unitcad.spec import Spec
 
 CIRCUIT = HalfSpace(density=1900.0, youngs_modulus=3e9, poisson_ratio=0.34)
 """Polyimide with copper: assumed."""
@@ -62,9 +63,8 @@ def unit_blocks(spec: Spec, omega: float, pad: bool) -> list[Block]:
         if layer.cap_mm is not None:
             found.append(Block(0.0, inner * _MM, below * _MM, top * _MM, solid))
         inner, below = radius, top
-    if pad and dims.pad_radius and dims.circuit_z:
-        low, high = dims.circuit_z
-        found.append(Block(0.0, dims.pad_radius * _MM, low * _MM, high * _MM, _solid(CIRCUIT, omega)))
+    if pad and dims.pad:
+        found.append(Block(0.0, dims.pad.radius * _MM, dims.pad.low * _MM, dims.pad.high * _MM, _solid(CIRCUIT, omega)))
     found.append(Block(0.0, dims.motor_radius * _MM, 0.0, dims.motor_height * _MM, None))
     return found
 

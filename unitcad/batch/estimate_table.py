@@ -28,7 +28,8 @@ from unitcad.batch.task import OK
 from unitcad.errors import UnitcadError
 from unitcad.estimating import variant_of
 from unitcad.pipeline.versions import code_version
-from unitcad.spec import Spec, from_data, put
+from unitcad.spec import Spec
+from unitcad.validation import from_data, put
 
 BLOCK = 1 << 15
 FREE = re.compile(r"layers\.(\d+)\.material|estimate\.frequency_hz|name|casting\..+")

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from unitcad.errors import Refusal
-from unitcad.spec import Spec
+from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
 
 
@@ -18,7 +18,7 @@ def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
 
     "layers.0.wall_mm", "estimate.frequency_hz" and whole tables ("fpcb", "layers") are paths.
     """
-    kind: Any = Spec
+    kind: Any = AskedSpec
     node: Any = base
     steps = path.split(".")
     for i, step in enumerate(steps):
@@ -42,7 +42,7 @@ def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
 
 def known_paths(base: dict[str, Any]) -> list[str]:
     """Every path of a spec like `base`, tables and values, in the models' order."""
-    return list(_walk(Spec, "", base))
+    return list(_walk(AskedSpec, "", base))
 
 
 def _walk(kind: Any, prefix: str, node: Any) -> Iterator[str]:

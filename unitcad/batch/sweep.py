@@ -27,8 +27,9 @@ from unitcad.batch.paths import check_path
 from unitcad.cache import digest
 from unitcad.errors import Refusal, unknown_name
 from unitcad.files import names_device
-from unitcad.spec import Spec, check_plain, convert, from_data, override, put, read, read_toml, templates
+from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.fields import fields_of
+from unitcad.validation import from_data, override, put, read, templates
 
 T = TypeVar("T", bound=Struct)
 Mode = Literal["product", "zip", "cases"]

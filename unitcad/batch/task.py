@@ -22,7 +22,7 @@ from unitcad.pipeline import folder as folders
 from unitcad.pipeline.build import Product, build_into, json_bytes, make, possible_outputs
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import code_version
-from unitcad.spec import Spec, from_json, own
+from unitcad.spec import Spec, custom_code, from_json
 
 OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no space"
 """broken: made, but a law or a mesh check says no. refused: the spec can't be. failed: did not get that far."""
@@ -58,7 +58,7 @@ class Task:
     cache: Path | None = None
     known: Bundle | None = None
     code: str = field(default_factory=code_version)
-    allowed: frozenset[str] = field(default_factory=own.allowed)
+    allowed: frozenset[str] = field(default_factory=custom_code.allowed)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def work(task: Task) -> list[VariantOutcome]:
     """Make a task's variants. Whatever goes wrong with one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
-    own.allow(task.allowed)
+    custom_code.allow(task.allowed)
     outcomes = []
     known = task.known
     for job in task.jobs:

@@ -38,7 +38,7 @@ def build(
     from unitcad.pipeline.build import build as run
     from unitcad.pipeline.folder import PAGE, held
     from unitcad.pipeline.slicing import slice_tools
-    from unitcad.spec import load
+    from unitcad.validation import load
 
     overrides = [*(sets or []), *chosen_formats(formats)]
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())

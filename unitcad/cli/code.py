@@ -13,9 +13,9 @@ AllowCode = Annotated[
 
 def allow_code(wanted: bool, nothing_else: bool = False) -> None:
     """Let this process run what a spec brings along, or with `nothing_else` no design's code at all."""
-    from unitcad.spec import own
+    from unitcad.spec import custom_code
 
     if wanted:
-        own.allow({own.ANY})
+        custom_code.allow({custom_code.ANY})
     elif nothing_else:
-        own.allow_nothing()
+        custom_code.allow_nothing()

@@ -36,7 +36,7 @@ def estimate(
     """
     from unitcad.attenuation.models import MODELS
     from unitcad.estimating import estimate_spec, frequency_table_of_spec
-    from unitcad.spec import load
+    from unitcad.validation import load
 
     if model not in ("", "all", *MODELS):
         raise unknown_name("--model", model, (*MODELS, "all"))
@@ -60,10 +60,10 @@ def estimate(
 
 def _warn_of_moulds(spec: Spec) -> None:
     """Say on standard error that `build` would refuse the moulds of a unit that can be estimated."""
+    from unitcad.designs import design_named
     from unitcad.moulds.plan import plan
-    from unitcad.spec.own import is_own
 
-    if is_own(spec.design):
+    if not design_named(spec.design).tooling:
         return
     try:
         plan(spec)

@@ -18,7 +18,7 @@ def init(
     from unitcad.cli.output import print_json
     from unitcad.errors import Refusal, UnitcadError
     from unitcad.files import names_device, write_new
-    from unitcad.spec.starter import starter
+    from unitcad.validation.starter import starter
 
     stem = name.removesuffix(".toml")
     if not re.fullmatch(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,58}[A-Za-z0-9_-])?", stem):

@@ -40,13 +40,13 @@ def _entries(kind: str) -> dict[str, Any]:
     import msgspec
 
     from unitcad import catalogue
-    from unitcad.spec import read, templates
-    from unitcad.spec.door import DESIGNS
+    from unitcad.designs import shipped
+    from unitcad.validation import read, templates
 
     if kind == "templates":
         return {name: _first_comment(path.read_text("utf-8")) for name, path in templates().items() if read(name)}
     if kind == "designs":
-        return dict.fromkeys(DESIGNS, "")
+        return {name: design.about for name, design in shipped().items()}
     if kind == "rules":
         from unitcad.check.rules.registry import rules
 

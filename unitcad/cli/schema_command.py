@@ -19,11 +19,11 @@ def schema(
     from unitcad.batch.sweep import SweepFile
     from unitcad.cli.output import print_json
     from unitcad.errors import unknown_name
-    from unitcad.spec import Spec
+    from unitcad.spec.asked import AskedSpec
 
     if kind not in KINDS:
         raise unknown_name("schema", kind, KINDS)
-    model = Spec if kind == "spec" else SweepFile
+    model = AskedSpec if kind == "spec" else SweepFile
     found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(model)}
     found["title"] = f"unitcad {kind}"
     print_json(found)

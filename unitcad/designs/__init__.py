@@ -1,13 +1,22 @@
-"""Designs: from a spec to the named bodies of a unit."""
+"""Designs: from a spec to the named bodies of a unit. Every file here that defines DESIGN is one."""
 
 from __future__ import annotations
 
-from unitcad.designs import common, embedded, encapsulating, own
-from unitcad.shape.body import Body
-from unitcad.spec import Dimensions, Spec, dimensions
-from unitcad.spec.own import is_own
+import pkgutil
+from functools import cache
+from importlib import import_module
 
-_LAYERS = {"embedded": embedded.layers, "encapsulating": encapsulating.layers}
+from unitcad.designs import parts
+from unitcad.designs.custom import custom
+from unitcad.designs.design import Design
+from unitcad.designs.dimensions import Dimensions
+from unitcad.errors import unknown_name
+from unitcad.shape.body import Body
+from unitcad.spec import Spec
+from unitcad.spec.custom_code import is_custom
+
+__all__ = ["Design", "Dimensions", "design_named", "dimensions", "layer_colour", "shipped", "unit_bodies"]
+
 _LAYER_COLOURS = (
     (0.38, 0.65, 1.00),
     (0.54, 0.87, 0.54),
@@ -19,44 +28,57 @@ _LAYER_COLOURS = (
 _MOTOR_COLOUR, _CIRCUIT_COLOUR = (0.70, 0.70, 0.78), (0.93, 0.56, 0.15)
 
 
+@cache
+def shipped() -> dict[str, Design]:
+    """Return the designs of this package by name."""
+    modules = (import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__))
+    return {module.DESIGN.name: module.DESIGN for module in modules if hasattr(module, "DESIGN")}
+
+
+def design_named(name: str) -> Design:
+    """Return a design by its name in a spec. Raises Refusal for an unknown one."""
+    if is_custom(name):
+        return custom(name)
+    if name not in shipped():
+        raise unknown_name("design", name, shipped())
+    return shipped()[name]
+
+
+def dimensions(spec: Spec) -> Dimensions:
+    """Return the lengths that follow from a spec, mm."""
+    return design_named(spec.design).dimensions(spec)
+
+
 def layer_colour(index: int) -> tuple[float, float, float]:
-    """The colour of layer `index` (from 0, inside out)."""
+    """Return the colour of layer `index` (from 0, inside out)."""
     return _LAYER_COLOURS[index % len(_LAYER_COLOURS)]
 
 
 def unit_bodies(spec: Spec) -> tuple[Body, ...]:
-    """The bodies of the unit as assembled on the skin z = 0: layers from the inside out, motor, circuit or wires."""
-    dims = dimensions(spec)
-    if is_own(spec.design):
-        return _own_bodies(spec, dims)
-    bodies = [
-        Body(f"layer{i + 1}", "unit", shape, layer_colour(i), made="cast", step=i + 1)
-        for i, shape in enumerate(_LAYERS[spec.design](dims))
-    ]
-    return (*bodies, *_inside(spec, dims))
+    """Return the bodies of the unit as assembled on the skin z = 0: layers inside out, motor, circuit or wires.
 
-
-def _own_bodies(spec: Spec, dims: Dimensions) -> tuple[Body, ...]:
-    """The bodies of a design of one's own: "layer1" ... are cast, whatever else it names is printed; motor and circuit
-    are added where it draws none.
+    "layer1" ... are cast, whatever else a design names is printed; motor and circuit are added where it draws none.
     """
+    design = design_named(spec.design)
+    dims = design.dimensions(spec)
+    drawn = design.layers(spec, dims)
+    names = [f"layer{i + 1}" for i in range(len(spec.layers))]
     bodies = []
-    for i, (name, shape) in enumerate(own.shapes(spec).items()):
-        number = name.removeprefix("layer")
-        step = int(number) if name != number and number.isdigit() and 1 <= int(number) <= len(spec.layers) else None
+    for i, (name, shape) in enumerate(drawn.items()):
+        step = names.index(name) + 1 if name in names else None
         bodies.append(Body(name, "unit", shape, layer_colour(i), made="cast" if step else "printed", step=step))
-    drawn = {body.name for body in bodies}
     return (*bodies, *(body for body in _inside(spec, dims) if body.name not in drawn))
 
 
 def _inside(spec: Spec, dims: Dimensions) -> tuple[Body, ...]:
-    """What is bought and goes into the silicone."""
-    bodies = [Body("motor", "unit", common.motor(dims), _MOTOR_COLOUR, made="bought")]
-    if spec.fpcb:
-        bodies.append(Body("fpcb", "unit", common.circuit(spec, dims), _CIRCUIT_COLOUR, made="bought"))
-    if spec.wires:
+    """Return what is bought and goes into the silicone."""
+    bodies = [Body("motor", "unit", parts.motor(dims), _MOTOR_COLOUR, made="bought")]
+    if spec.fpcb and dims.pad:
+        drawn = parts.circuit(spec.fpcb, dims.pad, dims)
+        bodies.append(Body("fpcb", "unit", drawn, _CIRCUIT_COLOUR, made="bought"))
+    if spec.wires and dims.exit:
         bodies += [
             Body(f"wire{i + 1}", "unit", shape, _CIRCUIT_COLOUR, made="bought")
-            for i, shape in enumerate(common.wires(spec, dims))
+            for i, shape in enumerate(parts.wires(spec.wires, dims.exit.wires_y, dims))
         ]
     return tuple(bodies)

@@ -7,15 +7,130 @@
 
 from __future__ import annotations
 
-from unitcad.designs.common import slots
+from unitcad import catalogue
+from unitcad.designs import limits
+from unitcad.designs.design import Design, Reason
+from unitcad.designs.dimensions import Dimensions, concentric, wire_exit
+from unitcad.designs.parts import slots
+from unitcad.errors import Refusal
 from unitcad.shape import Shape, cut, ring
-from unitcad.spec import Dimensions
+from unitcad.spec import Spec
+from unitcad.spec.asked import AskedSpec
 
 
-def layers(dims: Dimensions) -> tuple[Shape, ...]:
-    """Layer i: the tube from the radius of the one inside it to its own, as high as the motor, less the wires' way."""
+def layers(spec: Spec, dims: Dimensions) -> dict[str, Shape]:
+    """Draw layer i: the tube from the radius of the one inside it to its own, as high as the motor, less the notch."""
     inner = (dims.cavity_radius, *dims.radii[:-1])
-    return tuple(
-        cut(ring(r0, r1, 0, height), slots(dims))
-        for r0, r1, height in zip(inner, dims.radii, dims.heights, strict=True)
+    return {
+        f"layer{i + 1}": cut(ring(r0, r1, 0, height), slots(dims))
+        for i, (r0, r1, height) in enumerate(zip(inner, dims.radii, dims.heights, strict=True))
+    }
+
+
+def dimensions(spec: Spec) -> Dimensions:
+    """Return the dimensions: the core is as high as the motor; wires leave through a notch, a tail over the top."""
+    height = spec.motor.thickness_mm
+    return concentric(spec, height, wire_exit(spec, height))
+
+
+def check(spec: Spec, dims: Dimensions) -> None:
+    """Raise Refusal for caps, and for lengths that do not fit each other or the printer."""
+    for i, layer in enumerate(spec.layers):
+        if layer.cap_mm:
+            raise Refusal(
+                f"layers.{i}.cap_mm", layer.cap_mm, "an embedded layer is an open ring and has no cap; leave it out"
+            )
+    limits.check_motor(spec, dims)
+    _check_circuit(spec, dims)
+    limits.check_wires(spec, dims)
+    if dims.exit:
+        limits.check_slot_height(spec, DESIGN.wire_sides)
+        limits.check_under_window(spec, dims, dims.exit)
+    limits.check_printer(spec)
+    printer = catalogue.printers(spec.printers)[spec.moulds.printer]
+    floor = float(printer.least_flat_wall_mm)
+    limits.at_least(
+        "motor.thickness_mm",
+        dims.motor_height,
+        min(spec.moulds.engraving_depth_mm, float(printer.engraving_depth_mm)) + floor,
+        f"the first cup is as high as the motor, and its lettering leaves a floor of {floor:g} from",
     )
+    limits.check_engraving(spec, dims)
+    limits.check_seat(spec)
+
+
+def _check_circuit(spec: Spec, dims: Dimensions) -> None:
+    fpcb = spec.fpcb
+    if not fpcb:
+        return
+    pad = fpcb.pad_diameter_mm
+    limits.at_most("fpcb.pad_diameter_mm", pad, spec.diameter_mm, "the pad stays on the body, whose diameter is")
+    outermost = 2 * (dims.radii[-2] if len(dims.radii) > 1 else dims.cavity_radius)
+    limits.at_least(
+        "fpcb.pad_diameter_mm", pad, outermost + 0.2, "the embedded pad lies on every layer, so it reaches at least"
+    )
+    limits.at_most("fpcb.tail_width_mm", fpcb.tail_width_mm, pad, "the tail is no wider than the pad, which has")
+
+
+def advice(spec: Spec, dims: Dimensions) -> list[str]:
+    """Say where nothing holds the motor."""
+    if spec.fpcb or spec.motor.fill:
+        return []
+    return [
+        "motor.fill = false: without a circuit's pad nothing holds the motor in an embedded unit; fill the ring of "
+        "air round it, or set motor.fill = true"
+    ]
+
+
+def pad_radius(asked: AskedSpec, cavity_radius: float) -> float:
+    """Return the default radius of the pad: over every layer, half a millimetre or half a wall short of the edge."""
+    return asked.diameter_mm / 2 - min(0.5, asked.layers[-1].wall_mm / 2)
+
+
+def assembly(spec: Spec, dims: Dimensions) -> list[str]:
+    """Write how motor and circuit, or wires, go into the ring."""
+    if spec.wires:
+        steps = ["Push the motor into the ring from above, the wires lying in the notch."]
+    elif spec.fpcb:
+        steps = [
+            "Solder the motor to the circuit's pad. Set the motor into the ring, the pad on top of all layers, and "
+            "bond the pad with a thin smear of the last layer's silicone (assumed); it is that bond which holds the "
+            "motor."
+        ]
+    else:
+        steps = ["Push the motor in from the skin's side."]
+    if spec.motor.fill:
+        return [*steps, "Layer 1 holds the motor all round."]
+    if spec.fpcb:
+        return [*steps, f"A ring of air of {dims.air_ring:.2f} mm stays round the motor: what it is fixed to holds it."]
+    return [
+        *steps,
+        f"Nothing else holds it: lay the body on a greased flat, centre the motor, and fill the ring of "
+        f"{dims.air_ring:.2f} mm round it with Layer 1's silicone or a silicone adhesive (assumed). "
+        "motor.fill = true draws Layer 1 up to the motor instead.",
+    ]
+
+
+def left_out(spec: Spec) -> list[Reason]:
+    """Name the tooling that an open ring does without."""
+    reasons = [("filament stub and hole", "embedded: open rings hold no suction")]
+    if spec.fpcb:
+        reasons.insert(0, ("tongue and slot", "embedded: the circuit lies on the rings"))
+    return reasons
+
+
+DESIGN = Design(
+    name="embedded",
+    about="open rings round the motor, the circuit over all layers",
+    layers=layers,
+    dimensions=dimensions,
+    limits=check,
+    advice=advice,
+    pad_radius=pad_radius,
+    wire_sides=1,
+    tooling="concentric",
+    opens="above",
+    passes=1.0,
+    assembly=assembly,
+    left_out=left_out,
+)

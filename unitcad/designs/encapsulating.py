@@ -10,15 +10,149 @@
 
 from __future__ import annotations
 
-from unitcad.designs.common import slots
+from unitcad import catalogue
+from unitcad.designs import limits
+from unitcad.designs.design import Design
+from unitcad.designs.dimensions import MOTOR_CLEARANCE, Dimensions, Exit, concentric, wire_exit
+from unitcad.designs.parts import slots
+from unitcad.designs.strain import allowed_strain, pad_strain, tail_strain, widest_tail_end
+from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
-from unitcad.spec import Dimensions
+from unitcad.spec import Spec
+from unitcad.spec.asked import LEAST_TAIL
+from unitcad.spec.effective import Circuit
+
+TIP_PROUD = 0.2
+"""How far a tongue for wires stands proud of the core, mm, so that Layer 1 clears them; for a circuit it is as much."""
 
 
-def layers(dims: Dimensions) -> tuple[Shape, ...]:
-    """Layer i: wall and cap in one profile, less the slots of tails or wires."""
+def layers(spec: Spec, dims: Dimensions) -> dict[str, Shape]:
+    """Draw layer i: wall and cap in one profile, less the slots of tails or wires."""
     inner = zip((dims.cavity_radius, *dims.radii[:-1]), (dims.core_height, *dims.heights[:-1]), strict=True)
-    return tuple(
-        cut(Revolve(polygon((r0, 0), (r1, 0), (r1, z1), (0, z1), (0, z0), (r0, z0))), slots(dims))
-        for (r0, z0), r1, z1 in zip(inner, dims.radii, dims.heights, strict=True)
+    return {
+        f"layer{i + 1}": cut(Revolve(polygon((r0, 0), (r1, 0), (r1, z1), (0, z1), (0, z0), (r0, z0))), slots(dims))
+        for i, ((r0, z0), r1, z1) in enumerate(zip(inner, dims.radii, dims.heights, strict=True))
+    }
+
+
+def dimensions(spec: Spec) -> Dimensions:
+    """Return the dimensions: the core holds motor and circuit; tail or wires leave through a slot at its top."""
+    fpcb, moulds = spec.fpcb, spec.moulds
+    core = spec.motor.thickness_mm + (fpcb.thickness_mm if fpcb else 0.0)
+    exit = wire_exit(spec, core + TIP_PROUD)
+    if fpcb and not exit:
+        middle = spec.motor.thickness_mm + fpcb.thickness_mm / 2
+        half = moulds.slot_height_mm / 2
+        exit = Exit(middle - half, middle + half, moulds.slot_width_clearance_mm + fpcb.tail_width_mm)
+    return concentric(spec, core, exit)
+
+
+def check(spec: Spec, dims: Dimensions) -> None:
+    """Raise Refusal for missing caps, and for lengths that do not fit each other or the printer."""
+    for i, layer in enumerate(spec.layers):
+        if not layer.cap_mm:
+            raise Refusal(f"layers.{i}.cap_mm", None, "every encapsulating layer has a cap", layer.wall_mm)
+    limits.check_motor(spec, dims)
+    if spec.fpcb and dims.exit:
+        _check_circuit(spec, dims, spec.fpcb, dims.exit)
+    limits.check_wires(spec, dims)
+    if dims.exit:
+        limits.check_slot_height(spec, DESIGN.wire_sides)
+        moulds = spec.moulds
+        limits.at_least(
+            "layers.0.cap_mm",
+            spec.layers[0].cap_mm,
+            moulds.least_wall_mm + moulds.window_clearance_mm + dims.exit.high - dims.core_height,
+            f"with a {limits.leaving(spec)}, the cup's wall over the window needs a first cap of at least",
+        )
+        limits.check_under_window(spec, dims, dims.exit)
+    limits.check_printer(spec)
+    limits.check_engraving(spec, dims)
+    limits.check_seat(spec)
+    limits.check_filament(spec, dims)
+
+
+def _check_circuit(spec: Spec, dims: Dimensions, fpcb: Circuit, exit: Exit) -> None:
+    tail, pad, end = fpcb.tail_width_mm, fpcb.pad_diameter_mm, fpcb.tail_end_width_mm
+    widest = limits.widest_exit(spec, dims)
+    clearance = spec.moulds.window_clearance_mm
+    if widest < LEAST_TAIL and clearance > LEAST_TAIL:
+        # No tail fits because of the clearance: the refusal names the clearance, not the tail.
+        most = limits.down(clearance - (tail - widest) / 2)
+        limit = f"the ledge leaves room for a tail of {tail:g} mm up to a clearance of {most:g} mm"
+        raise Refusal("moulds.window_clearance_mm", clearance, limit, most if most > 0 else None)
+    limits.at_most(
+        "fpcb.tail_width_mm",
+        tail,
+        widest,
+        "half the tail is at most 0.7 of the core's radius and keeps off the ledge's ends, so the tail at most",
     )
+    limits.at_most(
+        "fpcb.pad_diameter_mm",
+        pad,
+        2 * dims.cavity_radius,
+        "the encapsulated pad touches Layer 1 only, so it stays in the cavity of",
+    )
+    limits.at_least("fpcb.pad_diameter_mm", pad, tail, "the pad is no narrower than the tail, which has")
+    limits.at_least("fpcb.tail_end_width_mm", end, tail, "the tail's end is no narrower than it,")
+    if end > tail:
+        allowed = allowed_strain(spec, catalogue.materials(spec.materials))
+        limits.at_most(
+            "fpcb.tail_end_width_mm",
+            end,
+            widest_tail_end(fpcb, exit, allowed),
+            f"passing the slot would stretch it by {tail_strain(fpcb, exit):.0%}, and the silicone takes "
+            f"{allowed:.0%} with its margin: solder the end on after, widen moulds.slot_width_clearance_mm, "
+            "or make the end at most",
+        )
+
+
+def advice(spec: Spec, dims: Dimensions) -> list[str]:
+    """Say where the pad has no clearance in the cavity."""
+    if not dims.pad or dims.pad.radius <= dims.cavity_radius - MOTOR_CLEARANCE + limits.EPS:
+        return []
+    return [
+        f"fpcb.pad_diameter_mm = {2 * dims.pad.radius:g} mm leaves no clearance in the cavity "
+        f"of {2 * dims.cavity_radius:g} mm"
+    ]
+
+
+def assembly(spec: Spec, dims: Dimensions) -> list[str]:
+    """Write how motor and circuit, or wires, go into the cavity."""
+    if spec.wires:
+        steps = ["Feed the wires out through the slot from inside, then push the motor in, its back against the cap."]
+    elif spec.fpcb and dims.exit:
+        steps = [
+            "Solder the motor to the circuit's pad. Feed the tail out through the slot from inside, then push pad "
+            "and motor in until the pad lies against the cap of Layer 1."
+        ]
+        strain = pad_strain(spec.fpcb, dims.exit)
+        if spec.fpcb.tail == "both" and strain:
+            steps.append(
+                f"In a chain the next pad does not go through the slot: that would stretch it by {strain:.0%}. "
+                f"Solder the next unit on after this one is in its body."
+            )
+    else:
+        steps = ["Push the motor in from the skin's side."]
+    steps.append(
+        "A smear of Layer 1's silicone between the back and the cap holds it (assumed: silicone bonds poorly to bare "
+        "metal and polyimide; a primer or a silicone adhesive holds better)."
+    )
+    if spec.motor.fill:
+        return [*steps, "Layer 1 holds the motor all round."]
+    return [*steps, f"A ring of air of {dims.air_ring:.2f} mm stays round the motor: what it is fixed to holds it."]
+
+
+DESIGN = Design(
+    name="encapsulating",
+    about="walls and caps over the motor, the circuit inside Layer 1",
+    layers=layers,
+    dimensions=dimensions,
+    limits=check,
+    advice=advice,
+    wire_sides=2,
+    tooling="concentric",
+    suction=True,
+    passes=2.0,
+    assembly=assembly,
+)

@@ -12,12 +12,12 @@ from xml.sax.saxutils import escape
 import numpy as np
 from manifold3d import CrossSection
 
+from unitcad.designs import Dimensions
 from unitcad.export import drawing
 from unitcad.export.drawing import Point
 from unitcad.export.threemf import colour_hex
 from unitcad.kernels.mesh import realise
 from unitcad.shape.body import Body
-from unitcad.spec import Dimensions
 
 HAIR_MM = 1 / 3000
 """The cut lies this far off its plane, and so in no plane of the length grid: a face in the plane
@@ -153,10 +153,10 @@ def _unit_measures(dims: Dimensions) -> list[Measure]:
         found.append(Measure(show(high - low), low, high, "left", 0, reach))
     if len(inside) > 2:
         found.append(Measure(show(levels[-1]), 0, levels[-1], "left", 1, reach))
-    if dims.slot_z:
-        low, high = dims.slot_z
+    if dims.exit:
+        low, high = dims.exit.low, dims.exit.high
         found.append(
-            Measure(f"slot {show(high - low)} × {show(dims.slot_width)}", low, high, "right", 0, dims.outer_radius)
+            Measure(f"slot {show(high - low)} × {show(dims.exit.width)}", low, high, "right", 0, dims.outer_radius)
         )
     return found
 

@@ -8,9 +8,10 @@ import re
 from dataclasses import dataclass
 
 from unitcad.catalogue import Material
+from unitcad.designs import Dimensions
 from unitcad.moulds.figures import Mix
 from unitcad.moulds.plan import Plan
-from unitcad.spec import Dimensions, Spec
+from unitcad.spec import Spec
 from unitcad.text import cell
 
 
@@ -57,7 +58,7 @@ def _pieces(spec: Spec, dims: Dimensions, plan: Plan) -> list[Item]:
             found.append(Item("filament stub", len(names), "piece", "cut", note))
             continue
         if tool.made == "cut":
-            height = dims.slot_z[1] - dims.slot_z[0] if dims.slot_z else 0.0
+            height = dims.exit.height if dims.exit else 0.0
             found.append(Item(kind, len(names), "piece", "cut", f"from film or steel strip of {height:.3g} mm"))
             continue
         attitude = "printed upside down" if tool.upside_down else "printed as drawn"

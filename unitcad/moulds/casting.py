@@ -10,14 +10,15 @@ from dataclasses import dataclass
 
 from unitcad import catalogue
 from unitcad.catalogue import Material
+from unitcad.designs import Dimensions, design_named, dimensions
 from unitcad.moulds import figures as fig
 from unitcad.moulds.bom import Item, bill
 from unitcad.moulds.figures import Figure, Mix, sourced
 from unitcad.moulds.grid import OffGrid, off_grid
 from unitcad.moulds.plan import Plan, Step
-from unitcad.moulds.steps import assembly, measurements, pour_steps, preparation, release
+from unitcad.moulds.steps import measurements, pour_steps, preparation, release
 from unitcad.shape import exact_volume
-from unitcad.spec import Dimensions, Spec, dimensions, printer_of
+from unitcad.spec import Spec, printer_of
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ def procedure(spec: Spec, plan: Plan, layer_volumes_mm3: Sequence[float]) -> Pro
         off_grid=edges,
         pours=tuple(pours),
         release=release(spec, plan, silicones[0]),
-        assembly=assembly(spec, dims),
+        assembly=tuple(design_named(spec.design).assembly(spec, dims)),
         measure=measurements(spec, dims, grams, _slot_as_printed(spec, plan, edges)),
         walls=tuple(_walls(spec)),
         bill=bill(spec, dims, plan, list(zip(silicones, mixes, strict=True))),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from unitcad.designs import Dimensions
+from unitcad.designs.dimensions import WIRE_GAP, Exit
 from unitcad.errors import Refusal
-from unitcad.spec import Dimensions, Spec
-from unitcad.spec.dimensions import WIRE_GAP
+from unitcad.spec import Spec
 
 TILT_DEG = 5.0
 """The tilt that a mould must bear on the bench."""
@@ -19,16 +20,16 @@ MESH_ROOM = 0.8
 def deepest(spec: Spec, layer: int) -> float:
     """The depth of a dent that a layer (from 0) bears, mm."""
     drawn = spec.layers[layer]
-    return DENT * min(drawn.wall_mm, drawn.cap_mm or drawn.wall_mm)
+    return DENT * min(drawn.wall_mm, drawn.cap_mm if drawn.cap_mm else drawn.wall_mm)
 
 
-def under_tongue(dims: Dimensions, layer: int) -> float:
+def under_tongue(dims: Dimensions, exit: Exit, layer: int) -> float:
     """Depth of the air that stays under a tongue where it meets the bore, the mould tilted towards it, mm.
 
     The tongue's flat underside is a ceiling; its highest point is on the bore at r, and the way out leads round to the
     tongue's edge, half a width h aside: lower by (r - sqrt(r^2 - h^2)) sin(tilt).
     """
-    bore, half = dims.radii[layer], dims.slot_width / 2
+    bore, half = dims.radii[layer], exit.width / 2
     return (bore - math.sqrt(max(bore**2 - half**2, 0.0))) * math.sin(math.radians(TILT_DEG))
 
 
@@ -42,13 +43,14 @@ def widest_tongue(spec: Spec, dims: Dimensions, layer: int) -> float:
 def check_tongue(spec: Spec, dims: Dimensions) -> None:
     """Raises Refusal where a tongue is too wide for the air under it to get out."""
     widths = [widest_tongue(spec, dims, layer) for layer in range(len(spec.layers))]
-    if not dims.slot_z or dims.slot_width <= min(widths):
+    if not dims.exit or dims.exit.width <= min(widths):
         return
     layer = widths.index(min(widths))
-    widest = widths[layer] - (spec.moulds.slot_width_clearance_mm or 0.0)
+    widest = widths[layer] - spec.moulds.slot_width_clearance_mm
+    depth = under_tongue(dims, dims.exit, layer)
     why = (
-        f"tilted by {TILT_DEG:g} degrees, pour {layer + 1} keeps {under_tongue(dims, layer):.3f} mm of air under the "
-        f"tongue, more than {MESH_ROOM * deepest(spec, layer):.3f}"
+        f"tilted by {TILT_DEG:g} degrees, pour {layer + 1} keeps {depth:.3f} mm of air under the tongue, more than "
+        f"{MESH_ROOM * deepest(spec, layer):.3f}"
     )
     if spec.wires:
         each = _down((widest + WIRE_GAP) / spec.wires.count - WIRE_GAP)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from unitcad.catalogue import Material, Value
+from unitcad.designs import Dimensions
 from unitcad.moulds.layout import Layout
-from unitcad.spec import Dimensions, Spec
+from unitcad.spec import Spec
 
 GRAVITY = 9.80665
 BUBBLE_MM = 0.2
@@ -86,12 +87,12 @@ def weep_mm3(spec: Spec, dims: Dimensions, lay: Layout, layer: int, material: Ma
 
     Plane Poiseuille flow through the window's clearance: clearance^3 perimeter pressure / (12 viscosity length).
     """
-    if not dims.slot_z:
+    if not dims.exit:
         return 0.0
-    clearance = (spec.moulds.window_clearance_mm or 0.0) / 1000
-    around = 2 * (dims.slot_width + dims.slot_z[1] - dims.slot_z[0]) / 1000
+    clearance = spec.moulds.window_clearance_mm / 1000
+    around = 2 * (dims.exit.width + dims.exit.height) / 1000
     length = (lay.cup[0] - max(abs(c.x) for c in lay.cells) - dims.radii[layer]) / 1000
-    head = max(dims.heights[layer] - sum(dims.slot_z) / 2, 0.0) / 1000
+    head = max(dims.heights[layer] - (dims.exit.low + dims.exit.high) / 2, 0.0) / 1000
     pressure = 1000 * float(material.density_g_cm3) * GRAVITY * head
     flow = clearance**3 * around * pressure / (12 * float(material.mixed_viscosity_cps) / 1000 * length)
     seconds = 60 * at_room(float(material.pot_life_min), spec.casting.room_c)
@@ -103,6 +104,6 @@ def wall_range(spec: Spec, layer: int) -> tuple[float, float]:
 
     Layer 1 lies between the core and one cup position, each further layer between two.
     """
-    play = (spec.moulds.plinth_clearance_mm or 0.0) * (1 if layer == 0 else 2)
+    play = spec.moulds.plinth_clearance_mm * (1 if layer == 0 else 2)
     wall = spec.layers[layer].wall_mm
     return max(wall - play, 0.0), wall + play

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 
-from unitcad.designs.common import BEYOND
+from unitcad.designs import Dimensions
+from unitcad.designs.limits import filament_groove
+from unitcad.designs.parts import BEYOND
 from unitcad.moulds.layout import Cell, Layout
 from unitcad.shape import Profile, Revolve, Shape, box, cylinder, moved, polygon, ring, turned, union
-from unitcad.spec import Dimensions, Spec
-from unitcad.spec.door import groove_depth
+from unitcad.spec import Spec
 
 FLARE = 1.0
 """Of the filament hole's lower end: the filament bends round it."""
@@ -25,7 +26,7 @@ _QUARTER = math.tan(math.pi / 8)
 
 def way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
     """The hole through a core, flared below, and the groove under the plate (whose lower face is z = `bottom`)."""
-    radius, depth = (spec.moulds.filament_hole_mm or 0) / 2, groove_depth(spec)
+    radius, depth = spec.moulds.filament_hole_mm / 2, filament_groove(spec)
     roof = bottom + depth
     hole = Revolve(
         polygon(
@@ -59,7 +60,7 @@ def annulus(spec: Spec, dims: Dimensions, cell: Cell) -> Shape:
     It reaches into both walls, or faces that coincide could leave a way of no width along them.
     """
     inner = spec.moulds.filament_mm / 2 - BITE
-    outer = (spec.moulds.filament_hole_mm or 0) / 2 + BITE
+    outer = spec.moulds.filament_hole_mm / 2 + BITE
     return moved(ring(inner, outer, -BEYOND, dims.core_height), cell.x, cell.y)
 
 
@@ -71,4 +72,4 @@ def _length(spec: Spec, lay: Layout, cell: Cell) -> float:
     """From the hole to beyond the plate's edge at -y, or, behind another cell, a pocket as long as the pitch allows."""
     if _meets_edge(lay, cell):
         return cell.y + lay.plate[1] + BEYOND
-    return lay.pitch - (spec.moulds.filament_hole_mm or 0) / 2 - FLARE - 2 * (spec.moulds.least_wall_mm or 0)
+    return lay.pitch - spec.moulds.filament_hole_mm / 2 - FLARE - 2 * spec.moulds.least_wall_mm

@@ -144,8 +144,8 @@ def gap_law(spec: Spec, plan: Plan, solids: Mapping[str, Manifold], segments: in
     """
     chord = math.cos(math.pi / segments)
     moulds = spec.moulds
-    skirt = min(moulds.plinth_clearance_mm or 0, moulds.seat_relief_mm or 0)
-    window = moulds.window_clearance_mm or 0
+    skirt = min(moulds.plinth_clearance_mm, moulds.seat_relief_mm)
+    window = moulds.window_clearance_mm
     found = []
     for step in plan.steps:
         cup = solids[step.cup]
@@ -155,7 +155,7 @@ def gap_law(spec: Spec, plan: Plan, solids: Mapping[str, Manifold], segments: in
             gap = cup.min_gap(solids[tongue], window + 1)
             found.append(at_least("C210", f"{step.cup} window and {tongue}", gap, window - GRID, "mm"))
         if step.lid:
-            play = moulds.plinth_clearance_mm or 0
+            play = moulds.plinth_clearance_mm
             gap = solids[step.lid].trim_by_plane((0, 0, -1), play - step.rim).min_gap(cup, play + 1)
             found.append(at_least("C210", f"{step.lid} skirt and {step.cup}", gap, play * chord - GRID, "mm"))
     return found

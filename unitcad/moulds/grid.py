@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from unitcad.designs import Dimensions
 from unitcad.moulds.tooling import groove_depth_of, plate_bottom
-from unitcad.spec import Dimensions, Spec
+from unitcad.spec import Spec
 
 NEAR = 0.02
 """Share of a layer within which a height counts as on the grid."""
@@ -23,7 +24,7 @@ class OffGrid:
 
 def off_grid(spec: Spec, dims: Dimensions) -> list[OffGrid]:
     """The edges that matter to a cavity and are off the grid. Cups lie upside down: heights count from the rim."""
-    layer = spec.moulds.layer_mm or 0.0
+    layer = spec.moulds.layer_mm
     found = []
     for piece, edge, height in _edges(spec, dims):
         nearest = round(height / layer) * layer
@@ -33,15 +34,15 @@ def off_grid(spec: Spec, dims: Dimensions) -> list[OffGrid]:
 
 
 def _edges(spec: Spec, dims: Dimensions) -> list[tuple[str, str, float]]:
-    bottom, clearance = plate_bottom(spec), spec.moulds.window_clearance_mm or 0.0
+    bottom, clearance = plate_bottom(spec), spec.moulds.window_clearance_mm
     edges = [("base", "seat", -bottom), ("base", "core's top", dims.core_height - bottom)]
-    if dims.slot_z:
-        edges += [("base", "ledge", dims.slot_z[0] - bottom), ("tongue", "thickness", dims.slot_z[1] - dims.slot_z[0])]
+    if dims.exit:
+        edges += [("base", "ledge", dims.exit.low - bottom), ("tongue", "thickness", dims.exit.height)]
     for i, rim in enumerate(dims.heights):
         cup = f"cup{i + 1}"
         edges += [(cup, "seat", rim), (cup, "groove's floor", groove_depth_of(spec, rim))]
-        if dims.slot_z:
-            low, high = dims.slot_z[0] - clearance, dims.slot_z[1] + clearance
+        if dims.exit:
+            low, high = dims.exit.low - clearance, dims.exit.high + clearance
             edges += [(cup, "window's lower edge", rim - low)]
             edges += [(cup, "window's upper edge", rim - high)] if high < rim else []
     return edges

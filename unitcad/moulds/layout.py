@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass
 
 from unitcad.catalogue import printers
+from unitcad.designs import Dimensions
 from unitcad.errors import Refusal
 from unitcad.shape.lettering import HEIGHT, text_width
-from unitcad.spec import Dimensions, Spec
+from unitcad.spec import Spec
 
 PLINTH_DRAFT_DEG = 5.0
 CORNER_RADIUS = 2.0
@@ -68,14 +69,14 @@ def layout(spec: Spec, dims: Dimensions) -> Layout:
     if max(over) > 1e-9:
         raise _too_large(spec, dims, found, columns, rows, over)
     tallest = spec.moulds.plinth_height_mm + spec.moulds.plate_mm + dims.heights[-1]
-    if tallest > (spec.moulds.bed_z_mm or 0.0) + 1e-9:
+    if tallest > spec.moulds.bed_z_mm + 1e-9:
         raise _too_tall(spec, tallest)
     return found
 
 
 def most_columns(dims: Dimensions) -> int:
     """Columns of a gang: a tail, or the tongue for it, must reach an edge along x; without tails any number will do."""
-    return {0: MOST_CELLS, 1: 2, 2: 1}[len(dims.sides) if dims.slot_z else 0]
+    return {0: MOST_CELLS, 1: 2, 2: 1}[len(dims.exits)]
 
 
 def _fill(spec: Spec, dims: Dimensions, most: int, most_rows: int) -> tuple[int, int]:
@@ -94,13 +95,13 @@ def _fill(spec: Spec, dims: Dimensions, most: int, most_rows: int) -> tuple[int,
 
 def _excess(spec: Spec, found: Layout) -> list[float]:
     """By how much the plate exceeds the bed along x and y (mm)."""
-    bed = spec.moulds.bed_x_mm or 0.0, spec.moulds.bed_y_mm or 0.0
+    bed = spec.moulds.bed_x_mm, spec.moulds.bed_y_mm
     return [2 * size - room for size, room in zip(found.plate, bed, strict=True)]
 
 
 def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
     moulds = spec.moulds
-    land, groove, stroke = moulds.land_mm or 0, moulds.groove_width_mm or 0, moulds.engraving_stroke_mm or 0
+    land, groove, stroke = moulds.land_mm, moulds.groove_width_mm, moulds.engraving_stroke_mm
     reach = dims.outer_radius + land + groove
     count, label = columns * rows, HEIGHT * stroke
     digits = 0 if count == 1 else 1 if count < 16 else 2
@@ -112,7 +113,7 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
     plinth = half[0] + reach, half[1] + reach
     splay = moulds.plinth_height_mm * math.tan(math.radians(PLINTH_DRAFT_DEG))
     foot = plinth[0] + splay, plinth[1] + splay
-    skirt = (moulds.plinth_clearance_mm or 0) + (moulds.skirt_wall_mm or 0)
+    skirt = moulds.plinth_clearance_mm + moulds.skirt_wall_mm
     corner = _corner_for_label(reach + 0.6, text_width("00", stroke), label)
     # The numbers of the last column and row lie outside its bores too, and behind the cut corner.
     beside = [pitch / 2 + size + MARK / 2 + 0.1 if digits else 0.0 for size in number]
@@ -147,10 +148,10 @@ def _corner_for_label(radius: float, width: float, height: float) -> float:
 
 def _too_tall(spec: Spec, tallest: float) -> Refusal:
     """The refusal of a piece higher than the printer prints: of the largest length in it, or of a lowered bed_z_mm."""
-    lengths = {"motor.thickness_mm": spec.motor.thickness_mm or 0.0, "moulds.plate_mm": spec.moulds.plate_mm}
-    lengths |= {f"layers.{i}.cap_mm": layer.cap_mm or 0.0 for i, layer in enumerate(spec.layers)}
+    lengths = {"motor.thickness_mm": spec.motor.thickness_mm, "moulds.plate_mm": spec.moulds.plate_mm}
+    lengths |= {f"layers.{i}.cap_mm": layer.cap_mm for i, layer in enumerate(spec.layers)}
     lengths["moulds.plinth_height_mm"] = spec.moulds.plinth_height_mm
-    bed = spec.moulds.bed_z_mm or 0.0
+    bed = spec.moulds.bed_z_mm
     if bed < float(printers(spec.printers)[spec.moulds.printer].bed_z_mm):
         nearest = math.ceil(tallest * 100) / 100
         return Refusal("moulds.bed_z_mm", bed, f"the tallest piece has {tallest:.4g} mm", nearest)
@@ -169,7 +170,7 @@ def _too_large(spec: Spec, dims: Dimensions, found: Layout, columns: int, rows: 
     still = max(
         2 * (size - (count - fit) / 2 * found.pitch) - room
         for size, count, fit, room in zip(
-            found.plate, (columns, rows), fits, (spec.moulds.bed_x_mm or 0, spec.moulds.bed_y_mm or 0), strict=True
+            found.plate, (columns, rows), fits, (spec.moulds.bed_x_mm, spec.moulds.bed_y_mm), strict=True
         )
     )
     size = f"the plate of {2 * found.plate[0]:.1f} x {2 * found.plate[1]:.1f} mm exceeds the bed"

@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import math
 
-from unitcad.designs.common import BEYOND
+from unitcad.designs import Dimensions
+from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
 from unitcad.moulds.dents import MESH_ROOM, TILT_DEG, deepest
 from unitcad.moulds.layout import MARK, Layout
 from unitcad.moulds.tooling import corner_labels, outline
 from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, moved, polygon
-from unitcad.spec import Dimensions, Spec
+from unitcad.spec import Spec
 
 THICKNESS, SKIRT, SKIRT_WALL, SKIRT_OFF_WINDOW = 3.0, 1.5, 1.6, 0.2
 VENT, LEAST_VENT = 1.0, 0.8
@@ -33,10 +34,10 @@ GATE = 0.8
 
 def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int, label: tuple[str, str, str] | None) -> Shape:
     """The lid of a layer's pour (from 0), lying on the cup's rim."""
-    rim, top, play = dims.heights[layer], lid_top(dims, layer), spec.moulds.plinth_clearance_mm or 0
+    rim, top, play = dims.heights[layer], lid_top(dims, layer), spec.moulds.plinth_clearance_mm
     low = rim - SKIRT
-    if dims.slot_z:
-        low = max(low, dims.slot_z[1] + (spec.moulds.window_clearance_mm or 0) + SKIRT_OFF_WINDOW)
+    if dims.exit:
+        low = max(low, dims.exit.high + spec.moulds.window_clearance_mm + SKIRT_OFF_WINDOW)
     tools = [Extrude(outline(lay.cup, MARK, play), low - BEYOND, rim), *channels(spec, dims, lay, layer, beyond=BEYOND)]
     if label:
         tools += corner_labels(spec, lay, top, label)
@@ -142,4 +143,4 @@ def _ceiling(dims: Dimensions, layer: int) -> tuple[float, float]:
 
 
 def _at_the_rim(dims: Dimensions, layer: int) -> bool:
-    return dims.slot_z is not None and dims.slot_z[1] >= dims.heights[layer]
+    return dims.exit is not None and dims.exit.high >= dims.heights[layer]

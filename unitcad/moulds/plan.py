@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from unitcad.designs import unit_bodies
+from unitcad.designs import Dimensions, design_named, dimensions, unit_bodies
 from unitcad.moulds import dents, filament, lid, tooling
 from unitcad.moulds.layout import Cell, Layout, layout
 from unitcad.shape import Shape, Union, content_hash, moved, turned
 from unitcad.shape.body import Body
-from unitcad.spec import Dimensions, Spec, dimensions, printer_of
+from unitcad.spec import Spec, printer_of
 
 _BASE, _CUP, _CUP2, _TONGUE = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.73, 0.83, 0.93), (0.90, 0.30, 0.30)
 _BLADE, _STUB, _LID = (0.87, 0.87, 0.55), (0.22, 0.22, 0.22), (0.80, 0.72, 0.90)
@@ -84,7 +84,7 @@ def plan(spec: Spec) -> Plan:
     cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
     around = [t.name for t in tools if t.name.startswith(("tongue", "stub"))]
     injected = spec.moulds.pour == "injected"
-    tails = sum(len(cell.sides) for cell in lay.cells) if dims.slot_z else 0
+    tails = sum(len(cell.sides) for cell in lay.cells) if dims.exit else 0
     steps = tuple(
         Step(
             index=i + 1,
@@ -97,7 +97,7 @@ def plan(spec: Spec) -> Plan:
             rim=dims.heights[i],
             top=lid.lid_top(dims, i) if injected else dims.heights[i],
             channels=tuple(lid.channels(spec, dims, lay, i)) if injected else (),
-            windows=tails if dims.slot_z and dims.slot_z[1] < dims.heights[i] else 0,
+            windows=tails if dims.exit and dims.exit.high < dims.heights[i] else 0,
         )
         for i, layer in enumerate(spec.layers)
     )
@@ -123,12 +123,12 @@ def _tools(spec: Spec, dims: Dimensions, lay: Layout, label: str) -> tuple[Body,
             found.append(Body(f"lid{i + 1}", "tool", shape, _LID, step=i + 1, upside_down=True))
     # A printed resin is too brittle for a strip this thin: it is cut from film or steel.
     brittle = printer_of(spec).technology.value == "sla"
-    strips = tooling.tongues(spec, dims, lay)
+    strips = tooling.tongues(dims, lay)
     found += [
         Body(_numbered("tongue", i, strips), "tool", shape, _TONGUE, made="cut" if brittle else "printed")
         for i, shape in enumerate(strips)
     ]
-    if spec.design == "encapsulating":
+    if design_named(spec.design).suction:
         bottom = tooling.plate_bottom(spec)
         stubs = [filament.stub(spec, dims, lay, cell, bottom) for cell in lay.cells]
         found += [Body(_numbered("stub", i, stubs), "tool", s, _STUB, made="cut") for i, s in enumerate(stubs)]

@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 
 from unitcad.catalogue import Material
+from unitcad.designs import Dimensions
 from unitcad.moulds.figures import MIXING_MIN, MOST_ERROR_PCT, Mix
 from unitcad.moulds.lid import SKIRT_WALL
 from unitcad.moulds.plan import Plan, Step
-from unitcad.spec import Dimensions, Spec
-from unitcad.spec.strain import pad_strain
+from unitcad.spec import Spec
 
 STRIKE_AGAIN_MIN = 10
 
@@ -136,60 +136,13 @@ def release(spec: Spec, plan: Plan, inner: Material) -> tuple[str, ...]:
     return tuple(found)
 
 
-def assembly(spec: Spec, dims: Dimensions) -> tuple[str, ...]:
-    """Motor and circuit, or wires, into the body."""
-    if spec.motor.fill:
-        held = "Layer 1 holds the motor all round."
-    elif spec.design == "embedded" and not spec.fpcb:
-        held = (
-            f"Nothing else holds it: lay the body on a greased flat, centre the motor, and fill the ring of "
-            f"{dims.air_ring:.2f} mm round it with Layer 1's silicone or a silicone adhesive (assumed). "
-            "motor.fill = true draws Layer 1 up to the motor instead."
-        )
-    else:
-        held = f"A ring of air of {dims.air_ring:.2f} mm stays round the motor: what it is fixed to holds it."
-    if spec.wires and spec.design == "encapsulating":
-        found = ["Feed the wires out through the slot from inside, then push the motor in, its back against the cap."]
-    elif spec.wires:
-        found = ["Push the motor into the ring from above, the wires lying in the notch."]
-    elif spec.fpcb and spec.design == "encapsulating":
-        found = [
-            "Solder the motor to the circuit's pad. Feed the tail out through the slot from inside, then push pad "
-            "and motor in "
-            "until the pad lies against the cap of Layer 1."
-        ]
-        strain = pad_strain(spec)
-        if spec.fpcb.tail == "both" and strain:
-            found.append(
-                f"In a chain the next pad does not go through the slot: that would stretch it by {strain:.0%}. "
-                f"Solder the next "
-                "unit on after this one is in its body."
-            )
-    elif spec.fpcb:
-        found = [
-            "Solder the motor to the circuit's pad. Set the motor into the ring, the pad on top of all layers, and "
-            "bond the pad "
-            "with a thin smear of the last layer's silicone (assumed); it is that bond which holds the motor."
-        ]
-    else:
-        found = ["Push the motor in from the skin's side."]
-    if spec.design == "encapsulating":
-        found.append(
-            "A smear of Layer 1's silicone between the back and the cap holds it (assumed: silicone bonds poorly to "
-            "bare "
-            "metal and polyimide; a primer or a silicone adhesive holds better)."
-        )
-    found.append(held)
-    return tuple(found)
-
-
 def measurements(
     spec: Spec, dims: Dimensions, grams: Sequence[float], as_printed: float | None = None
 ) -> tuple[str, ...]:
     """What to measure on the first part, and what it should be: `grams` of each layer of one unit, trimmed, and the
     slot's height if the slicer makes the tongue another one (mm).
     """
-    play = spec.moulds.plinth_clearance_mm or 0.0
+    play = spec.moulds.plinth_clearance_mm
     found = [
         f"Height over all: {dims.heights[-1]:.2f} mm. A cup that did not seat shows here.",
         f"Diameter at the skin: {2 * dims.outer_radius:.2f} mm, in two directions.",
@@ -201,10 +154,10 @@ def measurements(
             else "."
         ),
     ]
-    if dims.slot_z:
+    if dims.exit:
         found.append(
-            f"The {'notch' if spec.design == 'embedded' else 'slot'}: {dims.slot_width:.2f} wide, "
-            f"{dims.slot_z[1] - dims.slot_z[0]:.2f} high"
+            f"The {'notch' if dims.exit.high >= dims.heights[0] else 'slot'}: {dims.exit.width:.2f} wide, "
+            f"{dims.exit.height:.2f} high"
             + (
                 f" ({as_printed:.2f} if the tongue was printed in layers of {spec.moulds.layer_mm:g})"
                 if as_printed

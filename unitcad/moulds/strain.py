@@ -13,12 +13,13 @@ from itertools import pairwise
 from manifold3d import CrossSection, Manifold
 
 from unitcad import catalogue
+from unitcad.designs import dimensions
+from unitcad.designs.strain import allowed_strain, tail_strain
 from unitcad.kernels.mesh import arrays
 from unitcad.moulds.draw import peel
 from unitcad.moulds.finding import Finding, at_most
 from unitcad.moulds.plan import Plan
 from unitcad.spec import Spec
-from unitcad.spec.strain import allowed_strain, tail_strain
 
 TOUCHING = 1e-6
 """Area of silicone over the core, mm2, up to which nothing has to stretch: rounding where walls mate."""
@@ -48,9 +49,9 @@ def strains(spec: Spec, plan: Plan, solids: Mapping[str, Manifold], segments: in
         if strain > 0:
             where += f", at z = {z:.3g} mm"
         found.append(Strain(where, 100 * strain, z, room))
-    way = tail_strain(spec)
-    if way is not None:
-        found.append(Strain("tail through the slot", 100 * way))
+    slot = dimensions(spec).exit
+    if spec.fpcb and slot:
+        found.append(Strain("tail through the slot", 100 * tail_strain(spec.fpcb, slot)))
     return found
 
 

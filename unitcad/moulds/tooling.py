@@ -17,7 +17,9 @@ from __future__ import annotations
 
 import math
 
-from unitcad.designs.common import BEYOND, strip
+from unitcad.designs import Dimensions, design_named
+from unitcad.designs.dimensions import Exit
+from unitcad.designs.parts import BEYOND, strip
 from unitcad.moulds import filament
 from unitcad.moulds.layout import BLADE_HEIGHT, CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN, Cell, Layout
 from unitcad.shape import (
@@ -36,7 +38,7 @@ from unitcad.shape import (
     union,
 )
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
-from unitcad.spec import Dimensions, Spec
+from unitcad.spec import Spec
 
 PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER = 1.5, 4.0, 1.5
 GRIP_LENGTH, GRIP_WIDTH, GRIP_GAP, GRIP_APART = 8.0, 10.0, 3.0, 0.5
@@ -59,11 +61,12 @@ def base(spec: Spec, dims: Dimensions, lay: Layout, label: str) -> Shape:
     plate = Extrude(outline(lay.plate, MARK), bottom, top)
     body = union((plate, plinth(spec, lay), *(moved(core(dims), c.x, c.y) for c in lay.cells)))
     tools: list[Shape] = [_pry_slot(lay, top, side) for side in (1, -1)]
-    if spec.design == "encapsulating":
+    if design_named(spec.design).suction:
         tools += [filament.way(spec, dims, lay, c, bottom) for c in lay.cells]
-    tools += [moved(notch(spec, dims, s), c.x, c.y) for c in lay.cells for s in c.sides if dims.slot_z]
+    if dims.exit:
+        tools += [moved(notch(spec, dims, dims.exit, s), c.x, c.y) for c in lay.cells for s in c.sides]
     if label:
-        stroke, depth = spec.moulds.engraving_stroke_mm or 0, spec.moulds.engraving_depth_mm or 0
+        stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
         text = engraving(label, stroke, top - depth, top + BEYOND)
         width = text_width(label, stroke)
         tools.append(moved(text, -width / 2, (lay.cup[1] + lay.plate[1]) / 2 - lay.label_height / 2))
@@ -81,11 +84,10 @@ def core(dims: Dimensions) -> Shape:
     return cylinder(dims.cavity_radius, -BEYOND, dims.core_height)
 
 
-def notch(spec: Spec, dims: Dimensions, side: int) -> Shape:
+def notch(spec: Spec, dims: Dimensions, exit: Exit, side: int) -> Shape:
     """What the ledge removes from a core: the tongue's seat and a window's clearance beside it, open upwards."""
-    assert dims.slot_z is not None
-    half = dims.slot_width / 2 + (spec.moulds.window_clearance_mm or 0)
-    return strip(dims, side, dims.cavity_radius + BEYOND, half, dims.slot_z[0], dims.slot_z[1] + BEYOND)
+    half = exit.width / 2 + spec.moulds.window_clearance_mm
+    return strip(dims, side, dims.cavity_radius + BEYOND, half, exit.low, exit.high + BEYOND)
 
 
 def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int, label: tuple[str, str, str] | None) -> Shape:
@@ -116,25 +118,25 @@ def outline(size: tuple[float, float], key: float, grow: float = 0.0) -> Profile
 
 def skirt_end(spec: Spec) -> float:
     """z of the skirt's lower edge."""
-    return plate_top(spec) + (spec.moulds.seat_relief_mm or 0)
+    return plate_top(spec) + spec.moulds.seat_relief_mm
 
 
 def recess(spec: Spec, lay: Layout) -> Shape:
     """The cup's recess: the plinth's taper, wider by the printer's clearance measured square to its sides."""
-    clearance = (spec.moulds.plinth_clearance_mm or 0) / math.cos(math.radians(PLINTH_DRAFT_DEG))
+    clearance = spec.moulds.plinth_clearance_mm / math.cos(math.radians(PLINTH_DRAFT_DEG))
     return _tapered(lay, clearance, skirt_end(spec))
 
 
 def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
     """The overflow groove round a rim, behind the land; it stops over a window that would leave too thin a wall."""
     moulds, rim, radius = spec.moulds, dims.heights[layer], dims.radii[layer]
-    inner = radius + (moulds.land_mm or 0)
-    outer = inner + (moulds.groove_width_mm or 0)
+    inner = radius + moulds.land_mm
+    outer = inner + moulds.groove_width_mm
     depth = groove_depth_of(spec, rim)
     channel = ring(inner, outer, rim - depth, rim + BEYOND)
-    if dims.slot_z:
-        wall = moulds.least_wall_mm or 0
-        half, _, high = _window_section(spec, dims)
+    if dims.exit:
+        wall = moulds.least_wall_mm
+        half, _, high = _window_section(spec, dims.exit)
         if rim - depth - high < wall:
             stops = (
                 box(min(0, s * (outer + 1)), max(0, s * (outer + 1)), -half - wall, half + wall, 0, rim + 2 * BEYOND)
@@ -146,14 +148,14 @@ def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
 
 def groove_depth_of(spec: Spec, rim: float) -> float:
     """Depth of an overflow groove: the printer's, or half a low rim's height."""
-    return min(spec.moulds.groove_depth_mm or 0, rim / 2)
+    return min(spec.moulds.groove_depth_mm, rim / 2)
 
 
 def windows(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:
     """The passages of the tongues through a cup's wall, from each cell outwards to the edge."""
-    if not dims.slot_z:
+    if not dims.exit:
         return []
-    half, low, high = _window_section(spec, dims)
+    half, low, high = _window_section(spec, dims.exit)
     edge = lay.cup[0] + BEYOND
     return [
         box(min(c.x, s * edge), max(c.x, s * edge), c.y - half, c.y + half, low, high)
@@ -162,27 +164,26 @@ def windows(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:
     ]
 
 
-def tongue(spec: Spec, dims: Dimensions, lay: Layout) -> Shape:
+def tongue(dims: Dimensions, lay: Layout, exit: Exit) -> Shape:
     """The strip that forms the slot, with a grip outside the cup; for a single cell on the axis, leaving along +x.
 
     Its tip is round and stops against the core's riser, its underside rests on the ledge.
     """
-    assert dims.slot_z is not None
-    low, high = dims.slot_z
+    low, high = exit.low, exit.high
     edge = max(lay.cup[0] - abs(c.x) for c in lay.cells)
     reach = edge + GRIP_GAP + GRIP_LENGTH
-    half = max(GRIP_WIDTH, dims.slot_width + 4) / 2
+    half = max(GRIP_WIDTH, exit.width + 4) / 2
     if len(lay.cells) > 1:
-        half = max(min(half, lay.pitch / 2 - GRIP_APART), dims.slot_width / 2)
+        half = max(min(half, lay.pitch / 2 - GRIP_APART), exit.width / 2)
     grip = box(edge + GRIP_GAP, reach, -half, half, low, high)
-    return union((strip(dims, 1, reach - 1, dims.slot_width / 2, low, high), grip))
+    return union((strip(dims, 1, reach - 1, exit.width / 2, low, high), grip))
 
 
-def tongues(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:
-    """Every tongue in its place."""
-    if not dims.slot_z:
+def tongues(dims: Dimensions, lay: Layout) -> list[Shape]:
+    """Draw every tongue in its place."""
+    if not dims.exit:
         return []
-    one = tongue(spec, dims, lay)
+    one = tongue(dims, lay, dims.exit)
     return [moved(turned(one, "z", 0 if s > 0 else 2), c.x, c.y) for c in lay.cells for s in c.sides]
 
 
@@ -200,19 +201,19 @@ def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
     A window's seal is what the window removes from the cup, less the tongue; never a solid built a second time.
     """
     found: list[Shape] = []
-    if dims.slot_z:
-        around = tongues(spec, dims, lay)
+    if dims.exit:
+        around = tongues(dims, lay)
         walls = cut(
             cup_blank(spec, lay, dims.heights[layer]),
             [moved(cylinder(dims.radii[layer], -BEYOND, dims.heights[layer] + BEYOND), c.x, c.y) for c in lay.cells],
         )
         found += [cut(Common((walls, window)), around) for window in windows(spec, dims, lay)]
         found += [
-            cut(Common((moved(core(dims), c.x, c.y), moved(notch(spec, dims, s), c.x, c.y))), around)
+            cut(Common((moved(core(dims), c.x, c.y), moved(notch(spec, dims, dims.exit, s), c.x, c.y))), around)
             for c in lay.cells
             for s in c.sides
         ]
-    if spec.design == "encapsulating":
+    if design_named(spec.design).suction:
         found += [filament.annulus(spec, dims, c) for c in lay.cells]
     return found
 
@@ -226,11 +227,10 @@ def _tapered(lay: Layout, clearance: float, bottom: float) -> Shape:
     return Extrude(section(bottom), bottom, 0.0, top=section(0.0))
 
 
-def _window_section(spec: Spec, dims: Dimensions) -> tuple[float, float, float]:
+def _window_section(spec: Spec, exit: Exit) -> tuple[float, float, float]:
     """Half width, bottom and top of a window."""
-    assert dims.slot_z is not None
-    clearance = spec.moulds.window_clearance_mm or 0
-    return dims.slot_width / 2 + clearance, dims.slot_z[0] - clearance, dims.slot_z[1] + clearance
+    clearance = spec.moulds.window_clearance_mm
+    return exit.width / 2 + clearance, exit.low - clearance, exit.high + clearance
 
 
 def _pry_slot(lay: Layout, top: float, side: int) -> Shape:
@@ -241,7 +241,7 @@ def _pry_slot(lay: Layout, top: float, side: int) -> Shape:
 
 def corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, str]) -> list[Shape]:
     """Three pairs of characters to engrave in a plate's corners, outside all bores; the fourth corner is the key's."""
-    stroke, depth = spec.moulds.engraving_stroke_mm or 0, spec.moulds.engraving_depth_mm or 0
+    stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
     width, height = text_width("00", stroke), HEIGHT * stroke
     x, y = lay.cup[0] - TEXT_MARGIN, lay.cup[1] - TEXT_MARGIN
     corners = ((-x, y - height), (-x, -y), (x - width, -y))
@@ -253,7 +253,7 @@ def corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, st
 
 def _cell_numbers(spec: Spec, lay: Layout, rim: float) -> list[Shape]:
     """The number of each of several cells, in the space that the grooves leave at its upper right."""
-    stroke, depth = spec.moulds.engraving_stroke_mm or 0, spec.moulds.engraving_depth_mm or 0
+    stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
     return [
         moved(
             engraving(c.name, stroke, rim - depth, rim + BEYOND),

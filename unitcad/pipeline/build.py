@@ -16,14 +16,17 @@ from typing import Any
 
 from unitcad import __version__, files
 from unitcad.cache import MemoryStore, MissingContent, Store, digest
+from unitcad.designs import design_named
+from unitcad.designs.design import Reason
 from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.geometry import findings_count, geometry, pictures
 from unitcad.pipeline.stages import Say, Stages
 from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.versions import code_version, kernel_versions
-from unitcad.spec import Spec, to_toml, warnings, with_formats
-from unitcad.spec.own import is_own
+from unitcad.spec import Spec, to_toml, with_formats
+from unitcad.spec.custom_code import is_custom
+from unitcad.validation import warnings
 
 OUTPUTS = ("unit", "moulds", "estimate", "casting")
 OWN_DESIGN = "a design of one's own: tooling and estimate are known for the shipped designs only"
@@ -156,7 +159,7 @@ def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
 
     Raises Refusal where nothing is left.
     """
-    found = tuple(name for name in only if name == "unit" or not is_own(spec.design))
+    found = tuple(name for name in only if name == "unit" or not is_custom(spec.design))
     if not found:
         raise Refusal(
             "--only", ",".join(only), f"{spec.design} is a custom design, of which only the unit is made", "unit"
@@ -289,8 +292,7 @@ class _Making:
             found.append(_left("laws", folders.UNCHECKED if not self.check else "no moulds were asked for"))
         if not self.check:
             found.append(_left("mesh checks", folders.UNCHECKED))
-        if not is_own(spec.design):
-            found += _not_needed(spec)
+        found += [_left(what, why) for what, why in _not_needed(spec)]
         for name in OUTPUTS:
             if name not in self.only:
                 found.append(_left(name, OWN_DESIGN if name in self.asked else "not asked for (--only)"))
@@ -299,18 +301,15 @@ class _Making:
         return found
 
 
-def _not_needed(spec: Spec) -> list[dict[str, str]]:
-    """The tooling that this variant does without."""
-    found = []
-    if len(spec.layers) == 1:
-        found.append(_left("second pour", "one layer: one pour"))
+def _not_needed(spec: Spec) -> list[Reason]:
+    """Name the tooling that this variant does without."""
+    design = design_named(spec.design)
+    if not design.tooling:
+        return []
+    reasons = [("second pour", "one layer: one pour")] if len(spec.layers) == 1 else []
     if not spec.fpcb and not spec.wires:
-        found.append(_left("tongue and slot", "no FPCB"))
-    elif spec.design == "embedded" and not spec.wires:
-        found.append(_left("tongue and slot", "embedded: the circuit lies on the rings"))
-    if spec.design == "embedded":
-        found.append(_left("filament stub and hole", "embedded: open rings hold no suction"))
-    return found
+        reasons.append(("tongue and slot", "no FPCB"))
+    return reasons + design.left_out(spec)
 
 
 def _with_formats(spec: Spec, wanted: Sequence[str]) -> Spec:

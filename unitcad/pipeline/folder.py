@@ -52,7 +52,7 @@ def earlier_formats(folder: Path, spec: Spec, *, ours: bool = False) -> tuple[st
             return ()
         raise UnitcadError(f"{folder}: is not a result of unitcad (no spec.toml); choose another folder with -o")
     try:
-        from unitcad.spec import from_data
+        from unitcad.validation import from_data
 
         there = from_data(read_toml(file, links=False))
     except UnitcadError as error:

@@ -96,7 +96,7 @@ def threemf_content(variant: Variant, bodies: Sequence[Body]) -> bytes:
     """The 3MF of several bodies, side by side on the spec's bed."""
     from unitcad.export import threemf
 
-    bed = variant.spec.moulds.bed_x_mm or 0.0, variant.spec.moulds.bed_y_mm or 0.0
+    bed = variant.spec.moulds.bed_x_mm, variant.spec.moulds.bed_y_mm
     parts = [threemf.MeshPart(b.name, b.colour, *_ready(variant, b)) for b in bodies if printed(b)]
     return threemf.content(parts, bed)
 

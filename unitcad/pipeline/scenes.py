@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from unitcad.designs import design_named
 from unitcad.export.picture import Drawn, Scene
 from unitcad.kernels.mesh import arrays, bounds, realise
 
@@ -91,7 +92,7 @@ def unit_apart(variant: Variant) -> dict[str, Offset]:
     rest = [name for name in ("motor", "fpcb") if name in solids]
     others = [name for name in solids if name not in layers and name not in rest]
     inside_out = [*rest, *others, *layers]
-    order = [*reversed(layers), *rest, *others] if variant.spec.design == "embedded" else inside_out
+    order = [*reversed(layers), *rest, *others] if design_named(variant.spec.design).opens == "above" else inside_out
     offsets: dict[str, Offset] = {}
     top = 0.0
     for name in order:

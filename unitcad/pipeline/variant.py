@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
-from unitcad.designs import unit_bodies
+from unitcad.designs import Dimensions, dimensions, unit_bodies
 from unitcad.moulds.plan import Plan, plan
 from unitcad.shape.body import Body
-from unitcad.spec import Dimensions, Spec, dimensions, from_json, load, to_json
-from unitcad.spec.models import CastingTable, EstimateTable
+from unitcad.spec import Spec, from_json, to_json
+from unitcad.spec.asked import CastingTable
+from unitcad.spec.effective import Estimate
+from unitcad.validation import load
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -26,7 +28,7 @@ def geometric(spec: Spec) -> Spec:
         motor=structs.replace(spec.motor, part=None),
         layers=tuple(structs.replace(layer, material="") for layer in spec.layers),
         casting=CastingTable(),
-        estimate=EstimateTable(),
+        estimate=Estimate(frequency_hz=0.0, amplitude_um=0.0, tissue="", models=()),
         materials={},
         motors={},
         tissue={},

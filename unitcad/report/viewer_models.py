@@ -13,7 +13,8 @@ from unitcad.pipeline import Variant
 from unitcad.pipeline.geometry import GEOMETRIC, geometry_key
 from unitcad.pipeline.parts import glb_content
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
-from unitcad.spec import Spec, from_data, read_toml, with_formats
+from unitcad.spec import Spec, read_toml, with_formats
+from unitcad.validation import from_data
 
 
 def spec_in(folder: Path) -> Spec:

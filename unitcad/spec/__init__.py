@@ -1,41 +1,19 @@
-"""What was asked for: the TOML spec, checked at the door, and the dimensions that follow from it."""
+"""What was asked for and what is built: the tables of a TOML spec, and the effective spec with every value there."""
 
 from unitcad.spec.convert import check_plain, convert
-from unitcad.spec.dimensions import Dimensions, dimensions
-from unitcad.spec.door import printer_of, warnings
-from unitcad.spec.load import (
-    from_data,
-    from_json,
-    load,
-    override,
-    put,
-    read,
-    read_toml,
-    templates,
-    to_data,
-    to_json,
-    to_toml,
-)
-from unitcad.spec.models import Spec, with_formats
+from unitcad.spec.effective import Spec, with_formats
+from unitcad.spec.printer import printer_of
+from unitcad.spec.toml import from_json, read_toml, to_data, to_json, to_toml
 
 __all__ = [
-    "Dimensions",
     "Spec",
     "check_plain",
     "convert",
-    "dimensions",
-    "from_data",
     "from_json",
-    "load",
-    "override",
     "printer_of",
-    "put",
-    "read",
     "read_toml",
-    "templates",
     "to_data",
     "to_json",
     "to_toml",
-    "warnings",
     "with_formats",
 ]

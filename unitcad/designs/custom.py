@@ -1,4 +1,4 @@
-"""A design that a spec brings along: a function from a spec to a shape tree, or to several by name."""
+"""A custom design: a function in a file that a spec names, from a spec to a shape tree or to several by name."""
 
 from __future__ import annotations
 
@@ -8,24 +8,36 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, get_args
 
+from unitcad.designs.design import Design
+from unitcad.designs.dimensions import Dimensions, concentric, wire_exit
 from unitcad.errors import UnitcadError
 from unitcad.files import names_device
 from unitcad.shape import ProfileError, Shape
 from unitcad.spec import Spec
-from unitcad.spec.own import expect_allowed, function_of
+from unitcad.spec.custom_code import expect_allowed, function_of
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
 
 
-def shapes(spec: Spec) -> dict[str, Shape]:
-    """What the spec's function makes of it, by name: a single tree is "layer1".
+def custom(name: str) -> Design:
+    """Return the design of that name, "file.py:function": the spec's own text draws its layers."""
+    return Design(name=name, about="custom", layers=_layers, dimensions=_dimensions)
+
+
+def _dimensions(spec: Spec) -> Dimensions:
+    height = spec.motor.thickness_mm
+    return concentric(spec, height, wire_exit(spec, height))
+
+
+def _layers(spec: Spec, dims: Dimensions) -> dict[str, Shape]:
+    """Return what the spec's function draws, by name: a single tree is "layer1".
 
     Raises UnitcadError, with the line in the file, where the function raises or returns anything else, and where its
     code is not allowed to run.
     """
-    assert spec.design_source is not None
-    expect_allowed(spec.design, spec.design_source)
-    function = _function(spec.design, spec.design_source)
+    source = spec.design_source or ""
+    expect_allowed(spec.design, source)
+    function = _function(spec.design, source)
     try:
         made = function(spec)
     except (Exception, SystemExit) as error:
@@ -46,22 +58,22 @@ def shapes(spec: Spec) -> dict[str, Shape]:
 
 @lru_cache(maxsize=16)
 def _function(design: str, source: str) -> Any:
-    module = types.ModuleType("unitcad_own_design")
+    module = types.ModuleType("unitcad_custom_design")
     try:
         exec(compile(source, design.rpartition(":")[0], "exec"), module.__dict__)
     except (Exception, SystemExit) as error:
         raise _failed(design, error) from None
-    found = module.__dict__.get(function_of(design))
-    if not callable(found):
+    function = module.__dict__.get(function_of(design))
+    if not callable(function):
         names = [name for name, value in vars(module).items() if isinstance(value, types.FunctionType)]
         raise UnitcadError(
             f"design {design}: the file has no such function; it has {', '.join(sorted(names)) or 'none'}"
         )
-    return found
+    return function
 
 
 def _failed(design: str, error: BaseException) -> UnitcadError:
-    """The error of a design's code, with its line in the design's file."""
+    """Return the error with its line in the design's file."""
     file, line, trace = design.rpartition(":")[0], getattr(error, "lineno", None), error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == file:

@@ -1,4 +1,4 @@
-"""A design of one's own: `design = "path/to/file.py:function"`. Its text becomes part of the effective spec.
+"""A custom design: `design = "path/to/file.py:function"`. Its text becomes part of the effective spec.
 
 So a result's spec.toml stands alone, the result's hash covers the code, and a worker elsewhere needs no file.
 """
@@ -18,22 +18,24 @@ _FORM = re.compile(r"(?P<file>.+\.py):(?P<function>[A-Za-z_][A-Za-z0-9_]*)", re.
 LARGEST = 1_000_000
 
 
-def is_own(design: object) -> bool:
-    """Whether a spec's `design` means a function in a file."""
+def is_custom(design: object) -> bool:
+    """Tell whether a spec's `design` means a function in a file."""
     return isinstance(design, str) and _FORM.fullmatch(design) is not None
 
 
 def function_of(design: str) -> str:
-    """The function's name in "file.py:function"."""
+    """Return the function's name in "file.py:function"."""
     return design.rpartition(":")[2]
 
 
 def with_source(data: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """A spec's data with its own design's text in `design_source`, where it has one; a relative path starts at
-    `folder`. Such a file is the person's own: its code may run. Raises UnitcadError for a file that can't be read.
+    """Return a spec's data with its custom design's text in `design_source`, where it has one.
+
+    A relative path starts at `folder`. Such a file is the person's own: its code may run.
+    Raises UnitcadError for a file that can't be read.
     """
     design = data.get("design")
-    if not is_own(design) or data.get("design_source") is not None:
+    if not is_custom(design) or data.get("design_source") is not None:
         return data
     file, _, function = str(design).rpartition(":")
     path = folder / file
@@ -58,12 +60,12 @@ def allow(codes: Iterable[str]) -> None:
 
 
 def allowed() -> frozenset[str]:
-    """What this process may run, for a worker that gets its tasks from here."""
+    """Return what this process may run, for a worker that gets its tasks from here."""
     return frozenset(_allowed)
 
 
 def allow_nothing() -> None:
-    """Take back whatever was allowed."""
+    """Withdraw whatever was allowed."""
     _allowed.clear()
 
 

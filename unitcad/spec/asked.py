@@ -1,13 +1,14 @@
-"""What a person may ask for: the tables of a spec. Lengths in mm, the unit in each name; values are kept as typed.
+"""What a person may ask for: the tables of a spec as a TOML file holds them. Lengths in mm, the unit in each name.
 
-Only types and signs are settled here; what depends on several values at once is settled in `door`.
+None means that the key is left out; `unitcad.spec.effective` has the same spec with every value there. Only types and
+ranges of single values are checked here. What depends on several values is checked by the design and `validation`.
 """
 
 from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from msgspec import Meta, Struct, structs
+from msgspec import Meta, Struct
 
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
@@ -134,7 +135,7 @@ class OutputTable(Table, frozen=True, kw_only=True):
     tolerance_mm: Annotated[float, Meta(ge=0.0005, le=0.2)] = 0.01
 
 
-class Spec(Table, frozen=True, kw_only=True):
+class AskedSpec(Table, frozen=True, kw_only=True):
     """A haptic unit as asked for; `layers` run from the inside out, one entry being a single-layer control."""
 
     name: Annotated[str, Meta(min_length=1, max_length=120)]
@@ -153,13 +154,8 @@ class Spec(Table, frozen=True, kw_only=True):
     printers: dict[str, PrinterEntry] = {}
     tissue: dict[str, Annotated[dict[str, TissueEntry], Meta(min_length=1, description=_TISSUE)]] = {}
     parameters: Annotated[
-        dict[str, bool | int | float | str], Meta(description="what a design of one's own wants to know besides")
+        dict[str, bool | int | float | str], Meta(description="further values that a custom design reads")
     ] = {}
     design_source: Annotated[
-        str | None, Meta(description="the text of an own design's file; filled in when the spec is read")
+        str | None, Meta(description="the text of a custom design's file; filled in when the spec is read")
     ] = None
-
-
-def with_formats(spec: Spec, formats: tuple[Format, ...] = ()) -> Spec:
-    """The spec, asked for other formats, or for none: what does not depend on them is keyed so."""
-    return structs.replace(spec, output=structs.replace(spec.output, formats=formats))

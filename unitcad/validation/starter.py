@@ -10,9 +10,10 @@ from msgspec import NODEFAULT, Struct
 from msgspec.structs import FieldInfo
 
 from unitcad.errors import UnitcadError
+from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import entry_in, fields_of, meaning, table_in
-from unitcad.spec.load import read_toml, templates
-from unitcad.spec.models import Spec
+from unitcad.spec.toml import read_toml
+from unitcad.validation.load import templates
 
 _NOT_OFFERED = ("design_source",)
 
@@ -38,14 +39,14 @@ def starter(name: str, template: str = "encapsulating") -> str:
 def _further_keys(section: str, there: dict[str, Any]) -> str:
     """The keys that a table of the template leaves out, commented out."""
     header = re.match(r"\[(\w+)\]", section)
-    field = fields_of(Spec).get(header[1]) if header else None
+    field = fields_of(AskedSpec).get(header[1]) if header else None
     table = table_in(field.type) if field else None
     return "".join(f"{line}\n" for line in _keys(table, set(there[field.name]))) if field and table else ""
 
 
 def _further_tables(there: dict[str, Any]) -> str:
     lines = ["# The tables below are as if left out: take the # away to change a value. ... means: from the catalogue."]
-    for name, field in fields_of(Spec).items():
+    for name, field in fields_of(AskedSpec).items():
         if name in there or name in _NOT_OFFERED:
             continue
         table = table_in(field.type) or table_in(entry_in(field.type))

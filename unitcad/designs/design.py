@@ -1,0 +1,67 @@
+"""What a design is: the one protocol that the shipped designs and a custom design's file implement alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from unitcad.designs.dimensions import Dimensions
+from unitcad.shape import Shape
+from unitcad.spec import Spec
+from unitcad.spec.asked import AskedSpec
+
+Reason = tuple[str, str]
+"""Something that is left out, and why."""
+
+
+def _no_limits(spec: Spec, dims: Dimensions) -> None:
+    """Accept every spec."""
+
+
+def _nothing(spec: Spec, dims: Dimensions) -> list[str]:
+    return []
+
+
+def _nothing_left_out(spec: Spec) -> list[Reason]:
+    return []
+
+
+def _inside_cavity(asked: AskedSpec, inner_radius: float) -> float:
+    return inner_radius - 0.3
+
+
+@dataclass(frozen=True)
+class Design:
+    """A kind of unit, all of it in one file.
+
+    name         what `design` in a spec says
+    about        one line for `unitcad list designs`
+    layers       the cast layers from the inside out, by name ("layer1" ...); other names are printed bodies
+    dimensions   radii, heights, pad and exit that follow from a spec
+    limits       raises Refusal for a spec that this design can't be made of
+    advice       what is unwise and not refused, a sentence each
+    pad_radius   default radius of the circuit's pad (mm), from the asked spec and the cavity's radius
+    wire_sides   sides of a wire that need clearance in its exit: 2 in a slot, 1 in a notch
+    tooling      "concentric": base, cups, tongues and blade drawn from the dimensions; None: no moulds
+    suction      whether a unit closed at the top holds to its core, so that a filament must let air in
+    opens        where motor and circuit go in: "above" or "below" (the skin)
+    passes       how often the wave from motor to skin passes the border between the layers; None: no estimate
+    assembly     how motor and circuit go into the body, a sentence each
+    left_out     pieces that this variant does without, and why
+    """
+
+    name: str
+    about: str
+    layers: Callable[[Spec, Dimensions], Mapping[str, Shape]]
+    dimensions: Callable[[Spec], Dimensions]
+    limits: Callable[[Spec, Dimensions], None] = _no_limits
+    advice: Callable[[Spec, Dimensions], list[str]] = _nothing
+    pad_radius: Callable[[AskedSpec, float], float] = _inside_cavity
+    wire_sides: int = 1
+    tooling: Literal["concentric"] | None = None
+    suction: bool = False
+    opens: Literal["above", "below"] = "below"
+    passes: float | None = None
+    assembly: Callable[[Spec, Dimensions], list[str]] = _nothing
+    left_out: Callable[[Spec], list[Reason]] = _nothing_left_out

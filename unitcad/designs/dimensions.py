@@ -1,0 +1,118 @@
+"""The lengths that follow from an effective spec (mm): one place for designs, moulds and drawings to read them from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from unitcad.spec import Spec
+
+MOTOR_CLEARANCE = 0.1
+"""Least ring of air between the motor and Layer 1, mm, unless `motor.fill` closes it."""
+WIRE_GAP = 0.1
+"""Between wires side by side, and between them and what is next to them, mm."""
+
+
+@dataclass(frozen=True)
+class Exit:
+    """The passage of tails or wires through the silicone, from `low` to `high` (z, mm) and `width` wide.
+
+    A slot has silicone over it; a notch ends at the layers' top and is open there. `wires_y` is where the wires' axes
+    lie across it.
+    """
+
+    low: float
+    high: float
+    width: float
+    wires_y: tuple[float, ...] = ()
+
+    @property
+    def height(self) -> float:
+        """From its floor to its roof."""
+        return self.high - self.low
+
+
+@dataclass(frozen=True)
+class Pad:
+    """The circuit's round pad: its radius, and its faces at `low` and `high` (z, mm)."""
+
+    radius: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Dimensions:
+    """A unit's radii and heights; z = 0 is the skin.
+
+    cavity_radius   r of the cavity and so of the core; Layer 1 begins there
+    radii[i]        outer radius of layer i
+    core_height     top of the core
+    heights[i]      top of layer i
+    pad             the circuit's pad; None without a circuit
+    exit            slot or notch of tails or wires; None where nothing leaves through the silicone
+    ledge_radius    where the tongue's tip stops in the core
+    sides           where the tail leaves: +1 along +x, -1 along -x
+    """
+
+    cavity_radius: float
+    radii: tuple[float, ...]
+    core_height: float
+    heights: tuple[float, ...]
+    motor_radius: float
+    motor_height: float
+    pad: Pad | None
+    exit: Exit | None
+    ledge_radius: float
+    sides: tuple[int, ...]
+
+    @property
+    def outer_radius(self) -> float:
+        """D / 2."""
+        return self.radii[-1]
+
+    @property
+    def air_ring(self) -> float:
+        """Width of the ring of air between motor and Layer 1."""
+        return self.cavity_radius - self.motor_radius
+
+    @property
+    def exits(self) -> tuple[int, ...]:
+        """The sides on which something leaves through the silicone."""
+        return self.sides if self.exit else ()
+
+
+def concentric(spec: Spec, core_height: float, exit: Exit | None) -> Dimensions:
+    """Return the dimensions of a unit whose layers are rings, or cups, round the motor's axis.
+
+    `core_height` is the height of the core that Layer 1 is cast on, mm.
+    """
+    motor, fpcb = spec.motor, spec.fpcb
+    inner = spec.diameter_mm / 2 - sum(layer.wall_mm for layer in spec.layers)
+    radii = [inner + sum(layer.wall_mm for layer in spec.layers[: i + 1]) for i in range(len(spec.layers))]
+    radii[-1] = spec.diameter_mm / 2
+    caps = [layer.cap_mm for layer in spec.layers]
+    cavity = motor.diameter_mm / 2 if motor.fill else inner
+    back = motor.thickness_mm
+    return Dimensions(
+        cavity_radius=cavity,
+        radii=tuple(radii),
+        core_height=core_height,
+        heights=tuple(core_height + sum(caps[: i + 1]) for i in range(len(caps))),
+        motor_radius=motor.diameter_mm / 2,
+        motor_height=back,
+        pad=Pad(fpcb.pad_diameter_mm / 2, back, back + fpcb.thickness_mm) if fpcb else None,
+        exit=exit,
+        ledge_radius=cavity - spec.moulds.ledge_mm,
+        sides=(1, -1) if fpcb and fpcb.tail == "both" else (1,) if fpcb or spec.wires else (),
+    )
+
+
+def wire_exit(spec: Spec, top: float) -> Exit | None:
+    """Return the exit of a spec's wires, side by side, whose passage ends at z = `top`; None without wires."""
+    wires = spec.wires
+    if not wires:
+        return None
+    pitch = wires.diameter_mm + WIRE_GAP
+    across = tuple((i - (wires.count - 1) / 2) * pitch for i in range(wires.count))
+    width = spec.moulds.slot_width_clearance_mm + wires.count * pitch - WIRE_GAP
+    return Exit(top - spec.moulds.slot_height_mm, top, width, across)

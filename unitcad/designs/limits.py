@@ -1,0 +1,181 @@
+"""The limits that concentric designs share: everything refused that no kernel would notice.
+
+Each refusal names the field, its value, the limit and the nearest accepted value: that value, put in, meets this limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from unitcad import catalogue
+from unitcad.designs.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, Exit
+from unitcad.errors import Refusal
+from unitcad.spec import Spec
+from unitcad.spec.asked import FpcbTable, WiresTable
+from unitcad.spec.effective import Circuit
+
+TAIL_SHARE = 0.7
+"""Half the tail's width over the core's radius, at most: beyond it the ledge has no shoulders."""
+LEDGE_SHARE = 0.95
+"""Half the notch's width over the ledge's radius, at most: beyond it the tongue's round tip has prongs."""
+SLOT_CLEARANCE = 0.2
+"""Least height of the slot over the circuit's thickness, or a wire's on each side of it, mm."""
+EPS = 1e-9
+
+
+def check_motor(spec: Spec, dims: Dimensions) -> None:
+    """Raise Refusal where motor, clearance and walls do not fit the diameter."""
+    clearance = 0.0 if spec.motor.fill else MOTOR_CLEARANCE
+    walls = sum(layer.wall_mm for layer in spec.layers)
+    at_least(
+        "diameter_mm",
+        spec.diameter_mm,
+        2 * (dims.motor_radius + clearance + walls),
+        f"the motor ({2 * dims.motor_radius:g}), {clearance:g} of clearance and walls of {walls:g} a side need",
+    )
+
+
+def widest_exit(spec: Spec, dims: Dimensions) -> float:
+    """Return the widest tail, or bundle of wires, whose ledge keeps its shoulders, mm."""
+    beside = spec.moulds.slot_width_clearance_mm + 2 * spec.moulds.window_clearance_mm
+    return min(2 * TAIL_SHARE * dims.cavity_radius, 2 * LEDGE_SHARE * dims.ledge_radius - beside)
+
+
+def check_wires(spec: Spec, dims: Dimensions) -> None:
+    """Raise Refusal for wires beside a circuit, and for a bundle that the motor or the ledge leaves no room for."""
+    wires = spec.wires
+    if not wires:
+        return
+    if spec.fpcb:
+        raise Refusal("wires", "a table", "wires take the place of a circuit; leave out [fpcb] or [wires]")
+    at_most("wires.diameter_mm", wires.diameter_mm, dims.motor_height / 2, "half the motor's thickness is")
+    bundle = wires.count * (wires.diameter_mm + WIRE_GAP) - WIRE_GAP
+    widest = widest_exit(spec, dims)
+    if bundle > widest + EPS:
+        raise Refusal(
+            "wires.diameter_mm",
+            wires.diameter_mm,
+            f"{wires.count} side by side take {bundle:.4g} mm, and the ledge leaves {widest:.4g} mm",
+            down((widest + WIRE_GAP) / wires.count - WIRE_GAP) if widest > wires.count * WIRE_GAP else None,
+        )
+
+
+def least_slot(fpcb: FpcbTable | Circuit | None, wires: WiresTable | None, wire_sides: int) -> float:
+    """Return the least height of the exit, mm; 0 where nothing leaves. `wire_sides`: see `Design`."""
+    if wires:
+        return wires.diameter_mm + SLOT_CLEARANCE * wire_sides
+    return fpcb.thickness_mm + SLOT_CLEARANCE if fpcb else 0.0
+
+
+def check_slot_height(spec: Spec, wire_sides: int) -> None:
+    """Raise Refusal for a slot too low for what it takes."""
+    at_least(
+        "moulds.slot_height_mm",
+        spec.moulds.slot_height_mm,
+        least_slot(spec.fpcb, spec.wires, wire_sides),
+        f"the slot takes the {'circuit' if spec.fpcb else 'wire'} with clearance, so at least",
+    )
+
+
+def check_under_window(spec: Spec, dims: Dimensions, exit: Exit) -> None:
+    """Raise Refusal where the cup has no wall under the window that its tongue goes through."""
+    at_least(
+        "motor.thickness_mm",
+        dims.motor_height,
+        spec.moulds.least_wall_mm + spec.moulds.window_clearance_mm + dims.motor_height - exit.low,
+        f"with a {leaving(spec)}, the cup's wall under the window needs a motor of at least",
+    )
+
+
+def leaving(spec: Spec) -> str:
+    """Return what leaves the body: "tail" or "wire"."""
+    return "tail" if spec.fpcb else "wire"
+
+
+def check_printer(spec: Spec) -> None:
+    """Raise Refusal for walls and features that the printer can't make."""
+    moulds = spec.moulds
+    printer = catalogue.printers(spec.printers)[moulds.printer]
+    wall, feature = moulds.least_wall_mm, float(printer.least_feature_mm)
+    at_least(
+        "moulds.least_wall_mm", wall, float(printer.least_wall_mm), f"{moulds.printer} prints no wall thinner than"
+    )
+    for field in ("skirt_wall_mm", "land_mm", "plate_mm"):
+        at_least(f"moulds.{field}", getattr(moulds, field), wall, "the printer's least wall is")
+    for field in ("engraving_stroke_mm", "groove_width_mm", "slot_height_mm"):
+        at_least(f"moulds.{field}", getattr(moulds, field), feature, "the printer's least feature is")
+
+
+def check_engraving(spec: Spec, dims: Dimensions) -> None:
+    """Raise Refusal where no floor stays under the lettering on the first cup or on the plate."""
+    floor = float(catalogue.printers(spec.printers)[spec.moulds.printer].least_flat_wall_mm)
+    at_most(
+        "moulds.engraving_depth_mm",
+        spec.moulds.engraving_depth_mm,
+        min(dims.heights[0], spec.moulds.plate_mm) - floor,
+        f"a floor of {floor:g} must stay under the lettering, so at most",
+    )
+
+
+def check_seat(spec: Spec) -> None:
+    """Raise Refusal for a relief that leaves the cup nothing to be centred by."""
+    at_most(
+        "moulds.seat_relief_mm",
+        spec.moulds.seat_relief_mm,
+        spec.moulds.plinth_height_mm - 0.5,
+        "half a millimetre of skirt must stay to centre the cup, so at most",
+    )
+
+
+def check_filament(spec: Spec, dims: Dimensions) -> None:
+    """Raise Refusal where plate and core can't take the filament that lets air under a closed unit."""
+    moulds = spec.moulds
+    hole, wall = moulds.filament_hole_mm, moulds.least_wall_mm
+    at_least("moulds.filament_hole_mm", hole, moulds.filament_mm, "the hole takes the filament of")
+    at_least(
+        "moulds.plate_mm",
+        moulds.plate_mm,
+        filament_groove(spec) + wall,
+        "the plate holds the filament's groove and a wall over it, so at least",
+    )
+    inside = dims.ledge_radius if dims.sides else dims.cavity_radius
+    if inside < hole / 2 + wall - EPS:
+        more = 2 * (hole / 2 + wall - inside)
+        raise Refusal(
+            "diameter_mm",
+            spec.diameter_mm,
+            "the core must hold the filament's hole with a wall round it, and the ledge",
+            up(spec.diameter_mm + more) if not spec.motor.fill else None,
+        )
+
+
+def filament_groove(spec: Spec) -> float:
+    """Return depth and width of the groove that takes the bent filament under the plate, mm."""
+    return spec.moulds.filament_mm + 0.5
+
+
+def at_least(field: str, value: float, limit: float, why: str) -> None:
+    """Raise Refusal where `value` is below `limit`."""
+    _bound(field, value, limit, why, value < limit - EPS, up)
+
+
+def at_most(field: str, value: float, limit: float, why: str) -> None:
+    """Raise Refusal where `value` is above `limit`."""
+    _bound(field, value, limit, why, value > limit + EPS, down)
+
+
+def _bound(field: str, value: float, limit: float, why: str, broken: bool, nearest: Callable[[float], float]) -> None:
+    if broken:
+        accepted = nearest(limit)
+        raise Refusal(field, value, f"{why} {accepted:g} mm", accepted)
+
+
+def up(limit: float) -> float:
+    """Return the least typed value (three decimals) that is not below `limit`."""
+    return round(math.ceil(limit * 1000 - 1e-6) / 1000, 3)
+
+
+def down(limit: float) -> float:
+    """Return the largest typed value (three decimals) that is not above `limit`."""
+    return round(math.floor(limit * 1000 + 1e-6) / 1000, 3)

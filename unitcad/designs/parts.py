@@ -1,0 +1,53 @@
+"""What designs share: motor, circuit or wires, and the slot that lets the tail out.
+
+z
+|   .--------- pad, radius pad.radius ---------.========== tail ===  pad.low to pad.high
+|      .------- motor, radius motor_radius ----.
+0------'---------------------------------------'------------------- skin
+"""
+
+from __future__ import annotations
+
+from unitcad.designs.dimensions import WIRE_GAP, Dimensions, Pad
+from unitcad.shape import Shape, box, cut, cylinder, moved, turned, union
+from unitcad.spec.effective import Circuit, Wires
+
+BEYOND = 1.0
+"""How far a cutting tool reaches past what it cuts, mm: never in one plane with it."""
+
+
+def motor(dims: Dimensions) -> Shape:
+    """Draw the motor as a cylinder standing on the skin."""
+    return cylinder(dims.motor_radius, 0, dims.motor_height)
+
+
+def circuit(fpcb: Circuit, pad: Pad, dims: Dimensions) -> Shape:
+    """Draw pad and tails of the flexible circuit. The tail starts inside the pad, so that the union has one outline."""
+    half, reach = fpcb.tail_width_mm / 2, dims.outer_radius + fpcb.tail_length_mm
+    tails = (box(min(0, s * reach), max(0, s * reach), -half, half, pad.low, pad.high) for s in dims.sides)
+    return union((cylinder(pad.radius, pad.low, pad.high), *tails))
+
+
+def wires(drawn: Wires, across: tuple[float, ...], dims: Dimensions) -> list[Shape]:
+    """Draw the wires, from just off the motor's side out along +x, side by side, a gap below the core's top.
+
+    `across` is where their axes lie along y, mm.
+    """
+    radius = drawn.diameter_mm / 2
+    lying = turned(cylinder(radius, dims.motor_radius + WIRE_GAP, dims.outer_radius + drawn.length_mm), "y", 1)
+    return [moved(lying, 0, y, dims.core_height - WIRE_GAP - radius) for y in across]
+
+
+def strip(dims: Dimensions, side: int, reach: float, half_width: float, z0: float, z1: float) -> Shape:
+    """Draw a flat strip that leaves radially on one side, from the ledge's round riser outwards to x = `reach` (mm)."""
+    flat = box(min(0, side * reach), max(0, side * reach), -half_width, half_width, z0, z1)
+    return cut(flat, [cylinder(dims.ledge_radius, z0 - BEYOND, z1 + BEYOND)])
+
+
+def slots(dims: Dimensions) -> list[Shape]:
+    """Draw the passages of tails or wires through every layer, open outwards; a notch is open upwards too."""
+    if not dims.exit:
+        return []
+    low, high = dims.exit.low, dims.exit.high
+    high += BEYOND if high >= dims.heights[0] else 0.0
+    return [strip(dims, side, dims.outer_radius + BEYOND, dims.exit.width / 2, low, high) for side in dims.sides]

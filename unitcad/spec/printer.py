@@ -1,0 +1,19 @@
+"""The printer that a spec's tools are printed on."""
+
+from __future__ import annotations
+
+from msgspec import structs
+
+from unitcad import catalogue
+from unitcad.spec.effective import Spec
+
+
+def printer_of(spec: Spec) -> catalogue.Printer:
+    """Return the catalogue's printer with what the spec's moulds override."""
+    printer = catalogue.printers(spec.printers)[spec.moulds.printer]
+    overridden = {
+        name: catalogue.Value(value, "spec", "moulds")
+        for name, value in structs.asdict(spec.moulds).items()
+        if hasattr(printer, name) and float(getattr(printer, name)) != value
+    }
+    return structs.replace(printer, **overridden)

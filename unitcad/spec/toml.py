@@ -1,0 +1,67 @@
+"""TOML in and out: a file's data, and a spec as text that reads back as the same spec."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import tomli_w
+
+from unitcad.errors import UnitcadError
+from unitcad.files import read_text
+from unitcad.spec.effective import Spec
+
+
+def read_toml(path: Path, links: bool = True) -> dict[str, Any]:
+    """Return a TOML file's data.
+
+    Raises UnitcadError with line and column where it does not parse, for a special file, and for one that is larger
+    than `unitcad.files.LARGEST`; without `links` for a symbolic link too.
+    """
+    text = read_text(path, links=links)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise UnitcadError(f"{path}: not TOML: {error}") from None
+    except RecursionError:
+        raise UnitcadError(f"{path}: nests too deeply") from None
+    except ValueError:
+        raise UnitcadError(f"{path}: holds a number of thousands of digits") from None
+
+
+def to_data(spec: Spec) -> dict[str, Any]:
+    """Return the spec as plain data without what is None; validated again, it is the same spec."""
+    data = _without_none(msgspec.to_builtins(spec))
+    for layer in data["layers"]:
+        if not layer["cap_mm"]:
+            del layer["cap_mm"]
+    return data
+
+
+def to_json(spec: Spec) -> str:
+    """Return the spec as JSON, for keys and for another process. `from_json` makes it the same spec, unchecked."""
+    return msgspec.json.encode(spec).decode()
+
+
+def from_json(text: str) -> Spec:
+    """Return the spec of a text by `to_json`."""
+    return msgspec.json.decode(text, type=Spec)
+
+
+def to_toml(spec: Spec) -> str:
+    """Return the spec as TOML: the same spec when read again."""
+    return text_of(to_data(spec))
+
+
+def text_of(data: Mapping[str, Any]) -> str:
+    """Return a spec's plain data as TOML."""
+    return tomli_w.dumps(data)
+
+
+def _without_none(node: Any) -> Any:
+    if isinstance(node, dict):
+        return {key: _without_none(value) for key, value in node.items() if value is not None}
+    return [_without_none(value) for value in node] if isinstance(node, list | tuple) else node

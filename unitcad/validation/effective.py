@@ -1,0 +1,119 @@
+"""From an asked spec to the effective one: defaults written out, then every limit checked."""
+
+from __future__ import annotations
+
+from msgspec import structs
+
+from unitcad import catalogue
+from unitcad.catalogue import Motor as CatalogueMotor
+from unitcad.designs import Design, design_named
+from unitcad.designs.limits import least_slot
+from unitcad.errors import Refusal
+from unitcad.spec import Spec
+from unitcad.spec.asked import AskedSpec
+from unitcad.spec.custom_code import is_custom
+from unitcad.spec.effective import Circuit, Estimate, Layer, Motor, Moulds
+
+UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
+"""What is assumed of a motor whose entry does not say: the paper's motor."""
+_PRINTER_LENGTHS = tuple(f for f in Moulds.__struct_fields__ if f in catalogue.Printer.__struct_fields__)
+
+
+def effective(asked: AskedSpec) -> Spec:
+    """Return the effective spec. Raises Refusal for the first value that can't be."""
+    design = design_named(asked.design)
+    if is_custom(asked.design):
+        if asked.design_source is None:
+            raise Refusal("design_source", None, f"is required with design = {asked.design!r}")
+    else:
+        for field in ("parameters", "design_source"):
+            if getattr(asked, field):
+                raise Refusal(field, "...", f"only a custom design takes it; {asked.design} does not")
+    spec = _with_defaults(asked, design)
+    design.limits(spec, design.dimensions(spec))
+    return spec
+
+
+def _with_defaults(asked: AskedSpec, design: Design) -> Spec:
+    part, motor = _motor(asked)
+    known = catalogue.materials(asked.materials)
+    for i, layer in enumerate(asked.layers):
+        catalogue.choose(f"layers.{i}.material", layer.material, known)
+    moulds = _moulds(asked, design)
+    fpcb = _circuit(asked, design, motor)
+    estimate = _estimate(asked, part)
+    for name in (asked.estimate.tissue, *asked.tissue):
+        catalogue.tissue(name, asked.tissue)
+    return Spec(
+        name=asked.name,
+        design=asked.design,
+        diameter_mm=asked.diameter_mm,
+        motor=motor,
+        fpcb=fpcb,
+        wires=asked.wires,
+        layers=tuple(
+            Layer(material=layer.material, wall_mm=layer.wall_mm, cap_mm=layer.cap_mm or 0.0) for layer in asked.layers
+        ),
+        moulds=moulds,
+        casting=asked.casting,
+        estimate=estimate,
+        output=asked.output,
+        materials=asked.materials,
+        motors=asked.motors,
+        printers=asked.printers,
+        tissue=asked.tissue,
+        parameters=asked.parameters,
+        design_source=asked.design_source,
+    )
+
+
+def _motor(asked: AskedSpec) -> tuple[CatalogueMotor | None, Motor]:
+    """Return the motor's catalogue entry and its size; a size given beside a part overrides the entry's."""
+    given, part = asked.motor, None
+    sizes = {"diameter_mm": given.diameter_mm, "thickness_mm": given.thickness_mm}
+    if given.part is not None:
+        part = catalogue.choose("motor.part", given.part, catalogue.motors(asked.motors))
+        sizes = {field: float(getattr(part, field)) if size is None else size for field, size in sizes.items()}
+    for field, size in sizes.items():
+        if size is None:
+            raise Refusal(f"motor.{field}", None, "is required where no part is named")
+    found = {field: size for field, size in sizes.items() if size is not None}
+    return part, Motor(part=given.part, fill=given.fill, **found)
+
+
+def _moulds(asked: AskedSpec, design: Design) -> Moulds:
+    """Return the tooling's lengths: the printer's where the spec gives none, the slot as high as what it takes."""
+    printer = catalogue.choose("moulds.printer", asked.moulds.printer, catalogue.printers(asked.printers))
+    given = structs.asdict(asked.moulds)
+    lengths = {name: float(getattr(printer, name)) for name in _PRINTER_LENGTHS if given[name] is None}
+    if "slot_height_mm" in lengths:
+        least = least_slot(asked.fpcb, asked.wires, design.wire_sides)
+        lengths["slot_height_mm"] = max(lengths["slot_height_mm"], least)
+    return Moulds(**{**given, **lengths})
+
+
+def _circuit(asked: AskedSpec, design: Design, motor: Motor) -> Circuit | None:
+    """Return the circuit with its pad, which the design sizes, and its tail's end, as wide as the tail."""
+    fpcb = asked.fpcb
+    if fpcb is None:
+        return None
+    pad = fpcb.pad_diameter_mm
+    if pad is None:
+        inner = asked.diameter_mm / 2 - sum(layer.wall_mm for layer in asked.layers)
+        radius = design.pad_radius(asked, motor.diameter_mm / 2 if motor.fill else inner)
+        # Where no pad fits, the limits refuse the diameter; until then it is as large as the motor.
+        pad = round(2 * radius, 9) if radius > 0 else motor.diameter_mm
+    end = fpcb.tail_width_mm if fpcb.tail_end_width_mm is None else fpcb.tail_end_width_mm
+    return Circuit(**{**structs.asdict(fpcb), "pad_diameter_mm": pad, "tail_end_width_mm": end})
+
+
+def _estimate(asked: AskedSpec, part: CatalogueMotor | None) -> Estimate:
+    """Return what the estimate reads: the motor's frequency and amplitude where the spec gives none."""
+    unknown = dict(UNKNOWN_MOTOR)
+    if part and part.rpm:
+        unknown["frequency_hz"] = round(float(part.rpm) / 60, 3)
+    values = {
+        field: getattr(asked.estimate, field) or float(getattr(part, field, None) or default)
+        for field, default in unknown.items()
+    }
+    return Estimate(tissue=asked.estimate.tissue, models=asked.estimate.models, **values)
