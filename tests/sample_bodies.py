@@ -41,7 +41,7 @@ def base() -> Body:
     )
     groove = box(-1, 30, -1, 1, -8, -6.5)
     labels = [moved(LETTER_O, -18, 0, -2.4), moved(LETTER_L, -19, -6, -2.4)]
-    return Body("base", "tool", cut(body, [cylinder(0.975, -9, 4), groove, *labels]), (0.55, 0.6, 0.65))
+    return Body("base", "tool", "base", cut(body, [cylinder(0.975, -9, 4), groove, *labels]), (0.55, 0.6, 0.65))
 
 
 def cup() -> Body:
@@ -53,27 +53,37 @@ def cup() -> Body:
         Revolve(polygon((8, 3.61), (9.5, 3.61), (9.5, 5), (8, 5))),
         box(0, 20, -1.6, 1.6, 1.96, 2.56),
     ]
-    return Body("cup2", "tool", cut(block, tools), (0.85, 0.55, 0.2), upside_down=True)
+    return Body("cup2", "tool", "cup", cut(block, tools), (0.85, 0.55, 0.2), upside_down=True)
 
 
 def layers() -> tuple[Body, Body]:
     """Two layers of an encapsulating unit, both slotted on one side."""
     return (
-        Body("layer1", "unit", cut(Revolve(LAYER1), [box(3.9, 20, -1.7, 1.7, 2.0, 2.5)]), (0.95, 0.85, 0.7), "cast", 1),
-        Body("layer2", "unit", cut(Revolve(LAYER2), [SLOT]), (0.4, 0.55, 0.75), "cast", 2),
+        Body(
+            "layer1",
+            "unit",
+            "layer",
+            cut(Revolve(LAYER1), [box(3.9, 20, -1.7, 1.7, 2.0, 2.5)]),
+            (0.95, 0.85, 0.7),
+            "cast",
+            1,
+        ),
+        Body("layer2", "unit", "layer", cut(Revolve(LAYER2), [SLOT]), (0.4, 0.55, 0.75), "cast", 2),
     )
 
 
 def tongue() -> Body:
     """A strip, drawn upright and turned twice: a tree with placements."""
     strip = turned(turned(box(-1.5, 1.5, 0, 0.5, 4, 24), "y", 1), "x", 1)
-    return Body("tongue", "tool", moved(strip, 0, 0, 2), (0.2, 0.6, 0.5))
+    return Body("tongue", "tool", "tongue", moved(strip, 0, 0, 2), (0.2, 0.6, 0.5))
 
 
 def filleted() -> Body:
     """A revolved body with arcs in its profile, touching the axis, shared with a lens."""
     dome = Revolve(Profile(((0, 0, 0), (5, 0, 0), (5, 2, QUARTER), (4, 3, 0), (3, 3, -QUARTER), (2, 4, 0), (0, 4, 0))))
-    return Body("dome", "tool", Common((dome, cylinder(4.5, -1, 9), box(-9, 4, -9, 9, -1, 9))), (0.7, 0.3, 0.3))
+    return Body(
+        "dome", "tool", "coupon", Common((dome, cylinder(4.5, -1, 9), box(-9, 4, -9, 9, -1, 9))), (0.7, 0.3, 0.3)
+    )
 
 
 def gang() -> Body:
@@ -81,12 +91,12 @@ def gang() -> Body:
     places = [(18.0 * i, 18.0 * j) for i in range(3) for j in range(2)]
     cores = [moved(cylinder(4.5, 0, 2.11), x, y) for x, y in places]
     holes = [moved(cylinder(0.975, -9, 9), x, y) for x, y in places]
-    return Body("gang", "tool", cut(union([box(-12, 48, -12, 30, -6, 0), *cores]), holes), (0.5, 0.5, 0.5))
+    return Body("gang", "tool", "base", cut(union([box(-12, 48, -12, 30, -6, 0), *cores]), holes), (0.5, 0.5, 0.5))
 
 
 def tube() -> Body:
     """A plain tube."""
-    return Body("tube", "tool", ring(3, 5, 0, 10), (0.1, 0.2, 0.3))
+    return Body("tube", "tool", "coupon", ring(3, 5, 0, 10), (0.1, 0.2, 0.3))
 
 
 def all_bodies() -> list[Body]:

@@ -58,7 +58,9 @@ def test_a_fault_shows_when_read_back(tmp_path):
     """A tool left out of the cut is a part in ten thousand of the volume, and seen."""
     body = cup()
     assert isinstance(body.shape, Cut)
-    step.write(tmp_path / "a.step", [Body("cup2", "tool", Cut(body.shape.body, body.shape.tools[:-1]), (0, 0, 0))], "a")
+    step.write(
+        tmp_path / "a.step", [Body("cup2", "tool", "cup", Cut(body.shape.body, body.shape.tools[:-1]), (0, 0, 0))], "a"
+    )
     back = step.read(tmp_path / "a.step")[0]
     assert back.measures.volume != pytest.approx(occt.measure(occt.solids([body.shape])[0]).volume, rel=1e-4)
 
@@ -110,9 +112,9 @@ def test_schema_is_ap242_and_the_process_keeps_its_settings(capfd):
 def test_bodies_of_one_shape_keep_their_own_names_colours_and_places(tmp_path):
     shape = tongue().shape
     pair = [
-        Body("tongue1", "tool", shape, (1, 0, 0)),
-        Body("tongue2", "tool", moved(shape, 0, 0, 5), (0, 1, 0)),
-        Body("tongue3", "tool", shape, (0, 0, 1)),
+        Body("tongue1", "tool", "tongue", shape, (1, 0, 0)),
+        Body("tongue2", "tool", "tongue", moved(shape, 0, 0, 5), (0, 1, 0)),
+        Body("tongue3", "tool", "tongue", shape, (0, 0, 1)),
     ]
     step.write(tmp_path / "pair.step", pair, "pair")
     found = step.read(tmp_path / "pair.step")
@@ -124,11 +126,11 @@ def test_a_body_that_occt_gets_wrong_is_not_written():
     """A cylinder and a cone lying in it, edge on edge: OCCT loses a part and calls the rest valid."""
     shape = Union((cylinder(1, 0, 1), turned(Revolve(polygon((0, 0), (1, 0), (0, 1))), "y", 3)))
     with pytest.raises(UnitcadError, match=r"OCCT and manifold3d differ: 1 solids of 3\.6"):
-        step.content([Body("odd", "tool", shape, (0, 0, 0))], "odd")
+        step.content([Body("odd", "tool", "coupon", shape, (0, 0, 0))], "odd")
 
 
 def test_names_are_escaped(tmp_path):
-    step.write(tmp_path / "a.step", [Body("o'ne", "tool", tube().shape, (0, 0, 0))], "it's; a")
+    step.write(tmp_path / "a.step", [Body("o'ne", "tool", "coupon", tube().shape, (0, 0, 0))], "it's; a")
     assert step.read(tmp_path / "a.step")[0].name == "o'ne"
 
 

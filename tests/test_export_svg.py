@@ -85,12 +85,12 @@ def shared_area(bodies: list[Body], y: float) -> float:
 def test_bodies_in_one_section_do_not_overlap(y):
     """Also in planes that faces and vertices lie in; and a cup 0.5 mm too low is seen."""
     assert shared_area([base(), cup()], y) < 1e-3
-    low = Body("cup2", "tool", moved(cup().shape, z=-0.5), (0, 0, 0))
+    low = Body("cup2", "tool", "cup", moved(cup().shape, z=-0.5), (0, 0, 0))
     assert shared_area([base(), low], y) > 0.1
 
 
 def test_a_block_is_cut_where_it_is_asked_for():
-    block = Body("block", "tool", box(0, 4, -1, 3, 1, 2), (0, 0, 0))
+    block = Body("block", "tool", "coupon", box(0, 4, -1, 3, 1, 2), (0, 0, 0))
     assert area(svg.cut([block], 24, y=2.9)[0]) == pytest.approx(4, abs=1e-9)
     assert svg.cut([block], 24, y=3.1) == []
     assert area(svg.cut([block], 24, reach=2.5)[0]) == pytest.approx(2.5, abs=1e-9)

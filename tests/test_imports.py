@@ -17,6 +17,7 @@ FLOORS = [
     {"cli"},
     {"batch", "report", "accuracy"},
     {"pipeline"},
+    {"casting", "mould_checks"},
     {"moulds", "estimating"},
     {"validation"},
     {"export"},

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.designs.limits import filament_groove
+from unitcad.moulds.blade import BLADE_EDGE, BLADE_THICKNESS
 from unitcad.moulds.filament import FLARE, STUB_TAIL
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN
-from unitcad.moulds.tooling import BLADE_EDGE, BLADE_THICKNESS, GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
+from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
 from unitcad.pipeline import Variant
 from unitcad.shape import mm
 from unitcad.shape.lettering import HEIGHT, outlines, text_width

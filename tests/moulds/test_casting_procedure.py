@@ -6,20 +6,21 @@ import json
 import math
 
 import pytest
-from mould_set import MouldSet
+from faulty_sets import set_of
 
+from unitcad.casting import figures, written
+from unitcad.casting import procedure as casting_procedure
+from unitcad.casting.layer_grid import off_grid
+from unitcad.casting.procedure import Procedure
 from unitcad.catalogue import materials
-from unitcad.moulds import casting, casting_text, figures
-from unitcad.moulds.casting import Procedure
-from unitcad.moulds.grid import off_grid
 from unitcad.validation import templates
 
 
 def procedure(*source: str) -> Procedure:
-    moulds = MouldSet.of(*source)
-    solids = moulds.solids()
+    moulds = set_of(*source)
+    solids = moulds.solids
     volumes = [solids[step.name].volume() for step in moulds.plan.steps]
-    return casting.procedure(moulds.spec, moulds.plan, volumes)
+    return casting_procedure.procedure(moulds, volumes)
 
 
 # First pour of the encapsulating unit, 3.36 mm deep; worked out apart from this code.
@@ -64,7 +65,7 @@ def test_a_scale_of_a_hundredth_of_a_gram_is_3_to_12_percent_wrong() -> None:
 
 
 def test_mix_covers_waste_and_least_batch() -> None:
-    spec = MouldSet.of("encapsulating", "casting.waste=0.25", "casting.minimum_mix_g=0.1").spec
+    spec = set_of("encapsulating", "casting.waste=0.25", "casting.minimum_mix_g=0.1").spec
     found = figures.mix(spec, materials()["ecoflex-00-30"], 1000.0)
     assert found.mix_g == pytest.approx(1.07 * 1.25)
     assert found.part_a_g + found.part_b_g == pytest.approx(found.mix_g)
@@ -72,17 +73,17 @@ def test_mix_covers_waste_and_least_batch() -> None:
 
 
 def test_play_moves_walls() -> None:
-    spec = MouldSet.of("encapsulating").spec
+    spec = set_of("encapsulating").spec
     assert figures.wall_range(spec, 0) == pytest.approx((1.10, 1.40))
     assert figures.wall_range(spec, 1) == pytest.approx((0.95, 1.55))
 
 
 def test_weep_goes_with_the_cube_of_the_clearance() -> None:
-    one, two = (MouldSet.of("encapsulating", f"moulds.window_clearance_mm={c}") for c in (0.05, 0.1))
+    one, two = (set_of("encapsulating", f"moulds.window_clearance_mm={c}") for c in (0.05, 0.1))
     silicone = materials()["ecoflex-00-30"]
-    weep = [figures.weep_mm3(m.spec, m.dims, m.plan.layout, 0, silicone) for m in (one, two)]
+    weep = [figures.weep_mm3(m.spec, m.dimensions, m.plan.layout, 0, silicone) for m in (one, two)]
     assert weep[1] / weep[0] == pytest.approx(8, rel=1e-9)
-    assert figures.weep_mm3(one.spec, MouldSet.of("no-fpcb").dims, one.plan.layout, 0, silicone) == 0
+    assert figures.weep_mm3(one.spec, set_of("no-fpcb").dimensions, one.plan.layout, 0, silicone) == 0
 
 
 def test_cure_follows_the_room() -> None:
@@ -106,8 +107,8 @@ def test_every_figure_has_a_source(name: str) -> None:
         )
         assert figure.source.startswith(known), figure
         assert math.isfinite(figure.value)
-    assert json.loads(casting_text.to_json(found))["label"] == found.label
-    text = casting_text.to_markdown(found)
+    assert json.loads(written.to_json(found))["label"] == found.label
+    text = written.to_markdown(found)
     assert text.isascii()
     tongue = name not in ("embedded", "single-embedded", "no-fpcb")
     assert ("tongue out FIRST" in text) == tongue
@@ -116,7 +117,7 @@ def test_every_figure_has_a_source(name: str) -> None:
 
 
 def test_numbers_run_through_the_whole_text() -> None:
-    lines = casting_text.to_markdown(procedure("three-layer")).splitlines()
+    lines = written.to_markdown(procedure("three-layer")).splitlines()
     numbers = [int(line.split(".")[0]) for line in lines if line.split(".")[0].isdigit()]
     assert numbers == list(range(1, len(numbers) + 1))
 
@@ -132,7 +133,7 @@ def test_order_of_the_hands() -> None:
 
 
 def test_resin_and_lid_have_their_own_words() -> None:
-    text = casting_text.to_markdown(procedure("encapsulating", "moulds.printer=sla", "moulds.pour=injected"))
+    text = written.to_markdown(procedure("encapsulating", "moulds.printer=sla", "moulds.pour=injected"))
     for words in ("post-cure", "syringe", "from film or steel strip of 0.35 mm", "Lift the lid"):
         assert words in text
     assert "Strike off" not in text
@@ -144,26 +145,26 @@ def test_bill_counts_pieces() -> None:
     assert lines["tongue"].quantity == lines["filament stub"].quantity == lines["LCM0720A3463F"].quantity == 4
     assert lines["cup1"].quantity == 1
     assert "upside down" in lines["cup1"].made
-    csv = casting_text.files(found)["bom.csv"].splitlines()
+    csv = written.files(found)["bom.csv"].splitlines()
     assert len(csv) == len(found.bill) + 1
 
 
 def test_edges_off_the_layer_grid() -> None:
-    moulds = MouldSet.of("encapsulating")
-    found = {(e.piece, e.edge): e for e in off_grid(moulds.spec, moulds.dims)}
+    moulds = set_of("encapsulating")
+    found = {(e.piece, e.edge): e for e in off_grid(moulds.spec, moulds.dimensions)}
     # As printed, upside down, the window's edges lie 3.36 - 1.705 and 3.36 - 2.405 above the bed.
     assert found["cup1", "window's lower edge"].height_mm == pytest.approx(1.655)
     assert found["cup1", "window's upper edge"].nearest_mm == pytest.approx(1.0)
     assert ("base", "seat") not in found
-    fine = MouldSet.of("encapsulating", "moulds.layer_mm=0.005")
-    assert off_grid(fine.spec, fine.dims) == []
+    fine = set_of("encapsulating", "moulds.layer_mm=0.005")
+    assert off_grid(fine.spec, fine.dimensions) == []
 
 
 def test_drawing_of_every_pour_names_its_pieces() -> None:
-    moulds = MouldSet.of("encapsulating", "moulds.cavities=[2,1]")
+    moulds = set_of("encapsulating", "moulds.cavities=[2,1]")
     for step in moulds.plan.steps:
-        drawing = casting_text.step_section(moulds.plan, step, moulds.segments)
-        assert drawing == casting_text.step_section(moulds.plan, step, moulds.segments)
+        drawing = written.step_section(moulds, step)
+        assert drawing == written.step_section(moulds, step)
         for word in ("base", f"cup {step.index}", "tongue 1", "stub 2", f"layer {step.index}"):
             assert word in drawing
 

@@ -11,9 +11,9 @@ import pytest
 from manifold3d import Manifold
 from typer.testing import CliRunner
 
+from unitcad.casting import coupon
 from unitcad.catalogue import printers
 from unitcad.kernels.mesh import area_true, realise
-from unitcad.moulds import coupon
 from unitcad.shape import moved, turned
 from unitcad.validation import from_data, read
 
@@ -79,7 +79,7 @@ def test_command_writes_a_folder(tmp_path: Path) -> None:
 
 
 def test_resin_coupon_prints_no_tongue(tmp_path: Path) -> None:
-    from unitcad.moulds.coupon_files import write
+    from unitcad.casting.coupon_files import write
 
     assert not (write(printers()["sla"], tmp_path) / "coupon-tongue.stl").exists()
 

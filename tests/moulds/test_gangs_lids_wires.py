@@ -6,12 +6,13 @@ import math
 from pathlib import Path
 
 import pytest
-from mould_set import MouldSet
+from faulty_sets import broken, of_spec, set_of
 
 from unitcad.accuracy.outcomes import door, put_in
 from unitcad.accuracy.random_specs import DOCUMENTED, Seeded, random_spec
 from unitcad.errors import Refusal
-from unitcad.moulds import air, fit, lid
+from unitcad.mould_checks import air, check_moulds
+from unitcad.moulds import lid
 from unitcad.validation import from_data, read
 
 WIRES = {"diameter_mm": 0.3, "count": 2}
@@ -25,65 +26,65 @@ def wired(design: str) -> dict:
 @pytest.mark.parametrize(("name", "size", "cells"), [("embedded", 73, 9), ("encapsulating", 73, 6), ("chain", 73, 3)])
 def test_fill_takes_what_the_bed_takes_and_no_more(name: str, size: int, cells: int) -> None:
     bed = [f"moulds.bed_{axis}_mm={size}" for axis in "xy"]
-    lay = MouldSet.of(name, 'moulds.cavities="fill"', *bed).plan.layout
+    lay = set_of(name, 'moulds.cavities="fill"', *bed).plan.layout
     assert len(lay.cells) == cells
     assert max(2 * half for half in lay.plate) <= size
     columns = {cell.x for cell in lay.cells}
     with pytest.raises(Refusal) as refused:
-        MouldSet.of(name, f"moulds.cavities=[{len(columns)},{cells // len(columns) + 1}]", *bed)
+        set_of(name, f"moulds.cavities=[{len(columns)},{cells // len(columns) + 1}]", *bed)
     assert refused.value.nearest == [len(columns), cells // len(columns)]
     assert "exceeds the bed by" in str(refused.value)
 
 
 def test_a_unit_larger_than_the_bed_fills_nothing() -> None:
     with pytest.raises(Refusal, match="with one cavity"):
-        MouldSet.of("embedded", 'moulds.cavities="fill"', "moulds.bed_x_mm=30")
+        set_of("embedded", 'moulds.cavities="fill"', "moulds.bed_x_mm=30")
 
 
 @pytest.mark.parametrize(("name", "asked", "nearest"), [("encapsulating", "[3,2]", [2, 2]), ("chain", "[2,3]", [1, 3])])
 def test_a_tail_reaches_an_edge(name: str, asked: str, nearest: list[int]) -> None:
     with pytest.raises(Refusal) as refused:
-        MouldSet.of(name, f"moulds.cavities={asked}")
+        set_of(name, f"moulds.cavities={asked}")
     assert refused.value.nearest == nearest
-    MouldSet.of(name, f"moulds.cavities={nearest}")
+    set_of(name, f"moulds.cavities={nearest}")
 
 
 def test_without_tails_any_number_of_columns() -> None:
-    assert len(MouldSet.of("no-fpcb", "moulds.cavities=[4,2]").plan.layout.cells) == 8
+    assert len(set_of("no-fpcb", "moulds.cavities=[4,2]").plan.layout.cells) == 8
 
 
 @pytest.mark.parametrize("set_by_hand", [("moulds.bed_z_mm=8",), ("moulds.plate_mm=30", "moulds.bed_z_mm=25")])
 def test_a_piece_higher_than_the_printer(set_by_hand: tuple[str, ...]) -> None:
     with pytest.raises(Refusal, match=r"moulds\.bed_z_mm") as refused:
-        MouldSet.of("encapsulating", *set_by_hand)
-    MouldSet.of("encapsulating", *set_by_hand, f"moulds.bed_z_mm={refused.value.nearest}")
+        set_of("encapsulating", *set_by_hand)
+    set_of("encapsulating", *set_by_hand, f"moulds.bed_z_mm={refused.value.nearest}")
 
 
 def test_a_length_beyond_the_printer_s_height_is_the_one_refused() -> None:
     with pytest.raises(Refusal, match=r"the tallest piece has .* \(moulds\.bed_z_mm\) is 220 mm") as refused:
-        MouldSet.of("encapsulating", "layers.1.cap_mm=500")
+        set_of("encapsulating", "layers.1.cap_mm=500")
     assert refused.value.field == "layers.1.cap_mm"
-    MouldSet.of("encapsulating", f"layers.1.cap_mm={refused.value.nearest}")
+    set_of("encapsulating", f"layers.1.cap_mm={refused.value.nearest}")
 
 
 def test_cells_are_numbered_and_numbers_keep_off_grooves_and_each_other() -> None:
-    moulds = MouldSet.of("no-fpcb", "moulds.cavities=[5,4]")
+    moulds = set_of("no-fpcb", "moulds.cavities=[5,4]")
     names = [cell.name for cell in moulds.plan.layout.cells]
     assert names == [f"{i + 1:02X}" for i in range(20)]
     # Each character is a pocket of its own: the cup's top has the drawn number of outlines, none merged or cut open.
-    rim = moulds.dims.heights[1]
-    top = moulds.solids()["cup2"].slice(rim - 0.2)
+    rim = moulds.dimensions.heights[1]
+    top = moulds.solids["cup2"].slice(rim - 0.2)
     rings = sum(1 for part in top.decompose() if part.area() > 1)
-    assert top.area() < moulds.solids()["cup2"].slice(rim - 1.2).area()
+    assert top.area() < moulds.solids["cup2"].slice(rim - 1.2).area()
     assert rings >= 1 + 20  # the plate, and the land of each cell inside its groove
 
 
 def test_flat_lid_without_vents_traps_what_an_exact_integral_says() -> None:
     """A disc of radius r with a sprue of radius a in the middle: tan(t) times the integral of (x - a) over x > a."""
-    moulds = MouldSet.of("encapsulating", "moulds.pour=injected")
+    moulds = set_of("encapsulating", "moulds.pour=injected")
     step = moulds.plan.steps[1]
     sprue = step.channels[:1]
-    cup = fit.cavities(moulds.plan, moulds.solids(), moulds.segments)[1][0][1]
+    cup = moulds.cavities[1][0][1]
     from manifold3d import Manifold, OpType
 
     from unitcad.kernels.mesh import realise
@@ -103,10 +104,10 @@ def test_flat_lid_without_vents_traps_what_an_exact_integral_says() -> None:
 @pytest.mark.parametrize("count", [8, 12, 16])
 def test_measured_pocket_between_vents_is_the_formula(count: int) -> None:
     """Without a tongue, whose dent would be the deeper one; polygons stand for circles within 5 um."""
-    moulds = MouldSet.of("no-fpcb", "moulds.pour=injected", f"moulds.vents={count}", "output.tolerance_mm=0.001")
+    moulds = set_of("no-fpcb", "moulds.pour=injected", f"moulds.vents={count}", "output.tolerance_mm=0.001")
     step = moulds.plan.steps[0]
-    cavity = fit.cavities(moulds.plan, moulds.solids(), moulds.segments)[0][0][1]
-    expected = lid.pocket_depth(moulds.dims, 0, count)
+    cavity = moulds.cavities[0][0][1]
+    expected = lid.pocket_depth(moulds.dimensions, 0, count)
     assert air.pockets(cavity, step.top)[0].depth == pytest.approx(
         expected, abs=5e-3 * math.sin(math.radians(5)) + 2e-4
     )
@@ -114,20 +115,20 @@ def test_measured_pocket_between_vents_is_the_formula(count: int) -> None:
 
 def test_vents_that_cannot_clear_say_how_many_would() -> None:
     with pytest.raises(Refusal) as refused:
-        MouldSet.of("encapsulating", "moulds.pour=injected", "moulds.vents=4")
+        set_of("encapsulating", "moulds.pour=injected", "moulds.vents=4")
     assert refused.value.nearest == 8
     assert "8 would clear it" in str(refused.value)
 
 
 def test_vents_come_in_fours() -> None:
     with pytest.raises(Refusal) as refused:
-        MouldSet.of("encapsulating", "moulds.pour=injected", "moulds.vents=9")
+        set_of("encapsulating", "moulds.pour=injected", "moulds.vents=9")
     assert refused.value.nearest == 8
 
 
 def test_a_ring_too_narrow_for_a_vent() -> None:
     with pytest.raises(Refusal) as refused:
-        MouldSet.of("embedded", "moulds.pour=injected", "layers.0.wall_mm=0.7")
+        set_of("embedded", "moulds.pour=injected", "layers.0.wall_mm=0.7")
     assert (refused.value.field, refused.value.nearest) == ("layers.0.wall_mm", 1.0)
 
 
@@ -135,11 +136,11 @@ def test_a_ring_too_narrow_for_a_vent() -> None:
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_wires_keep_every_law(design: str, count: int) -> None:
     data = wired(design)
-    moulds = MouldSet.of_spec(from_data({**data, "wires": {**WIRES, "count": count}}))
-    assert moulds.broken() == set()
+    moulds = of_spec(from_data({**data, "wires": {**WIRES, "count": count}}))
+    assert broken(moulds) == set()
     assert [body.name for body in moulds.unit if body.name.startswith("wire")] == [f"wire{i + 1}" for i in range(count)]
     assert sum(tool.name.startswith("tongue") for tool in moulds.plan.tools) == 1
-    solids = moulds.solids()
+    solids = moulds.solids
     for i in range(count):
         for layer in ("layer1", "layer2"):
             assert solids[f"wire{i + 1}"].min_gap(solids[layer], 1) > 0.09
@@ -154,7 +155,7 @@ def test_wires_that_cannot_be() -> None:
     with pytest.raises(Refusal, match="side by side"):
         from_data({**wired("encapsulating"), "wires": {"diameter_mm": 0.9, "count": 8}})
     with pytest.raises(Refusal) as refused:
-        MouldSet.of_spec(from_data({**wired("embedded"), "moulds": {"pour": "injected"}}))
+        of_spec(from_data({**wired("embedded"), "moulds": {"pour": "injected"}}))
     assert refused.value.nearest == "open"
 
 
@@ -165,7 +166,7 @@ def test_a_connector_that_would_tear_the_slot() -> None:
     assert isinstance(nearest, float)
     # 2 (w + t) = 2 (3.4 + 0.5) (1 + 0.5 x 3.64), Dragon Skin 30's elongation being 364 %.
     assert nearest == pytest.approx(3.9 * 2.82 - 0.11, abs=1e-3)
-    MouldSet.of_spec(from_data(put_in(read("encapsulating"), "fpcb.tail_end_width_mm", nearest)))
+    of_spec(from_data(put_in(read("encapsulating"), "fpcb.tail_end_width_mm", nearest)))
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -185,15 +186,15 @@ def test_random_specs_keep_the_laws_or_are_refused(seed: int) -> None:
         if refusal.nearest is None:
             return
         data = put_in(data, refusal.field, refusal.nearest)
-    moulds = MouldSet.of_spec(from_data(data))
-    assert [finding for finding in moulds.judged() if not finding.ok] == []
+    moulds = of_spec(from_data(data))
+    assert [finding for finding in check_moulds(moulds) if not finding.ok] == []
 
 
 def test_docs_list_every_code() -> None:
-    from unitcad.moulds.laws import CODES
+    from unitcad.mould_checks import mould_checks
 
     page = (Path(__file__).parents[2] / "docs" / "moulds.md").read_text("utf-8")
-    assert all(f"| {code} |" in page for code in CODES)
+    assert all(f"| {code} |" in page for code in mould_checks())
 
 
 @pytest.mark.parametrize(
@@ -210,10 +211,10 @@ def test_docs_list_every_code() -> None:
 def test_nearest_value_leads_out(overrides: list[str], field: str, nearest: object) -> None:
     """What is offered is no nonsense: put in, it meets no limit of its own again."""
     with pytest.raises(Refusal) as refused:
-        MouldSet.of("encapsulating", *overrides)
+        set_of("encapsulating", *overrides)
     assert (refused.value.field, refused.value.nearest) == (field, nearest)
     put_in = f"{field}={nearest}"
     try:
-        MouldSet.of("encapsulating", *overrides[:-1], put_in)
+        set_of("encapsulating", *overrides[:-1], put_in)
     except Refusal as further:
         assert further.field != field

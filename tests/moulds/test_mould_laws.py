@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable
 
 import pytest
-from mould_set import MouldSet
+from faulty_sets import broken, set_of, with_fault, without
 
 from unitcad.errors import Refusal
-from unitcad.moulds import dents, fit, laws
+from unitcad.mould_checks import balance, check_moulds, mould_checks
+from unitcad.moulds import dents
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, ring, union
 from unitcad.shape.tree import Common, Revolve
 from unitcad.validation import from_data, templates
@@ -19,16 +21,16 @@ Fault = tuple[str, str, str, Callable[[Shape], Shape]]
 
 @pytest.mark.parametrize("name", sorted(templates()))
 def test_every_template_keeps_every_law(name: str) -> None:
-    found = MouldSet.of(name).judged()
+    found = check_moulds(set_of(name))
     assert [finding for finding in found if not finding.ok] == []
-    assert {finding.code for finding in found} == set(laws.CODES)
+    assert {finding.code for finding in found} == set(mould_checks())
     balance = [finding.value for finding in found if finding.code == "C100"]
     assert max(balance) < 1e-12
 
 
 def test_a_crevice_of_rounding_is_no_pocket() -> None:
     """Two wide tongues: between a tip and the ledge's riser a film of 1e-16 mm stays, which holds no air."""
-    found = MouldSet.of("encapsulating", "fpcb.tail=both", "fpcb.tail_width_mm=6.0").judged()
+    found = check_moulds(set_of("encapsulating", "fpcb.tail=both", "fpcb.tail_width_mm=6.0"))
     assert [finding for finding in found if not finding.ok] == []
 
 
@@ -49,9 +51,9 @@ def test_a_wedge_that_a_union_of_many_loses_is_no_leak() -> None:
         "moulds": {"plinth_clearance_mm": 0.231, "window_clearance_mm": 0.455, "slot_height_mm": 0.424},
         "output": {"tolerance_mm": 0.0009},
     }
-    moulds = MouldSet.of_spec(from_data(data))
-    for step, cells in zip(moulds.plan.steps, fit.cavities(moulds.plan, moulds.solids(), moulds.segments), strict=True):
-        assert max(finding.value for finding in fit.balance_law(step, cells)) < 1e-12
+    moulds = MouldSet(from_data(data))
+    for step, cells in zip(moulds.plan.steps, moulds.cavities, strict=True):
+        assert max(finding.value for finding in balance.of_pour(step, cells)) < 1e-12
 
 
 @pytest.mark.parametrize(
@@ -66,7 +68,7 @@ def test_a_wedge_that_a_union_of_many_loses_is_no_leak() -> None:
 )
 @pytest.mark.parametrize("name", ["encapsulating", "embedded"])
 def test_variants_keep_every_law(name: str, overrides: list[str]) -> None:
-    assert MouldSet.of(name, *overrides).broken() == set()
+    assert broken(set_of(name, *overrides)) == set()
 
 
 def less(*tools: Shape) -> Callable[[Shape], Shape]:
@@ -121,18 +123,18 @@ FAULTS: list[Fault] = [
 
 @pytest.mark.parametrize(("code", "tool", "what", "change"), FAULTS, ids=[f"{f[0]}-{f[1]}-{f[2]}" for f in FAULTS])
 def test_a_planted_fault_is_caught(code: str, tool: str, what: str, change: Callable[[Shape], Shape]) -> None:
-    assert code in MouldSet.of("encapsulating").with_fault(tool, change).broken(), what
+    assert code in broken(with_fault(set_of("encapsulating"), tool, change)), what
 
 
 def test_a_forgotten_tongue_is_a_leak() -> None:
-    assert "C100" in MouldSet.of("encapsulating").without("tongue").broken()
+    assert "C100" in broken(without(set_of("encapsulating"), "tongue"))
 
 
 def test_an_unpulled_tongue_holds_the_cup() -> None:
     """Out of the person's order: the cup can't go up while its tongue is in."""
-    from unitcad.moulds.draw import blocked
+    from unitcad.mould_checks.draw import blocked
 
-    solids = MouldSet.of("encapsulating").solids()
+    solids = set_of("encapsulating").solids
     assert blocked(solids["cup1"], solids["tongue"], (0, 0, 1)) > 10
     assert blocked(solids["tongue"], solids["cup1"], (1, 0, 0)) == 0
 
@@ -142,12 +144,12 @@ def test_the_peel_over_a_bar_printed_on_the_core(reach: float, sides: int) -> No
     """The hull of a circle and one or two bars in closed form: tangents, arcs and the bars' ends."""
     radius, half = 4.5, 1.7
     bars = [box(min(0, s * reach), max(0, s * reach), -half, half, 1.805, 2.0) for s in (1, -1)[:sides]]
-    bar_set = MouldSet.of("encapsulating", "casting.strain_margin=0.01").with_fault("base", more(*bars))
+    bar_set = with_fault(set_of("encapsulating", "casting.strain_margin=0.01"), "base", more(*bars))
     far = math.hypot(reach, half)
     tangent, angle = math.sqrt(far**2 - radius**2), math.atan(half / reach) + math.acos(radius / far)
     around = sides * (2 * tangent + 2 * half) + (2 * math.pi - 2 * sides * angle) * radius
     expected = around / (2 * math.pi * radius) - 1
-    found = [f for f in bar_set.judged() if f.code == "C310" and f.where.startswith("peel")]
+    found = [f for f in check_moulds(bar_set) if f.code == "C310" and f.where.startswith("peel")]
     assert len(found) == 1
     # An area-true polygon of n sides is longer than its circle by a share of (pi / n)^2 / 6.
     assert found[0].value == pytest.approx(
@@ -159,7 +161,7 @@ def test_the_peel_over_a_bar_printed_on_the_core(reach: float, sides: int) -> No
 
 def test_strain_within_the_margin_is_kept() -> None:
     bar = box(0, 5.75, -1.7, 1.7, 1.805, 2.0)
-    found = MouldSet.of("encapsulating").with_fault("base", more(bar)).judged()
+    found = check_moulds(with_fault(set_of("encapsulating"), "base", more(bar)))
     assert all(f.ok for f in found if f.code == "C310")
     assert max(f.value for f in found if f.code == "C310") > 5
 
@@ -167,7 +169,7 @@ def test_strain_within_the_margin_is_kept() -> None:
 @pytest.mark.parametrize("name", ["encapsulating", "chain"])
 def test_chain_pad_through_the_slot_needs_118_percent(name: str) -> None:
     """The circuit's pad of 8.4 through the slot of 3.4 by 0.5: 2 (8.4 + 0.11) over 2 (3.4 + 0.5), less one."""
-    found = MouldSet.of(name, "fpcb.tail_end_width_mm=8.4").judged()
+    found = check_moulds(set_of(name, "fpcb.tail_end_width_mm=8.4"))
     value = next(f.value for f in found if f.where == "tail through the slot")
     assert value == pytest.approx(100 * (2 * 8.51 / 7.8 - 1))
     assert round(value) == 118
@@ -175,13 +177,13 @@ def test_chain_pad_through_the_slot_needs_118_percent(name: str) -> None:
 
 def test_air_under_a_tongue_is_the_formulas() -> None:
     """The widest tail that the ledge leaves: the law measures what lengths say; on thin walls it is refused."""
-    moulds = MouldSet.of("encapsulating", "fpcb.tail_width_mm=6.3", "output.tolerance_mm=0.001")
-    measured = [f.value for f in moulds.judged() if f.code == "C400"]
-    expected = [dents.under_tongue(moulds.dims, moulds.dims.exit, layer) for layer in range(2)]
+    moulds = set_of("encapsulating", "fpcb.tail_width_mm=6.3", "output.tolerance_mm=0.001")
+    measured = [f.value for f in check_moulds(moulds) if f.code == "C400"]
+    expected = [dents.under_tongue(moulds.dimensions, moulds.dimensions.exit, layer) for layer in range(2)]
     assert measured == pytest.approx(expected, rel=0.01)
     with pytest.raises(Refusal) as refused:
-        MouldSet.of("encapsulating", "fpcb.tail_width_mm=6.3", "layers.0.wall_mm=0.6", "layers.1.wall_mm=1.9")
+        set_of("encapsulating", "fpcb.tail_width_mm=6.3", "layers.0.wall_mm=0.6", "layers.1.wall_mm=1.9")
     assert refused.value.field == "fpcb.tail_width_mm"
     narrower = f"fpcb.tail_width_mm={refused.value.nearest}"
-    kept = MouldSet.of("encapsulating", narrower, "layers.0.wall_mm=0.6", "layers.1.wall_mm=1.9").judged()
+    kept = check_moulds(set_of("encapsulating", narrower, "layers.0.wall_mm=0.6", "layers.1.wall_mm=1.9"))
     assert [finding for finding in kept if not finding.ok] == []

@@ -6,14 +6,14 @@ import json
 from pathlib import Path
 
 import pytest
-from mould_set import MouldSet
+from faulty_sets import set_of
 
+from unitcad.casting import coupon
 from unitcad.catalogue import printers
 from unitcad.errors import UnitcadError
 from unitcad.export import slicer, stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.moulds import coupon
 from unitcad.pipeline.build import build
 from unitcad.pipeline.slicing import slice_tools
 from unitcad.validation import load, templates
@@ -29,7 +29,7 @@ SETS = [(name,) for name in sorted(templates())] + [
 
 
 def written(folder: Path, *source: str) -> list[Path]:
-    moulds = MouldSet.of(*source)
+    moulds = set_of(*source)
     files = []
     for tool in moulds.plan.tools:
         if tool.made == "printed":
@@ -76,7 +76,7 @@ def test_print_time_and_filament(tmp_path: Path) -> None:
     assert found is not None
     assert found["pieces"][0]["repaired"] is False
     assert 10 < found["print_s"] < 3600
-    moulds = MouldSet.of("encapsulating")
+    moulds = set_of("encapsulating")
     solid = realise(moulds.plan.tool("tongue").shape, moulds.segments).volume() / 1000
     # A skirt round the piece comes on top.
     assert 0.5 * solid < found["filament_cm3"] < 5 * solid

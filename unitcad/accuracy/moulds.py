@@ -9,7 +9,7 @@ from unitcad.accuracy.result import Promise, Result, Say, Table
 from unitcad.accuracy.timing import machine, timing
 from unitcad.cache import MemoryStore
 from unitcad.errors import Refusal
-from unitcad.moulds.laws import CODES
+from unitcad.mould_checks import mould_checks
 from unitcad.pipeline.build import make
 from unitcad.pipeline.stages import Stages
 from unitcad.validation import from_data
@@ -41,7 +41,7 @@ def run(quick: bool, say: Say) -> Result:
                 margins[code] = (share, law, seed)
         seed += 1
     rows = tuple(
-        (code, CODES[code], counts[code], broken[code], *_worst(law), worst_seed)
+        (code, mould_checks()[code].demands, counts[code], broken[code], *_worst(law), worst_seed)
         for code, (_, law, worst_seed) in sorted(margins.items())
     )
     return Result(

@@ -27,7 +27,7 @@ from unitcad.batch.frames import receive, send
 from unitcad.errors import Refusal
 
 _START = "import sys; sys.path[:] = {path!r}; from unitcad.batch.worker import serve; serve({preload!r})"
-WARM = ("unitcad.pipeline.build", "unitcad.moulds.laws", "unitcad.check", "unitcad.kernels.mesh")
+WARM = ("unitcad.pipeline.build", "unitcad.mould_checks", "unitcad.check", "unitcad.kernels.mesh")
 """What a worker imports before its first task."""
 
 

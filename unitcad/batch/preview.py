@@ -8,11 +8,11 @@ from unitcad.batch.run import BatchOptions, counted
 from unitcad.batch.sweep import Sweep
 from unitcad.cache import MemoryStore
 from unitcad.errors import UnitcadError
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import parts
 from unitcad.pipeline.build import checked_outputs, make, possible_outputs
 from unitcad.pipeline.geometry import geometry_key
 from unitcad.pipeline.stages import Stages
-from unitcad.pipeline.variant import Variant
 from unitcad.spec import Spec
 
 LOOKED_AT = 20_000
@@ -68,9 +68,9 @@ def _distinct_parts(specs: list[Spec], only: tuple[str, ...]) -> int:
     """Bodies that differ, of all that these specs are made of."""
     found = set()
     for spec in specs:
-        variant = Variant(spec)
-        for group in parts.groups(variant, possible_outputs(spec, only)):
-            found |= {parts.key(variant, body, "record") for body in group.bodies}
+        moulds = MouldSet(spec)
+        for group in parts.groups(moulds, possible_outputs(spec, only)):
+            found |= {parts.key(moulds, body, "record") for body in group.bodies}
     return len(found)
 
 

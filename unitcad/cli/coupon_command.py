@@ -17,9 +17,9 @@ def coupon(
 ) -> None:
     """Write a fit coupon to print first, and how to judge it. The last line printed is the folder."""
     from unitcad import catalogue
+    from unitcad.casting import coupon as drawn
+    from unitcad.casting.coupon_files import write
     from unitcad.cli.output import print_json
-    from unitcad.moulds import coupon as drawn
-    from unitcad.moulds.coupon_files import write
 
     chosen = catalogue.choose("PRINTER", printer, catalogue.printers())
     folder = write(chosen, out)

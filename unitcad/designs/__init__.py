@@ -66,19 +66,20 @@ def unit_bodies(spec: Spec) -> tuple[Body, ...]:
     bodies = []
     for i, (name, shape) in enumerate(drawn.items()):
         step = names.index(name) + 1 if name in names else None
-        bodies.append(Body(name, "unit", shape, layer_colour(i), made="cast" if step else "printed", step=step))
+        kind, made = ("layer", "cast") if step else ("printed", "printed")
+        bodies.append(Body(name, "unit", kind, shape, layer_colour(i), made=made, step=step))
     return (*bodies, *(body for body in _inside(spec, dims) if body.name not in drawn))
 
 
 def _inside(spec: Spec, dims: Dimensions) -> tuple[Body, ...]:
     """Return what is bought and goes into the silicone."""
-    bodies = [Body("motor", "unit", parts.motor(dims), _MOTOR_COLOUR, made="bought")]
+    bodies = [Body("motor", "unit", "motor", parts.motor(dims), _MOTOR_COLOUR, made="bought")]
     if spec.fpcb and dims.pad:
         drawn = parts.circuit(spec.fpcb, dims.pad, dims)
-        bodies.append(Body("fpcb", "unit", drawn, _CIRCUIT_COLOUR, made="bought"))
+        bodies.append(Body("fpcb", "unit", "circuit", drawn, _CIRCUIT_COLOUR, made="bought"))
     if spec.wires and dims.exit:
         bodies += [
-            Body(f"wire{i + 1}", "unit", shape, _CIRCUIT_COLOUR, made="bought")
+            Body(f"wire{i + 1}", "unit", "wire", shape, _CIRCUIT_COLOUR, made="bought")
             for i, shape in enumerate(parts.wires(spec.wires, dims.exit.wires_y, dims))
         ]
     return tuple(bodies)

@@ -15,9 +15,9 @@ import math
 from unitcad.designs import Dimensions
 from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
+from unitcad.moulds.base import outline
 from unitcad.moulds.dents import MESH_ROOM, TILT_DEG, deepest
 from unitcad.moulds.layout import MARK, Layout
-from unitcad.moulds.tooling import corner_labels, outline
 from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, moved, polygon
 from unitcad.spec import Spec
 
@@ -32,15 +32,13 @@ GATE = 0.8
 """Diameter of what opens into a ring, over the ring's width."""
 
 
-def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int, label: tuple[str, str, str] | None) -> Shape:
-    """The lid of a layer's pour (from 0), lying on the cup's rim."""
+def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
+    """Draw the lid of a layer's pour (from 0), lying on the cup's rim."""
     rim, top, play = dims.heights[layer], lid_top(dims, layer), spec.moulds.plinth_clearance_mm
     low = rim - SKIRT
     if dims.exit:
         low = max(low, dims.exit.high + spec.moulds.window_clearance_mm + SKIRT_OFF_WINDOW)
     tools = [Extrude(outline(lay.cup, MARK, play), low - BEYOND, rim), *channels(spec, dims, lay, layer, beyond=BEYOND)]
-    if label:
-        tools += corner_labels(spec, lay, top, label)
     return cut(Extrude(outline(lay.cup, MARK, play + SKIRT_WALL), low, top), tools)
 
 

@@ -1,17 +1,25 @@
-"""A casting plan: every tool drawn once, and the pours as records that laws, procedure and pictures run through."""
+"""A casting plan: every tool drawn once, and the pours as records that checks, procedure and pictures run through."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_named, dimensions, unit_bodies
-from unitcad.moulds import dents, filament, lid, tooling
+from unitcad.moulds import dents, filament, lid
+from unitcad.moulds.base import base, plate_bottom
+from unitcad.moulds.blade import blade
+from unitcad.moulds.cup import cup
+from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved
 from unitcad.moulds.layout import Cell, Layout, layout
+from unitcad.moulds.seals import seals
+from unitcad.moulds.tongue import tongues
 from unitcad.shape import Shape, Union, content_hash, moved, turned
-from unitcad.shape.body import Body
+from unitcad.shape.body import Body, Kind
 from unitcad.spec import Spec, printer_of
 
 _BASE, _CUP, _CUP2, _TONGUE = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.73, 0.83, 0.93), (0.90, 0.30, 0.30)
+_UP, _DOWN = (0, 0, 1), (0, 0, -1)
 _BLADE, _STUB, _LID = (0.87, 0.87, 0.55), (0.22, 0.22, 0.22), (0.80, 0.72, 0.90)
 
 
@@ -61,28 +69,31 @@ class Plan:
         """The tool of that name. Raises KeyError."""
         return {tool.name: tool for tool in self.tools}[name]
 
-    @property
-    def tongue_sides(self) -> dict[str, int]:
-        """The side (+1, -1 along x) that each tongue is pulled out to."""
-        sides = [side for cell in self.layout.cells for side in cell.sides]
-        names = [tool.name for tool in self.tools if tool.name.startswith("tongue")]
-        return dict(zip(names, sides, strict=True)) if names else {}
+    def of_kind(self, kind: Kind) -> tuple[Body, ...]:
+        """Return the tools of a kind."""
+        return tuple(tool for tool in self.tools if tool.kind == kind)
+
+    def standing(self, step: Step, kind: Kind) -> tuple[Body, ...]:
+        """Return the tools of a kind that stand in a pour."""
+        return tuple(tool for tool in self.of_kind(kind) if tool.name in step.tools)
 
 
 def plan(spec: Spec) -> Plan:
-    """The plan of a spec. Raises Refusal where the moulds can't be: beyond the bed, a tail that reaches no edge, a lid
-    whose vents or a tongue whose width can't clear the air.
+    """Return the plan of a spec.
+
+    Raises Refusal where the moulds can't be: beyond the bed, a tail that reaches no edge, a lid whose vents or a tongue
+    whose width can't clear the air.
     """
     dims = dimensions(spec)
     lay = layout(spec, dims)
     dents.check_tongue(spec, dims)
-    blank = _tools(spec, dims, lay, "")
+    blank = _tools(spec, dims, lay)
     layers = tuple(body.shape for body in unit_bodies(spec) if body.made == "cast")
     # Material variants share pieces: the label is of geometry alone, drawn before there is a label on it.
     label = content_hash(Union((*(tool.shape for tool in blank), *layers)))[:4].upper()
-    tools = _tools(spec, dims, lay, label)
+    tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in blank)
     cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
-    around = [t.name for t in tools if t.name.startswith(("tongue", "stub"))]
+    around = [tool.name for tool in tools if tool.kind in ("tongue", "stub")]
     injected = spec.moulds.pour == "injected"
     tails = sum(len(cell.sides) for cell in lay.cells) if dims.exit else 0
     steps = tuple(
@@ -93,7 +104,7 @@ def plan(spec: Spec) -> Plan:
             tools=("base", f"cup{i + 1}", *([f"lid{i + 1}"] if injected else []), *around),
             layer=cast[i],
             earlier=tuple(shape for earlier in cast[:i] for shape in earlier),
-            seals=tuple(tooling.seals(spec, dims, lay, i)),
+            seals=tuple(seals(spec, dims, lay, i)),
             rim=dims.heights[i],
             top=lid.lid_top(dims, i) if injected else dims.heights[i],
             channels=tuple(lid.channels(spec, dims, lay, i)) if injected else (),
@@ -105,37 +116,52 @@ def plan(spec: Spec) -> Plan:
 
 
 def placed(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
-    """A unit's solid in its cell: turned by half where the cell's one tail leaves to -x."""
+    """Return a unit's solid in its cell: turned by half where the cell's one tail leaves to -x."""
     return moved(turned(shape, "z", 2 if cell.sides == (-1,) and dims.sides == (1,) else 0), cell.x, cell.y)
 
 
-def _tools(spec: Spec, dims: Dimensions, lay: Layout, label: str) -> tuple[Body, ...]:
-    """Every tool, in the order in which a person takes them up; without a label they are drawn blank."""
-    found = [Body("base", "tool", tooling.base(spec, dims, lay, f"B{label}" if label else ""), _BASE)]
+def _tools(spec: Spec, dims: Dimensions, lay: Layout) -> list[Body]:
+    """Draw every tool without its label, in the order in which a person needs them."""
+    found = [Body("base", "tool", "base", base(spec, dims, lay), _BASE)]
     injected = spec.moulds.pour == "injected"
     for i in range(len(spec.layers)):
-        text = (f"C{i + 1:X}", label[:2], label[2:]) if label else None
-        shape = tooling.cup(spec, dims, lay, i, text)
-        found.append(Body(f"cup{i + 1}", "tool", shape, _CUP2 if i % 2 else _CUP, step=i + 1, upside_down=True))
+        shape, colour = cup(spec, dims, lay, i), _CUP2 if i % 2 else _CUP
+        found.append(Body(f"cup{i + 1}", "tool", "cup", shape, colour, step=i + 1, upside_down=True, removal=_UP))
         if injected:
-            text = (f"L{i + 1:X}", label[:2], label[2:]) if label else None
-            shape = lid.lid(spec, dims, lay, i, text)
-            found.append(Body(f"lid{i + 1}", "tool", shape, _LID, step=i + 1, upside_down=True))
+            shape = lid.lid(spec, dims, lay, i)
+            found.append(Body(f"lid{i + 1}", "tool", "lid", shape, _LID, step=i + 1, upside_down=True, removal=_UP))
     # A printed resin is too brittle for a strip this thin: it is cut from film or steel.
     brittle = printer_of(spec).technology.value == "sla"
-    strips = tooling.tongues(dims, lay)
+    strips, made = tongues(dims, lay), "cut" if brittle else "printed"
     found += [
-        Body(_numbered("tongue", i, strips), "tool", shape, _TONGUE, made="cut" if brittle else "printed")
-        for i, shape in enumerate(strips)
+        Body(_numbered("tongue", i, strips), "tool", "tongue", shape, _TONGUE, made=made, removal=(side, 0, 0))
+        for i, (side, shape) in enumerate(strips)
     ]
     if design_named(spec.design).suction:
-        bottom = tooling.plate_bottom(spec)
-        stubs = [filament.stub(spec, dims, lay, cell, bottom) for cell in lay.cells]
-        found += [Body(_numbered("stub", i, stubs), "tool", s, _STUB, made="cut") for i, s in enumerate(stubs)]
+        stubs = [filament.stub(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells]
+        found += [
+            Body(_numbered("stub", i, stubs), "tool", "stub", stub, _STUB, made="cut", removal=_DOWN)
+            for i, stub in enumerate(stubs)
+        ]
     if not injected:
-        found.append(Body("blade", "tool", tooling.blade(lay, dims.heights[-1]), _BLADE, upside_down=True))
-    return tuple(found)
+        found.append(Body("blade", "tool", "blade", blade(lay, dims.heights[-1]), _BLADE, upside_down=True))
+    return found
 
 
-def _numbered(name: str, index: int, among: list[Shape]) -> str:
+def _engraved(tool: Body, spec: Spec, dims: Dimensions, lay: Layout, label: str) -> Body:
+    """Return the tool with the set's label, and a cup with the numbers of its cells."""
+    corners = label[:2], label[2:]
+    if tool.kind == "base":
+        letters = base_label(spec, lay, f"B{label}")
+    elif tool.kind == "cup" and tool.step:
+        rim = dims.heights[tool.step - 1]
+        letters = corner_labels(spec, lay, rim, (f"C{tool.step:X}", *corners)) + cell_numbers(spec, lay, rim)
+    elif tool.kind == "lid" and tool.step:
+        letters = corner_labels(spec, lay, lid.lid_top(dims, tool.step - 1), (f"L{tool.step:X}", *corners))
+    else:
+        return tool
+    return replace(tool, shape=engraved(tool.shape, letters))
+
+
+def _numbered(name: str, index: int, among: Sequence[object]) -> str:
     return name if len(among) == 1 else f"{name}{index + 1}"

@@ -19,10 +19,10 @@ from unitcad.cache import MemoryStore, MissingContent, Store, digest
 from unitcad.designs import design_named
 from unitcad.designs.design import Reason
 from unitcad.errors import Refusal, UnitcadError, unknown_name
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.geometry import findings_count, geometry, pictures
 from unitcad.pipeline.stages import Say, Stages
-from unitcad.pipeline.variant import Variant
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.spec import Spec, to_toml, with_formats
 from unitcad.spec.custom_code import is_custom
@@ -141,7 +141,7 @@ def build_into(
 
 def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
     """Everything asked for of a spec, nothing written yet. Raises Refusal where the moulds can't be."""
-    return _Making(Variant(spec), only, check, store, stages).all()
+    return _Making(MouldSet(spec), only, check, store, stages).all()
 
 
 def checked_outputs(only: Sequence[str]) -> tuple[str, ...]:
@@ -170,10 +170,10 @@ def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
 class _Making:
     """One variant, made into a product."""
 
-    def __init__(self, variant: Variant, only: Sequence[str], check: bool, store: Store, stages: Stages) -> None:
-        self.variant, self.check, self.store, self.stages = variant, check, store, stages
-        self.spec = variant.spec
-        self.asked, self.only = only, possible_outputs(variant.spec, only)
+    def __init__(self, moulds: MouldSet, only: Sequence[str], check: bool, store: Store, stages: Stages) -> None:
+        self.moulds, self.check, self.store, self.stages = moulds, check, store, stages
+        self.spec = moulds.spec
+        self.asked, self.only = only, possible_outputs(moulds.spec, only)
         self.own: dict[str, bytes] = {}
         self.left_out: list[dict[str, str]] = []
 
@@ -194,7 +194,7 @@ class _Making:
             "mesh": {
                 "kernel": "manifold3d",
                 "tolerance_mm": spec.output.tolerance_mm,
-                "segments": self.variant.segments,
+                "segments": self.moulds.segments,
                 "note": "volume_mm3 and bbox_mm are the mesh's: its corners may stand out by the tolerance",
             },
             "parts": [self._part(part) for part in shape["parts"]],
@@ -221,10 +221,10 @@ class _Making:
         """The geometry's laws and its strains against this variant's silicones, by code."""
         if not shape["strains"]:
             return shape["laws"]
-        from unitcad.moulds import laws
+        from unitcad.mould_checks import Strain, strain_findings
 
-        strained = laws.strain_law(self.spec, [laws.Strain(**strain) for strain in shape["strains"]])
-        return sorted(shape["laws"] + [laws.as_dict(finding) for finding in strained], key=lambda law: law["code"])
+        strained = strain_findings(self.spec, [Strain(**strain) for strain in shape["strains"]])
+        return sorted(shape["laws"] + [finding.as_dict() for finding in strained], key=lambda law: law["code"])
 
     def _estimate(self) -> dict[str, Any] | None:
         """estimate.json and its summary. The layered solver's part reads no silicone: the store shares it."""
@@ -249,12 +249,12 @@ class _Making:
         """The procedure's files; returns their names."""
         if "casting" not in self.only:
             return None
-        from unitcad.moulds.casting import procedure
-        from unitcad.moulds.casting_text import files
+        from unitcad.casting.procedure import procedure
+        from unitcad.casting.written import files
 
         with self.stages("casting"):
             volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
-            written = files(procedure(self.spec, self.variant.plan, volumes))
+            written = files(procedure(self.moulds, volumes))
         self.own.update({name: text.encode() for name, text in written.items()})
         return sorted(written)
 

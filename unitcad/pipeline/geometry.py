@@ -11,19 +11,18 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from unitcad.cache import Store, digest
+from unitcad.moulds.mould_set import MouldSet, geometric
 from unitcad.pipeline import parts
 from unitcad.pipeline.stages import Stages
-from unitcad.pipeline.variant import Variant, geometric
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.spec import Spec, printer_of, to_json, with_formats
 
 if TYPE_CHECKING:
-    from manifold3d import Manifold
+    pass
 
 GEOMETRIC = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
@@ -40,7 +39,7 @@ def geometry(spec: Spec, only: Sequence[str], check: bool, store: Store, stages:
     blank = geometric(spec)
     return store.data(
         _key(blank, only, check),
-        lambda: _Making(Variant(blank), only, check, store, stages).all(),
+        lambda: _Making(MouldSet(blank), only, check, store, stages).all(),
         intact=lambda found: all(map(store.has, found["files"].values())),
     )
 
@@ -58,7 +57,7 @@ def pictures(spec: Spec, only: Sequence[str], store: Store) -> dict[str, str]:
         from unitcad.export.picture import draw
         from unitcad.pipeline.scenes import pictures as scenes
 
-        wanted = scenes(Variant(blank), only)
+        wanted = scenes(MouldSet(blank), only)
         images = draw(list(wanted.values()))
         return {
             path: store.file(digest(f"{key} {path}".encode()), lambda image=image: image)
@@ -71,15 +70,15 @@ def pictures(spec: Spec, only: Sequence[str], store: Store) -> dict[str, str]:
 class _Making:
     """One geometry, made into a store."""
 
-    def __init__(self, variant: Variant, only: Sequence[str], check: bool, store: Store, stages: Stages) -> None:
-        self.variant, self.only, self.check, self.store, self.stages = variant, only, check, store, stages
-        self.formats = variant.spec.output.formats
+    def __init__(self, moulds: MouldSet, only: Sequence[str], check: bool, store: Store, stages: Stages) -> None:
+        self.moulds, self.only, self.check, self.store, self.stages = moulds, only, check, store, stages
+        self.formats = moulds.spec.output.formats
         self.files: dict[str, str] = {}
 
     def all(self) -> dict[str, Any]:
-        variant, stages = self.variant, self.stages
+        moulds, stages = self.moulds, self.stages
         with stages("plan"):
-            groups = parts.groups(variant, self.only)
+            groups = parts.groups(moulds, self.only)
         with stages("meshes"):
             records = [record for group in groups for record in self._meshes(group)]
         with stages("drawing"):
@@ -88,14 +87,14 @@ class _Making:
             with stages("step"):
                 for group in groups:
                     self._step(group, records)
-        moulds, pours = "moulds" in self.only, {"moulds", "casting"} & set(self.only)
+        tooling, pours = "moulds" in self.only, {"moulds", "casting"} & set(self.only)
         with stages("laws"):
-            laws = self._laws() if self.check and moulds else {"laws": [], "strains": []}
+            laws = self._laws() if self.check and tooling else {"laws": [], "strains": []}
         with stages("check"):
             check = self._check(records) if self.check else []
         return {
-            "label": variant.plan.label if pours else None,
-            "air_ring_mm": round(variant.dimensions.air_ring, 9),
+            "label": moulds.plan.label if pours else None,
+            "air_ring_mm": round(moulds.dimensions.air_ring, 9),
             "parts": records,
             "steps": self._steps() if pours else [],
             **laws,
@@ -106,31 +105,31 @@ class _Making:
     def _meshes(self, group: parts.Group) -> list[dict[str, Any]]:
         records = []
         for body in group.bodies:
-            key = parts.key(self.variant, body, "record")
-            record = self.store.data(key, lambda body=body: parts.record(self.variant, body))
+            key = parts.key(self.moulds, body, "record")
+            record = self.store.data(key, lambda body=body: parts.record(self.moulds, body))
             records.append({**record, "files": {}})
             if "stl" in self.formats and parts.printed(body):
                 path = f"{group.folder}/{parts.file_stem(body)}.stl"
-                key = parts.key(self.variant, body, "stl")
-                entry = self._file(path, key, lambda body=body: parts.stl_content(self.variant, body))
+                key = parts.key(self.moulds, body, "stl")
+                entry = self._file(path, key, lambda body=body: parts.stl_content(self.moulds, body))
                 records[-1]["files"]["stl"] = entry
         if "3mf" in self.formats:
-            content = parts.threemf_key(self.variant, group.bodies)
+            content = parts.threemf_key(self.moulds, group.bodies)
             entry = self._file(
-                f"{group.together}.3mf", content, lambda: parts.threemf_content(self.variant, group.bodies)
+                f"{group.together}.3mf", content, lambda: parts.threemf_content(self.moulds, group.bodies)
             )
             for record, body in zip(records, group.bodies, strict=True):
                 if parts.printed(body):
                     record["files"]["3mf"] = entry
         if "glb" in self.formats:
-            key = parts.glb_key(self.variant, group.bodies)
-            entry = self._file(f"{group.together}.glb", key, lambda: parts.glb_content(self.variant, group.bodies))
+            key = parts.glb_key(self.moulds, group.bodies)
+            entry = self._file(f"{group.together}.glb", key, lambda: parts.glb_content(self.moulds, group.bodies))
             for record in records:
                 record["files"]["glb"] = entry
         return records
 
     def _step(self, group: parts.Group, records: list[dict[str, Any]]) -> None:
-        key = parts.step_key(self.variant, group.bodies, group.name)
+        key = parts.step_key(self.moulds, group.bodies, group.name)
         entry = self._file(f"{group.together}.step", key, lambda: parts.step_content(group.bodies, group.name))
         names = {body.name for body in group.bodies}
         for record in records:
@@ -143,32 +142,30 @@ class _Making:
         except ImportError:
             return
         if "unit" in self.only:
-            v = self.variant
+            v = self.moulds
             self._file(
                 "section.svg",
                 self._own_key("section"),
                 lambda: svg.unit_section(v.unit, v.dimensions, v.segments).encode(),
             )
         if "casting" in self.only:
-            from unitcad.moulds.casting_text import step_section
+            from unitcad.casting.written import step_section
 
-            for step in self.variant.plan.steps:
+            for step in self.moulds.plan.steps:
                 self._file(
                     f"step{step.index}-section.svg",
                     self._own_key(f"section of pour {step.index}"),
-                    lambda step=step: step_section(self.variant.plan, step, self.variant.segments).encode(),
+                    lambda step=step: step_section(self.moulds, step).encode(),
                 )
 
     def _laws(self) -> dict[str, list[dict[str, Any]]]:
         """The laws that read no silicone, judged; and the strains that a silicone's limit is still to be put to."""
-        from unitcad.moulds import laws
+        from unitcad.mould_checks import check_geometry, strains
 
         def judged() -> dict[str, list[dict[str, Any]]]:
-            spec, plan, solids, segments = self.variant.spec, self.variant.plan, self._solids, self.variant.segments
-            found = laws.geometric_laws(spec, self.variant.unit, plan, solids, segments, self._cavities)
             return {
-                "laws": [laws.as_dict(finding) for finding in found],
-                "strains": [asdict(strain) for strain in laws.strains(spec, plan, solids, segments)],
+                "laws": [finding.as_dict() for finding in check_geometry(self.moulds)],
+                "strains": [asdict(strain) for strain in strains(self.moulds)],
             }
 
         return self.store.data(self._own_key("laws"), judged)
@@ -182,7 +179,7 @@ class _Making:
         from unitcad.check import Options, check_bytes
 
         # A tool's STL is judged against the printer; its 3MF holds the same meshes.
-        printer = printer_of(self.variant.spec) if role == "tool" and path.endswith(".stl") else None
+        printer = printer_of(self.moulds.spec) if role == "tool" and path.endswith(".stl") else None
 
         def judged() -> list[dict[str, Any]]:
             content = self.store.content(self.files[path])
@@ -201,28 +198,16 @@ class _Making:
                     "layer": step.name,
                     "tools": list(step.tools),
                     "cavity_volume_mm3": float(f"{sum(cavity.volume() for _, cavity in cells):.9g}"),
-                    "layer_volume_mm3": float(f"{self._solids[step.name].volume():.9g}"),
+                    "layer_volume_mm3": float(f"{self.moulds.solids[step.name].volume():.9g}"),
                 }
-                for step, cells in zip(self.variant.plan.steps, self._cavities, strict=True)
+                for step, cells in zip(self.moulds.plan.steps, self.moulds.cavities, strict=True)
             ]
 
         return self.store.data(self._own_key("steps"), measured)
 
-    @cached_property
-    def _solids(self) -> dict[str, Manifold]:
-        """The mesh of every body by name."""
-        variant = self.variant
-        return {body.name: variant.mesh(body) for body in (*variant.unit, *variant.plan.tools)}
-
-    @cached_property
-    def _cavities(self) -> list[list[tuple[Manifold, Manifold]]]:
-        from unitcad.moulds import fit
-
-        return fit.cavities(self.variant.plan, self._solids, self.variant.segments)
-
     def _own_key(self, what: str) -> str:
         """The key of something that reads the whole geometry, but neither formats nor outputs."""
-        return _key(with_formats(self.variant.spec), what)
+        return _key(with_formats(self.moulds.spec), what)
 
     def _file(self, path: str, key: str, make: Any) -> dict[str, str]:
         """One shared file: its content by `key` in the store, its place in the variant's folder by `path`."""

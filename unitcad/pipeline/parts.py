@@ -15,7 +15,7 @@ from unitcad.errors import UnitcadError
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, bounds, realise
-from unitcad.pipeline import variant as drawings
+from unitcad.moulds import mould_set
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.shape import Shape, content_hash
 from unitcad.shape.body import Body
@@ -23,7 +23,7 @@ from unitcad.shape.body import Body
 if TYPE_CHECKING:
     import numpy as np
 
-    from unitcad.pipeline.variant import Variant
+    from unitcad.moulds.mould_set import MouldSet
 
 MESH_FORMATS = ("stl", "3mf")
 
@@ -38,19 +38,19 @@ class Group:
     together: str
 
 
-def groups(variant: Variant, only: Sequence[str]) -> list[Group]:
+def groups(moulds: MouldSet, only: Sequence[str]) -> list[Group]:
     """The groups of bodies that `only` asks for."""
     found = []
     if "unit" in only:
-        found.append(Group("unit", variant.unit, "unit", "unit"))
+        found.append(Group("unit", moulds.unit, "unit", "unit"))
     if "moulds" in only:
-        found.append(Group("moulds", variant.plan.tools, "moulds", "moulds/moulds"))
+        found.append(Group("moulds", moulds.plan.tools, "moulds", "moulds/moulds"))
     return found
 
 
 def file_stem(body: Body) -> str:
     """A body's file name without suffix: cups begin with their step, so that a folder lists them in order."""
-    return f"step{body.step}-cup" if body.name.startswith("cup") else body.name
+    return f"step{body.step}-cup" if body.kind == "cup" else body.name
 
 
 def printed(body: Body) -> bool:
@@ -58,56 +58,56 @@ def printed(body: Body) -> bool:
     return body.role == "unit" or body.made == "printed"
 
 
-def key(variant: Variant, body: Body, form: str) -> str:
+def key(moulds: MouldSet, body: Body, form: str) -> str:
     """What a body's file depends on: tree, name, colour, attitude, resolution, format, version of code and kernels."""
     return content_hash(
-        body.shape, body.name, body.role, body.step, body.made, body.colour, body.upside_down, variant.segments, form,
+        body.shape, body.name, body.role, body.step, body.made, body.colour, body.upside_down, moulds.segments, form,
         code_version(), sorted(kernel_versions(()).items()),
     )  # fmt: skip
 
 
-def threemf_key(variant: Variant, bodies: Sequence[Body]) -> str:
+def threemf_key(moulds: MouldSet, bodies: Sequence[Body]) -> str:
     """What the 3MF of several bodies depends on."""
-    return _joint_key(variant, bodies, "3mf", variant.spec.moulds.bed_x_mm, variant.spec.moulds.bed_y_mm)
+    return _joint_key(moulds, bodies, "3mf", moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm)
 
 
-def glb_key(variant: Variant, bodies: Sequence[Body]) -> str:
+def glb_key(moulds: MouldSet, bodies: Sequence[Body]) -> str:
     """What the GLB of several bodies depends on."""
-    return _joint_key(variant, bodies, "glb")
+    return _joint_key(moulds, bodies, "glb")
 
 
-def step_key(variant: Variant, bodies: Sequence[Body], name: str) -> str:
+def step_key(moulds: MouldSet, bodies: Sequence[Body], name: str) -> str:
     """What the STEP of several bodies depends on, its date among it."""
     return _joint_key(
-        variant, bodies, "step", name, os.environ.get("SOURCE_DATE_EPOCH"), sorted(kernel_versions(("step",)).items())
+        moulds, bodies, "step", name, os.environ.get("SOURCE_DATE_EPOCH"), sorted(kernel_versions(("step",)).items())
     )
 
 
-def _joint_key(variant: Variant, bodies: Sequence[Body], *more: object) -> str:
-    return digest(repr(([key(variant, body, "") for body in bodies], more)).encode())
+def _joint_key(moulds: MouldSet, bodies: Sequence[Body], *more: object) -> str:
+    return digest(repr(([key(moulds, body, "") for body in bodies], more)).encode())
 
 
-def stl_content(variant: Variant, body: Body) -> bytes:
+def stl_content(moulds: MouldSet, body: Body) -> bytes:
     """A body's STL."""
-    return stl.content(*_ready(variant, body), body.name)
+    return stl.content(*_ready(moulds, body), body.name)
 
 
-def threemf_content(variant: Variant, bodies: Sequence[Body]) -> bytes:
+def threemf_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
     """The 3MF of several bodies, side by side on the spec's bed."""
     from unitcad.export import threemf
 
-    bed = variant.spec.moulds.bed_x_mm, variant.spec.moulds.bed_y_mm
-    parts = [threemf.MeshPart(b.name, b.colour, *_ready(variant, b)) for b in bodies if printed(b)]
+    bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
+    parts = [threemf.MeshPart(b.name, b.colour, *_ready(moulds, b)) for b in bodies if printed(b)]
     return threemf.content(parts, bed)
 
 
-def glb_content(variant: Variant, bodies: Sequence[Body]) -> bytes:
+def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
     """The GLB of several bodies as assembled; what is cut or bought is in it too."""
     from unitcad.export import glb
 
     return glb.content(
         [
-            glb.GlbPart(b.name, b.colour, *arrays(variant.mesh(b)), {"role": b.role, "made": b.made, "step": b.step})
+            glb.GlbPart(b.name, b.colour, *arrays(moulds.mesh(b)), {"role": b.role, "made": b.made, "step": b.step})
             for b in bodies
         ]
     )
@@ -125,9 +125,9 @@ def step_content(bodies: Sequence[Body], name: str) -> bytes:
         return path.read_bytes()
 
 
-def record(variant: Variant, body: Body) -> dict[str, Any]:
+def record(moulds: MouldSet, body: Body) -> dict[str, Any]:
     """A body's entry in the manifest, without material and files."""
-    solid = variant.mesh(body)
+    solid = moulds.mesh(body)
     return {
         "name": body.name,
         "role": body.role,
@@ -135,13 +135,13 @@ def record(variant: Variant, body: Body) -> dict[str, Any]:
         "made": body.made,
         "volume_mm3": _round(solid.volume()),
         "bbox_mm": [_round(v) for v in bounds(solid)],
-        "triangles": len(_ready(variant, body)[1]) if printed(body) else int(solid.num_tri()),
+        "triangles": len(_ready(moulds, body)[1]) if printed(body) else int(solid.num_tri()),
     }
 
 
-def _ready(variant: Variant, body: Body) -> tuple[np.ndarray, np.ndarray]:
+def _ready(moulds: MouldSet, body: Body) -> tuple[np.ndarray, np.ndarray]:
     """The mesh as it is written: its count of faces and both mesh formats come from one rounding."""
-    return _rounded(body.shape, variant.segments, body.upside_down)
+    return _rounded(body.shape, moulds.segments, body.upside_down)
 
 
 @lru_cache(maxsize=64)
@@ -152,7 +152,7 @@ def _rounded(shape: Shape, segments: int, upside_down: bool) -> tuple[np.ndarray
 def forget() -> None:
     """Drop plans, meshes and their roundings that are kept for the next call: what a measurement of times needs."""
     _rounded.cache_clear()
-    drawings.forget()
+    mould_set.forget()
 
 
 def _round(value: float) -> float:

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.designs import design_named
 from unitcad.export.picture import Drawn, Scene
 from unitcad.kernels.mesh import arrays, bounds, realise
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-    from unitcad.pipeline.variant import Variant
+    from unitcad.moulds.mould_set import MouldSet
 
 GAP = 7.0
 """Between two pieces taken apart, mm."""
@@ -33,15 +32,14 @@ class Moment:
     parts: tuple[str, ...]
 
 
-def moments(variant: Variant) -> tuple[Moment, ...]:
-    """Casting from the bare base to the unit, in the person's order."""
-    plan, found = variant.plan, []
-    base = tuple(t.name for t in plan.tools if t.name == "base" or t.name.startswith("stub"))
+def moments(moulds: MouldSet) -> tuple[Moment, ...]:
+    """Return casting from the bare base to the unit, in the person's order."""
+    plan, found = moulds.plan, []
+    base = tuple(tool.name for kind in ("base", "stub") for tool in plan.of_kind(kind))
     found.append(Moment("Base, filament flush with the core" if len(base) > 1 else "Base", base))
     for step in plan.steps:
         cured = tuple(f"layer{i}" for i in range(1, step.index))
-        cup = f"cup{step.index}"
-        tongues = tuple(name for name in step.tools if name.startswith("tongue"))
+        cup, tongues = step.cup, tuple(tool.name for tool in plan.standing(step, "tongue"))
         found.append(Moment(f"Pour {step.index}: cup {step.index} on", (*base, *cured, cup)))
         if tongues:
             found.append(Moment(f"Pour {step.index}: tongue in, to the ledge", (*base, *cured, cup, *tongues)))
@@ -50,49 +48,47 @@ def moments(variant: Variant) -> tuple[Moment, ...]:
         if tongues:
             found.append(Moment(f"Pour {step.index}: cured, tongue out first", (*full, cup)))
         found.append(Moment(f"Pour {step.index}: cup up, layer {step.index} stays", full))
-    unit = tuple(body.name for body in variant.unit)
+    unit = tuple(body.name for body in moulds.unit)
     found.append(Moment("The unit: peeled off, motor and circuit in", unit))
     return tuple(found)
 
 
-def taken_apart(variant: Variant) -> dict[str, Offset]:
+def taken_apart(moulds: MouldSet) -> dict[str, Offset]:
     """How far each tool and each cast layer moves (mm) when the set is shown exploded: up the axis in casting order,
     a tongue out of its window, a filament stub down.
     """
-    plan = variant.plan
+    plan = moulds.plan
     offsets: dict[str, Offset] = {"base": (0.0, 0.0, 0.0)}
-    top = _top(variant, "base")
+    top = _top(moulds, "base")
     cup_levels = []
     for step in plan.steps:
-        for name in (f"cup{step.index}", step.name):
-            low, high = _extent(variant, name)
+        for name in (step.cup, step.name):
+            low, high = _extent(moulds, name)
             lift = top + GAP - low
             offsets[name] = (0.0, 0.0, lift)
             top = high + lift
-            if name.startswith("cup"):
+            if name == step.cup:
                 cup_levels.append(lift)
     for tool in plan.tools:
-        if tool.name.startswith("tongue"):
-            x0, _, _, x1, _, _ = bounds(variant.mesh(tool))
-            side = 1.0 if x0 + x1 > 0 else -1.0
-            offsets[tool.name] = (side * ASIDE, 0.0, cup_levels[0])
-        elif tool.name.startswith("stub"):
-            low, high = _extent(variant, tool.name)
-            offsets[tool.name] = (0.0, 0.0, _extent(variant, "base")[0] - GAP - high)
+        if tool.kind == "tongue" and tool.removal:
+            offsets[tool.name] = (tool.removal[0] * ASIDE, 0.0, cup_levels[0])
+        elif tool.kind == "stub":
+            _, high = _extent(moulds, tool.name)
+            offsets[tool.name] = (0.0, 0.0, _extent(moulds, "base")[0] - GAP - high)
         elif tool.name not in offsets:
-            offsets[tool.name] = (0.0, 0.0, top + GAP - _extent(variant, tool.name)[0])
-            top += GAP + _extent(variant, tool.name)[1] - _extent(variant, tool.name)[0]
+            offsets[tool.name] = (0.0, 0.0, top + GAP - _extent(moulds, tool.name)[0])
+            top += GAP + _extent(moulds, tool.name)[1] - _extent(moulds, tool.name)[0]
     return offsets
 
 
-def unit_apart(variant: Variant) -> dict[str, Offset]:
+def unit_apart(moulds: MouldSet) -> dict[str, Offset]:
     """The same for the unit's bodies: what goes in first stays below."""
-    solids = {body.name: variant.mesh(body) for body in variant.unit}
-    layers = sorted((n for n in solids if n.startswith("layer")), key=lambda n: int(n[5:]))
-    rest = [name for name in ("motor", "fpcb") if name in solids]
+    solids = {body.name: moulds.mesh(body) for body in moulds.unit}
+    layers = [body.name for body in sorted(moulds.unit, key=lambda body: body.step or 0) if body.kind == "layer"]
+    rest = [body.name for kind in ("motor", "circuit") for body in moulds.unit if body.kind == kind]
     others = [name for name in solids if name not in layers and name not in rest]
     inside_out = [*rest, *others, *layers]
-    order = [*reversed(layers), *rest, *others] if design_named(variant.spec.design).opens == "above" else inside_out
+    order = [*reversed(layers), *rest, *others] if moulds.design.opens == "above" else inside_out
     offsets: dict[str, Offset] = {}
     top = 0.0
     for name in order:
@@ -102,62 +98,63 @@ def unit_apart(variant: Variant) -> dict[str, Offset]:
     return offsets
 
 
-def _solids(variant: Variant, name: str) -> list[Manifold]:
+def _solids(moulds: MouldSet, name: str) -> list[Manifold]:
     """The solids of a tool, or of a cast layer in the frame of the tools (one a cell)."""
-    for step in variant.plan.steps:
+    for step in moulds.plan.steps:
         if step.name == name:
-            return [realise(shape, variant.segments) for shape in step.layer]
-    return [variant.mesh(variant.plan.tool(name))]
+            return [realise(shape, moulds.segments) for shape in step.layer]
+    return [moulds.mesh(moulds.plan.tool(name))]
 
 
-def _extent(variant: Variant, name: str) -> tuple[float, float]:
-    boxes = [bounds(solid) for solid in _solids(variant, name)]
+def _extent(moulds: MouldSet, name: str) -> tuple[float, float]:
+    boxes = [bounds(solid) for solid in _solids(moulds, name)]
     return min(b[2] for b in boxes), max(b[5] for b in boxes)
 
 
-def _top(variant: Variant, name: str) -> float:
-    return _extent(variant, name)[1]
+def _top(moulds: MouldSet, name: str) -> float:
+    return _extent(moulds, name)[1]
 
 
-def pictures(variant: Variant, only: Sequence[str] = ("unit", "moulds")) -> dict[str, Scene]:
+def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict[str, Scene]:
     """The pictures of a variant by the path of their file: the unit cut open, the set taken apart, each pour in
     section.
     """
     found: dict[str, Scene] = {}
     if "unit" in only:
-        found["unit.png"] = unit_cut_open(variant)
+        found["unit.png"] = unit_cut_open(moulds)
     if "moulds" in only:
-        found["moulds/exploded.png"] = exploded(variant)
-        for step in variant.plan.steps:
-            found[f"moulds/step{step.index}.png"] = step_in_section(variant, step.index)
+        found["moulds/exploded.png"] = exploded(moulds)
+        for step in moulds.plan.steps:
+            found[f"moulds/step{step.index}.png"] = step_in_section(moulds, step.index)
     return found
 
 
-def unit_cut_open(variant: Variant) -> Scene:
+def unit_cut_open(moulds: MouldSet) -> Scene:
     """The unit, its nearer half taken away, seen from a little below: the skin's side is the open one."""
-    parts = [_drawn(_far_half(variant.mesh(body)), body.colour) for body in variant.unit]
+    parts = [_drawn(_far_half(moulds.mesh(body)), body.colour) for body in moulds.unit]
     return Scene(tuple(p for p in parts if p), (0.45, -1.0, -0.38), (1200, 640))
 
 
-def step_in_section(variant: Variant, index: int) -> Scene:
+def step_in_section(moulds: MouldSet, index: int) -> Scene:
     """Pour `index` as it stands when struck off, cut through the first row of cells."""
-    step = variant.plan.steps[index - 1]
-    colours = _colours(variant)
-    y = min(cell.y for cell in variant.plan.layout.cells)
+    step = moulds.plan.steps[index - 1]
+    colours = _colours(moulds)
+    y = min(cell.y for cell in moulds.plan.layout.cells)
     names = (*(n for n in step.tools), *(f"layer{i}" for i in range(1, index + 1)))
-    parts = [_drawn(_far_half(solid, y), colours[name]) for name in names for solid in _solids(variant, name)]
+    parts = [_drawn(_far_half(solid, y), colours[name]) for name in names for solid in _solids(moulds, name)]
     return Scene(tuple(p for p in parts if p), (0.18, -1.0, 0.48), (1200, 640))
 
 
-def exploded(variant: Variant) -> Scene:
+def exploded(moulds: MouldSet) -> Scene:
     """The whole set taken apart, with names."""
-    colours, offsets = _colours(variant), taken_apart(variant)
-    numbered = [name for name in offsets if name.startswith(("tongue", "stub")) and name[-1].isdigit()]
-    told = {name for name in numbered if name.rstrip("0123456789") + "1" != name}
+    colours, offsets = _colours(moulds), taken_apart(moulds)
+    groups = [[tool.name for tool in moulds.plan.of_kind(kind)] for kind in ("tongue", "stub")]
+    numbered = [name for group in groups if len(group) > 1 for name in group]
+    unnamed = {name for group in groups for name in group[1:]}
     parts = []
     for name, offset in offsets.items():
-        for i, solid in enumerate(_solids(variant, name)):
-            label = "" if i or name in told else name.rstrip("1") if name in numbered else spoken(name)
+        for i, solid in enumerate(_solids(moulds, name)):
+            label = "" if i or name in unnamed else name.rstrip("1") if name in numbered else spoken(name)
             parts.append(_drawn(solid.translate(offset), colours[name], label))
     return Scene(tuple(p for p in parts if p), (0.55, -1.0, 0.5), (1000, 1300))
 
@@ -168,8 +165,8 @@ def spoken(name: str) -> str:
     return f"{stem} {name[len(stem) :]}".strip()
 
 
-def _colours(variant: Variant) -> Mapping[str, tuple[float, float, float]]:
-    return {body.name: body.colour for body in (*variant.unit, *variant.plan.tools)}
+def _colours(moulds: MouldSet) -> Mapping[str, tuple[float, float, float]]:
+    return {body.name: body.colour for body in (*moulds.unit, *moulds.plan.tools)}
 
 
 def _far_half(solid: Manifold, y: float = 0.0) -> Manifold:

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.errors import UnitcadError
-from unitcad.moulds.plan import Plan
-from unitcad.pipeline import Variant
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.geometry import GEOMETRIC, geometry_key
 from unitcad.pipeline.parts import glb_content
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
@@ -32,22 +31,22 @@ def model(spec: Spec) -> dict[str, Any]:
 
     Raises UnitcadError where the geometry can't be made any more.
     """
-    variant = Variant(spec)
-    plan = variant.plan
+    moulds = MouldSet(spec)
+    plan = moulds.plan
     return {
-        "unit": _embedded(glb_content(variant, variant.unit)),
-        "moulds": _embedded(glb_content(variant, plan.tools)),
-        "cells": cells(variant, plan),
-        "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(variant)],
-        "unit_apart": {name: list(offset) for name, offset in unit_apart(variant).items()},
-        "moulds_apart": {name: list(offset) for name, offset in taken_apart(variant).items()},
+        "unit": _embedded(glb_content(moulds, moulds.unit)),
+        "moulds": _embedded(glb_content(moulds, plan.tools)),
+        "cells": cells(moulds),
+        "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(moulds)],
+        "unit_apart": {name: list(offset) for name, offset in unit_apart(moulds).items()},
+        "moulds_apart": {name: list(offset) for name, offset in taken_apart(moulds).items()},
     }
 
 
-def cells(variant: Variant, plan: Plan) -> list[list[float]]:
+def cells(moulds: MouldSet) -> list[list[float]]:
     """Where the unit's layers stand in the moulds: x, y (mm) and quarter turns about z, a cell each."""
-    one_sided = variant.dimensions.sides == (1,)
-    return [[cell.x, cell.y, 2 if one_sided and cell.sides == (-1,) else 0] for cell in plan.layout.cells]
+    one_sided = moulds.dimensions.sides == (1,)
+    return [[cell.x, cell.y, 2 if one_sided and cell.sides == (-1,) else 0] for cell in moulds.plan.layout.cells]
 
 
 def unpacked(text: str) -> bytes:

@@ -1,10 +1,16 @@
-"""A named solid of a unit or its tooling: what every export, law and report handles."""
+"""A named solid of a unit or its tooling: what every export, mould check and report handles."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from unitcad.shape.tree import Shape
+
+Kind = Literal[
+    "layer", "printed", "motor", "circuit", "wire", "base", "cup", "lid", "tongue", "stub", "blade", "coupon"
+]
+"""What a body is: a part of the unit (layer to wire) or a piece of tooling."""
 
 
 @dataclass(frozen=True)
@@ -13,13 +19,16 @@ class Body:
 
     `name` comes from role and layer number alone ("layer1", "cup2", "base"), never from a material or a variant, since
     files of equal bodies are shared. `made` is "cast", "printed", "cut" (from film or filament) or "bought".
-    `upside_down`: how it lies on the printer's bed, turned by 180 degrees about x.
+    `step` is the pour that it belongs to. `upside_down`: how it lies on the printer's bed, turned by 180 degrees about
+    x. `removal` is the signed axis along which a piece of tooling is taken away, None for one that stays.
     """
 
     name: str
-    role: str  # unit | tool
+    role: Literal["unit", "tool"]
+    kind: Kind
     shape: Shape
     colour: tuple[float, float, float]
-    made: str = "printed"
+    made: Literal["cast", "printed", "cut", "bought"] = "printed"
     step: int | None = None
     upside_down: bool = False
+    removal: tuple[int, int, int] | None = None

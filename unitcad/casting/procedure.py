@@ -9,14 +9,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from unitcad import catalogue
+from unitcad.casting import figures as fig
+from unitcad.casting.bill import Item, bill
+from unitcad.casting.figures import Figure, Mix, sourced
+from unitcad.casting.instructions import measurements, pour_steps, preparation, release
+from unitcad.casting.layer_grid import OffGrid, off_grid
 from unitcad.catalogue import Material
-from unitcad.designs import Dimensions, design_named, dimensions
-from unitcad.moulds import figures as fig
-from unitcad.moulds.bom import Item, bill
-from unitcad.moulds.figures import Figure, Mix, sourced
-from unitcad.moulds.grid import OffGrid, off_grid
+from unitcad.designs import Dimensions
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Plan, Step
-from unitcad.moulds.steps import measurements, pour_steps, preparation, release
 from unitcad.shape import exact_volume
 from unitcad.spec import Spec, printer_of
 
@@ -51,9 +52,10 @@ class Procedure:
     bill: tuple[Item, ...]
 
 
-def procedure(spec: Spec, plan: Plan, layer_volumes_mm3: Sequence[float]) -> Procedure:
-    """The procedure of a spec. `layer_volumes_mm3`: of each layer of one unit, from the inside out."""
-    dims, known = dimensions(spec), catalogue.materials(spec.materials)
+def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure:
+    """Return the procedure of a mould set. `layer_volumes_mm3`: of each layer of one unit, from the inside out."""
+    spec, plan, dims = moulds.spec, moulds.plan, moulds.dimensions
+    known = catalogue.materials(spec.materials)
     silicones = [known[layer.material] for layer in spec.layers]
     mixes = [
         fig.mix(spec, silicone, len(plan.layout.cells) * volume + _channels_mm3(step))
@@ -82,7 +84,7 @@ def procedure(spec: Spec, plan: Plan, layer_volumes_mm3: Sequence[float]) -> Pro
         off_grid=edges,
         pours=tuple(pours),
         release=release(spec, plan, silicones[0]),
-        assembly=tuple(design_named(spec.design).assembly(spec, dims)),
+        assembly=tuple(moulds.design.assembly(spec, dims)),
         measure=measurements(spec, dims, grams, _slot_as_printed(spec, plan, edges)),
         walls=tuple(_walls(spec)),
         bill=bill(spec, dims, plan, list(zip(silicones, mixes, strict=True))),
@@ -168,7 +170,7 @@ def _verdict(spec: Spec, step: Step, silicone: Material) -> str:
 
 def _slot_as_printed(spec: Spec, plan: Plan, edges: Sequence[OffGrid]) -> float | None:
     """The tongue's thickness as the slicer makes it, where that is another one; a tongue that is cut has its own."""
-    printed = any(tool.name.startswith("tongue") and tool.made == "printed" for tool in plan.tools)
+    printed = any(tool.made == "printed" for tool in plan.of_kind("tongue"))
     heights = [edge.nearest_mm for edge in edges if edge.piece == "tongue"]
     return heights[0] if printed and heights else None
 

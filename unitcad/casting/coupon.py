@@ -16,8 +16,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from unitcad.casting.layer_grid import NEAR
 from unitcad.catalogue import Printer
-from unitcad.moulds.grid import NEAR
 from unitcad.moulds.layout import PLINTH_DRAFT_DEG
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, turned, union
 from unitcad.shape.body import Body
@@ -74,9 +74,12 @@ def toml(printer: Printer, fit: Fit, station: int) -> str:
 
 def bodies(printer: Printer) -> tuple[Body, ...]:
     """The coupon's pieces as they lie on the bed: the plate, the plug and the tongue."""
-    found = [Body("coupon-plate", "tool", _plate(printer), _COLOUR), Body("coupon-plug", "tool", _plug(), _PLUG_COLOUR)]
+    found = [
+        Body("coupon-plate", "tool", "coupon", _plate(printer), _COLOUR),
+        Body("coupon-plug", "tool", "coupon", _plug(), _PLUG_COLOUR),
+    ]
     made = "cut" if _resin(printer) else "printed"
-    return (*found, Body("coupon-tongue", "tool", _tongue(printer), _TONGUE_COLOUR, made=made))
+    return (*found, Body("coupon-tongue", "tool", "coupon", _tongue(printer), _TONGUE_COLOUR, made=made))
 
 
 def to_markdown(printer: Printer) -> str:

@@ -6,12 +6,13 @@ import json
 from dataclasses import asdict
 from itertools import count
 
+from unitcad.casting.bill import to_csv
+from unitcad.casting.figures import Figure
+from unitcad.casting.procedure import Pour, Procedure
 from unitcad.designs import layer_colour
 from unitcad.export import svg
-from unitcad.moulds.bom import to_csv
-from unitcad.moulds.casting import Pour, Procedure
-from unitcad.moulds.figures import Figure
-from unitcad.moulds.plan import Plan, Step
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
 from unitcad.shape.body import Body
 from unitcad.text import markdown
 
@@ -55,14 +56,15 @@ def to_markdown(found: Procedure) -> str:
     return "\n".join(lines) + "\n"
 
 
-def step_section(plan: Plan, step: Step, segments: int) -> str:
-    """The assembled pour cut along its first cell's tail, as SVG: tools, cured layers, the layer being cast."""
+def step_section(moulds: MouldSet, step: Step) -> str:
+    """Draw the assembled pour cut along its first cell's tail, as SVG: tools, cured layers, the layer being cast."""
+    plan = moulds.plan
     cells = len(plan.layout.cells)
     bodies = [plan.tool(name) for name in step.tools]
     layers = [(i // cells, shape) for i, shape in enumerate(step.earlier)]
     layers += [(step.index - 1, shape) for shape in step.layer]
-    bodies += [Body(f"layer{i + 1}", "unit", shape, layer_colour(i), made="cast") for i, shape in layers]
-    regions = svg.cut(bodies, segments, y=plan.layout.cells[0].y)
+    bodies += [Body(f"layer{i + 1}", "unit", "layer", shape, layer_colour(i), made="cast") for i, shape in layers]
+    regions = svg.cut(bodies, moulds.segments, y=plan.layout.cells[0].y)
     labels = {region.name: _spaced(region.name) for region in regions}
     return svg.section(_once(regions), title=f"Pour {step.index}: {_spaced(step.name)}", labels=labels, ground="seat")
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from dataclasses import dataclass
 
+from unitcad.casting.figures import Mix
 from unitcad.catalogue import Material
 from unitcad.designs import Dimensions
-from unitcad.moulds.figures import Mix
 from unitcad.moulds.plan import Plan
 from unitcad.spec import Spec
 from unitcad.text import cell
@@ -44,7 +43,7 @@ def _pieces(spec: Spec, dims: Dimensions, plan: Plan) -> list[Item]:
     kinds: dict[str, list[str]] = {}
     for tool in plan.tools:
         # Tongues and stubs are numbered by cell and otherwise alike; cups and lids are not.
-        kind = re.sub(r"\d+$", "", tool.name) if tool.name.startswith(("tongue", "stub")) else tool.name
+        kind = tool.kind if tool.kind in ("tongue", "stub") else tool.name
         kinds.setdefault(kind, []).append(tool.name)
     found = []
     for kind, names in kinds.items():
@@ -96,7 +95,7 @@ def _consumables(spec: Spec, plan: Plan) -> list[Item]:
     found = [
         Item("mixing cups and sticks", len(spec.layers), "set", "bought", "no latex, no sulphur clay: they inhibit")
     ]
-    if plan.tongue_sides:
+    if plan.of_kind("tongue"):
         found.append(Item("petroleum jelly", 1, "dab", "bought", "for tongues and windows only"))
     if len(spec.layers) > 1:
         found.append(

@@ -1,4 +1,4 @@
-"""Law C300: every piece comes out, in the person's order, without passing through anything that stays.
+"""C300: every piece comes out, in the person's order, without passing through anything that stays.
 
 A piece that moves along +z meets what stays if, and only if, somewhere an upward face of the piece lies below (or
 against) a downward face of what stays, on one vertical line. So the test is exact for any polyhedron: project the faces
@@ -9,19 +9,19 @@ is sampled.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
-import manifold3d
 import numpy as np
 from manifold3d import Manifold
 
 from unitcad.check.limits import Deadline
 from unitcad.check.pairs import Frame, boxes_of, frame_of, meeting_between, morton_order
-from unitcad.kernels.mesh import arrays, realise
-from unitcad.moulds.finding import Finding, at_most
-from unitcad.moulds.fit import boxes_meet
-from unitcad.moulds.plan import Plan, Step
+from unitcad.kernels.mesh import arrays
+from unitcad.mould_checks import overlap
+from unitcad.mould_checks.check import MouldCheck
+from unitcad.mould_checks.finding import MouldFinding, at_most
+from unitcad.moulds.cavities import boxes_meet
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.removal import removals
 
 BLOCKED = 1e-5
 """Largest area of facing faces, mm2: what rounding leaves of faces that only touch along an edge."""
@@ -30,40 +30,12 @@ LEVEL = 1e-9
 _BLOCK = 100_000  # pairs of triangles clipped together
 
 
-@dataclass(frozen=True)
-class Removal:
-    """One movement of the person's hands: which piece goes which way, past what stays, after which pour."""
+def findings(moulds: MouldSet) -> list[MouldFinding]:
+    """Return the area of every removed piece that runs into what stays.
 
-    step: int
-    piece: str
-    direction: tuple[int, int, int]
-    stays: tuple[str, ...]
-
-
-def removals(plan: Plan) -> Iterator[tuple[Step, Removal]]:
-    """Every movement in its order: lid up, tongues sideways, cup up, a pour at a time; at the end filaments down.
-
-    "cured" stands for all layers that are there. The peel off the core comes last and is `peel`'s.
+    Where pieces overlap, the piece is cut out of what stays first: silicone has taken the tool's real shape.
     """
-    for step in plan.steps:
-        there = [*step.tools, "cured"]
-        for piece in _in_order(step):
-            there.remove(piece)
-            way = _sideways(plan, piece) if piece.startswith("tongue") else (0, 0, 1)
-            yield step, Removal(step.index, piece, way, tuple(there))
-    last = plan.steps[-1]
-    there = [name for name in last.tools if name == "base" or name.startswith("stub")] + ["cured"]
-    for piece in [name for name in there if name.startswith("stub")]:
-        there.remove(piece)
-        yield last, Removal(last.index, piece, (0, 0, -1), tuple(there))
-
-
-def draw_law(plan: Plan, solids: Mapping[str, Manifold], segments: int, overlapping: bool = False) -> list[Finding]:
-    """C300 for every removal: the area of the piece that runs into what stays.
-
-    Where pieces are `overlapping`, the piece is cut out of what stays first: silicone has taken the tool's real shape.
-    """
-    found = []
+    overlapping = any(not finding.ok for finding in overlap.findings(moulds))
     faces: dict[tuple[int, tuple[int, int, int], bool], np.ndarray] = {}
 
     def facing(solid: Manifold, direction: tuple[int, int, int], upwards: bool) -> np.ndarray:
@@ -72,11 +44,12 @@ def draw_law(plan: Plan, solids: Mapping[str, Manifold], segments: int, overlapp
             faces[key] = _facing(solid, direction, upwards)
         return faces[key]
 
-    layers = {step.index: [realise(s, segments) for s in (*step.layer, *step.earlier)] for step in plan.steps}
-    for step, removal in removals(plan):
-        staying = [(name, solids[name]) for name in removal.stays if name != "cured"]
-        staying += [("layer", solid) for solid in layers[step.index]]
-        piece, way = solids[removal.piece], removal.direction
+    found = []
+    layers = {step.index: moulds.meshes((*step.layer, *step.earlier)) for step in moulds.plan.steps}
+    for removal in removals(moulds.plan):
+        staying = [(name, moulds.solids[name]) for name in removal.stays]
+        staying += [("layer", solid) for solid in layers[removal.step]]
+        piece, way = moulds.solids[removal.piece], removal.direction
         areas = []
         for name, solid in staying:
             if overlapping and boxes_meet(piece, solid):
@@ -134,28 +107,6 @@ def _in_the_way(piece: Manifold, stays: Manifold, direction: tuple[int, int, int
         if way <= 0 and q[axis] > p[axis + 3] + LEVEL:
             return False
     return True
-
-
-def peel(plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[tuple[Manifold, Manifold]]:
-    """For each cell what is pulled off at the end (all layers, bonded) and the base that stays."""
-    last, cells = plan.steps[-1], len(plan.layout.cells)
-    shapes = (*last.earlier, *last.layer)
-    return [
-        (
-            Manifold.batch_boolean([realise(s, segments) for s in shapes[i::cells]], manifold3d.OpType.Add),
-            solids["base"],
-        )
-        for i in range(cells)
-    ]
-
-
-def _in_order(step: Step) -> list[str]:
-    tongues = [name for name in step.tools if name.startswith("tongue")]
-    return [*([step.lid] if step.lid else []), *tongues, step.cup]
-
-
-def _sideways(plan: Plan, tongue: str) -> tuple[int, int, int]:
-    return (plan.tongue_sides[tongue], 0, 0)
 
 
 def _advice(name: str) -> str:
@@ -228,3 +179,6 @@ def _height(triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+CHECK = MouldCheck("C300", "draw: every piece comes out in the person's order", findings)

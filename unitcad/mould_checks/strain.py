@@ -1,4 +1,4 @@
-"""Law C310: where silicone must stretch, the hoop strain against its elongation at break, with a margin.
+"""C310: where silicone must stretch, the hoop strain against its elongation at break, with a margin.
 
 Strain is the perimeter that has to pass over the perimeter that is there, less one: of the convex hull, since stretched
 silicone spans a hollow. The least elongation among the layers is the limit's, though the innermost stretches most.
@@ -6,19 +6,19 @@ silicone spans a hollow. The least elongation among the layers is the limit's, t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
+import manifold3d
 from manifold3d import CrossSection, Manifold
 
 from unitcad import catalogue
-from unitcad.designs import dimensions
 from unitcad.designs.strain import allowed_strain, tail_strain
 from unitcad.kernels.mesh import arrays
-from unitcad.moulds.draw import peel
-from unitcad.moulds.finding import Finding, at_most
-from unitcad.moulds.plan import Plan
+from unitcad.mould_checks.check import MouldCheck
+from unitcad.mould_checks.finding import MouldFinding, at_most
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import Spec
 
 TOUCHING = 1e-6
@@ -39,26 +39,41 @@ class Strain:
     room: float = 0.0
 
 
-def strains(spec: Spec, plan: Plan, solids: Mapping[str, Manifold], segments: int) -> list[Strain]:
-    """The peel of each unit off its core along +z, and the way of the tail through the slot: geometry, no silicone."""
+def strains(moulds: MouldSet) -> list[Strain]:
+    """Return the strains that the geometry asks for: each unit's peel off its core along +z, the tail's way out."""
     found = []
-    pulled = peel(plan, solids, segments)
+    pulled = peel(moulds)
     for i, (body, base) in enumerate(pulled):
         strain, z, room = peel_strain(body, base)
         where = "peel off the core" + (f", cell {i + 1}" if len(pulled) > 1 else "")
         if strain > 0:
             where += f", at z = {z:.3g} mm"
         found.append(Strain(where, 100 * strain, z, room))
-    slot = dimensions(spec).exit
-    if spec.fpcb and slot:
-        found.append(Strain("tail through the slot", 100 * tail_strain(spec.fpcb, slot)))
+    fpcb, slot = moulds.spec.fpcb, moulds.dimensions.exit
+    if fpcb and slot:
+        found.append(Strain("tail through the slot", 100 * tail_strain(fpcb, slot)))
     return found
 
 
-def strain_law(spec: Spec, found: Iterable[Strain]) -> list[Finding]:
-    """C310: every strain within the margin of the spec's silicones. Values in percent."""
+def strain_findings(spec: Spec, found: Iterable[Strain]) -> list[MouldFinding]:
+    """Compare strains with the margin of the spec's silicones. Values in percent."""
     limit = 100 * allowed_strain(spec, catalogue.materials(spec.materials))
     return [at_most("C310", s.where, s.percent, limit, "%", _advice(s, limit)) for s in found]
+
+
+def findings(moulds: MouldSet) -> list[MouldFinding]:
+    """Look at every strain of a set."""
+    return strain_findings(moulds.spec, strains(moulds))
+
+
+def peel(moulds: MouldSet) -> list[tuple[Manifold, Manifold]]:
+    """Return for each cell what is pulled off at the end (all layers, bonded) and the base that stays."""
+    last, cells = moulds.plan.steps[-1], len(moulds.plan.layout.cells)
+    shapes = (*last.earlier, *last.layer)
+    return [
+        (Manifold.batch_boolean(moulds.meshes(shapes[i::cells]), manifold3d.OpType.Add), moulds.solids["base"])
+        for i in range(cells)
+    ]
 
 
 def _advice(strain: Strain, limit: float) -> str:
@@ -101,3 +116,8 @@ def _perimeter(section: CrossSection) -> float:
     for loop in section.to_polygons():
         total += float(sum(((loop - loop[[*range(1, len(loop)), 0]]) ** 2).sum(axis=1) ** 0.5))
     return total
+
+
+CHECK = MouldCheck(
+    "C310", "strain: where silicone stretches it keeps the margin on its elongation", findings, reads_silicone=True
+)

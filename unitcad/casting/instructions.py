@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from unitcad.casting.figures import MIXING_MIN, MOST_ERROR_PCT, Mix
 from unitcad.catalogue import Material
 from unitcad.designs import Dimensions
-from unitcad.moulds.figures import MIXING_MIN, MOST_ERROR_PCT, Mix
 from unitcad.moulds.lid import SKIRT_WALL
 from unitcad.moulds.plan import Plan, Step
 from unitcad.spec import Spec
@@ -30,7 +30,7 @@ def preparation(spec: Spec, plan: Plan, resin: bool) -> tuple[str, ...]:
             "then cure a "
             "drop of each silicone on a spot of the base that is no cavity. If it stays tacky, coat or reprint."
         )
-    if any(tool.name.startswith("stub") for tool in plan.tools):
+    if plan.of_kind("stub"):
         found.append(
             f"Push {'the' if len(plan.layout.cells) == 1 else 'each'} filament stub up through the core from below "
             "until its end is flush with the core's top, its bent end lying in the groove under the plate and on the "
@@ -41,7 +41,7 @@ def preparation(spec: Spec, plan: Plan, resin: bool) -> tuple[str, ...]:
 
 def pour_steps(spec: Spec, plan: Plan, step: Step, silicone: Material, mix: Mix, verdict: str) -> tuple[str, ...]:
     """One pour, from an empty mould to a cured layer on the core."""
-    first, tongues = step.index == 1, [name for name in step.tools if name.startswith("tongue")]
+    first, tongues = step.index == 1, plan.standing(step, "tongue")
     cells = len(plan.layout.cells)
     found = []
     if not first:
@@ -125,7 +125,7 @@ def release(spec: Spec, plan: Plan, inner: Material) -> tuple[str, ...]:
     """From the last cured layer to a unit in the hand; `inner` is Layer 1's silicone."""
     tear = float(inner.tensile_mpa) * math.pi * (spec.moulds.filament_mm / 2) ** 2
     found = []
-    if any(tool.name.startswith("stub") for tool in plan.tools):
+    if plan.of_kind("stub"):
         found.append(
             f"Pull {'the' if len(plan.layout.cells) == 1 else 'each'} filament out downwards: it lets air in under "
             "the unit. Never push it through: "

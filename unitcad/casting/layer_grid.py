@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from unitcad.designs import Dimensions
-from unitcad.moulds.tooling import groove_depth_of, plate_bottom
+from unitcad.moulds.base import plate_bottom
+from unitcad.moulds.cup import groove_depth_of
 from unitcad.spec import Spec
 
 NEAR = 0.02

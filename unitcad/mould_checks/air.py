@@ -1,4 +1,4 @@
-"""Law C400: air finds its way out. Every high region of a cavity meets the rim or a vent, level and tilted.
+"""C400: air finds its way out. Every high region of a cavity meets the rim or a vent, level and tilted.
 
 A high region is a peak of the cavity's height function that is a ceiling, not the top of something standing in it. Its
 depth is what separates the peak from the saddle over which it would empty; a dent shallower than a tenth of the layer's
@@ -16,8 +16,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from unitcad.kernels.mesh import arrays
-from unitcad.moulds.dents import TILT_DEG
-from unitcad.moulds.finding import Finding, at_most
+from unitcad.mould_checks.check import MouldCheck
+from unitcad.mould_checks.finding import MouldFinding, at_most
+from unitcad.moulds.dents import TILT_DEG, deepest
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.profile import GRID_PER_MM
 
@@ -29,7 +31,7 @@ _AT_TOP = 1 / GRID_PER_MM
 
 
 CREVICE = 1e-6
-"""A pocket of a smaller share of the cavity is a crevice that rounding leaves between two pieces, as in law C100."""
+"""A pocket of a smaller share of the cavity is a crevice that rounding leaves between two pieces, as in C100."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,18 @@ class Pocket:
     peak: tuple[float, float, float]
 
 
-def air_law(step: Step, cells: list[Manifold], limit: float) -> list[Finding]:
-    """C400 for each cell of a pour: the deepest pocket over the five attitudes against `limit`, in mm."""
+def findings(moulds: MouldSet) -> list[MouldFinding]:
+    """Look at every cavity of every pour."""
+    pours = zip(moulds.plan.steps, moulds.cavities, strict=True)
+    return [
+        finding
+        for layer, (step, cells) in enumerate(pours)
+        for finding in of_pour(step, [cell.reached for cell in cells], deepest(moulds.spec, layer))
+    ]
+
+
+def of_pour(step: Step, cells: list[Manifold], limit: float) -> list[MouldFinding]:
+    """Compare the deepest pocket of each cell over the five attitudes with `limit`, in mm."""
     found = []
     for i, cavity in enumerate(cells):
         where = f"pour {step.index}" + (f" cell {i + 1}" if len(cells) > 1 else "")
@@ -154,3 +166,6 @@ def _components(edges: np.ndarray, count: int) -> tuple[int, np.ndarray]:
     graph = coo_matrix((np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])), shape=(count, count))
     found, labels = connected_components(graph, directed=False)
     return int(found), labels
+
+
+CHECK = MouldCheck("C400", "air: every high region of a cavity meets the rim or a vent, level and tilted", findings)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from unitcad import files
+from unitcad.casting import coupon
 from unitcad.catalogue import Printer
 from unitcad.errors import UnitcadError
 from unitcad.export import stl, threemf
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.moulds import coupon
 
 SEGMENTS = 64
 

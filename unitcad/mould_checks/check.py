@@ -1,0 +1,19 @@
+"""What a mould check is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from unitcad.mould_checks.finding import MouldFinding
+from unitcad.moulds.mould_set import MouldSet
+
+
+@dataclass(frozen=True)
+class MouldCheck:
+    """A code, what it demands in one line, and the function that looks. `reads_silicone`: its limit is a material's."""
+
+    code: str
+    demands: str
+    findings: Callable[[MouldSet], list[MouldFinding]]
+    reads_silicone: bool = False

@@ -1,0 +1,40 @@
+"""What a mould check states about one place."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class MouldFinding:
+    """One check at one place: `value` against `limit` in `unit`, whether it holds, and what to change where not."""
+
+    code: str
+    where: str
+    ok: bool
+    value: float
+    limit: float
+    unit: str
+    advice: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return JSON-ready data; six significant digits, so that a summation's last bits do not show."""
+        return {**asdict(self), "value": float(f"{self.value:.6g}")}
+
+
+def exactly(code: str, where: str, value: float, wanted: float, unit: str) -> MouldFinding:
+    """Return a finding that holds where `value` is `wanted`."""
+    return MouldFinding(code, where, bool(value == wanted), float(value), float(wanted), unit)
+
+
+def at_most(code: str, where: str, value: float, limit: float, unit: str, advice: str = "") -> MouldFinding:
+    """Return a finding that holds up to `limit`."""
+    ok = bool(value <= limit)
+    return MouldFinding(code, where, ok, float(value), float(limit), unit, "" if ok else advice)
+
+
+def at_least(code: str, where: str, value: float, limit: float, unit: str, advice: str = "") -> MouldFinding:
+    """Return a finding that holds from `limit` on."""
+    ok = bool(value >= limit)
+    return MouldFinding(code, where, ok, float(value), float(limit), unit, "" if ok else advice)

@@ -1,0 +1,92 @@
+"""The base: plate, keyed plinth and cores in one piece.
+
+        section of pour 1            cup          rim, z = heights[0]
+            .-----------.  groove .--_-----------.
+            |           '--'      | |            |
+            |     cup   | cavity .'-'. tongue ====== grip
+        .---'  .--------+--------'core|-----------'---.
+        | skirt|  plinth            stub              |   seat, z = 0
+        '------'  ........................ .----------'   skirt ends above the plate
+        |  plate                     |   |            |
+        '----------------------------'   '- groove ---'
+
+Tools are drawn from the spec's lengths. None is made by subtracting the unit: C100 compares the two.
+"""
+
+from __future__ import annotations
+
+import math
+
+from unitcad.designs import Dimensions, design_named
+from unitcad.designs.dimensions import Exit
+from unitcad.designs.parts import BEYOND, strip
+from unitcad.moulds import filament
+from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, Layout
+from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, union
+from unitcad.spec import Spec
+
+PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER = 1.5, 4.0, 1.5
+
+
+def plate_top(spec: Spec) -> float:
+    """z of the plate's upper face."""
+    return -spec.moulds.plinth_height_mm
+
+
+def plate_bottom(spec: Spec) -> float:
+    """z of the plate's lower face."""
+    return plate_top(spec) - spec.moulds.plate_mm
+
+
+def base(spec: Spec, dims: Dimensions, lay: Layout) -> Shape:
+    """Draw plate, keyed plinth and cores in one piece, with pry slots, filament holes and grooves, and ledges."""
+    top, bottom = plate_top(spec), plate_bottom(spec)
+    plate = Extrude(outline(lay.plate, MARK), bottom, top)
+    body = union((plate, plinth(spec, lay), *(moved(core(dims), c.x, c.y) for c in lay.cells)))
+    tools: list[Shape] = [_pry_slot(lay, top, side) for side in (1, -1)]
+    if design_named(spec.design).suction:
+        tools += [filament.way(spec, dims, lay, c, bottom) for c in lay.cells]
+    if dims.exit:
+        tools += [moved(notch(spec, dims, dims.exit, s), c.x, c.y) for c in lay.cells for s in c.sides]
+    return cut(body, tools)
+
+
+def plinth(spec: Spec, lay: Layout) -> Shape:
+    """The keyed square on the plate, 5 degrees a side, that every cup fits over; its top is the seat z = 0."""
+    height = spec.moulds.plinth_height_mm
+    return tapered(lay, 0.0, -height)
+
+
+def core(dims: Dimensions) -> Shape:
+    """The positive of a cavity, standing on the plinth (its foot sunk in it)."""
+    return cylinder(dims.cavity_radius, -BEYOND, dims.core_height)
+
+
+def notch(spec: Spec, dims: Dimensions, exit: Exit, side: int) -> Shape:
+    """What the ledge removes from a core: the tongue's seat and a window's clearance beside it, open upwards."""
+    half = exit.width / 2 + spec.moulds.window_clearance_mm
+    return strip(dims, side, dims.cavity_radius + BEYOND, half, exit.low, exit.high + BEYOND)
+
+
+def outline(size: tuple[float, float], key: float, grow: float = 0.0) -> Profile:
+    """A plate of half sizes `size` with its (+x, +y) corner cut by the leg `key`, then every side moved out by `grow`.
+
+    A 45 degree cut moves out by as much, which lengthens its leg by (2 - sqrt 2) `grow`.
+    """
+    leg = key + (2 - math.sqrt(2)) * grow
+    return rounded_rectangle(size[0] + grow, size[1] + grow, CORNER_RADIUS + grow, leg)
+
+
+def tapered(lay: Layout, clearance: float, bottom: float) -> Shape:
+    """The plinth's taper from `bottom` up to the seat, grown by `clearance` on every side."""
+
+    def section(z: float) -> Profile:
+        return outline(lay.plinth, lay.key, clearance - z * math.tan(math.radians(PLINTH_DRAFT_DEG)))
+
+    return Extrude(section(bottom), bottom, 0.0, top=section(0.0))
+
+
+def _pry_slot(lay: Layout, top: float, side: int) -> Shape:
+    """A slot in the plate's edge that reaches under the skirt: a screwdriver lifts the cup there."""
+    inner, outer = side * (lay.cup[0] - PRY_UNDER), side * (lay.plate[0] + BEYOND)
+    return box(min(inner, outer), max(inner, outer), -PRY_HALF_WIDTH, PRY_HALF_WIDTH, top - PRY_DEPTH, top + BEYOND / 4)

@@ -1,0 +1,51 @@
+"""The engraving of pieces: which set and step a piece belongs to, and the numbers of its cells."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from unitcad.designs.parts import BEYOND
+from unitcad.moulds.base import plate_top
+from unitcad.moulds.layout import TEXT_MARGIN, Layout
+from unitcad.shape import Cut, Shape, cut, moved
+from unitcad.shape.lettering import HEIGHT, engraving, text_width
+from unitcad.spec import Spec
+
+
+def engraved(blank: Shape, letters: list[Shape]) -> Shape:
+    """Return a piece with its letters cut in the same pass as its other openings."""
+    return replace(blank, tools=(*blank.tools, *letters)) if isinstance(blank, Cut) else cut(blank, letters)
+
+
+def base_label(spec: Spec, lay: Layout, label: str) -> list[Shape]:
+    """Draw the base's label on the plate's upper face, in front of the cup."""
+    stroke, depth, top = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm, plate_top(spec)
+    text = engraving(label, stroke, top - depth, top + BEYOND)
+    width = text_width(label, stroke)
+    return [moved(text, -width / 2, (lay.cup[1] + lay.plate[1]) / 2 - lay.label_height / 2)]
+
+
+def corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, str]) -> list[Shape]:
+    """Three pairs of characters to engrave in a plate's corners, outside all bores; the fourth corner is the key's."""
+    stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
+    width, height = text_width("00", stroke), HEIGHT * stroke
+    x, y = lay.cup[0] - TEXT_MARGIN, lay.cup[1] - TEXT_MARGIN
+    corners = ((-x, y - height), (-x, -y), (x - width, -y))
+    return [
+        moved(engraving(text, stroke, rim - depth, rim + BEYOND), *corner)
+        for text, corner in zip(label, corners, strict=True)
+    ]
+
+
+def cell_numbers(spec: Spec, lay: Layout, rim: float) -> list[Shape]:
+    """The number of each of several cells, in the space that the grooves leave at its upper right."""
+    stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
+    return [
+        moved(
+            engraving(c.name, stroke, rim - depth, rim + BEYOND),
+            c.x + lay.pitch / 2 - text_width(c.name, stroke) / 2,
+            c.y + lay.pitch / 2 - HEIGHT * stroke / 2,
+        )
+        for c in lay.cells
+        if c.name
+    ]

@@ -1,0 +1,127 @@
+"""A mould set: a spec's unit, tooling and pours, their meshes and cavities, each worked out when first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from msgspec import structs
+
+from unitcad.designs import Design, Dimensions, design_named, unit_bodies
+from unitcad.moulds.plan import Plan, plan
+from unitcad.shape import Shape
+from unitcad.shape.body import Body
+from unitcad.spec import Spec, from_json, to_json
+from unitcad.spec.asked import CastingTable
+from unitcad.spec.effective import Estimate
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+    from unitcad.moulds.cavities import Cavity
+
+_T = TypeVar("_T")
+
+
+def geometric(spec: Spec) -> Spec:
+    """Return the spec with everything blank that the geometry does not read."""
+    return structs.replace(
+        spec,
+        name="unit",
+        motor=structs.replace(spec.motor, part=None),
+        layers=tuple(structs.replace(layer, material="") for layer in spec.layers),
+        casting=CastingTable(),
+        estimate=Estimate(frequency_hz=0.0, amplitude_um=0.0, tissue="", models=()),
+        materials={},
+        motors={},
+        tissue={},
+    )
+
+
+@lru_cache(maxsize=32)
+def _drawn(geometry: str) -> Plan:
+    """Return the plan of a geometry (a spec's JSON), materials blank: variants of one geometry share the drawing."""
+    return plan(from_json(geometry))
+
+
+def forget() -> None:
+    """Drop plans and meshes that are kept for the next call: what a measurement of times needs."""
+    from unitcad.kernels import mesh
+
+    _drawn.cache_clear()
+    mesh.forget()
+
+
+@dataclass(frozen=True, eq=False)
+class MouldSet:
+    """A spec's unit and moulds. Lengths in mm, as assembled, z = 0 at the skin.
+
+    `altered` stands in for the plan that the spec's own would be: a set with a fault, for tests.
+    """
+
+    spec: Spec
+    altered: Plan | None = None
+    _kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    @cached_property
+    def design(self) -> Design:
+        """The design of the unit."""
+        return design_named(self.spec.design)
+
+    @cached_property
+    def dimensions(self) -> Dimensions:
+        """Radii and heights."""
+        return self.design.dimensions(self.spec)
+
+    @cached_property
+    def unit(self) -> tuple[Body, ...]:
+        """The bodies of the unit."""
+        return unit_bodies(self.spec)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Tools and pours. Raises Refusal where the moulds can't be."""
+        if self.altered:
+            return self.altered
+        drawn = _drawn(to_json(geometric(self.spec)))
+        poured = zip(drawn.steps, self.spec.layers, strict=True)
+        return replace(drawn, steps=tuple(replace(step, material=layer.material) for step, layer in poured))
+
+    @cached_property
+    def segments(self) -> int:
+        """Sides of every full turn in this set's meshes: one number, so that mating faces mate."""
+        from unitcad.kernels.mesh import segment_count
+
+        return segment_count(self.dimensions.outer_radius, self.spec.output.tolerance_mm)
+
+    def mesh(self, body: Body) -> Manifold:
+        """Return a body's mesh, kept once made."""
+        from unitcad.kernels.mesh import realise
+
+        return realise(body.shape, self.segments)
+
+    def meshes(self, shapes: Iterable[Shape]) -> list[Manifold]:
+        """Return the meshes of shapes in the frame of the tools: the cells of a layer, seals, channels."""
+        from unitcad.kernels.mesh import realise
+
+        return [realise(shape, self.segments) for shape in shapes]
+
+    @cached_property
+    def solids(self) -> dict[str, Manifold]:
+        """The mesh of every body of unit and tooling by name."""
+        return {body.name: self.mesh(body) for body in (*self.unit, *self.plan.tools)}
+
+    @cached_property
+    def cavities(self) -> list[list[Cavity]]:
+        """The cavities of each pour, one a cell."""
+        from unitcad.moulds.cavities import cavities
+
+        return cavities(self.plan, self.solids, self.segments)
+
+    def once(self, name: str, make: Callable[[], _T]) -> _T:
+        """Return what `make` gives, worked out once for this set under `name`."""
+        if name not in self._kept:
+            self._kept[name] = make()
+        return self._kept[name]

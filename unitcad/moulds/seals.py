@@ -1,0 +1,36 @@
+"""The seals of a pour: what silicone is kept from though no tool fills it."""
+
+from __future__ import annotations
+
+from unitcad.designs import Dimensions, design_named
+from unitcad.designs.parts import BEYOND
+from unitcad.moulds import filament
+from unitcad.moulds.base import core, notch
+from unitcad.moulds.cup import cup_blank, windows
+from unitcad.moulds.layout import Layout
+from unitcad.moulds.tongue import tongues
+from unitcad.shape import Common, Shape, cut, cylinder, moved
+from unitcad.spec import Spec
+
+
+def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
+    """What silicone is kept from though no tool fills it: grease round a tongue, the annulus round a filament.
+
+    A window's seal is what the window removes from the cup, less the tongue; never a solid built a second time.
+    """
+    found: list[Shape] = []
+    if dims.exit:
+        around = [shape for _, shape in tongues(dims, lay)]
+        walls = cut(
+            cup_blank(spec, lay, dims.heights[layer]),
+            [moved(cylinder(dims.radii[layer], -BEYOND, dims.heights[layer] + BEYOND), c.x, c.y) for c in lay.cells],
+        )
+        found += [cut(Common((walls, window)), around) for window in windows(spec, dims, lay)]
+        found += [
+            cut(Common((moved(core(dims), c.x, c.y), moved(notch(spec, dims, dims.exit, s), c.x, c.y))), around)
+            for c in lay.cells
+            for s in c.sides
+        ]
+    if design_named(spec.design).suction:
+        found += [filament.annulus(spec, dims, c) for c in lay.cells]
+    return found
