@@ -69,20 +69,26 @@ class Contacts:
         """A number for each pair of shells, in either order."""
         return np.minimum(one, other).astype(np.int64) * self.shells + np.maximum(one, other)
 
-    def fresh(self, keys: Ints) -> Ints:
-        """Rows of the first of each key that is not known."""
-        rows = np.flatnonzero(~np.isin(keys, self.known))
-        return rows[np.unique(keys[rows], return_index=True)[1]]
-
     def open(self, keys: Ints) -> Bools:
         """Which keys are still asked for."""
-        return np.ones(len(keys), bool) if self.every else ~np.isin(keys, self.known)
+        return np.ones(len(keys), bool) if self.every else ~self._knows(keys)
+
+    def fresh(self, keys: Ints) -> Ints:
+        """Rows of the first of each key that is not known."""
+        rows = np.unique(keys, return_index=True)[1]
+        return rows[~self._knows(keys[rows])]
+
+    def _knows(self, keys: Ints) -> Bools:
+        """Which keys are known, by bisection: `numpy.isin` hashes all that are known at each call."""
+        if not len(self.known):
+            return np.zeros(len(keys), bool)
+        return self.known.take(np.searchsorted(self.known, keys), mode="clip") == keys
 
     def add(self, keys: Ints, pairs: Ints) -> None:
         """Note pairs of faces that meet, one for each pair of shells that is not known."""
         rows = self.fresh(keys)
         if len(rows):
-            self.known = np.sort(np.concatenate([self.known, keys[rows]]))
+            self.known = np.sort(np.concatenate([self.known, keys[rows]]), kind="stable")  # merges
         if len(rows) or self.every:
             self.pairs.append(pairs if self.every else pairs[rows])
 
@@ -94,7 +100,7 @@ class Contacts:
                 return
             met = rows[meet(rows)]
             self.add(keys[met], pairs[met])
-            left = ~np.isin(keys, self.known)
+            left = ~self._knows(keys)
             left[rows] = False
             keys, pairs, meet = keys[left], pairs[left], _of(np.flatnonzero(left), meet)
         met = np.flatnonzero(meet(np.arange(len(keys))))

@@ -204,7 +204,8 @@ def _contacts(faces: _Faces, i: Ints, j: Ints, sharing: Bools, found: _Found) ->
     """Note the shells that meet, of pairs of faces that can do no more than touch; those `sharing` a corner do."""
     keys, pair = found.contact.keys(faces.shell[i], faces.shell[j]), np.stack([i, j], axis=1)
     found.contact.add(keys[sharing], pair[sharing])
-    asked = np.flatnonzero(~sharing & found.contact.open(keys))
+    asked = np.flatnonzero(~sharing)
+    asked = asked[found.contact.open(keys[asked])]
     a, b = (faces.planes.corners(faces.planes.vertices(f[asked])) for f in (i, j))
     near = np.flatnonzero(~contact.parts_apart(a, b))
     asked = asked[near]
