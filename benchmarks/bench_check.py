@@ -82,10 +82,10 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     """Processor seconds of the crossing test alone, and of ours over those of pymeshlab and MeshLib, interleaved."""
     import meshes
 
-    from unitcad.check import crossing
+    from unitcad.check.geometry import self_crossing
+    from unitcad.check.geometry.topology import topology_of
+    from unitcad.check.geometry.triangle_mesh import Mesh
     from unitcad.check.limits import Deadline
-    from unitcad.check.mesh import Mesh
-    from unitcad.check.topology import topology_of
 
     vertices, faces = getattr(meshes, shape)(size)
     found = topology_of(Mesh(vertices, faces), Deadline(600)).as_stored()
@@ -96,7 +96,7 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     times: dict[str, list[float]] = {"ours": [], "pymeshlab": [], "meshlib": []}
     for _ in range(rounds):
         start = time.process_time()
-        crossing.judge(found, Deadline(600))
+        self_crossing.crossings_of(found, Deadline(600))
         times["ours"].append(time.process_time() - start)
         for name in ("pymeshlab", "meshlib"):
             other.stdin.write(f"{name}\n")
@@ -120,9 +120,9 @@ def measure(size: int, peer: str | None, rounds: int, folder: Path) -> list[str]
     import trimesh
 
     from unitcad.check import check_file, check_mesh
+    from unitcad.check.geometry.topology import topology_of
+    from unitcad.check.geometry.triangle_mesh import Mesh
     from unitcad.check.limits import Deadline
-    from unitcad.check.mesh import Mesh
-    from unitcad.check.topology import topology_of
 
     vertices, faces = torus(size)
     path = folder / f"torus-{size}.stl"

@@ -7,14 +7,14 @@ import pytest
 from exact_pairs import counts
 from shapes import CUBE_CORNERS, CUBE_FACES
 
-from unitcad.check import crossing, pairs
+from unitcad.check.geometry import self_crossing
+from unitcad.check.geometry.topology import topology_of
+from unitcad.check.geometry.triangle_mesh import Mesh, weld_exact
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Mesh, weld_exact
-from unitcad.check.topology import topology_of
+from unitcad.geometry import boxes
 
 KINDS = ["lattice", "lattice of tenths", "random", "one tilted plane", "sheared lattice", "slivers", "about a vertex",
          "two heights", "boxes", "turned boxes", "far away"]  # fmt: skip
-_OVERLAPS = ("G004", "G008", "G009")
 
 
 def _soup(kind: str, rng: np.random.Generator) -> np.ndarray:
@@ -61,15 +61,14 @@ def _compare(kind: str, seed: int) -> tuple[int, int, int]:
     labels = top.shells[(top.areas != 0).any(axis=1)]
     if len(faces) < 2:
         return 0, 0, 0
-    found = crossing.judge(top, Deadline(60))
+    found = self_crossing.crossings_of(top, Deadline(60))
     crossings, overlaps, touching = counts(vertices, faces)
-    said = {item.code: item.count for item in found.findings}
-    assert said.get("G001", 0) == crossings
+    assert len(self_crossing.joined(found.crossing)) == crossings
     # Of pairs that share an edge those count that are folded at it; of slivers what is wider than rounding.
-    covers = sum(said.get(code, 0) for code in _OVERLAPS)
+    covers = len(self_crossing.joined(found.covering))
     assert (0 if kind == "slivers" else overlaps[0]) <= covers <= overlaps[1]
     shells = {tuple(sorted((int(labels[i]), int(labels[j])))) for i, j in touching if labels[i] != labels[j]}
-    assert {tuple(pair) for pair in found.touching.tolist()} == shells
+    assert {tuple(pair) for pair in found.touching().tolist()} == shells
     return crossings, covers, len(shells)
 
 
@@ -79,9 +78,9 @@ def test_every_pair_is_what_fractions_say(kind: str, monkeypatch: pytest.MonkeyP
     sums = np.zeros(3, int)
     for seed in range(8):
         if seed == 4:
-            monkeypatch.setattr(crossing, "_BLOCK", 3)
-            monkeypatch.setattr(pairs, "_STEP_BITS", 2)
-            monkeypatch.setattr(pairs, "_STEP", 4)
+            monkeypatch.setattr(self_crossing, "_BLOCK", 3)
+            monkeypatch.setattr(boxes, "_STEP_BITS", 2)
+            monkeypatch.setattr(boxes, "_STEP", 4)
         sums += _compare(kind, seed)
     assert sums[2] > 0
 

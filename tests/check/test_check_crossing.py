@@ -11,11 +11,11 @@ from exact_pairs import cross, dot, minus, point, reference
 from shapes import CUBE_CORNERS, CUBE_FACES
 
 from unitcad.check import check_mesh
-from unitcad.check.exact import integers, orient2d, orient3d
+from unitcad.check.geometry.predicates import integers, orient2d, orient3d
+from unitcad.check.geometry.triangles import common_point, coplanar, meet
 from unitcad.check.limits import Deadline
-from unitcad.check.pairs import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
 from unitcad.check.rules.registry import explain
-from unitcad.check.triangles import common_point, coplanar, meet
+from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
 
 
 @pytest.mark.parametrize("kind", ["grid", "grid sharing a corner", "random", "random sharing a corner"])
@@ -105,13 +105,13 @@ def test_box_pairs_are_all_that_meet(n: int, m: int) -> None:
 
     own = {
         tuple(sorted(p))
-        for i, j in meeting_pairs(both_sets[:n], Deadline(60))
+        for i, j in meeting_pairs(both_sets[:n], Deadline(60).tick)
         for p in zip(i.tolist(), j.tolist(), strict=True)
     }
     assert own == {(a, b) for a in range(n) for b in range(a + 1, n) if naive(boxes[a], boxes[b])}
     both = {
         p
-        for i, j in meeting_between(both_sets[:n], both_sets[n:], Deadline(60))
+        for i, j in meeting_between(both_sets[:n], both_sets[n:], Deadline(60).tick)
         for p in zip(i.tolist(), j.tolist(), strict=True)
     }
     assert both == {(a, b) for a in range(n) for b in range(m) if naive(boxes[a], others[b])}

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from unitcad.check.exact import orient2d
+from unitcad.check.geometry.predicates import orient2d
 
 
 def _next_to_parallel(seed: int) -> tuple[list[int], int]:

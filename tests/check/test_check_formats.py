@@ -16,14 +16,14 @@ from shapes import box, stl, text_stl
 
 from unitcad.check import FileReport, Options, check_file, check_mesh
 from unitcad.check.findings import SEVERITIES, Finding, Location, merge
+from unitcad.check.geometry.source import Source
+from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.limits import Deadline
 from unitcad.check.many_files import check_files
-from unitcad.check.mesh import Mesh
 from unitcad.check.one_mesh import check_surface, in_file
 from unitcad.check.output import as_text
 from unitcad.check.output.render import FORMATS, render
 from unitcad.check.rules.registry import FAMILIES, check_prefixes, explain, markdown, rules
-from unitcad.check.source import Source
 from unitcad.errors import Refusal
 
 HERE = Path(__file__).parent

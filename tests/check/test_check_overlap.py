@@ -12,7 +12,7 @@ from manifold3d import triangulate
 from shapes import FORMATS, box, in_format, obj, stl, text_ply, turned
 
 from unitcad.check import check_bytes, check_mesh
-from unitcad.check.mesh import weld_exact
+from unitcad.check.geometry.triangle_mesh import weld_exact
 from unitcad.check.rules.registry import rules
 
 OVERLAP = {"G002", "G008", "T008", "G009", "T009"}

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES
 
-from unitcad.check import check_mesh, crossing, exact, triangles
+from unitcad.check import check_mesh
+from unitcad.check.geometry import predicates, self_crossing, triangles
 from unitcad.check.rules import g_shells
 
 Built = tuple[np.ndarray, np.ndarray]
@@ -52,9 +53,9 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Callable[[Built], dict[str, float]]
 
         monkeypatch.setattr(module, name, counted)
 
-    watch(crossing, "_decide_exactly", "sieved", lambda _, i, *others: len(i))
+    watch(self_crossing, "_decide_exactly", "sieved", lambda _, i, *others: len(i))
     watch(triangles, "meet", "decided", lambda a, _: len(a))
-    watch(exact, "integers", "integers", lambda values: values.shape[-1])
+    watch(predicates, "integers", "integers", lambda values: values.shape[-1])
     watch(g_shells, "_shared", "booleans", lambda *_: 1)
 
     def judged(built: Built) -> dict[str, float]:

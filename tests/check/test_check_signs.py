@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from unitcad.check import exact
-from unitcad.check.exact import orient2d, orient3d
+from unitcad.check.geometry import predicates
+from unitcad.check.geometry.predicates import orient2d, orient3d
 
 N = 600
 
@@ -104,8 +104,8 @@ def test_pythons_integers_are_left_what_differs_in_size(
         rows += values.shape[-1]
         return whole(values)
 
-    whole = exact.integers
-    monkeypatch.setattr(exact, "integers", counted)
+    whole = predicates.integers
+    monkeypatch.setattr(predicates, "integers", counted)
     p = _points(kind, np.random.default_rng(8))
     orient3d(*(p.astype(np.float32).astype(np.float64) if single else p))
     assert rows <= most

@@ -7,10 +7,12 @@ import pytest
 from shapes import CUBE_CORNERS, CUBE_FACES, mesh_xml, model_xml, package, stl
 
 from unitcad.catalogue import printers
-from unitcad.check import check_bytes, crossing, pairs
+from unitcad.check import check_bytes
 from unitcad.check.findings import Facts, FileReport
+from unitcad.check.geometry import self_crossing
 from unitcad.check.limits import Deadline, OutOfTime, Unreadable
 from unitcad.check.options import Options
+from unitcad.geometry import boxes
 
 
 def _open_and_crossing() -> tuple[np.ndarray, np.ndarray]:
@@ -38,9 +40,9 @@ def _threemf() -> bytes:
 @pytest.fixture
 def stopped(monkeypatch: pytest.MonkeyPatch):
     """Judge `data` with a clock that runs out at its n-th look."""
-    monkeypatch.setattr(crossing, "_BLOCK", 100)
-    monkeypatch.setattr(pairs, "_STEP_BITS", 4)
-    monkeypatch.setattr(pairs, "_STEP", 16)
+    monkeypatch.setattr(self_crossing, "_BLOCK", 100)
+    monkeypatch.setattr(boxes, "_STEP_BITS", 4)
+    monkeypatch.setattr(boxes, "_STEP", 16)
 
     def judge(data: bytes, name: str, looks: int, options: Options) -> FileReport:
         left = looks
@@ -102,7 +104,7 @@ def test_no_memory_ends_as_a_limit_with_the_rest(monkeypatch: pytest.MonkeyPatch
     def fails(*_: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(crossing, "_decide", fails)
+    monkeypatch.setattr(self_crossing, "_decide", fails)
     report = check_bytes(_stl(), "a.stl")
     assert report.has("F011")
     assert report.has("T001")

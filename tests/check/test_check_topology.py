@@ -10,9 +10,9 @@ from scipy import ndimage
 from shapes import CUBE_CORNERS, CUBE_FACES, box, stl
 
 from unitcad.check import check_mesh
-from unitcad.check import edges as mesh_edges
-from unitcad.check.mesh import weld_exact
-from unitcad.check.volumes import winding_number
+from unitcad.check.geometry import edges as mesh_edges
+from unitcad.check.geometry.triangle_mesh import weld_exact
+from unitcad.check.geometry.volumes import winding_number
 
 
 def _random_faces(seed: int, n_vertices: int, n_faces: int) -> np.ndarray:
@@ -86,7 +86,7 @@ def test_weld_joins_equal_corners_only() -> None:
 def test_weld_survives_a_hash_collision(monkeypatch: pytest.MonkeyPatch) -> None:
     corners = np.random.default_rng(1).normal(size=(50, 3, 3))
     expected = {tuple(row) for row in corners.reshape(-1, 3).tolist()}
-    monkeypatch.setattr("unitcad.check.mesh._mix", lambda bits: np.zeros(len(bits), np.uint64))
+    monkeypatch.setattr("unitcad.check.geometry.triangle_mesh._mix", lambda bits: np.zeros(len(bits), np.uint64))
     vertices, faces = weld_exact(corners)
     assert {tuple(row) for row in vertices.tolist()} == expected
     assert (vertices[faces] == corners).all()

@@ -19,6 +19,7 @@ import numpy as np
 
 from unitcad import files
 from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, Location
+from unitcad.check.rules.registry import rules
 from unitcad.errors import UnitcadError
 from unitcad.geometry.arrays import Bools, Floats
 
@@ -27,7 +28,6 @@ NEAR = 1e-4
 NEAR_PRINTING = 2e-2
 """The same for printability, whose places are sampled."""
 _LARGEST = 256_000_000  # bytes
-_COUNTED = ("F002", "F006", "G005")  # their count is a size, not a number of faults
 
 
 class Entry(msgspec.Struct, frozen=True, omit_defaults=True, forbid_unknown_fields=True):
@@ -129,7 +129,7 @@ def _compared(found: Finding, entry: Entry | None, facts: Facts) -> Finding:
         return found
     new = _new(found, entry, facts)
     worse = SEVERITIES.index(found.severity) > (SEVERITIES.index(entry.severity) if entry.severity in SEVERITIES else 0)
-    if not worse and not new.any() and (found.count <= entry.count or found.code in _COUNTED):
+    if not worse and not new.any() and (found.count <= entry.count or rules()[found.code].count_is_size):
         return replace(found, known=True)
     order = np.argsort(~new, kind="stable")
     message = found.message if worse else f"{found.message} ({entry.count} in the baseline)"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from unitcad.check.mesh import Mesh
+    from unitcad.check.geometry.triangle_mesh import Mesh
 
 SHOWN = 5
 """Locations of a finding unless more are asked for; its count says how many there are."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, SupportsFloat
 from unitcad.check.detail import detail
 
 if TYPE_CHECKING:
-    from unitcad.check.mesh import Mesh
+    from unitcad.check.geometry.triangle_mesh import Mesh
 
 SEVERITIES = ("info", "warning", "error")
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from unitcad.check.detail import detailed
 from unitcad.check.findings import Facts, FileReport, Finding, ending, merge
+from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
-from unitcad.check.mesh import Mesh
 from unitcad.check.options import UNITS_MM, Options
 from unitcad.check.readers import sniff
 from unitcad.check.rules.f_file import F001, F005, F012

@@ -10,14 +10,15 @@ import numpy as np
 
 from unitcad.check.detail import detail
 from unitcad.check.findings import Facts, Finding, Location, ending
+from unitcad.check.geometry.source import Source
+from unitcad.check.geometry.topology import topology_of
+from unitcad.check.geometry.triangle_mesh import Mesh, representable
 from unitcad.check.limits import Deadline, keeping
-from unitcad.check.mesh import Mesh, extent, representable
 from unitcad.check.rules import registry
 from unitcad.check.rules.f_file import F001
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import not_finite
-from unitcad.check.source import Source
-from unitcad.check.topology import topology_of
+from unitcad.geometry.arrays import extent
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unitcad.check.findings import Facts, Finding, Location, counted, ending
+from unitcad.check.geometry.topology import diagonals, topology_of
+from unitcad.check.geometry.triangle_mesh import LARGEST, solid_of
 from unitcad.check.limits import Deadline, Unreadable, keeping
-from unitcad.check.mesh import LARGEST, cross, extent, solid_of
 from unitcad.check.one_mesh import CheckedMesh, check_on_bed, check_surface
 from unitcad.check.options import UNITS_MM, Options
 from unitcad.check.readers.threemf import elements
@@ -26,8 +27,7 @@ from unitcad.check.rules import g_shells, s_scale, v_values
 from unitcad.check.rules.g_shells import G002
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import V001
-from unitcad.check.topology import diagonals, topology_of
-from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.arrays import Floats, Ints, cross, extent
 
 if TYPE_CHECKING:
     from manifold3d import Manifold

@@ -19,7 +19,7 @@ import numpy as np
 
 from unitcad import files
 from unitcad.check.findings import SEVERITIES, FileReport, Finding, Location
-from unitcad.check.mesh import LARGEST, Mesh, weld_exact
+from unitcad.check.geometry.triangle_mesh import LARGEST, Mesh, weld_exact
 from unitcad.check.rules.registry import rules
 from unitcad.export import drawing, raster, threemf
 from unitcad.export.marks import Marks, marks_of

@@ -8,13 +8,10 @@ is sampled.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from manifold3d import Manifold
 
-from unitcad.check.limits import Deadline
-from unitcad.check.pairs import Frame, boxes_of, frame_of, meeting_between, morton_order
+from unitcad.geometry.boxes import Frame, boxes_of, frame_of, meeting_between, morton_order
 from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks import overlap
 from unitcad.mould_checks.check import MouldCheck
@@ -82,7 +79,7 @@ def _meeting(up: np.ndarray, down: np.ndarray) -> float:
     # A triangle may meet all that is above it: upward boxes have no top, downward ones no bottom.
     risen[:, 5], sunk[:, 2] = 0, 0
     total = 0.0
-    for first, second in meeting_between(risen, sunk, Deadline(math.inf)):
+    for first, second in meeting_between(risen, sunk):
         for start in range(0, len(first), _BLOCK):
             one, other = up[first[start : start + _BLOCK]], down[second[start : start + _BLOCK]]
             near = _overlap(one, other)

@@ -63,9 +63,6 @@ def summary(reports: Sequence[FileReport]) -> str:
     return f"{counted(len(reports), 'file')}: {', '.join(parts)}"
 
 
-_SIZES = {"F002", "F006", "G005"}  # their count is a number of bytes, facets or shells by which the file is wrong
-
-
 def statistics(reports: Sequence[FileReport]) -> str:
     """How many files each rule hit and how often, most files first. A finding that counts bytes is one occurrence."""
     files: Counter[str] = Counter()
@@ -73,7 +70,7 @@ def statistics(reports: Sequence[FileReport]) -> str:
     for report in reports:
         for found in report.findings:
             files[found.code] += 1
-            times[found.code] += 1 if found.code in _SIZES else found.count
+            times[found.code] += 1 if rules()[found.code].count_is_size else found.count
     lines = [
         f"{counted(n, 'file ', 'files'):>12} {times[code]:9d} x  {code} {rules()[code].title}"
         for code, n in files.most_common()

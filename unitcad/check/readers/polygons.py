@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, number
+from unitcad.check.geometry.source import Source
+from unitcad.check.geometry.triangle_mesh import LARGEST, Mesh, weld_points
 from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
-from unitcad.check.mesh import LARGEST, Mesh, weld_points
 from unitcad.check.rules.f_file import F001, F008, F013
 from unitcad.check.rules.p_package import P011
 from unitcad.check.rules.rule import Rule
 from unitcad.check.rules.v_values import V001
-from unitcad.check.source import Source
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 FLAT = 1e-3  # F013: distance of a corner from the polygon's plane, as part of the polygon's size

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
-from unitcad.check.mesh import Mesh
 from unitcad.check.readers import rows
 from unitcad.check.readers.polygons import Polygons, mesh_of
 from unitcad.check.readers.rows import Rows

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, number
+from unitcad.check.geometry.topology import Topology
+from unitcad.check.geometry.volumes import winding_number
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
-from unitcad.check.topology import Topology
-from unitcad.check.volumes import winding_number
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer

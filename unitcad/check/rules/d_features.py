@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.check.edges import components
 from unitcad.check.findings import Finding, Location, counted, number
+from unitcad.check.geometry.edges import components
+from unitcad.check.geometry.rays import Rays
+from unitcad.check.geometry.topology import Topology
+from unitcad.check.geometry.triangle_mesh import solid_of
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import solid_of
-from unitcad.check.rays import Rays
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
-from unitcad.check.topology import Topology
 from unitcad.geometry.arrays import Floats, Ints
 
 if TYPE_CHECKING:

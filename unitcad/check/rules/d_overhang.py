@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.check.edges import components
 from unitcad.check.findings import Finding, Location, number
+from unitcad.check.geometry.edges import components
+from unitcad.check.geometry.topology import Topology
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
-from unitcad.check.topology import Topology
 from unitcad.geometry.arrays import Floats, Ints
 
 if TYPE_CHECKING:

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.check.edges import components
 from unitcad.check.findings import Finding, Location, counted, number
-from unitcad.check.rays import SLACK, Rays, cast, lying
+from unitcad.check.geometry.edges import components
+from unitcad.check.geometry.rays import SLACK, Rays, cast, lying
+from unitcad.check.geometry.topology import Topology
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
-from unitcad.check.topology import Topology
 from unitcad.geometry.arrays import Floats
 
 if TYPE_CHECKING:

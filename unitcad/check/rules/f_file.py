@@ -26,6 +26,7 @@ F002 = Rule(
     ),
     example="A binary STL of 12 facets was cut after 400 bytes, which have room for 6.",
     fix="Copy or export the file again; a file cut short in transfer cannot be repaired.",
+    count_is_size=True,
 )
 
 F003 = Rule(
@@ -71,6 +72,7 @@ F006 = Rule(
     ),
     example="A binary STL has 16 bytes of a checksum after its last facet.",
     fix="Export again, or cut the file after its last facet.",
+    count_is_size=True,
 )
 
 F007 = Rule(

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
-from unitcad.check import overlap
-from unitcad.check.findings import Finding
+import numpy as np
+
+from unitcad.check.detail import detail
+from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.geometry.coverings import folded_edges, kinds, through_edges
+from unitcad.check.geometry.edges import Edges, edges_of
+from unitcad.check.geometry.self_crossing import Crossings, Faces, facing, joined
+from unitcad.check.geometry.topology import Topology
+from unitcad.check.geometry.triangle_mesh import float32_step, same_place
+from unitcad.check.geometry.triangles import common_point
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
+from unitcad.geometry.arrays import Ints
 
 G001 = Rule(
     "G001",
@@ -71,7 +80,109 @@ G009 = Rule(
 )
 
 
+_LISTED = 16  # pairs whose places are computed, unless more are kept: some fall together
+
+
 def check_mesh(part: Inspection) -> Iterator[Finding]:
     """Apply the rules to all pairs of faces, then along the edges."""
-    yield from part.crossings.findings
-    yield from overlap.judge(part.topology)
+    crossings = part.crossings
+    if crossings.faces is not None:
+        yield from _pairs(part.topology, crossings, crossings.faces)
+        yield from _touching(part.topology, crossings, crossings.faces)
+    if crossings.stopped is not None:
+        raise crossings.stopped
+    yield from _along_edges(part.topology)
+
+
+def _pairs(topology: Topology, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
+    """Pairs of faces that cross or cover each other."""
+    crossing, covering = joined(crossings.crossing), joined(crossings.covering)
+    opposite = facing(faces, covering[:, 0], covering[:, 1]) < 0
+    twice, thin = kinds(topology, faces.shell[covering], opposite)
+    for rule, pairs, what in (
+        (G001, crossing, "that cross"),
+        (G004, covering[~twice & ~thin], "that overlap in one plane"),
+        (G008, covering[twice], "of one shell that overlap in one plane and look the same way"),
+        (G009, covering[thin], "in one plane with nothing between them"),
+    ):
+        if len(pairs):
+            text = f"{counted(len(pairs), 'pair')} of faces {what}"
+            yield rule.finding(text, len(pairs), _places(topology, faces, pairs))
+
+
+def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
+    """Pairs of shells whose faces meet and do not cross."""
+    touching, contact = joined(crossings.contact.pairs), crossings.contact
+    if not len(touching):
+        return
+    met = np.sort(faces.shell[touching], axis=1)
+    shells, first, which = np.unique(met, axis=0, return_index=True, return_inverse=True)
+    through = contact.keys(*faces.shell[joined(crossings.crossing)].T)
+    only = ~np.isin(contact.keys(*shells.T), through)
+    if not only.any():
+        return
+    n = int(only.sum())
+    order, which = np.argsort(which, axis=None, kind="stable"), np.sort(which, axis=None)
+
+    def region(at: int) -> tuple[Ints, tuple[float, float, float]]:
+        """Return the faces of a pair of shells that touch, and the middle of what their boxes share."""
+        at = int(np.flatnonzero(only)[at])
+        begin, end = np.searchsorted(which, at + np.arange(2))
+        x, y, z = (topology.low[shells[at]].max(axis=0) + topology.high[shells[at]].min(axis=0)).tolist()
+        return faces.original[np.unique(touching[order[begin:end]])], (x / 2, y / 2, z / 2)
+
+    places = _places(topology, faces, touching[first[only]], region)
+    yield G003.finding(f"{counted(n, 'pair')} of shells that touch", n, places)
+
+
+def _places(
+    topology: Topology,
+    faces: Faces,
+    pairs: Ints,
+    region: Callable[[int], tuple[Ints, tuple[float, float, float]]] | None = None,
+) -> list[Location]:
+    """Where pairs meet, no point twice, with both faces; first the one that was not named before."""
+    found: dict[tuple[int, ...], Location] = {}
+    named: set[int] = set()
+    grid = 4 * max(float32_step(faces.vertices), 1e-300)
+    listed = max(_LISTED, detail().locations)
+    chosen = np.arange(0, len(pairs), max(1, len(pairs) // listed))[:listed]
+    corners = faces.vertices[faces.corners[:, pairs[chosen]].transpose(1, 2, 0)].tolist()
+    names = np.sort(faces.original[pairs[chosen]], axis=1).tolist()
+    for at, (a, b), (one, other) in zip(chosen.tolist(), corners, names, strict=True):
+        x, y, z = common_point(a, b) or (sum(values) / 3 for values in zip(*a, strict=True))
+        xyz = x + 0.0, y + 0.0, z + 0.0  # no -0
+        near = tuple(round(v / grid) for v in xyz)
+        if near in found:
+            continue
+        first, second = (other, one) if one in named else (one, other)
+        named.add(first)
+        drawn, centre = region(at) if region else (None, None)
+        found[near] = Location(faces=(first, second), xyz=xyz, object=topology.mesh.name, region=drawn, centre=centre)
+    return sorted(found.values(), key=lambda place: place.face or 0)
+
+
+def _along_edges(topology: Topology) -> Iterator[Finding]:
+    """G008 and G009 along edges. Vertices in one place are one, whether or not the file lists them apart."""
+    mesh, edges, faces = topology.mesh, topology.edges, topology.mesh.faces
+    kept, shells, areas = topology.kept, topology.shells, topology.areas
+    if mesh.indexed:
+        place = same_place(mesh.vertices)
+        if not np.array_equal(place, np.arange(len(place))):
+            faces = place[faces]
+            whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+            faces, kept, shells, areas = faces[whole], kept[whole], shells[whole], areas[whole]
+            edges = edges_of(faces, len(mesh.vertices))
+    for rule, which, text in (
+        (G008, through_edges(mesh.vertices, faces, edges, shells), "at which a shell passes through itself"),
+        (G009, folded_edges(mesh.vertices, faces, edges, areas), "at which two faces fold onto each other"),
+    ):
+        if len(which):
+            places = (_at(topology, faces, kept, edges, i) for i in which.tolist())
+            yield rule.finding(f"{counted(len(which), 'edge')} {text}", len(which), places)
+
+
+def _at(topology: Topology, faces: Ints, kept: Ints, edges: Edges, edge: int) -> Location:
+    vertices = topology.mesh.vertices
+    x, y, z = ((vertices[edges.low[edge]] + vertices[edges.high[edge]]) / 2).tolist()
+    return Location(face=int(kept[edges.order[edges.first[edge]] // 3]), xyz=(x, y, z), object=topology.mesh.name)

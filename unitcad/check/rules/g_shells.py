@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, number
+from unitcad.check.geometry.topology import Topology, diagonals
+from unitcad.check.geometry.triangle_mesh import solid_of
+from unitcad.check.geometry.volumes import winding_number
 from unitcad.check.limits import Deadline, Unreadable
-from unitcad.check.mesh import solid_of
-from unitcad.check.pairs import boxes_of, frame_of, meeting_pairs, morton_order
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
-from unitcad.check.topology import Topology, diagonals
-from unitcad.check.volumes import winding_number
 from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.boxes import boxes_of, frame_of, meeting_pairs, morton_order
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -40,6 +40,7 @@ G005 = Rule(
     cause="The file has more or fewer shells than --shells or the manifest says: a loose chip, or a lost piece.",
     example="`--shells 1` for a file that holds a part and a chip beside it.",
     fix="Look for loose pieces.",
+    count_is_size=True,
 )
 
 G006 = Rule(
@@ -93,7 +94,7 @@ _SHARE = 1e-6  # of the smaller shell's volume: shells that share no more only t
 
 def check_mesh(part: Inspection) -> Iterator[Finding]:
     """Apply the rules but for G005, for which a number must be expected."""
-    topology, touching, crossed = part.topology, part.crossings.touching, part.crossings.crossed
+    topology, crossings = part.topology, part.crossings
     labels, n = topology.shells, topology.n_shells
     volumes, low, high, sound = topology.volumes, topology.low, topology.high, topology.closed
     if n == 0:
@@ -112,7 +113,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     depth, overlaps = np.zeros(n, int), list[tuple[int, int]]()
     try:
         if n > 1:
-            _relate(topology, np.asarray(sound), touching, depth, overlaps, part.deadline)
+            _relate(topology, np.asarray(sound), crossings.touching(), depth, overlaps, part.deadline)
     except Unreadable as stop:
         stop.findings = (*_overlapping(topology, overlaps), *stop.findings)
         raise
@@ -123,7 +124,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
         (T008, np.flatnonzero(inwards & (depth % 2 == 0)), "inverted shell", ""),
         (G006, np.flatnonzero(inwards & (depth % 2 == 1)), "closed cavity", "closed cavities"),
     ):
-        if len(which) and not (rule is T008 and crossed and n == 1):
+        if len(which) and not (rule is T008 and n == 1 and crossings.crossed):
             places = (_where(topology, low, high, i) for i in which.tolist())
             yield rule.finding(counted(len(which), one, many), len(which), places)
 
@@ -210,7 +211,7 @@ def box_pairs(low: Floats, high: Floats, deadline: Deadline) -> Ints:
     steps = frame_of(corners).steps(corners)
     order = morton_order(steps, np.arange(n))
     found = [np.empty((0, 2), np.int64)]
-    for i, j in meeting_pairs(boxes_of(steps, order, order + n), deadline):
+    for i, j in meeting_pairs(boxes_of(steps, order, order + n), deadline.tick):
         pair = np.sort(np.stack([order[i], order[j]], axis=1), axis=1).astype(np.int64)
         one, other = pair.T
         found.append(pair[((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)])

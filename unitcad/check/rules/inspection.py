@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from unitcad.check import crossing
-from unitcad.check.crossing import Crossings
+from unitcad.check.detail import detail
+from unitcad.check.geometry.rays import Rays, cast
+from unitcad.check.geometry.self_crossing import Crossings, crossings_of
+from unitcad.check.geometry.topology import Topology
+from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Mesh
-from unitcad.check.rays import Rays, cast
-from unitcad.check.topology import Topology
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
@@ -40,7 +40,8 @@ class Inspection:
         """How its faces meet each other; nothing where they are not compared."""
         if not self.cross or not len(self.topology.kept):
             return Crossings()
-        return crossing.judge(self.topology.as_stored(), self.deadline)
+        every = detail().meshes is not None
+        return crossings_of(self.topology.as_stored(), self.deadline, every=every)
 
     @cached_property
     def material(self) -> Rays:

@@ -14,7 +14,8 @@ from unitcad.check.findings import Finding, Location
 class Rule:
     """What is wrong (`title`), how bad it is, why it matters (`cause`), an example, and how to fix it.
 
-    The code is the family's letter and three digits; the severity is error, warning or info.
+    The code is the family's letter and three digits; the severity is error, warning or info. `count_is_size`: the count
+    of a finding says by how many bytes, facets or shells the file is wrong, not how often.
     """
 
     code: str
@@ -23,6 +24,7 @@ class Rule:
     cause: str
     example: str
     fix: str
+    count_is_size: bool = False
 
     def finding(
         self, message: str, count: int = 1, places: Iterable[Location] = (), severity: str | None = None

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unitcad.check.findings import Facts, Finding, number
-from unitcad.check.mesh import extent
 from unitcad.check.options import UNITS_MM
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
+from unitcad.geometry.arrays import extent
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer

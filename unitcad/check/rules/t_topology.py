@@ -8,12 +8,12 @@ from itertools import chain
 
 import numpy as np
 
-from unitcad.check.edges import Edges
 from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.mesh import Mesh, float32_step, float32_steps
+from unitcad.check.geometry.edges import Edges
+from unitcad.check.geometry.topology import Topology, diagonals, max_side_squared
+from unitcad.check.geometry.triangle_mesh import Mesh, float32_step, float32_steps
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
-from unitcad.check.topology import Topology, diagonals, max_side_squared
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 T001 = Rule(

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, ending, number
-from unitcad.check.mesh import LARGEST, Mesh, float32_steps
+from unitcad.check.geometry.topology import diagonals
+from unitcad.check.geometry.triangle_mesh import LARGEST, Mesh, float32_steps
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
-from unitcad.check.topology import diagonals
 from unitcad.geometry.arrays import Floats
 
 V001 = Rule(

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from unitcad.check.findings import Location
+from unitcad.check.geometry.triangle_mesh import LARGEST
 from unitcad.check.limits import Limits, Unreadable, over_limit
-from unitcad.check.mesh import LARGEST
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Use
 from unitcad.check.readers.threemf.xml_stream import forbidden, new_parser, stream

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from unitcad.check.edges import Edges, balanced
+from unitcad.check.geometry.edges import Edges, balanced
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _BLOCK = 500_000

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.exact import orient2d, orient3d, sides
+from unitcad.check.geometry.predicates import orient2d, orient3d, sides
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _Point = Sequence[float]

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.limits import Deadline
-from unitcad.check.mesh import extent, sorted_with_order
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints, extent, sorted_with_order
 
+Tick = Callable[[], object]
+"""Called now and then by what may take long; it may raise."""
 _FAN = 4
 _ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked at
 _STEP_BITS = 12
@@ -122,21 +122,21 @@ def slabs_of(steps: list[Ints], *corners: Ints) -> Slabs:
     return Slabs(low.view(np.uint64), high.view(np.uint64))
 
 
-def meeting_pairs(boxes: Ints, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
+def meeting_pairs(boxes: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints, Ints]]:
     """Blocks of pairs i, j of different rows of `boxes` whose boxes meet, each pair once.
 
     Rows near each other should be near in space.
     """
     levels = _levels(boxes, 0)
     first, second = np.triu_indices(len(levels[-1]))
-    yield from _descend(levels, levels, first, second, deadline, own=True)
+    yield from _descend(levels, levels, first, second, tick, own=True)
 
 
-def meeting_between(boxes: Ints, others: Ints, deadline: Deadline) -> Iterator[tuple[Ints, Ints]]:
+def meeting_between(boxes: Ints, others: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints, Ints]]:
     """The same between the rows of two sets in one frame: row of `boxes`, row of `others`."""
     here, there = _levels(boxes, len(others)), _levels(others, len(boxes))
     top = np.indices((len(here[-1]), len(there[-1]))).reshape(2, -1)
-    yield from _descend(here, there, top[0], top[1], deadline, own=False)
+    yield from _descend(here, there, top[0], top[1], tick, own=False)
 
 
 def _levels(boxes: Ints, least: int) -> list[Ints]:
@@ -166,7 +166,7 @@ def _packed(boxes: Ints) -> Ints:
 
 
 def _descend(
-    here: list[Ints], there: list[Ints], first: Ints, second: Ints, deadline: Deadline, *, own: bool
+    here: list[Ints], there: list[Ints], first: Ints, second: Ints, tick: Tick, *, own: bool
 ) -> Iterator[tuple[Ints, Ints]]:
     for level in range(len(here) - 1, 0, -1):
         rows = _packed(here[level - 1])
@@ -175,7 +175,7 @@ def _descend(
         keep &= second < others.shape[1]
         first, second = first[keep], second[keep]
         skip = None if not own else np.greater if level > 1 else np.greater_equal
-        walk = _walk(rows, others, first, second, skip, deadline)
+        walk = _walk(rows, others, first, second, skip, tick)
         if level > 1:
             blocks = list(walk)
             first = np.concatenate([block[0] for block in blocks])
@@ -197,7 +197,7 @@ def _walk(
     first: Ints,
     second: Ints,
     skip: Callable[[Ints, Ints], Bools] | None,
-    deadline: Deadline,
+    tick: Tick,
 ) -> Iterator[tuple[Ints, Ints]]:
     """Children of the node pairs whose boxes meet.
 
@@ -209,7 +209,7 @@ def _walk(
     empty = np.empty(0, np.intp)
     yield empty, empty
     for start in range(0, len(first), _STEP):
-        deadline.tick()
+        tick()
         i, j = first[start : start + _STEP], second[start : start + _STEP]
         low_a, high_a = _children(rows, i)
         low_b, high_b = _children(others, j)

@@ -7,13 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from unitcad.check import edges as mesh_edges
-from unitcad.check import volumes
-from unitcad.check.edges import Edges
+from unitcad.check.geometry import edges as mesh_edges
+from unitcad.check.geometry import volumes
+from unitcad.check.geometry.edges import Edges
+from unitcad.check.geometry.seams import connected, join, t_junctions
+from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
 from unitcad.check.limits import Deadline
-from unitcad.check.mesh import Mesh, area_vectors, extent, extents
-from unitcad.check.seams import connected, join, t_junctions
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints, extent, extents
 
 
 @dataclass(frozen=True)

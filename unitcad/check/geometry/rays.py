@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from unitcad.check.geometry.topology import Topology, max_side_squared
 from unitcad.check.limits import Deadline
-from unitcad.check.pairs import boxes_of, frame_of, meeting_between, morton_order
-from unitcad.check.topology import Topology, max_side_squared
 from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, morton_order
 
 PARALLEL = float(np.cos(np.radians(12.0)))  # two sides of a wall
 AWAY = 0.3  # two sides of a whisker, which may have three
@@ -89,7 +89,7 @@ def _behind(
     order_faces = morton_order(steps, first)
     first, by_place = first[order_faces], solid[order_faces]
     faces = boxes_of(steps, first, first + 1, first + 2)
-    for i, j in meeting_between(rays, faces, deadline):
+    for i, j in meeting_between(rays, faces, deadline.tick):
         ray, face = order[i], by_place[j]
         facing = np.einsum("ij,ij->i", normal[owner[ray]], normal[face])
         away = facing < -AWAY

@@ -1,4 +1,4 @@
-"""Self-crossing (G001), touching shells (G003) and coplanar overlap (G004, G008, G009), decided exactly.
+"""Faces of a mesh that cross, touch or cover each other in one plane, decided exactly.
 
 Sieves, each a whole block of pairs at a time: boxes; faces round a vertex whose star is a height field, which can
 meet in that vertex only; slabs square to the diagonals of space; planes that set faces apart. What is left is decided
@@ -8,54 +8,29 @@ A crossing is one of: two faces pass through each other; an edge lies in a face 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from unitcad.check import contact, overlap, triangles
-from unitcad.check.contact import Contacts
-from unitcad.check.detail import detail
-from unitcad.check.edges import balanced
-from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.geometry import contact, coverings, triangles
+from unitcad.check.geometry.contact import Contacts
+from unitcad.check.geometry.edges import balanced
+from unitcad.check.geometry.planes import Planes, planes_of
+from unitcad.check.geometry.stars import height_fields
+from unitcad.check.geometry.topology import Topology
+from unitcad.check.geometry.triangle_mesh import same_place
 from unitcad.check.limits import Deadline, Unreadable
-from unitcad.check.mesh import float32_step, same_place
-from unitcad.check.pairs import box_order, boxes_of, frame_of, meeting_pairs, slabs_of
-from unitcad.check.planes import Planes, planes_of
-from unitcad.check.rulebook import finding
-from unitcad.check.stars import height_fields
-from unitcad.check.topology import Topology
 from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.boxes import box_order, boxes_of, frame_of, meeting_pairs, slabs_of
 
 _BLOCK = 1 << 17
 _PAIRS = 1 << 12  # pairs whose corners stay in the processor's cache
 _OPEN, _APART, _FLUSH = 0, 1, 2  # undecided; no point but common corners; nothing but perhaps touching
-_LISTED = 16  # pairs whose places are computed, unless more are kept: some fall together
 _FEW = 4_000_000  # meeting pairs kept; more is a mesh that lies on itself everywhere, and one is enough to say so
 
 
 @dataclass(frozen=True)
-class Crossings:
-    """Findings, whether faces cross, and pairs of shells (k, 2) whose faces meet."""
-
-    findings: tuple[Finding, ...] = ()
-    crossed: bool = False
-    touching: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
-
-
-@dataclass
-class _Found:
-    """Pairs collected over the blocks."""
-
-    contact: Contacts
-    crossing: list[Ints] = field(default_factory=list)
-    overlap: list[Ints] = field(default_factory=list)
-    leaning: list[Ints] = field(default_factory=list)
-    kept: int = 0
-
-
-@dataclass(frozen=True)
-class _Faces:
+class Faces:
     """Faces in the order of a space-filling curve and what the sieves need of them.
 
     `normal` (3, m) is twice their area vectors; the vertices of `planes` are the first in each place.
@@ -72,8 +47,35 @@ class _Faces:
     doubled: bool
 
 
-def judge(topology: Topology, deadline: Deadline) -> Crossings:
-    """Apply the rules to a mesh that went through the topology rules."""
+@dataclass
+class Crossings:
+    """Pairs of `faces` that meet, collected over the blocks; `stopped`: why not all were looked at, None if they were.
+
+    `crossing` pass through each other, `covering` overlap in one plane; `contact` has pairs of shells that meet.
+    """
+
+    faces: Faces | None = None
+    contact: Contacts = field(default_factory=lambda: Contacts(0))
+    crossing: list[Ints] = field(default_factory=list)
+    covering: list[Ints] = field(default_factory=list)
+    leaning: list[Ints] = field(default_factory=list)
+    kept: int = 0
+    stopped: Unreadable | None = None
+
+    @property
+    def crossed(self) -> bool:
+        """Whether faces pass through each other."""
+        return any(len(pairs) for pairs in self.crossing)
+
+    def touching(self) -> Ints:
+        """Pairs of shells (k, 2) whose faces meet, the smaller number first."""
+        if self.faces is None:
+            return np.empty((0, 2), np.int64)
+        return np.unique(np.sort(self.faces.shell[joined(self.contact.pairs)], axis=1), axis=0).astype(np.int64)
+
+
+def crossings_of(topology: Topology, deadline: Deadline, *, every: bool = False) -> Crossings:
+    """Find the pairs of faces that meet; `every`: all of those that touch, else one for each pair of shells."""
     mesh = topology.mesh
     frame = frame_of(mesh.vertices)
     steps = frame.steps(mesh.vertices)
@@ -89,11 +91,11 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
     faces = _prepared(topology, order, normal)
     boxes, slabs = boxes.take(order, axis=0), slabs_of(steps, *faces.corners)
     del normal, steps
-    found = _Found(Contacts(topology.n_shells, every=detail().meshes is not None))
+    found = Crossings(faces, Contacts(topology.n_shells, every=every))
     waiting: list[tuple[Ints, Ints]] = []
     count = 0
     try:
-        for i, j in meeting_pairs(boxes, deadline):
+        for i, j in meeting_pairs(boxes, deadline.tick):
             i, j = slabs.meeting(*_strangers(faces, i, j))
             waiting.append((i, j))
             count += len(i)
@@ -103,20 +105,18 @@ def judge(topology: Topology, deadline: Deadline) -> Crossings:
                 deadline.tick()
         _decide(faces, waiting, found)
     except Unreadable as stop:
-        _leaning(faces, found)
         found.contact.pairs.clear()  # shells that touch there may cross elsewhere
-        stop.findings = (*_said(topology, faces, found).findings, *stop.findings)
-        raise
+        found.stopped = stop
     _leaning(faces, found)
-    return _said(topology, faces, found)
+    return found
 
 
-def _prepared(topology: Topology, order: Ints, normal: Floats) -> _Faces:
+def _prepared(topology: Topology, order: Ints, normal: Floats) -> Faces:
     vertices, several = topology.mesh.vertices, topology.n_shells > 1
     columns, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(topology.mesh.faces.take(order, axis=0).T)
     smooth = height_fields(columns, corners, normal, _surrounded(topology))
     places = same_place(vertices).take(corners) if several else corners
-    return _Faces(
+    return Faces(
         vertices,
         corners,
         normal,
@@ -139,7 +139,7 @@ def _surrounded(topology: Topology) -> Bools:
     return found
 
 
-def _strangers(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
+def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     """Without pairs that share a vertex whose star is a height field."""
     mine = [safe.take(i, mode="clip") for safe in faces.safe]
     theirs = [corner.take(j, mode="clip") for corner in faces.corners]
@@ -153,7 +153,7 @@ def _strangers(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     return i[keep], j[keep]
 
 
-def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> None:
+def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], found: Crossings) -> None:
     """Answers for pairs of faces that are near each other: planes and boxes first, then exact signs."""
     if not waiting or found.kept > _FEW:
         return
@@ -171,7 +171,7 @@ def _decide(faces: _Faces, waiting: list[tuple[Ints, Ints]], found: _Found) -> N
     _decide_exactly(faces, i[left], j[left], shared[left], found)
 
 
-def _sieved(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
+def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     """What planes and boxes say of pairs, and how many corners the faces of each share."""
     planes = faces.planes
     ids_a, ids_b = (planes.vertices(f) for f in (i, j))
@@ -185,9 +185,9 @@ def _sieved(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     # Neighbours across an edge meet elsewhere only if one is folded flat onto the other.
     edge = np.flatnonzero((shared >= 2) & ~apart)
     if len(edge):
-        open_ = _facing(faces, i[edge], j[edge]) > 0
+        open_ = facing(faces, i[edge], j[edge]) > 0
         if faces.doubled:
-            open_ &= ~overlap.run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
+            open_ &= ~coverings.run_alike(ids_a[:, edge].T, ids_b[:, edge].T)
         apart[edge] = open_
     state = apart.astype(np.int8)
     left = np.flatnonzero(~apart)
@@ -200,7 +200,7 @@ def _sieved(faces: _Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     return state, shared
 
 
-def _contacts(faces: _Faces, i: Ints, j: Ints, sharing: Bools, found: _Found) -> None:
+def _contacts(faces: Faces, i: Ints, j: Ints, sharing: Bools, found: Crossings) -> None:
     """Note the shells that meet, of pairs of faces that can do no more than touch; those `sharing` a corner do."""
     keys, pair = found.contact.keys(faces.shell[i], faces.shell[j]), np.stack([i, j], axis=1)
     found.contact.add(keys[sharing], pair[sharing])
@@ -216,7 +216,7 @@ def _contacts(faces: _Faces, i: Ints, j: Ints, sharing: Bools, found: _Found) ->
     found.contact.look(keys[asked], pair[asked], meet)
 
 
-def _decide_exactly(faces: _Faces, i: Ints, j: Ints, shared: Ints, found: _Found) -> None:
+def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, found: Crossings) -> None:
     """Answers by exact signs; `shared` corners (n,)."""
     if not len(i):
         return
@@ -227,7 +227,7 @@ def _decide_exactly(faces: _Faces, i: Ints, j: Ints, shared: Ints, found: _Found
     overlaps[some] = meeting.overlaps
     wide = np.flatnonzero(overlaps)
     wide = wide[~_same_corners(faces, i[wide], j[wide])]
-    found.overlap.append(pair[wide[overlap.wide(a[wide], b[wide])]])
+    found.covering.append(pair[wide[coverings.wide(a[wide], b[wide])]])
     if faces.several:
         meets[some] |= meeting.touches | meeting.crosses
         meets &= faces.shell[i] != faces.shell[j]
@@ -246,18 +246,18 @@ def _decide_exactly(faces: _Faces, i: Ints, j: Ints, shared: Ints, found: _Found
         found.leaning.append(_edges_inside(faces, face, holder, one, other, sides))
 
 
-def _facing(faces: _Faces, i: Ints, j: Ints) -> Floats:
+def facing(faces: Faces, i: Ints, j: Ints) -> Floats:
     """The product of both faces' normals: positive where they look the same way."""
     return np.einsum("ij,ij->j", faces.normal.take(i, axis=1), faces.normal.take(j, axis=1))
 
 
-def _same_corners(faces: _Faces, i: Ints, j: Ints) -> Bools:
+def _same_corners(faces: Faces, i: Ints, j: Ints) -> Bools:
     """Which pairs i, j are one face that is listed twice, with the same vertices."""
     one, other = (np.sort(np.stack([corner[f] for corner in faces.corners]), axis=0) for f in (i, j))
     return np.asarray((one == other).all(axis=0))
 
 
-def _edges_inside(faces: _Faces, face: Ints, holder: Ints, one: Floats, other: Floats, sides: Ints) -> Ints:
+def _edges_inside(faces: Faces, face: Ints, holder: Ints, one: Floats, other: Floats, sides: Ints) -> Ints:
     """Edges of `face` (corners `one`) within `holder` (corners `other`), of faces with one corner off its plane.
 
     Rows of holder, both vertices of the edge, the side that its face leaves to, and that face.
@@ -273,7 +273,7 @@ def _edges_inside(faces: _Faces, face: Ints, holder: Ints, one: Floats, other: F
     return np.column_stack([holder, ends, sides[kept, free[kept]], face]).astype(np.int64)
 
 
-def _leaning(faces: _Faces, found: _Found) -> None:
+def _leaning(faces: Faces, found: Crossings) -> None:
     """Edges that lie in a face with their two faces on both sides of it: crossings through an edge."""
     if not found.leaning:
         return
@@ -286,70 +286,6 @@ def _leaning(faces: _Faces, found: _Found) -> None:
     found.crossing.append(rows[through][:, [4, 0]].astype(np.int32))
 
 
-def _said(topology: Topology, faces: _Faces, found: _Found) -> Crossings:
-    findings: list[Finding] = []
-    crossing, covering = _joined(found.crossing), _joined(found.overlap)
-    opposite = _facing(faces, covering[:, 0], covering[:, 1]) < 0
-    twice, thin = overlap.kinds(topology, faces.shell[covering], opposite)
-    for code, pairs, what in (
-        ("G001", crossing, "that cross"),
-        ("G004", covering[~twice & ~thin], "that overlap in one plane"),
-        ("G008", covering[twice], "of one shell that overlap in one plane and look the same way"),
-        ("G009", covering[thin], "in one plane with nothing between them"),
-    ):
-        if len(pairs):
-            text = f"{counted(len(pairs), 'pair')} of faces {what}"
-            findings.append(finding(code, text, len(pairs), _places(topology, faces, pairs)))
-    touching = _joined(found.contact.pairs)
-    if not len(touching):
-        return Crossings(tuple(findings), bool(len(crossing)))
-    met = np.sort(faces.shell[touching], axis=1)
-    shells, first, which = np.unique(met, axis=0, return_index=True, return_inverse=True)
-    shells = shells.astype(np.int64)
-    through = found.contact.keys(*faces.shell[crossing].T)
-    only = ~np.isin(found.contact.keys(*shells.T), through)
-    if only.any():
-        n = int(only.sum())
-        order, which = np.argsort(which, axis=None, kind="stable"), np.sort(which, axis=None)
-
-        def region(at: int) -> tuple[Ints, tuple[float, float, float]]:
-            """The faces found of a pair of shells that touch, and the middle of what their boxes share."""
-            at = int(np.flatnonzero(only)[at])
-            begin, end = np.searchsorted(which, at + np.arange(2))
-            x, y, z = (topology.low[shells[at]].max(axis=0) + topology.high[shells[at]].min(axis=0)).tolist()
-            return faces.original[np.unique(touching[order[begin:end]])], (x / 2, y / 2, z / 2)
-
-        places = _places(topology, faces, touching[first[only]], region)
-        findings.append(finding("G003", f"{counted(n, 'pair')} of shells that touch", n, places))
-    return Crossings(tuple(findings), bool(len(crossing)), shells)
-
-
-def _places(
-    topology: Topology,
-    faces: _Faces,
-    pairs: Ints,
-    region: Callable[[int], tuple[Ints, tuple[float, float, float]]] | None = None,
-) -> list[Location]:
-    """Where pairs meet, no point twice, with both faces; first the one that was not named before."""
-    found: dict[tuple[int, ...], Location] = {}
-    named: set[int] = set()
-    grid = 4 * max(float32_step(faces.vertices), 1e-300)
-    listed = max(_LISTED, detail().locations)
-    chosen = np.arange(0, len(pairs), max(1, len(pairs) // listed))[:listed]
-    corners = faces.vertices[faces.corners[:, pairs[chosen]].transpose(1, 2, 0)].tolist()
-    names = np.sort(faces.original[pairs[chosen]], axis=1).tolist()
-    for at, (a, b), (one, other) in zip(chosen.tolist(), corners, names, strict=True):
-        x, y, z = triangles.common_point(a, b) or (sum(values) / 3 for values in zip(*a, strict=True))
-        xyz = x + 0.0, y + 0.0, z + 0.0  # no -0
-        near = tuple(round(v / grid) for v in xyz)
-        if near in found:
-            continue
-        first, second = (other, one) if one in named else (one, other)
-        named.add(first)
-        drawn, centre = region(at) if region else (None, None)
-        found[near] = Location(faces=(first, second), xyz=xyz, object=topology.mesh.name, region=drawn, centre=centre)
-    return sorted(found.values(), key=lambda place: place.face or 0)
-
-
-def _joined(blocks: list[Ints]) -> Ints:
+def joined(blocks: list[Ints]) -> Ints:
+    """Return the pairs of all blocks, (k, 2)."""
     return np.concatenate(blocks) if blocks else np.empty((0, 2), np.int32)

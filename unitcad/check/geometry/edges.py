@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.mesh import cross, sorted_with_order
-from unitcad.geometry.arrays import Bools, Floats, Ints
+from unitcad.geometry.arrays import Bools, Floats, Ints, cross, sorted_with_order
 
 _SMALL = 60_000
 _SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane

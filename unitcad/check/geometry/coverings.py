@@ -1,4 +1,4 @@
-"""Faces that cover each other and shells that pass through themselves along their edges: G004, G008, G009.
+"""Faces that cover each other in one plane, and shells that pass through themselves along their edges.
 
 Where no two faces cross, the winding number can take a value other than 0 and 1 within one shell only if the shell goes
 through itself along edges that four or more of its faces share. Between the faces round such an edge, sorted by angle,
@@ -9,40 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from unitcad.check import edges as mesh_edges
-from unitcad.check.edges import Edges
-from unitcad.check.exact import orient3d
-from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.mesh import area_vectors, float32_steps, same_place
-from unitcad.check.rulebook import finding
-from unitcad.check.topology import Topology, max_side_squared
-from unitcad.check.volumes import side_by_side
+from unitcad.check.geometry import edges as mesh_edges
+from unitcad.check.geometry.edges import Edges
+from unitcad.check.geometry.predicates import orient3d
+from unitcad.check.geometry.topology import Topology, max_side_squared
+from unitcad.check.geometry.triangle_mesh import area_vectors, float32_steps
+from unitcad.check.geometry.volumes import side_by_side
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 _FLAT = 2.0  # float32 steps: a fold thinner than that has no thickness
 _WIDE = 64.0  # float32 steps: a face lower than that may be thin by rounding
-
-
-def judge(topology: Topology) -> list[Finding]:
-    """Apply G008 and G009 along edges. Vertices in one place are one, whether or not the file lists them apart."""
-    mesh, edges, faces = topology.mesh, topology.edges, topology.mesh.faces
-    kept, shells, areas = topology.kept, topology.shells, topology.areas
-    if mesh.indexed:
-        place = same_place(mesh.vertices)
-        if not np.array_equal(place, np.arange(len(place))):
-            faces = place[faces]
-            whole = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-            faces, kept, shells, areas = faces[whole], kept[whole], shells[whole], areas[whole]
-            edges = mesh_edges.edges_of(faces, len(mesh.vertices))
-    found = []
-    for code, which, text in (
-        ("G008", _through(mesh.vertices, faces, edges, shells), "at which a shell passes through itself"),
-        ("G009", _folded(mesh.vertices, faces, edges, areas), "at which two faces fold onto each other"),
-    ):
-        if len(which):
-            places = (_at(topology, faces, kept, edges, i) for i in which.tolist())
-            found.append(finding(code, f"{counted(len(which), 'edge')} {text}", len(which), places))
-    return found
 
 
 def kinds(topology: Topology, shells: Ints, opposite: Bools) -> tuple[Bools, Bools]:
@@ -75,13 +51,7 @@ def wide(a: Floats, b: Floats) -> Bools:
     return high
 
 
-def _at(topology: Topology, faces: Ints, kept: Ints, edges: Edges, edge: int) -> Location:
-    vertices = topology.mesh.vertices
-    x, y, z = ((vertices[edges.low[edge]] + vertices[edges.high[edge]]) / 2).tolist()
-    return Location(face=int(kept[edges.order[edges.first[edge]] // 3]), xyz=(x, y, z), object=topology.mesh.name)
-
-
-def _through(vertices: Floats, faces: Ints, edges: Edges, shells: Ints) -> Ints:
+def through_edges(vertices: Floats, faces: Ints, edges: Edges, shells: Ints) -> Ints:
     """Edges round which the winding number of one shell takes three values or more."""
     if edges.closed:
         return np.empty(0, np.int64)
@@ -107,7 +77,7 @@ def _through(vertices: Floats, faces: Ints, edges: Edges, shells: Ints) -> Ints:
     return many[np.unique(group[start][(high - low > 1) & evenly])]
 
 
-def _folded(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> Ints:
+def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> Ints:
     """Edges of two faces that look opposite ways and are in one plane as float32 has it, though not exactly."""
     two = edges.size == 2
     if not edges.closed:  # two faces that run alike are turned over, not folded

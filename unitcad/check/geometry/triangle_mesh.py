@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from unitcad.check.source import Source
-from unitcad.geometry.arrays import Floats, Ints
+from unitcad.check.geometry.source import Source
+from unitcad.geometry.arrays import Floats, Ints, sorted_with_order
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -39,23 +39,6 @@ class Mesh:
     indexed: bool = True
     single: bool = False
     source: Source | None = None
-
-
-def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDArray[np.uint64], Ints]:
-    """`key` (its low `bits` bits) sorted, and the order that sorts it.
-
-    Where key and position fit into 64 bits together, one sort of plain integers does it, four times faster.
-    """
-    room = max(len(key) - 1, 1).bit_length()
-    if bits + room > 64:
-        order = np.argsort(key, kind="stable")
-        return key[order], order.astype(np.int32)
-    packed = key << np.uint64(room)
-    packed |= np.arange(len(key), dtype=np.uint64)
-    packed.sort()
-    order = (packed & np.uint64((1 << room) - 1)).astype(np.int32)
-    packed >>= np.uint64(room)
-    return packed, order
 
 
 def representable(points: Floats) -> Floats:
@@ -132,29 +115,6 @@ def float32_steps(places: Floats) -> Floats:
     """The distance between neighbouring float32 numbers at the largest coordinate of each of n places, mm."""
     largest = np.abs(places).max(axis=tuple(range(1, places.ndim)), initial=0)
     return np.spacing(np.minimum(largest, 1e38).astype(np.float32)).astype(np.float64)
-
-
-def extent(points: Floats) -> tuple[Floats, Floats]:
-    """Low and high corner of the box round (n, 3) points, column by column (five times faster than along an axis)."""
-    columns = [points[:, axis] for axis in range(3)]
-    return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
-
-
-def extents(points: Floats, label: Ints, n: int) -> tuple[Floats, Floats]:
-    """Low and high corners (n, 3) of the boxes round the points of each label; of a label without any inf and -inf."""
-    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
-    np.minimum.at(low, label, points)
-    np.maximum.at(high, label, points)
-    return low, high
-
-
-def cross(a: Floats, b: Floats) -> Floats:
-    """Row-wise cross product of (n, 3) arrays; several times faster than numpy.cross on long arrays."""
-    found = np.empty_like(a)
-    for axis in range(3):
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        np.subtract(a[:, i] * b[:, j], a[:, j] * b[:, i], out=found[:, axis])
-    return found
 
 
 def solid_of(vertices: Floats, faces: Ints) -> Manifold:
