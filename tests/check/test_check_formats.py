@@ -18,11 +18,11 @@ from unitcad.check import FileReport, Options, check_file, check_mesh
 from unitcad.check.findings import SEVERITIES, Finding, Location, merge
 from unitcad.check.geometry.source import Source
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.limits import Deadline
 from unitcad.check.many_files import check_files
 from unitcad.check.one_mesh import check_surface, in_file
 from unitcad.check.output import as_text
 from unitcad.check.output.render import FORMATS, render
+from unitcad.check.resource_limits import Deadline
 from unitcad.check.rules.registry import FAMILIES, check_prefixes, explain, markdown, rules
 from unitcad.errors import Refusal
 

@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import CUBE_CORNERS, CUBE_FACES
 
-from unitcad.check.limits import Deadline, Limits
 from unitcad.check.readers.sniff import reader_of
+from unitcad.check.resource_limits import Deadline, Limits
 from unitcad.export import glb
 
 CUBE = (CUBE_CORNERS * 0.01).astype("<f4")  # metres

@@ -15,8 +15,8 @@ from polygon_files import every_way, obj, off, ply
 from shapes import CUBE_CORNERS
 
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.limits import Deadline, Limits
 from unitcad.check.readers.sniff import reader_of
+from unitcad.check.resource_limits import Deadline, Limits
 
 QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 HALF = [[0, 1, 3], [0, 3, 2], *QUADS[1:]]  # a cube of five quads and two triangles

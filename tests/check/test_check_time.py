@@ -10,8 +10,8 @@ from unitcad.catalogue import printers
 from unitcad.check import check_bytes
 from unitcad.check.findings import Facts, FileReport
 from unitcad.check.geometry import self_crossing
-from unitcad.check.limits import Deadline, OutOfTime, Unreadable
 from unitcad.check.options import Options
+from unitcad.check.resource_limits import Deadline, OutOfTime, Unreadable
 from unitcad.geometry import boxes
 
 
@@ -116,7 +116,7 @@ def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.Mon
     import time
 
     from unitcad.check import many_files
-    from unitcad.check.limits import Limits
+    from unitcad.check.resource_limits import Limits
     from unitcad.check.rules import g_shells
 
     if not hasattr(signal, "setitimer"):

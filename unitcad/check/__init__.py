@@ -5,8 +5,8 @@ readers and rules are loaded by the first file that needs them.
 """
 
 from unitcad.check.findings import Facts, FileReport, Finding, Location
-from unitcad.check.limits import Limits
 from unitcad.check.one_file import check_bytes, check_file, check_mesh
 from unitcad.check.options import Options
+from unitcad.check.resource_limits import Limits
 
 __all__ = ["Facts", "FileReport", "Finding", "Limits", "Location", "Options", "check_bytes", "check_file", "check_mesh"]

@@ -15,7 +15,6 @@ import numpy as np
 from unitcad.check.findings import Facts, Finding, Location, counted, ending
 from unitcad.check.geometry.topology import diagonals, topology_of
 from unitcad.check.geometry.triangle_mesh import LARGEST, solid_of
-from unitcad.check.limits import Deadline, Unreadable, keeping
 from unitcad.check.one_mesh import CheckedMesh, check_on_bed, check_surface
 from unitcad.check.options import UNITS_MM, Options
 from unitcad.check.readers.threemf import elements
@@ -23,6 +22,7 @@ from unitcad.check.readers.threemf.model_data import Model, Object
 from unitcad.check.readers.threemf.opc import Package, open_package
 from unitcad.check.readers.threemf.placement import Instance, Key, mesh_of
 from unitcad.check.readers.threemf.read_3mf import Build, read_build
+from unitcad.check.resource_limits import Deadline, Unreadable, keeping
 from unitcad.check.rules import g_shells, s_scale, v_values
 from unitcad.check.rules.g_shells import G002
 from unitcad.check.rules.inspection import Inspection

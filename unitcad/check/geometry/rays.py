@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.check.geometry.topology import Topology, max_side_squared
-from unitcad.check.limits import Deadline
+from unitcad.check.resource_limits import Deadline
 from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, morton_order
 

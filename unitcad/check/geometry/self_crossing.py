@@ -19,7 +19,7 @@ from unitcad.check.geometry.planes import Planes, planes_of
 from unitcad.check.geometry.stars import height_fields
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import same_place
-from unitcad.check.limits import Deadline, Unreadable
+from unitcad.check.resource_limits import Deadline, Unreadable
 from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.geometry.boxes import box_order, boxes_of, frame_of, meeting_pairs, slabs_of
 

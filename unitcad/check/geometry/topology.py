@@ -12,7 +12,7 @@ from unitcad.check.geometry import volumes
 from unitcad.check.geometry.edges import Edges
 from unitcad.check.geometry.seams import connected, join, t_junctions
 from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
-from unitcad.check.limits import Deadline
+from unitcad.check.resource_limits import Deadline
 from unitcad.geometry.arrays import Bools, Floats, Ints, extent, extents
 
 

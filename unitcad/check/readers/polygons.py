@@ -13,7 +13,7 @@ import numpy as np
 from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.geometry.source import Source
 from unitcad.check.geometry.triangle_mesh import LARGEST, Mesh, weld_points
-from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
+from unitcad.check.resource_limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.rules.f_file import F001, F008, F013
 from unitcad.check.rules.p_package import P011
 from unitcad.check.rules.rule import Rule

@@ -16,8 +16,8 @@ import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.readers.polygons import Polygons, mesh_of
+from unitcad.check.resource_limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.rules.f_file import F001, F002, F003, F004, F006, F008
 from unitcad.check.rules.p_package import P007, P009, P011, P012, P013, P016
 from unitcad.geometry.arrays import Floats, Ints

@@ -12,10 +12,10 @@ import numpy as np
 
 from unitcad.check.findings import Finding, Location
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.readers import rows
 from unitcad.check.readers.polygons import Polygons, mesh_of
 from unitcad.check.readers.rows import BLANK, JOINED, NEWLINE, SLASH, SPACE
+from unitcad.check.resource_limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.rules.f_file import F005
 from unitcad.check.rules.p_package import P011
 from unitcad.geometry.arrays import Floats, Ints

@@ -8,10 +8,10 @@ import numpy as np
 
 from unitcad.check.findings import Finding, counted
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.readers import rows
 from unitcad.check.readers.polygons import Polygons, mesh_of
 from unitcad.check.readers.rows import Rows
+from unitcad.check.resource_limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.rules.f_file import F002, F003, F005, F006
 
 _START = re.compile(rb"(?:\s|#[^\n]*\n)*([A-Z0-9]*)OFF(?![A-Z])", re.IGNORECASE)

@@ -15,10 +15,10 @@ import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.readers import rows
 from unitcad.check.readers.polygons import Polygons, mesh_of
 from unitcad.check.readers.rows import Rows
+from unitcad.check.resource_limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.rules.f_file import F001, F002, F003, F005, F006
 from unitcad.geometry.arrays import Floats, Ints
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from unitcad import children
 from unitcad.check.findings import Facts, Finding, number
-from unitcad.check.limits import Limits, Unreadable, over_limit
 from unitcad.check.options import Options
+from unitcad.check.resource_limits import Limits, Unreadable, over_limit
 from unitcad.check.rules.f_file import F003, F005, F011, F012
 from unitcad.check.rules.g_crossing import G001
 from unitcad.check.rules.g_shells import G007, T008, expected

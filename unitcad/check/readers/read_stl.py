@@ -14,8 +14,8 @@ import numpy as np
 from unitcad.check.detail import SHOWN
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.geometry.triangle_mesh import Mesh, weld_exact
-from unitcad.check.limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.readers.rows import NUMBER
+from unitcad.check.resource_limits import Deadline, Limits, Unreadable, over_limit
 from unitcad.check.rules.f_file import F001, F002, F003, F004, F005, F006, F007, F008, F009, F010
 from unitcad.check.rules.rule import Rule
 from unitcad.check.rules.v_values import V001

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.limits import Deadline, Unreadable
+from unitcad.check.resource_limits import Deadline, Unreadable
 from unitcad.check.rules.f_file import F003, F004, F009
 from unitcad.geometry.arrays import Bools, Floats, Ints
 

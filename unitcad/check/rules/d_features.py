@@ -17,7 +17,7 @@ from unitcad.check.geometry.edges import components
 from unitcad.check.geometry.rays import Rays
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import solid_of
-from unitcad.check.limits import Deadline
+from unitcad.check.resource_limits import Deadline
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Floats, Ints

@@ -11,7 +11,7 @@ from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.geometry.topology import Topology, diagonals
 from unitcad.check.geometry.triangle_mesh import solid_of
 from unitcad.check.geometry.volumes import winding_number
-from unitcad.check.limits import Deadline, Unreadable
+from unitcad.check.resource_limits import Deadline, Unreadable
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Bools, Floats, Ints

@@ -11,7 +11,7 @@ from unitcad.check.geometry.rays import Rays, cast
 from unitcad.check.geometry.self_crossing import Crossings, crossings_of
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.limits import Deadline
+from unitcad.check.resource_limits import Deadline
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer

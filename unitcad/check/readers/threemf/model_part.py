@@ -13,10 +13,10 @@ import numpy as np
 
 from unitcad.check.findings import Location
 from unitcad.check.geometry.triangle_mesh import LARGEST
-from unitcad.check.limits import Limits, Unreadable, over_limit
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Use
 from unitcad.check.readers.threemf.xml_stream import forbidden, new_parser, stream
+from unitcad.check.resource_limits import Limits, Unreadable, over_limit
 from unitcad.check.rules.f_file import F004
 from unitcad.check.rules.p_package import P010, P013, P015, P016, P017, P018
 from unitcad.check.rules.v_values import V001

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 from urllib.parse import unquote
 
 from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.limits import Deadline, Limits, OutOfTime, Unreadable, over_limit
 from unitcad.check.readers.threemf.xml_stream import Element, read_small
+from unitcad.check.resource_limits import Deadline, Limits, OutOfTime, Unreadable, over_limit
 from unitcad.check.rules.f_file import F003, F006
 from unitcad.check.rules.p_package import P001, P002, P003, P004, P005, P007, P008
 from unitcad.check.rules.rule import Rule

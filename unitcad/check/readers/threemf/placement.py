@@ -10,8 +10,8 @@ import numpy as np
 from unitcad.check.findings import Finding
 from unitcad.check.geometry.source import Source
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.limits import Limits, Unreadable, over_limit
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Use
+from unitcad.check.resource_limits import Limits, Unreadable, over_limit
 from unitcad.check.rules.p_package import P009, P012
 from unitcad.geometry.arrays import Floats
 

@@ -9,7 +9,7 @@ from typing import Any
 from xml.parsers import expat
 
 from unitcad.check.findings import Location
-from unitcad.check.limits import Unreadable, over_limit
+from unitcad.check.resource_limits import Unreadable, over_limit
 from unitcad.check.rules.f_file import F003, F009
 from unitcad.check.rules.p_package import P006
 
