@@ -183,7 +183,7 @@ def test_the_bar_on_a_terminal_shows_rate_reused_failed(monkeypatch: pytest.Monk
     import io
     import sys
 
-    from unitcad.batch.run import Summary
+    from unitcad.batch import Summary
     from unitcad.cli.batch_progress import watching
 
     class Terminal(io.StringIO):

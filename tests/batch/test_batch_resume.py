@@ -12,6 +12,7 @@ import pytest
 from batching import bytes_of, ring_sweep, rows, unitcad
 
 from unitcad.batch import BatchOptions, Summary, load_sweep, run
+from unitcad.batch.batch_records import JournalEntry
 from unitcad.batch.executors import SerialExecutor
 from unitcad.batch.journal import Journal
 from unitcad.cache import digest
@@ -80,10 +81,10 @@ def test_a_finished_variant_whose_files_are_not_whole_is_made_again(
     before = bytes_of(out)
     LARGER[damage](out / rows(out)[0]["folder"] / file)
     summary = _run(sweep, out)
-    assert (summary.ok, summary.taken_up) == (2, 1)
+    assert (summary.ok, summary.resumed) == (2, 1)
     assert bytes_of(out) == before
     assert not (out / rows(out)[0]["folder"] / file).is_symlink()
-    assert _run(sweep, out).taken_up == 2
+    assert _run(sweep, out).resumed == 2
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -92,9 +93,9 @@ def test_hashes_are_held_with_verify(damage: Callable[[Path], None], file: str, 
     sweep, out = made
     before = bytes_of(out)
     damage(out / rows(out)[0]["folder"] / file)
-    assert _run(sweep, out, verify=True).taken_up == 1
+    assert _run(sweep, out, verify=True).resumed == 1
     assert bytes_of(out) == before
-    assert _run(sweep, out, verify=True).taken_up == 2
+    assert _run(sweep, out, verify=True).resumed == 2
 
 
 def test_verify_on_the_command_line(tmp_path: Path) -> None:
@@ -139,11 +140,11 @@ def test_contents_are_on_the_disk_before_the_journal_says_so(tmp_path: Path, mon
         sync(handle)
         synced.add(os.fstat(handle).st_ino)
 
-    def checked(self: Journal, entry: dict) -> None:
-        folder = self.out / entry["folder"]
+    def checked(self: Journal, entry: JournalEntry) -> None:
+        folder = self.out / entry.folder
         for path in ("manifest.json", *json.loads((folder / "manifest.json").read_text())["files"]):
             assert (folder / path).stat().st_ino in synced, path
-        noted.append(entry["index"])
+        noted.append(entry.index)
         add(self, entry)
 
     monkeypatch.setattr(os, "fsync", recorded)

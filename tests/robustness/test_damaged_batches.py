@@ -222,13 +222,13 @@ def _attack_results(kind: str, made: tuple[Batch, Path], folder: Path, seed: int
         return
     if kind in FAILED:
         assert (summary.ok, summary.failed) == (3, 1)
-        assert f"{variant}: is a" in summary.failures[0]["reason"]
+        assert f"{variant}: is a" in summary.failures[0].reason
         return
     assert (summary.ok, summary.failed, summary.stopped) == (4, 0, "")
     assert bytes_of(batch.out) == bytes_of(made[0].out)
     assert not any(path.is_symlink() for path in batch.out.rglob("*"))
     assert not leftovers(batch.out)
-    assert batch.run(sweep).taken_up == 4
+    assert batch.run(sweep).resumed == 4
 
 
 def _share(kinds: dict[str, tuple[str, Change]], count: int) -> list[str]:

@@ -10,26 +10,30 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from msgspec import to_builtins
+from msgspec.structs import replace
 
+from unitcad.batch.batch_records import BatchHead, JournalEntry
 from unitcad.batch.journal import JOURNAL, Journal
 from unitcad.errors import UnitcadError
 
-HEAD = {"batch": "0123456789abcdef", "name": "rings", "mode": "product", "code": "0.1.0+abc"}
+HEAD = BatchHead(batch="0123456789abcdef", name="rings")
+CODE = "0.1.0+abc"
 VARIANTS = 12
 
 
-def _entry(index: int, tries: int = 0) -> dict:
+def _entry(index: int, tries: int = 0) -> JournalEntry:
     row = {"name": f"n{index}", "diameter_mm": 14.0 + index / 7, "laws": tries}
-    return {"index": index, "status": "ok", "reason": "", "folder": "", "values": {"a": index}, "row": row}
+    return JournalEntry(index=index, status="ok", values={"a": index}, row=row)
 
 
 @pytest.fixture
 def whole(tmp_path: Path) -> bytes:
     """A journal of VARIANTS variants, some written twice, two equal to an earlier one."""
-    journal = Journal(tmp_path / "whole", HEAD)
+    journal = Journal(tmp_path / "whole", HEAD, CODE)
     for index in range(VARIANTS):
         journal.add(
-            {"index": index, "same_as": index - 3, "values": {"a": -index}} if index in (5, 9) else _entry(index)
+            JournalEntry(index=index, same_as=index - 3, values={"a": -index}) if index in (5, 9) else _entry(index)
         )
         if index % 4 == 3:
             journal.add(_entry(index, 1))
@@ -37,24 +41,24 @@ def whole(tmp_path: Path) -> bytes:
     return (tmp_path / "whole" / JOURNAL).read_bytes()
 
 
-def _true(index: int) -> list[dict]:
+def _true(index: int) -> list[JournalEntry]:
     """What may be told of a variant."""
     if index in (5, 9):
-        return [{**_entry(index - 3), "index": index, "values": {"a": -index}}]
+        return [replace(_entry(index - 3), index=index, values={"a": -index})]
     return [_entry(index), _entry(index, 1)]
 
 
-def _open(folder: Path, content: bytes) -> tuple[list[dict], int]:
+def _open(folder: Path, content: bytes) -> tuple[list[JournalEntry], int]:
     """The entries of a journal of that content, opened twice; how many lines were left out."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / JOURNAL).write_bytes(content)
-    journal = Journal(folder, HEAD)
+    journal = Journal(folder, HEAD, CODE)
     try:
         found, damaged = list(journal.entries()), journal.damaged
         journal.add(_entry(VARIANTS))
     finally:
         journal.close()
-    again = Journal(folder, HEAD)
+    again = Journal(folder, HEAD, CODE)
     seen = list(again.entries()), again.damaged
     again.close()
     assert seen == ([*found, _entry(VARIANTS)], 0)
@@ -113,7 +117,7 @@ def _hold_to_truth(folder: Path, content: bytes) -> None:
         assert (folder / JOURNAL).read_bytes() == content
         return
     for entry in found:
-        assert entry in _true(entry["index"]), entry
+        assert entry in _true(entry.index), entry
 
 
 @pytest.mark.parametrize("kind", RANDOM)
@@ -137,7 +141,7 @@ def _hold_to_tear(folder: Path, whole: bytes, cut: int) -> None:
         complete.append(lines.pop(0))
         position += len(complete[-1])
     found, damaged = _open(folder, whole[:cut])
-    assert {entry["index"] for entry in found} == {json.loads(line)["index"] for line in complete}
+    assert {entry.index for entry in found} == {json.loads(line)["index"] for line in complete}
     assert damaged == (cut > position)
 
 
@@ -191,7 +195,10 @@ def test_what_is_no_journal_is_refused_or_begun_anew(kind: str, tmp_path: Path) 
 def test_a_line_that_we_did_not_write_is_left_out(kind: str, old: bool, whole: bytes, tmp_path: Path) -> None:
     lines = whole.splitlines(keepends=True)
     if old:
-        lines = [json.dumps(line).encode() + b"\n" for line in (HEAD, *(_entry(index) for index in range(3)))]
+        lines = [
+            json.dumps(line).encode() + b"\n"
+            for line in ({"code": CODE, **to_builtins(HEAD)}, *(to_builtins(_entry(index)) for index in range(3)))
+        ]
     start = time.monotonic()
     found, damaged = _open(tmp_path / "out", b"".join([*lines, json.dumps(FORGED[kind]).encode() + b"\n"]))
     assert time.monotonic() - start < 5
@@ -200,7 +207,7 @@ def test_a_line_that_we_did_not_write_is_left_out(kind: str, old: bool, whole: b
 
 
 def test_lines_of_another_batch_are_left_out(whole: bytes, tmp_path: Path) -> None:
-    other = Journal(tmp_path / "other", {**HEAD, "batch": "f" * 16})
+    other = Journal(tmp_path / "other", replace(HEAD, batch="f" * 16), CODE)
     other.add(_entry(2, 7))
     other.close()
     foreign = (tmp_path / "other" / JOURNAL).read_bytes().splitlines(keepends=True)[1]
@@ -222,5 +229,5 @@ def test_what_is_not_a_file_is_refused(kind: str, whole: bytes, tmp_path: Path) 
         case "link":
             (out / JOURNAL).symlink_to(tmp_path / "elsewhere")
     with pytest.raises(UnitcadError, match=JOURNAL):
-        Journal(out, HEAD)
+        Journal(out, HEAD, CODE)
     assert (tmp_path / "elsewhere").read_bytes() == whole

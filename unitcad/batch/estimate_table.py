@@ -20,14 +20,14 @@ from unitcad.attenuation.closed_form import Units
 from unitcad.attenuation.models import edge_levels
 from unitcad.attenuation.table import CROSSINGS
 from unitcad.batch import task as tasks
+from unitcad.batch.batch_records import Failure, JournalEntry, Summary
 from unitcad.batch.journal import Journal
 from unitcad.batch.results import FIRST, write_results, write_timings
-from unitcad.batch.run import MOST_FAILURES_TOLD, BatchOptions, Summary, batch_head, counted
+from unitcad.batch.run import MOST_FAILURES_TOLD, BatchOptions, batch_head, counted
 from unitcad.batch.sweep import Sweep
 from unitcad.batch.task import OK
 from unitcad.errors import UnitcadError
 from unitcad.estimating import variant_of
-from unitcad.pipeline.versions import code_version
 from unitcad.spec import Spec
 from unitcad.validation import from_data, put
 
@@ -70,14 +70,14 @@ def write_estimates(sweep: Sweep, out: Path, options: BatchOptions) -> Summary:
     """
     count = counted(sweep, options.limit)
     head = batch_head(sweep, ("estimate",), options)
-    journal = Journal(out, {**head, "code": code_version()})
+    journal = Journal(out, head)
     summary, start = Summary(count), time.perf_counter()
     try:
         blocks = list(evaluate(sweep, count))
         models = list(dict.fromkeys(model for block in blocks for model in block.levels))
         paths = [path for path in sweep.paths if path != "name"]
         columns = list(dict.fromkeys([*FIRST, *paths, "name", "design", "diameter_mm", *(f"edge_{m}" for m in models)]))
-        write_results(out, columns, lambda: _entries(sweep, blocks), {**head, "versions": head["versions"]})
+        write_results(out, columns, lambda: _entries(sweep, blocks), head)
         _count(summary, blocks)
         summary.seconds = round(time.perf_counter() - start, 3)
         write_timings(out, summary, 1)
@@ -214,20 +214,20 @@ def _free_value(sweep: Sweep, base: int, position: int, digit: int, values: dict
     return values[key]
 
 
-def _entries(sweep: Sweep, blocks: list[Block]) -> Iterator[dict[str, Any]]:
+def _entries(sweep: Sweep, blocks: list[Block]) -> Iterator[JournalEntry]:
     for block in blocks:
         levels = {f"edge_{model}": found.tolist() for model, found in block.levels.items()}
         for row, known in enumerate(block.known):
             index = block.start + row
             _, values = sweep.values(index)
-            entry = {"index": index, "status": OK, "reason": "", "folder": "", "values": values}
             if isinstance(known, UnitcadError):
                 failed = tasks.failure(index, known)
-                yield {**entry, "status": failed.status, "reason": failed.reason, "row": {}}
+                yield JournalEntry(index=index, status=failed.status, reason=failed.reason, values=values)
                 continue
             edges = {name: _rounded(found[row]) for name, found in levels.items()}
             name = values.get("name", known.name)
-            yield {**entry, "row": {"name": name, "design": known.design, "diameter_mm": known.diameter_mm, **edges}}
+            columns = {"name": name, "design": known.design, "diameter_mm": known.diameter_mm, **edges}
+            yield JournalEntry(index=index, status=OK, values=values, row=columns)
 
 
 def _rounded(level: float) -> float | None:
@@ -243,7 +243,4 @@ def _count(summary: Summary, blocks: list[Block]) -> None:
         if isinstance(entry, UnitcadError)
     ]
     summary.failed, summary.ok = len(failed), summary.done - len(failed)
-    summary.failures = [
-        {"index": outcome.index, "status": outcome.status, "reason": outcome.reason, "folder": ""}
-        for outcome in failed[:MOST_FAILURES_TOLD]
-    ]
+    summary.failures = [Failure(each.index, each.status, each.reason) for each in failed[:MOST_FAILURES_TOLD]]

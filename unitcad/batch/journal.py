@@ -18,9 +18,12 @@ from pathlib import Path
 from typing import IO, Any
 
 from filelock import FileLock, Timeout
+from msgspec import ValidationError, convert, structs, to_builtins
 
 from unitcad import files
+from unitcad.batch.batch_records import BatchHead, JournalEntry
 from unitcad.errors import UnitcadError
+from unitcad.pipeline.versions import code_version
 
 JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
 NOT_THERE = -1
@@ -36,8 +39,9 @@ class Journal:
     Raises UnitcadError for a folder that isn't ours, that holds another batch, or in which a batch is running.
     """
 
-    def __init__(self, out: Path, head: dict[str, Any]) -> None:
-        self.out, self.head = out, {"format": FORMAT, **head}
+    def __init__(self, out: Path, head: BatchHead, code: str | None = None) -> None:
+        self.out = out
+        self.head = {"format": FORMAT, **to_builtins(head), "code": code or code_version()}
         self._seed = zlib.crc32(_text(self.head))
         self._lines = array("q")
         self.damaged = 0
@@ -48,25 +52,25 @@ class Journal:
             self._lock.release()
             raise
 
-    def add(self, entry: dict[str, Any]) -> None:
-        """Write one variant's end. Raises OSError."""
+    def add(self, entry: JournalEntry) -> None:
+        """Write the result of one variant. Raises OSError."""
         start = self._file.seek(0, os.SEEK_END)
-        self._file.write(_packed(entry, self._seed))
+        self._file.write(_packed(to_builtins(entry), self._seed))
         self._file.flush()
-        self._note(entry["index"], start)
+        self._note(entry.index, start)
 
-    def entry(self, index: int) -> dict[str, Any] | None:
-        """What was written last of a variant; a variant equal to another one gets that one's entry."""
-        found = self._own(index)
-        if found is None or "same_as" not in found:
-            return found
-        other = self._own(found["same_as"])
-        if other is None or "same_as" in other:
+    def entry(self, index: int) -> JournalEntry | None:
+        """Return the last entry of a variant; a variant equal to another one gets that one's entry."""
+        own = self._own(index)
+        if own is None or own.same_as is None:
+            return own
+        other = self._own(own.same_as)
+        if other is None or other.same_as is not None:
             return None
-        return {**other, "index": index, "values": found["values"]}
+        return structs.replace(other, index=index, values=own.values)
 
-    def entries(self) -> Iterator[dict[str, Any]]:
-        """Every variant's entry in the sweep's order, read one by one."""
+    def entries(self) -> Iterator[JournalEntry]:
+        """Yield every variant's entry in the sweep's order, read one by one."""
         return (entry for index in range(len(self._lines)) if (entry := self.entry(index)) is not None)
 
     def close(self) -> None:
@@ -74,11 +78,11 @@ class Journal:
         self._file.close()
         self._lock.release()
 
-    def _own(self, index: int) -> dict[str, Any] | None:
+    def _own(self, index: int) -> JournalEntry | None:
         if index >= len(self._lines) or self._lines[index] == NOT_THERE:
             return None
         self._file.seek(self._lines[index])
-        return _unpacked(self._file.readline(LONGEST), self._seed)
+        return _entry(self._file.readline(LONGEST), self._seed)
 
     def _note(self, index: int, offset: int) -> None:
         while len(self._lines) <= index:
@@ -97,7 +101,7 @@ class Journal:
         file.seek(0)
         offset = len(file.readline())
         for line, entry in self._entries(path):
-            self._note(entry["index"], offset)
+            self._note(entry.index, offset)
             offset += len(line)
         return file
 
@@ -127,12 +131,12 @@ class Journal:
             self.damaged = sum(1 for line in _lines(file)) - whole + torn
         return True
 
-    def _entries(self, path: Path) -> Iterator[tuple[bytes, dict[str, Any]]]:
-        """The lines below the head that are whole, and what they hold."""
+    def _entries(self, path: Path) -> Iterator[tuple[bytes, JournalEntry]]:
+        """Yield the lines below the head that are whole, and what they hold."""
         with open(path, "rb") as file:
             file.readline(LONGEST)
             for line in _lines(file):
-                entry = _unpacked(line, self._seed)
+                entry = _entry(line, self._seed)
                 if entry is not None:
                     yield line, entry
 
@@ -167,6 +171,15 @@ def _unpacked(line: bytes, seed: int) -> dict[str, Any] | None:
     return json.loads(text + b"}")
 
 
+def _entry(line: bytes, seed: int) -> JournalEntry | None:
+    """Return the entry in a line; None where it is damaged, or holds something else."""
+    data = _unpacked(line, seed)
+    try:
+        return None if data is None else convert(data, JournalEntry)
+    except ValidationError:
+        return None
+
+
 def _head(line: bytes) -> dict[str, Any] | None:
     """A journal's head, with a checksum or, as of before there was one, without; None where it is none."""
     found = _unpacked(line, 0)
@@ -186,7 +199,7 @@ def _another(out: Path, name: str) -> UnitcadError:
     )
 
 
-def _lock(out: Path, head: dict[str, Any]) -> FileLock:
+def _lock(out: Path, head: BatchHead) -> FileLock:
     lock = FileLock(out / LOCK, blocking=False, thread_local=False)
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -204,7 +217,7 @@ def _lock(out: Path, head: dict[str, Any]) -> FileLock:
     return lock
 
 
-def _check_free(out: Path, head: dict[str, Any]) -> None:
+def _check_free(out: Path, head: BatchHead) -> None:
     """Refuse a folder without a journal that holds something, unless it is this batch's and has lost it."""
     if all(path.name == LOCK for path in out.iterdir()):
         return
@@ -212,7 +225,7 @@ def _check_free(out: Path, head: dict[str, Any]) -> None:
         raise UnitcadError(f"{out}: holds something that is no batch's result; choose another folder with -o")
     try:
         there = files.read_json(out / TABLE, largest=files.LARGEST_TABLE, links=False)
-        name, same = there["name"], there["batch"] == head["batch"]
+        name, same = there["name"], there["batch"] == head.batch
     except (UnitcadError, KeyError, TypeError):
         return  # it was interrupted before there was a table
     if not same:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from unitcad.batch.batch_records import Preview, RefusedVariant
 from unitcad.batch.run import BatchOptions, counted
 from unitcad.batch.sweep import Sweep
 from unitcad.cache import MemoryStore
@@ -19,31 +18,31 @@ LOOKED_AT = 20_000
 """Variants whose geometry is worked out; of a larger sweep the rest is estimated in proportion."""
 DRAWN, BUILT = 24, 2
 """Geometries whose parts are counted, and geometries that are really made to see what they weigh."""
-REFUSED_TOLD = 20
+MOST_REFUSED = 20
 
 
-def preview(sweep: Sweep, options: BatchOptions) -> dict[str, Any]:
-    """Variants, distinct geometries and parts, files and megabytes; `exact` tells whether the first three are counts.
+def preview(sweep: Sweep, options: BatchOptions) -> Preview:
+    """Count variants, distinct geometries and parts, files and megabytes.
 
-    Every variant that is looked at passes the door; `refused` tells the first ones that don't. Raises UnitcadError
-    where none does.
+    Every variant that is looked at is validated; `refused` holds the first ones that are refused. Raises UnitcadError
+    where all are.
     """
     only = checked_outputs(options.only)
     count = counted(sweep, options.limit)
     looked = min(count, LOOKED_AT)
     geometries: dict[str, Spec] = {}
-    refused: list[dict[str, Any]] = []
+    refused: list[RefusedVariant] = []
     accepted = 0
     for index in range(looked):
         try:
             spec = sweep.spec(index)
         except UnitcadError as error:
-            refused.append({"index": index, "reason": str(error)})
+            refused.append(RefusedVariant(index, str(error)))
             continue
         accepted += 1
         geometries.setdefault(geometry_key(spec, only, options.check), spec)
     if refused and not accepted:
-        raise UnitcadError(f"every variant is refused, the first: {refused[0]['reason']}")
+        raise UnitcadError(f"every variant is refused, the first: {refused[0].reason}")
     share = count / looked
     spread = list(geometries.values())
     drawn = spread[:: max(1, len(spread) // DRAWN)][:DRAWN]
@@ -51,17 +50,17 @@ def preview(sweep: Sweep, options: BatchOptions) -> dict[str, Any]:
     weighed = [_weight(spec, only) for spec in drawn[:: max(1, len(drawn) // BUILT)][:BUILT]]
     shared, own, files = (sum(w[i] for w in weighed) / max(1, len(weighed)) for i in range(3))
     number, variants = len(geometries) * share, accepted * share
-    return {
-        "variants": count,
-        "geometries": round(number),
-        "parts": round(per_drawn * number / max(1, len(drawn))),
-        "exact": looked == count and len(drawn) == len(geometries),
-        "files": round(files * variants),
-        "stored_mb": round((shared * number + own * variants) / 1e6, 3),
-        "linked_mb": round((shared + own) * variants / 1e6, 3),
-        "refused_count": round(len(refused) * share),
-        "refused": refused[:REFUSED_TOLD],
-    }
+    return Preview(
+        variants=count,
+        geometries=round(number),
+        parts=round(per_drawn * number / max(1, len(drawn))),
+        exact=looked == count and len(drawn) == len(geometries),
+        files=round(files * variants),
+        stored_mb=round((shared * number + own * variants) / 1e6, 3),
+        linked_mb=round((shared + own) * variants / 1e6, 3),
+        refused_count=round(len(refused) * share),
+        refused=refused[:MOST_REFUSED],
+    )
 
 
 def _distinct_parts(specs: list[Spec], only: tuple[str, ...]) -> int:

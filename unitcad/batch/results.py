@@ -10,7 +10,10 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
+from msgspec import to_builtins
+
 from unitcad import files
+from unitcad.batch.batch_records import BatchHead, JournalEntry, Summary, Values
 from unitcad.batch.journal import Journal
 from unitcad.batch.sweep import Sweep
 from unitcad.text import cell
@@ -19,36 +22,36 @@ FIRST = ("index", "status", "reason", "folder")
 
 
 def write_results(
-    out: Path, columns: list[str], entries: Callable[[], Iterable[dict[str, Any]]], head: dict[str, Any]
+    out: Path, columns: list[str], entries: Callable[[], Iterable[JournalEntry]], head: BatchHead
 ) -> None:
     """Write both tables; `entries` gives the variants in the sweep's order, one at a time. Raises OSError."""
     _write_csv(out / "variants.csv", columns, entries())
-    _write_json(out / "batch.json", {**head, "columns": columns}, entries())
+    _write_json(out / "batch.json", {**to_builtins(head), "columns": columns}, entries())
 
 
-def write_timings(out: Path, summary: Any, workers: int) -> None:
-    """What this run did and how fast: not part of what is the same from run to run."""
-    told = {key: value for key, value in vars(summary).items() if key not in ("failures", "warnings")}
-    fresh = summary.done - summary.taken_up
-    told["variants_per_second"] = round(fresh / summary.seconds, 2) if summary.seconds else None
-    files.write(out / "timings.json", (json.dumps({"workers": workers, **told}, indent=1) + "\n").encode())
+def write_timings(out: Path, summary: Summary, workers: int) -> None:
+    """Write what this run did and how fast: not part of what is the same from run to run."""
+    timings = {key: value for key, value in to_builtins(summary).items() if key not in ("failures", "warnings")}
+    fresh = summary.done - summary.resumed
+    timings["variants_per_second"] = round(fresh / summary.seconds, 2) if summary.seconds else None
+    files.write(out / "timings.json", (json.dumps({"workers": workers, **timings}, indent=1) + "\n").encode())
 
 
 def columns_of(sweep: Sweep, journal: Journal) -> list[str]:
-    """First what it is, then what was swept, then what came out, in the order in which rows name it."""
-    found: dict[str, None] = dict.fromkeys(FIRST)
-    found.update(dict.fromkeys(path for path in sweep.paths if path != "name"))
+    """Return the columns: first those of every batch, then what was swept, then what came out as rows name it."""
+    columns: dict[str, None] = dict.fromkeys(FIRST)
+    columns.update(dict.fromkeys(path for path in sweep.paths if path != "name"))
     for entry in journal.entries():
-        found.update(dict.fromkeys(entry["row"]))
-    return list(found)
+        columns.update(dict.fromkeys(entry.row))
+    return list(columns)
 
 
-def flat(entry: dict[str, Any]) -> dict[str, Any]:
-    """One variant's values by column."""
-    return {**{key: entry.get(key, "") for key in FIRST}, **entry["row"], **entry["values"]}
+def flat(entry: JournalEntry) -> Values:
+    """Return one variant's values by column."""
+    return {**{key: getattr(entry, key) for key in FIRST}, **entry.row, **entry.values}
 
 
-def _write_csv(path: Path, columns: list[str], entries: Iterable[dict[str, Any]]) -> None:
+def _write_csv(path: Path, columns: list[str], entries: Iterable[JournalEntry]) -> None:
     with _written(path) as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(columns)
@@ -57,7 +60,7 @@ def _write_csv(path: Path, columns: list[str], entries: Iterable[dict[str, Any]]
             table.writerow([_cell(values.get(column)) for column in columns])
 
 
-def _write_json(path: Path, head: dict[str, Any], entries: Iterable[dict[str, Any]]) -> None:
+def _write_json(path: Path, head: dict[str, Any], entries: Iterable[JournalEntry]) -> None:
     with _written(path) as file:
         text = json.dumps(head, indent=1, ensure_ascii=False, allow_nan=False)
         file.write(text.removesuffix("\n}") + ',\n "variants": [')

@@ -13,10 +13,10 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Executor, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from unitcad import __version__
 from unitcad.batch import task as tasks
+from unitcad.batch.batch_records import BatchHead, Failure, JournalEntry, Summary
 from unitcad.batch.executors import ProcessExecutor
 from unitcad.batch.journal import JOURNAL, Journal
 from unitcad.batch.remote import Receiver
@@ -28,7 +28,7 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline.build import OUTPUTS, checked_outputs
 from unitcad.pipeline.folder import clear_leftovers, folder_name, whole
 from unitcad.pipeline.geometry import geometry_key
-from unitcad.pipeline.versions import code_version, kernel_versions
+from unitcad.pipeline.versions import kernel_versions
 from unitcad.spec import to_json
 
 WINDOW = 2048
@@ -55,24 +55,6 @@ class BatchOptions:
     verify: bool = False
 
 
-@dataclass
-class Summary:
-    """How a batch ended: variants by what became of them, geometries, seconds; `stopped` says why it ended early."""
-
-    variants: int
-    done: int = 0
-    taken_up: int = 0
-    reused: int = 0
-    ok: int = 0
-    failed: int = 0
-    geometries: int = 0
-    retried: int = 0
-    seconds: float = 0.0
-    stopped: str = ""
-    failures: list[dict[str, Any]] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-
-
 Watch = Callable[[Summary, VariantOutcome | None], None]
 MOST_FAILURES_TOLD = 20
 
@@ -97,7 +79,7 @@ def run(
     count = counted(sweep, options.limit)
     head = batch_head(sweep, only, options)
     store = DiskStore(options.cache or default_root())
-    journal = Journal(out, {**head, "code": code_version()})
+    journal = Journal(out, head)
     own = None
     if executor is None:
         executor = own = ProcessExecutor(workers)
@@ -135,16 +117,16 @@ def trim(options: BatchOptions) -> None:
         collect(options.cache or default_root(), int(options.cache_mb * 1e6))
 
 
-def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> dict[str, Any]:
-    """What says which batch this is, in its journal and in its tables."""
-    return {
-        "batch": digest(repr((sweep.hash, only, options.check)).encode())[:16],
-        "name": sweep.name,
-        "mode": sweep.mode,
-        "bases": [base for base, _ in sweep.bases],
-        "outputs": list(only),
-        "versions": {"unitcad": __version__, **kernel_versions(("step",))},
-    }
+def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> BatchHead:
+    """Return the batch's identity, for its journal and its tables."""
+    return BatchHead(
+        batch=digest(repr((sweep.hash, only, options.check)).encode())[:16],
+        name=sweep.name,
+        mode=sweep.mode,
+        bases=[base for base, _ in sweep.bases],
+        outputs=list(only),
+        versions={"unitcad": __version__, **kernel_versions(("step",))},
+    )
 
 
 def counted(sweep: Sweep, limit: int | None) -> int:
@@ -208,9 +190,9 @@ class _Batch:
                 index, again = self.failed_before.popleft(), False
             entry = self.journal.entry(index)
             if entry is not None and self._stands(entry):
-                self._finished(VariantOutcome(index, entry["status"]), fresh=False)
+                self._finished(VariantOutcome(index, entry.status), fresh=False)
                 continue
-            if entry is not None and entry["status"] == tasks.FAILED and again:
+            if entry is not None and entry.status == tasks.FAILED and again:
                 # What failed before comes last: a batch that stops at a failure has made all others by then.
                 self.failed_before.append(index)
                 continue
@@ -222,22 +204,22 @@ class _Batch:
             identity = int(folder_name(spec)[-12:], 16)
             first = self.seen.setdefault(identity, index)
             if first != index:
-                self.journal.add({"index": index, "same_as": first, "values": self.sweep.values(index)[1]})
+                self.journal.add(JournalEntry(index=index, same_as=first, values=self.sweep.values(index)[1]))
                 self._finished(VariantOutcome(index, tasks.OK), fresh=False)
                 continue
             key = geometry_key(spec, self.only, self.options.check)
-            damaged = entry["manifest"] if entry else ""
+            damaged = entry.manifest if entry else ""
             self.groups.setdefault(key, _Group()).jobs.append(Job(index, to_json(spec), damaged))
             self.waiting += 1
 
-    def _stands(self, entry: dict[str, Any]) -> bool:
-        """Whether a variant is finished, with or without a broken law, and its folder is whole."""
-        if entry["status"] not in (tasks.OK, tasks.BROKEN):
+    def _stands(self, entry: JournalEntry) -> bool:
+        """Whether a variant is finished, with or without a broken mould check, and its folder is whole."""
+        if entry.status not in (tasks.OK, tasks.BROKEN):
             return False
-        folder, hashes = self.out / entry["folder"], self.options.verify
+        folder, hashes = self.out / entry.folder, self.options.verify
         if whole(folder, hashes=hashes) is None:
             return False
-        return not hashes or digest((folder / "manifest.json").read_bytes()) == entry["manifest"]
+        return not hashes or digest((folder / "manifest.json").read_bytes()) == entry.manifest
 
     def _give_out(self) -> None:
         """Keep every worker busy, and one task ahead for each."""
@@ -330,26 +312,27 @@ class _Batch:
         summary = self.summary
         if fresh:
             self.journal.add(
-                {
-                    "index": outcome.index,
-                    "status": outcome.status,
-                    "reason": outcome.reason,
-                    "folder": outcome.folder,
-                    "values": self.sweep.values(outcome.index)[1],
-                    "row": outcome.row,
-                    "manifest": outcome.manifest,
-                }
+                JournalEntry(
+                    index=outcome.index,
+                    status=outcome.status,
+                    reason=outcome.reason,
+                    folder=outcome.folder,
+                    values=self.sweep.values(outcome.index)[1],
+                    row=outcome.row,
+                    manifest=outcome.manifest,
+                )
             )
         summary.done += 1
-        summary.taken_up += not fresh
+        summary.resumed += not fresh
         summary.reused += bool(fresh and outcome.reused and not outcome.built)
         if outcome.status == tasks.OK:
             summary.ok += 1
         else:
             summary.failed += 1
             if len(summary.failures) < MOST_FAILURES_TOLD:
-                entry = self.journal.entry(outcome.index) or {}
-                summary.failures.append({k: entry.get(k, "") for k in ("index", "status", "reason", "folder")})
+                entry = self.journal.entry(outcome.index)
+                if entry is not None:
+                    summary.failures.append(Failure(entry.index, entry.status, entry.reason, entry.folder))
             # A refused variant says nothing of the others; what broke or failed may happen to each.
             if fresh and outcome.status != tasks.REFUSED and not self.options.keep_going:
                 summary.stopped = summary.stopped or f"variant {outcome.index}: {outcome.reason}"

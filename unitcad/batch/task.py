@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad import files
+from unitcad.batch.batch_records import Values
 from unitcad.batch.row import row
 from unitcad.cache import Bundle, DiskStore, MemoryStore, digest
 from unitcad.errors import Refusal, UnitcadError
@@ -71,7 +72,7 @@ class VariantOutcome:
     index: int
     status: str
     folder: str = ""
-    row: dict[str, Any] = field(default_factory=dict)
+    row: Values = field(default_factory=dict)
     reason: str = ""
     seconds: float = 0.0
     built: int = 0

@@ -13,6 +13,7 @@ from unitcad.cli.output import warn
 
 if TYPE_CHECKING:
     from unitcad.batch import Summary
+    from unitcad.batch.batch_records import Preview
 
 
 def batch(
@@ -64,7 +65,7 @@ def batch(
     json_lines: Annotated[bool, typer.Option("--json-lines", help="One JSON object a line as variants end.")] = False,
 ) -> None:
     """Make every variant of a sweep, each distinct part once. The last line printed is the folder."""
-    from dataclasses import asdict
+    from msgspec import to_builtins
 
     from unitcad.batch import BatchOptions, load_sweep, run
     from unitcad.batch.cluster import Certificates
@@ -84,8 +85,8 @@ def batch(
     allow_code(code, nothing_else=dry_run)
     options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify)
     if dry_run:
-        found = preview(wanted, options)
-        print_json(found) if as_json or json_lines else _tell_preview(found)
+        size = preview(wanted, options)
+        print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)
         return
     folder = out or Path("out") / wanted.slug
     try:
@@ -108,25 +109,25 @@ def batch(
 
         write_report(folder, warn)
     if as_json:
-        print_json({"folder": str(folder), **asdict(summary)})
+        print_json({"folder": str(folder), **to_builtins(summary)})
     elif not json_lines:
-        _tell(summary, folder)
+        _print_summary(summary, folder)
     if summary.failed or summary.stopped:
         sys.exit(1)
 
 
-def _tell(summary: Summary, folder: Path) -> None:
+def _print_summary(summary: Summary, folder: Path) -> None:
     from unitcad.check.findings import counted
 
     for warning in summary.warnings:
         warn(f"warning: {warning}")
     for failure in summary.failures:
-        warn(f"variant {failure['index']}: {failure['status']}: {failure['reason']}")
+        warn(f"variant {failure.index}: {failure.status}: {failure.reason}")
     if summary.failed > len(summary.failures):
         typer.echo(f"and {summary.failed - len(summary.failures)} more: see variants.csv", err=True)
     if summary.stopped:
         warn(f"stopped: {summary.stopped}; the next run takes up the rest")
-    before = f" ({summary.taken_up} from before)" if summary.taken_up else ""
+    before = f" ({summary.resumed} from before)" if summary.resumed else ""
     left = summary.variants - summary.done
     parts = [
         f"{summary.ok} of {counted(summary.variants, 'variant')} made{before}",
@@ -140,16 +141,15 @@ def _tell(summary: Summary, folder: Path) -> None:
     typer.echo(str(folder))
 
 
-def _tell_preview(found: dict) -> None:
+def _print_preview(size: Preview) -> None:
     from unitcad.check.findings import counted
 
-    about = "" if found["exact"] else "about "
-    geometries = counted(found["geometries"], "geometry", "geometries")
-    typer.echo(f"{counted(found['variants'], 'variant')} of {about}{geometries}")
-    typer.echo(f"{about}{counted(found['parts'], 'distinct part')}")
-    sizes = f"{found['stored_mb']:.1f} MB stored, {found['linked_mb']:.1f} MB with every link counted"
-    typer.echo(f"about {counted(found['files'], 'file')}, {sizes}")
-    for refused in found["refused"]:
-        warn(f"variant {refused['index']} can't be: {refused['reason']}")
-    if found["refused_count"] > len(found["refused"]):
-        typer.echo(f"and {about}{found['refused_count'] - len(found['refused'])} more", err=True)
+    about = "" if size.exact else "about "
+    typer.echo(f"{counted(size.variants, 'variant')} of {about}{counted(size.geometries, 'geometry', 'geometries')}")
+    typer.echo(f"{about}{counted(size.parts, 'distinct part')}")
+    stored = f"{size.stored_mb:.1f} MB stored, {size.linked_mb:.1f} MB with every link counted"
+    typer.echo(f"about {counted(size.files, 'file')}, {stored}")
+    for refused in size.refused:
+        warn(f"variant {refused.index} can't be: {refused.reason}")
+    if size.refused_count > len(size.refused):
+        typer.echo(f"and {about}{size.refused_count - len(size.refused)} more", err=True)

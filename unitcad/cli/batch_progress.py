@@ -7,7 +7,10 @@ import json
 import sys
 from collections.abc import Iterator
 
-from unitcad.batch.run import Summary, Watch
+from msgspec import to_builtins
+
+from unitcad.batch.batch_records import Summary
+from unitcad.batch.run import Watch
 from unitcad.batch.task import VariantOutcome
 from unitcad.cli.output import console
 
@@ -26,9 +29,9 @@ def watching(json_lines: bool) -> Iterator[Watch]:
 
 def _line(summary: Summary, outcome: VariantOutcome | None) -> None:
     if outcome is None:
-        told = {"event": "end", **{k: v for k, v in vars(summary).items() if k != "failures"}}
+        event = {"event": "end", **{k: v for k, v in to_builtins(summary).items() if k != "failures"}}
     else:
-        told = {
+        event = {
             "event": "variant",
             "index": outcome.index,
             "status": outcome.status,
@@ -38,7 +41,7 @@ def _line(summary: Summary, outcome: VariantOutcome | None) -> None:
             "done": summary.done,
             "variants": summary.variants,
         }
-    sys.stdout.write(json.dumps(told) + "\n")
+    sys.stdout.write(json.dumps(event) + "\n")
     sys.stdout.flush()
 
 
