@@ -1,4 +1,4 @@
-"""Mesh files judged as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB and STEP, by named rules.
+"""Checks of mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB and STEP, by named rules.
 
 `check_file(path, Options())` gives a `FileReport`. Needs numpy and scipy; knows nothing of CAD. Importing it is light:
 readers and rules are loaded by the first file that needs them.

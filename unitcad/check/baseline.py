@@ -2,7 +2,7 @@
 
 A finding is known if the baseline lists its code for the file with at least this count and severity, and each of its
 places near a listed one. Places are middles of boxes, so the order of vertices and faces does not matter. An error that
-ended the judgement of a file is never known, nor is one about a manifest.
+ended the check of a file is never known, nor is one about a manifest.
 """
 
 from __future__ import annotations
@@ -68,34 +68,34 @@ def read(path: Path) -> Baseline:
     """Read a baseline. Raises UnitcadError where there is none."""
     content = files.read(path, largest=_LARGEST)
     try:
-        found = msgspec.json.decode(content, type=Baseline)
+        baseline = msgspec.json.decode(content, type=Baseline)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UnitcadError(f"{path}: not a baseline of `unitcad check`: {_fault(error)}; {_AGAIN}") from None
-    if found.unitcad_baseline != 1:
-        raise UnitcadError(f"{path}: a baseline of form {found.unitcad_baseline}; this version reads form 1")
-    return found
+    if baseline.unitcad_baseline != 1:
+        raise UnitcadError(f"{path}: a baseline of form {baseline.unitcad_baseline}; this version reads form 1")
+    return baseline
 
 
 def write(path: Path, old: Baseline, reports: Sequence[FileReport]) -> Baseline:
     """Write the findings of the reports as known, and return them.
 
-    Entries of `old` for files that were not judged stay as long as the file exists.
+    Entries of `old` for files that were not checked stay as long as the file exists.
     """
-    judged = {
+    checked = {
         _key(path, report.path): [_entry(item) for item in report.findings if _may_be(item)] for report in reports
     }
     stay = {key: known for key, known in old.files.items() if os.path.exists(os.path.join(path.parent, key))}
-    entries = {key: known for key, known in sorted((stay | judged).items()) if known}
-    found = Baseline(1, entries)
-    files.write(path, msgspec.json.format(msgspec.json.encode(found), indent=1) + b"\n")
-    return found
+    entries = {key: known for key, known in sorted((stay | checked).items()) if known}
+    baseline = Baseline(1, entries)
+    files.write(path, msgspec.json.format(msgspec.json.encode(baseline), indent=1) + b"\n")
+    return baseline
 
 
 def apply(baseline: Baseline, path: Path, report: FileReport) -> FileReport:
     """The report with what the baseline at `path` lists marked as known."""
     known = {entry.code: entry for entry in baseline.files.get(_key(path, report.path), [])}
-    found = tuple(_compared(item, known.get(item.code), report.facts) for item in report.findings)
-    return replace(report, findings=found)
+    findings = tuple(_compared(item, known.get(item.code), report.facts) for item in report.findings)
+    return replace(report, findings=findings)
 
 
 def _key(path: Path, file: str) -> str:
@@ -103,14 +103,14 @@ def _key(path: Path, file: str) -> str:
     return files.seen_from(file, path.parent).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
-def _may_be(found: Finding) -> bool:
-    return not found.ends and not found.code.startswith("M")
+def _may_be(finding: Finding) -> bool:
+    return not finding.ends and not finding.code.startswith("M")
 
 
-def _entry(found: Finding) -> Entry:
-    places = sorted({_rounded(place.centre) for place in found.locations if place.centre is not None})
-    names = sorted({_name(place) for place in found.locations if place.centre is None})
-    return Entry(found.code, found.severity, found.count, places, names)
+def _entry(finding: Finding) -> Entry:
+    places = sorted({_rounded(place.centre) for place in finding.locations if place.centre is not None})
+    names = sorted({_name(place) for place in finding.locations if place.centre is None})
+    return Entry(finding.code, finding.severity, finding.count, places, names)
 
 
 def _rounded(point: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -123,28 +123,29 @@ def _name(place: Location) -> str:
     return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
-def _compared(found: Finding, entry: Entry | None, facts: Facts) -> Finding:
+def _compared(finding: Finding, entry: Entry | None, facts: Facts) -> Finding:
     """The finding as known, or with the places that are new in front."""
-    if entry is None or not _may_be(found):
-        return found
-    new = _new(found, entry, facts)
-    worse = SEVERITIES.index(found.severity) > (SEVERITIES.index(entry.severity) if entry.severity in SEVERITIES else 0)
-    if not worse and not new.any() and (found.count <= entry.count or rules()[found.code].count_is_size):
-        return replace(found, known=True)
+    if entry is None or not _may_be(finding):
+        return finding
+    new = _new(finding, entry, facts)
+    known = SEVERITIES.index(entry.severity) if entry.severity in SEVERITIES else 0
+    worse = SEVERITIES.index(finding.severity) > known
+    if not worse and not new.any() and (finding.count <= entry.count or rules()[finding.code].count_is_size):
+        return replace(finding, known=True)
     order = np.argsort(~new, kind="stable")
-    message = found.message if worse else f"{found.message} ({entry.count} in the baseline)"
-    return replace(found, message=message, locations=tuple(found.locations[i] for i in order))
+    message = finding.message if worse else f"{finding.message} ({entry.count} in the baseline)"
+    return replace(finding, message=message, locations=tuple(finding.locations[i] for i in order))
 
 
-def _new(found: Finding, entry: Entry, facts: Facts) -> Bools:
+def _new(finding: Finding, entry: Entry, facts: Facts) -> Bools:
     """Which of the finding's locations the entry does not have."""
-    places = found.locations
+    places = finding.locations
     points = np.array([place.centre or (math.nan,) * 3 for place in places], float).reshape(-1, 3)
     named = np.isnan(points[:, 0])
     names = set(entry.names)
     new = np.array([named[i] and _name(place) not in names for i, place in enumerate(places)], bool)
     if not named.all():
-        new[~named] = ~_near(points[~named], np.array(entry.places, float).reshape(-1, 3), found.code, facts)
+        new[~named] = ~_near(points[~named], np.array(entry.places, float).reshape(-1, 3), finding.code, facts)
     return new
 
 

@@ -1,4 +1,4 @@
-"""How much detail a report has: locations of a finding, and meshes to draw. Set for the time a file is judged."""
+"""How much detail a report has: locations of a finding, and meshes to draw. Set while a file is checked."""
 
 from __future__ import annotations
 

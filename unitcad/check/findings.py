@@ -1,4 +1,4 @@
-"""What a check finds, as frozen data: a finding a rule, facts of the file, and the report that holds both."""
+"""The results of a check as frozen data: a finding for each rule that is broken, facts of the file, its report."""
 
 from __future__ import annotations
 
@@ -73,10 +73,10 @@ class Location:
 
 @dataclass(frozen=True)
 class Finding:
-    """One rule's verdict on one file: how often, and where first.
+    """One rule that a file breaks: how often, and where first.
 
-    `ends`: it ended the judgement, so that other rules were not run; no filter drops it. `known`: a baseline lists it,
-    and it does not fail.
+    `ends`: it ended the check of the file, so that other rules were not run; no filter drops it. `known`: a baseline
+    lists it, and it does not fail.
     """
 
     code: str
@@ -125,7 +125,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class FileReport:
-    """A file's findings, sorted by severity and code, its facts, and the wall time that judging it took, if known.
+    """A file's findings, sorted by severity and code, its facts, and the wall time that the check took, if known.
 
     `meshes`: those that the locations number, where `Options.draw` asked for them.
     """
@@ -139,8 +139,8 @@ class FileReport:
     @property
     def verdict(self) -> str:
         """`error`, `warning` or `pass`: the worst finding, infos and known ones aside."""
-        found = {finding.severity for finding in self.findings if not finding.known}
-        return "error" if "error" in found else "warning" if "warning" in found else "pass"
+        severities = {finding.severity for finding in self.findings if not finding.known}
+        return "error" if "error" in severities else "warning" if "warning" in severities else "pass"
 
     def has(self, code: str) -> bool:
         """Whether a finding of that code is there."""
@@ -162,14 +162,14 @@ class FileReport:
 
 
 def ending(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The findings, the errors among them marked as what ended the judgement."""
+    """The findings, the errors among them marked as what ended the check."""
     return tuple(replace(item, ends=True) if item.severity == "error" else item for item in findings)
 
 
-def said(found: Finding, places: int) -> str:
-    """The message, and in brackets the first so many places."""
-    shown = ", ".join(text for place in found.locations[:places] if (text := str(place)))
-    return f"{found.message}{f' (at {shown})' if shown else ''}"
+def with_places(finding: Finding, places: int) -> str:
+    """Return the message, and in brackets the first so many places."""
+    shown = ", ".join(text for place in finding.locations[:places] if (text := str(place)))
+    return f"{finding.message}{f' (at {shown})' if shown else ''}"
 
 
 def number(length: SupportsFloat, digits: int = 6) -> str:
@@ -213,6 +213,6 @@ def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
             old.ends or new.ends,
         )
     for code in merged:
-        found = by_code[code]
-        by_code[code] = replace(found, message=f"{found.message} ({found.count} in all)")
-    return tuple(sorted(by_code.values(), key=lambda found: (-SEVERITIES.index(found.severity), found.code)))
+        finding = by_code[code]
+        by_code[code] = replace(finding, message=f"{finding.message} ({finding.count} in all)")
+    return tuple(sorted(by_code.values(), key=lambda finding: (-SEVERITIES.index(finding.severity), finding.code)))

@@ -88,13 +88,13 @@ def _together(old: ListedFile, new: ListedFile) -> ListedFile:
 
 
 def work(listing: Listing, paths: Sequence[str], options: Choice, printer_named: bool) -> list[tuple[str, Options]]:
-    """What to judge: the named files, or all meshes of the manifest; tools with a printer, other parts without.
+    """Choose what to check: the named files, or all meshes of the manifest; tools with a printer, other parts without.
 
     `options` gives those of a path.
     """
     chosen = list(paths) or [files.seen_from(path) for path in listing.files if path.lower().endswith(_MESHES)]
     known = catalogue.printers()
-    found = []
+    pairs = []
     for path in chosen:
         part = listing.files.get(os.path.abspath(path))
         chosen_here = options(path)
@@ -103,24 +103,25 @@ def work(listing: Listing, paths: Sequence[str], options: Choice, printer_named:
             printer = known.get(listing.printer or "fdm-0.4") if part.tool else None
         elif part is not None and not part.tool:
             printer = None
-        found.append((path, replace(chosen_here, printer=printer)))
-    return found
+        pairs.append((path, replace(chosen_here, printer=printer)))
+    return pairs
 
 
 def compare(listing: Listing, report: FileReport, options: Options) -> FileReport:
     """The report with what the manifest adds to it."""
     part = listing.files.get(os.path.abspath(report.path))
-    found = [M004.finding("the manifest does not list this file")] if part is None else list(check_listed(part, report))
-    added = [item for item in found if options.wants(item.code)]
+    unlisted = [M004.finding("the manifest does not list this file")]
+    findings = unlisted if part is None else check_listed(part, report)
+    added = [item for item in findings if options.wants(item.code)]
     return replace(report, findings=merge([*report.findings, *added]))
 
 
-def unjudged(listing: Listing, judged: Sequence[str], options: Choice) -> list[FileReport]:
-    """Reports of the listed files that were not judged (STEP, drawings, ...) and are gone or changed: M003, M004.
+def unchecked(listing: Listing, checked: Sequence[str], options: Choice) -> list[FileReport]:
+    """Reports of the listed files that were not checked (STEP, drawings, ...) and are gone or changed: M003, M004.
 
     One of the manifest itself comes last where it lists paths outside its folder (M005): nothing there is read.
     """
-    seen = {os.path.abspath(path) for path in judged}
+    seen = {os.path.abspath(path) for path in checked}
     left = [files.seen_from(path) for path in listing.files if path not in seen]
     reports = [compare(listing, FileReport(path), options(path)) for path in left]
     name = files.seen_from(listing.path)
@@ -129,6 +130,5 @@ def unjudged(listing: Listing, judged: Sequence[str], options: Choice) -> list[F
             ", ..." if len(listing.outside) > 3 else ""
         )
         text = f"{counted(len(listing.outside), 'path')} outside the manifest's folder: {shown}"
-        found = M005.finding(text, len(listing.outside))
-        reports.append(FileReport(name, (found,)))
+        reports.append(FileReport(name, (M005.finding(text, len(listing.outside)),)))
     return [report for report in reports if report.findings]

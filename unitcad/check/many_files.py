@@ -1,4 +1,4 @@
-"""Many files: folders and globs expanded, judged one after the other or by several processes, within hard limits."""
+"""Many files: folders and globs expanded, checked one after the other or by several processes, within hard limits."""
 
 from __future__ import annotations
 
@@ -67,10 +67,10 @@ def _walked(folder: Path) -> Iterator[str]:
 
 
 def _readable(paths: list[str]) -> tuple[list[str], list[FileReport]]:
-    """Files of a folder that can be judged here, and for those that only an extra reads a report with a warning."""
+    """Files of a folder that can be checked here, and for those that only an extra reads a report with a warning."""
     step = [] if read_step.installed() else [path for path in paths if Path(path).suffix.lower() in (".step", ".stp")]
-    said = F012.finding(f"{read_step.NEEDS}; not judged", severity="warning")
-    return [path for path in paths if path not in step], [FileReport(path, (said,)) for path in step]
+    warning = F012.finding(f"{read_step.NEEDS}; not checked", severity="warning")
+    return [path for path in paths if path not in step], [FileReport(path, (warning,)) for path in step]
 
 
 def _inside(paths: Iterable[str]) -> list[str]:
@@ -145,7 +145,7 @@ def _in_processes(
                 done += 1
         except BrokenProcessPool:
             # A worker died (killed for its memory, or a crash in native code). Which file it was is found by
-            # judging the first unfinished one alone.
+            # checking the first unfinished one alone.
             yield _alone(*left[done], memory_mb, then)
             done += 1
         finally:
@@ -159,7 +159,7 @@ def _alone(path: str, options: Options, memory_mb: int | None, then: Then | None
         try:
             return pool.submit(guarded, path, options, then).result()
         except BrokenProcessPool:
-            return _stopped(path, "the process that judged it died (memory, or a fault in native code)")
+            return _stopped(path, "the process that checked it died (memory, or a fault in native code)")
 
 
 def _limit_memory(memory_mb: int | None) -> None:

@@ -32,7 +32,7 @@ _KINDS = {
 
 
 def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) -> FileReport:
-    """Judge a mesh in memory: vertices (n, 3) mm, faces (m, 3) indices. The report's path is empty."""
+    """Check a mesh in memory: vertices (n, 3) mm, faces (m, 3) indices. The report's path is empty."""
     options = options or Options()
     points = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
     triangles = np.asarray(faces).reshape(-1, 3)
@@ -47,7 +47,7 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
 
 
 def check_file(path: str | Path, options: Options | None = None) -> FileReport:
-    """Judge one file. Missing, unreadable and hostile files are findings of the report."""
+    """Check one file. Missing, unreadable and hostile files are findings of the report."""
     options = options or Options()
     place = Path(path)
     return _guarded(
@@ -56,7 +56,7 @@ def check_file(path: str | Path, options: Options | None = None) -> FileReport:
 
 
 def check_bytes(data: bytes, name: str, options: Options | None = None) -> FileReport:
-    """Judge a file's content without the file; `name` says by its suffix what it is. Not for STEP."""
+    """Check a file's content without the file; `name` says by its suffix what it is. Not for STEP."""
     options = options or Options()
     return _guarded(name, options, lambda deadline: _check(data, Path(name), options, deadline))
 

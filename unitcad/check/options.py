@@ -16,12 +16,12 @@ UNITS_MM = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4,
 
 @dataclass(frozen=True)
 class Options:
-    """What to judge and against what.
+    """What to check a file for, and for which printer.
 
     `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all. An error
-    that ended the judgement of a file (not readable, a limit reached, no mesh) is kept whatever they say.
+    that ended the check of a file (not readable, a limit reached, no mesh) is kept whatever they say.
     `unit`: unit of formats that have none (a key of UNITS_MM); `printer`: D and S002 rules for it.
-    `shells`: the number of shells expected (G005). `cross`: judge self-crossing. `strict_3mf`: what the 3MF
+    `shells`: the number of shells expected (G005). `cross`: look for self-crossing. `strict_3mf`: what the 3MF
     specification forbids and common programs write all the same is an error, not a warning. `unwanted`: prefixes of
     codes that no select brings back. `locations`: how many are kept of a finding; `draw`: keep meshes with the report.
     """
@@ -39,7 +39,7 @@ class Options:
     draw: bool = False
 
     def wants(self, code: str) -> bool:
-        """Whether findings of `code` are reported, unless they ended the judgement: those always are."""
+        """Whether findings of `code` are reported, unless they ended the check: those always are."""
         chosen = max((len(p) for p in self.select if code.startswith(p)), default=-1 if self.select else 0)
         dropped = max((len(p) for p in self.ignore if code.startswith(p)), default=-1)
         return chosen >= 0 and chosen > dropped and not code.startswith(self.unwanted or ("-",))

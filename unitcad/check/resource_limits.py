@@ -27,7 +27,7 @@ class Limits:
 
 
 class Unreadable(Exception):
-    """The judgement can go no further; the findings say why, and no filter drops the errors among them.
+    """The check can go no further; the findings say why, and no filter drops the errors among them.
 
     What was found before, and the facts known by then, are added on the way up (`keeping`).
     """
@@ -52,11 +52,11 @@ def over_limit(what: str) -> Unreadable:
 
 @contextlib.contextmanager
 def keeping(
-    found: Sequence[Finding] = (),
+    findings: Sequence[Finding] = (),
     facts: Facts | None = None,
     change: Callable[[Iterable[Finding]], Iterable[Finding]] = iter,
 ) -> Iterator[None]:
-    """Put what `found` holds by then, and the facts, beside what ends the judgement inside; `change` all of it.
+    """Put the findings by then, and the facts, beside what ends the check inside; `change` all of them.
 
     Raises `Unreadable`, with F011 where memory runs out or calls nest too deeply.
     """
@@ -67,7 +67,7 @@ def keeping(
             stop = error
         else:
             stop = over_limit("out of memory (--memory)" if isinstance(error, MemoryError) else "nested too deeply")
-        stop.findings = tuple(change((*found, *stop.findings)))
+        stop.findings = tuple(change((*findings, *stop.findings)))
         if facts is not None and stop.facts == Facts():
             stop.facts = facts
         raise stop from None

@@ -73,13 +73,13 @@ class _Turned:
     scale: float
 
 
-def _turned(found: Object, linear: Floats, factor: float) -> _Turned:
+def _turned(model_object: Object, linear: Floats, factor: float) -> _Turned:
     """Measured once for all instances that differ by a shift: adding it to the box rounds as it does every vertex."""
-    assert found.vertices is not None
-    assert found.triangles is not None
+    assert model_object.vertices is not None
+    assert model_object.triangles is not None
     with np.errstate(all="ignore"):
-        points = (found.vertices @ linear) * factor
-        a, b, c = (points[found.triangles[:, i]] for i in range(3))
+        points = (model_object.vertices @ linear) * factor
+        a, b, c = (points[model_object.triangles[:, i]] for i in range(3))
         area = float(np.linalg.norm(cross(b - a, c - a), axis=1).sum()) / 2
         return _Turned(np.stack(extent(points)), area, abs(float(np.linalg.det(linear))))
 
@@ -100,24 +100,24 @@ def _geometry(
     watertight = known = bool(instances)
     compared, solids = options.cross and len(instances) > 1, list[Placed]()
     for instance in instances:
-        found = models[instance.key[0]].resources[instance.key[1]]
-        assert isinstance(found, Object)
-        assert found.vertices is not None
-        assert found.triangles is not None
-        if not len(found.triangles):
+        model_object = models[instance.key[0]].resources[instance.key[1]]
+        assert isinstance(model_object, Object)
+        assert model_object.vertices is not None
+        assert model_object.triangles is not None
+        if not len(model_object.triangles):
             continue
         factor = UNITS_MM.get(models[instance.key[0]].unit, 1.0)
         if instance.key not in checked:
-            checked[instance.key] = _check_object(found, instance.key[0], factor, options, deadline)
+            checked[instance.key] = _check_object(model_object, instance.key[0], factor, options, deadline)
             findings += checked[instance.key].findings
         facts = checked[instance.key].facts
         linear = instance.key, instance.matrix[:3].tobytes()
         if linear not in turned:
-            turned[linear] = _turned(found, instance.matrix[:3], factor)
+            turned[linear] = _turned(model_object, instance.matrix[:3], factor)
         one = turned[linear]
         boxes.append(one.box)
         shifts.append(instance.matrix[3] * factor)
-        placed.append(found.id)
+        placed.append(model_object.id)
         triangles += facts.triangles or 0
         vertices += facts.vertices or 0
         shells += facts.shells or 0
@@ -128,8 +128,8 @@ def _geometry(
         known = known and facts.volume_mm3 is not None
         if compared and facts.watertight and size > 0 and len(solids) <= MOST:
             with np.errstate(all="ignore"):
-                mesh = mesh_of(found, instance.key[0], factor, instance.matrix)
-            solids.append(Placed(mesh.vertices, mesh.faces, size, str(found.id)))
+                mesh = mesh_of(model_object, instance.key[0], factor, instance.matrix)
+            solids.append(Placed(mesh.vertices, mesh.faces, size, str(model_object.id)))
         deadline.tick()
     if not triangles:
         return list(ending(findings)), Facts(triangles=0, vertices=vertices, shells=0)
@@ -160,11 +160,11 @@ def _geometry(
     return findings, facts
 
 
-def _check_object(found: Object, part: str, factor: float, options: Options, deadline: Deadline) -> CheckedMesh:
+def _check_object(model_object: Object, part: str, factor: float, options: Options, deadline: Deadline) -> CheckedMesh:
     """The geometry rules for one object; only model and solidsupport objects must be solids, unless slices stand in."""
-    mesh = mesh_of(found, part, factor)
-    stand_in = found.attributes.get(f"{elements.SLICE} meshresolution") == "lowres"
-    if found.type not in ("model", "solidsupport") or stand_in:
+    mesh = mesh_of(model_object, part, factor)
+    stand_in = model_object.attributes.get(f"{elements.SLICE} meshresolution") == "lowres"
+    if model_object.type not in ("model", "solidsupport") or stand_in:
         return CheckedMesh((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)))
     with keeping(change=_filled):
         checked = check_surface(mesh, deadline, cross=options.cross)
@@ -198,7 +198,7 @@ def overlapping(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
     boxes = [extent(solid.vertices) for solid in some]
     low, high = np.array([box[0] for box in boxes]), np.array([box[1] for box in boxes])
     solids: dict[int, Manifold] = {}
-    found: list[Location] = []
+    places: list[Location] = []
     pairs = g_shells.box_pairs(low, high, deadline)
     try:
         for a, b in pairs[:_PAIRS].tolist():
@@ -210,18 +210,18 @@ def overlapping(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
             if _shared(a, b, some, solids) > _SHARE * least:
                 centre = (np.maximum(low[a], low[b]) + np.minimum(high[a], high[b])) / 2
                 xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
-                found.append(Location(xyz=xyz, object=f"{some[a].name} and {some[b].name}"))
+                places.append(Location(xyz=xyz, object=f"{some[a].name} and {some[b].name}"))
     except Unreadable as stop:
-        stop.findings = (*_said(found, among=True), *stop.findings)
+        stop.findings = (*_overlaps(places, among=True), *stop.findings)
         raise
-    return _said(found, among=len(placed) > MOST or len(pairs) > _PAIRS)
+    return _overlaps(places, among=len(placed) > MOST or len(pairs) > _PAIRS)
 
 
-def _said(found: list[Location], *, among: bool) -> list[Finding]:
-    if not found:
+def _overlaps(places: list[Location], *, among: bool) -> list[Finding]:
+    if not places:
         return []
-    text = f"{counted(len(found), 'pair')} of instances that share volume{' among those compared' if among else ''}"
-    return [G002.finding(f"{text} (3MF's fill rule says what is solid)", len(found), found, "warning")]
+    text = f"{counted(len(places), 'pair')} of instances that share volume{' among those compared' if among else ''}"
+    return [G002.finding(f"{text} (3MF's fill rule says what is solid)", len(places), places, "warning")]
 
 
 def _shared(a: int, b: int, some: Sequence[Placed], solids: dict[int, Manifold]) -> float:
@@ -235,24 +235,24 @@ def _shared(a: int, b: int, some: Sequence[Placed], solids: dict[int, Manifold])
 def printed(
     models: dict[str, Model], instances: Sequence[Instance], printer: Printer, deadline: Deadline
 ) -> list[Finding]:
-    """The printer's rules for each instance; those that differ by their place on the bed alone are judged once."""
-    found: list[Finding] = []
+    """The printer's rules for each instance; those that differ by their place on the bed alone are checked once."""
+    findings: list[Finding] = []
     checked: dict[tuple[Key, bytes, float], tuple[Floats, tuple[Finding, ...]]] = {}
     for instance in instances:
-        thing = models[instance.key[0]].resources[instance.key[1]]
-        assert isinstance(thing, Object)
-        if thing.type != "model" or thing.triangles is None or not len(thing.triangles):
+        model_object = models[instance.key[0]].resources[instance.key[1]]
+        assert isinstance(model_object, Object)
+        if model_object.type != "model" or model_object.triangles is None or not len(model_object.triangles):
             continue
         factor = UNITS_MM.get(models[instance.key[0]].unit, 1.0)
         alike = instance.key, instance.matrix[:3].tobytes(), float(instance.matrix[3, 2])
         if alike not in checked:
-            mesh = mesh_of(thing, instance.key[0], factor, instance.matrix)
-            with keeping(found):
+            mesh = mesh_of(model_object, instance.key[0], factor, instance.matrix)
+            with keeping(findings):
                 part = Inspection(mesh, topology_of(mesh, deadline), deadline)
                 checked[alike] = instance.matrix[3], check_on_bed(part, printer)
         begin, of = checked[alike]
-        found += _shifted(of, (instance.matrix[3] - begin) * factor)
-    return found
+        findings += _shifted(of, (instance.matrix[3] - begin) * factor)
+    return findings
 
 
 def _shifted(findings: Sequence[Finding], by: Floats) -> Iterator[Finding]:

@@ -159,7 +159,7 @@ def _run(
     work = listing.work(listed, paths, options, printer_named)
     judged = list(check_all(work))
     compared = [listing.compare(listed, report, options(report.path)) for report in judged]
-    return reports + compared + listing.unjudged(listed, [path for path, _ in work], options)
+    return reports + compared + listing.unchecked(listed, [path for path, _ in work], options)
 
 
 def _drawn(show: str | None) -> Callable[[FileReport], FileReport] | None:

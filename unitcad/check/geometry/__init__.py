@@ -1,1 +1,1 @@
-"""Geometry of triangle meshes, without rules: what the rules judge by."""
+"""Geometry of triangle meshes, which the rules use."""

@@ -32,7 +32,7 @@ class Edges:
 
 
 def scipy_pays(n: int) -> bool:
-    """Whether scipy's compiled code pays for `n` rows: to load it takes longer than to judge a small mesh without."""
+    """Whether scipy's compiled code pays for `n` rows: to load it takes longer than to check a small mesh without."""
     return n > _SMALL or "scipy.sparse" in sys.modules
 
 

@@ -1,4 +1,4 @@
-"""The topology of a mesh: edges, shells, what is open, wound wrongly or pinched. What the rules judge a mesh by."""
+"""The topology of a mesh: edges, shells, what is open, wound wrongly or pinched."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A mesh as the rules see it: vertices in mm, faces as indices, and what the file said besides.
+"""A mesh as the rules see it: vertices in mm, faces as indices, and what else the file has.
 
 Readers give a triangle soup or an indexed mesh; `weld_exact` makes the one into the other without moving a vertex.
 """

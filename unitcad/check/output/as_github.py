@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from unitcad.check.findings import FileReport, said
+from unitcad.check.findings import FileReport, with_places
 from unitcad.check.output.as_text import line, summary
 from unitcad.check.rules.registry import rules
 from unitcad.text import printable
@@ -16,15 +16,15 @@ def github(reports: Sequence[FileReport]) -> str:
     """Workflow commands: an annotation a finding that is not known, then a line for the log that counts."""
     lines = []
     for report in reports:
-        for found in report.findings:
-            if found.known:
-                lines.append(f"known: {line(report, found)}")
+        for finding in report.findings:
+            if finding.known:
+                lines.append(f"known: {line(report, finding)}")
                 continue
-            title = f"{found.code} {rules()[found.code].title}"
-            first = next((place.line for place in found.locations if place.line is not None), None)
+            title = f"{finding.code} {rules()[finding.code].title}"
+            first = next((place.line for place in finding.locations if place.line is not None), None)
             where = f"file={_property(report.path)}" + (f",line={first}" if first is not None else "")
-            text = f"{said(found, 3)}. Fix: {rules()[found.code].fix}"
-            lines.append(f"::{_GITHUB[found.severity]} {where},title={_property(title)}::{_data(text)}")
+            text = f"{with_places(finding, 3)}. Fix: {rules()[finding.code].fix}"
+            lines.append(f"::{_GITHUB[finding.severity]} {where},title={_property(title)}::{_data(text)}")
     return "\n".join([*lines, summary(reports)]) + "\n"
 
 

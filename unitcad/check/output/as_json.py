@@ -19,6 +19,6 @@ def as_dict(reports: Sequence[FileReport], config: str | None = None, baseline: 
 
 def _entry(report: FileReport) -> dict[str, Any]:
     entry = report.as_dict()
-    for shown, found in zip(entry["findings"], report.findings, strict=True):
-        shown |= {"fix": rules()[found.code].fix, "known": found.known}
+    for shown, finding in zip(entry["findings"], report.findings, strict=True):
+        shown |= {"fix": rules()[finding.code].fix, "known": finding.known}
     return entry

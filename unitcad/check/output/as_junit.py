@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.sax.saxutils import escape, quoteattr
 
-from unitcad.check.findings import SEVERITIES, FileReport, Finding, said
+from unitcad.check.findings import SEVERITIES, FileReport, Finding, with_places
 from unitcad.check.rules.registry import rules
 
 
@@ -14,15 +14,18 @@ def junit(reports: Sequence[FileReport], fail_on: str) -> str:
     least = SEVERITIES.index(fail_on)
     cases, failed = [], 0
     for report in reports:
-        bad = [found for found in report.findings if not found.known and SEVERITIES.index(found.severity) >= least]
-        rest = [found for found in report.findings if found not in bad]
+        bad = [
+            finding for finding in report.findings if not finding.known and SEVERITIES.index(finding.severity) >= least
+        ]
+        rest = [finding for finding in report.findings if finding not in bad]
         failed += bool(bad)
-        inner = "".join(_failure(found) for found in bad)
+        inner = "".join(_failure(finding) for finding in bad)
         if rest:
-            told = "\n".join(
-                f"{found.code} {found.severity}{' (known)' if found.known else ''}: {said(found, 3)}" for found in rest
+            others = "\n".join(
+                f"{item.code} {item.severity}{' (known)' if item.known else ''}: {with_places(item, 3)}"
+                for item in rest
             )
-            inner += f"<system-out>{escape(_xml(told))}</system-out>"
+            inner += f"<system-out>{escape(_xml(others))}</system-out>"
         name = f"name={quoteattr(_xml(report.path))}" + _time(report.seconds)
         cases.append(f'<testcase classname="unitcad.check" {name}>{inner}</testcase>')
     known = [report.seconds for report in reports if report.seconds is not None]
@@ -39,11 +42,11 @@ def _time(seconds: float | None) -> str:
     return "" if seconds is None else f' time="{seconds:.3f}"'
 
 
-def _failure(found: Finding) -> str:
-    rule = rules()[found.code]
-    places = [f"at {text}" for place in found.locations if (text := str(place))]
-    body = "\n".join([f"{found.code} {rule.title}: {found.message}", *places, f"Fix: {rule.fix}"])
-    head = f"type={quoteattr(found.code)} message={quoteattr(_xml(said(found, 3)))}"
+def _failure(finding: Finding) -> str:
+    rule = rules()[finding.code]
+    places = [f"at {text}" for place in finding.locations if (text := str(place))]
+    body = "\n".join([f"{finding.code} {rule.title}: {finding.message}", *places, f"Fix: {rule.fix}"])
+    head = f"type={quoteattr(finding.code)} message={quoteattr(_xml(with_places(finding, 3)))}"
     return f"<failure {head}>{escape(_xml(body))}</failure>"
 
 

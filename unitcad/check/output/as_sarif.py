@@ -11,7 +11,7 @@ from typing import Any
 from urllib.parse import quote
 
 from unitcad import __version__
-from unitcad.check.findings import FileReport, Finding, said
+from unitcad.check.findings import FileReport, Finding, with_places
 from unitcad.check.rules.registry import rules
 from unitcad.check.rules.rule import Rule
 from unitcad.text import markdown
@@ -39,7 +39,7 @@ def sarif(reports: Sequence[FileReport]) -> dict[str, Any]:
                     }
                 },
                 "columnKind": "unicodeCodePoints",
-                "results": [_result(report, found, index) for report in reports for found in report.findings],
+                "results": [_result(report, finding, index) for report in reports for finding in report.findings],
             }
         ],
     }
@@ -59,24 +59,24 @@ def _rule(rule: Rule) -> dict[str, Any]:
     }
 
 
-def _result(report: FileReport, found: Finding, index: dict[str, int]) -> dict[str, Any]:
+def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict[str, Any]:
     uri = _uri(report.path)
     physical: dict[str, Any] = {"artifactLocation": {"uri": uri}}
-    line = next((place.line for place in found.locations if place.line is not None), None)
+    line = next((place.line for place in finding.locations if place.line is not None), None)
     if line is not None:
         physical["region"] = {"startLine": max(line, 1)}
-    objects = dict.fromkeys(place.object for place in found.locations if place.object)
+    objects = dict.fromkeys(place.object for place in finding.locations if place.object)
     logical = {"logicalLocations": [{"name": name, "kind": "object"} for name in objects]} if objects else {}
-    fingerprint = hashlib.sha256(f"{_uri(_inside(report.path))}\n{found.code}".encode()).hexdigest()
-    known = {"baselineState": "unchanged", "suppressions": [{"kind": "external"}]} if found.known else {}
+    fingerprint = hashlib.sha256(f"{_uri(_inside(report.path))}\n{finding.code}".encode()).hexdigest()
+    known = {"baselineState": "unchanged", "suppressions": [{"kind": "external"}]} if finding.known else {}
     return {
-        "ruleId": found.code,
-        "ruleIndex": index[found.code],
-        "level": _LEVELS[found.severity],
-        "message": {"text": f"{said(found, 1)}. Fix: {rules()[found.code].fix}"},
+        "ruleId": finding.code,
+        "ruleIndex": index[finding.code],
+        "level": _LEVELS[finding.severity],
+        "message": {"text": f"{with_places(finding, 1)}. Fix: {rules()[finding.code].fix}"},
         "locations": [{"physicalLocation": physical, **logical}],
         "partialFingerprints": {"pathAndRule/v1": fingerprint},
-        "properties": {"count": found.count, "places": [place.as_dict() for place in found.locations]},
+        "properties": {"count": finding.count, "places": [place.as_dict() for place in finding.locations]},
         **known,
     }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from unitcad.check.findings import Facts, FileReport, Finding, counted, number, said
+from unitcad.check.findings import Facts, FileReport, Finding, counted, number, with_places
 from unitcad.check.rules.registry import rules
 from unitcad.text import printable
 
@@ -15,10 +15,10 @@ def text(reports: Sequence[FileReport]) -> str:
     lines = []
     codes: set[str] = set()
     for report in reports:
-        for found in report.findings:
-            if not found.known:
-                codes.add(found.code)
-            lines.append(line(report, found))
+        for finding in report.findings:
+            if not finding.known:
+                codes.add(finding.code)
+            lines.append(line(report, finding))
         if report.verdict == "pass" and (size := _size(report.facts)):
             lines.append(f"{printable(report.path)}: passed: {size}")
     fixes = [f"  {code} {rule.title}: {rule.fix}" for code, rule in rules().items() if code in codes]
@@ -27,10 +27,10 @@ def text(reports: Sequence[FileReport]) -> str:
     return "\n".join([*lines, summary(reports)]) + "\n"
 
 
-def line(report: FileReport, found: Finding) -> str:
+def line(report: FileReport, finding: Finding) -> str:
     """A finding in one line: file, code, severity, message and its first places."""
-    known = " (known)" if found.known else ""
-    return f"{printable(report.path)}: {found.code} {found.severity}{known}: {printable(said(found, 3))}"
+    known = " (known)" if finding.known else ""
+    return f"{printable(report.path)}: {finding.code} {finding.severity}{known}: {printable(with_places(finding, 3))}"
 
 
 _EXPLAIN = "`unitcad check --explain CODE` says what a code means and why it matters."
@@ -58,7 +58,7 @@ def summary(reports: Sequence[FileReport]) -> str:
         f"{verdicts[name]} {word}" for name, word in (("error", "failed"), ("warning", "warned")) if verdicts[name]
     ]
     parts.append(f"{verdicts['pass']} passed")
-    if known := sum(found.known for report in reports for found in report.findings):
+    if known := sum(finding.known for report in reports for finding in report.findings):
         parts.append(counted(known, "known finding"))
     return f"{counted(len(reports), 'file')}: {', '.join(parts)}"
 
@@ -68,9 +68,9 @@ def statistics(reports: Sequence[FileReport]) -> str:
     files: Counter[str] = Counter()
     times: Counter[str] = Counter()
     for report in reports:
-        for found in report.findings:
-            files[found.code] += 1
-            times[found.code] += 1 if rules()[found.code].count_is_size else found.count
+        for finding in report.findings:
+            files[finding.code] += 1
+            times[finding.code] += 1 if rules()[finding.code].count_is_size else finding.count
     lines = [
         f"{counted(n, 'file ', 'files'):>12} {times[code]:9d} x  {code} {rules()[code].title}"
         for code, n in files.most_common()

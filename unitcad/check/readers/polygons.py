@@ -108,7 +108,7 @@ def _in_triangles(
     bent = np.zeros(len(sizes), np.float32)
     counts = np.maximum(sizes - 2, 0)
     first, offsets = np.cumsum(sizes) - sizes, np.cumsum(counts) - counts
-    found = np.empty((int(counts.sum()), 3), corners.dtype)
+    triangles = np.empty((int(counts.sum()), 3), corners.dtype)
     for size in np.unique(sizes[sizes >= 3]).tolist():
         alike = np.flatnonzero(sizes == size)
         step = max(1, _CHUNK // size)
@@ -118,12 +118,12 @@ def _in_triangles(
             ring = corners[first[some, None] + np.arange(size)]
             rows = offsets[some, None] + np.arange(size - 2)
             if size == 3:
-                found[rows[:, 0]] = ring
+                triangles[rows[:, 0]] = ring
                 continue
             cut, off = _cut(vertices[ring], deadline)
-            found[rows] = np.take_along_axis(ring, cut.reshape(len(ring), -1), axis=1).reshape(len(ring), -1, 3)
+            triangles[rows] = np.take_along_axis(ring, cut.reshape(len(ring), -1), axis=1).reshape(len(ring), -1, 3)
             bent[some] = off
-    return found, np.repeat(np.arange(len(sizes)), counts), bent
+    return triangles, np.repeat(np.arange(len(sizes)), counts), bent
 
 
 def _cut(points: Floats, deadline: Deadline) -> tuple[Ints, Floats]:
@@ -167,5 +167,5 @@ def _concave(local: Floats, normal: Floats, fan: Ints) -> Ints:
     if not abs(normal[drop]) > 0:
         return fan
     flat = local[:, [(drop + 1) % 3, (drop + 2) % 3]] * [np.sign(normal[drop]), 1]
-    found = np.asarray(triangulate([flat]))
-    return found if found.shape == fan.shape else fan
+    triangles = np.asarray(triangulate([flat]))
+    return triangles if triangles.shape == fan.shape else fan

@@ -97,10 +97,10 @@ def _no_number(name: str) -> float:
 
 
 def _list(holder: dict[str, Any], key: str) -> list[Any]:
-    found = holder.get(key, [])
-    if not isinstance(found, list):
-        raise _wrong(key, found, "a list")
-    return found
+    value = holder.get(key, [])
+    if not isinstance(value, list):
+        raise _wrong(key, value, "a list")
+    return value
 
 
 def _wrong(what: str, value: Any, wanted: str) -> Unreadable:
@@ -176,7 +176,7 @@ def _matrix(node: dict[str, Any], name: str, findings: list[Finding]) -> Floats:
         return np.array(values, float)
 
     if "matrix" in node:
-        found = numbers("matrix", np.eye(4).ravel().tolist()).reshape(4, 4).T
+        matrix = numbers("matrix", np.eye(4).ravel().tolist()).reshape(4, 4).T
     else:
         x, y, z, w = numbers("rotation", [0.0, 0.0, 0.0, 1.0])
         turned = np.array(
@@ -186,15 +186,15 @@ def _matrix(node: dict[str, Any], name: str, findings: list[Finding]) -> Floats:
                 [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
             ]
         )
-        found = np.eye(4)
-        found[:3, :3] = turned * numbers("scale", [1.0, 1.0, 1.0])
-        found[:3, 3] = numbers("translation", [0.0, 0.0, 0.0])
+        matrix = np.eye(4)
+        matrix[:3, :3] = turned * numbers("scale", [1.0, 1.0, 1.0])
+        matrix[:3, 3] = numbers("translation", [0.0, 0.0, 0.0])
     with np.errstate(all="ignore"):
-        determinant = float(np.linalg.det(found[:3, :3]))
-        size = float(np.prod(np.linalg.norm(found[:3, :3], axis=0)))
+        determinant = float(np.linalg.det(matrix[:3, :3]))
+        size = float(np.prod(np.linalg.norm(matrix[:3, :3], axis=0)))
     if not abs(determinant) > 1e-12 * size:
         findings.append(P013.finding(f"the matrix of {name} has determinant zero", places=[Location(object=name)]))
-    return found
+    return matrix
 
 
 def _polygons(
@@ -291,8 +291,8 @@ def _accessor(document: dict[str, Any], binary: memoryview, index: Any, kind: st
         what = "sparse" if "sparse" in accessor else "without a buffer view"
         raise Unreadable(F003.finding(f"{who} is {what}, which cannot be read; export without compression"))
     if accessor.get("type") != kind or accessor.get("componentType") not in _TYPES:
-        found = f"{accessor.get('type')} of {accessor.get('componentType')}"
-        raise _wrong(who, found, f"{kind} of a known type of numbers")
+        there = f"{accessor.get('type')} of {accessor.get('componentType')}"
+        raise _wrong(who, there, f"{kind} of a known type of numbers")
     view = _entry(document, "bufferViews", accessor["bufferView"], who)
     buffer = _entry(document, "buffers", view.get("buffer"), f"buffer view {accessor['bufferView']}")
     if "uri" in buffer or view.get("buffer") != 0:

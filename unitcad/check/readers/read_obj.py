@@ -44,31 +44,31 @@ def read_obj(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
     if not _ANY.search(raw):
         raise Unreadable(F005.finding("named .obj, but has no line of one"))
     raw = raw.replace(b"\\\n", b" \v")
-    found = _Read()
+    state = _Read()
     with keeping(findings):
         for block, line in rows.blocks(raw, 0, deadline):
-            _take(block, line, found)
-            if max(found.n_vertices, found.n_corners) > 3 * limits.max_faces + 2:
+            _take(block, line, state)
+            if max(state.n_vertices, state.n_corners) > 3 * limits.max_faces + 2:
                 raise over_limit(f"more faces or vertices than --max-faces {limits.max_faces} allows")
-        meshes, more = mesh_of(_polygons(found), limits, deadline)
+        meshes, more = mesh_of(_polygons(state), limits, deadline)
     return meshes, findings + more
 
 
-def _polygons(found: _Read) -> Polygons:
-    named = found.objects or found.groups
+def _polygons(state: _Read) -> Polygons:
+    named = state.objects or state.groups
     empty = np.empty(0, np.int64)
     return Polygons(
-        np.concatenate(found.vertices) if found.vertices else np.empty((0, 3)),
-        np.concatenate([empty, *found.corners]),
-        np.concatenate([empty, *found.sizes]),
-        np.concatenate([empty, *found.lines]).astype(np.int32),
+        np.concatenate(state.vertices) if state.vertices else np.empty((0, 3)),
+        np.concatenate([empty, *state.corners]),
+        np.concatenate([empty, *state.sizes]),
+        np.concatenate([empty, *state.lines]).astype(np.int32),
         np.concatenate([empty, *(starts for starts, _ in named)]),
         b"".join(names for _, names in named),
         counts_from=1,
     )
 
 
-def _take(block: Ints, line: int, found: _Read) -> None:
+def _take(block: Ints, line: int, state: _Read) -> None:
     """Add a block's vertices, faces and names."""
     text = rows.without_comments(block)
     starts, ends = rows.words(text)
@@ -91,23 +91,23 @@ def _take(block: Ints, line: int, found: _Read) -> None:
     points, arguments = statements(b"v")
     if len(points):
         numbers = rows.rows_of(arguments, line, which=points)
-        found.vertices.append(rows.columns(numbers, slice(None), 3))
+        state.vertices.append(rows.columns(numbers, slice(None), 3))
     faces, arguments = statements(b"f")
-    for letter, names in ((b"o", found.objects), (b"g", found.groups)):
+    for letter, names in ((b"o", state.objects), (b"g", state.groups)):
         if (letters == ord(letter)).any():
             named, _ = statements(letter)
             begins = np.flatnonzero(block == NEWLINE)[named] - widths[named] + 1
             places = rows.spread(
                 keys[letters == ord(letter)] + 1, begins + widths[named] - keys[letters == ord(letter)] - 1
             )
-            names.append((found.n_polygons + np.searchsorted(faces, named), block[places].tobytes()))
+            names.append((state.n_polygons + np.searchsorted(faces, named), block[places].tobytes()))
     if len(faces):
-        above = found.n_vertices + np.searchsorted(points, faces)
-        _take_faces(arguments, line, faces, above, found)
-    found.n_vertices += len(points)
+        above = state.n_vertices + np.searchsorted(points, faces)
+        _take_faces(arguments, line, faces, above, state)
+    state.n_vertices += len(points)
 
 
-def _take_faces(text: Ints, line: int, faces: Ints, above: Ints, found: _Read) -> None:
+def _take_faces(text: Ints, line: int, faces: Ints, above: Ints, state: _Read) -> None:
     """Add the faces on the lines `faces`; `above` is how many vertices stand before each."""
     behind = rows.between(text, SLASH, BLANK[text])
     behind[1:] &= ~BLANK[text[:-1]]  # a word that begins with a slash is no index
@@ -117,11 +117,11 @@ def _take_faces(text: Ints, line: int, faces: Ints, above: Ints, found: _Read) -
     wrong = np.flatnonzero((ids == 0) | (ids < -before))
     if len(wrong):
         at = int(refs.lines[np.searchsorted(refs.starts, wrong[0], "right") - 1])
-        said = ids[wrong[0]]
-        why = f"vertex {said}, of {before[wrong[0]]} above it" if said else "vertex 0; OBJ counts from 1"
+        index = ids[wrong[0]]
+        why = f"vertex {index}, of {before[wrong[0]]} above it" if index else "vertex 0; OBJ counts from 1"
         raise Unreadable(P011.finding(f"a face names {why}", places=[Location(line=at)]))
-    found.corners.append(np.where(ids > 0, ids - 1, before + ids))
-    found.sizes.append(sizes)
-    found.lines.append(refs.lines)
-    found.n_polygons += len(sizes)
-    found.n_corners += len(ids)
+    state.corners.append(np.where(ids > 0, ids - 1, before + ids))
+    state.sizes.append(sizes)
+    state.lines.append(refs.lines)
+    state.n_polygons += len(sizes)
+    state.n_corners += len(ids)

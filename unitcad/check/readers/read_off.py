@@ -29,16 +29,16 @@ def read_off(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list
         what = f"{kind}OFF" if kind else "binary OFF"
         raise Unreadable(F003.finding(f"{what} cannot be read; OFF, COFF, NOFF, CNOFF and STOFF in text can"))
     with keeping(findings):
-        found = rows.all_rows(raw, start.end(), raw.count(b"\n", 0, start.end()) + 1, deadline, comments=True)
-        polygons, more = _polygons(found, len(raw), limits)
+        table = rows.all_rows(raw, start.end(), raw.count(b"\n", 0, start.end()) + 1, deadline, comments=True)
+        polygons, more = _polygons(table, len(raw), limits)
         findings += more
         meshes, more = mesh_of(polygons, limits, deadline)
     return meshes, findings + more
 
 
-def _polygons(found: Rows, size: int, limits: Limits) -> tuple[Polygons, list[Finding]]:
-    sizes = found.sizes
-    head = found.values[: sizes[0]] if len(found) else found.values
+def _polygons(table: Rows, size: int, limits: Limits) -> tuple[Polygons, list[Finding]]:
+    sizes = table.sizes
+    head = table.values[: sizes[0]] if len(table) else table.values
     if len(head) not in (2, 3) or (head != np.floor(head)).any() or (head < 0).any():
         raise Unreadable(F003.finding("the counts of vertices, faces and edges are missing"))
     n, m = int(head[0]), int(head[1])
@@ -46,7 +46,7 @@ def _polygons(found: Rows, size: int, limits: Limits) -> tuple[Polygons, list[Fi
         raise over_limit(f"{max(n, m)} vertices or faces promised")
     if max(n, m) > size:
         raise Unreadable(F002.finding(f"{max(n, m)} vertices or faces promised in {size} bytes"))
-    lines = len(found) - 1
+    lines = len(table) - 1
     if lines < n + m:
         text = f"the header promises {counted(n + m, 'line')} of vertices and faces, not {lines}"
         raise Unreadable(F002.finding(text, n + m - lines))
@@ -55,7 +55,7 @@ def _polygons(found: Rows, size: int, limits: Limits) -> tuple[Polygons, list[Fi
         extra = lines - n - m
         findings.append(F006.finding(f"{counted(extra, 'line')} after the last element", extra))
     points, faces = slice(1, n + 1), slice(n + 1, n + m + 1)
-    begins, lines = found.starts[:-1][faces], found.lines[faces]
-    numbers = rows.lengths(found.values[begins], sizes[faces] - 1, lines)
-    corners = rows.integers(found.values[rows.spread(begins + 1, numbers)])
-    return Polygons(rows.columns(found, points, 3), corners, numbers, lines), findings
+    begins, lines = table.starts[:-1][faces], table.lines[faces]
+    numbers = rows.lengths(table.values[begins], sizes[faces] - 1, lines)
+    corners = rows.integers(table.values[rows.spread(begins + 1, numbers)])
+    return Polygons(rows.columns(table, points, 3), corners, numbers, lines), findings

@@ -120,19 +120,19 @@ def _text(
     raw: bytes, at: int, elements: list[_Element], deadline: Deadline
 ) -> tuple[dict[str, dict[str, Column]], Ints | None, list[Finding]]:
     """The wanted columns of each element, the lines of the faces, and findings."""
-    found = rows.all_rows(raw, at, raw.count(b"\n", 0, at) + 1, deadline, comments=False)
+    table = rows.all_rows(raw, at, raw.count(b"\n", 0, at) + 1, deadline, comments=False)
     promised = sum(element.count for element in elements)
-    if len(found) < promised:
+    if len(table) < promised:
         text = (
-            f"the header promises {counted(promised, 'line')} of vertices, faces and other elements, not {len(found)}"
+            f"the header promises {counted(promised, 'line')} of vertices, faces and other elements, not {len(table)}"
         )
-        raise Unreadable(F002.finding(text, promised - len(found)))
-    extra, longer, tables, lines, row = len(found) - promised, 0, {}, None, 0
+        raise Unreadable(F002.finding(text, promised - len(table)))
+    extra, longer, tables, lines, row = len(table) - promised, 0, {}, None, 0
     for element in elements:
         which = slice(row, row + element.count)
-        tables[element.name], more = _text_element(found, which, element)
+        tables[element.name], more = _text_element(table, which, element)
         longer += more
-        lines = found.lines[which] if element.name == "face" else lines
+        lines = table.lines[which] if element.name == "face" else lines
         row += element.count
     findings = [F006.finding(f"{counted(extra, 'line')} after the last element", extra)] if extra else []
     if longer:  # as MeshLab writes, which announces colours of faces and writes a list
@@ -140,17 +140,17 @@ def _text(
     return tables, lines, findings
 
 
-def _text_element(found: Rows, which: slice, element: _Element) -> tuple[dict[str, Column], int]:
+def _text_element(table: Rows, which: slice, element: _Element) -> tuple[dict[str, Column], int]:
     """The wanted columns, and how many records have numbers after their last property; only faces may."""
     columns: dict[str, Column] = {}
-    place, ends, lines = found.starts[:-1][which], found.starts[1:][which], found.lines[which]
+    place, ends, lines = table.starts[:-1][which], table.starts[1:][which], table.lines[which]
     for name, length, _ in element.properties:
         _refuse(place >= ends, element, lines)
         sizes = None
         if length:
-            sizes = rows.lengths(found.values[place], ends - place - 1, lines, element.name)
+            sizes = rows.lengths(table.values[place], ends - place - 1, lines, element.name)
         if name in _WANTED.get(element.name, ()):
-            columns[name] = (sizes, found.values[place if sizes is None else rows.spread(place + 1, sizes)])
+            columns[name] = (sizes, table.values[place if sizes is None else rows.spread(place + 1, sizes)])
         place = place + 1 + (0 if sizes is None else sizes)
     if element.name != "face":
         _refuse(place < ends, element, lines)

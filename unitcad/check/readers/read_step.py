@@ -31,14 +31,16 @@ def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Fin
     _text(data, options.limits)
     if not installed():
         raise Unreadable(F012.finding(NEEDS))
-    said = _from_child(path, options.limits.seconds)
-    if not said:
+    measured = _from_child(path, options.limits.seconds)
+    if not measured:
         raise Unreadable(F003.finding("the STEP file holds no shape that can be read"))
-    solids, volume = said["solids"], said["volume"]
+    solids, volume = measured["solids"], measured["volume"]
     findings: list[Finding] = []
-    if not said["valid"]:
+    if not measured["valid"]:
         findings.append(G001.finding("the B-rep is not valid by BRepCheck"))
-    facts = Facts(shells=solids, volume_mm3=volume, area_mm2=said["area"], bbox_mm=said["box"], watertight=solids > 0)
+    facts = Facts(
+        shells=solids, volume_mm3=volume, area_mm2=measured["area"], bbox_mm=measured["box"], watertight=solids > 0
+    )
     if not solids:
         findings.append(G007.finding("no solid in the file"))
     elif volume < 0:

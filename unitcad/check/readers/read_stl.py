@@ -116,29 +116,29 @@ class _Text:
 
 
 def _read_text(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    found = _Text()
-    raw = _decoded(data.obj if isinstance(data.obj, bytes) else bytes(data), found.findings)
-    _walk(raw, found, limits, deadline)
-    if found.nested:  # one finding for all of them: a file may have a hundred thousand
-        places = [Location(line=line) for line in found.nested_at]
-        found.findings.append(F003.finding("solid begins before the last one ended", found.nested, places))
-    if not found.facets:
-        raise Unreadable(*found.findings, F001.finding("the file has no facet"))
-    if found.solids > 1:
-        found.findings.append(F010.finding(f"{found.solids} solids in one file", found.solids))
-    corners = np.concatenate(found.corners) if found.corners else np.empty((0, 3, 3))
-    normals = np.concatenate(found.normals) if found.normals else np.empty((0, 3))
-    if not len(corners) or any(item.code == "F004" for item in found.findings):
-        return [], found.findings
+    state = _Text()
+    raw = _decoded(data.obj if isinstance(data.obj, bytes) else bytes(data), state.findings)
+    _walk(raw, state, limits, deadline)
+    if state.nested:  # one finding for all of them: a file may have a hundred thousand
+        places = [Location(line=line) for line in state.nested_at]
+        state.findings.append(F003.finding("solid begins before the last one ended", state.nested, places))
+    if not state.facets:
+        raise Unreadable(*state.findings, F001.finding("the file has no facet"))
+    if state.solids > 1:
+        state.findings.append(F010.finding(f"{state.solids} solids in one file", state.solids))
+    corners = np.concatenate(state.corners) if state.corners else np.empty((0, 3, 3))
+    normals = np.concatenate(state.normals) if state.normals else np.empty((0, 3))
+    if not len(corners) or any(item.code == "F004" for item in state.findings):
+        return [], state.findings
     with np.errstate(over="ignore"):
         single = corners.astype(np.float32)
     finite = np.isfinite(single)
     if not finite.all():
-        found.findings.append(_not_finite(np.asarray(finite.all(axis=(1, 2)))))
-        return [], found.findings
+        state.findings.append(_not_finite(np.asarray(finite.all(axis=(1, 2)))))
+        return [], state.findings
     del single
     vertices, faces = weld_exact(corners)
-    return [Mesh(vertices, faces, normals, indexed=False)], found.findings
+    return [Mesh(vertices, faces, normals, indexed=False)], state.findings
 
 
 def _decoded(raw: bytes, findings: list[Finding]) -> bytes:
@@ -161,7 +161,7 @@ def _decoded(raw: bytes, findings: list[Finding]) -> bytes:
     return raw
 
 
-def _walk(raw: bytes, found: _Text, limits: Limits, deadline: Deadline) -> None:
+def _walk(raw: bytes, state: _Text, limits: Limits, deadline: Deadline) -> None:
     """Read solid after solid. Adds findings; never raises for what the text holds but for limits."""
     at, end = 0, len(raw)
     inside = False
@@ -175,30 +175,30 @@ def _walk(raw: bytes, found: _Text, limits: Limits, deadline: Deadline) -> None:
         word = raw[at : at + 8].split(None, 1)[0].lower() if raw[at : at + 8].strip() else b""
         if word.startswith(b"solid"):
             if inside:
-                found.nested += 1
-                if found.nested <= SHOWN:
-                    found.nested_at.append(raw.count(b"\n", 0, at) + 1)
-            inside, found.solids, at = True, found.solids + 1, line_end
+                state.nested += 1
+                if state.nested <= SHOWN:
+                    state.nested_at.append(raw.count(b"\n", 0, at) + 1)
+            inside, state.solids, at = True, state.solids + 1, line_end
         elif word == b"endsolid":
             inside, at = False, line_end
         elif word == b"facet":
             if not inside:
-                what = "after endsolid" if found.solids else "without a solid line"
-                found.findings.append(_at(F003, f"facets {what}", raw, at))
-                found.solids, inside = found.solids + 1, True
-            at = _facets(raw, at, found, limits, deadline)
+                what = "after endsolid" if state.solids else "without a solid line"
+                state.findings.append(_at(F003, f"facets {what}", raw, at))
+                state.solids, inside = state.solids + 1, True
+            at = _facets(raw, at, state, limits, deadline)
             if at < 0:
                 return
         else:
             rule, what = (F003, "unexpected") if inside else (F006, "after endsolid:")
-            if rule is F006 and found.facets:
-                found.findings.append(_at(rule, f"{counted(end - at, 'byte')} after endsolid", raw, at))
+            if rule is F006 and state.facets:
+                state.findings.append(_at(rule, f"{counted(end - at, 'byte')} after endsolid", raw, at))
                 return
             shown = raw[at : min(line_end, at + 30)].decode("utf-8", "replace")
-            found.findings.append(_at(F003, f"{what} {shown!r}", raw, at))
+            state.findings.append(_at(F003, f"{what} {shown!r}", raw, at))
             return
     if inside:
-        found.findings.append(_at(F003, "the text ends before endsolid", raw, end))
+        state.findings.append(_at(F003, "the text ends before endsolid", raw, end))
 
 
 def _skip_blank(raw: bytes, at: int) -> int:
@@ -210,7 +210,7 @@ _BLANK = re.compile(rb"[\s\x00]*")
 _END = re.compile(rb"(?im)^[ \t]*(?:endsolid|solid)\b")
 
 
-def _facets(raw: bytes, at: int, found: _Text, limits: Limits, deadline: Deadline) -> int:
+def _facets(raw: bytes, at: int, state: _Text, limits: Limits, deadline: Deadline) -> int:
     """Read facets from `at` to the next solid or endsolid, whole blocks at a time; the place after them, or -1."""
     match = _END.search(raw, at)
     stop = match.start() if match else len(raw)
@@ -224,31 +224,31 @@ def _facets(raw: bytes, at: int, found: _Text, limits: Limits, deadline: Deadlin
         block = raw[at:cut]
         tokens = block.lower().split()
         if len(tokens) % _TOKENS or any(set(tokens[i::_TOKENS]) != {word} for i, word in _WORDS.items()):
-            return _explain(raw, at, cut, found, limits)
-        _take(block, tokens, found, limits)
+            return _explain(raw, at, cut, state, limits)
+        _take(block, tokens, state, limits)
         at = cut
     return stop
 
 
-def _take(block: bytes, tokens: list[bytes], found: _Text, limits: Limits) -> None:
+def _take(block: bytes, tokens: list[bytes], state: _Text, limits: Limits) -> None:
     blocks = len(tokens) // _TOKENS
-    if found.facets + blocks > limits.max_faces:
+    if state.facets + blocks > limits.max_faces:
         raise over_limit(f"more faces than --max-faces {limits.max_faces}")
     columns = []
     plain = block.isascii() and b"_" not in block  # numpy takes 1_0 for ten, as Python does
     for column in _NUMBERS:
         texts = tokens[column::_TOKENS]
         try:
-            columns.append(np.array(texts).astype(np.float64) if plain else _slow_numbers(texts, found))
+            columns.append(np.array(texts).astype(np.float64) if plain else _slow_numbers(texts, state))
         except ValueError:
-            columns.append(_slow_numbers(texts, found))
+            columns.append(_slow_numbers(texts, state))
     numbers = np.stack(columns, axis=1)
-    found.normals.append(numbers[:, :3])
-    found.corners.append(numbers[:, 3:].reshape(-1, 3, 3))
-    found.facets += blocks
+    state.normals.append(numbers[:, :3])
+    state.corners.append(numbers[:, 3:].reshape(-1, 3, 3))
+    state.facets += blocks
 
 
-def _slow_numbers(texts: list[bytes], found: _Text) -> Floats:
+def _slow_numbers(texts: list[bytes], state: _Text) -> Floats:
     values = np.zeros(len(texts))
     for i, text in enumerate(texts):
         if NUMBER.fullmatch(text):
@@ -258,18 +258,18 @@ def _slow_numbers(texts: list[bytes], found: _Text) -> Floats:
         else:
             shown = text[:30].decode("utf-8", "replace")
             why = " (a decimal comma)" if b"," in text else ""
-            place = [Location(face=found.facets + i)]
-            found.findings.append(F004.finding(f"{shown!r} is not a number{why}", places=place))
+            place = [Location(face=state.facets + i)]
+            state.findings.append(F004.finding(f"{shown!r} is not a number{why}", places=place))
     return values
 
 
-def _explain(raw: bytes, at: int, cut: int, found: _Text, limits: Limits) -> int:
+def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> int:
     """Read one irregular block token by token up to the first one that breaks the grammar, and end the reading.
 
     Facets with more or fewer vertices than three (F008) and words in a number's place (F004) break it no further.
     """
-    found.corners.clear()  # a mesh of what came before would only blame the wrong thing
-    found.normals.clear()
+    state.corners.clear()  # a mesh of what came before would only blame the wrong thing
+    state.normals.clear()
     place, vertices, start = 0, 0, at
     for match in _WORD.finditer(raw, at, cut):
         word, here = match.group().lower(), match.start()
@@ -281,28 +281,28 @@ def _explain(raw: bytes, at: int, cut: int, found: _Text, limits: Limits) -> int
                 break  # the text was cut within the word
             shown = word[:30].decode("utf-8", "replace")
             if wanted or word in _KEYWORDS:
-                said = b" or ".join(wanted).decode() or "a number"
-                found.findings.append(_at(F003, f"{shown!r} where {said} belongs", raw, here))
+                expected = b" or ".join(wanted).decode() or "a number"
+                state.findings.append(_at(F003, f"{shown!r} where {expected} belongs", raw, here))
                 return -1
             why = " (a decimal comma)" if b"," in word else ""
-            found.findings.append(_at(F004, f"{shown!r} is not a number{why}", raw, here))
+            state.findings.append(_at(F004, f"{shown!r} is not a number{why}", raw, here))
         if place == 0:
             start, vertices = here, 0
-            found.facets += 1
+            state.facets += 1
         vertices += place == _VERTEX
         if place == _LOOP_END and vertices != 3:
-            found.findings.append(_at(F008, f"a facet with {counted(vertices, 'vertex', 'vertices')}", raw, start))
+            state.findings.append(_at(F008, f"a facet with {counted(vertices, 'vertex', 'vertices')}", raw, start))
         place = (place + 1) % len(_GRAMMAR)
-        if len(found.findings) > 50 or found.facets > limits.max_faces:
+        if len(state.findings) > 50 or state.facets > limits.max_faces:
             return -1
     else:
         if place == 0:
             return -1
     if raw[cut:].strip():
-        found.findings.append(_at(F003, "the solid ends inside a facet", raw, _skip_blank(raw, cut)))
+        state.findings.append(_at(F003, "the solid ends inside a facet", raw, _skip_blank(raw, cut)))
     else:
         inside = "inside a facet" if place else "before endsolid"
-        found.findings.append(_at(F003, f"the text ends {inside}", raw, len(raw.rstrip())))
+        state.findings.append(_at(F003, f"the text ends {inside}", raw, len(raw.rstrip())))
     return -1
 
 

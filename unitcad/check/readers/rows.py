@@ -27,9 +27,9 @@ JOINED = 11  # a vertical tab stands where a line was continued
 
 
 def _table(characters: bytes) -> Bools:
-    found = np.zeros(256, bool)
-    found[list(characters)] = True
-    return found
+    table = np.zeros(256, bool)
+    table[list(characters)] = True
+    return table
 
 
 BLANK = _table(b" \t\n\v\f\r")
@@ -56,15 +56,15 @@ class Rows:
 
 def plain(raw: bytes) -> tuple[bytes, list[Finding]]:
     """A text with LF line ends and without a byte order mark; what had to be changed is a finding."""
-    found = []
+    findings = []
     if raw[:3] == b"\xef\xbb\xbf":
-        found.append(F009.finding("a UTF-8 byte order mark at the start"))
+        findings.append(F009.finding("a UTF-8 byte order mark at the start"))
         raw = raw[3:]
     if b"\r" in raw:
         if b"\n" not in raw:
-            found.append(F009.finding("CR-only line ends"))
+            findings.append(F009.finding("CR-only line ends"))
         raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return raw.replace(b"\v", b" "), found
+    return raw.replace(b"\v", b" "), findings
 
 
 def blocks(raw: bytes, at: int, deadline: Deadline, line: int = 1) -> Iterator[tuple[Ints, int]]:
@@ -141,14 +141,14 @@ def spread(firsts: Ints, counts: Ints, step: int = 1) -> Ints:
     return places
 
 
-def columns(found: Rows, which: slice, most: int) -> Floats:
+def columns(table: Rows, which: slice, most: int) -> Floats:
     """The first so many numbers of each row. Raises `Unreadable` (F003) for a row that has fewer."""
-    sizes, lines = found.sizes[which], found.lines[which]
+    sizes, lines = table.sizes[which], table.lines[which]
     short = np.flatnonzero(sizes < most)
     if len(short):
         text = f"a vertex with {counted(int(sizes[short[0]]), 'number')}"
         raise Unreadable(F003.finding(text, len(short), [Location(line=int(lines[short[0]]))]))
-    return found.values[found.starts[:-1][which, None] + np.arange(most)]
+    return table.values[table.starts[:-1][which, None] + np.arange(most)]
 
 
 def lengths(counts: Floats, room: Ints, lines: Ints, what: str = "face") -> Ints:

@@ -41,7 +41,7 @@ _TEXT_MARKS = (b"<!doctype html", b"<html", b"<head", b"<body")
 
 
 def foreign(head: bytes) -> str | None:
-    """The name of a format that is certainly no STL, OBJ, PLY or OFF; None where that can't be said."""
+    """Name a format that is certainly not STL, OBJ, PLY or OFF; None where the bytes do not tell."""
     for magic, name in _MAGIC:
         if head.startswith(magic):
             return name

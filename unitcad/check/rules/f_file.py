@@ -122,8 +122,8 @@ F011 = Rule(
     "error",
     "resource limit reached",
     cause=(
-        "The file asks for more bytes, faces, time or memory than the limits allow, so it was not judged to its "
-        "end. Never read as a pass."
+        "The file asks for more bytes, faces, time or memory than the limits allow, so it was not checked to its "
+        "end. It never passes."
     ),
     example="A mesh has 12 million faces, and --max-faces is 10 million.",
     fix=(

@@ -42,7 +42,7 @@ M004 = Rule(
     "M004",
     "error",
     "file and manifest do not name each other",
-    cause="The manifest lists a file that is not there, or does not list the file that was to be judged by it.",
+    cause="The manifest lists a file that is not there, or does not list the file that was to be compared with it.",
     example="lid.stl was renamed after the build.",
     fix="Build again.",
 )

@@ -179,7 +179,7 @@ P016 = Rule(
         "reader does not know, so the model may mean something else than it seems."
     ),
     example='`requiredextensions="x"` without `xmlns:x`.',
-    fix="Leave the extension out, or judge the file with a program that knows it.",
+    fix="Leave the extension out, or check the file with a program that knows it.",
 )
 
 P017 = Rule(

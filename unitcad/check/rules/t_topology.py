@@ -73,7 +73,7 @@ T006 = Rule(
         "place, or where they are nearer than 1e-5 of their own shell's diagonal (or two float32 steps there) and "
         "than a tenth of the shortest edge at either. So a gap wider than that stays a boundary (T001), no face "
         "collapses, and other shells of the file have no influence. Crossings, stored normals and slivers are "
-        "judged on the faces as stored."
+        "checked on the faces as stored."
     ),
     example="Two halves of a ball were exported apart, and their rims differ by 0.000001 mm.",
     fix="Weld vertices at export.",

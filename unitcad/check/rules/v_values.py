@@ -44,7 +44,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
 
 
 def not_finite(mesh: Mesh) -> tuple[Finding, ...]:
-    """V001, which ends the judgement of a mesh."""
+    """Apply V001, which ends the check of a mesh."""
     finite = np.asarray((np.abs(mesh.vertices) <= LARGEST).all(axis=1))
     if finite.all():
         return ()

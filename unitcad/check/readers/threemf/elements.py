@@ -22,8 +22,8 @@ OLD_DISPLACEMENT = "http://schemas.microsoft.com/3dmanufacturing/displacement/20
 ALTERNATIVES = "http://schemas.microsoft.com/3dmanufacturing/production/alternatives/2021/04"
 VOLUMETRIC = "http://schemas.3mf.io/3dmanufacturing/volumetric/2022/01"
 IMPLICIT = "http://schemas.3mf.io/3dmanufacturing/implicit/2023/12"
-# Extensions whose required use does not hinder judging the meshes of a file. Secure content is not among them: what
-# is encrypted cannot be judged.
+# Extensions whose required use does not hinder a check of the meshes of a file. Secure content is not among them: what
+# is encrypted cannot be checked.
 KNOWN = {CORE, MATERIAL, PRODUCTION, SLICE, BEAM, BALLS, TRIANGLE_SETS, BOOLEAN, DISPLACEMENT}
 KNOWN |= {OLD_DISPLACEMENT, ALTERNATIVES, VOLUMETRIC, IMPLICIT}
 

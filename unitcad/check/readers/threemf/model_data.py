@@ -81,7 +81,7 @@ class Model:
             self.findings.append(rule.finding(message, 1, [place], severity))
 
     def say_lenient(self, rule: Rule, message: str) -> None:
-        """Add a finding that real programs' files have: a warning unless the model is judged strictly."""
+        """Add a finding that real programs' files have: a warning unless the model is checked strictly."""
         self.say(rule, message, None if self.strict else "warning")
 
     def objects(self) -> dict[int, Object]:

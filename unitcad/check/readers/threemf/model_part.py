@@ -245,8 +245,8 @@ class _Reader:
         self._resource(Resource("basematerials", int(attributes["id"]), self.rank, attributes))
 
     def _take_object(self, attributes: dict[str, str]) -> None:
-        found = Object("object", int(attributes["id"]), self.rank, attributes, type=attributes.get("type", "model"))
-        self._resource(found)
+        kind = attributes.get("type", "model")
+        self._resource(Object("object", int(attributes["id"]), self.rank, attributes, type=kind))
 
     def _take_triangle(self, attributes: dict[str, str]) -> None:
         row = tuple(int(attributes.get(name, -1)) for name in ("v1", "v2", "v3", "p1", "p2", "p3", "pid"))
@@ -285,29 +285,29 @@ class _Reader:
             int(attributes["objectid"]), path, matrix, self.rank, uuid is not None, self.parser.CurrentLineNumber
         )
 
-    def _matrix(self, said: str | None) -> Floats:
+    def _matrix(self, text: str | None) -> Floats:
         """The transform (4, 3); the identity with a finding where it is none."""
         identity = np.vstack([np.eye(3), np.zeros(3)])
-        if said is None:
+        if text is None:
             return identity
-        parts = said.split()
+        parts = text.split()
         if len(parts) == 12 and all(elements.number(part) for part in parts):
-            found = np.array([float(part) for part in parts]).reshape(4, 3)
-            if not (np.abs(found) <= LARGEST).all():
-                self.model.say(P013, f'transform="{said[:60]}" is not twelve float32 numbers')
+            matrix = np.array([float(part) for part in parts]).reshape(4, 3)
+            if not (np.abs(matrix) <= LARGEST).all():
+                self.model.say(P013, f'transform="{text[:60]}" is not twelve float32 numbers')
                 return identity
             if (linear := tuple(parts[:9])) not in self.regular:  # most items of a build differ by their shift only
-                det = float(np.linalg.det(found[:3]))
-                scale = float(np.prod(np.linalg.norm(found[:3], axis=1)))
+                det = float(np.linalg.det(matrix[:3]))
+                scale = float(np.prod(np.linalg.norm(matrix[:3], axis=1)))
                 if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
                     self.model.say(P013, "a transform has determinant zero")
                 elif det < 0:
                     self.model.say(P015, "a transform mirrors")
                 else:
                     self.regular.add(linear)
-            return found
+            return matrix
         rule = P013 if len(parts) == 12 and any(part.lower() in _NAMES for part in parts) else P017
-        self.model.say(rule, f'transform="{said[:60]}" is not twelve numbers')
+        self.model.say(rule, f'transform="{text[:60]}" is not twelve numbers')
         return identity
 
     def _take_lattice(self, local: str, attributes: dict[str, str]) -> None:
@@ -333,7 +333,7 @@ class _Reader:
                 raise ValueError(text[:40])
             values = np.array(self.numbers, dtype=np.float64)
         except ValueError:
-            values = np.array([self._number(said, self.lines[i // 3]) for i, said in enumerate(self.numbers)])
+            values = np.array([self._number(text, self.lines[i // 3]) for i, text in enumerate(self.numbers)])
         bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if len(bad):
             self.model.say(V001, "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
@@ -343,14 +343,14 @@ class _Reader:
         if sum(len(block) for block in self.vertices) > 3 * self.limits.max_faces + 3:
             raise over_limit("more vertices than three times --max-faces")
 
-    def _number(self, said: str, line: int) -> float:
-        said = said.strip()
-        if elements.number(said):
-            return float(said)
-        if said.lower() in _NAMES:
+    def _number(self, text: str, line: int) -> float:
+        text = text.strip()
+        if elements.number(text):
+            return float(text)
+        if text.lower() in _NAMES:
             return math.nan
-        why = " (a decimal comma)" if "," in said else ""
-        self.model.say(F004, f"{said[:40]!r} is not a number{why}", line=line)
+        why = " (a decimal comma)" if "," in text else ""
+        self.model.say(F004, f"{text[:40]!r} is not a number{why}", line=line)
         return 0.0
 
     def _flush_triangles(self) -> None:
@@ -365,11 +365,11 @@ class _Reader:
         if isinstance(self.resource, Object):
             self.resource.vertices, self.resource.triangles = vertices, triangles
 
-    def _close_object(self, found: Object) -> None:
-        if found.vertices is None and not found.components and not found.other_shape:
-            self.model.say(P017, f"object {found.id} has neither mesh nor components")
-        if found.vertices is not None and found.components:
-            self.model.say(P017, f"object {found.id} has a mesh and components")
+    def _close_object(self, resource: Object) -> None:
+        if resource.vertices is None and not resource.components and not resource.other_shape:
+            self.model.say(P017, f"object {resource.id} has neither mesh nor components")
+        if resource.vertices is not None and resource.components:
+            self.model.say(P017, f"object {resource.id} has a mesh and components")
 
 
 # Extensions whose elements take the place of an object's mesh.

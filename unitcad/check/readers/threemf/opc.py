@@ -68,7 +68,7 @@ class Package:
         self.findings.append(rule.finding(message, places=places, severity=severity))
 
     def say_lenient(self, rule: Rule, message: str, part: str | None = None) -> None:
-        """Add a finding that real programs' files have: a warning unless the package is judged strictly."""
+        """Add a finding that real programs' files have: a warning unless the package is checked strictly."""
         self.say(rule, message, part, None if self.strict else "warning")
 
     def chunks(self, name: str) -> Iterator[bytes]:
@@ -103,8 +103,8 @@ class Package:
 
     def content_type(self, name: str) -> str | None:
         """The part's content type by override or default, without parameters, in lower case."""
-        said = self.overrides.get(name) or self.defaults.get(posixpath.splitext(name)[1][1:])
-        return said.split(";")[0].strip().lower() if said else None
+        content_type = self.overrides.get(name) or self.defaults.get(posixpath.splitext(name)[1][1:])
+        return content_type.split(";")[0].strip().lower() if content_type else None
 
     def relations(self, name: str) -> list[Relation]:
         """The relationships of a part ("" for the package), their faults added to the findings."""

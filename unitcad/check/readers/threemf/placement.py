@@ -30,7 +30,9 @@ class Instance:
 def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list[Finding]) -> list[Instance]:
     """The meshes of the build with their transforms; faces are counted before anything is expanded."""
     counts: dict[Key, tuple[int, int]] = {}
-    objects = {(part, id_): found for part, model in models.items() for id_, found in model.objects().items()}
+    objects = {
+        (part, id_): model_object for part, model in models.items() for id_, model_object in model.objects().items()
+    }
 
     def key_of(part: str, use: Use) -> Key:
         return (use.path.lower().lstrip("/") if use.path else part, use.object)
@@ -39,15 +41,15 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         """Faces and nodes under an object; depth and recursion are bounded here."""
         if key in counts:
             return counts[key]
-        found = objects.get(key)
-        if found is None:
+        model_object = objects.get(key)
+        if model_object is None:
             return 0, 0
         if key in trail:
             raise Unreadable(P012.finding(f"object {key[1]} contains itself"))
         if len(trail) >= limits.max_depth:
             raise Unreadable(P009.finding(f"components nest deeper than {limits.max_depth}"))
-        faces, nodes = (0 if found.triangles is None else len(found.triangles)), 1
-        for use in found.components:
+        faces, nodes = (0 if model_object.triangles is None else len(model_object.triangles)), 1
+        for use in model_object.components:
             more, below = size(key_of(key[0], use), (*trail, key))
             faces, nodes = faces + more, nodes + below
         counts[key] = faces, nodes
@@ -65,14 +67,14 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
     instances: list[Instance] = []
 
     def place(key: Key, matrix: Floats, depth: int) -> None:
-        found = objects.get(key)
-        if found is None or depth > limits.max_depth:
+        model_object = objects.get(key)
+        if model_object is None or depth > limits.max_depth:
             return
-        if found.type == "other" and not found.components:
+        if model_object.type == "other" and not model_object.components:
             findings.append(P012.finding(f"the build uses object {key[1]} of type other"))
-        if found.vertices is not None:
+        if model_object.vertices is not None:
             instances.append(Instance(key, matrix))
-        for use in found.components:
+        for use in model_object.components:
             place(key_of(key[0], use), _times(use.matrix, matrix), depth + 1)
 
     for item in root.items:
@@ -94,13 +96,13 @@ def _times(first: Floats, then: Floats) -> Floats:
         return np.vstack([first[:3] @ then[:3], first[3] @ then[:3] + then[3]])
 
 
-def mesh_of(found: Object, part: str, factor: float, matrix: Floats | None = None) -> Mesh:
+def mesh_of(model_object: Object, part: str, factor: float, matrix: Floats | None = None) -> Mesh:
     """The object, of a part of the package, in its own place or that of an instance; `factor` mm a unit."""
-    assert found.vertices is not None
-    assert found.triangles is not None
-    points = found.vertices if matrix is None else found.vertices @ matrix[:3] + matrix[3]
-    faces = found.triangles[:, :3].astype(np.int32)
+    assert model_object.vertices is not None
+    assert model_object.triangles is not None
+    points = model_object.vertices if matrix is None else model_object.vertices @ matrix[:3] + matrix[3]
+    faces = model_object.triangles[:, :3].astype(np.int32)
     if matrix is not None and np.linalg.det(matrix[:3]) < 0:
         faces = faces[:, ::-1]
-    source = Source(lines=found.triangles[:, LINE], part=part)
-    return Mesh(points * factor, np.ascontiguousarray(faces), name=str(found.id), source=source)
+    source = Source(lines=model_object.triangles[:, LINE], part=part)
+    return Mesh(points * factor, np.ascontiguousarray(faces), name=str(model_object.id), source=source)

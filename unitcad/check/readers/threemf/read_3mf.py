@@ -35,7 +35,7 @@ def read_build(package: Package, limits: Limits) -> Build:
     """
     models = _models(package, limits)
     for model in models.values():
-        references.judge(model)
+        references.check_references(model)
         package.findings += model.findings
     if not models:
         return Build({}, [])
@@ -84,10 +84,10 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
 
 def _reached(model: Model) -> dict[str, str]:
     """The parts that a model names by path, each as it is written there."""
-    uses = [*model.items, *(use for found in model.objects().values() for use in found.components)]
+    uses = [*model.items, *(use for resource in model.objects().values() for use in resource.components)]
     paths = {use.path for use in uses if use.path}
-    for found in model.resources.values():
-        paths |= {member["slicepath"] for member in found.members if "slicepath" in member}
+    for resource in model.resources.values():
+        paths |= {member["slicepath"] for member in resource.members if "slicepath" in member}
     return {path.lower().lstrip("/"): path.lstrip("/") for path in sorted(paths)}
 
 
@@ -99,25 +99,25 @@ def _singletons(package: Package, relations: list[Relation], who: str, kinds: tu
         if len(of) > 1:
             package.say(P020, f"{len(of)} parts of type {name} for {who}")
         for relation in of:
-            said = package.content_type(relation.target)
+            content_type = package.content_type(relation.target)
             if kind == opc.THUMBNAIL:
                 _image(package, relation.target, P020)
-            elif kind == opc.TICKET and said != _TICKET_TYPE:
-                text = f"{package.shown(relation.target)} has type {said!r}, not a print ticket's"
+            elif kind == opc.TICKET and content_type != _TICKET_TYPE:
+                text = f"{package.shown(relation.target)} has type {content_type!r}, not a print ticket's"
                 package.say(P020, text, relation.target)
             elif kind == opc.PROPERTIES:
                 package.xml(relation.target, F003)
 
 
 def _image(package: Package, part: str, rule: Rule) -> None:
-    said = package.content_type(part)
-    if said is None:
+    content_type = package.content_type(part)
+    if content_type is None:
         package.say(P001, f"{package.shown(part)} has no content type", part)
         return
-    if said not in _IMAGES and not (
-        rule is P019 and said == "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
+    if content_type not in _IMAGES and not (
+        rule is P019 and content_type == "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
     ):
-        package.say(rule, f"{package.shown(part)} has type {said!r}, not PNG's or JPEG's", part)
+        package.say(rule, f"{package.shown(part)} has type {content_type!r}, not PNG's or JPEG's", part)
         return
     try:
         kind, why = image_kind(package.chunks(part))
@@ -128,31 +128,31 @@ def _image(package: Package, part: str, rule: Rule) -> None:
         return
     if why:
         package.say(rule, f"{package.shown(part)}: {why}", part)
-    elif said in _IMAGES and kind != _IMAGES[said]:
-        package.say(rule, f"{package.shown(part)} is {kind or 'no image'}, its type says {said}", part)
+    elif content_type in _IMAGES and kind != _IMAGES[content_type]:
+        package.say(rule, f"{package.shown(part)} is {kind or 'no image'}, its type says {content_type}", part)
 
 
 def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
     """What a model part names by path exists, and is the target of a relationship of the right type."""
     by_kind = {kind: {r.target for r in related if r.kind == kind} for kind in opc.KNOWN}
     images = by_kind[opc.THUMBNAIL] | by_kind[opc.TEXTURE]
-    for found in model.resources.values():
-        path = found.attributes.get("path" if found.kind == "texture2d" else "thumbnail")
-        if path is None or found.kind not in ("texture2d", "object"):
+    for resource in model.resources.values():
+        path = resource.attributes.get("path" if resource.kind == "texture2d" else "thumbnail")
+        if path is None or resource.kind not in ("texture2d", "object"):
             continue
         part = path.lower().lstrip("/")
         if part not in package.parts:
-            rule, say = (P019, package.say) if found.kind == "texture2d" else (P002, package.say_lenient)
-            say(rule, f"{path} of {found.kind} {found.id} is not in the package", model.part)
-        elif part not in (by_kind[opc.TEXTURE] if found.kind == "texture2d" else images):
-            say = package.say if found.kind == "texture2d" else package.say_lenient
-            say(P002, f"{path} of {found.kind} {found.id} has no relationship", model.part)
+            rule, say = (P019, package.say) if resource.kind == "texture2d" else (P002, package.say_lenient)
+            say(rule, f"{path} of {resource.kind} {resource.id} is not in the package", model.part)
+        elif part not in (by_kind[opc.TEXTURE] if resource.kind == "texture2d" else images):
+            say = package.say if resource.kind == "texture2d" else package.say_lenient
+            say(P002, f"{path} of {resource.kind} {resource.id} has no relationship", model.part)
         else:
-            _image(package, part, P019 if found.kind == "texture2d" else P020)
+            _image(package, part, P019 if resource.kind == "texture2d" else P020)
     for part, written in sorted(_reached(model).items()):
         if part not in package.parts:
             package.say(P012, f"{written} is not in the package", model.part)
         elif part not in by_kind[opc.START]:
             package.say(P002, f"{written} has no relationship of the model type", model.part)
-        elif not is_root and any(use.path for found in model.objects().values() for use in found.components):
+        elif not is_root and any(use.path for resource in model.objects().values() for use in resource.components):
             package.say(P012, "a part other than the root one refers to objects by path", model.part)

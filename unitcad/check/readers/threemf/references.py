@@ -20,7 +20,7 @@ _SOLID = ("model", "solidsupport")
 _STACK = f"{elements.SLICE} slicestackid"
 
 
-def judge(model: Model) -> None:
+def check_references(model: Model) -> None:
     """Add findings about references to the model. Objects in other parts are the package's business."""
     for resource in model.resources.values():
         model.where = partial(_line_of, resource)
@@ -42,47 +42,47 @@ def _line_of(thing: Resource | Use) -> Location:
 
 
 def _used(model: Model, id_: int, rank: int, who: str) -> None:
-    found = model.resources.get(id_)
-    if not isinstance(found, Object):
+    resource = model.resources.get(id_)
+    if not isinstance(resource, Object):
         if id_ not in model.foreign:
             model.say(P012, f"{who} names object {id_}, which is not there")
-    elif found.rank > rank:
+    elif resource.rank > rank:
         model.say(P012, f"{who} names object {id_}, which is defined later or is itself")
 
 
-def _object(model: Model, found: Object) -> None:
-    who = f"object {found.id}"
-    for use in found.components:
+def _object(model: Model, resource: Object) -> None:
+    who = f"object {resource.id}"
+    for use in resource.components:
         if not use.path:
-            _used(model, use.object, found.rank - (use.object == found.id), f"a component of {who}")
-    pid = found.attributes.get("pid")
-    if found.components and pid is not None:
+            _used(model, use.object, resource.rank - (use.object == resource.id), f"a component of {who}")
+    pid = resource.attributes.get("pid")
+    if resource.components and pid is not None:
         model.say_lenient(P019, f"{who} has components and a pid")
-    if "pindex" in found.attributes and pid is None:
+    if "pindex" in resource.attributes and pid is None:
         model.say(P019, f"{who} has a pindex without a pid")
-    group = _group(model, int(pid), found.rank, who) if pid is not None else None
-    if group is not None and "pindex" in found.attributes:
-        _in_range(model, int(found.attributes["pindex"]), group.count, f"pindex of {who}")
-    if found.vertices is not None and found.triangles is not None:
-        _mesh(model, found, pid is not None)
-    if found.lattice is not None:
-        _lattice(model, found)
-    _sliced(model, found)
+    group = _group(model, int(pid), resource.rank, who) if pid is not None else None
+    if group is not None and "pindex" in resource.attributes:
+        _in_range(model, int(resource.attributes["pindex"]), group.count, f"pindex of {who}")
+    if resource.vertices is not None and resource.triangles is not None:
+        _mesh(model, resource, pid is not None)
+    if resource.lattice is not None:
+        _lattice(model, resource)
+    _sliced(model, resource)
 
 
 def _group(model: Model, id_: int, rank: int, who: str) -> Resource | None:
     """The property group with that id, or None with a finding; groups of unknown extensions pass unseen."""
-    found = model.resources.get(id_)
-    if found is None:
+    resource = model.resources.get(id_)
+    if resource is None:
         if id_ not in model.foreign:
             model.say(P019, f"{who} names property group {id_}, which is not there")
         return None
-    if found.kind not in _GROUPS:
-        model.say(P019, f"{who} names resource {id_}, a {found.kind}, as property group")
+    if resource.kind not in _GROUPS:
+        model.say(P019, f"{who} names resource {id_}, a {resource.kind}, as property group")
         return None
-    if found.rank > rank:
+    if resource.rank > rank:
         model.say(P019, f"{who} names property group {id_}, which is defined later")
-    return found
+    return resource
 
 
 def _in_range(model: Model, index: int, count: int, what: str) -> None:
@@ -90,17 +90,17 @@ def _in_range(model: Model, index: int, count: int, what: str) -> None:
         model.say(P011, f"{what} is {index}, the list has {count}")
 
 
-def _mesh(model: Model, found: Object, has_default: bool) -> None:
-    assert found.vertices is not None
-    assert found.triangles is not None
-    who, rows = f"object {found.id}", found.triangles
-    solid = found.type in _SOLID and found.lattice is None
-    if len(found.vertices) < 3 and not found.other_shape:
-        model.say(P017, f"the mesh of {who} has {counted(len(found.vertices), 'vertex', 'vertices')}")
-    if len(rows) < (4 if solid and found.type == "model" else 1) and found.lattice is None:
+def _mesh(model: Model, resource: Object, has_default: bool) -> None:
+    assert resource.vertices is not None
+    assert resource.triangles is not None
+    who, rows = f"object {resource.id}", resource.triangles
+    solid = resource.type in _SOLID and resource.lattice is None
+    if len(resource.vertices) < 3 and not resource.other_shape:
+        model.say(P017, f"the mesh of {who} has {counted(len(resource.vertices), 'vertex', 'vertices')}")
+    if len(rows) < (4 if solid and resource.type == "model" else 1) and resource.lattice is None:
         model.say(P017, f"the mesh of {who} has {counted(len(rows), 'triangle')}")
     corners = rows[:, :3]
-    outside = (corners >= len(found.vertices)).any(axis=1)
+    outside = (corners >= len(resource.vertices)).any(axis=1)
     if outside.any():
         first = int(np.flatnonzero(outside)[0])
         some = counted(int(outside.sum()), "triangle")
@@ -110,11 +110,11 @@ def _mesh(model: Model, found: Object, has_default: bool) -> None:
     if same.any():
         line = int(rows[same.argmax(), LINE])
         model.say(P017, f"{counted(int(same.sum()), 'triangle')} of {who} with one vertex twice", line=line)
-    _triangle_properties(model, found, rows, has_default)
+    _triangle_properties(model, resource, rows, has_default)
 
 
-def _triangle_properties(model: Model, found: Object, rows: Ints, has_default: bool) -> None:
-    who = f"object {found.id}"
+def _triangle_properties(model: Model, resource: Object, rows: Ints, has_default: bool) -> None:
+    who = f"object {resource.id}"
     used = (rows[:, 3:LINE] >= 0).any(axis=1)
     if not used.any():
         return
@@ -123,12 +123,12 @@ def _triangle_properties(model: Model, found: Object, rows: Ints, has_default: b
         model.say_lenient(P019, f"triangles of {who} have properties, the object has no pid as default")
     if ((rows[:, 3] < 0) & (rows[:, 4:6] >= 0).any(axis=1)).any():
         model.say(P019, f"a triangle of {who} has p2 or p3 without p1")
-    default = int(found.attributes.get("pid", -1))
+    default = int(resource.attributes.get("pid", -1))
     pids = np.where(rows[:, 6] >= 0, rows[:, 6], default)
     for pid in np.unique(pids):
         if pid < 0:
             continue
-        group = _group(model, int(pid), found.rank, f"a triangle of {who}")
+        group = _group(model, int(pid), resource.rank, f"a triangle of {who}")
         if group is None:
             continue
         of = rows[pids == pid]
@@ -139,48 +139,48 @@ def _triangle_properties(model: Model, found: Object, rows: Ints, has_default: b
             model.say(P019, f"a triangle of {who} blends base materials")
 
 
-def _property(model: Model, found: Resource) -> None:
-    who = f"{found.kind} {found.id}"
-    display = found.attributes.get("displaypropertiesid")
+def _property(model: Model, resource: Resource) -> None:
+    who = f"{resource.kind} {resource.id}"
+    display = resource.attributes.get("displaypropertiesid")
     if display is not None:
-        _earlier(model, int(display), found.rank, who, "displayproperties")
+        _earlier(model, int(display), resource.rank, who, "displayproperties")
     for name in _TEXTURED:
-        if name in found.attributes:
-            _earlier(model, int(found.attributes[name]), found.rank, who, "texture2d")
-    if found.kind == "texture2dgroup":
-        _earlier(model, int(found.attributes["texid"]), found.rank, who, "texture2d")
-    elif found.kind == "compositematerials":
-        base = _earlier(model, int(found.attributes["matid"]), found.rank, who, "basematerials")
+        if name in resource.attributes:
+            _earlier(model, int(resource.attributes[name]), resource.rank, who, "texture2d")
+    if resource.kind == "texture2dgroup":
+        _earlier(model, int(resource.attributes["texid"]), resource.rank, who, "texture2d")
+    elif resource.kind == "compositematerials":
+        base = _earlier(model, int(resource.attributes["matid"]), resource.rank, who, "basematerials")
         if base is not None:
-            for said in found.attributes["matindices"].split():
-                _in_range(model, int(said), base.count, f"an index of {who}")
-    elif found.kind == "multiproperties":
-        _multi(model, found)
-    elif found.kind == "slicestack":
-        _slicestack(model, found, found.id in _solid_stacks(model))
+            for text in resource.attributes["matindices"].split():
+                _in_range(model, int(text), base.count, f"an index of {who}")
+    elif resource.kind == "multiproperties":
+        _multi(model, resource)
+    elif resource.kind == "slicestack":
+        _slicestack(model, resource, resource.id in _solid_stacks(model))
 
 
 def _earlier(model: Model, id_: int, rank: int, who: str, kind: str) -> Resource | None:
-    found = model.resources.get(id_)
-    if found is None and id_ in model.foreign:
+    resource = model.resources.get(id_)
+    if resource is None and id_ in model.foreign:
         return None
-    if found is None or not found.kind.endswith(kind):
+    if resource is None or not resource.kind.endswith(kind):
         model.say(P019, f"{who} names {id_} as {kind}, which is not there")
         return None
-    if found.rank > rank:
+    if resource.rank > rank:
         model.say(P019, f"{who} names {kind} {id_}, which is defined later")
-    return found
+    return resource
 
 
-def _multi(model: Model, found: Resource) -> None:
+def _multi(model: Model, resource: Resource) -> None:
     """Materials 1.2, chapter 5: one material at most and first, one colour group at most, no multiproperties."""
-    who = f"multiproperties {found.id}"
-    ids = [int(said) for said in found.attributes["pids"].split()]
+    who = f"multiproperties {resource.id}"
+    ids = [int(text) for text in resource.attributes["pids"].split()]
     textures = [id_ for id_ in ids if id_ in model.resources and model.resources[id_].kind == "texture2d"]
     if textures:
         # Drafts allowed it and the consortium's own MUSTPASS files do it, so it does not fail a file.
         model.say(P019, f"{who} names texture {textures[0]} itself, not a group of its coordinates", "warning")
-    groups = [None if id_ in textures else _group(model, id_, found.rank, who) for id_ in ids]
+    groups = [None if id_ in textures else _group(model, id_, resource.rank, who) for id_ in ids]
     kinds = [group.kind if group else "" for group in groups]
     materials = [place for place, kind in enumerate(kinds) if kind in _MATERIALS]
     if len(materials) > 1:
@@ -191,10 +191,10 @@ def _multi(model: Model, found: Resource) -> None:
         model.say(P019, f"{who} names two colour groups")
     if "multiproperties" in kinds:
         model.say(P019, f"{who} names multiproperties")
-    if len(found.attributes.get("blendmethods", "").split()) > len(ids) - 1:
+    if len(resource.attributes.get("blendmethods", "").split()) > len(ids) - 1:
         model.say(P019, f"{who} has more blend methods than layers less one")
-    for member in found.members if not textures else ():
-        indices = [int(said) for said in member["pindices"].split()]
+    for member in resource.members if not textures else ():
+        indices = [int(text) for text in member["pindices"].split()]
         if len(indices) > len(ids):
             model.say(P019, f"{who} has more indices than groups")
         for index, group in zip(indices, groups, strict=False):
@@ -205,23 +205,23 @@ def _multi(model: Model, found: Resource) -> None:
 def _solid_stacks(model: Model) -> set[int]:
     """Slice stacks of objects that must be solids: their polygons must be closed."""
     named = (thing.attributes.get(_STACK, "") for thing in model.objects().values() if thing.type in _SOLID)
-    return {int(said) for said in named if elements.resource_id(said)}
+    return {int(text) for text in named if elements.resource_id(text)}
 
 
-def _slicestack(model: Model, found: Resource, solid: bool) -> None:
+def _slicestack(model: Model, resource: Resource, solid: bool) -> None:
     """Slice 1.0: heights rise from zbottom; slices or references, not both; polygons name vertices that exist."""
-    who = f"slicestack {found.id}"
-    kinds = {member[""] for member in found.members}
+    who = f"slicestack {resource.id}"
+    kinds = {member[""] for member in resource.members}
     if {"slice", "sliceref"} <= kinds:
         model.say(P017, f"{who} has slices and references")
-    height = float(found.attributes.get("zbottom", 0))
+    height = float(resource.attributes.get("zbottom", 0))
     count, start, last = 0, -1, -1
 
     def close_polygon() -> None:
         if solid and start >= 0 and last != start:
             model.say(P017, f"a polygon of {who} is open")
 
-    for member in found.members:
+    for member in resource.members:
         kind = member[""]
         if kind == "slice":
             close_polygon()
@@ -247,57 +247,57 @@ def _slicestack(model: Model, found: Resource, solid: bool) -> None:
     close_polygon()
 
 
-def _sliced(model: Model, found: Object) -> None:
-    stack = found.attributes.get(_STACK)
-    resolution = found.attributes.get(f"{elements.SLICE} meshresolution", "fullres")
-    who = f"object {found.id}"
+def _sliced(model: Model, resource: Object) -> None:
+    stack = resource.attributes.get(_STACK)
+    resolution = resource.attributes.get(f"{elements.SLICE} meshresolution", "fullres")
+    who = f"object {resource.id}"
     if resolution not in ("fullres", "lowres"):
         model.say(P017, f"mesh resolution {resolution[:40]!r} of {who}")
     if stack is not None:
         if not elements.resource_id(stack):
             model.say(P017, f"slice stack {stack[:40]!r} of {who} is no id")
         else:
-            _earlier(model, int(stack), found.rank, who, "slicestack")
+            _earlier(model, int(stack), resource.rank, who, "slicestack")
 
 
-def _lattice(model: Model, found: Object) -> None:
+def _lattice(model: Model, resource: Object) -> None:
     """Beam lattice 1.2: ends exist and differ, sets name beams that exist, clipping meshes are earlier mesh objects."""
-    assert found.lattice is not None
-    who, count = f"the lattice of object {found.id}", 0 if found.vertices is None else len(found.vertices)
-    if found.type not in _SOLID:
-        model.say(P017, f"{who} is in an object of type {found.type}")
-    for beam in found.beams:
+    assert resource.lattice is not None
+    who, count = f"the lattice of object {resource.id}", 0 if resource.vertices is None else len(resource.vertices)
+    if resource.type not in _SOLID:
+        model.say(P017, f"{who} is in an object of type {resource.type}")
+    for beam in resource.beams:
         ends = int(beam["v1"]), int(beam["v2"])
         if ends[0] == ends[1]:
             model.say(P017, f"a beam of {who} ends where it begins")
         _in_range(model, max(ends), count, f"a beam's end in {who}")
         if "r2" in beam and "r1" not in beam:
             model.say(P017, f"a beam of {who} has r2 without r1")
-    for ball in found.balls:
+    for ball in resource.balls:
         _in_range(model, int(ball["vindex"]), count, f"a ball's vertex in {who}")
-    for index in found.beam_refs:
-        _in_range(model, index, len(found.beams), f"a beam set's index in {who}")
-    if found.lattice.get("clippingmode", "none") != "none" and "clippingmesh" not in found.lattice:
+    for index in resource.beam_refs:
+        _in_range(model, index, len(resource.beams), f"a beam set's index in {who}")
+    if resource.lattice.get("clippingmode", "none") != "none" and "clippingmesh" not in resource.lattice:
         model.say(P019, f"{who} clips without a clipping mesh")
     for name in ("clippingmesh", "representationmesh"):
-        if name not in found.lattice:
+        if name not in resource.lattice:
             continue
-        other = model.resources.get(int(found.lattice[name]))
-        if not isinstance(other, Object) or other.rank >= found.rank:
+        other = model.resources.get(int(resource.lattice[name]))
+        if not isinstance(other, Object) or other.rank >= resource.rank:
             model.say(P019, f"the {name} of {who} is no earlier object")
         elif other.lattice is not None or other.components:
             model.say(P019, f"the {name} of {who} is no plain mesh")
-    for holder, index in _lattice_properties(found):
-        group = _group(model, holder, found.rank, who)
+    for holder, index in _lattice_properties(resource):
+        group = _group(model, holder, resource.rank, who)
         if group is not None and index is not None:
             _in_range(model, index, group.count, f"a property index in {who}")
 
 
-def _lattice_properties(found: Object) -> Iterator[tuple[int, int | None]]:
-    assert found.lattice is not None
-    if "pid" in found.lattice:
-        yield int(found.lattice["pid"]), int(found.lattice["pindex"]) if "pindex" in found.lattice else None
-    for beam in found.beams:
+def _lattice_properties(resource: Object) -> Iterator[tuple[int, int | None]]:
+    assert resource.lattice is not None
+    if "pid" in resource.lattice:
+        yield int(resource.lattice["pid"]), int(resource.lattice["pindex"]) if "pindex" in resource.lattice else None
+    for beam in resource.beams:
         if "pid" in beam:
             for name in ("p1", "p2"):
                 if name in beam:
@@ -309,10 +309,10 @@ def _uuids(model: Model) -> None:
     missing = [] if model.build_uuid or not model.has_build else ["the build"]
     if any(not item.uuid for item in model.items):
         missing.append("an item")
-    for found in model.objects().values():
-        if f"{elements.PRODUCTION} UUID" not in found.attributes:
-            missing.append(f"object {found.id}")
-        if any(not use.uuid for use in found.components):
-            missing.append(f"a component of object {found.id}")
+    for resource in model.objects().values():
+        if f"{elements.PRODUCTION} UUID" not in resource.attributes:
+            missing.append(f"object {resource.id}")
+        if any(not use.uuid for use in resource.components):
+            missing.append(f"a component of object {resource.id}")
     if missing:
         model.say_lenient(P017, f"no UUID for {', '.join(missing[:3])}")

@@ -78,11 +78,11 @@ def stream(
         parser.Parse(b"", True)
     except expat.ExpatError as error:
         line = [Location(part=part, line=error.lineno)]
-        said = expat.ErrorString(error.code)
+        reason = expat.ErrorString(error.code)
         at = parser.ErrorByteIndex - seen
         if 0 <= at < len(chunk) and any(byte > 127 for byte in chunk[at : at + 4]):
             raise Unreadable(F009.finding("bytes that are not UTF-8", places=line, severity="error")) from error
-        raise Unreadable(F003.finding(f"XML not well formed: {said}", places=line)) from error
+        raise Unreadable(F003.finding(f"XML not well formed: {reason}", places=line)) from error
 
 
 def _with_head(chunks: Iterable[bytes]) -> Iterator[bytes]:
