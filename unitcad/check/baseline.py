@@ -52,7 +52,7 @@ _AGAIN = "remove it, and make it again with --write-baseline"
 
 
 def _fault(error: Exception) -> str:
-    """Where a baseline differs from what this program writes."""
+    """Say where a baseline differs from what this program writes."""
     if not isinstance(error, msgspec.ValidationError):
         byte = re.search(r"byte (\d+)", str(error))
         return f"it is not JSON (byte {byte[1]})" if byte else "it is not JSON"
@@ -92,14 +92,14 @@ def write(path: Path, old: Baseline, reports: Sequence[FileReport]) -> Baseline:
 
 
 def apply(baseline: Baseline, path: Path, report: FileReport) -> FileReport:
-    """The report with what the baseline at `path` lists marked as known."""
+    """Return the report with what the baseline at `path` lists marked as known."""
     known = {entry.code: entry for entry in baseline.files.get(_key(path, report.path), [])}
     findings = tuple(_compared(item, known.get(item.code), report.facts) for item in report.findings)
     return replace(report, findings=findings)
 
 
 def _key(path: Path, file: str) -> str:
-    """A file's name in the baseline at `path`."""
+    """Return a file's name in the baseline at `path`."""
     return files.seen_from(file, path.parent).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
@@ -124,7 +124,7 @@ def _name(place: Location) -> str:
 
 
 def _compared(finding: Finding, entry: Entry | None, facts: Facts) -> Finding:
-    """The finding as known, or with the places that are new in front."""
+    """Return the finding as known, or with the places that are new in front."""
     if entry is None or not _may_be(finding):
         return finding
     new = _new(finding, entry, facts)
@@ -138,7 +138,7 @@ def _compared(finding: Finding, entry: Entry | None, facts: Facts) -> Finding:
 
 
 def _new(finding: Finding, entry: Entry, facts: Facts) -> Bools:
-    """Which of the finding's locations the entry does not have."""
+    """Return which of the finding's locations the entry does not have."""
     places = finding.locations
     points = np.array([place.centre or (math.nan,) * 3 for place in places], float).reshape(-1, 3)
     named = np.isnan(points[:, 0])
@@ -150,7 +150,7 @@ def _new(finding: Finding, entry: Entry, facts: Facts) -> Bools:
 
 
 def _near(points: Floats, known: Floats, code: str, facts: Facts) -> Bools:
-    """Whether each point lies near a known one."""
+    """Return whether each point lies near a known one."""
     if not len(known):
         return np.zeros(len(points), bool)
     from scipy.spatial import KDTree

@@ -30,7 +30,7 @@ _DETAIL: ContextVar[Detail] = ContextVar("detail", default=_DEFAULT)
 
 
 def detail() -> Detail:
-    """What is kept now."""
+    """Return what is kept now."""
     return _DETAIL.get()
 
 

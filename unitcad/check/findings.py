@@ -42,7 +42,7 @@ class Location:
             object.__setattr__(self, "faces", (self.face,))
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready, without what is not known."""
+        """Return it JSON-ready, without what is not known."""
         known: dict[str, Any] = {}
         if self.part is not None:
             known["part"] = self.part
@@ -88,7 +88,7 @@ class Finding:
     known: bool = False
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready."""
+        """Return it JSON-ready."""
         return {
             "code": self.code,
             "severity": self.severity,
@@ -111,7 +111,7 @@ class Facts:
     watertight: bool | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready; bbox_mm is [[x, y, z] low, [x, y, z] high]."""
+        """Return it JSON-ready; bbox_mm is [[x, y, z] low, [x, y, z] high]."""
         return {
             "triangles": self.triangles,
             "vertices": self.vertices,
@@ -143,16 +143,16 @@ class FileReport:
         return "error" if "error" in severities else "warning" if "warning" in severities else "pass"
 
     def has(self, code: str) -> bool:
-        """Whether a finding of that code is there."""
+        """Return whether a finding of that code is there."""
         return any(finding.code == code for finding in self.findings)
 
     def shortened(self, locations: int) -> FileReport:
-        """The report with so many locations a finding at most."""
+        """Return the report with so many locations a finding at most."""
         kept = tuple(replace(item, locations=item.locations[:locations]) for item in self.findings)
         return replace(self, findings=kept)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready; without the time, so that the same file gives the same text."""
+        """Return it JSON-ready; without the time, so that the same file gives the same text."""
         return {
             "path": self.path,
             "verdict": self.verdict,
@@ -162,7 +162,7 @@ class FileReport:
 
 
 def ending(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The findings, the errors among them marked as what ended the check."""
+    """Return the findings, the errors among them marked as what ended the check."""
     return tuple(replace(item, ends=True) if item.severity == "error" else item for item in findings)
 
 
@@ -173,7 +173,7 @@ def with_places(finding: Finding, places: int) -> str:
 
 
 def number(length: SupportsFloat, digits: int = 6) -> str:
-    """A length, area or volume in a message: never -0, and no power of ten where digits can say it.
+    """Return a length, area or volume in a message: never -0, and no power of ten where digits can say it.
 
     What is below a millionth of a mm is 0.
     """
@@ -186,12 +186,14 @@ def number(length: SupportsFloat, digits: int = 6) -> str:
 
 
 def counted(n: int, one: str, many: str = "") -> str:
-    """`1 shell`, `2 shells`; `many` where the plural takes more than an s."""
+    """Write `1 shell`, `2 shells`; `many` where the plural takes more than an s."""
     return f"{n} {one if n == 1 else many or one + 's'}"
 
 
 def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """One finding a rule: counts added, first two messages and first places kept, worst severity; worst first."""
+    """Merge to one finding a rule, worst first: counts added, two messages and the first places kept, worst
+    severity.
+    """
     by_code: dict[str, Finding] = {}
     merged: set[str] = set()
     for new in findings:

@@ -67,7 +67,7 @@ def _listing(manifest: Path, data: Any) -> Listing:
 
 
 def leads_outside(folder: Path, listed: str) -> bool:
-    """Whether a path of a manifest is absolute, has `..` in it, or leaves the manifest's folder through a link.
+    """Return whether a path of a manifest is absolute, has `..` in it, or leaves the manifest's folder through a link.
 
     What is absolute or climbs on any system is refused on all of them.
     """
@@ -108,7 +108,7 @@ def work(listing: Listing, paths: Sequence[str], options: Choice, printer_named:
 
 
 def compare(listing: Listing, report: FileReport, options: Options) -> FileReport:
-    """The report with what the manifest adds to it."""
+    """Return the report with what the manifest adds to it."""
     part = listing.files.get(os.path.abspath(report.path))
     unlisted = [M004.finding("the manifest does not list this file")]
     findings = unlisted if part is None else check_listed(part, report)
@@ -117,7 +117,7 @@ def compare(listing: Listing, report: FileReport, options: Options) -> FileRepor
 
 
 def unchecked(listing: Listing, checked: Sequence[str], options: Choice) -> list[FileReport]:
-    """Reports of the listed files that were not checked (STEP, drawings, ...) and are gone or changed: M003, M004.
+    """Report the listed files that were not checked (STEP, drawings and others) and are gone or changed: M003, M004.
 
     One of the manifest itself comes last where it lists paths outside its folder (M005): nothing there is read.
     """

@@ -31,7 +31,7 @@ Then = Callable[[FileReport], FileReport]
 
 
 def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
-    """Files for names that may be folders or globs, without repeats; a report for each name that gives none.
+    """Return files for names that may be folders or globs, without repeats; a report for each name that gives none.
 
     So for a folder's STEP files where none can be read: a warning, since nobody named them.
     """
@@ -57,7 +57,7 @@ def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
 
 
 def _walked(folder: Path) -> Iterator[str]:
-    """Mesh files below a folder, without hidden folders and those behind links."""
+    """Return mesh files below a folder, without hidden folders and those behind links."""
     for here, below, names in os.walk(folder):
         below[:] = [name for name in below if not name.startswith(".")]
         for name in names:
@@ -67,19 +67,21 @@ def _walked(folder: Path) -> Iterator[str]:
 
 
 def _readable(paths: list[str]) -> tuple[list[str], list[FileReport]]:
-    """Files of a folder that can be checked here, and for those that only an extra reads a report with a warning."""
+    """Return files of a folder that can be checked here, and for those that only an extra reads a report with a
+    warning.
+    """
     step = [] if read_step.installed() else [path for path in paths if Path(path).suffix.lower() in (".step", ".stp")]
     warning = F012.finding(f"{read_step.NEEDS}; not checked", severity="warning")
     return [path for path in paths if path not in step], [FileReport(path, (warning,)) for path in step]
 
 
 def _inside(paths: Iterable[str]) -> list[str]:
-    """Each real file once, by the name with the fewest folders; sorted."""
+    """Return each real file once, by the name with the fewest folders; sorted."""
     return sorted(_once(sorted(paths, key=lambda path: (path.count(os.sep), path))))
 
 
 def _once(paths: Iterable[str]) -> list[str]:
-    """Each real file by the first of its names."""
+    """Return each real file by the first of its names."""
     real: dict[str, str] = {}
     for path in paths:
         real.setdefault(os.path.realpath(path), path)
@@ -92,7 +94,7 @@ def check_files(
     memory_mb: int | None = None,
     then: Then | None = None,
 ) -> Iterator[FileReport]:
-    """A report for each (path, options), in order. `memory_mb` bounds each process's address space (POSIX only).
+    """Return a report for each (path, options), in order. `memory_mb` bounds each process's address space (POSIX only).
 
     `then` takes each report where it was made, with its meshes, and gives the one that is passed on.
     """
@@ -105,7 +107,7 @@ def check_files(
 
 
 def guarded(path: str, options: Options, then: Then | None = None) -> FileReport:
-    """`check_file` with an alarm behind its clock and a net below it: an inner fault is a finding, not a crash."""
+    """Call `check_file` with an alarm behind its clock; an inner fault becomes a finding, not a crash."""
     begin = time.perf_counter()
     report = _guarded(path, options)
     report = replace(report, seconds=time.perf_counter() - begin)
@@ -190,7 +192,7 @@ def _bounded(memory_mb: int | None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _alarm(seconds: float) -> Iterator[None]:
-    """Raises `OutOfTime` in Python code that no deadline's tick reaches, when half the time more has passed.
+    """Raise `OutOfTime` in Python code that no deadline's tick reaches, when half the time more has passed.
 
     Does nothing outside the main thread or on Windows.
     """
@@ -213,6 +215,6 @@ def _alarm(seconds: float) -> Iterator[None]:
 
 
 def worst(reports: Iterable[FileReport], fail_on: str) -> int:
-    """The exit code: 1 if any report has a finding at or above `fail_on` (error or warning), else 0."""
+    """Return the exit code: 1 if any report has a finding at or above `fail_on` (error or warning), else 0."""
     failing = {"error"} if fail_on == "error" else {"error", "warning"}
     return int(any(report.verdict in failing for report in reports))

@@ -74,7 +74,7 @@ def _guarded(path: str, options: Options, work: Callable[[Deadline], tuple[Seque
 
 
 def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
-    kind = sniff.kind_of(path.name, data[:64])
+    kind = sniff.kind_of(path.name)
     if not kind:
         known = ", ".join(sorted(sniff.SUFFIXES))
         raise Unreadable(F005.finding(f"suffix {path.suffix!r} is no mesh's; known: {known}"))
@@ -111,7 +111,9 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
 
 
 def _bytes_of(path: Path, limits: Limits) -> bytes:
-    """The content; its size is looked at first, and what is no regular file is never opened (a FIFO would wait)."""
+    """Read the content; its size is looked at first, and what is no regular file is never opened (a FIFO would
+    wait).
+    """
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):

@@ -84,7 +84,7 @@ def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
 
 
 def _drawn(place: Location, mesh: Mesh) -> Location:
-    """The location with the middle of its triangles and, where somebody draws, the number of their mesh."""
+    """Return the location with the middle of its triangles and, where somebody draws, the number of their mesh."""
     if place.mesh is not None or (place.centre is not None and place.region is None):
         return place
     whole, meshes = place.region is not None, detail().meshes
@@ -103,7 +103,7 @@ def _drawn(place: Location, mesh: Mesh) -> Location:
 
 
 def _located(place: Location, source: Source) -> Location:
-    """The location with its triangles' faces, line, part and object as the file has them."""
+    """Return the location with its triangles' faces, line, part and object as the file has them."""
     part = place.part or source.part
     if place.face is None:
         return replace(place, part=part)

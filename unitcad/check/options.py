@@ -39,7 +39,7 @@ class Options:
     draw: bool = False
 
     def wants(self, code: str) -> bool:
-        """Whether findings of `code` are reported, unless they ended the check: those always are."""
+        """Return whether findings of `code` are reported, unless they ended the check: those always are."""
         chosen = max((len(p) for p in self.select if code.startswith(p)), default=-1 if self.select else 0)
         dropped = max((len(p) for p in self.ignore if code.startswith(p)), default=-1)
         return chosen >= 0 and chosen > dropped and not code.startswith(self.unwanted or ("-",))

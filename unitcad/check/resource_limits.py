@@ -46,7 +46,7 @@ class OutOfTime(Unreadable):
 
 
 def over_limit(what: str) -> Unreadable:
-    """The limit `what` is reached."""
+    """Return the limit `what` is reached."""
     return Unreadable(F011.finding(what))
 
 
@@ -81,6 +81,6 @@ class Deadline:
         self._end = time.monotonic() + seconds
 
     def tick(self) -> None:
-        """Raises `OutOfTime` (F011) after the last second."""
+        """Raise `OutOfTime` (F011) after the last second."""
         if time.monotonic() > self._end:
             raise OutOfTime(self.seconds)

@@ -43,7 +43,7 @@ _SHARE = 1e-6  # of the smaller volume, below which solids only touch
 
 
 def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
-    """All findings about a 3MF file and the facts of what it builds."""
+    """Return all findings about a 3MF file and the facts of what it builds."""
     package = open_package(data, options.limits, deadline, strict=options.strict_3mf)
     try:
         with keeping(package.findings):
@@ -55,7 +55,7 @@ def check_3mf(data: memoryview, options: Options, deadline: Deadline) -> tuple[l
 
 
 def _named(package: Package, item: Finding) -> Finding:
-    """The finding with its places' parts as the package writes them."""
+    """Return the finding with its places' parts as the package writes them."""
     return replace(
         item,
         locations=tuple(
@@ -74,7 +74,7 @@ class _Turned:
 
 
 def _turned(model_object: Object, linear: Floats, factor: float) -> _Turned:
-    """Measured once for all instances that differ by a shift: adding it to the box rounds as it does every vertex."""
+    """Measure once for all instances that differ by a shift: adding it to the box rounds as it does every vertex."""
     assert model_object.vertices is not None
     assert model_object.triangles is not None
     with np.errstate(all="ignore"):
@@ -161,7 +161,9 @@ def _geometry(
 
 
 def _check_object(model_object: Object, part: str, factor: float, options: Options, deadline: Deadline) -> CheckedMesh:
-    """The geometry rules for one object; only model and solidsupport objects must be solids, unless slices stand in."""
+    """Return the geometry rules for one object; only model and solidsupport objects must be solids, unless slices stand
+    in.
+    """
     mesh = mesh_of(model_object, part, factor)
     stand_in = model_object.attributes.get(f"{elements.SLICE} meshresolution") == "lowres"
     if model_object.type not in ("model", "solidsupport") or stand_in:
@@ -172,7 +174,7 @@ def _check_object(model_object: Object, part: str, factor: float, options: Optio
 
 
 def _filled(findings: Iterable[Finding]) -> Iterator[Finding]:
-    """The findings, of rules that 3MF answers by its fill rule as warnings."""
+    """Return the findings, of rules that 3MF answers by its fill rule as warnings."""
     for item in findings:
         if item.code in _FILLED:
             yield replace(item, severity="warning", message=f"{item.message} (3MF's fill rule says what is solid)")
@@ -191,7 +193,7 @@ class Placed:
 
 
 def overlapping(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
-    """G002 as a warning for the pairs that share volume, by manifold3d's boolean of those whose boxes do."""
+    """Apply G002, as a warning, to pairs that share volume, by manifold3d's boolean of those whose boxes do."""
     some = placed[:MOST]
     if len(some) < 2:
         return []
@@ -225,7 +227,7 @@ def _overlaps(places: list[Location], *, among: bool) -> list[Finding]:
 
 
 def _shared(a: int, b: int, some: Sequence[Placed], solids: dict[int, Manifold]) -> float:
-    """The volume that two share, mm3; 0 where manifold3d refuses one (its own faults are reported)."""
+    """Return the volume that two share, mm3; 0 where manifold3d refuses one (its own faults are reported)."""
     for i in (a, b):
         if i not in solids:
             solids[i] = solid_of(some[i].vertices, some[i].faces)
@@ -235,7 +237,9 @@ def _shared(a: int, b: int, some: Sequence[Placed], solids: dict[int, Manifold])
 def printed(
     models: dict[str, Model], instances: Sequence[Instance], printer: Printer, deadline: Deadline
 ) -> list[Finding]:
-    """The printer's rules for each instance; those that differ by their place on the bed alone are checked once."""
+    """Apply the printer's rules to each instance; those that differ by their place on the bed alone are
+    checked once.
+    """
     findings: list[Finding] = []
     checked: dict[tuple[Key, bytes, float], tuple[Floats, tuple[Finding, ...]]] = {}
     for instance in instances:
@@ -256,7 +260,7 @@ def printed(
 
 
 def _shifted(findings: Sequence[Finding], by: Floats) -> Iterator[Finding]:
-    """The findings of an instance that lies elsewhere on the bed."""
+    """Return the findings of an instance that lies elsewhere on the bed."""
     if not by.any():
         yield from findings
         return

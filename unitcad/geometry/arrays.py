@@ -16,7 +16,7 @@ Bools = NDArray[Any]
 
 
 def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDArray[np.uint64], Ints]:
-    """`key` (its low `bits` bits) sorted, and the order that sorts it.
+    """Sort `key` (its low `bits` bits); return it and the order that sorts it.
 
     Where key and position fit into 64 bits together, one sort of plain integers does it, four times faster.
     """
@@ -33,13 +33,17 @@ def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDAr
 
 
 def extent(points: Floats) -> tuple[Floats, Floats]:
-    """Low and high corner of the box round (n, 3) points, column by column (five times faster than along an axis)."""
+    """Return low and high corner of the box round (n, 3) points, column by column (five times faster than along an
+    axis).
+    """
     columns = [points[:, axis] for axis in range(3)]
     return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
 
 
 def extents(points: Floats, label: Ints, n: int) -> tuple[Floats, Floats]:
-    """Low and high corners (n, 3) of the boxes round the points of each label; of a label without any inf and -inf."""
+    """Return low and high corners (n, 3) of the boxes round the points of each label; of a label without any inf and
+    -inf.
+    """
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     np.minimum.at(low, label, points)
     np.maximum.at(high, label, points)
@@ -47,7 +51,7 @@ def extents(points: Floats, label: Ints, n: int) -> tuple[Floats, Floats]:
 
 
 def cross(a: Floats, b: Floats) -> Floats:
-    """Row-wise cross product of (n, 3) arrays; several times faster than numpy.cross on long arrays."""
+    """Return the row-wise cross product of (n, 3) arrays; several times faster than numpy.cross on long arrays."""
     found = np.empty_like(a)
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3

@@ -32,7 +32,9 @@ class Frame:
     scale: Floats
 
     def steps(self, points: Floats) -> list[Ints]:
-        """The three coordinates of (n, 3) points in steps, 1 to 65,534; order is kept, what lies outside is clipped."""
+        """Return the three coordinates of (n, 3) points in steps, 1 to 65,534; order is kept, what lies outside is
+        clipped.
+        """
         found = []
         for axis in range(3):
             value = (points[:, axis] - self.origin[axis]) * self.scale[axis]
@@ -40,19 +42,23 @@ class Frame:
         return found
 
     def even(self, steps: list[Ints]) -> list[Ints]:
-        """The same in steps of about one length, by powers of two: cells of a space-filling curve are near cubes."""
+        """Return the same in steps of about one length, by powers of two: cells of a space-filling curve are near
+        cubes.
+        """
         shift = np.round(np.log2(self.scale / self.scale.min())).clip(0, 15).astype(np.uint16)
         return [step >> bits for step, bits in zip(steps, shift, strict=True)]
 
 
 def frame_of(points: Floats) -> Frame:
-    """A frame round (n, 3) points."""
+    """Return a frame round (n, 3) points."""
     low, high = extent(points)
     return Frame(low, (_TOP - 1) / np.maximum(high - low, 1e-300))
 
 
 def morton_order(steps: list[Ints], corner: Ints | None = None) -> Ints:
-    """The order of points along a space-filling curve; with `corner`, of what has `corner[i]` as its first point."""
+    """Return the order of points along a space-filling curve; with `corner`, of what has `corner[i]` as its first
+    point.
+    """
     key = np.zeros(len(steps[0]), np.uint64)
     for axis in range(3):
         key |= _spread((steps[axis] >> np.uint16(16 - _BITS)).astype(np.uint64)) << np.uint64(axis)
@@ -60,20 +66,24 @@ def morton_order(steps: list[Ints], corner: Ints | None = None) -> Ints:
 
 
 def box_order(boxes: Ints, frame: Frame) -> Ints:
-    """The order of boxes in a frame by their middles, along a space-filling curve with cells that are near cubes."""
+    """Return the order of boxes in a frame by their middles, along a space-filling curve with cells that are near
+    cubes.
+    """
     middle = [boxes[:, axis] // 2 + (np.uint16(65_535) - boxes[:, axis + 3]) // 2 for axis in range(3)]
     return morton_order(frame.even(middle))
 
 
 def _spread(value: np.ndarray) -> np.ndarray:
-    """Bits of `value` (up to 16) moved three apart."""
+    """Return bits of `value` (up to 16) moved three apart."""
     for shift, mask in ((16, 0xFF0000FF), (8, 0x0F00F00F00F), (4, 0xC30C30C30C3), (2, 0x249249249249)):
         value = (value | (value << np.uint64(shift))) & np.uint64(mask)
     return value
 
 
 def boxes_of(steps: list[Ints], *corners: Ints) -> Ints:
-    """Boxes round the points named by each row of the corner columns: low corner, 65,535 less high corner; (m, 6)."""
+    """Return boxes round the points named by each row of the corner columns: low corner, 65,535 less high corner; (m,
+    6).
+    """
     boxes = np.empty((len(corners[0]), 6), np.uint16)
     for axis in range(3):
         low = high = steps[axis][corners[0]]
@@ -93,7 +103,7 @@ class Slabs:
     high: Ints
 
     def meeting(self, i: Ints, j: Ints) -> tuple[Ints, Ints]:
-        """The pairs i, j of faces whose slabs meet along all diagonals."""
+        """Return the pairs i, j of faces whose slabs meet along all diagonals."""
         meet = self._reach(i, j)
         meet &= self._reach(j, i)
         keep = np.flatnonzero(meet.view(np.uint32) == 0x01010101)
@@ -104,7 +114,7 @@ class Slabs:
 
 
 def slabs_of(steps: list[Ints], *corners: Ints) -> Slabs:
-    """The slabs of faces, by the steps of their corners along the axes, as `boxes_of` makes their boxes.
+    """Return the slabs of faces, by the steps of their corners along the axes, as `boxes_of` makes their boxes.
 
     A sum of three steps is off by less than three of them, a fourth of it by one at most: so much are they wider.
     """
@@ -123,7 +133,7 @@ def slabs_of(steps: list[Ints], *corners: Ints) -> Slabs:
 
 
 def meeting_pairs(boxes: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints, Ints]]:
-    """Blocks of pairs i, j of different rows of `boxes` whose boxes meet, each pair once.
+    """Return blocks of pairs i, j of different rows of `boxes` whose boxes meet, each pair once.
 
     Rows near each other should be near in space.
     """
@@ -133,14 +143,14 @@ def meeting_pairs(boxes: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints
 
 
 def meeting_between(boxes: Ints, others: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints, Ints]]:
-    """The same between the rows of two sets in one frame: row of `boxes`, row of `others`."""
+    """Return the same between the rows of two sets in one frame: row of `boxes`, row of `others`."""
     here, there = _levels(boxes, len(others)), _levels(others, len(boxes))
     top = np.indices((len(here[-1]), len(there[-1]))).reshape(2, -1)
     yield from _descend(here, there, top[0], top[1], tick, own=False)
 
 
 def _levels(boxes: Ints, least: int) -> list[Ints]:
-    """The tree's levels from the leaves up, for `least` leaves or more; the uppermost has few boxes."""
+    """Return the tree's levels from the leaves up, for `least` leaves or more; the uppermost has few boxes."""
     levels = [_padded(boxes, max(least - len(boxes), 0))]
     while len(levels) == 1 or len(levels[-1]) > _ROOTS:
         below = levels[-1]
@@ -150,13 +160,13 @@ def _levels(boxes: Ints, least: int) -> list[Ints]:
 
 
 def _padded(boxes: Ints, more: int) -> Ints:
-    """Rows up to a multiple of the fan, the added ones empty: they meet nothing."""
+    """Return rows up to a multiple of the fan, the added ones empty: they meet nothing."""
     more += -(len(boxes) + more) % _FAN
     return np.concatenate([boxes, np.full((more, 6), 65_535, np.uint16)]) if more else boxes
 
 
 def _packed(boxes: Ints) -> Ints:
-    """Every four rows in one column: six words of four coordinates each, low then high, (6, n / 4).
+    """Return every four rows in one column: six words of four coordinates each, low then high, (6, n / 4).
 
     They are signed, less half their range: such comparisons are the fastest.
     """
@@ -185,7 +195,7 @@ def _descend(
 
 
 def _children(rows: Ints, which: Ints) -> tuple[Ints, Ints]:
-    """Low and high corners of the children of some nodes: (axis, child, node) each."""
+    """Return low and high corners of the children of some nodes: (axis, child, node) each."""
     words = rows.take(which, axis=1, mode="clip")
     corners = np.ascontiguousarray(words.view(np.int16).reshape(6, -1, _FAN).transpose(0, 2, 1))
     return corners[:3], corners[3:]
@@ -199,7 +209,7 @@ def _walk(
     skip: Callable[[Ints, Ints], Bools] | None,
     tick: Tick,
 ) -> Iterator[tuple[Ints, Ints]]:
-    """Children of the node pairs whose boxes meet.
+    """Return children of the node pairs whose boxes meet.
 
     Of a node with itself the pairs of children (p, q) for which `skip(p, q)` are left out.
     """

@@ -17,7 +17,7 @@ _TRIES = 3  # pairs of faces tried one by one for each pair of shells before all
 
 
 def by_boxes(a: Floats, b: Floats) -> tuple[Bools, Bools]:
-    """For pairs of triangles (corner, axis, n): whether their boxes are apart, and whether all they can do is touch.
+    """Return for pairs of triangles (corner, axis, n) whether their boxes are apart, and whether they can only touch.
 
     They can where their boxes do, and the plane between these holds no side of one and all of the other.
     """
@@ -35,7 +35,9 @@ def by_boxes(a: Floats, b: Floats) -> tuple[Bools, Bools]:
 
 
 def parts_apart(a: Floats, b: Floats) -> Bools:
-    """Whether the boxes of those parts are apart that pairs of triangles have in a plane where their boxes touch."""
+    """Return whether the boxes of those parts are apart that pairs of triangles have in a plane where their boxes
+    touch.
+    """
     (low_a, high_a), (low_b, high_b) = _box(a), _box(b)
     apart = np.zeros(a.shape[2], bool)
     for axis in range(3):
@@ -49,7 +51,7 @@ def parts_apart(a: Floats, b: Floats) -> Bools:
 
 
 def _box(corners: Floats, out: Bools | None = None) -> tuple[Floats, Floats]:
-    """Low and high corner (axis, n) of the corners' box, without those that are `out`."""
+    """Return low and high corner (axis, n) of the corners' box, without those that are `out`."""
     low = high = corners
     if out is not None:
         low, high = np.where(out[:, None], np.inf, corners), np.where(out[:, None], -np.inf, corners)
@@ -66,20 +68,20 @@ class Contacts:
     pairs: list[Ints] = field(default_factory=list)
 
     def keys(self, one: Ints, other: Ints) -> Ints:
-        """A number for each pair of shells, in either order."""
+        """Return a number for each pair of shells, in either order."""
         return np.minimum(one, other).astype(np.int64) * self.shells + np.maximum(one, other)
 
     def open(self, keys: Ints) -> Bools:
-        """Which keys are still asked for."""
+        """Return which keys are still asked for."""
         return np.ones(len(keys), bool) if self.every else ~self._knows(keys)
 
     def fresh(self, keys: Ints) -> Ints:
-        """Rows of the first of each key that is not known."""
+        """Return rows of the first of each key that is not known."""
         rows = np.unique(keys, return_index=True)[1]
         return rows[~self._knows(keys[rows])]
 
     def _knows(self, keys: Ints) -> Bools:
-        """Which keys are known, by bisection: `numpy.isin` hashes all that are known at each call."""
+        """Return which keys are known, by bisection: `numpy.isin` hashes all that are known at each call."""
         if not len(self.known):
             return np.zeros(len(keys), bool)
         return self.known.take(np.searchsorted(self.known, keys), mode="clip") == keys

@@ -22,7 +22,7 @@ _WIDE = 64.0  # float32 steps: a face lower than that may be thin by rounding
 
 
 def kinds(topology: Topology, shells: Ints, opposite: Bools) -> tuple[Bools, Bools]:
-    """Of pairs of faces that cover each other in one plane: which double a shell (G008), which have nothing between
+    """Return, of pairs of faces that cover each other in one plane, which double a shell, which have nothing between
     them (G009). `shells` (n, 2) are theirs; `opposite`: they look opposite ways.
 
     The others belong to two shells side by side, or to one within the other, of which G003 and G002 tell.
@@ -34,14 +34,16 @@ def kinds(topology: Topology, shells: Ints, opposite: Bools) -> tuple[Bools, Boo
 
 
 def run_alike(a: Ints, b: Ints) -> Bools:
-    """Which pairs of faces (n, 3) run along a common edge in the same direction: they lie on the same side of it."""
+    """Return which pairs of faces (n, 3) run along a common edge in the same direction: they lie on the same side of
+    it.
+    """
     ends = [np.roll(face, -1, axis=1) for face in (a, b)]
     same = (a[:, :, None] == b[:, None, :]) & (ends[0][:, :, None] == ends[1][:, None, :])
     return np.asarray(same.any(axis=(1, 2)))
 
 
 def wide(a: Floats, b: Floats) -> Bools:
-    """Of coplanar pairs that overlap: whether both are higher than four float32 steps. Rounding makes lower ones."""
+    """Return which coplanar pairs that overlap are higher than four float32 steps both. Rounding makes lower ones."""
     high = np.ones(len(a), bool)
     least = 4 * float32_steps(np.concatenate([a, b], axis=1))
     for corners in (a, b):
@@ -52,7 +54,7 @@ def wide(a: Floats, b: Floats) -> Bools:
 
 
 def through_edges(vertices: Floats, faces: Ints, edges: Edges, shells: Ints) -> Ints:
-    """Edges round which the winding number of one shell takes three values or more."""
+    """Return edges round which the winding number of one shell takes three values or more."""
     if edges.closed:
         return np.empty(0, np.int64)
     many = np.flatnonzero((edges.size > 3) & mesh_edges.balanced(faces, edges))
@@ -78,7 +80,7 @@ def through_edges(vertices: Floats, faces: Ints, edges: Edges, shells: Ints) -> 
 
 
 def folded_edges(vertices: Floats, faces: Ints, edges: Edges, areas: Floats) -> Ints:
-    """Edges of two faces that look opposite ways and are in one plane as float32 has it, though not exactly."""
+    """Return edges of two faces that look opposite ways and are in one plane as float32 has it, though not exactly."""
     two = edges.size == 2
     if not edges.closed:  # two faces that run alike are turned over, not folded
         two &= mesh_edges.balanced(faces, edges)

@@ -32,12 +32,14 @@ class Edges:
 
 
 def scipy_pays(n: int) -> bool:
-    """Whether scipy's compiled code pays for `n` rows: to load it takes longer than to check a small mesh without."""
+    """Return whether scipy's compiled code pays for `n` rows: to load it takes longer than to check a small mesh
+    without.
+    """
     return n > _SMALL or "scipy.sparse" in sys.modules
 
 
 def half_edges(faces: Ints) -> tuple[Ints, Ints]:
-    """Start and end vertex of every half-edge, (3 m,) each."""
+    """Return start and end vertex of every half-edge, (3 m,) each."""
     start = np.ascontiguousarray(faces).reshape(-1)
     end = np.ascontiguousarray(faces[:, [1, 2, 0]]).reshape(-1)
     return start, end
@@ -64,14 +66,14 @@ def edges_of(faces: Ints, n_vertices: int) -> Edges:
 
 
 def _in_pairs(low: Ints, high: Ints) -> bool:
-    """Whether sorted edges come in twos, no more and no fewer."""
+    """Return whether sorted edges come in twos, no more and no fewer."""
     if not ((low[0::2] == low[1::2]).all() and (high[0::2] == high[1::2]).all()):
         return False
     return bool(((low[1:-1:2] != low[2::2]) | (high[1:-1:2] != high[2::2])).all())
 
 
 def _sorted_edges(low: Ints, high: Ints, n_vertices: int) -> tuple[Ints, Ints, Ints]:
-    """Half-edges in the order of (low, high, half-edge), and these two ends in that order."""
+    """Return half-edges in the order of (low, high, half-edge), and these two ends in that order."""
     n = len(low)
     if not scipy_pays(n):
         bits = max(n_vertices - 1, 1).bit_length()
@@ -90,7 +92,7 @@ def _sorted_edges(low: Ints, high: Ints, n_vertices: int) -> tuple[Ints, Ints, I
 
 
 def opposite(edges: Edges, n_half: int) -> Ints:
-    """For each half-edge the one across its edge; itself where an edge has other than two faces."""
+    """Return for each half-edge the one across its edge; itself where an edge has other than two faces."""
     found = np.arange(n_half, dtype=np.int32)
     pairs = edges.first[edges.size == 2]
     one, other = edges.order[pairs], edges.order[pairs + 1]
@@ -100,7 +102,7 @@ def opposite(edges: Edges, n_half: int) -> Ints:
 
 
 def pinched_closed(faces: Ints, across: Ints, n_vertices: int) -> Ints:
-    """Vertices of a closed, consistently wound mesh whose faces form more than one fan.
+    """Return vertices of a closed, consistently wound mesh whose faces form more than one fan.
 
     The half-edges leaving a vertex are permuted by turning to the next face; a fan is one cycle. Cycles are counted
     by pointer doubling, in as many rounds as the largest valence has binary digits.
@@ -122,7 +124,9 @@ def pinched_closed(faces: Ints, across: Ints, n_vertices: int) -> Ints:
 
 
 def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
-    """The same for any mesh: fans are joined across edges of two faces; vertices of edges with more are left out."""
+    """Return the same for any mesh: fans are joined across edges of two faces; vertices of edges with more are left
+    out.
+    """
     start, _ = half_edges(faces)
     n = len(start)
     pairs = edges.first[edges.size == 2]
@@ -141,7 +145,7 @@ def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
 
 
 def shells_of(vertices: Floats, faces: Ints, edges: Edges) -> Ints:
-    """The shell of each face, numbered by their first face.
+    """Return the shell of each face, numbered by their first face.
 
     Faces are joined across edges of two faces, and in pairs across edges of four, six and so on.
     """
@@ -154,14 +158,14 @@ def shells_of(vertices: Floats, faces: Ints, edges: Edges) -> Ints:
 
 
 def balanced(faces: Ints, edges: Edges) -> Bools:
-    """For each edge, whether as many faces run along it one way as the other, as they do round a solid."""
+    """Return for each edge whether as many faces run along it one way as the other, as they do round a solid."""
     along = faces.reshape(-1)[edges.order] == np.repeat(edges.low, edges.size)
     return 2 * np.add.reduceat(along.astype(np.int32), edges.first) == edges.size if len(along) else along
 
 
 def around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Ints, Ints, Bools, Ints]:
-    """The half-edges of the edges `many` by angle; of each the place of its edge in `many`, whether the solid ends at
-    its face, and its turn: the rank of that angle, the same for faces in one plane.
+    """Return the half-edges of the edges `many` by angle; of each the place of its edge in `many`, whether the solid
+    ends at its face, and its turn: the rank of that angle, the same for faces in one plane.
 
     By angle about the edge, the solid begins at faces that run from its high vertex to its low one and ends at the
     others. Half-edges are in the order of edge and turn.
@@ -191,7 +195,7 @@ def around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Int
 
 
 def _paired(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Ints, Ints]:
-    """Half-edges at the balanced edges `many` in pairs that have the solid between them.
+    """Return half-edges at the balanced edges `many` in pairs that have the solid between them.
 
     Where it begins twice before it ends (solids that overlap), first begun is first ended, so that faces in one place
     need no order. Where it begins and ends in one plane, one solid ends and the next one begins.
@@ -212,7 +216,7 @@ def _paired(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[In
 
 
 def components(n: int, left: Ints, right: Ints) -> Ints:
-    """The component of each of `n` nodes joined by pairs, numbered in the order of their first node."""
+    """Return the component of each of `n` nodes joined by pairs, numbered in the order of their first node."""
     if scipy_pays(n):
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components

@@ -38,11 +38,11 @@ class Planes:
     line_error: float
 
     def vertices(self, i: Ints) -> Ints:
-        """The vertices of faces i: (corner, n), to take with."""
+        """Return the vertices of faces i: (corner, n), to take with."""
         return self.ids.take(i, axis=1, mode="clip").astype(np.intp)
 
     def corners(self, ids: Ints) -> Floats:
-        """The corners of faces by their vertices: (corner, axis, n)."""
+        """Return the corners of faces by their vertices: (corner, axis, n)."""
         found = np.empty((3, 3, ids.shape[1]))
         for k, at in enumerate(ids):
             for axis, column in enumerate(self.columns):
@@ -50,8 +50,8 @@ class Planes:
         return found
 
     def one_side(self, i: Ints, others: Ints, shared: Ints) -> Bools:
-        """Whether the vertices `others` (corner, n) of faces are on one side of the plane of each face i, but for 0 to
-        3 that are `shared`.
+        """Return whether the vertices `others` (corner, n) of faces are on one side of the plane of each face i, but
+        for 0 to 3 that are `shared`.
         """
         x, y, z = (row.take(i, mode="clip") for row in self.normal)
         offset, error = self.offset.take(i, mode="clip"), self.error.take(i, mode="clip")
@@ -69,7 +69,8 @@ class Planes:
         return ((above == 0) | (below == 0)) & (above + below >= 3 - shared) & (shared < 3)
 
     def seen_apart(self, i: Ints, a: Floats, b: Floats, shared: Ints) -> Bools:
-        """Whether, seen along the axis that face i faces most, the line of a side of a or b has them on both its sides.
+        """Return whether a side of a or b has them on both sides of its line, seen along the axis that face i
+        faces most.
 
         `a` are the corners of i, `b` those of the other face.
         """
@@ -79,7 +80,7 @@ class Planes:
         return self._outside(x_a, y_a, x_b, y_b, shared) | self._outside(x_b, y_b, x_a, y_a, shared)
 
     def _outside(self, x: Floats, y: Floats, other_x: Floats, other_y: Floats, shared: Ints) -> Bools:
-        """Whether all of the other's corners (corner, pair) are outside one side of a triangle in the plane."""
+        """Return whether all of the other's corners (corner, pair) are outside one side of a triangle in the plane."""
         along_x, along_y = x[[1, 2, 0]] - x, y[[1, 2, 0]] - y
         turn = along_x[0] * along_y[1] - along_y[0] * along_x[1]
         turn = np.sign(turn) * (np.abs(turn) > self.line_error)
@@ -95,7 +96,7 @@ class Planes:
 
 
 def planes_of(columns: Floats, ids: Ints, normal: Floats) -> Planes:
-    """The planes of faces (3, m) by the coordinates of vertices (3, n) and twice the area vectors (3, m), as
+    """Return the planes of faces (3, m) by the coordinates of vertices (3, n) and twice the area vectors (3, m), as
     `area_vectors` makes them.
     """
     low, high = columns.min(axis=1), columns.max(axis=1)

@@ -27,17 +27,18 @@ _BLOCK = 1 << 12  # rows whose intermediate values stay in the processor's cache
 
 
 def orient3d(a: Floats, b: Floats, c: Floats, d: Floats) -> Ints:
-    """The sign of orient3d for each row of four (n, 3) arrays, int8."""
+    """Return the sign of orient3d for each row of four (n, 3) arrays, int8."""
     return _signs(a, b, c, d)
 
 
 def orient2d(a: Floats, b: Floats, c: Floats) -> Ints:
-    """The sign of the area of each triangle a, b, c in the plane, (n, 2) arrays: positive anticlockwise."""
+    """Return the sign of the area of each triangle a, b, c in the plane, (n, 2) arrays: positive anticlockwise."""
     return _signs(a, b, c)
 
 
 def sides(a: Floats, b: Floats) -> Ints:
-    """The side of the plane of each triangle `a` (corner, axis, n) that each corner of `b` lies on, int8 (corner, n).
+    """Return the side of the plane of each triangle `a` (corner, axis, n) that each corner of `b` lies on, int8
+    (corner, n).
 
     Positive where `a` is seen anticlockwise; zero for all corners where `a` has no area.
     """
@@ -78,7 +79,7 @@ def _signs(*points: Floats) -> Ints:
 
 
 def _determinant(rows: Any) -> Any:
-    """Of rows[i][axis], floats, whole numbers or pairs."""
+    """Return the determinant of rows[i][axis], floats, whole numbers or pairs."""
     if len(rows) == 2:
         (ax, ay), (bx, by) = rows
         return ax * by - ay * bx
@@ -87,7 +88,7 @@ def _determinant(rows: Any) -> Any:
 
 
 def _size(points: Floats) -> Floats:
-    """The sum of the sizes of the determinant's terms."""
+    """Return the sum of the sizes of the determinant's terms."""
     rows = np.abs(points[:-1] - points[-1])
     if len(rows) == 2:
         (ax, ay), (bx, by) = rows
@@ -97,7 +98,7 @@ def _size(points: Floats) -> Floats:
 
 
 def _exact(points: Floats, size: Floats) -> Ints:
-    """Signs of the determinants of points (axes + 1, axes, n) that the filter leaves; `size` as by `_size`."""
+    """Return signs of the determinants of points (axes + 1, axes, n) that the filter leaves; `size` as by `_size`."""
     sign = np.zeros(len(size), np.int8)
     same = points == points[-1]
     left = np.flatnonzero(
@@ -123,7 +124,7 @@ def _exact(points: Floats, size: Floats) -> Ints:
 
 
 def _modular(points: Floats, bound: Floats) -> tuple[Bools, Ints]:
-    """Which determinants, at most `bound`, 64-bit whole numbers hold, and the signs of those."""
+    """Return which determinants, at most `bound`, 64-bit whole numbers hold, and the signs of those."""
     lowest = _lowest_bits(points).min(axis=(0, 1), initial=_ZERO)
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not held
         scaled = points * np.ldexp(1.0, -lowest)
@@ -134,7 +135,7 @@ def _modular(points: Floats, bound: Floats) -> tuple[Bools, Ints]:
 
 
 def _lowest_bits(values: Floats) -> Ints:
-    """The exponent of each float's lowest bit that is set, as in 2**exponent; _ZERO for 0."""
+    """Return the exponent of each float's lowest bit that is set, as in 2**exponent; _ZERO for 0."""
     mantissa, exponent = np.frexp(values)
     digits = (mantissa * 2.0**53).astype(np.int64)
     lowest = np.frexp((digits & -digits).astype(np.float64))[1] + exponent - 54
@@ -142,7 +143,7 @@ def _lowest_bits(values: Floats) -> Ints:
 
 
 def integers(values: Floats) -> np.ndarray:
-    """The floats times one power of two that makes them all whole, as Python's integers."""
+    """Return the floats times one power of two that makes them all whole, as Python's integers."""
     mantissa, exponent = np.frexp(values)
     digits = (mantissa * 2.0**53).astype(np.int64)
     shift = np.where(digits == 0, 0, exponent - exponent.min(initial=_ZERO, where=digits != 0))
@@ -158,7 +159,7 @@ class _Pair:
 
     @classmethod
     def difference(cls, a: Floats, b: Floats) -> _Pair:
-        """Of two floats, exact (Shewchuk 1997, two-diff)."""
+        """Return the difference of two floats, exact (Shewchuk 1997, two-diff)."""
         high = a - b
         virtual = a - high
         return cls(high, (a - (high + virtual)) + (virtual - b))

@@ -54,7 +54,7 @@ def cast(topology: Topology, floors: tuple[float, float], least: float, deadline
 
 
 def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float) -> tuple[Floats, Ints]:
-    """Points inside the faces, about `step` apart, and the face of each."""
+    """Return points inside the faces, about `step` apart, and the face of each."""
     count = np.clip(np.ceil(longest / step), 1, _FINEST).astype(int)
     while (count * (count + 1) // 2)[sound].sum() > _SAMPLES and count.max() > 1:
         count = np.maximum(count - 1, 1)
@@ -73,7 +73,7 @@ def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float)
 def _behind(
     corners: Floats, normal: Floats, sound: Floats, points: Floats, owner: Ints, reach: Floats, deadline: Deadline
 ) -> tuple[Floats, Floats, Ints]:
-    """Distances from each point, against its normal, and the face across, as `Rays` has them."""
+    """Return distances from each point, against its normal, and the face across, as `Rays` has them."""
     thickness, behind = np.full((2, len(points)), np.inf)
     across = np.full(len(points), -1)
     ends = points - normal[owner] * reach[:, None]
@@ -105,7 +105,7 @@ def _behind(
 
 
 def _hit(origin: Floats, along: Floats, corners: Floats, normal: Floats) -> Floats:
-    """Distances to the triangles' insides, inf where missed or behind."""
+    """Return distances to the triangles' insides, inf where missed or behind."""
     slope = np.einsum("ij,ij->i", along, normal)
     distance = np.einsum("ij,ij->i", corners[:, 0] - origin, normal) / slope
     place = origin + along * distance[:, None]
@@ -118,6 +118,6 @@ def _hit(origin: Floats, along: Floats, corners: Floats, normal: Floats) -> Floa
 
 
 def lying(topology: Topology) -> Bools:
-    """Faces that belong to flat walls: their normals are nearer to the vertical than to the level."""
+    """Return faces that belong to flat walls: their normals are nearer to the vertical than to the level."""
     areas = topology.areas
     return np.abs(areas[:, 2]) > LEVEL * np.sqrt(np.einsum("ij,ij->i", areas, areas))

@@ -74,13 +74,13 @@ def _three(faces: Ints) -> Bools:
 
 
 def connected(faces: Ints, n: int) -> Ints:
-    """For each of `n` vertices which part of the mesh it belongs to: faces connect their vertices."""
+    """Return for each of `n` vertices which part of the mesh it belongs to: faces connect their vertices."""
     spokes = np.concatenate([faces[:, 0], faces[:, 0]]), np.concatenate([faces[:, 1], faces[:, 2]])
     return components(n, *spokes)
 
 
 def _shortest_edges(vertices: Floats, faces: Ints, points: Ints) -> Floats:
-    """The length of the shortest edge at each of `points`, mm."""
+    """Return the length of the shortest edge at each of `points`, mm."""
     asked = np.zeros(len(vertices), bool)
     asked[points] = True
     start, end = half_edges(faces[asked[faces].any(axis=1)])
@@ -92,7 +92,7 @@ def _shortest_edges(vertices: Floats, faces: Ints, points: Ints) -> Floats:
 
 
 def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
-    """Pairs of points within both their reaches, and their distances.
+    """Return pairs of points within both their reaches, and their distances.
 
     Points of like reach are searched together, so that a coarse shell does not make a fine one a crowd.
     """
@@ -115,7 +115,7 @@ def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
 
 
 def _joined(place: Ints, stored: Ints, points: Ints, pairs: Ints) -> Ints:
-    """The faces with the points of each group of pairs made one, but for groups that would collapse a face."""
+    """Return the faces with the points of each group of pairs made one, but for groups that would collapse a face."""
     group = components(len(points), pairs[:, 0], pairs[:, 1])
     _, first = np.unique(group, return_index=True)
     target = np.arange(len(place), dtype=np.int32)
@@ -130,7 +130,8 @@ def _joined(place: Ints, stored: Ints, points: Ints, pairs: Ints) -> Ints:
 
 
 def t_junctions(vertices: Floats, low: Ints, high: Ints, reach: Floats) -> Bools:
-    """Which open edges (low, high) have another vertex of the open border on them, within the `reach` of their vertex.
+    """Return which open edges (low, high) have another vertex of the open border on them, within the `reach` of their
+    vertex.
 
     Where a long open edge meets a chain of short ones, the first short one starts at an end of the long one and lies
     along it; so only open edges that share a vertex are compared.

@@ -68,7 +68,7 @@ class Crossings:
         return any(len(pairs) for pairs in self.crossing)
 
     def touching(self) -> Ints:
-        """Pairs of shells (k, 2) whose faces meet, the smaller number first."""
+        """Return pairs of shells (k, 2) whose faces meet, the smaller number first."""
         if self.faces is None:
             return np.empty((0, 2), np.int64)
         return np.unique(np.sort(self.faces.shell[joined(self.contact.pairs)], axis=1), axis=0).astype(np.int64)
@@ -130,7 +130,7 @@ def _prepared(topology: Topology, order: Ints, normal: Floats) -> Faces:
 
 
 def _surrounded(topology: Topology) -> Bools:
-    """Vertices all of whose edges have two faces, wound alike."""
+    """Return vertices all of whose edges have two faces, wound alike."""
     edges, found = topology.edges, np.ones(len(topology.mesh.vertices), bool)
     if not edges.closed:
         wrong = (edges.size != 2) | ~balanced(topology.mesh.faces, edges)
@@ -140,7 +140,7 @@ def _surrounded(topology: Topology) -> Bools:
 
 
 def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
-    """Without pairs that share a vertex whose star is a height field."""
+    """Drop pairs that share a vertex whose star is a height field."""
     mine = [safe.take(i, mode="clip") for safe in faces.safe]
     theirs = [corner.take(j, mode="clip") for corner in faces.corners]
     shared = mine[0] == theirs[0]
@@ -154,7 +154,7 @@ def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
 
 
 def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], found: Crossings) -> None:
-    """Answers for pairs of faces that are near each other: planes and boxes first, then exact signs."""
+    """Give answers for pairs of faces that are near each other: planes and boxes first, then exact signs."""
     if not waiting or found.kept > _FEW:
         return
     i = np.concatenate([pair[0] for pair in waiting])
@@ -172,7 +172,7 @@ def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], found: Crossings) ->
 
 
 def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
-    """What planes and boxes say of pairs, and how many corners the faces of each share."""
+    """Return what planes and boxes say of pairs, and how many corners the faces of each share."""
     planes = faces.planes
     ids_a, ids_b = (planes.vertices(f) for f in (i, j))
     shared = np.zeros(len(i), np.int8)
@@ -217,7 +217,7 @@ def _contacts(faces: Faces, i: Ints, j: Ints, sharing: Bools, found: Crossings) 
 
 
 def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, found: Crossings) -> None:
-    """Answers by exact signs; `shared` corners (n,)."""
+    """Give answers by exact signs; `shared` corners (n,)."""
     if not len(i):
         return
     pair, overlaps, meets = np.stack([i, j], axis=1), shared == 3, shared > 0
@@ -247,18 +247,18 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, found: Crossin
 
 
 def facing(faces: Faces, i: Ints, j: Ints) -> Floats:
-    """The product of both faces' normals: positive where they look the same way."""
+    """Return the product of both faces' normals: positive where they look the same way."""
     return np.einsum("ij,ij->j", faces.normal.take(i, axis=1), faces.normal.take(j, axis=1))
 
 
 def _same_corners(faces: Faces, i: Ints, j: Ints) -> Bools:
-    """Which pairs i, j are one face that is listed twice, with the same vertices."""
+    """Return which pairs i, j are one face that is listed twice, with the same vertices."""
     one, other = (np.sort(np.stack([corner[f] for corner in faces.corners]), axis=0) for f in (i, j))
     return np.asarray((one == other).all(axis=0))
 
 
 def _edges_inside(faces: Faces, face: Ints, holder: Ints, one: Floats, other: Floats, sides: Ints) -> Ints:
-    """Edges of `face` (corners `one`) within `holder` (corners `other`), of faces with one corner off its plane.
+    """Return edges of `face` (corners `one`) within `holder` (corners `other`), of faces with one corner off its plane.
 
     Rows of holder, both vertices of the edge, the side that its face leaves to, and that face.
     """
@@ -274,7 +274,7 @@ def _edges_inside(faces: Faces, face: Ints, holder: Ints, one: Floats, other: Fl
 
 
 def _leaning(faces: Faces, found: Crossings) -> None:
-    """Edges that lie in a face with their two faces on both sides of it: crossings through an edge."""
+    """Return edges that lie in a face with their two faces on both sides of it: crossings through an edge."""
     if not found.leaning:
         return
     rows = np.concatenate(found.leaning)

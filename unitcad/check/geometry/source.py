@@ -31,10 +31,10 @@ class Source:
         return [name.strip() for name in self.names.decode("utf-8", "replace").split("\n")]
 
     def line(self, polygon: int) -> int | None:
-        """The line on which a polygon stands."""
+        """Return the line on which a polygon stands."""
         return None if self.lines is None else int(self.lines[polygon])
 
     def object(self, polygon: int) -> str | None:
-        """The name of the object that a polygon belongs to."""
+        """Return the name of the object that a polygon belongs to."""
         at = int(np.searchsorted(self.starts, polygon, "right")) - 1
         return self._names[at] if at >= 0 and self._names[at] else None

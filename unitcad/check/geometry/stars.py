@@ -16,7 +16,7 @@ _FACING = 0.01  # cosine to the mean direction
 
 
 def height_fields(columns: Floats, corners: Ints, areas: Floats, surrounded: Bools) -> Bools:
-    """Which vertices (3, n) have such a star, of those that are `surrounded` by faces wound alike.
+    """Return which vertices (3, n) have such a star, of those that are `surrounded` by faces wound alike.
 
     `corners` (3, m) are the vertices of the faces, `areas` (3, m) twice their area vectors.
     """
@@ -25,7 +25,7 @@ def height_fields(columns: Floats, corners: Ints, areas: Floats, surrounded: Boo
 
 
 def _along_axes(columns: Floats, corners: Ints, areas: Floats) -> Bools:
-    """Vertices whose faces all face one way along some axis and go round once.
+    """Return vertices whose faces all face one way along some axis and go round once.
 
     Seen along the axis each face then turns the same way by less than half a turn, so turns are counted by the
     neighbours that pass the line of one coordinate: comparisons only, hence exact.
@@ -59,7 +59,7 @@ def _along_axes(columns: Floats, corners: Ints, areas: Floats) -> Bools:
 
 
 def _along_means(columns: Floats, corners: Ints, areas: Floats, asked: Bools) -> Bools:
-    """The same for the vertices `asked`, along the mean normal of each one's faces: rims and corners.
+    """Return the same for the vertices `asked`, along the mean normal of each one's faces: rims and corners.
 
     Rounding moves a face's turn by 2e-5 at most, and turns are whole.
     """
@@ -87,13 +87,13 @@ def _along_means(columns: Floats, corners: Ints, areas: Floats, asked: Bools) ->
 
 
 def _sides(columns: Floats, ids: list[Ints]) -> list[list[Floats]]:
-    """The sides of faces from each corner to the next, by axis."""
+    """Return the sides of faces from each corner to the next, by axis."""
     at = [[column.take(corner, mode="clip") for column in columns] for corner in ids]
     return [[at[(k + 1) % 3][axis] - at[k][axis] for axis in range(3)] for k in range(3)]
 
 
 def _longest(sides: list[list[Floats]]) -> Floats:
-    """The squared longest side."""
+    """Return the squared longest side."""
     one, two, three = (_dot(side, side) for side in sides)
     return np.maximum(np.maximum(one, two), three)
 

@@ -79,7 +79,7 @@ class Topology:
         return area_vectors(self.mesh.vertices, self.stored)
 
     def as_stored(self) -> Topology:
-        """The same with every face where the file has it."""
+        """Return the same with every face where the file has it."""
         if self.stored is self.mesh.faces:
             return self
         edges = mesh_edges.edges_of(self.stored, len(self.mesh.vertices))
@@ -142,7 +142,7 @@ def topology_of(mesh: Mesh, deadline: Deadline) -> Topology:
 
 
 def _referenced(mesh: Mesh) -> tuple[Mesh, int]:
-    """The mesh without the vertices that no face uses, which have no part in its size, and how many there are."""
+    """Return the mesh without vertices that no face uses, which have no part in its size, and their number."""
     used = np.zeros(len(mesh.vertices), bool)
     used[mesh.faces.reshape(-1)] = True
     n = len(used) - int(np.count_nonzero(used))
@@ -153,7 +153,7 @@ def _referenced(mesh: Mesh) -> tuple[Mesh, int]:
 
 
 def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[Ints, Ints, Ints, Edges, OpenEdges]:
-    """The faces welded and as stored, what they are in the file, the edges of the former, and the open edges."""
+    """Return the faces welded and as stored, what they are in the file, the edges of the former, and the open edges."""
     open_ = np.flatnonzero(edges.size == 1)
     seams = join(vertices, faces, np.unique(np.concatenate([edges.low[open_], edges.high[open_]])))
     joined, stored, whole = seams.joined, seams.stored, seams.whole
@@ -175,7 +175,7 @@ def _welded(vertices: Floats, faces: Ints, kept: Ints, edges: Edges) -> tuple[In
 
 
 def _boxes(vertices: Floats, faces: Ints, shells: Ints) -> tuple[Floats, Floats]:
-    """Low and high corner of each shell, (n, 3) mm."""
+    """Return low and high corner of each shell, (n, 3) mm."""
     n = int(shells.max(initial=-1)) + 1
     if n == 1:
         low, high = extent(vertices)
@@ -184,13 +184,13 @@ def _boxes(vertices: Floats, faces: Ints, shells: Ints) -> tuple[Floats, Floats]
 
 
 def diagonals(low: Floats, high: Floats) -> Floats:
-    """The diagonals of boxes, mm."""
+    """Return the diagonals of boxes, mm."""
     sides = high - low
     return np.sqrt(np.einsum("ij,ij->i", sides, sides))
 
 
 def _same_vertices(faces: Ints) -> tuple[Ints, Bools]:
-    """An order of the faces, and where in it a face has the vertices of the one before."""
+    """Return an order of the faces, and where in it a face has the vertices of the one before."""
     ordered = np.sort(faces, axis=1)
     order = np.lexsort(ordered.T)
     same = (ordered[order[1:]] == ordered[order[:-1]]).all(axis=1)
@@ -203,7 +203,7 @@ def _duplicates(faces: Ints) -> Ints:
 
 
 def _facing(faces: Ints, areas: Floats, shells: Ints, volume: Floats) -> Ints:
-    """Duplicates that are none: two faces back to back, of two closed shells that lie on either side of them.
+    """Return duplicates that are none: two faces back to back, of two closed shells that lie on either side of them.
 
     Where a cavity reaches the wall's outer face, the wall has no thickness.
     """
@@ -218,7 +218,7 @@ def _facing(faces: Ints, areas: Floats, shells: Ints, volume: Floats) -> Ints:
 
 
 def max_side_squared(corners: Floats) -> Floats:
-    """The squared length of each triangle's longest side; corners (n, 3, 3)."""
+    """Return the squared length of each triangle's longest side; corners (n, 3, 3)."""
     found = np.zeros(len(corners))
     for k in range(3):
         side = corners[:, k] - corners[:, k - 1]

@@ -42,20 +42,20 @@ class Mesh:
 
 
 def representable(points: Floats) -> Floats:
-    """The points with 0 for each coordinate below SMALLEST; the same array where there is none."""
+    """Return the points with 0 for each coordinate below SMALLEST; the same array where there is none."""
     size = np.abs(points)
     tiny = (size < SMALLEST) & (size > 0)
     return np.where(tiny, 0.0, points) if tiny.any() else points
 
 
 def weld_exact(corners: Floats) -> tuple[Floats, Ints]:
-    """Vertices and faces of a triangle soup (m, 3, 3), welded by `weld_points`."""
+    """Return vertices and faces of a triangle soup (m, 3, 3), welded by `weld_points`."""
     vertices, index = weld_points(corners.reshape(-1, 3))
     return vertices, index.reshape(-1, 3)
 
 
 def weld_points(points: Floats) -> tuple[Floats, Ints]:
-    """Distinct points as float64 (v, 3), and for each of the points (n, 3) which of them it is.
+    """Return distinct points as float64 (v, 3), and for each of the points (n, 3) which of them it is.
 
     Points with the same three numbers are one; -0.0 is 0.0. Their order is that of a hash, the same on every run.
     """
@@ -79,7 +79,7 @@ def weld_points(points: Floats) -> tuple[Floats, Ints]:
 
 
 def same_place(points: Floats) -> Ints:
-    """For each of (n, 3) points the first one that is in the same place."""
+    """Return for each of (n, 3) points the first one that is in the same place."""
     distinct, index = weld_points(points)
     if len(distinct) == len(points):
         return np.arange(len(points), dtype=np.int32)
@@ -92,7 +92,7 @@ def _same_places(vertices: Floats, index: Ints, flat: Floats) -> bool:
 
 
 def _mix(bits: NDArray[np.unsignedinteger]) -> NDArray[np.uint64]:
-    """A 64-bit hash of each row of three integers (multiply and xor-shift, as in splitmix64)."""
+    """Return a 64-bit hash of each row of three integers (multiply and xor-shift, as in splitmix64)."""
     key = np.zeros(len(bits), np.uint64)
     for column in range(3):
         key += bits[:, column]
@@ -104,7 +104,7 @@ def _mix(bits: NDArray[np.unsignedinteger]) -> NDArray[np.uint64]:
 
 
 def float32_step(vertices: Floats) -> float:
-    """The distance between neighbouring float32 numbers at the largest coordinate, mm."""
+    """Return the distance between neighbouring float32 numbers at the largest coordinate, mm."""
     if not len(vertices):
         return 0.0
     largest = max(abs(float(vertices.min())), abs(float(vertices.max())))
@@ -112,20 +112,20 @@ def float32_step(vertices: Floats) -> float:
 
 
 def float32_steps(places: Floats) -> Floats:
-    """The distance between neighbouring float32 numbers at the largest coordinate of each of n places, mm."""
+    """Return the distance between neighbouring float32 numbers at the largest coordinate of each of n places, mm."""
     largest = np.abs(places).max(axis=tuple(range(1, places.ndim)), initial=0)
     return np.spacing(np.minimum(largest, 1e38).astype(np.float32)).astype(np.float64)
 
 
 def solid_of(vertices: Floats, faces: Ints) -> Manifold:
-    """manifold3d's solid of a mesh, vertices (n, 3) mm and faces (m, 3); empty where it refuses the mesh."""
+    """Make manifold3d's solid of a mesh, vertices (n, 3) mm and faces (m, 3); empty where it refuses the mesh."""
     from manifold3d import Manifold, Mesh64
 
     return Manifold(Mesh64(vert_properties=vertices, tri_verts=faces.astype(np.uint64)))
 
 
 def area_vectors(vertices: Floats, faces: Ints) -> Floats:
-    """Twice the area of each face along its normal (right-hand rule), (m, 3) mm2."""
+    """Return twice the area of each face along its normal (right-hand rule), (m, 3) mm2."""
     corners = [np.ascontiguousarray(faces[:, k]) for k in range(3)]
     first, second = [], []
     for axis in range(3):

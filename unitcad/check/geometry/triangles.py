@@ -34,7 +34,9 @@ class Meeting:
 
 
 def _table() -> tuple[Ints, Bools]:
-    """By three signs (index 9 p + 3 q + r + 13): which corner stands alone, and whether the other one is flipped."""
+    """Tabulate by three signs (index 9 p + 3 q + r + 13) which corner stands alone, and whether the other is
+    flipped.
+    """
     alone, flip = np.zeros(27, np.int8), np.zeros(27, bool)
     for index in range(27):
         p, q, r = index // 9 - 1, index // 3 % 3 - 1, index % 3 - 1
@@ -95,7 +97,7 @@ def _straddles(sides: Ints) -> Bools:
 
 
 def _compared(a: Floats, b: Floats, side_a: Ints, side_b: Ints) -> tuple[Ints, Ints]:
-    """The two determinants that compare the intervals' ends."""
+    """Return the two determinants that compare the intervals' ends."""
     rows = np.arange(len(a))
     weights = np.array([9, 3, 1])
     index_a = side_a.astype(np.int64) @ weights + 13
@@ -113,7 +115,7 @@ def _compared(a: Floats, b: Floats, side_a: Ints, side_b: Ints) -> tuple[Ints, I
 
 
 def flattened(a: Floats, *others: Floats) -> list[Floats]:
-    """The corners without the axis along which the triangles `a` (n, 3, 3) face most: (n, k, 2) each."""
+    """Return the corners without the axis along which the triangles `a` (n, 3, 3) face most: (n, k, 2) each."""
     normal = np.abs(np.cross(a[:, 1] - a[:, 0], a[:, 2] - a[:, 0]))
     drop = np.argmax(normal, axis=1)
     keep = np.array([[1, 2], [2, 0], [0, 1]])[drop]
@@ -122,7 +124,7 @@ def flattened(a: Floats, *others: Floats) -> list[Floats]:
 
 
 def coplanar(a: Floats, b: Floats) -> tuple[Bools, Bools]:
-    """Whether coplanar triangles share area, and whether they share a point: no side of either separates them."""
+    """Return whether coplanar triangles share area, and whether a point: no side of either separates them."""
     flat = flattened(a, b)
     sides = np.concatenate([_off_sides(flat[0], flat[1]), _off_sides(flat[1], flat[0])])
     largest = sides.max(axis=1)
@@ -130,7 +132,9 @@ def coplanar(a: Floats, b: Floats) -> tuple[Bools, Bools]:
 
 
 def _off_sides(corners: Floats, points: Floats) -> Ints:
-    """For triangles (n, 3, 2) and points (n, k, 2): 1 where a point is inward of a side, -1 outward: (side, k, n)."""
+    """Return for triangles (n, 3, 2) and points (n, k, 2) 1 where a point is inward of a side, -1 outward:
+    (side, k, n).
+    """
     n, count = len(corners), points.shape[1]
     whole = [corners[:, k] for k in range(3)]
     start = [corner for corner in whole for _ in range(count)]
@@ -142,7 +146,7 @@ def _off_sides(corners: Floats, points: Floats) -> Ints:
 
 
 def segment_inside(u: Floats, v: Floats, b: Floats) -> Bools:
-    """Whether the open segment u v (n, 3), which lies in the plane of triangle b, passes through b's inside."""
+    """Return whether the open segment u v (n, 3), which lies in the plane of triangle b, passes through b's inside."""
     flat, ends = flattened(b, np.stack([u, v], axis=1))
     inside = (_off_sides(flat, ends).max(axis=1) > 0).all(axis=0)
     across = orient2d(
@@ -152,7 +156,7 @@ def segment_inside(u: Floats, v: Floats, b: Floats) -> Bools:
 
 
 def common_point(a: Sequence[_Point], b: Sequence[_Point]) -> tuple[float, float, float] | None:
-    """A point of two triangles that meet: the middle of the point, segment or polygon that they share.
+    """Return a point of two triangles that meet: the middle of the point, segment or polygon that they share.
 
     `a` is cut to the prism over `b` that is as high as rounding, so it is exact to rounding only; None where nothing is
     left. In plain numbers: arrays of three take five times as long.

@@ -11,7 +11,7 @@ _BLOCK = 500_000
 
 
 def closed(faces: Ints, edges: Edges, shells: Ints, n: int) -> Bools:
-    """Whether each of `n` shells has an inside: at all its edges as many faces run one way as the other."""
+    """Return whether each of `n` shells has an inside: at all its edges as many faces run one way as the other."""
     found = np.ones(n, bool)
     if not edges.closed:
         wrong = np.repeat(~balanced(faces, edges), edges.size)
@@ -20,7 +20,8 @@ def closed(faces: Ints, edges: Edges, shells: Ints, n: int) -> Bools:
 
 
 def signed(vertices: Floats, faces: Ints, areas: Floats, shells: Ints, n: int) -> Floats:
-    """The volume of each of `n` shells, mm3: below zero where its faces look inwards, anything where it is not closed.
+    """Return the volume of each of `n` shells, mm3: below zero where its faces look inwards, anything where it is not
+    closed.
 
     Tetrahedra stand on the middle of all vertices, so that a part far from the origin loses no digits.
     """
@@ -37,7 +38,8 @@ def signed(vertices: Floats, faces: Ints, areas: Floats, shells: Ints, n: int) -
 
 
 def side_by_side(one: Floats, other: Floats) -> Bools:
-    """Whether closed shells of these volumes, which meet in faces that look opposite ways, have material on both sides.
+    """Return whether closed shells of these volumes, which meet in faces that look opposite ways, have material on both
+    sides.
 
     Two solids have; a cavity and the wall's outer face have not: the wall is without thickness there. What stands in a
     cavity has less volume than the cavity, whose volume is below zero. 0 stands for a shell that is not closed.
@@ -46,7 +48,7 @@ def side_by_side(one: Floats, other: Floats) -> Bools:
 
 
 def winding_number(vertices: Floats, faces: Ints, point: Floats) -> int:
-    """How often the closed surface winds round `point`: the sum of solid angles over 4 pi (Van Oosterom, 1983)."""
+    """Count how often a closed surface winds round `point`: the sum of solid angles over 4 pi (Van Oosterom, 1983)."""
     total = 0.0
     for start in range(0, len(faces), _BLOCK):
         a, b, c = (vertices[faces[start : start + _BLOCK, k]] - point for k in range(3))

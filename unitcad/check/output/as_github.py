@@ -13,7 +13,7 @@ _GITHUB = {"error": "error", "warning": "warning", "info": "notice"}
 
 
 def github(reports: Sequence[FileReport]) -> str:
-    """Workflow commands: an annotation a finding that is not known, then a line for the log that counts."""
+    """Write workflow commands: an annotation a finding that is not known, then a line for the log that counts."""
     lines = []
     for report in reports:
         for finding in report.findings:
@@ -29,7 +29,9 @@ def github(reports: Sequence[FileReport]) -> str:
 
 
 def _data(text: str) -> str:
-    """Text of a workflow command: line breaks as the runner decodes them, other control characters shown, not sent."""
+    """Return text of a workflow command: line breaks as the runner decodes them, other control characters shown, not
+    sent.
+    """
     lines = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
     return printable(lines)
 

@@ -10,7 +10,7 @@ from unitcad.check.rules.registry import rules
 
 
 def as_dict(reports: Sequence[FileReport], config: str | None = None, baseline: str | None = None) -> dict[str, Any]:
-    """The JSON object: {files: [{path, verdict, findings, facts}], config, baseline}.
+    """Return the JSON object: {files: [{path, verdict, findings, facts}], config, baseline}.
 
     A finding also says how to fix it, and whether the baseline lists it.
     """

@@ -10,7 +10,7 @@ from unitcad.check.rules.registry import rules
 
 
 def junit(reports: Sequence[FileReport], fail_on: str) -> str:
-    """JUnit XML: a test case a file, a failure a finding at or above `fail_on`, the others in system-out."""
+    """Write JUnit XML: a test case a file, a failure a finding at or above `fail_on`, the others in system-out."""
     least = SEVERITIES.index(fail_on)
     cases, failed = [], 0
     for report in reports:
@@ -51,6 +51,6 @@ def _failure(finding: Finding) -> str:
 
 
 def _xml(text: str) -> str:
-    """Without the characters that XML 1.0 cannot hold."""
+    """Replace the characters that XML 1.0 cannot hold."""
     return "".join(c if c in "\t\n\r" or (c >= " " and not 0xD800 <= ord(c) <= 0xDFFF and c not in "\ufffe\uffff")
                    else "\ufffd" for c in text)  # fmt: skip

@@ -21,7 +21,7 @@ _LEVELS = {"error": "error", "warning": "warning", "info": "note"}
 
 
 def sarif(reports: Sequence[FileReport]) -> dict[str, Any]:
-    """One run with every rule and a result a finding. Fingerprints depend on path and rule only.
+    """Return one run with every rule and a result a finding. Fingerprints depend on path and rule only.
 
     What the baseline lists is `unchanged`, and suppressed.
     """
@@ -82,13 +82,13 @@ def _result(report: FileReport, finding: Finding, index: dict[str, int]) -> dict
 
 
 def _inside(path: str) -> str:
-    """The path from the working directory for what lies in it, however it is named; else the path itself."""
+    """Return the path from the working directory for what lies in it, however it is named; else the path itself."""
     whole, here = os.path.abspath(path), os.getcwd()
     return os.path.relpath(whole, here) if whole.startswith(os.path.join(here, "")) else path
 
 
 def _uri(path: str) -> str:
-    """A relative path as a URI reference; an absolute one as a file: URI."""
+    """Return a relative path as a URI reference; an absolute one as a file: URI."""
     pure = PurePath(path)
     if pure.is_absolute():
         return pure.as_uri()

@@ -11,7 +11,7 @@ from unitcad.text import printable
 
 
 def text(reports: Sequence[FileReport]) -> str:
-    """A line a finding, one with the size of each file that passed, how to fix what was found, then a count."""
+    """Return a line a finding, one with the size of each file that passed, how to fix what was found, then a count."""
     lines = []
     codes: set[str] = set()
     for report in reports:
@@ -28,7 +28,7 @@ def text(reports: Sequence[FileReport]) -> str:
 
 
 def line(report: FileReport, finding: Finding) -> str:
-    """A finding in one line: file, code, severity, message and its first places."""
+    """Return a finding in one line: file, code, severity, message and its first places."""
     known = " (known)" if finding.known else ""
     return f"{printable(report.path)}: {finding.code} {finding.severity}{known}: {printable(with_places(finding, 3))}"
 
@@ -37,7 +37,7 @@ _EXPLAIN = "`unitcad check --explain CODE` says what a code means and why it mat
 
 
 def _size(facts: Facts) -> str:
-    """Sides of the box, volume, shells and triangles, as far as they are known."""
+    """Return sides of the box, volume, shells and triangles, as far as they are known."""
     parts = []
     if facts.bbox_mm is not None:
         sides = [high - low for low, high in zip(*facts.bbox_mm, strict=True)]
@@ -52,7 +52,7 @@ def _size(facts: Facts) -> str:
 
 
 def summary(reports: Sequence[FileReport]) -> str:
-    """How many files failed, gave warnings and passed."""
+    """Return how many files failed, gave warnings and passed."""
     verdicts = Counter(report.verdict for report in reports)
     parts = [
         f"{verdicts[name]} {word}" for name, word in (("error", "failed"), ("warning", "warned")) if verdicts[name]
@@ -64,7 +64,9 @@ def summary(reports: Sequence[FileReport]) -> str:
 
 
 def statistics(reports: Sequence[FileReport]) -> str:
-    """How many files each rule hit and how often, most files first. A finding that counts bytes is one occurrence."""
+    """Return how many files each rule hit and how often, most files first. A finding that counts bytes is one
+    occurrence.
+    """
     files: Counter[str] = Counter()
     times: Counter[str] = Counter()
     for report in reports:

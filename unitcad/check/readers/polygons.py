@@ -44,7 +44,7 @@ class Polygons:
 
 
 def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    """The mesh, none where a vertex is not finite, and what is wrong with the polygons.
+    """Return the mesh, none where a vertex is not finite, and what is wrong with the polygons.
 
     Raises `Unreadable` where there is no polygon (F001), too many (F011), or one names a missing vertex (P011).
     """
@@ -99,7 +99,7 @@ def _bent(bent: Floats) -> str:
 def _in_triangles(
     vertices: Floats, corners: Ints, sizes: Ints, deadline: Deadline
 ) -> tuple[Ints, Ints | None, Floats | None]:
-    """Triangles (t, 3) in the polygons' order, the polygon of each (t,), how far each polygon is bent (p,) mm.
+    """Return triangles (t, 3) in the polygons' order, the polygon of each (t,), how far each polygon is bent (p,) mm.
 
     Where all are triangles, the second is None, since triangle and polygon are one, and so is the third.
     """
@@ -127,7 +127,9 @@ def _in_triangles(
 
 
 def _cut(points: Floats, deadline: Deadline) -> tuple[Ints, Floats]:
-    """Triangles (k, n - 2, 3) of polygons (k, n, 3) as places in them; how far each is bent, mm, 0 where it is flat."""
+    """Return triangles (k, n - 2, 3) of polygons (k, n, 3) as places in them; how far each is bent, mm, 0 where it is
+    flat.
+    """
     n = points.shape[1]
     with np.errstate(all="ignore"):
         local = points - points.mean(axis=1, keepdims=True)
@@ -153,14 +155,14 @@ def _cut(points: Floats, deadline: Deadline) -> tuple[Ints, Floats]:
 
 
 def _proper(local: Floats, normal: Floats, fans: Ints, least: Floats) -> Bools:
-    """Which polygons all triangles of a fan turn with, none of them without an area."""
+    """Return which polygons all triangles of a fan turn with, none of them without an area."""
     a, b, c = (local[:, fans[:, k]] for k in range(3))
     areas = np.einsum("kti,ki->kt", np.cross(b - a, c - a), normal)
     return np.asarray((areas > least[:, None]).all(axis=1))
 
 
 def _concave(local: Floats, normal: Floats, fan: Ints) -> Ints:
-    """Triangles of one polygon by manifold3d; the fan where its corners lie on a line or it crosses itself."""
+    """Return triangles of one polygon by manifold3d; the fan where its corners lie on a line or it crosses itself."""
     from manifold3d import triangulate
 
     drop = int(np.argmax(np.abs(normal)))

@@ -43,7 +43,7 @@ class _Part:
 def read_glb(
     data: memoryview, limits: Limits, deadline: Deadline, unit_mm: float = 1000.0
 ) -> tuple[list[Mesh], list[Finding]]:
-    """The mesh of a GLB's scene and what the file itself breaks. Raises `Unreadable` where no mesh remains.
+    """Read the mesh of a GLB's scene and what the file itself breaks. Raises `Unreadable` where no mesh remains.
 
     `unit_mm` is the length in mm that a 1 in the scene stands for.
     """
@@ -61,7 +61,7 @@ def read_glb(
 
 
 def _chunks(data: memoryview, findings: list[Finding]) -> tuple[dict[str, Any], memoryview]:
-    """The document and the binary chunk."""
+    """Return the document and the binary chunk."""
     if len(data) < 20:
         raise Unreadable(F001.finding(f"{counted(len(data), 'byte')}: shorter than a GLB's header"))
     version, length = (int.from_bytes(data[i : i + 4], "little") for i in (4, 8))
@@ -108,7 +108,7 @@ def _wrong(what: str, value: Any, wanted: str) -> Unreadable:
 
 
 def _count(holder: dict[str, Any], key: str, default: int | None = None) -> int:
-    """A whole number that is not negative."""
+    """Return a whole number that is not negative."""
     value = holder.get(key, default)
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 2**53:
         raise _wrong(key, value, "a whole number from 0")
@@ -116,7 +116,9 @@ def _count(holder: dict[str, Any], key: str, default: int | None = None) -> int:
 
 
 def _entry(document: dict[str, Any], key: str, index: Any, who: str) -> dict[str, Any]:
-    """The object with that index in one of the document's lists. Raises `Unreadable` (P011) where it is not there."""
+    """Return the object with that index in one of the document's lists. Raises `Unreadable` (P011) where it is not
+    there.
+    """
     held = _list(document, key)
     if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(held):
         raise Unreadable(P011.finding(f"{who} names {key} {str(index)[:20]}, the list has {len(held)}"))
@@ -126,7 +128,7 @@ def _entry(document: dict[str, Any], key: str, index: Any, who: str) -> dict[str
 
 
 def _parts(document: dict[str, Any], limits: Limits, findings: list[Finding]) -> Iterator[_Part]:
-    """The primitives of the scene's nodes, in the order of the scene. Its nodes must be a tree."""
+    """Return the primitives of the scene's nodes, in the order of the scene. Its nodes must be a tree."""
     nodes = _list(document, "nodes")
     if "scene" in document or _list(document, "scenes"):
         roots = _list(_entry(document, "scenes", document.get("scene", 0), "the document"), "nodes")
@@ -164,7 +166,7 @@ def _parts(document: dict[str, Any], limits: Limits, findings: list[Finding]) ->
 
 
 def _matrix(node: dict[str, Any], name: str, findings: list[Finding]) -> Floats:
-    """A node's own matrix (4, 4) for columns. Raises `Unreadable` (P013) where it is not of finite numbers."""
+    """Return a node's own matrix (4, 4) for columns. Raises `Unreadable` (P013) where it is not of finite numbers."""
 
     def numbers(key: str, default: list[float]) -> Floats:
         values = node.get(key, default)
@@ -205,7 +207,7 @@ def _polygons(
     limits: Limits,
     deadline: Deadline,
 ) -> Polygons:
-    """All triangles of the scene in mm; what it promises is counted before anything is made."""
+    """Return all triangles of the scene in mm; what it promises is counted before anything is made."""
     sizes = [_promised(document, part.primitive) for part in parts]
     faces, points = sum(size[0] for size in sizes), sum(size[1] for size in sizes)
     if faces > limits.max_faces or points > 3 * limits.max_faces:
@@ -235,14 +237,14 @@ def _polygons(
 
 
 def _placed(points: Floats, matrix: Floats, unit_mm: float) -> Floats:
-    """Points under a matrix, mm, as float32 numbers. Column by column, so that equal points stay equal."""
+    """Return points under a matrix, mm, as float32 numbers. Column by column, so that equal points stay equal."""
     with np.errstate(all="ignore"):
         rows = [sum(points[:, k] * row[k] for k in range(3)) + row[3] for row in matrix[:3]]
         return (np.stack(rows, axis=1) * unit_mm).astype(np.float32).astype(np.float64)
 
 
 def _promised(document: dict[str, Any], primitive: dict[str, Any]) -> tuple[int, int]:
-    """Triangles (at most) and vertices of a primitive."""
+    """Return triangles (at most) and vertices of a primitive."""
     attributes = primitive.get("attributes")
     if not isinstance(attributes, dict) or "POSITION" not in attributes:
         raise Unreadable(F003.finding("a primitive of triangles has no POSITION"))
@@ -254,7 +256,7 @@ def _promised(document: dict[str, Any], primitive: dict[str, Any]) -> tuple[int,
 
 
 def _primitive(document: dict[str, Any], binary: memoryview, part: _Part) -> tuple[Floats, Ints]:
-    """Vertices (n, 3) and triangles (m, 3) of a primitive."""
+    """Return vertices (n, 3) and triangles (m, 3) of a primitive."""
     primitive = part.primitive
     points = _accessor(document, binary, primitive["attributes"]["POSITION"], "VEC3", 3)
     corners: Ints = np.arange(len(points))
@@ -284,7 +286,9 @@ def _primitive(document: dict[str, Any], binary: memoryview, part: _Part) -> tup
 
 
 def _accessor(document: dict[str, Any], binary: memoryview, index: Any, kind: str, width: int) -> Floats:
-    """The numbers (n, width) of an accessor. Raises `Unreadable` where they are not in the file's own binary chunk."""
+    """Return the numbers (n, width) of an accessor. Raises `Unreadable` where they are not in the file's own binary
+    chunk.
+    """
     accessor = _entry(document, "accessors", index, "a primitive")
     who = f"accessor {index}"
     if "sparse" in accessor or "bufferView" not in accessor:

@@ -39,7 +39,9 @@ class _Read:
 
 
 def read_obj(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    """The mesh of an OBJ file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh remains."""
+    """Read the mesh of an OBJ file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh
+    remains.
+    """
     raw, findings = rows.plain(bytes(data))
     if not _ANY.search(raw):
         raise Unreadable(F005.finding("named .obj, but has no line of one"))
@@ -79,7 +81,7 @@ def _take(block: Ints, line: int, state: _Read) -> None:
     widths = np.diff(np.flatnonzero(block == NEWLINE), prepend=-1)
 
     def statements(letter: bytes) -> tuple[Ints, Ints]:
-        """The lines of a statement, and the text with nothing but their arguments and the ends of lines."""
+        """Return the lines of a statement, and the text with nothing but their arguments and the ends of lines."""
         ours = letters == ord(letter)
         chosen = np.zeros(len(counts), bool)
         chosen[lines[ours]] = True

@@ -19,7 +19,9 @@ _KINDS = re.compile(rb"(?:ST)?C?N?", re.IGNORECASE)
 
 
 def read_off(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    """The mesh of an OFF file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh remains."""
+    """Read the mesh of an OFF file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh
+    remains.
+    """
     raw, findings = rows.plain(bytes(data))
     start = _START.match(raw[:100_000])
     if start is None:

@@ -47,7 +47,9 @@ class _Element:
 
 
 def read_ply(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    """The mesh of a PLY file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh remains."""
+    """Read the mesh of a PLY file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh
+    remains.
+    """
     raw, findings = bytes(data), list[Finding]()
     if _TEXT.search(raw[:1000]):
         raw, findings = rows.plain(raw)
@@ -85,7 +87,7 @@ def _polygons(elements: list[_Element], tables: dict[str, dict[str, Column]], li
 
 
 def _header(raw: bytes) -> tuple[str, list[_Element], int]:
-    """Byte order ("ascii" for text), elements, and where the header ends."""
+    """Return byte order ("ascii" for text), elements, and where the header ends."""
     order, elements, at = "", list[_Element](), 0
     while True:
         end = raw.find(b"\n", at)
@@ -119,7 +121,7 @@ def _no(what: str, words: list[str]) -> Unreadable:
 def _text(
     raw: bytes, at: int, elements: list[_Element], deadline: Deadline
 ) -> tuple[dict[str, dict[str, Column]], Ints | None, list[Finding]]:
-    """The wanted columns of each element, the lines of the faces, and findings."""
+    """Return the wanted columns of each element, the lines of the faces, and findings."""
     table = rows.all_rows(raw, at, raw.count(b"\n", 0, at) + 1, deadline, comments=False)
     promised = sum(element.count for element in elements)
     if len(table) < promised:
@@ -141,7 +143,7 @@ def _text(
 
 
 def _text_element(table: Rows, which: slice, element: _Element) -> tuple[dict[str, Column], int]:
-    """The wanted columns, and how many records have numbers after their last property; only faces may."""
+    """Return the wanted columns, and how many records have numbers after their last property; only faces may."""
     columns: dict[str, Column] = {}
     place, ends, lines = table.starts[:-1][which], table.starts[1:][which], table.lines[which]
     for name, length, _ in element.properties:
@@ -158,7 +160,7 @@ def _text_element(table: Rows, which: slice, element: _Element) -> tuple[dict[st
 
 
 def _refuse(wrong: Ints, element: _Element, lines: Ints) -> None:
-    """Raises `Unreadable` (F003) where a record of the element has more or fewer numbers than its properties."""
+    """Raise `Unreadable` (F003) where a record of the element has more or fewer numbers than its properties."""
     if wrong.any():
         text = f"a {element.name} with more or fewer numbers than its properties take"
         raise Unreadable(F003.finding(text, int(wrong.sum()), [Location(line=int(lines[int(np.argmax(wrong))]))]))
@@ -167,7 +169,7 @@ def _refuse(wrong: Ints, element: _Element, lines: Ints) -> None:
 def _binary(
     raw: bytes, at: int, order: str, elements: list[_Element], deadline: Deadline
 ) -> tuple[dict[str, dict[str, Column]], list[Finding]]:
-    """The wanted columns of each element, and findings."""
+    """Return the wanted columns of each element, and findings."""
     tables = {}
     for element in elements:
         if element.lists and not _alike(raw, at, element, order):
@@ -180,7 +182,7 @@ def _binary(
 
 
 def _layout(raw: bytes, at: int, element: _Element, order: str) -> np.dtype | None:
-    """The type of the record at `at`, a list as its length "#i" and its numbers; None where that cannot be had."""
+    """Return the type of the record at `at`, a list as its length "#i" and its numbers; None where there is none."""
     fields: list[tuple] = []
     begin = at
     for i, (name, length, kind) in enumerate(element.properties):
@@ -202,7 +204,7 @@ def _layout(raw: bytes, at: int, element: _Element, order: str) -> np.dtype | No
 
 
 def _alike(raw: bytes, at: int, element: _Element, order: str) -> bool:
-    """Whether all records of an element have lists as long as the first one's, as far as the file goes."""
+    """Return whether all records of an element have lists as long as the first one's, as far as the file goes."""
     layout = _layout(raw, at, element, order)
     if layout is None or not element.count:
         return layout is not None
@@ -213,7 +215,7 @@ def _alike(raw: bytes, at: int, element: _Element, order: str) -> bool:
 
 
 def _records(raw: bytes, at: int, element: _Element, order: str) -> tuple[dict[str, Column], int]:
-    """The columns of an element whose records are alike, and where they end."""
+    """Return the columns of an element whose records are alike, and where they end."""
     layout = _layout(raw, at, element, order) if element.count else np.dtype([])
     size = layout.itemsize if layout is not None else 0
     if layout is None or at + size * element.count > len(raw):
@@ -230,7 +232,7 @@ def _records(raw: bytes, at: int, element: _Element, order: str) -> tuple[dict[s
 
 
 def _walked(raw: bytes, at: int, element: _Element, order: str, deadline: Deadline) -> tuple[dict[str, Column], int]:
-    """The columns of an element whose lists differ in length, record after record, and where they end."""
+    """Return the columns of an element whose lists differ in length, record after record, and where they end."""
     steps = [(struct.Struct(order + (length or kind)), struct.calcsize(order + kind) if length else 0,
               name in _WANTED.get(element.name, ())) for name, length, kind in element.properties]  # fmt: skip
     kept = {i: (array("q"), array("q")) for i, (_, _, wanted) in enumerate(steps) if wanted}

@@ -22,12 +22,12 @@ NEEDS = "STEP needs the extra build123d or cadquery: pip install 'unitcad[build1
 
 
 def installed() -> bool:
-    """Whether STEP can be read here."""
+    """Return whether STEP can be read here."""
     return find_spec("OCP") is not None
 
 
 def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Finding], Facts]:
-    """Findings about a STEP file's text and, with OCP there, about its solids."""
+    """Return findings about a STEP file's text and, with OCP there, about its solids."""
     _text(data, options.limits)
     if not installed():
         raise Unreadable(F012.finding(NEEDS))
@@ -50,7 +50,7 @@ def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Fin
 
 
 def _from_child(path: Path, seconds: float) -> dict[str, Any]:
-    """What `measure` finds, in a process of its own: OCCT dies of some malformed files, and it prints."""
+    """Return what `measure` finds, in a process of its own: OCCT dies of some malformed files, and it prints."""
     with TemporaryDirectory() as folder:
         out = Path(folder, "found.json")
         try:

@@ -32,7 +32,9 @@ _BLOCK = 8_000_000
 
 
 def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    """The mesh of an STL file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh remains."""
+    """Read the mesh of an STL file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh
+    remains.
+    """
     size = len(data)
     if size == 0:
         raise Unreadable(F001.finding("the file is empty"))
@@ -142,7 +144,7 @@ def _read_text(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[li
 
 
 def _decoded(raw: bytes, findings: list[Finding]) -> bytes:
-    """The text as bytes with LF line ends, whatever it was stored as; oddities become findings."""
+    """Return the text as bytes with LF line ends, whatever it was stored as; oddities become findings."""
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         findings.append(F009.finding("UTF-16 text with a byte order mark"))
         raw = raw.decode("utf-16", "replace").encode("utf-8")
@@ -316,7 +318,7 @@ _WORD = re.compile(rb"\S+")
 
 
 def _begins(word: bytes, wanted: tuple[bytes, ...]) -> bool:
-    """Whether the last word of a text may be the beginning of what belongs there."""
+    """Return whether the last word of a text may be the beginning of what belongs there."""
     return any(whole.startswith(word) for whole in wanted) or not (wanted or word in _KEYWORDS)
 
 

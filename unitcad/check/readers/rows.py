@@ -55,7 +55,7 @@ class Rows:
 
 
 def plain(raw: bytes) -> tuple[bytes, list[Finding]]:
-    """A text with LF line ends and without a byte order mark; what had to be changed is a finding."""
+    """Return a text with LF line ends and without a byte order mark; what had to be changed is a finding."""
     findings = []
     if raw[:3] == b"\xef\xbb\xbf":
         findings.append(F009.finding("a UTF-8 byte order mark at the start"))
@@ -68,7 +68,9 @@ def plain(raw: bytes) -> tuple[bytes, list[Finding]]:
 
 
 def blocks(raw: bytes, at: int, deadline: Deadline, line: int = 1) -> Iterator[tuple[Ints, int]]:
-    """Whole lines of the text from `at` on as bytes (n,), each block ending in a newline, with their first line."""
+    """Yield whole lines of the text from `at` on as bytes (n,), each block ending in a newline, with their
+    first line.
+    """
     while at < len(raw):
         deadline.tick()
         cut = raw.find(b"\n", min(at + BLOCK, len(raw)))
@@ -81,7 +83,7 @@ def blocks(raw: bytes, at: int, deadline: Deadline, line: int = 1) -> Iterator[t
 
 
 def between(block: Ints, mark: int, stop: Bools) -> Bools:
-    """Which bytes stand behind a `mark`, itself included, with no `stop` in between."""
+    """Return which bytes stand behind a `mark`, itself included, with no `stop` in between."""
     marked = block == mark
     if not marked.any():
         return marked
@@ -91,7 +93,7 @@ def between(block: Ints, mark: int, stop: Bools) -> Bools:
 
 
 def words(block: Ints) -> tuple[Ints, Ints]:
-    """Where words begin, and how many of them began before each line's end."""
+    """Return where words begin, and how many of them began before each line's end."""
     blank = BLANK[block]
     first = ~blank
     first[1:] &= blank[:-1]
@@ -100,7 +102,8 @@ def words(block: Ints) -> tuple[Ints, Ints]:
 
 
 def rows_of(block: Ints, line: int, *, integers: bool = False, which: Ints | None = None) -> Rows:
-    """The numbers of a block that begins on `line`, a row for each line that has any, or for each of the lines `which`.
+    """Return the numbers of a block that begins on `line`, a row for each line that has any, or for each of the lines
+    `which`.
 
     Raises `Unreadable` (F004) for a word that is no number.
     """
@@ -118,7 +121,7 @@ def rows_of(block: Ints, line: int, *, integers: bool = False, which: Ints | Non
 
 
 def all_rows(raw: bytes, at: int, line: int, deadline: Deadline, *, comments: bool) -> Rows:
-    """The numbers of a text from `at`, which stands on `line`; with `comments` a # begins one."""
+    """Return the numbers of a text from `at`, which stands on `line`; with `comments` a # begins one."""
     return joined(
         [
             rows_of(without_comments(block) if comments else block, first)
@@ -128,12 +131,12 @@ def all_rows(raw: bytes, at: int, line: int, deadline: Deadline, *, comments: bo
 
 
 def without_comments(block: Ints) -> Ints:
-    """The block with blanks from each # to the end of its line."""
+    """Return the block with blanks from each # to the end of its line."""
     return np.where(between(block, HASH, block == NEWLINE), np.uint8(SPACE), block)
 
 
 def spread(firsts: Ints, counts: Ints, step: int = 1) -> Ints:
-    """The places firsts[i], firsts[i] + step ... of all runs, counts[i] each."""
+    """Return the places firsts[i], firsts[i] + step ... of all runs, counts[i] each."""
     ends = np.cumsum(counts)
     places = np.arange(int(ends[-1]) if len(ends) else 0) - np.repeat(ends - counts, counts)
     places *= step
@@ -142,7 +145,7 @@ def spread(firsts: Ints, counts: Ints, step: int = 1) -> Ints:
 
 
 def columns(table: Rows, which: slice, most: int) -> Floats:
-    """The first so many numbers of each row. Raises `Unreadable` (F003) for a row that has fewer."""
+    """Return the first so many numbers of each row. Raises `Unreadable` (F003) for a row that has fewer."""
     sizes, lines = table.sizes[which], table.lines[which]
     short = np.flatnonzero(sizes < most)
     if len(short):
@@ -152,7 +155,9 @@ def columns(table: Rows, which: slice, most: int) -> Floats:
 
 
 def lengths(counts: Floats, room: Ints, lines: Ints, what: str = "face") -> Ints:
-    """The lengths of lists whose rows have `room` numbers for them. Raises `Unreadable` (F003) where one is longer."""
+    """Return the lengths of lists whose rows have `room` numbers for them. Raises `Unreadable` (F003) where one is
+    longer.
+    """
     bad = np.flatnonzero(~((counts >= 0) & (counts <= room) & (counts == np.floor(counts))))
     if len(bad):
         row = int(bad[0])
@@ -163,7 +168,7 @@ def lengths(counts: Floats, room: Ints, lines: Ints, what: str = "face") -> Ints
 
 
 def integers(values: Floats) -> Ints:
-    """Indices from numbers. Raises `Unreadable` (F004) for one that is no integer."""
+    """Return indices from numbers. Raises `Unreadable` (F004) for one that is no integer."""
     bad = np.flatnonzero(~((values == np.floor(values)) & (np.abs(values) < 2**53)))
     if len(bad):
         raise Unreadable(F004.finding(f"'{values[bad[0]]:.15g}' is not a vertex's index", len(bad)))
@@ -171,7 +176,7 @@ def integers(values: Floats) -> Ints:
 
 
 def joined(parts: list[Rows]) -> Rows:
-    """Rows after each other."""
+    """Return rows after each other."""
     if not parts:
         return Rows(np.empty(0), np.zeros(1, np.int64), np.empty(0, np.int64))
     ends = np.cumsum([len(part.values) for part in parts])
@@ -184,7 +189,7 @@ def joined(parts: list[Rows]) -> Rows:
 
 
 def _parsed(block: Ints, count: int, integers: bool) -> Floats | None:
-    """The numbers where all words of the block are some; None where one may be none."""
+    """Return the numbers where all words of the block are some; None where one may be none."""
     if not (_IN_INTEGERS if integers else _IN_NUMBERS)[block].all():
         return None
     kind = np.int64 if integers else np.float64
@@ -198,7 +203,7 @@ def _parsed(block: Ints, count: int, integers: bool) -> Floats | None:
 
 
 def _slowly(block: Ints, line: int, integers: bool) -> Floats:
-    """The numbers word by word. Raises `Unreadable` for the first word that is none."""
+    """Return the numbers word by word. Raises `Unreadable` for the first word that is none."""
     text = block.tobytes()
     values = []
     for match in _WORD.finditer(text):

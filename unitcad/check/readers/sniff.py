@@ -55,8 +55,8 @@ def foreign(head: bytes) -> str | None:
     return None
 
 
-def kind_of(path: str, head: bytes) -> str:
-    """The reader for a file: stl, 3mf, obj, ply, off, glb, step, or "" for a suffix that none reads."""
+def kind_of(path: str) -> str:
+    """Return the reader for a file: stl, 3mf, obj, ply, off, glb, step, or "" for a suffix that none reads."""
     suffix = PurePath(path).suffix.lower()
     if suffix not in SUFFIXES:
         return ""
@@ -64,7 +64,7 @@ def kind_of(path: str, head: bytes) -> str:
 
 
 def reader_of(kind: str, unit: str | None = None) -> Reader:
-    """The reader of a format that holds one mesh; its module is loaded by the first file that needs it.
+    """Return the reader of a format that holds one mesh; its module is loaded by the first file that needs it.
 
     The numbers of a GLB, in `unit` or metres, become mm where they are read.
     """

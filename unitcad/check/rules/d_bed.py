@@ -50,7 +50,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
 
 
 def _stands(topology: Topology) -> Iterator[Finding]:
-    """D005: lowest point at z = 0, and a flat there that faces down."""
+    """Apply D005: lowest point at z = 0, and a flat there that faces down."""
     vertices, faces = topology.mesh.vertices, topology.mesh.faces
     low = float(vertices[np.unique(faces), 2].min())
     if abs(low) > ON_BED:
@@ -63,7 +63,7 @@ def _stands(topology: Topology) -> Iterator[Finding]:
 
 
 def _trapped(topology: Topology) -> Iterator[Finding]:
-    """D004: shells that face inwards inside another one."""
+    """Apply D004: shells that face inwards inside another one."""
     if topology.n_shells < 2:
         return
     volumes, low, high = topology.volumes, topology.low, topology.high

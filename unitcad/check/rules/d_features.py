@@ -65,7 +65,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
 
 
 def _standing(topology: Topology, solid: Manifold, least: float, layer: float) -> list[Location]:
-    """Islands of level sections."""
+    """Return islands of level sections."""
     mesh = topology.mesh
     heights = np.unique(np.round(mesh.vertices[np.unique(mesh.faces), 2], 3))
     gaps = np.flatnonzero(np.diff(heights) >= layer * 0.99)
@@ -82,7 +82,7 @@ def _standing(topology: Topology, solid: Manifold, least: float, layer: float) -
 
 
 def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, deadline: Deadline) -> list[Location]:
-    """One place for each connected patch of thin faces that a section across shows to be a whisker."""
+    """Return one place for each connected patch of thin faces that a section across shows to be a whisker."""
     faces, vertices, edges = topology.mesh.faces, topology.mesh.vertices, topology.edges
     n = len(faces)
     thick = np.bincount(rays.owner[rays.behind >= least * _SLACK], minlength=n)
@@ -105,7 +105,7 @@ def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, deadli
 
 
 def _whisker(vertices: Floats, faces: Ints, solid: Manifold, least: float) -> tuple[float, float, float] | None:
-    """The middle of a face of the patch where the solid, cut across its length, is narrow both ways."""
+    """Return the middle of a face of the patch where the solid, cut across its length, is narrow both ways."""
     corners = vertices[faces]
     sides = corners[:, [1, 2, 0]] - corners
     lengths = np.sqrt(np.einsum("fkx,fkx->fk", sides, sides))
@@ -124,7 +124,7 @@ def _whisker(vertices: Floats, faces: Ints, solid: Manifold, least: float) -> tu
 
 
 def _frame(along: Floats) -> Floats:
-    """A rotation (3, 3) that turns the unit vector `along` to z."""
+    """Return a rotation (3, 3) that turns the unit vector `along` to z."""
     beside = np.eye(3)[np.argmin(np.abs(along))]
     x = np.cross(beside, along)
     x /= np.linalg.norm(x)
@@ -132,7 +132,7 @@ def _frame(along: Floats) -> Floats:
 
 
 def _narrow_at(turned: Manifold, point: Floats, shift: float, least: float) -> bool:
-    """Whether the level section `shift` above the point has a narrow island there.
+    """Return whether the level section `shift` above the point has a narrow island there.
 
     A corner that is cut off askew is narrow too, but not so a little farther in.
     """
@@ -146,7 +146,7 @@ def _narrow_at(turned: Manifold, point: Floats, shift: float, least: float) -> b
 
 
 def _narrow(island: CrossSection, least: float) -> bool:
-    """Whether a box at some angle about the island has both sides below `least`."""
+    """Return whether a box at some angle about the island has both sides below `least`."""
     x0, y0, x1, y1 = island.bounds()
     if max(x1 - x0, y1 - y0) >= 1.5 * least or island.area() <= _LEAST_MM2:
         return False

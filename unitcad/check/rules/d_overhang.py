@@ -84,7 +84,9 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
 
 
 def _border(topology: Topology, beyond: Ints, bed: float) -> tuple[Floats, Floats]:
-    """Border edges in plan (n, 2, 2), and whether each is held: it lies on the bed, or the face beyond goes down."""
+    """Return border edges in plan (n, 2, 2), and whether each is held: it lies on the bed, or the face beyond
+    goes down.
+    """
     faces, vertices = topology.mesh.faces, topology.mesh.vertices
     face, side = beyond // 3, beyond % 3
     a, b = vertices[faces[face, side]], vertices[faces[face, (side + 1) % 3]]
@@ -116,7 +118,7 @@ def _bridged(topology: Topology, faces: Ints, segments: Floats, supported: Float
 
 
 def _first(points: Floats, along: Floats, segments: Floats, supported: Floats) -> tuple[Floats, Floats]:
-    """Distance to the first border edge from each point along a direction, and whether that edge is supported."""
+    """Return the distance to the first border edge from each point along a direction, and whether it is supported."""
     a, d = segments[:, 0], segments[:, 1] - segments[:, 0]
     across = d[:, 0] * along[1] - d[:, 1] * along[0]
     parallel = np.abs(across) < 1e-12
@@ -132,7 +134,7 @@ def _first(points: Floats, along: Floats, segments: Floats, supported: Floats) -
 
 
 def _distance(points: Floats, segments: Floats) -> Floats:
-    """Distance in plan from each point to the nearest segment."""
+    """Return distance in plan from each point to the nearest segment."""
     a, d = segments[:, 0], segments[:, 1] - segments[:, 0]
     off = points[:, None, :] - a[None]
     s = np.clip((off * d).sum(axis=2) / np.maximum((d * d).sum(axis=1), 1e-300), 0, 1)

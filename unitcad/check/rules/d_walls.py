@@ -66,7 +66,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
 
 
 def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float, Location]]:
-    """The least distance and its place for each wall or gap, the thinnest first.
+    """Return the least distance and its place for each wall or gap, the thinnest first.
 
     Thin points grouped by faces that share edges; groups that reach farther than the floor both ways are walls.
 
@@ -107,7 +107,9 @@ def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float
 
 
 def _reach(cloud: Floats, lying: bool) -> float:
-    """How far a thin patch reaches across its longest direction, mm: its height, or its lesser extent in plan."""
+    """Measure how far a thin patch reaches across its longest direction, mm: its height, or its lesser extent
+    in plan.
+    """
     if not lying:
         return float(np.ptp(cloud[:, 2]))
     plan = cloud[:, :2] - cloud[:, :2].mean(axis=0)

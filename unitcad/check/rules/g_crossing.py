@@ -95,7 +95,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
 
 
 def _pairs(topology: Topology, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
-    """Pairs of faces that cross or cover each other."""
+    """Return pairs of faces that cross or cover each other."""
     crossing, covering = joined(crossings.crossing), joined(crossings.covering)
     opposite = facing(faces, covering[:, 0], covering[:, 1]) < 0
     twice, thin = kinds(topology, faces.shell[covering], opposite)
@@ -111,7 +111,7 @@ def _pairs(topology: Topology, crossings: Crossings, faces: Faces) -> Iterator[F
 
 
 def _touching(topology: Topology, crossings: Crossings, faces: Faces) -> Iterator[Finding]:
-    """Pairs of shells whose faces meet and do not cross."""
+    """Return pairs of shells whose faces meet and do not cross."""
     touching, contact = joined(crossings.contact.pairs), crossings.contact
     if not len(touching):
         return
@@ -141,7 +141,7 @@ def _places(
     pairs: Ints,
     region: Callable[[int], tuple[Ints, tuple[float, float, float]]] | None = None,
 ) -> list[Location]:
-    """Where pairs meet, no point twice, with both faces; first the one that was not named before."""
+    """List where pairs meet, no point twice, with both faces; first the one that was not named before."""
     found: dict[tuple[int, ...], Location] = {}
     named: set[int] = set()
     grid = 4 * max(float32_step(faces.vertices), 1e-300)
@@ -163,7 +163,7 @@ def _places(
 
 
 def _along_edges(topology: Topology) -> Iterator[Finding]:
-    """G008 and G009 along edges. Vertices in one place are one, whether or not the file lists them apart."""
+    """Apply G008 and G009 along edges. Vertices in one place are one, whether or not the file lists them apart."""
     mesh, edges, faces = topology.mesh, topology.edges, topology.mesh.faces
     kept, shells, areas = topology.kept, topology.shells, topology.areas
     if mesh.indexed:
@@ -178,11 +178,11 @@ def _along_edges(topology: Topology) -> Iterator[Finding]:
         (G009, folded_edges(mesh.vertices, faces, edges, areas), "at which two faces fold onto each other"),
     ):
         if len(which):
-            places = (_at(topology, faces, kept, edges, i) for i in which.tolist())
+            places = (_at(topology, kept, edges, i) for i in which.tolist())
             yield rule.finding(f"{counted(len(which), 'edge')} {text}", len(which), places)
 
 
-def _at(topology: Topology, faces: Ints, kept: Ints, edges: Edges, edge: int) -> Location:
+def _at(topology: Topology, kept: Ints, edges: Edges, edge: int) -> Location:
     vertices = topology.mesh.vertices
     x, y, z = ((vertices[edges.low[edge]] + vertices[edges.high[edge]]) / 2).tolist()
     return Location(face=int(kept[edges.order[edges.first[edge]] // 3]), xyz=(x, y, z), object=topology.mesh.name)

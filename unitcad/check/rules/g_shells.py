@@ -130,13 +130,15 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
 
 
 def expected(there: int | None, wanted: int | None, word: str = "shell") -> Iterator[Finding]:
-    """G005 where a number of shells is `wanted`, and the file has another one."""
+    """Apply G005 where a number of shells is `wanted`, and the file has another one."""
     if wanted is not None and there is not None and there != wanted:
         yield G005.finding(f"{counted(there, word)}, {wanted} expected", abs(there - wanted))
 
 
 def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
-    """G010 for the bodies `asked` of those with these boxes, (n, 3) mm, where one of them is as large as a part."""
+    """Apply G010 to the bodies `asked` of those with these boxes, (n, 3) mm, where one of them is as large as
+    a part.
+    """
     side = (high - low).max(axis=1, initial=0)
     tiny = np.flatnonzero(asked & (side < SPECK))
     if not len(tiny) or side.max() < BODY:
@@ -192,7 +194,7 @@ def _relate(
 
 
 def _where(topology: Topology, low: Floats, high: Floats, *shells: int) -> Location:
-    """The middle of what the boxes of the shells have in common, with all faces of the shells."""
+    """Return the middle of what the boxes of the shells have in common, with all faces of the shells."""
     which = list(shells)
     x, y, z = ((low[which].max(axis=0) + high[which].min(axis=0)) / 2).tolist()
     region = topology.kept[np.isin(topology.shells, which)]
@@ -205,7 +207,7 @@ def _faces_by_shell(labels: Ints, n: int) -> list[Ints]:
 
 
 def box_pairs(low: Floats, high: Floats, deadline: Deadline) -> Ints:
-    """Pairs of boxes that meet (k, 2), the smaller number first, sorted; low and high corners (n, 3)."""
+    """Return pairs of boxes that meet (k, 2), the smaller number first, sorted; low and high corners (n, 3)."""
     n = len(low)
     corners = np.concatenate([low, high])
     steps = frame_of(corners).steps(corners)
@@ -220,7 +222,7 @@ def box_pairs(low: Floats, high: Floats, deadline: Deadline) -> Ints:
 
 
 def _shared(topology: Topology, groups: list[Ints], a: int, b: int, solids: dict[int, Manifold]) -> float:
-    """The volume that two shells share, mm3, by manifold3d's boolean; `solids` keeps what it has made.
+    """Return the volume that two shells share, mm3, by manifold3d's boolean; `solids` keeps what it has made.
 
     Shells that face inwards are turned first; one that manifold3d refuses gives 0 (its own faults are reported).
     """

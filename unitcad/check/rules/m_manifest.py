@@ -74,7 +74,7 @@ class ListedFile:
 
 
 def check_listed(part: ListedFile, report: FileReport) -> Iterator[Finding]:
-    """M001 to M004 for one file."""
+    """Apply M001 to M004 to one file."""
     path = Path(report.path)
     if not os.path.isfile(path):
         yield M004.finding(f"listed for {', '.join(part.names)}")

@@ -29,7 +29,7 @@ _FAMILY_FILE = re.compile(f"[{''.join(FAMILIES).lower()}]_")
 
 @cache
 def modules() -> tuple[ModuleType, ...]:
-    """The files of rules, family by family; a file's name begins with the family's letter."""
+    """Return the files of rules, family by family; a file's name begins with the family's letter."""
     names = sorted(name for _, name, _ in iter_modules(folder.__path__) if _FAMILY_FILE.match(name))
     names.sort(key=lambda name: list(FAMILIES).index(name[0].upper()))
     return tuple(import_module(f"{folder.__name__}.{name}") for name in names)
@@ -37,7 +37,7 @@ def modules() -> tuple[ModuleType, ...]:
 
 @cache
 def rules() -> dict[str, Rule]:
-    """All rules by code, family by family. Raises ValueError where two have one code."""
+    """Return all rules by code, family by family. Raises ValueError where two have one code."""
     every: dict[str, Rule] = {}
     for rule in (value for module in modules() for value in vars(module).values() if isinstance(value, Rule)):
         if every.setdefault(rule.code, rule) is not rule:

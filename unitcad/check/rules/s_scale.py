@@ -41,7 +41,7 @@ SMALL, LARGE = 1.0, 2000.0  # mm; a printed part lies between
 
 
 def likely_unit(facts: Facts, unit: str | None) -> Iterator[Finding]:
-    """S001 from the largest side of the box; `unit` is the one that the file or the caller named, as in UNITS_MM."""
+    """Apply S001 to the largest side; `unit` is the one that the file or the caller named, as in UNITS_MM."""
     if facts.bbox_mm is None:
         return
     side = max(high - low for low, high in zip(*facts.bbox_mm, strict=True))
@@ -59,7 +59,7 @@ def likely_unit(facts: Facts, unit: str | None) -> Iterator[Finding]:
 
 
 def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
-    """S002 from the box of the mesh as it stands."""
+    """Apply S002 to the box of the mesh as it stands."""
     mesh = part.topology.mesh
     low, high = extent(mesh.vertices[np.unique(mesh.faces)])
     size = high - low

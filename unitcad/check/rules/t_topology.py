@@ -191,7 +191,7 @@ def _at_edges(mesh: Mesh, edges: Edges, kept: Ints, which: Ints) -> Iterator[Loc
 
 
 def _open_edges(topology: Topology) -> Iterator[Finding]:
-    """Boundary edges: closed by welding (T006), or T-junctions (T005) and boundaries (T001)."""
+    """Report open edges: closed by welding (T006), or T-junctions (T005) and boundaries (T001)."""
     opened, mesh = topology.opened, topology.mesh
     if opened is None:
         return
@@ -218,7 +218,7 @@ def _many_faces(topology: Topology) -> Iterator[Finding]:
 
 
 def _thin(topology: Topology) -> Iterator[Finding]:
-    """Degenerate faces (T010) and slivers (T011), on the faces as stored.
+    """Report degenerate faces (T010) and slivers (T011), on the faces as stored.
 
     A sliver harms where it is long: its height is below the float32 step, so rounding alone decides where it faces,
     and it is longer than SLIVER of its shell. Short ones vanish in a slicer's own resolution.
@@ -245,7 +245,9 @@ def _thin(topology: Topology) -> Iterator[Finding]:
 
 
 def _exactly_flat(corners: Floats, double: Floats) -> Bools:
-    """Whether three points lie on one line: the float answer where its error bound decides, fractions on the rest."""
+    """Return whether three points lie on one line: the float answer where its error bound decides, fractions on the
+    rest.
+    """
     first = np.abs(corners[:, 1] - corners[:, 0])
     second = np.abs(corners[:, 2] - corners[:, 0])
     bound = 8 * np.finfo(float).eps * (_abs_cross(first, second) + np.abs(corners).max(axis=(1, 2), initial=0)[:, None]
@@ -265,7 +267,9 @@ def _abs_cross(a: Floats, b: Floats) -> Floats:
 
 
 def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats) -> Iterator[Finding]:
-    """T013; a stored normal of zeros means none, and a face lower than a thousandth of its length has none worth it."""
+    """Apply T013; a stored normal of zeros is none, and a face lower than a thousandth of its length has no
+    direction.
+    """
     stored = normals[kept]
     lengths = np.sqrt(np.einsum("ij,ij->i", stored, stored, dtype=np.float64))
     dot = np.einsum("ij,ij->i", stored, areas)

@@ -55,7 +55,7 @@ def not_finite(mesh: Mesh) -> tuple[Finding, ...]:
 
 
 def too_far(corners: Floats, size: Floats) -> list[Finding]:
-    """V002 for shells or instances: the low and high corner of each one's box, (n, 2, 3) mm, and its diagonal, mm."""
+    """Apply V002 to shells or instances: low and high corners of their boxes, (n, 2, 3) mm, and diagonals, mm."""
     step = float32_steps(corners)
     far = np.flatnonzero((step > FAR * size) & (size > 0))
     if not len(far):

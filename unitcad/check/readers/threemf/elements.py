@@ -38,63 +38,63 @@ Test = Callable[[str], bool]
 
 
 def number(text: str) -> bool:
-    """ST_Number."""
+    """Test for ST_Number."""
     return _number.fullmatch(text.strip()) is not None
 
 
 def positive(text: str) -> bool:
-    """ST_PositiveNumber."""
+    """Test for ST_PositiveNumber."""
     return number(text) and float(text) >= 0
 
 
 def resource_id(text: str) -> bool:
-    """ST_ResourceID: 1 to 2^31 - 1."""
+    """Test for ST_ResourceID: 1 to 2^31 - 1."""
     return _integer.fullmatch(text.strip()) is not None and 0 < int(text) < _LIMIT
 
 
 def index(text: str) -> bool:
-    """ST_ResourceIndex: 0 to 2^31 - 1."""
+    """Test for ST_ResourceIndex: 0 to 2^31 - 1."""
     return _integer.fullmatch(text.strip()) is not None and int(text) < _LIMIT
 
 
 def matrix(text: str) -> bool:
-    """ST_Matrix3D: twelve numbers."""
+    """Test for ST_Matrix3D: twelve numbers."""
     parts = text.split()
     return len(parts) == 12 and all(number(part) for part in parts)
 
 
 def color(text: str) -> bool:
-    """ST_ColorValue."""
+    """Test for ST_ColorValue."""
     return _color.fullmatch(text) is not None
 
 
 def boolean(text: str) -> bool:
-    """xs:boolean."""
+    """Test for xs:boolean."""
     return text.strip() in ("true", "false", "0", "1")
 
 
 def part_name(text: str) -> bool:
-    """ST_UriReference: an absolute part name."""
+    """Test for ST_UriReference: an absolute part name."""
     return text.startswith("/")
 
 
 def uuid(text: str) -> bool:
-    """ST_UUID of the production extension."""
+    """Test for ST_UUID of the production extension."""
     return _uuid.fullmatch(text.strip()) is not None
 
 
 def text(_: str) -> bool:
-    """xs:string."""
+    """Test for xs:string, which any text is."""
     return True
 
 
 def one_of(*values: str) -> Test:
-    """An enumeration."""
+    """Return an enumeration."""
     return lambda text: text in values
 
 
 def many(test: Test) -> Test:
-    """A space-separated list, at least one."""
+    """Return a space-separated list, at least one."""
     return lambda text: bool(text.split()) and all(test(part) for part in text.split())
 
 

@@ -9,7 +9,7 @@ _LIMIT = 4_000_000
 
 
 def image_kind(chunks: Iterable[bytes]) -> tuple[str | None, str | None]:
-    """`png`, `jpeg` or None, and what is wrong with it or None. Looks at the first 4 MB; pixels are not decoded."""
+    """Return `png`, `jpeg` or None, and what is wrong or None. Looks at the first 4 MB; pixels are not decoded."""
     data = b""
     for chunk in chunks:
         if len(data) < _LIMIT:
@@ -22,7 +22,7 @@ def image_kind(chunks: Iterable[bytes]) -> tuple[str | None, str | None]:
 
 
 def _components(data: bytes) -> int | None:
-    """The number of colour components of a JPEG's frame, or None where no frame header is found."""
+    """Return the number of colour components of a JPEG's frame, or None where no frame header is found."""
     at = 2
     while at + 9 < len(data):
         if data[at] != 0xFF:

@@ -85,5 +85,5 @@ class Model:
         self.say(rule, message, None if self.strict else "warning")
 
     def objects(self) -> dict[int, Object]:
-        """The object resources by id."""
+        """Return the object resources by id."""
         return {id_: found for id_, found in self.resources.items() if isinstance(found, Object)}

@@ -130,7 +130,7 @@ class _Reader:
         return isinstance(self.resource, Object) and self.resource.lattice is not None
 
     def _child(self, space: str, local: str, rules: elements.Rules | None) -> None:
-        """Whether this child may stand here, and in this order."""
+        """Return whether this child may stand here, and in this order."""
         parent = self.stack[-1]
         if parent is _LEAF:
             self.model.say(P017, f"<{local}> inside <vertex>")
@@ -286,7 +286,7 @@ class _Reader:
         )
 
     def _matrix(self, text: str | None) -> Floats:
-        """The transform (4, 3); the identity with a finding where it is none."""
+        """Return the transform (4, 3); the identity with a finding where it is none."""
         identity = np.vstack([np.eye(3), np.zeros(3)])
         if text is None:
             return identity

@@ -72,7 +72,7 @@ class Package:
         self.say(rule, message, part, None if self.strict else "warning")
 
     def chunks(self, name: str) -> Iterator[bytes]:
-        """A part's bytes, inflated piece by piece within the limits. Raises `Unreadable`."""
+        """Return a part's bytes, inflated piece by piece within the limits. Raises `Unreadable`."""
         info = self.parts[name]
         if info.flag_bits & 1 or info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             what = "encrypted" if info.flag_bits & 1 else f"packed with method {info.compress_type}"
@@ -98,16 +98,16 @@ class Package:
             raise Unreadable(F003.finding(text, places=[Location(part=info.filename)])) from error
 
     def shown(self, name: str) -> str:
-        """A part's name as the package writes it; `parts` has it in lower case, since OPC compares names so."""
+        """Return a part's name as the package writes it; `parts` has it in lower case, since OPC compares names so."""
         return self.parts[name].filename.lstrip("/") if name in self.parts else name
 
     def content_type(self, name: str) -> str | None:
-        """The part's content type by override or default, without parameters, in lower case."""
+        """Return the part's content type by override or default, without parameters, in lower case."""
         content_type = self.overrides.get(name) or self.defaults.get(posixpath.splitext(name)[1][1:])
         return content_type.split(";")[0].strip().lower() if content_type else None
 
     def relations(self, name: str) -> list[Relation]:
-        """The relationships of a part ("" for the package), their faults added to the findings."""
+        """Return the relationships of a part ("" for the package), their faults added to the findings."""
         folder, base = posixpath.split(name)
         rels = posixpath.join(folder, "_rels", f"{base}.rels")
         if rels not in self.parts:
@@ -121,7 +121,7 @@ class Package:
         return list(self._read_relations(root, folder, rels))
 
     def xml(self, name: str, rule: Rule) -> Element | None:
-        """A small XML part as a tree, or None with a finding (of `rule`, or what the XML itself breaks)."""
+        """Return a small XML part as a tree, or None with a finding (of `rule`, or what the XML itself breaks)."""
         try:
             return read_small(self.chunks(name), self.shown(name))
         except OutOfTime:
@@ -189,14 +189,14 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
 
 
 def _after_the_end(data: memoryview) -> int:
-    """Bytes after the end record and its comment, which zipfile skips in silence (APPNOTE 4.3.16)."""
+    """Return bytes after the end record and its comment, which zipfile skips in silence (APPNOTE 4.3.16)."""
     tail = bytes(data[-(1 << 16) - 22 :])
     at = tail.rfind(b"PK\x05\x06")
     return max(0, len(tail) - at - 22 - int.from_bytes(tail[at + 20 : at + 22], "little")) if at >= 0 else 0
 
 
 def _unsafe(name: str) -> str | None:
-    """Why a zip entry's name may not be a part's, or None."""
+    """Return why a zip entry's name may not be a part's, or None."""
     if name.startswith("/") or _SCHEME.match(name):
         return "is absolute"
     if "\\" in name:

@@ -28,7 +28,7 @@ class Instance:
 
 
 def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list[Finding]) -> list[Instance]:
-    """The meshes of the build with their transforms; faces are counted before anything is expanded."""
+    """Return the meshes of the build with their transforms; faces are counted before anything is expanded."""
     counts: dict[Key, tuple[int, int]] = {}
     objects = {
         (part, id_): model_object for part, model in models.items() for id_, model_object in model.objects().items()
@@ -38,7 +38,7 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         return (use.path.lower().lstrip("/") if use.path else part, use.object)
 
     def size(key: Key, trail: tuple[Key, ...]) -> tuple[int, int]:
-        """Faces and nodes under an object; depth and recursion are bounded here."""
+        """Return faces and nodes under an object; depth and recursion are bounded here."""
         if key in counts:
             return counts[key]
         model_object = objects.get(key)
@@ -86,18 +86,18 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
 
 
 def _large(n: int) -> str:
-    """A count in digits that can be read: whole up to 1e15, else its power of ten."""
+    """Return a count in digits that can be read: whole up to 1e15, else its power of ten."""
     return str(n) if n < 10**15 else f"more than 1e{math.floor(math.log10(n))}"
 
 
 def _times(first: Floats, then: Floats) -> Floats:
-    """The transform `first` followed by `then`, rows as 3MF writes them."""
+    """Return the transform `first` followed by `then`, rows as 3MF writes them."""
     with np.errstate(all="ignore"):  # what comes out too large is found where it is used
         return np.vstack([first[:3] @ then[:3], first[3] @ then[:3] + then[3]])
 
 
 def mesh_of(model_object: Object, part: str, factor: float, matrix: Floats | None = None) -> Mesh:
-    """The object, of a part of the package, in its own place or that of an instance; `factor` mm a unit."""
+    """Return the object, of a part of the package, in its own place or that of an instance; `factor` mm a unit."""
     assert model_object.vertices is not None
     assert model_object.triangles is not None
     points = model_object.vertices if matrix is None else model_object.vertices @ matrix[:3] + matrix[3]

@@ -46,7 +46,7 @@ def read_build(package: Package, limits: Limits) -> Build:
 
 
 def _models(package: Package, limits: Limits) -> dict[str, Model]:
-    """The start part's model first, then those that it reaches by path, each with its relationships checked."""
+    """Return the start part's model first, then those that it reaches by path, each with its relationships checked."""
     relations = package.relations("")
     if "_rels/.rels" not in package.parts:
         package.say(P002, "_rels/.rels is missing")
@@ -83,7 +83,7 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
 
 
 def _reached(model: Model) -> dict[str, str]:
-    """The parts that a model names by path, each as it is written there."""
+    """Return the parts that a model names by path, each as it is written there."""
     uses = [*model.items, *(use for resource in model.objects().values() for use in resource.components)]
     paths = {use.path for use in uses if use.path}
     for resource in model.resources.values():
@@ -92,7 +92,7 @@ def _reached(model: Model) -> dict[str, str]:
 
 
 def _singletons(package: Package, relations: list[Relation], who: str, kinds: tuple[str, ...]) -> None:
-    """P020: one thumbnail, ticket and set of properties at most, each of the type that it must have."""
+    """Apply P020: one thumbnail, ticket and set of properties at most, each of the type that it must have."""
     for kind in kinds:
         of = [relation for relation in relations if relation.kind == kind]
         name = kind.rsplit("/", 1)[-1]
@@ -133,7 +133,7 @@ def _image(package: Package, part: str, rule: Rule) -> None:
 
 
 def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
-    """What a model part names by path exists, and is the target of a relationship of the right type."""
+    """Return what a model part names by path exists, and is the target of a relationship of the right type."""
     by_kind = {kind: {r.target for r in related if r.kind == kind} for kind in opc.KNOWN}
     images = by_kind[opc.THUMBNAIL] | by_kind[opc.TEXTURE]
     for resource in model.resources.values():

@@ -71,7 +71,7 @@ def _object(model: Model, resource: Object) -> None:
 
 
 def _group(model: Model, id_: int, rank: int, who: str) -> Resource | None:
-    """The property group with that id, or None with a finding; groups of unknown extensions pass unseen."""
+    """Return the property group with that id, or None with a finding; groups of unknown extensions pass unseen."""
     resource = model.resources.get(id_)
     if resource is None:
         if id_ not in model.foreign:
@@ -173,7 +173,7 @@ def _earlier(model: Model, id_: int, rank: int, who: str, kind: str) -> Resource
 
 
 def _multi(model: Model, resource: Resource) -> None:
-    """Materials 1.2, chapter 5: one material at most and first, one colour group at most, no multiproperties."""
+    """Check materials 1.2, chapter 5: one material at most and first, one colour group at most, no multiproperties."""
     who = f"multiproperties {resource.id}"
     ids = [int(text) for text in resource.attributes["pids"].split()]
     textures = [id_ for id_ in ids if id_ in model.resources and model.resources[id_].kind == "texture2d"]
@@ -203,13 +203,13 @@ def _multi(model: Model, resource: Resource) -> None:
 
 
 def _solid_stacks(model: Model) -> set[int]:
-    """Slice stacks of objects that must be solids: their polygons must be closed."""
+    """Return slice stacks of objects that must be solids: their polygons must be closed."""
     named = (thing.attributes.get(_STACK, "") for thing in model.objects().values() if thing.type in _SOLID)
     return {int(text) for text in named if elements.resource_id(text)}
 
 
 def _slicestack(model: Model, resource: Resource, solid: bool) -> None:
-    """Slice 1.0: heights rise from zbottom; slices or references, not both; polygons name vertices that exist."""
+    """Check slice 1.0: heights rise from zbottom; slices or references, not both; polygons name vertices that exist."""
     who = f"slicestack {resource.id}"
     kinds = {member[""] for member in resource.members}
     if {"slice", "sliceref"} <= kinds:
@@ -261,7 +261,9 @@ def _sliced(model: Model, resource: Object) -> None:
 
 
 def _lattice(model: Model, resource: Object) -> None:
-    """Beam lattice 1.2: ends exist and differ, sets name beams that exist, clipping meshes are earlier mesh objects."""
+    """Check beam lattice 1.2: ends exist and differ, sets name beams that exist, clipping meshes are earlier
+    mesh objects.
+    """
     assert resource.lattice is not None
     who, count = f"the lattice of object {resource.id}", 0 if resource.vertices is None else len(resource.vertices)
     if resource.type not in _SOLID:
@@ -305,7 +307,7 @@ def _lattice_properties(resource: Object) -> Iterator[tuple[int, int | None]]:
 
 
 def _uuids(model: Model) -> None:
-    """Production 1.1: with the extension required, build, items, objects and components carry a UUID."""
+    """Check production 1.1: with the extension required, build, items, objects and components carry a UUID."""
     missing = [] if model.build_uuid or not model.has_build else ["the build"]
     if any(not item.uuid for item in model.items):
         missing.append("an item")

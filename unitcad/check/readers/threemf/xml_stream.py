@@ -34,7 +34,7 @@ End = Callable[[str], Any]
 
 
 def new_parser() -> expat.XMLParserType:
-    """A parser that names elements "namespace local"."""
+    """Return a parser that names elements "namespace local"."""
     parser = expat.ParserCreate(None, " ")
     parser.ordered_attributes = True
     parser.buffer_text = True
@@ -86,7 +86,7 @@ def stream(
 
 
 def _with_head(chunks: Iterable[bytes]) -> Iterator[bytes]:
-    """The same bytes, the first piece at least 200 long where there are so many."""
+    """Return the same bytes, the first piece at least 200 long where there are so many."""
     head: bytes | None = b""
     for chunk in chunks:
         if head is None:
@@ -110,7 +110,7 @@ def _utf8_only(head: bytes, place: list[Location]) -> None:
 
 
 def forbidden(name: str) -> str | None:
-    """Why an attribute may stand nowhere in 3MF markup, or None: xml:space and all of xsi."""
+    """Return why an attribute may stand nowhere in 3MF markup, or None: xml:space and all of xsi."""
     if name.startswith(XML_SPACE) and name != XML_SPACE + "lang":
         return f"attribute xml:{name[len(XML_SPACE) :]}"
     if name.startswith(XSI):
@@ -119,7 +119,7 @@ def forbidden(name: str) -> str | None:
 
 
 def read_small(chunks: Iterable[bytes], part: str) -> Element:
-    """A whole small part as a tree. Raises `Unreadable` as `stream` does, and for parts over 5 MB."""
+    """Return a whole small part as a tree. Raises `Unreadable` as `stream` does, and for parts over 5 MB."""
     stack: list[Element] = [Element("", {})]
 
     def start(name: str, attributes: list[str]) -> None:
