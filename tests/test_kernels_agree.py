@@ -13,7 +13,9 @@ from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import (
+    Below,
     Common,
+    Component,
     Cut,
     Extrude,
     Place,
@@ -101,6 +103,39 @@ def test_leaves_have_their_closed_form_volume(name):
     reference = assert_breps_agree(LEAVES[name])
     assert reference.volume == pytest.approx(exact_volume(LEAVES[name]), rel=1e-9)
     assert_mesh_within_bound(LEAVES[name], 64, reference)
+
+
+LUG = Extrude(rounded_rectangle(8, 3, 2), 2, 4)
+UNDER = {
+    "lug": (LUG, 5 * LUG.profile.area),
+    "lug on a post": (Union((LUG, cylinder(2, 0, 6))), 5 * LUG.profile.area + 2 * math.pi * 4),
+    "half ball": (Revolve(Profile(((0, 1, 0), (3, 1, QUARTER), (0, 4, 0)))), 2 * math.pi * 9 + 2 / 3 * math.pi * 27),
+}
+
+
+@pytest.mark.parametrize("name", UNDER)
+def test_what_lies_below_a_shape_has_its_closed_form_volume(name):
+    inner, volume = UNDER[name]
+    shape = Below(inner, -1.0)
+    reference = assert_breps_agree(shape)
+    assert reference.volume == pytest.approx(volume, rel=1e-9)
+    assert_mesh_within_bound(shape, 64, reference)
+
+
+def test_a_face_that_turns_from_up_to_down_has_no_prism():
+    with pytest.raises(UnitcadError, match="turns from up to down"):
+        occt.solids([Below(LEAVES["ball"], -4.0)])
+    under = mesh.realise(Below(LEAVES["ball"], -4.0), 512).volume()
+    assert under == pytest.approx(4 * math.pi * 9 + 2 / 3 * math.pi * 27, rel=1e-3)
+
+
+def test_a_component_is_the_piece_that_holds_the_point():
+    three = Union(tuple(Place(cylinder(1, 0, 1 + i), move=(3 * i, 0, 0)) for i in range(3)))
+    for i in range(3):
+        reference = assert_breps_agree(Component(three, (3 * i, 0, 0.5)))
+        assert reference.volume == pytest.approx(math.pi * (1 + i), rel=1e-9)
+        assert_mesh_within_bound(Component(three, (3 * i, 0, 0.5)), 64, reference)
+    assert mesh.realise(Component(three, (1.5, 0, 0.5)), 64).is_empty()
 
 
 @pytest.mark.parametrize("name", ["tube", "stepped"])

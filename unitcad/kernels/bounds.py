@@ -8,6 +8,8 @@ With n segments a turn, a = sqrt(x / sin x), x = 2 pi / n (see `mesh.area_true`)
 
 Volume: |V_mesh - V| <= sum over the leaves of d S, S the area of the leaf's curved faces. It holds through every
 boolean, since what two sums, differences or intersections disagree on lies where their operands disagree.
+Under `Below` a leaf's curved faces also bound what lies under them: their area counts by how much taller it becomes,
+for leaves that are moved but not turned.
 Box: each face of the box moves by at most max d where a leaf's own face is what reaches out farthest, and by d / sin(w)
 where it is an edge at which two faces meet at an angle w: 2 max d for any w of 30 degrees or more.
 `segment_count(r, t)` makes r (a - 1) <= t, and so d <= 1.5 t for every extruded R <= r.
@@ -19,13 +21,13 @@ import math
 from collections.abc import Iterator
 
 from unitcad.kernels.mesh import area_true
-from unitcad.shape import Common, Cut, Extrude, Place, Profile, Revolve, Shape, Union
+from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Profile, Revolve, Shape, Union
 from unitcad.shape.profile import arc_centre, sides
 
 
 def deviation(shape: Shape, segments: int) -> float:
     """The farthest (mm) that any leaf's mesh of `segments` a turn lies from the leaf's surface."""
-    return max(_deviation(leaf, segments) for leaf in _leaves(shape))
+    return max(_deviation(leaf, segments) for leaf, _ in _leaves(shape))
 
 
 def box_bound(shape: Shape, segments: int) -> float:
@@ -35,21 +37,30 @@ def box_bound(shape: Shape, segments: int) -> float:
 
 def volume_bound(shape: Shape, segments: int) -> float:
     """The most (mm3) by which the mesh's volume may differ from the shape's."""
-    return sum(_deviation(leaf, segments) * _curved_area(leaf) for leaf in _leaves(shape))
+    return sum(times * _deviation(leaf, segments) * _curved_area(leaf) for leaf, times in _leaves(shape))
 
 
-def _leaves(shape: Shape) -> Iterator[Revolve | Extrude]:
+def _leaves(shape: Shape, times: float = 1.0) -> Iterator[tuple[Revolve | Extrude, float]]:
+    """Yield every leaf, and how often its curved area counts: under `Below` its faces reach farther down."""
     match shape:
         case Revolve() | Extrude():
-            yield shape
+            yield shape, times
         case Union(parts) | Common(parts):
             for part in parts:
-                yield from _leaves(part)
+                yield from _leaves(part, times)
         case Cut(body, tools):
             for part in (body, *tools):
-                yield from _leaves(part)
-        case Place(inner):
-            yield from _leaves(inner)
+                yield from _leaves(part, times)
+        case Place(inner) | Component(inner):
+            yield from _leaves(inner, times)
+        case Below(inner, bottom):
+            for leaf, more in _leaves(inner, times):
+                low, high = (
+                    (leaf.z0, leaf.z1)
+                    if isinstance(leaf, Extrude)
+                    else (leaf.profile.bounds[1], leaf.profile.bounds[3])
+                )
+                yield leaf, more * (1 + max(high - bottom, 0.0) / (high - low))
 
 
 def _deviation(leaf: Revolve | Extrude, segments: int) -> float:

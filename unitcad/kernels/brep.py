@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
-from unitcad.shape import Common, Cut, Extrude, Place, Revolve, Shape, Union
+from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Revolve, Shape, Union
 from unitcad.shape.profile import Profile, arc_middle, sides
 from unitcad.shape.tree import Turn
 
@@ -29,6 +29,8 @@ class Library(Protocol):
     def fuse(self, parts: Sequence[Any], /) -> Any: ...
     def cut(self, body: Any, tools: Sequence[Any], /) -> Any: ...
     def common(self, one: Any, other: Any, /) -> Any: ...
+    def component(self, solid: Any, at: Point, /) -> Any: ...
+    def below(self, solid: Any, bottom: float, /) -> Any: ...
     def place(self, solid: Any, turn: Turn, move: Point, /) -> Any: ...
 
 
@@ -63,6 +65,10 @@ def _built(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
             for other in rest:
                 first = library.common(first, other)
             return first
+        case Component(inner, at):
+            return library.component(_solid(inner, library, known), at)
+        case Below(inner, bottom):
+            return library.below(_solid(inner, library, known), bottom)
         case Place(inner, turn, move):
             return library.place(_solid(inner, library, known), turn, move)
     raise TypeError(f"not a shape: {shape!r}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from unitcad.kernels import brep
+from unitcad.kernels import brep, occt
 from unitcad.kernels.ocp import loading
 from unitcad.shape import Shape
 from unitcad.shape.body import Body
@@ -69,6 +69,14 @@ def cut(body: B3dShape, tools: Sequence[B3dShape]) -> B3dShape:
 
 def common(one: B3dShape, other: B3dShape) -> B3dShape:
     return b3d.Compound(one.intersect(other) or [])
+
+
+def component(shape: B3dShape, at: brep.Point) -> B3dShape:
+    return B3dShape.cast(occt.component(shape.wrapped, at))
+
+
+def below(shape: B3dShape, bottom: float) -> B3dShape:
+    return B3dShape.cast(occt.below(shape.wrapped, bottom))
 
 
 def place(shape: B3dShape, turn: Turn, move: brep.Point) -> B3dShape:

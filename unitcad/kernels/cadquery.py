@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from unitcad.kernels import brep
+from unitcad.kernels import brep, occt
 from unitcad.kernels.ocp import loading
 from unitcad.shape import Shape
 from unitcad.shape.body import Body
@@ -66,6 +66,14 @@ def cut(body: cq.Shape, tools: Sequence[cq.Shape]) -> cq.Shape:
 
 def common(one: cq.Shape, other: cq.Shape) -> cq.Shape:
     return one.intersect(other)
+
+
+def component(shape: cq.Shape, at: brep.Point) -> cq.Shape:
+    return cq.Shape.cast(occt.component(shape.wrapped, at))
+
+
+def below(shape: cq.Shape, bottom: float) -> cq.Shape:
+    return cq.Shape.cast(occt.below(shape.wrapped, bottom))
 
 
 def place(shape: cq.Shape, turn: Turn, move: brep.Point) -> cq.Shape:

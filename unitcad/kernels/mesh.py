@@ -8,8 +8,10 @@ from functools import lru_cache
 import manifold3d
 import numpy as np
 from manifold3d import CrossSection, Manifold
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
-from unitcad.shape import Common, Cut, Extrude, Place, Revolve, Shape, Union
+from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Revolve, Shape, Union
 from unitcad.shape.profile import Profile, points
 
 FINEST, COARSEST = 4096, 24
@@ -57,6 +59,10 @@ def _realise(shape: Shape, segments: int) -> Manifold:
             return Manifold.batch_boolean(bodies, manifold3d.OpType.Subtract)
         case Common(parts):
             return Manifold.batch_boolean([_realise(part, segments) for part in parts], manifold3d.OpType.Intersect)
+        case Component(inner, at):
+            return component(_realise(inner, segments), at)
+        case Below(inner, bottom):
+            return _below(_realise(inner, segments), bottom)
         case Place(inner, turn, move):
             return _realise(inner, segments).transform(np.column_stack([turn, move]))
     raise TypeError(f"not a shape: {shape!r}")
@@ -76,6 +82,54 @@ def arrays(solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
 def bounds(solid: Manifold) -> tuple[float, ...]:
     """(x0, y0, z0, x1, y1, z1) in mm."""
     return tuple(solid.bounding_box())
+
+
+_PROBE = 1e-4
+"""Edge of the cube that finds which piece holds a point, mm."""
+
+
+def component(solid: Manifold, at: tuple[float, float, float]) -> Manifold:
+    """Return the connected piece of `solid` that holds the point `at` (mm); nothing where none does."""
+    probe = Manifold.cube((_PROBE, _PROBE, _PROBE), True).translate(at)
+    pieces = [(float((piece ^ probe).volume()), i, piece) for i, piece in enumerate(solid.decompose())]
+    shared, _, held = max(pieces, default=(0.0, 0, Manifold()))
+    return held if shared > 0 else Manifold()
+
+
+def _below(solid: Manifold, bottom: float) -> Manifold:
+    """Return what lies under the upward faces of `solid`, down to `bottom`: a prism a patch of faces that join."""
+    vertices, faces = arrays(solid)
+    corners = vertices[faces]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    faces = faces[a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] > 1e-12]
+    return Manifold.batch_boolean([_prism(vertices, patch, bottom) for patch in _patches(faces)], manifold3d.OpType.Add)
+
+
+def _patches(faces: np.ndarray) -> list[np.ndarray]:
+    """Return faces (m, 3) in groups that are joined by edges."""
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    of_face = np.repeat(np.arange(len(faces)), 3)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    same = np.all(edges[order][1:] == edges[order][:-1], axis=1)
+    first, second = of_face[order][:-1][same], of_face[order][1:][same]
+    joined = coo_matrix((np.ones(len(first)), (first, second)), shape=(len(faces), len(faces)))
+    count, labels = connected_components(joined, directed=False)
+    return [faces[labels == i] for i in range(count)]
+
+
+def _prism(vertices: np.ndarray, patch: np.ndarray, bottom: float) -> Manifold:
+    """Return the solid between upward faces and the plane z = `bottom`."""
+    used, patch = np.unique(patch, return_inverse=True)
+    patch, n = patch.reshape(-1, 3), len(used)
+    roof = vertices[used]
+    floor = np.column_stack([roof[:, :2], np.full(n, bottom)])
+    edges = patch[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    inner = {(int(j), int(i)) for i, j in edges}
+    border = np.array([edge for edge in edges.tolist() if tuple(edge) not in inner])
+    i, j = border.T
+    walls = np.vstack([np.column_stack([j, i, i + n]), np.column_stack([j, i + n, j + n])])
+    triangles = np.vstack([patch, patch[:, ::-1] + n, walls]).astype(np.uint64)
+    return Manifold(manifold3d.Mesh64(np.vstack([roof, floor]), triangles))
 
 
 def _taper(below: np.ndarray, above: np.ndarray, z0: float, z1: float) -> Manifold:

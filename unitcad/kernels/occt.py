@@ -21,14 +21,15 @@ with loading("OCP"):
     from OCP.BRepAlgoAPI import BRepAlgoAPI_BooleanOperation, BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
     from OCP.BRepBndLib import BRepBndLib
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
-    from OCP.BRepGProp import BRepGProp
+    from OCP.BRepClass3d import BRepClass3d_SolidClassifier
+    from OCP.BRepGProp import BRepGProp, BRepGProp_Face
     from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
     from OCP.GC import GC_MakeArcOfCircle
     from OCP.gp import gp_Ax1, gp_Ax3, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
     from OCP.GProp import GProp_GProps
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
-    from OCP.TopAbs import TopAbs_SOLID
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_SOLID
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Wire
@@ -120,6 +121,42 @@ def cut(body: TopoDS_Shape, tools: Sequence[TopoDS_Shape]) -> TopoDS_Shape:
 
 def common(one: TopoDS_Shape, other: TopoDS_Shape) -> TopoDS_Shape:
     return _boolean(BRepAlgoAPI_Common(), [one], [other])
+
+
+def component(solid: TopoDS_Shape, at: brep.Point) -> TopoDS_Shape:
+    for piece in _solids_in(solid):
+        if BRepClass3d_SolidClassifier(piece, gp_Pnt(*at), 1e-7).State() == TopAbs_IN:
+            return piece
+    raise UnitcadError(f"OCCT: no solid holds the point {at}")
+
+
+def below(solid: TopoDS_Shape, bottom: float) -> TopoDS_Shape:
+    """Return the prisms under the upward faces, fused: exact where each such face is seen whole from above."""
+    x0, y0, _, x1, y1, high = measure(solid).box
+    prisms = []
+    explorer = TopExp_Explorer(solid, TopAbs_FACE)
+    while explorer.More():
+        each = TopoDS.Face(explorer.Current())
+        if _faces_up(each):
+            prisms.append(BRepPrimAPI_MakePrism(each, gp_Vec(0, 0, bottom - 1 - high), True).Shape())
+        explorer.Next()
+    under = BRepPrimAPI_MakeBox(gp_Pnt(x0 - 1, y0 - 1, bottom), gp_Pnt(x1 + 1, y1 + 1, high + 1)).Shape()
+    return common(fuse([solid, *prisms]), under)
+
+
+def _faces_up(each: TopoDS_Face) -> bool:
+    """Tell whether a face looks upwards. Raises UnitcadError for one that turns from up to down: it has no prism."""
+    surface, point, normal = BRepGProp_Face(each), gp_Pnt(), gp_Vec()
+    u0, u1, v0, v1 = surface.Bounds()
+    found = set()
+    for u in (0.02, 0.35, 0.65, 0.98):
+        for v in (0.02, 0.35, 0.65, 0.98):
+            surface.Normal(u0 + u * (u1 - u0), v0 + v * (v1 - v0), point, normal)
+            if abs(normal.Z()) > 1e-6 * normal.Magnitude():
+                found.add(normal.Z() > 0)
+    if len(found) > 1:
+        raise UnitcadError("OCCT: a curved face that turns from up to down bounds a mould; part it where it turns")
+    return found == {True}
 
 
 def place(solid: TopoDS_Shape, turn: Turn, move: brep.Point) -> TopoDS_Shape:

@@ -6,6 +6,7 @@ import pkgutil
 from functools import cache
 from importlib import import_module
 
+from unitcad.mould_checks import overlap
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding
 from unitcad.mould_checks.strain import Strain, strain_findings, strains
@@ -17,6 +18,7 @@ __all__ = [
     "Strain",
     "check_geometry",
     "check_moulds",
+    "check_unit",
     "mould_checks",
     "strain_findings",
     "strains",
@@ -34,6 +36,11 @@ def mould_checks() -> dict[str, MouldCheck]:
 def check_moulds(moulds: MouldSet) -> list[MouldFinding]:
     """Return what all mould checks find on a unit and its moulds, in the order of codes."""
     return [finding for check in mould_checks().values() for finding in check.findings(moulds)]
+
+
+def check_unit(moulds: MouldSet) -> list[MouldFinding]:
+    """Return what the checks find on the unit alone, without moulds: its overlaps."""
+    return overlap.of_unit(moulds)
 
 
 def check_geometry(moulds: MouldSet) -> list[MouldFinding]:

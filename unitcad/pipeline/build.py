@@ -30,6 +30,7 @@ from unitcad.validation import warnings
 
 OUTPUTS = ("unit", "moulds", "estimate", "casting")
 OWN_DESIGN = "a design of one's own: tooling and estimate are known for the shipped designs only"
+NO_MOULDS = "no moulds were asked for: of the mould checks only C200 looked at the unit"
 TRIES = 5
 """How often a result is made when what it shares vanishes from the cache meanwhile."""
 FORMATS = ("step", "stl", "3mf", "svg", "png", "glb")
@@ -289,7 +290,7 @@ class _Making:
     def _left_out(self) -> list[dict[str, str]]:
         spec, found = self.spec, list(self.left_out)
         if not self.check or "moulds" not in self.only:
-            found.append(_left("laws", folders.UNCHECKED if not self.check else "no moulds were asked for"))
+            found.append(_left("laws", folders.UNCHECKED if not self.check else NO_MOULDS))
         if not self.check:
             found.append(_left("mesh checks", folders.UNCHECKED))
         found += [_left(what, why) for what, why in _not_needed(spec)]

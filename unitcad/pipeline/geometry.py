@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 GEOMETRIC = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
+NO_LAWS: dict[str, list[dict[str, Any]]] = {"laws": [], "strains": []}
 
 
 def geometry_key(spec: Spec, only: Sequence[str], check: bool) -> str:
@@ -89,7 +90,7 @@ class _Making:
                     self._step(group, records)
         tooling, pours = "moulds" in self.only, {"moulds", "casting"} & set(self.only)
         with stages("laws"):
-            laws = self._laws() if self.check and tooling else {"laws": [], "strains": []}
+            laws = self._laws(tooling) if self.check and (tooling or "unit" in self.only) else NO_LAWS
         with stages("check"):
             check = self._check(records) if self.check else []
         return {
@@ -158,17 +159,22 @@ class _Making:
                     lambda step=step: step_section(self.moulds, step).encode(),
                 )
 
-    def _laws(self) -> dict[str, list[dict[str, Any]]]:
-        """The laws that read no silicone, judged; and the strains that a silicone's limit is still to be put to."""
-        from unitcad.mould_checks import check_geometry, strains
+    def _laws(self, tooling: bool) -> dict[str, list[dict[str, Any]]]:
+        """Return the findings that read no silicone, and the strains that are still to be compared with a silicone's.
+
+        Without `tooling` only the unit's own overlaps are looked for.
+        """
+        from unitcad.mould_checks import check_geometry, check_unit, strains
 
         def judged() -> dict[str, list[dict[str, Any]]]:
+            if not tooling:
+                return {**NO_LAWS, "laws": [finding.as_dict() for finding in check_unit(self.moulds)]}
             return {
                 "laws": [finding.as_dict() for finding in check_geometry(self.moulds)],
                 "strains": [asdict(strain) for strain in strains(self.moulds)],
             }
 
-        return self.store.data(self._own_key("laws"), judged)
+        return self.store.data(self._own_key("laws" if tooling else "unit's laws"), judged)
 
     def _check(self, records: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """What the mesh rules find in every file: tools against the printer."""

@@ -9,7 +9,9 @@ from unitcad.shape.profile import (
     rounded_rectangle,
 )
 from unitcad.shape.tree import (
+    Below,
     Common,
+    Component,
     Cut,
     Extrude,
     Place,
@@ -28,7 +30,9 @@ from unitcad.shape.tree import (
 )
 
 __all__ = [
+    "Below",
     "Common",
+    "Component",
     "Cut",
     "Extrude",
     "Place",

@@ -72,6 +72,25 @@ class Common:
     parts: tuple[Shape, ...]
 
 
+@dataclass(frozen=True)
+class Component:
+    """The connected piece of `shape` that holds the point `at` (mm)."""
+
+    shape: Shape
+    at: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Below:
+    """`shape` and everything under it, straight down to z = `bottom` (mm), which lies below the shape."""
+
+    shape: Shape
+    bottom: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bottom", mm(self.bottom))
+
+
 Turn = tuple[tuple[int, int, int], ...]
 """A proper rotation as a signed axis permutation, by rows."""
 
@@ -89,7 +108,7 @@ class Place:
         object.__setattr__(self, "move", (mm(x), mm(y), mm(z)))
 
 
-Shape = Revolve | Extrude | Union | Cut | Common | Place
+Shape = Revolve | Extrude | Union | Cut | Common | Component | Below | Place
 
 
 def cylinder(radius: float, z0: float, z1: float) -> Revolve:
