@@ -6,7 +6,7 @@ Topology rules against trimesh's is_volume on the same arrays; all rules (topolo
 pymeshlab's compute_selection_by_self_intersections_per_face, which is GPL and runs in an environment of its own
 (`--peer`); a whole file by `check_file` beside the admesh command, which knows no crossing; and the peak memory of a
 process that judges the file. With `--peer`, an environment that also has meshlib (non-commercial), the crossing test
-alone on five shapes.
+alone on six shapes.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ print(before, peak(), report.verdict)
 """
 
 
-SHAPES = ("torus", "plate", "gyroid", "scan", "cubes")
+SHAPES = ("torus", "plate", "gyroid", "scan", "body", "cubes")
 CROSSING = """
 import sys, time
 sys.path.insert(0, {here!r})
