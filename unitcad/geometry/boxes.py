@@ -21,6 +21,7 @@ _ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked 
 _STEP_BITS = 12
 _STEP = 1 << _STEP_BITS  # pairs of nodes looked at together
 _TOP = 65_534  # largest step; 65,535 is an empty box's low corner
+_FACES = 1 << 14  # faces whose corners stay in the processor's cache
 _BITS = 14  # of each axis in a Morton key
 
 
@@ -123,13 +124,14 @@ def slabs_of(steps: list[Ints], *corners: Ints) -> Slabs:
     for k, value in enumerate((x + y + z, x + y - z + _TOP, x - y + z + _TOP, y + z - x + _TOP)):
         np.right_shift(value, 2, out=along[:, k], casting="unsafe")
     words = along.view(np.uint64)[:, 0]
-    first, *others = (words.take(corner, mode="clip").view(np.uint16) for corner in corners)
-    low, high = first.copy(), first
-    for other in others:
-        np.minimum(low, other, out=low)
-        np.maximum(high, other, out=high)
-    high += np.uint16(1)
-    return Slabs(low.view(np.uint64), high.view(np.uint64))
+    low, high = np.empty((2, len(corners[0])), np.uint64)
+    for start in range(0, len(low), _FACES):
+        block = slice(start, start + _FACES)
+        one, two, three = (words.take(corner[block], mode="clip").view(np.uint16) for corner in corners)
+        np.minimum(np.minimum(one, two), three, out=low[block].view(np.uint16))
+        np.maximum(np.maximum(one, two), three, out=high[block].view(np.uint16))
+    high.view(np.uint16)[:] += np.uint16(1)
+    return Slabs(low, high)
 
 
 def meeting_pairs(boxes: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints, Ints]]:
@@ -187,7 +189,7 @@ def _descend(
         skip = None if not own else np.greater if level > 1 else np.greater_equal
         walk = _walk(rows, others, first, second, skip, tick)
         if level > 1:
-            blocks = list(walk)
+            blocks = [(i.astype(np.int32), j.astype(np.int32)) for i, j in walk]
             first = np.concatenate([block[0] for block in blocks])
             second = np.concatenate([block[1] for block in blocks])
         else:
@@ -220,7 +222,7 @@ def _walk(
     yield empty, empty
     for start in range(0, len(first), _STEP):
         tick()
-        i, j = first[start : start + _STEP], second[start : start + _STEP]
+        i, j = (side[start : start + _STEP].astype(np.intp) for side in (first, second))
         low_a, high_a = _children(rows, i)
         low_b, high_b = _children(others, j)
         meet = np.zeros((_FAN, _FAN, _STEP), bool)

@@ -1,0 +1,97 @@
+"""Floats may leave a pair of faces open, but what they set apart is apart: against exact signs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from unitcad.check.geometry.planes import Planes, planes_of
+from unitcad.check.geometry.triangle_mesh import area_vectors
+from unitcad.check.geometry.triangles import meet
+from unitcad.geometry.boxes import frame_of, slabs_of
+
+N = 4000
+
+
+def _pairs(kind: str, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of pairs of triangles (n, 3, 3), near to touching."""
+    if kind == "lattice":
+        return rng.integers(-2, 3, (2, N, 3, 3)).astype(float)[0], rng.integers(-2, 3, (N, 3, 3)).astype(float)
+    a, b = rng.normal(size=(2, N, 3, 3))
+    weight = rng.dirichlet(np.ones(3), N)
+    inside = np.einsum("nk,nkd->nd", weight, a)
+    b[:, 0] = inside + rng.normal(size=(N, 3)) * 10.0 ** rng.uniform(-17, -3, (N, 1))
+    if kind == "one plane":
+        b = inside[:, None] + np.einsum("nck,nkd->ncd", rng.normal(size=(N, 3, 2)), a[:, 1:] - a[:, :1])
+    if kind == "slivers":
+        a[:, 2] = a[:, 0] + (a[:, 1] - a[:, 0]) * rng.random((N, 1)) + rng.normal(size=(N, 3)) * 1e-9
+    if kind == "sizes":
+        size = 10.0 ** rng.uniform(-6, 3, (N, 1, 1))
+        return a * size, b * size
+    if kind == "far away":
+        return a + 1e6, b + 1e6
+    return a, b
+
+
+def _planes(a: np.ndarray, b: np.ndarray) -> Planes:
+    """Faces 0 to n - 1 are a, n to 2 n - 1 are b."""
+    points = np.concatenate([a, b]).reshape(-1, 3)
+    faces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
+    return planes_of(
+        np.ascontiguousarray(points.T),
+        np.ascontiguousarray(faces.T),
+        np.ascontiguousarray(area_vectors(points, faces).T),
+    )
+
+
+KINDS = ["lattice", "near", "one plane", "slivers", "sizes", "far away"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_plane_sets_apart_is_apart(kind: str) -> None:
+    a, b = _pairs(kind, np.random.default_rng(KINDS.index(kind)))
+    planes, i = _planes(a, b), np.arange(N)
+    solid = (planes.normal != 0).any(axis=0)
+    none = np.zeros(N, np.int8)
+    by_plane = planes.one_side(i, planes.vertices(i + N), none) | planes.one_side(i + N, planes.vertices(i), none)
+    ids = [planes.vertices(f) for f in (i, i + N)]
+    seen = planes.seen_apart(i, planes.corners(ids[0]), planes.corners(ids[1]), none)
+    whole = np.flatnonzero(solid[:N] & solid[N:])
+    exact = meet(a[whole], b[whole])
+    meets = exact.touches | exact.crosses | exact.overlaps
+    assert not (meets & (by_plane | seen)[whole]).any()
+    assert (by_plane | seen)[whole].sum() > 100
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("shared", [1, 2])
+def test_faces_that_share_corners_have_no_more_in_common(kind: str, shared: int) -> None:
+    """No crossing and no common area; of faces at one edge the third corner is off the plane or across the edge."""
+    a, b = _pairs(kind, np.random.default_rng([shared, KINDS.index(kind)]))
+    b[:, :shared] = a[:, :shared]
+    planes, i = _planes(a, b), np.arange(N)
+    count = np.full(N, shared, np.int8)
+    found = planes.one_side(i, planes.vertices(i + N), count)
+    corners = [planes.corners(planes.vertices(f)) for f in (i, i + N)]
+    found |= planes.seen_apart(i, *corners, count)
+    solid = (planes.normal != 0).any(axis=0)
+    rows = np.flatnonzero(found & solid[:N] & solid[N:])
+    exact = meet(a[rows], b[rows])
+    assert len(rows) > N / 20
+    assert not (exact.crosses | exact.overlaps).any()
+    other = exact.side_b if shared == 2 else None  # third corner off the plane, or in it and on the edge's other side
+    assert other is None or (((other != 0).sum(axis=1) == 1) | (other == 0).all(axis=1)).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_slabs_keep_faces_that_touch(seed: int) -> None:
+    """Pairs that share a corner, in a frame whose axes differ much in length."""
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(300, 3)) * [1, 10.0**-seed, 1000]
+    faces = rng.integers(0, len(points), (2000, 3)).astype(np.int32)
+    i, j = np.triu_indices(len(faces), 1)
+    touch = (faces[i][:, :, None] == faces[j][:, None, :]).any(axis=(1, 2))
+    slabs = slabs_of(frame_of(points).steps(points), *np.ascontiguousarray(faces.T))
+    kept = slabs.meeting(i[touch], j[touch])
+    assert len(kept[0]) == touch.sum()
+    assert len(slabs.meeting(i[~touch], j[~touch])[0]) < (~touch).sum()
