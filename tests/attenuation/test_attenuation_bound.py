@@ -82,6 +82,16 @@ def test_a_stiff_layer_below_a_thin_one():
     assert _off(found, truth) <= found.error
 
 
+@pytest.mark.parametrize("omega", [0.0, 785.0])
+@pytest.mark.parametrize("moduli", [(1e160, 1e4), (1e4, 1e300), (1e307, 1e307)])
+def test_what_overflows_is_refused_in_one_sentence(moduli, omega):
+    """Impedances beyond 1e308: the displacement is no number, and is not returned."""
+    top, below = moduli
+    medium = LayeredMedium([Layer(1e-3, 1000, top, 0.3)], HalfSpace(1000, below, 0.3))
+    with pytest.raises(UnitcadError, match="no finite answer"):
+        medium.response(UniformDisc(3e-3), omega, [1e-3, 1e-2], rtol=1e-3)
+
+
 @pytest.mark.parametrize("r", [0.0, [0.0], [[0.0, 1e-3]]])
 @pytest.mark.parametrize("omega", [0.0, 785.0])
 def test_under_a_point_load_the_answer_is_infinite(r, omega):

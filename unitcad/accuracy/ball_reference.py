@@ -4,14 +4,15 @@ Nothing here is shared with `unitcad.attenuation` but the description of the med
 the P and S waves of all layers solve one linear system (the global matrix method) in balls of 320 bits
 (python-flint), so that neither growing exponentials nor P and S alike cost a digit. k C(k) is interpolated on panels
 that are halved until it is a polynomial there; its products with the Bessel functions are then integrated on as many
-points as they need. Where all layers are damped the path is the real axis itself: no pole is passed on the wrong side.
+points as they need. The path is the real axis itself: damping puts each pole on the side where it belongs. Bodies
+without damping get small losses, and the result is taken to no loss by a polynomial.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -32,7 +33,8 @@ _DENSE_TABLE = np.polynomial.legendre.legvander(_DENSE, _DEGREE - 1)
 _DEEPEST = 60  # halvings of a panel
 _MOST_POINTS = 3_000_000
 _FINE = 1e-12
-_LEAST_LOSS = 1e-3  # tan delta from which the poles are far enough from the real axis
+_LEAST_LOSS = 1e-6  # over 1: below it a body counts as undamped
+_LOSSES = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
 
 
 @dataclass(frozen=True)
@@ -55,12 +57,29 @@ def response(medium: LayeredMedium, load: Load, omega: float, r: np.ndarray, z: 
     """
     r = np.asarray(r, dtype=float)
     kernel = Kernel(medium, omega, z)
-    if kernel.least_loss >= _LEAST_LOSS:
-        u, doubt = _along(kernel, load, r, 0.0)
+    if omega == 0.0 or kernel.least_loss >= _LEAST_LOSS:
+        u, doubt = _along(kernel, load, r)
         return Reference(u, doubt, kernel.count)
-    height = min(1.0 / (float(r.max()) + load.reach), 0.03 / max(kernel.thickness, 1e-300), kernel.slowest / 8)
-    (one, doubt), (other, _) = (_along(kernel, load, r, part * height) for part in (1.0, 0.4))
-    return Reference(one, doubt + np.abs(one - other), kernel.count)
+    losses = _LOSSES * 1e-3 / max(1.0, kernel.slowest * (float(r.max()) + load.reach))
+    kernels = [Kernel(_with_loss(medium, float(loss)), omega, z) for loss in losses]
+    values, doubts = zip(*(_along(one, load, r) for one in kernels), strict=True)
+    weights, fewer = _weights_at_0(losses), np.append(_weights_at_0(losses[:-1]), 0.0)
+    u = np.tensordot(weights, values, 1)
+    doubt = np.tensordot(np.abs(weights), doubts, 1) + np.abs(u - np.tensordot(fewer, values, 1))
+    return Reference(u, doubt, sum(one.count for one in kernels))
+
+
+def _with_loss(medium: LayeredMedium, tan_delta: float) -> LayeredMedium:
+    """The same, bodies without damping with that loss."""
+    law = LossFactor(tan_delta)
+    layers = [layer if layer.damping else replace(layer, damping=law) for layer in medium.layers]
+    base = medium.half_space
+    return LayeredMedium(layers, base if base.damping else replace(base, damping=law))
+
+
+def _weights_at_0(x: np.ndarray) -> np.ndarray:
+    """Lagrange's weights of values at `x` in their polynomial's value at 0."""
+    return np.array([np.prod([other / (other - one) for other in x if other != one]) for one in x])
 
 
 class Kernel:
@@ -73,8 +92,6 @@ class Kernel:
             raise UnitcadError("the independent reference needs python-flint: pip install 'unitcad[test]'") from None
         self.flint, self.omega, self.z, self.count = flint, omega, z, 0
         self.least_loss, self.slowest = math.inf, 0.0
-        self.thickness = sum(layer.thickness for layer in medium.layers)
-        self.surface = 0.0 + 0j
         flint.ctx.prec = BITS
         self.bodies = []
         bodies = [layer for layer in medium.layers if layer.thickness > 0]
@@ -190,8 +207,8 @@ def _root(squared: Any) -> Any:
     return -root if value.real < 0 or (value.real == 0 and value.imag < 0) else root
 
 
-def _along(kernel: Kernel, load: Load, r: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """The integral along a half-ellipse of `height` (0: the real axis) to beyond all poles, then the real axis."""
+def _along(kernel: Kernel, load: Load, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The integral along the real axis."""
     column = 1 if load.direction == "normal" else 0
     order = [column, 1 - column]  # rows of the kernel that go with (along, across)
     total = np.zeros((2, r.size), dtype=complex)
@@ -201,23 +218,19 @@ def _along(kernel: Kernel, load: Load, r: np.ndarray, height: float) -> tuple[np
         total[order] = taken[order][:, None] * np.array(_static_pair(load, r))
     doubt = 1e-15 * np.abs(total)
     end = 3.0 * kernel.slowest or 0.1 / (float(r.max()) + load.reach)
-    turns = np.linspace(0.0, np.pi, 13)
-    corners = end / 2 * (1 - np.cos(turns)) + 1j * height * np.sin(turns)
-    corners[-1] = end
-    if height == 0.0:
-        corners = np.concatenate([[0.0], end * 2.0 ** np.arange(-6.0, 1.0)])
+    corners = np.concatenate([[0.0], end * 2.0 ** np.arange(-6.0, 1.0)])
     scale, spent = float(np.max(np.abs(total))), 0
     while True:
         span = float(r.max()) + load.reach
         spent += int(abs(corners[-1] - corners[0]) * span * 3)
         part, off, scale = _panels(kernel, load, r, corners, column, taken, scale, total)
         total, doubt = total + part, doubt + off
-        at = float(corners[-1].real)
+        at = float(corners[-1])
         last = np.abs(kernel(np.array([at], complex))[0, :, column] - taken)
         rest = last[:, None] * _tail(load, at, r)
         if np.max(rest) < _FINE * scale or spent > _MOST_POINTS:
             return total, doubt + rest
-        corners = np.array([at, 2.0 * at], dtype=complex)
+        corners = np.array([at, 2.0 * at])
 
 
 def _tail(load: Load, k: float, r: np.ndarray) -> np.ndarray:
@@ -273,7 +286,7 @@ def _panels(
     return total, doubt, scale
 
 
-def _dense(load: Load, r: np.ndarray, a: complex, b: complex, coefficients: np.ndarray) -> np.ndarray:
+def _dense(load: Load, r: np.ndarray, a: float, b: float, coefficients: np.ndarray) -> np.ndarray:
     """Integral from a to b of the kernel's polynomial times transform and Bessel functions."""
     pieces = max(1, math.ceil(abs(b - a) * (float(r.max()) + load.reach) / 12.0))
     out = np.zeros((2, r.size), dtype=complex)
@@ -284,11 +297,7 @@ def _dense(load: Load, r: np.ndarray, a: complex, b: complex, coefficients: np.n
         values = np.polynomial.legendre.legval(t, coefficients)
         k = (a + b) / 2 + (b - a) / 2 * t
         weight = (b - a) / 2 / pieces * np.tile(_DENSE_WEIGHTS, index.size)
-        if k.imag.any():
-            q, waves = _transform(load, k), [special.jv(order, k[:, None] * r) for order in (1, 0)]
-        else:
-            k = k.real
-            q, waves = _transform(load, k), [special.j1(k[:, None] * r), special.j0(k[:, None] * r)]
+        q, waves = _transform(load, k), [special.j1(k[:, None] * r), special.j0(k[:, None] * r)]
         out += np.stack([(values[c] * q * weight) @ waves[c] for c in range(2)])
     return out
 
@@ -299,9 +308,7 @@ def _transform(load: Load, k: np.ndarray) -> np.ndarray:
         return np.full(k.shape, 1.0 / (2.0 * math.pi))
     a, x = load.radius, k * load.radius
     if load.direction == "normal":
-        return a * special.jv(1, x) / k
-    if np.iscomplexobj(x):
-        return a * a * np.array([_moment(one) for one in x])
+        return a * special.j1(x) / k
     far = np.maximum(x, 8.0)
     struve = np.pi / 2 * (special.j1(far) * special.struve(0, far) - special.j0(far) * special.struve(1, far)) / far
     near = (x <= 8.0) | ~np.isfinite(struve)  # scipy's struve(0, x) has a gap at 25.765
@@ -310,14 +317,6 @@ def _transform(load: Load, k: np.ndarray) -> np.ndarray:
         t = (nodes + 1) / 2
         struve[near] = special.j1(x[near, None] * t) @ (weights / 2 * t)
     return a * a * struve
-
-
-def _moment(x: complex) -> complex:
-    """Integral of t J1(x t) from 0 to 1: x/6 1F2(3/2; 2, 5/2; -x^2/4)."""
-    import flint
-
-    at = flint.acb(x)
-    return complex(at / 6 * (-at * at / 4).hypgeom([flint.acb(1.5)], [flint.acb(2), flint.acb(2.5)]))
 
 
 def _static_pair(load: Load, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -143,6 +143,23 @@ def _wide_contrast(rng: np.random.Generator) -> LayeredMedium:
     return LayeredMedium(layers, HalfSpace(*part()))
 
 
+def _extreme_contrast(rng: np.random.Generator) -> LayeredMedium:
+    """Moduli 1e6 to 1e12 apart: a stiff layer on, under or between soft ones, damped or not."""
+    ratio = _between(rng, 1e6, 1e12)
+    soft = _between(rng, 1e2, 1e5)
+    damped = rng.random() < 0.7
+
+    def part(modulus: float) -> tuple[float, float, float, Damping]:
+        nu = float(rng.choice([0.0, 0.3, 0.45, 0.4999999, 0.5]))
+        law = LossFactor(_between(rng, 0.01, 0.5)) if damped else None
+        return float(rng.uniform(900, 2000)), modulus, nu, law
+
+    start = int(rng.integers(0, 2))
+    moduli = [soft * _between(rng, 1.0, 10.0) * (ratio if i % 2 == start else 1.0) for i in range(rng.integers(2, 5))]
+    layers = [Layer(_between(rng, 3e-5, 0.02), *part(modulus)) for modulus in moduli[:-1]]
+    return LayeredMedium(layers, HalfSpace(*part(moduli[-1])))
+
+
 _MEDIA: dict[str, Callable[[np.random.Generator], LayeredMedium]] = {
     "ordinary": _ordinary,
     "film on the forearm": _film_on_the_forearm,
@@ -152,5 +169,6 @@ _MEDIA: dict[str, Callable[[np.random.Generator], LayeredMedium]] = {
     "large k a": _large,
     "undamped": _undamped,
     "wide contrast": _wide_contrast,
+    "extreme contrast": _extreme_contrast,
 }
 CLASSES = tuple(_MEDIA)

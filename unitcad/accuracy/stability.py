@@ -118,7 +118,7 @@ def run(quick: bool, say: Say) -> Result:
             f"k h up to {max(case.kh for case in known):.0e}, any damping or none; the response's error below "
             "`error_r` and `error_z` at each radius, whether or not rtol was reached. The responses below are judged "
             "by a reference that shares no code with the solver: the global matrix in balls of 320 bits "
-            "(python-flint), its own path (the real axis where all is damped), its own closed forms. A film thinner "
+            "(python-flint), its own panels, its own closed forms. A film thinner "
             "than some micrometres, or one that is nearly fluid, needs more wavenumbers than are spent: there a small "
             "rtol is often not met, and the errors stay at what was reached."
         ),

@@ -1,16 +1,21 @@
 """From wavenumbers to radii: the Hankel integral of a layered medium's compliance, with a bound on its error.
 
-u_z(r) = integral of C_z(k) q(k) J0(kr) k dk, u_r(r) the same with J1, over a path lifted off the real axis while k is
-below every wave's wavenumber (the poles lie below it for e^{+i omega t}), then along the axis. At the surface the
-static half-space of one of the layers, known in closed form, is taken out first. Composite Gauss-Legendre on panels in
-proportion to the oscillation; a panel whose last Legendre coefficients have not died is halved. All layers count at
-every wavenumber: no bound is known of what a lower layer sends back that is both proved and cheaper than the layer.
+u_z(r) = integral of C_z(k) q(k) J0(kr) k dk, u_r(r) the same with J1, along the real axis. At the surface the static
+half-space of one of the layers, known in closed form, is taken out first. Composite Gauss-Legendre on panels in
+proportion to the oscillation; a panel whose last Legendre coefficients have not died is halved.
+
+The axis is where damping puts the path: each pole is on the side where it belongs. A path lifted into the upper half
+plane would be smoother, but waves whose energy runs against their phase (backward waves of plates and of layers on
+a stiff base) and the bending of a stiff layer on a soft one have their poles there. Where nothing is damped, poles lie
+on the axis, and the displacement is the limit of a loss that goes to 0.
+
+All layers count at every wavenumber: no bound is known of what a lower layer sends back that is both proved and
+cheaper than the layer.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,7 +25,7 @@ from unitcad.attenuation import waves as w
 from unitcad.attenuation.bessel import bessel, envelope
 from unitcad.attenuation.loads import Load
 from unitcad.attenuation.medium import LayeredMedium
-from unitcad.attenuation.rheology import finite
+from unitcad.attenuation.rheology import LossFactor, finite
 from unitcad.attenuation.tail import measure_tail
 from unitcad.errors import Refusal, UnitcadError
 
@@ -28,10 +33,12 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_NODES, _NODES.size - 1))
 _ODD_FACTORIALS = np.array([float(factorial2(2 * (2 * _NODES.size - j) - 1)) for j in range(_NODES.size)])
 _PHASE = 8.0 * np.pi  # of the fastest Bessel product over one panel
+_LEAST_PANELS = 6  # up to the last pole
 _MAX_PANELS = 40_000
 _MOST_PANELS = 2_500  # up to the last pole: a few seconds
 _MAX_ROUNDS = 40
 _MOST_ATTEMPTS = 3
+_ROUNDING = 1e-15  # of a wavenumber, as the kernel feels it next to a pole
 _CHUNK = 200_000  # integrand values held at once
 
 
@@ -75,6 +82,12 @@ class _Problem:
         out = k * self.medium.transfer(traction, k, self.omega, self.z)
         return out - static_kernel(self.reference, self.column)[:, None] if self.reference else out
 
+    def with_loss(self, tan_delta: float) -> _Problem:
+        """The same with that loss in every body."""
+        law, medium = LossFactor(tan_delta), self.medium
+        layers = [replace(layer, damping=law) for layer in medium.layers]
+        return replace(self, medium=LayeredMedium(layers, replace(medium.half_space, damping=law)))
+
 
 def static_kernel(material: w.Material, column: int) -> w.Array:
     """k C(k) of a static half-space: (1 - nu) / mu along the load, -(1 - 2 nu) / (2 mu) across; nu by eps."""
@@ -104,14 +117,50 @@ def respond(medium: LayeredMedium, load: Load, omega: float, r: Any, z: float = 
     flat = radii.ravel()
     end = _last_pole(medium, materials, omega)
     _check_size(end, float(flat.max()) + load.reach + 2.0 * z, omega)
-    found = _solve(_Problem(medium, load, omega, flat, z, None), materials, end, rtol)
+    lossless = omega > 0 and all(material.shear.imag == 0 for material in materials)
+    solve = _solve_lossless if lossless else _solve
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what is no number is refused below
+        found = solve(_Problem(medium, load, omega, flat, z, None), end, rtol)
     u, error = found.total.reshape(2, *radii.shape), found.error.reshape(2, *radii.shape)
     if not (np.all(np.isfinite(u)) and np.all(np.isfinite(error))):
-        raise UnitcadError(f"no finite answer at omega = {omega:g} rad/s: an undamped mode on the path, or an overflow")
+        raise UnitcadError(f"no finite answer at omega = {omega:g} rad/s: a number overflows on the way")
     return Response(u[0][()], u[1][()], error[0][()], error[1][()], found.wavenumbers)
 
 
-def _solve(bare: _Problem, materials: tuple[w.Material, ...], end: float, rtol: float) -> _Found:
+_LIMIT = np.array([6.0, -15.0, 20.0, -15.0, 6.0, -1.0])
+"""Weights that give a polynomial's value at 0 from those at 1 to 6, and, less by one degree, from those at 1 to 5."""
+_LOWER = np.array([5.0, -10.0, 10.0, -5.0, 1.0, 0.0])
+
+
+def _solve_lossless(bare: _Problem, end: float, rtol: float) -> _Found:
+    """The limit of a loss that goes to 0: a polynomial through six small losses.
+
+    What one of a degree less would give differs by the error. Waves decay little over the distance at these losses;
+    next to a frequency at which a wave is cut off the displacement changes sooner, and smaller ones are tried. The
+    first is not so small that rounding next to the poles outweighs the polynomial's error: a smaller rtol then gives
+    the same.
+    """
+    phase = max(1.0, end * (float(bare.r.max()) + bare.load.reach))
+    by_rounding = (80.0 * _ROUNDING * phase / 2.0) ** (1.0 / 6.0)
+    loss = min(0.02, 2.0 * max((0.3 * rtol) ** 0.2, by_rounding) / phase)
+    best, count = None, 0
+    for _ in range(_MOST_ATTEMPTS):
+        wanted = max(0.008 * rtol, 2.0 * _ROUNDING / loss)
+        found = [_solve(bare.with_loss(i * loss), end, wanted) for i in range(1, _LIMIT.size + 1)]
+        values, errors = np.array([one.total for one in found]), np.array([one.error for one in found])
+        total = np.tensordot(_LIMIT, values, 1)
+        integrals, limit = np.tensordot(abs(_LIMIT), errors, 1), np.abs(total - np.tensordot(_LOWER, values, 1))
+        count += sum(one.wavenumbers for one in found)
+        if best is None or np.max(integrals + limit) < np.max(best.error):
+            best = replace(found[0], total=total, error=integrals + limit)
+        if np.max(best.error) <= rtol * np.max(np.abs(best.total)) or np.max(integrals) > np.max(limit):
+            break
+        loss /= 30.0
+    assert best is not None
+    return replace(best, wavenumbers=count)
+
+
+def _solve(bare: _Problem, end: float, rtol: float) -> _Found:
     """The best that is reached, in a few attempts.
 
     What was integrated first may have been accepted beside a largest |u| that the rest then took away: again, beside
@@ -119,7 +168,7 @@ def _solve(bare: _Problem, materials: tuple[w.Material, ...], end: float, rtol: 
     """
     best, size, count = None, np.inf, 0
     for _ in range(_MOST_ATTEMPTS):
-        found = _integrate(bare, materials, end, rtol, size)
+        found = _integrate(bare, end, rtol, size)
         count += found.wavenumbers
         if best is None or np.max(found.error) < np.max(best.error):
             best = found
@@ -174,7 +223,7 @@ def _graded(panels: np.ndarray, materials: tuple[w.Material, ...]) -> np.ndarray
     A stiff half-space's branch points and pole lie there, too small a feature for a long panel's last coefficients.
     """
     least = min(abs(m.ks2) ** 0.5 * (m.eps**0.5 or 1.0) for m in materials if m.shear != 0)
-    first = abs(panels[0, 1] - panels[0, 0])
+    first = panels[0, 1]
     if panels[0, 0] != 0 or least == 0.0 or least >= first:
         return panels
     halvings = min(int(np.ceil(np.log2(first / least))) + 1, _MAX_ROUNDS)
@@ -196,28 +245,13 @@ class _Found:
     exhausted: bool
 
 
-def _path(end: float, reach: float, thickness: float) -> list[complex]:
-    """Corners of the lifted path from 0 to `end`; its height keeps Bessel functions of k times `reach` (m) below e^2.
-
-    Layers have complex modes as well, with poles above the axis at heights of about 1 / `thickness` of them all (m):
-    the path stays well below.
-    """
-    if end == 0.0:
-        return [0j]
-    height = min(2.0 / reach if reach > 0 else np.inf, end / 4.0, 0.1 / thickness if thickness > 0 else np.inf)
-    return [0j, height * (1 + 1j), end + 1j * height, end + height + 0j]
-
-
-def _panels(corners: list[complex], stop: float, span: float) -> np.ndarray:
-    """Panels (n, 2) along the corners and on along the real axis to `stop`; span: phase per unit wavenumber (m)."""
+def _panels(end: float, stop: float, span: float, start: float = 0.0) -> np.ndarray:
+    """Panels (n, 2) from `start` to `stop`, all of one length up to `end`; span: phase per unit wavenumber (m)."""
     longest = _PHASE / span if span > 0 else np.inf
-    edges: list[np.ndarray] = []
-    for a, b in pairwise(corners):
-        count = max(2, int(np.ceil(abs(b - a) / longest)))
-        edges.append(a + (b - a) * np.linspace(0.0, 1.0, count + 1))
-    at = corners[-1].real
-    line = [at]
-    if at == 0.0:
+    line = [start]
+    if start < end:
+        line = list(np.linspace(start, end, max(_LEAST_PANELS, int(np.ceil((end - start) / longest))) + 1))
+    elif start == 0.0:
         line += [min(stop, longest) / 8.0]
     while line[-1] < stop and len(line) < _MAX_PANELS:
         growth = line[-1]
@@ -226,10 +260,9 @@ def _panels(corners: list[complex], stop: float, span: float) -> np.ndarray:
             line += list(line[-1] + longest * np.arange(1, count + 1))
         else:
             line.append(line[-1] + growth)
-    if len(line) > 1 and line[-1] > stop:
-        line[-1] = stop  # the tail's bound counts from there, and so do panels added later
-    edges.append(np.array(line, dtype=complex))
-    return np.concatenate([np.stack([e[:-1], e[1:]], axis=1) for e in edges])
+    if len(line) > 1 and line[-1] > max(stop, end):
+        line[-1] = max(stop, end)  # the tail's bound counts from there, and so do panels added later
+    return np.stack([line[:-1], line[1:]], axis=1)
 
 
 def _cut(panels: np.ndarray, pieces: int) -> np.ndarray:
@@ -247,9 +280,10 @@ def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
     return found
 
 
-def _integrate(bare: _Problem, materials: tuple[w.Material, ...], end: float, rtol: float, largest: float) -> _Found:
+def _integrate(bare: _Problem, end: float, rtol: float, largest: float) -> _Found:
     """To rtol times the largest |u| that is met on the way, or times `largest`, where that is less."""
     load, r, z = bare.load, bare.r, bare.z
+    materials = bare.medium.materials(bare.omega)
     r_max = float(r.max())
     span = r_max + load.reach + 2.0 * z
     far = _PHASE / span * _MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
@@ -258,73 +292,71 @@ def _integrate(bare: _Problem, materials: tuple[w.Material, ...], end: float, rt
     rtol = max(rtol, 0.3 * least / (tail.scale or 1.0))  # what the tail leaves anyway is worth no halving
     problem = replace(bare, reference=tail.reference)
     known = _static_part(problem)
-    corners = _path(end, max(r_max, load.reach), sum(layer.thickness for layer in bare.medium.layers))
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
     count, done, exhausted = 0, 0, False
     stop = tail.start(tail.scale, rtol)
-    pending = _graded(_panels(corners, stop, span), materials)
+    pending = _graded(_panels(end, stop, span), materials)
     for _ in range(_MAX_ROUNDS):
-        parts, errors, absolute = _evaluate(problem, pending)
+        parts, errors, absolute, gains = _evaluate(problem, pending)
         count += pending.shape[0] * _NODES.size
         scale = min(float(np.max(np.abs(known + total + parts.sum(0)))) or 1.0, largest)
         done += pending.shape[0]
-        worst = errors.max(axis=(1, 2))
         limit = 0.3 * rtol * scale / max(done, 1)
-        bad = worst > limit
+        bad = gains > limit
         if np.max(quadrature + errors.sum(0)) <= 0.4 * rtol * scale:
             bad[:] = False
         room = (_MAX_PANELS - done) // 4  # quarters of them are what is left
         exhausted |= np.count_nonzero(bad) > room
-        bad = _worst(worst, bad, room)
+        bad = _worst(gains, bad, room)
         total = total + parts[~bad].sum(0)
         quadrature += errors[~bad].sum(0)
         size += absolute[~bad].sum(0)
         if np.any(bad):
-            far_off = bad & (worst > 1e3 * limit)
+            far_off = bad & (gains > 1e3 * limit)
             pending = np.concatenate([_cut(pending[bad & ~far_off], 2), _cut(pending[far_off], 4)])
             continue
         wanted = tail.start(min(float(np.max(np.abs(known + total))), largest), rtol)
         exhausted |= wanted > stop and done > _MAX_PANELS
         if wanted <= stop or exhausted:
             break
-        pending = _panels([complex(stop)], wanted, span)
+        pending = _panels(0.0, wanted, span, start=stop)
         stop = wanted
     else:
-        parts, errors, absolute = _evaluate(problem, pending)
+        parts, errors, absolute, _ = _evaluate(problem, pending)
         total, quadrature, size = total + parts.sum(0), quadrature + errors.sum(0), size + absolute.sum(0)
     rest = tail.bound(stop)
     error = quadrature + rest + 4e-15 * size + 4e-16 * np.abs(known)
     return _Found(known + total, error, count, least > 0.5 * float(np.max(error)), exhausted)
 
 
-def _evaluate(problem: _Problem, panels: w.Array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Per panel, of (u_r, u_z) at each radius: its integral, a bound of its error and its absolute size."""
+def _evaluate(problem: _Problem, panels: w.Array) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Per panel, of (u_r, u_z) at each radius: its integral, a bound of its error and its absolute size.
+
+    And, per panel, the largest part of that error that halving it would lessen.
+    """
     step = max(1, _CHUNK // (_NODES.size * problem.r.size * 2))
-    lifted = np.any(panels.imag != 0, axis=1)
     shape = (len(panels), 2, problem.r.size)
     parts, errors, sizes = np.empty(shape, dtype=np.complex128), np.empty(shape), np.empty(shape)
-    for group in (np.nonzero(lifted)[0], np.nonzero(~lifted)[0]):
-        for first in range(0, group.size, step):
-            part = group[first : first + step]
-            half = (panels[part, 1] - panels[part, 0]) / 2.0
-            k = (panels[part].mean(1)[:, None] + half[:, None] * _NODES).ravel()
-            kernel = problem.kernel(k)
-            if not lifted[part[0]]:  # real Bessel functions cost a tenth of complex ones
-                k = k.real
-            phase = k[:, None] * problem.r
-            shape = (2, part.size, _NODES.size, -1)
-            waves = np.stack([bessel(1, phase), bessel(0, phase)]) * problem.load.transform(k)[:, None]
-            waves = waves.reshape(shape) * half[:, None, None]
-            kernel = kernel.reshape(2, part.size, _NODES.size)
-            parts[part] = ((kernel * _WEIGHTS)[:, :, None] @ waves)[:, :, 0].swapaxes(0, 1)
-            sizes[part], errors[part] = _sizes_and_errors(problem, panels[part], kernel, np.abs(waves))
-    return parts, errors, sizes
+    gains = np.empty(len(panels))
+    for first in range(0, len(panels), step):
+        part = slice(first, first + step)
+        half = (panels[part, 1] - panels[part, 0]) / 2.0
+        k = (panels[part].mean(1)[:, None] + half[:, None] * _NODES).ravel()
+        phase = k[:, None] * problem.r
+        waves = np.stack([bessel(1, phase), bessel(0, phase)]) * problem.load.transform(k)[:, None]
+        waves = waves.reshape(2, half.size, _NODES.size, -1) * half[:, None, None]
+        kernel = problem.kernel(k.astype(np.complex128)).reshape(2, half.size, _NODES.size)
+        parts[part] = ((kernel * _WEIGHTS)[:, :, None] @ waves)[:, :, 0].swapaxes(0, 1)
+        sizes[part], errors[part], gains[part] = _sizes_and_errors(problem, panels[part], kernel, np.abs(waves))
+    return parts, errors, sizes, gains
 
 
 def _sizes_and_errors(
     problem: _Problem, panels: w.Array, kernel: w.Array, waves: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Per panel, component and radius: the absolute size of the integral and a bound of its error.
+
+    Per panel: the largest part of the error that halving would lessen.
 
     kernel (2, panels, nodes), waves (2, panels, nodes, radii): the rest of the integrand, absolute.
 
@@ -332,20 +364,23 @@ def _sizes_and_errors(
     that were seen, as soon as they halve within n degrees or so (to count on the rate at which they seem to fall was
     too bold: a pole of small residue next to the panel shows in the last ones only); it enters the integral and the
     rule. The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `weight`: their coefficient of degree m is
-    at most weight e^{|Im k| span} phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
+    at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
     meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
     six halves: there their envelope takes the place of the weight.
+
+    Next to a pole the wavenumber's own rounding, times the kernel's slope of at most itself over the panel, is all that
+    is left of the last coefficients: halving does not lessen that.
     """
     n, span = _NODES.size, float(problem.r.max()) + problem.load.reach
     coefficients = np.abs(kernel @ _TO_LEGENDRE.T)
     rest = 2.0 * coefficients[..., -2:].sum(axis=-1)
-    half = np.abs(panels[:, 1] - panels[:, 0]) / 2.0
+    half = (panels[:, 1] - panels[:, 0]) / 2.0
     phi = half * span
     swing = np.zeros_like(rest)
     for j in range(n):  # Horner
         swing = (swing + coefficients[..., j] / _ODD_FACTORIALS[j]) * phi
-    swing *= 3.0 * half * phi**n * np.exp(np.abs(panels.imag).max(axis=1) * span)
-    least = np.abs(panels).min(axis=1)
+    swing *= 3.0 * half * phi**n
+    least = panels[:, 0]
     far = (least > 6.0 * half)[:, None]
     at = np.maximum(least, half)[:, None] / 2.0
     wave = 2.0 * problem.load.envelope(at) * envelope(at * problem.r)
@@ -353,4 +388,7 @@ def _sizes_and_errors(
     size = np.abs(kernel) * _WEIGHTS
     found = np.stack([size, np.broadcast_to(_WEIGHTS, size.shape)], axis=2) @ waves
     sizes, covered = np.moveaxis(found, (2, 0), (0, 2))
-    return sizes, 2.0 * rest.T[..., None] * covered + swing.T[..., None] * weight[:, None]
+    rounding = _ROUNDING * (panels[:, 1] / half) * np.abs(kernel).max(axis=-1)
+    oscillation = swing.T[..., None] * weight[:, None]
+    gains = 2.0 * np.maximum(rest - rounding, 0.0).T[..., None] * covered + oscillation
+    return sizes, 2.0 * np.maximum(rest, rounding).T[..., None] * covered + oscillation, gains.max(axis=(1, 2))
