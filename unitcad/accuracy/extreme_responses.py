@@ -125,8 +125,8 @@ def tables(extreme: Sequence[Row], surveyed: Sequence[Row]) -> tuple[Table, ...]
             tuple((kind, *_summary([r for r in surveyed if r.kind == kind])) for kind in CLASSES),
             "A disc or a point, pushing or radial, at the surface or at depth, four radii, five tolerances, seeded. A "
             "bound is broken where the error at one radius of one component exceeds it by more than the reference's "
-            "doubt. The reference can tell where that doubt is below a tenth of the bound. A medium that it can't do in "
-            "reasonable time is left out.",
+            "doubt. The reference can tell where that doubt is below a tenth of the bound. Media that take it too long "
+            "are left out.",
         ),
         Table(
             "Response of random media, by tolerance",
