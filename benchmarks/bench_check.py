@@ -88,7 +88,7 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     from unitcad.check.resource_limits import Deadline
 
     vertices, faces = getattr(meshes, shape)(size)
-    found = topology_of(Mesh(vertices, faces), Deadline(600)).as_stored()
+    found = topology_of(Mesh(vertices, faces), Deadline(600).tick).as_stored()
     code = CROSSING.format(here=str(Path(__file__).parent), shape=shape, size=size)
     other = subprocess.Popen([peer, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert other.stdin is not None
@@ -96,7 +96,7 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     times: dict[str, list[float]] = {"ours": [], "pymeshlab": [], "meshlib": []}
     for _ in range(rounds):
         start = time.process_time()
-        self_crossing.crossings_of(found, Deadline(600))
+        self_crossing.crossings_of(found, Deadline(600).tick)
         times["ours"].append(time.process_time() - start)
         for name in ("pymeshlab", "meshlib"):
             other.stdin.write(f"{name}\n")
@@ -139,7 +139,7 @@ def measure(size: int, peer: str | None, rounds: int, folder: Path) -> list[str]
     for _ in range(rounds):
         mesh = trimesh.Trimesh(vertices, faces, process=False)
         note("trimesh is_volume", timed(lambda mesh=mesh: mesh.is_volume))
-        note("topology", timed(lambda: topology_of(Mesh(vertices, faces), Deadline(600))))
+        note("topology", timed(lambda: topology_of(Mesh(vertices, faces), Deadline(600).tick)))
         note("all rules", timed(lambda: check_mesh(vertices, faces)))
         if other and other.stdin and other.stdout:
             other.stdin.write("go\n")

@@ -112,6 +112,24 @@ def test_no_files_of_a_room_import_each_other_in_a_circle(room: str, least: int)
     assert _circles(graph) == {}
 
 
+def test_the_rooms_of_check_import_one_way() -> None:
+    """Geometry knows no rules; rules and readers know neither the outputs nor what runs them."""
+    above = {
+        "geometry": {"rules", "readers", "output", ""},
+        "rules": {"readers", "output"},
+        "readers": {"output"},
+        "output": {"readers"},
+    }
+    runs = {
+        f"check/{name}.py" for name in ("one_mesh", "one_file", "many_files", "threemf_build", "manifest", "baseline")
+    }
+    for file, below in _file_imports(PACKAGE / "check").items():
+        room = file.split("/")[1] if file.count("/") > 1 else ""
+        for other in below if room else ():
+            assert (other.split("/")[1] if other.count("/") > 1 else "") not in above[room], f"{file} imports {other}"
+            assert other not in runs, f"{file} imports {other}"
+
+
 @pytest.mark.parametrize("room", ["check", "cli", "batch", "report"])
 def test_no_file_of_a_room_has_the_name_of_another_file(room: str) -> None:
     names = Counter(file.name for file in PACKAGE.rglob("*.py") if file.name != "__init__.py")

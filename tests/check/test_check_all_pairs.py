@@ -55,13 +55,13 @@ def _compare(kind: str, seed: int) -> tuple[int, int, int]:
         vertices, faces = weld_exact(soup)
     else:
         vertices, faces = soup.reshape(-1, 3), np.arange(3 * len(soup), dtype=np.int32).reshape(-1, 3)
-    top = topology_of(Mesh(vertices, faces), Deadline(60)).as_stored()
+    top = topology_of(Mesh(vertices, faces), Deadline(60).tick).as_stored()
     faces, vertices = top.mesh.faces, top.mesh.vertices
     faces = faces[(top.areas != 0).any(axis=1)]
     labels = top.shells[(top.areas != 0).any(axis=1)]
     if len(faces) < 2:
         return 0, 0, 0
-    found = self_crossing.crossings_of(top, Deadline(60))
+    found = self_crossing.crossings_of(top, Deadline(60).tick)
     crossings, overlaps, touching = counts(vertices, faces)
     assert len(self_crossing.joined(found.crossing)) == crossings
     # Of pairs that share an edge those count that are folded at it; of slivers what is wider than rounding.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from unitcad.check.findings import Facts, Finding, ending
 from unitcad.check.rules.f_file import F011
+from unitcad.geometry.ticks import Interrupted
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Limits:
     seconds: float = 600.0
 
 
-class Unreadable(Exception):
+class Unreadable(Interrupted):
     """The check can go no further; the findings say why, and no filter drops the errors among them.
 
     What was found before, and the facts known by then, are added on the way up (`keeping`).

@@ -252,7 +252,7 @@ def printed(
         if alike not in checked:
             mesh = mesh_of(model_object, instance.key[0], factor, instance.matrix)
             with keeping(findings):
-                part = Inspection(mesh, topology_of(mesh, deadline), deadline)
+                part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline)
                 checked[alike] = instance.matrix[3], check_on_bed(part, printer)
         begin, of = checked[alike]
         findings += _shifted(of, (instance.matrix[3] - begin) * factor)

@@ -214,9 +214,11 @@ def _unit(field: str, unit: str | None) -> str | None:
 
 
 def _printer(field: str, name: str | None) -> Printer | None:
+    if name is None:
+        return None
     from unitcad import catalogue
 
-    return None if name is None else catalogue.choose(field, name, catalogue.printers())
+    return catalogue.choose(field, name, catalogue.printers())
 
 
 def _limits(found: Configuration, max_faces: int | None, timeout: float | None) -> Limits:

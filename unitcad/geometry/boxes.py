@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, extent, sorted_with_order
+from unitcad.geometry.ticks import Tick
 
-Tick = Callable[[], object]
-"""Called now and then by what may take long; it may raise."""
 _FAN = 4
 _ROOTS = 64  # boxes of the uppermost level at most: all their pairs are looked at
 _STEP_BITS = 12

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.check.geometry.topology import Topology, max_side_squared
-from unitcad.check.resource_limits import Deadline
 from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, morton_order
+from unitcad.geometry.ticks import Tick
 
 PARALLEL = float(np.cos(np.radians(12.0)))  # two sides of a wall
 AWAY = 0.3  # two sides of a whisker, which may have three
@@ -37,7 +37,7 @@ class Rays:
     across: Ints
 
 
-def cast(topology: Topology, floors: tuple[float, float], least: float, deadline: Deadline, *, side: int) -> Rays:
+def cast(topology: Topology, floors: tuple[float, float], least: float, tick: Tick, *, side: int) -> Rays:
     """Measure from each face; `floors`: of upright and of lying walls, mm; `side` is 1 for material, -1 for air."""
     upright, level = floors
     mesh = topology.mesh
@@ -48,9 +48,7 @@ def cast(topology: Topology, floors: tuple[float, float], least: float, deadline
     points, owner = _spread_points(corners, longest, sound, upright)
     normal = side * topology.areas / np.maximum(double, 1e-300)[:, None]
     floor = (np.where(lying(topology), level, upright) * SLACK)[owner]
-    return Rays(
-        points, owner, floor, *_behind(corners, normal, sound, points, owner, np.maximum(floor, least), deadline)
-    )
+    return Rays(points, owner, floor, *_behind(corners, normal, sound, points, owner, np.maximum(floor, least), tick))
 
 
 def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float) -> tuple[Floats, Ints]:
@@ -71,7 +69,7 @@ def _spread_points(corners: Floats, longest: Floats, sound: Floats, step: float)
 
 
 def _behind(
-    corners: Floats, normal: Floats, sound: Floats, points: Floats, owner: Ints, reach: Floats, deadline: Deadline
+    corners: Floats, normal: Floats, sound: Floats, points: Floats, owner: Ints, reach: Floats, tick: Tick
 ) -> tuple[Floats, Floats, Ints]:
     """Return distances from each point, against its normal, and the face across, as `Rays` has them."""
     thickness, behind = np.full((2, len(points)), np.inf)
@@ -89,7 +87,7 @@ def _behind(
     order_faces = morton_order(steps, first)
     first, by_place = first[order_faces], solid[order_faces]
     faces = boxes_of(steps, first, first + 1, first + 2)
-    for i, j in meeting_between(rays, faces, deadline.tick):
+    for i, j in meeting_between(rays, faces, tick):
         ray, face = order[i], by_place[j]
         facing = np.einsum("ij,ij->i", normal[owner[ray]], normal[face])
         away = facing < -AWAY

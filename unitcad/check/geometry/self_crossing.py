@@ -19,9 +19,9 @@ from unitcad.check.geometry.planes import Planes, planes_of
 from unitcad.check.geometry.stars import height_fields
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import same_place
-from unitcad.check.resource_limits import Deadline, Unreadable
 from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.geometry.boxes import box_order, boxes_of, frame_of, meeting_pairs, slabs_of
+from unitcad.geometry.ticks import Interrupted, Tick
 
 _BLOCK = 1 << 17
 _PAIRS = 1 << 12  # pairs whose corners stay in the processor's cache
@@ -60,7 +60,7 @@ class Crossings:
     covering: list[Ints] = field(default_factory=list)
     leaning: list[Ints] = field(default_factory=list)
     kept: int = 0
-    stopped: Unreadable | None = None
+    stopped: Interrupted | None = None
 
     @property
     def crossed(self) -> bool:
@@ -74,7 +74,7 @@ class Crossings:
         return np.unique(np.sort(self.faces.shell[joined(self.contact.pairs)], axis=1), axis=0).astype(np.int64)
 
 
-def crossings_of(topology: Topology, deadline: Deadline, *, every: bool = False) -> Crossings:
+def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Crossings:
     """Find the pairs of faces that meet; `every`: all of those that touch, else one for each pair of shells."""
     mesh = topology.mesh
     frame = frame_of(mesh.vertices)
@@ -87,7 +87,7 @@ def crossings_of(topology: Topology, deadline: Deadline, *, every: bool = False)
         order, normal = order[solid], normal[:, solid]
     if len(order) < 2:
         return Crossings()
-    deadline.tick()
+    tick()
     faces = _prepared(topology, order, normal)
     boxes, slabs = boxes.take(order, axis=0), slabs_of(steps, *faces.corners)
     del normal, steps
@@ -95,16 +95,16 @@ def crossings_of(topology: Topology, deadline: Deadline, *, every: bool = False)
     waiting: list[tuple[Ints, Ints]] = []
     count = 0
     try:
-        for i, j in meeting_pairs(boxes, deadline.tick):
+        for i, j in meeting_pairs(boxes, tick):
             i, j = slabs.meeting(*_strangers(faces, i, j))
             waiting.append((i, j))
             count += len(i)
             if count > _BLOCK:
                 _decide(faces, waiting, found)
                 waiting, count = [], 0
-                deadline.tick()
+                tick()
         _decide(faces, waiting, found)
-    except Unreadable as stop:
+    except Interrupted as stop:
         found.contact.pairs.clear()  # shells that touch there may cross elsewhere
         found.stopped = stop
     _leaning(faces, found)

@@ -12,8 +12,8 @@ from unitcad.check.geometry import volumes
 from unitcad.check.geometry.edges import Edges
 from unitcad.check.geometry.seams import connected, join, t_junctions
 from unitcad.check.geometry.triangle_mesh import Mesh, area_vectors
-from unitcad.check.resource_limits import Deadline
 from unitcad.geometry.arrays import Bools, Floats, Ints, extent, extents
+from unitcad.geometry.ticks import Tick
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Topology:
         return replace(self, mesh=replace(self.mesh, faces=self.stored), edges=edges, areas=self.stored_areas)
 
 
-def topology_of(mesh: Mesh, deadline: Deadline) -> Topology:
+def topology_of(mesh: Mesh, tick: Tick) -> Topology:
     """Work out the topology of a mesh with finite vertices."""
     mesh, unused = _referenced(mesh) if mesh.indexed else (mesh, 0)
     faces, vertices = mesh.faces, mesh.vertices
@@ -96,12 +96,12 @@ def topology_of(mesh: Mesh, deadline: Deadline) -> Topology:
         kept = np.flatnonzero(~repeated).astype(np.int32)
         faces = faces[kept]
     edges = mesh_edges.edges_of(faces, len(vertices))
-    deadline.tick()
+    tick()
     stored, opened = faces, None
     if not edges.closed and (edges.size == 1).any():
         faces, stored, kept, edges, opened = _welded(vertices, faces, kept, edges)
     areas = area_vectors(vertices, faces)
-    deadline.tick()
+    tick()
     across = mesh_edges.opposite(edges, 3 * len(faces)) if edges.closed else None
     if across is not None:
         pinched = mesh_edges.pinched_closed(faces, across, len(vertices))
@@ -109,14 +109,14 @@ def topology_of(mesh: Mesh, deadline: Deadline) -> Topology:
     else:
         pinched = mesh_edges.pinched_open(faces, edges, len(vertices))
         twice = _duplicates(faces)
-    deadline.tick()
+    tick()
     shells = mesh_edges.shells_of(vertices, faces, edges)
     low, high = _boxes(vertices, faces, shells)
     volume = volumes.signed(vertices, faces, areas, shells, len(low))
     closed = volumes.closed(faces, edges, shells, len(low))
     if across is None and len(twice):
         twice = np.setdiff1d(twice, _facing(faces, areas, shells, volume * closed))
-    deadline.tick()
+    tick()
     unbalanced = np.empty(0, int)
     if not edges.closed:
         unbalanced = np.flatnonzero((edges.size % 2 == 0) & ~mesh_edges.balanced(faces, edges))

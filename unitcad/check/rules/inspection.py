@@ -41,11 +41,11 @@ class Inspection:
         if not self.cross or not len(self.topology.kept):
             return Crossings()
         every = detail().meshes is not None
-        return crossings_of(self.topology.as_stored(), self.deadline, every=every)
+        return crossings_of(self.topology.as_stored(), self.deadline.tick, every=every)
 
     @cached_property
     def material(self) -> Rays:
         """How much material lies behind points of its faces, as far as matters for the printer."""
         assert self.printer is not None
         floors = float(self.printer.least_wall_mm), float(self.printer.least_flat_wall_mm)
-        return cast(self.topology, floors, float(self.printer.least_feature_mm), self.deadline, side=1)
+        return cast(self.topology, floors, float(self.printer.least_feature_mm), self.deadline.tick, side=1)

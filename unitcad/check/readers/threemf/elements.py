@@ -99,7 +99,7 @@ def many(test: Test) -> Test:
 
 
 @dataclass(frozen=True)
-class Rules:
+class ElementSchema:
     """What one element must and may have; `children` are (name, least, most) in order; `open_`: foreign attributes."""
 
     required: dict[str, Test] = field(default_factory=dict)
@@ -116,96 +116,96 @@ _TILE = one_of("wrap", "mirror", "clamp", "none")
 _OBJECT_TYPE = one_of("model", "solidsupport", "support", "surface", "other")
 
 
-def _core() -> dict[str, Rules]:
+def _core() -> dict[str, ElementSchema]:
     shape = (("metadatagroup", 0, 1), ("mesh", 0, 1), ("components", 0, 1))
     part = {"partnumber": text}
     triangle = {"v1": index, "v2": index, "v3": index}
     props = {"p1": index, "p2": index, "p3": index, "pid": resource_id}
     return {
-        "model": Rules(
+        "model": ElementSchema(
             {},
             {"unit": text, "requiredextensions": text, "recommendedextensions": text, "thumbnail": part_name},
             (("metadata", 0, _MANY), ("resources", 1, 1), ("build", 1, 1)),
         ),
-        "metadata": Rules({"name": text}, {"preserve": boolean, "type": text}),
-        "metadatagroup": Rules(children=(("metadata", 1, _MANY),), open_=False),
-        "resources": Rules(children=(("basematerials", 0, _MANY), ("object", 0, _MANY)), ordered=False),
-        "basematerials": Rules({"id": resource_id}, _DISPLAY, (("base", 1, _MANY),)),
-        "base": Rules({"name": text, "displaycolor": color}, _DISPLAY),
-        "object": Rules(
+        "metadata": ElementSchema({"name": text}, {"preserve": boolean, "type": text}),
+        "metadatagroup": ElementSchema(children=(("metadata", 1, _MANY),), open_=False),
+        "resources": ElementSchema(children=(("basematerials", 0, _MANY), ("object", 0, _MANY)), ordered=False),
+        "basematerials": ElementSchema({"id": resource_id}, _DISPLAY, (("base", 1, _MANY),)),
+        "base": ElementSchema({"name": text, "displaycolor": color}, _DISPLAY),
+        "object": ElementSchema(
             {"id": resource_id},
             {"type": _OBJECT_TYPE, "thumbnail": part_name, "name": text, "pid": resource_id, "pindex": index} | part,
             shape,
         ),
-        "mesh": Rules(children=(("vertices", 1, 1), ("triangles", 0, 1)), open_=False),
-        "vertices": Rules(children=(("vertex", 0, _MANY),), open_=False),
-        "triangles": Rules(children=(("triangle", 0, _MANY),), open_=False),
-        "vertex": Rules({"x": text, "y": text, "z": text}),
-        "triangle": Rules(triangle, props),
-        "components": Rules(children=(("component", 1, _MANY),), open_=False),
-        "component": Rules({"objectid": resource_id}, {"transform": text}),
-        "build": Rules(children=(("item", 0, _MANY),)),
-        "item": Rules({"objectid": resource_id}, {"transform": text} | part, (("metadatagroup", 0, 1),)),
+        "mesh": ElementSchema(children=(("vertices", 1, 1), ("triangles", 0, 1)), open_=False),
+        "vertices": ElementSchema(children=(("vertex", 0, _MANY),), open_=False),
+        "triangles": ElementSchema(children=(("triangle", 0, _MANY),), open_=False),
+        "vertex": ElementSchema({"x": text, "y": text, "z": text}),
+        "triangle": ElementSchema(triangle, props),
+        "components": ElementSchema(children=(("component", 1, _MANY),), open_=False),
+        "component": ElementSchema({"objectid": resource_id}, {"transform": text}),
+        "build": ElementSchema(children=(("item", 0, _MANY),)),
+        "item": ElementSchema({"objectid": resource_id}, {"transform": text} | part, (("metadatagroup", 0, 1),)),
     }
 
 
-def _material() -> dict[str, Rules]:
+def _material() -> dict[str, ElementSchema]:
     id_ = {"id": resource_id}
     named = {"name": text}
     return {
-        "colorgroup": Rules(id_, _DISPLAY, (("color", 1, _MANY),)),
-        "color": Rules({"color": color}),
-        "texture2d": Rules(
+        "colorgroup": ElementSchema(id_, _DISPLAY, (("color", 1, _MANY),)),
+        "color": ElementSchema({"color": color}),
+        "texture2d": ElementSchema(
             id_ | {"path": part_name, "contenttype": one_of("image/png", "image/jpeg")},
             {"tilestyleu": _TILE, "tilestylev": _TILE, "filter": one_of("auto", "linear", "nearest")},
         ),
-        "texture2dgroup": Rules(id_ | {"texid": resource_id}, _DISPLAY, (("tex2coord", 1, _MANY),)),
-        "tex2coord": Rules({"u": number, "v": number}),
-        "compositematerials": Rules(
+        "texture2dgroup": ElementSchema(id_ | {"texid": resource_id}, _DISPLAY, (("tex2coord", 1, _MANY),)),
+        "tex2coord": ElementSchema({"u": number, "v": number}),
+        "compositematerials": ElementSchema(
             id_ | {"matid": resource_id, "matindices": many(index)}, _DISPLAY, (("composite", 1, _MANY),)
         ),
-        "composite": Rules({"values": many(number)}),
-        "multiproperties": Rules(
+        "composite": ElementSchema({"values": many(number)}),
+        "multiproperties": ElementSchema(
             id_ | {"pids": many(resource_id)},
             _DISPLAY | {"blendmethods": many(one_of("mix", "multiply", "none"))},
             (("multi", 1, _MANY),),
         ),
-        "multi": Rules({"pindices": many(index)}),
-        "pbspeculardisplayproperties": Rules(id_, {}, (("pbspecular", 1, _MANY),)),
-        "pbspecular": Rules(named, {"specularcolor": color, "glossiness": number}),
-        "pbmetallicdisplayproperties": Rules(id_, {}, (("pbmetallic", 1, _MANY),)),
-        "pbmetallic": Rules(named, {"metallicness": number, "roughness": number}),
-        "pbspeculartexturedisplayproperties": Rules(
+        "multi": ElementSchema({"pindices": many(index)}),
+        "pbspeculardisplayproperties": ElementSchema(id_, {}, (("pbspecular", 1, _MANY),)),
+        "pbspecular": ElementSchema(named, {"specularcolor": color, "glossiness": number}),
+        "pbmetallicdisplayproperties": ElementSchema(id_, {}, (("pbmetallic", 1, _MANY),)),
+        "pbmetallic": ElementSchema(named, {"metallicness": number, "roughness": number}),
+        "pbspeculartexturedisplayproperties": ElementSchema(
             id_ | named | {"speculartextureid": resource_id, "glossinesstextureid": resource_id},
             {"diffusefactor": color, "specularfactor": color, "glossinessfactor": number},
         ),
-        "pbmetallictexturedisplayproperties": Rules(
+        "pbmetallictexturedisplayproperties": ElementSchema(
             id_ | named | {"metallictextureid": resource_id, "roughnesstextureid": resource_id},
             {"basecolorfactor": color, "metallicfactor": number, "roughnessfactor": number},
         ),
-        "translucentdisplayproperties": Rules(id_, {}, (("translucent", 1, _MANY),)),
-        "translucent": Rules(
+        "translucentdisplayproperties": ElementSchema(id_, {}, (("translucent", 1, _MANY),)),
+        "translucent": ElementSchema(
             named | {"attenuation": many(number)}, {"refractiveindex": many(number), "roughness": number}
         ),
     }
 
 
-def _slice() -> dict[str, Rules]:
+def _slice() -> dict[str, ElementSchema]:
     props = {"p1": index, "p2": index, "pid": resource_id}
     return {
-        "slicestack": Rules(
+        "slicestack": ElementSchema(
             {"id": resource_id}, {"zbottom": number}, (("slice", 0, _MANY), ("sliceref", 0, _MANY)), ordered=False
         ),
-        "slice": Rules({"ztop": number}, {}, (("vertices", 0, 1), ("polygon", 0, _MANY))),
-        "sliceref": Rules({"slicestackid": resource_id, "slicepath": part_name}),
-        "vertices": Rules(children=(("vertex", 2, _MANY),)),
-        "vertex": Rules({"x": number, "y": number}),
-        "polygon": Rules({"startv": index}, {}, (("segment", 1, _MANY),)),
-        "segment": Rules({"v2": index}, props),
+        "slice": ElementSchema({"ztop": number}, {}, (("vertices", 0, 1), ("polygon", 0, _MANY))),
+        "sliceref": ElementSchema({"slicestackid": resource_id, "slicepath": part_name}),
+        "vertices": ElementSchema(children=(("vertex", 2, _MANY),)),
+        "vertex": ElementSchema({"x": number, "y": number}),
+        "polygon": ElementSchema({"startv": index}, {}, (("segment", 1, _MANY),)),
+        "segment": ElementSchema({"v2": index}, props),
     }
 
 
-def _beam() -> dict[str, Rules]:
+def _beam() -> dict[str, ElementSchema]:
     props = {"p1": index, "p2": index, "pid": resource_id, "cap1": _CAP, "cap2": _CAP}
     ball = {"vindex": index}
     lattice = {
@@ -219,23 +219,23 @@ def _beam() -> dict[str, Rules]:
         "ballradius": positive,
     }
     return {
-        "beamlattice": Rules(
+        "beamlattice": ElementSchema(
             {"minlength": positive, "radius": positive},
             lattice,
             (("beams", 1, 1), ("balls", 0, 1), ("beamsets", 0, 1)),
         ),
-        "beams": Rules(children=(("beam", 0, _MANY),)),
-        "beam": Rules({"v1": index, "v2": index}, {"r1": positive, "r2": positive} | props),
-        "balls": Rules(children=(("ball", 0, _MANY),)),
-        "ball": Rules(ball, {"r": positive, "p": index, "pid": resource_id}),
-        "beamsets": Rules(children=(("beamset", 0, _MANY),)),
-        "beamset": Rules({}, {"name": text, "identifier": text}, (("ref", 0, _MANY), ("ballref", 0, _MANY))),
-        "ref": Rules({"index": index}),
-        "ballref": Rules({"index": index}),
+        "beams": ElementSchema(children=(("beam", 0, _MANY),)),
+        "beam": ElementSchema({"v1": index, "v2": index}, {"r1": positive, "r2": positive} | props),
+        "balls": ElementSchema(children=(("ball", 0, _MANY),)),
+        "ball": ElementSchema(ball, {"r": positive, "p": index, "pid": resource_id}),
+        "beamsets": ElementSchema(children=(("beamset", 0, _MANY),)),
+        "beamset": ElementSchema({}, {"name": text, "identifier": text}, (("ref", 0, _MANY), ("ballref", 0, _MANY))),
+        "ref": ElementSchema({"index": index}),
+        "ballref": ElementSchema({"index": index}),
     }
 
 
-ELEMENTS: dict[str, dict[str, Rules]] = {
+ELEMENTS: dict[str, dict[str, ElementSchema]] = {
     CORE: _core(),
     MATERIAL: _material(),
     SLICE: _slice(),

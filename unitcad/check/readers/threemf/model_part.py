@@ -33,7 +33,7 @@ class _Open:
 
     space: str
     name: str
-    rules: elements.Rules | None
+    rules: elements.ElementSchema | None
     counts: dict[str, int] = field(default_factory=dict)
     last: int = -1
 
@@ -129,7 +129,7 @@ class _Reader:
     def _lattice(self) -> bool:
         return isinstance(self.resource, Object) and self.resource.lattice is not None
 
-    def _child(self, space: str, local: str, rules: elements.Rules | None) -> None:
+    def _child(self, space: str, local: str, rules: elements.ElementSchema | None) -> None:
         """Return whether this child may stand here, and in this order."""
         parent = self.stack[-1]
         if parent is _LEAF:
@@ -164,7 +164,7 @@ class _Reader:
         ):
             self.model.say(P017, f"<{local}> inside <{parent.name}>")
 
-    def _attributes(self, local: str, rules: elements.Rules, attributes: dict[str, str]) -> bool:
+    def _attributes(self, local: str, rules: elements.ElementSchema, attributes: dict[str, str]) -> bool:
         """Check them; whether all required ones are there and well typed."""
         good = True
         for name in rules.required:
