@@ -142,7 +142,7 @@ def test_ctrl_c_stops_at_once_and_keeps_what_is_done(tmp_path: Path) -> None:
     _, errors = child.communicate(timeout=120)
     assert child.returncode == 130
     assert "interrupted: " in errors
-    assert "the next run takes up the rest" in errors
+    assert "the same command resumes" in errors
     assert "Traceback" not in errors
     psutil.wait_procs(workers, timeout=60)
     assert not any(worker.is_running() for worker in workers)

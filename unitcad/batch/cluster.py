@@ -14,20 +14,20 @@ from typing import Any
 from unitcad.errors import Refusal, UnitcadError
 
 DASK_SECONDS = 6.0
-"""How long a scheduler may take to answer; with what is loaded and started all is said within ten."""
+"""Seconds that a scheduler may take to answer: with imports and start-up the command ends within ten."""
 ENCRYPTED = ("tls://", "wss://")
 
 
 @dataclass(frozen=True)
 class Certificates:
-    """Files (PEM) by which we and a cluster know each other; what is not given is as Dask's configuration has it."""
+    """Certificate files (PEM) for a TLS connection; Dask's configuration gives those that are None."""
 
     ca: Path | None = None
     cert: Path | None = None
     key: Path | None = None
 
     def given(self) -> dict[str, tuple[str, Path]]:
-        """The option that gives it and its path, by Dask's name."""
+        """Return the option and the path of each file that is given, by Dask's name."""
         named = {
             "tls_ca_file": ("--tls-ca-file", self.ca),
             "tls_client_cert": ("--tls-cert", self.cert),
@@ -49,7 +49,7 @@ def check_certificates(certificates: Certificates, scheduler: str | None) -> Non
 
 
 def dask_executor(address: str, certificates: Certificates = FROM_DASK) -> tuple[Executor, int]:
-    """A Dask cluster's executor, and how many tasks it runs at once.
+    """Connect to a Dask cluster; return its executor, and how many tasks it runs at once.
 
     Raises UnitcadError without the extra, for certificates that can't be used, or where no scheduler answers in time.
     """
@@ -88,7 +88,7 @@ def dask_executor(address: str, certificates: Certificates = FROM_DASK) -> tuple
         return answer
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    # Asked before there is a client, since one that finds nobody takes long to give up.
+    # Ask first: a client that reaches no scheduler takes long to give up.
     start = time.monotonic()
     try:
         answer = asyncio.run(asyncio.wait_for(ask(), DASK_SECONDS))
@@ -101,7 +101,7 @@ def dask_executor(address: str, certificates: Certificates = FROM_DASK) -> tuple
     except Exception:  # bytes that are not Dask's end in anything: a length read from them in a MemoryError
         answer = None
     if not isinstance(answer, dict) or answer.get("type") != "Scheduler":
-        raise UnitcadError(f"--scheduler {address}: what answers there is not a Dask scheduler")
+        raise UnitcadError(f"--scheduler {address}: the server at this address is not a Dask scheduler")
     client = Client(address, timeout=DASK_SECONDS, set_as_default=False, security=security)
     cores: Any = client.ncores()
     threads = sum(cores.values())

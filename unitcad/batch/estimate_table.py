@@ -1,8 +1,8 @@
 """The estimate-only sweep: no folders, one table, the closed forms evaluated over arrays of variants.
 
 A variant's edge level reads its design, its walls, its silicones and the frequency. Silicones and the frequency are
-looked up value by value; everything else that is swept goes through the door once for each combination. Both are then
-put together as arrays, a block of variants at a time.
+looked up value by value; everything else that is swept is validated once for each combination. Both are then put
+together as arrays, a block of variants at a time.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from unitcad.validation import from_data, put
 
 BLOCK = 1 << 15
 FREE = re.compile(r"layers\.(\d+)\.material|estimate\.frequency_hz|name|casting\..+")
-"""Paths that the door looks at one by one: no other value decides whether theirs can be, if the tail's end is plain."""
+"""Paths that are validated one by one: no other value decides whether theirs is accepted, without a tail end width."""
 FIELDS = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
 
 
 @dataclass(frozen=True)
 class _Known:
-    """What the models read of one combination: crossings, walls (m), omega, and (N, 4) of the layers' FIELDS.
+    """Input of the models for one combination: crossings, walls (m), omega, and (N, 4) of the layers' FIELDS.
 
     A silicone that is known as a range only has NaN: no number can be given.
     """
@@ -56,7 +56,7 @@ class _Known:
 
 @dataclass(frozen=True)
 class Block:
-    """Variants `start` and on: their edge levels by model (NaN: no number), what is known of each, why one can't be."""
+    """Variants from `start` on: edge levels by model (NaN: no number), and the input of each or why it is refused."""
 
     start: int
     levels: dict[str, np.ndarray]
@@ -87,7 +87,7 @@ def write_estimates(sweep: Sweep, out: Path, options: BatchOptions) -> Summary:
 
 
 def evaluate(sweep: Sweep, count: int) -> Iterator[Block]:
-    """Edge levels of variants 0 to `count`, a block at a time."""
+    """Yield edge levels of variants 0 to `count`, a block at a time."""
     free = _free_axes(sweep)
     combinations: dict[int, _Known | UnitcadError] = {}
     values: dict[tuple[int | str, int, int], Any] = {}
@@ -106,14 +106,14 @@ def evaluate(sweep: Sweep, count: int) -> Iterator[Block]:
 
 
 def _free_axes(sweep: Sweep) -> list[int]:
-    """The axes (by position) whose values don't meddle with each other."""
+    """Return the axes (by position) whose values are independent of each other."""
     if sweep.mode != "product" or any("tail_end_width_mm" in repr(base) for base in (sweep.bases, sweep.paths)):
         return []
     return [i for i, axis in enumerate(sweep.axes) if FREE.fullmatch(axis.path)]
 
 
 def _of(sweep: Sweep, index: int, free: set[str]) -> _Known | UnitcadError:
-    """Variant `index`, but what is free as its base has it."""
+    """Return the input of variant `index`, with the base's values on the free axes."""
     base, values = sweep.values(index)
     data = sweep.base_data(base)
     try:
@@ -149,7 +149,7 @@ def _silicone(layer: Any) -> list[float]:
 def _block(
     sweep: Sweep, start: int, digits: np.ndarray, known: list[_Known | UnitcadError], free: list[int], values: dict
 ) -> Block:
-    """Levels of one block: what is known of the combinations, with the free axes' own values put in."""
+    """Evaluate one block: the combinations' inputs, with the free axes' values put in."""
     levels: dict[str, np.ndarray] = {}
     by_layers: dict[int, list[int]] = {}
     for row, entry in enumerate(known):
@@ -190,7 +190,7 @@ def _block(
 
 
 def _frequencies(sweep: Sweep, position: int, values: dict) -> np.ndarray | None:
-    """The frequencies of an axis, Hz, if each is a positive number, which is all that the door asks of one."""
+    """Return the frequencies of an axis, Hz, if each is a positive number; else None."""
     key = ("frequencies", position, 0)
     if key not in values:
         axis = sweep.axes[position]
@@ -201,7 +201,7 @@ def _frequencies(sweep: Sweep, position: int, values: dict) -> np.ndarray | None
 
 
 def _free_value(sweep: Sweep, base: int, position: int, digit: int, values: dict) -> _Known | UnitcadError:
-    """What one value of a free axis does to its base, all else as the base has it."""
+    """Return the input of a base with one value of a free axis put in."""
     key = (base, position, digit)
     if key not in values:
         axis = sweep.axes[position]

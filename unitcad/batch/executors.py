@@ -1,7 +1,7 @@
 """Where variants are made, as `concurrent.futures.Executor`: in this process, in worker processes, on a Dask cluster.
 
-The worker processes are our own and not ProcessPoolExecutor's for one reason: there a worker that dies takes the pool
-and every running task with it, and nobody can say whose fault it was. Here one task fails, and one worker is replaced.
+ProcessPoolExecutor fails all running tasks when one worker dies. Here only the dead worker's task fails, and the worker
+is replaced. docs/scale.md compares this pool with Pebble's.
 They are started by `python -c`, so neither fork after a kernel has run threads (it hangs) nor a guard in the caller's
 main module is needed.
 """
@@ -28,15 +28,15 @@ from unitcad.errors import Refusal
 
 _START = "import sys; sys.path[:] = {path!r}; from unitcad.batch.worker import serve; serve({preload!r})"
 WARM = ("unitcad.pipeline.build", "unitcad.mould_checks", "unitcad.check", "unitcad.kernels.mesh")
-"""What a worker imports before its first task."""
+"""Modules that a worker imports before its first task."""
 
 
 class WorkerDied(Exception):
-    """A worker process ended in the middle of a task."""
+    """The end of a worker process in the middle of a task."""
 
 
 class SerialExecutor(Executor):
-    """Runs each task at once, in the caller's thread: for debugging. A crash or a hang is the caller's own."""
+    """An executor that runs each task at once, in the caller's thread, which a crash or a hang ends: for debugging."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
@@ -48,7 +48,7 @@ class SerialExecutor(Executor):
 
 
 class ProcessExecutor(Executor):
-    """`workers` processes, started at once and kept warm; one that dies fails its task with WorkerDied and is replaced.
+    """A pool of `workers` processes that are kept; one that dies fails its task with WorkerDied and is replaced.
 
     Tasks and results are pickled; functions go by name, as with `multiprocessing`.
     """
@@ -64,7 +64,7 @@ class ProcessExecutor(Executor):
 
     @property
     def pids(self) -> list[int]:
-        """The worker processes that live now."""
+        """Process ids of the workers that run now."""
         return [child.pid for child in list(self._children.values()) if child.poll() is None]
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
@@ -88,7 +88,7 @@ class ProcessExecutor(Executor):
                 thread.join()
 
     def kill(self) -> None:
-        """End every worker now; what they were at is lost. Results are put in place whole, so nothing is left half."""
+        """End every worker now. Their tasks are lost; a result is put in place whole, so none is left half written."""
         self._closing = True
         for child in list(self._children.values()):
             with contextlib.suppress(OSError):
@@ -96,7 +96,7 @@ class ProcessExecutor(Executor):
         self.shutdown(wait=True, cancel_futures=True)
 
     def _serve(self, slot: int) -> None:
-        """One worker's keeper: gives it tasks one by one, notices its end."""
+        """Give one worker its tasks, one by one; start another one where it ends."""
         child, log = self._start(slot)
         while (item := self._tasks.get()) is not None:
             future, task = item
@@ -115,7 +115,7 @@ class ProcessExecutor(Executor):
                 send(child.stdin, message)
                 ok, result = pickle.loads(receive(child.stdout))
             except (OSError, EOFError, pickle.UnpicklingError):
-                future.set_exception(WorkerDied(_obituary(child, log)))
+                future.set_exception(WorkerDied(_cause_of_end(child, log)))
                 continue
             if ok:
                 future.set_result(result)
@@ -143,8 +143,10 @@ def open_executor(
     timeout: float | None = None,
     certificates: Certificates = FROM_DASK,
 ) -> Iterator[tuple[Executor, int]]:
-    """An executor and how many tasks it runs at once: Dask's with a `scheduler`, else `jobs` worker processes (one a
-    core by default), with 0 this process. Whatever ends the block ends the workers that were started for it.
+    """Open an executor; yield it and how many tasks it runs at once.
+
+    It is Dask's with a `scheduler`, else `jobs` worker processes (one a core by default), with 0 this process. The end
+    of the block ends the workers that were started for it.
 
     Raises Refusal or UnitcadError for a combination that can't be, or a scheduler that does not answer.
     """
@@ -177,8 +179,8 @@ def _cores() -> int:
     return os.cpu_count() or 1
 
 
-def _obituary(child: subprocess.Popen[bytes], log: IO[bytes]) -> str:
-    """How a worker ended, in a few words that don't change from run to run."""
+def _cause_of_end(child: subprocess.Popen[bytes], log: IO[bytes]) -> str:
+    """Say how a worker ended, in words that are the same in every run."""
     with contextlib.suppress(subprocess.TimeoutExpired):
         child.wait(10)
     code = child.returncode

@@ -6,7 +6,7 @@ from typing import IO
 
 
 def send(pipe: IO[bytes], message: bytes) -> None:
-    """Write one message. Raises OSError where nobody reads."""
+    """Write one message. Raises OSError where the reader is gone."""
     pipe.write(len(message).to_bytes(8, "little"))
     pipe.write(message)
     pipe.flush()
@@ -18,7 +18,7 @@ def receive(pipe: IO[bytes]) -> bytes:
 
 
 def _exactly(pipe: IO[bytes], count: int) -> bytes:
-    found = pipe.read(count)
-    if found is None or len(found) < count:
+    content = pipe.read(count)
+    if content is None or len(content) < count:
         raise EOFError
-    return found
+    return content

@@ -4,7 +4,7 @@
 <out>/journal.jsonl   a head that says which batch this is, then a line a finished variant; the last one counts
 
 Each line ends with a checksum over itself and over what the batch is. A line that was damaged, or that belongs to
-another batch, is left out, and its variant is looked at again.
+another batch, is left out, and its variant is checked again.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from unitcad.pipeline.versions import code_version
 JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
 NOT_THERE = -1
 FORMAT = 2
-"""Of the lines. The first had no checksum; other code wrote it, so it begins anew."""
+"""Version of the lines. A journal of version 1, which had no checksums, is begun anew."""
 LONGEST = 1 << 26
-"""Bytes of a line; what is longer was not written by us."""
+"""Bytes of a line, at most; a longer one is damaged."""
 
 
 class Journal:
@@ -90,12 +90,12 @@ class Journal:
         self._lines[index] = offset
 
     def _open(self, path: Path) -> IO[bytes]:
-        """The journal's file with whole lines only: those of this batch, or just a head."""
-        going_on = path.exists() and self._goes_on(path)
-        if not going_on or self.damaged or not _ended(path):
+        """Open the journal's file with whole lines only: those of this batch, or just a head."""
+        continued = path.exists() and self._continues(path)
+        if not continued or self.damaged or not _ended(path):
             with files.writing(path, sync=True) as file:
                 file.write(_packed(self.head, 0))
-                if going_on:
+                if continued:
                     file.writelines(line for line, _ in self._entries(path))
         file = open(path, "ab+")  # noqa: SIM115
         file.seek(0)
@@ -105,8 +105,8 @@ class Journal:
             offset += len(line)
         return file
 
-    def _goes_on(self, path: Path) -> bool:
-        """Whether a journal is this batch's, of this version of the code; counts the lines that are damaged.
+    def _continues(self, path: Path) -> bool:
+        """Check whether a journal is this batch's, of this version of the code; count the lines that are damaged.
 
         Raises UnitcadError where the folder holds another batch.
         """
@@ -121,7 +121,7 @@ class Journal:
                 if first.strip(b"\0 \n") and not _packed(self.head, 0).startswith(first):
                     raise UnitcadError(
                         f"{path}: is no journal of a batch, or damaged in whole; choose another folder with -o, or "
-                        "delete the journal to have finished variants looked at again"
+                        "delete the journal to have finished variants checked again"
                     )
                 return False
             if there is not None and there["batch"] != self.head["batch"]:
@@ -142,7 +142,7 @@ class Journal:
 
 
 def _lines(file: IO[bytes]) -> Iterator[bytes]:
-    """The rest of a file by lines; a last one that lacks its end has it."""
+    """Yield the rest of a file by lines; a last one without its line end gets one."""
     while line := file.readline(LONGEST):
         yield line if line.endswith(b"\n") else line + b"\n"
 
@@ -158,13 +158,13 @@ def _text(data: dict[str, Any]) -> bytes:
 
 
 def _packed(data: dict[str, Any], seed: int) -> bytes:
-    """A line: JSON whose last key is the checksum of what stands before it."""
+    """Return a line: JSON whose last key is the checksum of the keys before it."""
     text = _text(data)[:-1]
     return text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed)
 
 
 def _unpacked(line: bytes, seed: int) -> dict[str, Any] | None:
-    """What a line holds; None where it is damaged or of another batch."""
+    """Return the data of a line; None where it is damaged or of another batch."""
     text, _, _ = line.rpartition(b', "crc": "')
     if line != text + b', "crc": "%08x"}\n' % zlib.crc32(text, seed):
         return None
@@ -181,7 +181,7 @@ def _entry(line: bytes, seed: int) -> JournalEntry | None:
 
 
 def _head(line: bytes) -> dict[str, Any] | None:
-    """A journal's head, with a checksum or, as of before there was one, without; None where it is none."""
+    """Return a journal's head; None where the line is none. Version 1 has no checksum."""
     found = _unpacked(line, 0)
     if found is None:
         try:
@@ -218,7 +218,7 @@ def _lock(out: Path, head: BatchHead) -> FileLock:
 
 
 def _check_free(out: Path, head: BatchHead) -> None:
-    """Refuse a folder without a journal that holds something, unless it is this batch's and has lost it."""
+    """Refuse a folder that is not empty and has no journal, unless its table says that it is this batch's."""
     if all(path.name == LOCK for path in out.iterdir()):
         return
     if not (out / LOCK).exists():

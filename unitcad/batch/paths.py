@@ -13,8 +13,8 @@ from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, tab
 
 
 def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
-    """Refuse a path that no spec has, or that names a list entry which `base` (a spec's data) lacks; it was typed in
-    the table `where`.
+    """Refuse a path that no spec has, or that names a list entry which `base` (a spec's data) lacks; `where`
+    is the table of the sweep file that has it.
 
     "layers.0.wall_mm", "estimate.frequency_hz" and whole tables ("fpcb", "layers") are paths.
     """
@@ -41,7 +41,7 @@ def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
 
 
 def known_paths(base: dict[str, Any]) -> list[str]:
-    """Every path of a spec like `base`, tables and values, in the models' order."""
+    """List every path of a spec like `base`, tables and values, in the models' order."""
     return list(_walk(AskedSpec, "", base))
 
 

@@ -1,4 +1,4 @@
-"""What a batch would make, without making it."""
+"""The size of a batch, without making it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from unitcad.spec import Spec
 LOOKED_AT = 20_000
 """Variants whose geometry is worked out; of a larger sweep the rest is estimated in proportion."""
 DRAWN, BUILT = 24, 2
-"""Geometries whose parts are counted, and geometries that are really made to see what they weigh."""
+"""Geometries whose parts are counted, and geometries that are made to measure their bytes."""
 MOST_REFUSED = 20
 
 
@@ -64,7 +64,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
 
 
 def _distinct_parts(specs: list[Spec], only: tuple[str, ...]) -> int:
-    """Bodies that differ, of all that these specs are made of."""
+    """Count the different bodies of these specs."""
     found = set()
     for spec in specs:
         moulds = MouldSet(spec)
@@ -74,7 +74,7 @@ def _distinct_parts(specs: list[Spec], only: tuple[str, ...]) -> int:
 
 
 def _weight(spec: Spec, only: tuple[str, ...]) -> tuple[int, int, int]:
-    """(bytes shared, bytes of its own, files) of one variant, made in memory without laws and checks."""
+    """Return (bytes shared, bytes of its own, files) of one variant, made in memory without checks."""
     store = MemoryStore()
     product = make(spec, only, False, store, Stages())
     shared = {sha: len(store.content(sha)) for sha in product.shared.values()}

@@ -1,4 +1,4 @@
-"""The near end of workers that don't share our disk: what they hand back is kept, and put in place."""
+"""The caller's side of remote workers, which don't share its disk: it keeps their results and puts them in place."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from unitcad.pipeline.versions import code_version
 
 
 class Receiver:
-    """Keeps what comes back in a store: contents once each, and by geometry what a worker need not make again."""
+    """A store of what remote workers return: contents once each, and by geometry what need not be made again."""
 
     def __init__(self, out: Path, store: DiskStore) -> None:
         self.out, self.store = out, store
 
     def known(self, geometry: str) -> Bundle | None:
-        """What is here of a geometry, or None where any of it is missing."""
-        found = self.store.peek(_key(geometry))
-        if found is None or not all(map(self.store.has, found["files"].values())):
+        """Return the bundle of a geometry, or None where any of it is missing."""
+        bundle = self.store.peek(_key(geometry))
+        if bundle is None or not all(map(self.store.has, bundle["files"].values())):
             return None
-        return Bundle(found["data"], found["files"], found["sizes"])
+        return Bundle(bundle["data"], bundle["files"], bundle["sizes"])
 
     def place(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
-        """Put a variant's files into its folder; the outcome without them. Raises OSError."""
+        """Put a variant's files into its folder; return the outcome without them. Raises OSError."""
         assert outcome.product is not None
         try:
             for content in outcome.contents.values():

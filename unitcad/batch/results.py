@@ -71,7 +71,7 @@ def _write_json(path: Path, head: dict[str, Any], entries: Iterable[JournalEntry
 
 @contextlib.contextmanager
 def _written(path: Path) -> Iterator[IO[str]]:
-    """A text file in UTF-8, its line ends as written, that takes the place of `path` when the block ends well."""
+    """Open a text file in UTF-8, line ends as written, that replaces `path` when the block ends without an error."""
     with files.writing(path) as file:
         text = io.TextIOWrapper(file, "utf-8", newline="")
         yield text

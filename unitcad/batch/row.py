@@ -10,7 +10,7 @@ from unitcad.spec import Spec
 
 
 def row(spec: Spec, manifest: dict[str, Any]) -> Values:
-    """Return volumes (mm3) and masses (g) of the cast layers, laws and checks, the estimate's edge level by model."""
+    """Return volumes (mm3) and masses (g) of the cast layers, mould checks, mesh checks, and edge level by model."""
     densities = catalogue.materials(spec.materials)
     columns: Values = {"name": spec.name, "design": spec.design, "diameter_mm": spec.diameter_mm}
     total = 0.0

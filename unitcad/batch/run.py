@@ -1,4 +1,4 @@
-"""Running a sweep: variants grouped by geometry, given out to an executor, noted one by one, taken up where it ended.
+"""Running a sweep: variants grouped by geometry, given to an executor, noted one by one, resumed after an interruption.
 
 The first task of a geometry makes its files; the others of that geometry wait for it and then cost a few milliseconds
 each. So no geometry is made twice, and at most WINDOW variants are held in memory, however many there are.
@@ -32,17 +32,17 @@ from unitcad.pipeline.versions import kernel_versions
 from unitcad.spec import to_json
 
 WINDOW = 2048
-"""Variants held in memory: enough to find those that share a geometry."""
+"""Variants held in memory: enough to group those that share a geometry."""
 FIRST, NEXT = 4, 16
 """Variants in the task that makes a geometry, and in those after it."""
 COLLECT_EVERY = 500
-"""Geometries made between two looks at the cache's size."""
+"""Geometries made between two checks of the cache's size."""
 
 
 @dataclass(frozen=True)
 class BatchOptions:
-    """How a sweep is run. `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end;
-    `verify`: what is finished is held to its hashes, not only to its sizes.
+    """Options of a run: `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end;
+    `verify` compares the hashes of finished variants, not only their sizes.
     """
 
     only: Sequence[str] = OUTPUTS
@@ -66,14 +66,14 @@ def run(
     executor: Executor | None = None,
     *,
     workers: int = 2,
-    away: bool = False,
+    remote: bool = False,
     watch: Watch = lambda summary, outcome: None,
 ) -> Summary:
     """Make every variant of `sweep` in `out`, with `variants.csv`, `batch.json`, `timings.json`.
 
-    `executor`, of that many `workers`, is the caller's to shut down; without one, processes are started. `away`: its
-    workers don't share our disk, so results come back as messages. What an earlier run in `out` finished is not made
-    again. Raises UnitcadError where nothing can be run; whatever happens to a variant is in the summary.
+    `executor`, of that many `workers`, is the caller's to shut down; without one, processes are started. With
+    `remote` its workers don't share this disk: results come back as messages. What an earlier run in `out` finished is
+    not made again. Raises UnitcadError where nothing can be run; whatever happens to a variant is in the summary.
     """
     only = checked_outputs(options.only)
     count = counted(sweep, options.limit)
@@ -83,10 +83,10 @@ def run(
     own = None
     if executor is None:
         executor = own = ProcessExecutor(workers)
-    batch = _Batch(sweep, out, only, options, executor, workers, away, watch, journal, store, Summary(count))
+    batch = _Batch(sweep, out, only, options, executor, workers, remote, watch, journal, store, Summary(count))
     if journal.damaged:
         batch.summary.warnings.append(
-            f"{out / JOURNAL}: damaged in {journal.damaged} lines; their variants were looked at again"
+            f"{out / JOURNAL}: damaged in {journal.damaged} lines; their variants were checked again"
         )
     start = time.perf_counter()
     try:
@@ -112,7 +112,7 @@ def run(
 
 
 def trim(options: BatchOptions) -> None:
-    """Bring the cache down to its limit. A cache that somebody has cleared away needs none, and fails no batch."""
+    """Reduce the cache to its limit. A cache that was deleted meanwhile is no error."""
     with contextlib.suppress(UnitcadError, OSError):
         collect(options.cache or default_root(), int(options.cache_mb * 1e6))
 
@@ -130,7 +130,7 @@ def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> Ba
 
 
 def counted(sweep: Sweep, limit: int | None) -> int:
-    """How many variants to make. Raises Refusal for too many to be meant, and for a limit below one."""
+    """Count the variants to make. Raises Refusal for more than MOST without a limit, and for a limit below one."""
     if limit is not None and limit < 1:
         raise Refusal("--limit", limit, "needs a number of variants from 1 on", 1)
     if limit is None and sweep.count > MOST:
@@ -142,22 +142,22 @@ def counted(sweep: Sweep, limit: int | None) -> int:
 
 @dataclass
 class _Group:
-    """Variants of one geometry that wait."""
+    """Waiting variants of one geometry."""
 
     jobs: deque[Job] = field(default_factory=deque)
     making: bool = False
 
 
 class _Batch:
-    """One run over one sweep."""
+    """One run of one sweep."""
 
     def __init__(
         self, sweep: Sweep, out: Path, only: tuple[str, ...], options: BatchOptions, executor: Executor, workers: int,
-        away: bool, watch: Watch, journal: Journal, store: DiskStore, summary: Summary,
+        remote: bool, watch: Watch, journal: Journal, store: DiskStore, summary: Summary,
     ) -> None:  # fmt: skip
         self.sweep, self.out, self.only, self.options, self.executor = sweep, out, only, options, executor
         self.watch, self.journal, self.store, self.summary = watch, journal, store, summary
-        self.receiver = Receiver(out, store) if away else None
+        self.receiver = Receiver(out, store) if remote else None
         self.room = 2 * workers
         self.coming = iter(range(summary.variants))
         self.failed_before: deque[int] = deque()
@@ -172,16 +172,16 @@ class _Batch:
     def all(self) -> Summary:
         while not self.summary.stopped:
             self._fill()
-            self._give_out()
+            self._submit()
             if not self.running:
                 break
-            self._take_in()
-        while self.running:  # what was begun is ended and kept
-            self._take_in()
+            self._collect()
+        while self.running:  # tasks that were begun are finished and kept
+            self._collect()
         return self.summary
 
     def _fill(self) -> None:
-        """Bring variants into the window, those that are done or can't be noted at once."""
+        """Bring variants into the window; note at once those that are done or refused."""
         while self.waiting < WINDOW and not self.summary.stopped:
             index, again = next(self.coming, None), True
             if index is None:
@@ -213,7 +213,7 @@ class _Batch:
             self.waiting += 1
 
     def _stands(self, entry: JournalEntry) -> bool:
-        """Whether a variant is finished, with or without a broken mould check, and its folder is whole."""
+        """Check whether a variant is finished, with or without a broken mould check, and its folder is whole."""
         if entry.status not in (tasks.OK, tasks.BROKEN):
             return False
         folder, hashes = self.out / entry.folder, self.options.verify
@@ -221,8 +221,8 @@ class _Batch:
             return False
         return not hashes or digest((folder / "manifest.json").read_bytes()) == entry.manifest
 
-    def _give_out(self) -> None:
-        """Keep every worker busy, and one task ahead for each."""
+    def _submit(self) -> None:
+        """Submit tasks: one for every worker, and one ahead."""
         while len(self.running) < self.room and not self.summary.stopped:
             chosen = self._next()
             if chosen is None:
@@ -241,7 +241,7 @@ class _Batch:
             self.running[self.executor.submit(tasks.work, task)] = task
 
     def _next(self) -> tuple[str, list[Job]] | None:
-        """A variant to try again alone; else a geometry not yet made; else more of one that is."""
+        """Choose a variant to try again alone; else a geometry not yet made; else more of one that is."""
         if self.again:
             key, job = self.again.popleft()
             return key, [job]
@@ -255,7 +255,7 @@ class _Batch:
         self.waiting -= len(jobs)
         return key, jobs
 
-    def _take_in(self) -> None:
+    def _collect(self) -> None:
         for future in wait(list(self.running), return_when="FIRST_COMPLETED").done:
             task = self.running.pop(future)
             group = self.groups.get(task.geometry)
@@ -282,9 +282,9 @@ class _Batch:
             trim(self.options)
 
     def _lost(self, task: Task, error: BaseException) -> None:
-        """A task whose worker went: which of its variants did it is found out by trying each alone."""
+        """Handle a task whose worker ended: each of its variants is tried alone, to see which one ended it."""
         if isinstance(error, CancelledError):
-            raise UnitcadError(f"lost the scheduler after {self.summary.done} variants; the next run takes up the rest")
+            raise UnitcadError(f"lost the scheduler after {self.summary.done} variants; the same command resumes")
         job, *others = task.jobs
         if others:
             self.again.extend((task.geometry, job) for job in task.jobs)
@@ -333,18 +333,18 @@ class _Batch:
                 entry = self.journal.entry(outcome.index)
                 if entry is not None:
                     summary.failures.append(Failure(entry.index, entry.status, entry.reason, entry.folder))
-            # A refused variant says nothing of the others; what broke or failed may happen to each.
+            # A refusal concerns one variant only; a failure may happen to each.
             if fresh and outcome.status != tasks.REFUSED and not self.options.keep_going:
                 summary.stopped = summary.stopped or f"variant {outcome.index}: {outcome.reason}"
         self.watch(summary, outcome)
 
 
 def _short(key: str) -> int:
-    """A key in 8 bytes."""
+    """Shorten a key to 8 bytes."""
     return int(key[:16], 16)
 
 
 def _no_room(outcome: VariantOutcome, out: Path, summary: Summary) -> UnitcadError:
-    error = UnitcadError(f"{out}: {outcome.reason}; {summary.done} variants are done, the next run takes up the rest")
+    error = UnitcadError(f"{out}: {outcome.reason}; {summary.done} variants are done, the same command resumes")
     error.exit_code = 1
     return error

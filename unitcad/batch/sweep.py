@@ -1,4 +1,4 @@
-"""The sweep file: which specs, over which values. Variants are worked out one at a time, never all at once.
+"""The sweep file: which specs, over which values. Variants are expanded one at a time.
 
 base = "encapsulating"                    # a template, a spec file beside this one, or a list of them
 name = "walls"                            # else the file's name
@@ -38,7 +38,7 @@ _KEYS = {
     "cases": {"type": "array", "items": {"type": "object"}},
 }
 MOST = 1_000_000
-"""Variants that a sweep may have without being asked for with --limit."""
+"""Variants that a sweep may have without --limit."""
 
 
 class Range(Struct, frozen=True, forbid_unknown_fields=True):
@@ -59,7 +59,7 @@ class Range(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SweepFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A sweep as typed: `fixed` and the paths of `sweep` are looked at by `from_file`."""
+    """A sweep as typed: `from_file` validates `fixed` and the paths of `sweep`."""
 
     base: str | Annotated[list[str], Meta(min_length=1)]
     name: Annotated[str, Meta(min_length=1, max_length=60)] | None = None
@@ -70,14 +70,14 @@ class SweepFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class SweepTable(Struct, frozen=True):
-    """The keys of `sweep` that are no paths."""
+    """Keys of `sweep` that are no paths."""
 
     mode: Mode = "product"
     cases: tuple[dict[str, Any], ...] = ()
 
 
 class Case(Struct, frozen=True):
-    """The keys of a case that are no paths: its base where it is not the file's first one, a name for its folder."""
+    """Keys of a case that are no paths: its base where it is not the file's first one, a name for its folder."""
 
     base: str | None = None
     name: str | None = None
@@ -96,7 +96,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep that has passed the door: `bases` as (name, data); values by path for each case, or axes."""
+    """A validated sweep: `bases` as (name, data); values by path for each case, or axes."""
 
     name: str
     bases: tuple[tuple[str, dict[str, Any]], ...]
@@ -106,12 +106,12 @@ class Sweep:
 
     @property
     def slug(self) -> str:
-        """The name as a folder's."""
+        """Name of the batch's folder."""
         slug = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-") or "batch"
         return f"{slug}-batch" if names_device(slug) else slug
 
     def overridden(self, overrides: Sequence[str]) -> Sweep:
-        """The sweep with each "path=value" put into every base; what is swept stays swept. Raises Refusal."""
+        """Return the sweep with each "path=value" put into every base; swept values win. Raises Refusal."""
         if not overrides:
             return self
         for text in overrides:
@@ -131,21 +131,21 @@ class Sweep:
 
     @cached_property
     def paths(self) -> tuple[str, ...]:
-        """The swept paths, in the file's order."""
+        """Swept paths, in the file's order."""
         if self.mode == "cases":
             return tuple(dict.fromkeys(path for _, values in self.cases for path in values))
         return tuple(axis.path for axis in self.axes)
 
     @property
     def hash(self) -> str:
-        """Over everything that decides which variants there are."""
+        """Hash over everything that decides which variants there are."""
         axes = [
             (a.path, structs.asdict(a.values) if isinstance(a.values, Range) else list(a.values)) for a in self.axes
         ]
         return digest(json.dumps([self.name, self.bases, self.mode, axes, self.cases]).encode())
 
     def values(self, index: int) -> tuple[str, dict[str, Any]]:
-        """(base, value by path) of variant `index`: the last axis runs fastest, the bases slowest."""
+        """Return (base, value by path) of variant `index`: the last axis runs fastest, the bases slowest."""
         if self.mode == "cases":
             return self.cases[index]
         per_base = self.count // len(self.bases)
@@ -160,7 +160,7 @@ class Sweep:
         return self.bases[base][0], {axis.path: found[axis.path] for axis in self.axes}
 
     def spec(self, index: int) -> Spec:
-        """The effective spec of variant `index`. Raises Refusal where it can't be."""
+        """Return the effective spec of variant `index`. Raises Refusal."""
         base, values = self.values(index)
         data = self.base_data(base)
         for path, value in values.items():
@@ -168,7 +168,7 @@ class Sweep:
         return from_data(data, Path())
 
     def base_data(self, base: str) -> dict[str, Any]:
-        """A base's data, to be changed at will."""
+        """Return a copy of a base's data."""
         return json.loads(self._texts[base])
 
     def __iter__(self) -> Iterator[tuple[int, dict[str, Any]]]:
@@ -180,13 +180,13 @@ class Sweep:
 
 
 def shipped() -> dict[str, Path]:
-    """The shipped sweeps by name."""
+    """Return the shipped sweeps by name."""
     folder = next(iter(templates().values())).parent / "sweeps"
     return {file.stem: file for file in sorted(folder.glob("*.toml"))}
 
 
 def load_sweep(source: str | os.PathLike[str]) -> Sweep:
-    """The sweep of a file (a path separator or .toml in `source`) or a shipped one (a bare name).
+    """Load the sweep of a file (a path separator or .toml in `source`) or a shipped one (a bare name).
 
     Raises Refusal or UnitcadError for an unknown base or path, lists of unequal lengths in a zip, an empty sweep.
     """
@@ -202,7 +202,7 @@ def load_sweep(source: str | os.PathLike[str]) -> Sweep:
 
 
 def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
-    """A checked sweep of a sweep file's data; `folder` is where its relative paths start."""
+    """Return a validated sweep of a sweep file's data; `folder` is where its relative paths start."""
     file = convert(data, SweepFile)
     table, values = _parted(file.sweep, SweepTable, "sweep")
     typed = [_parted(case, Case, f"sweep.cases.{i}") for i, case in enumerate(table.cases)]
@@ -226,7 +226,7 @@ def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
 
 
 def _parted(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[str, Any]]:
-    """The keys that `kind` has, and the other ones, which are paths of a spec."""
+    """Split a table into the keys that `kind` has and the other ones, which are paths of a spec."""
     own = fields_of(kind)
     return (
         convert({key: value for key, value in data.items() if key in own}, kind, field),
@@ -247,7 +247,7 @@ def _read_base(base: str, folder: Path) -> dict[str, Any]:
 
 
 def _values(path: str, given: Any) -> Sequence[Any] | Range:
-    """The values of an axis: a scalar or a table counts as one, a table with a range's keys as a range."""
+    """Return the values of an axis: a scalar or a table counts as one, a table with a range's keys as a range."""
     if isinstance(given, dict) and given.keys() & fields_of(Range).keys():
         given = convert(given, Range, f"sweep.{path}")
     values = given if isinstance(given, list | Range) else [given]
@@ -277,5 +277,5 @@ def _check_mode(mode: str, axes: tuple[Axis, ...], cases: tuple[Any, ...]) -> No
         raise Refusal("sweep", None, 'the sweep is empty: it needs a path with values, such as "diameter_mm"')
     lengths = {axis.path: len(axis) for axis in axes if len(axis) > 1}
     if mode == "zip" and len(set(lengths.values())) > 1:
-        told = ", ".join(f"{path} has {count}" for path, count in lengths.items())
-        raise Refusal("sweep.mode", "zip", f"the lists are of unequal lengths: {told}")
+        counts = ", ".join(f"{path} has {count}" for path, count in lengths.items())
+        raise Refusal("sweep.mode", "zip", f"the lists are of unequal lengths: {counts}")

@@ -26,7 +26,7 @@ from unitcad.pipeline.versions import code_version
 from unitcad.spec import Spec, custom_code, from_json
 
 OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no space"
-"""broken: made, but a law or a mesh check says no. refused: the spec can't be. failed: did not get that far."""
+"""broken: made, but a mould check or a mesh check failed. refused: the spec is invalid. failed: not made."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Job:
 class Task:
     """Variants of one geometry, and how to make them.
 
-    With `out` and `cache` (folders that the worker reaches) results go there. Without, they come back in the outcomes;
-    `known` is then what the caller has of this geometry already. `allowed` is the code that the caller may run: the
-    worker may too.
+    With `out` and `cache` (folders that the worker reaches) results go there. Without, they are in the outcomes, and
+    `known` is what the caller has of this geometry. `allowed` is the code that the caller may run, and so
+    may the worker.
     """
 
     jobs: tuple[Job, ...]
@@ -64,9 +64,9 @@ class Task:
 
 @dataclass(frozen=True)
 class VariantOutcome:
-    """What became of one variant; `manifest` is the SHA-256 of its manifest.json.
+    """Outcome of one variant; `manifest` is the SHA-256 of its manifest.json.
 
-    `product`, `contents` and `bundle` are there only where the caller is to place the files.
+    `product`, `contents` and `bundle` are set only where the caller places the files.
     """
 
     index: int
@@ -84,7 +84,7 @@ class VariantOutcome:
 
 
 def work(task: Task) -> list[VariantOutcome]:
-    """Make a task's variants. Whatever goes wrong with one of them is in its outcome."""
+    """Make a task's variants. An error of one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
     custom_code.allow(task.allowed)
@@ -94,19 +94,19 @@ def work(task: Task) -> list[VariantOutcome]:
         start = time.perf_counter()
         try:
             with _watch(task.timeout):
-                outcome = _here(job, task) if task.out else _away(job, task, known)
+                outcome = _locally(job, task) if task.out else _remotely(job, task, known)
         except Exception as error:
             outcome = failure(job.index, error)
         outcomes.append(replace(outcome, seconds=time.perf_counter() - start))
         known = outcome.bundle or known
     if task.out:
-        # Before anybody notes them as done: what is noted is on the disk.
+        # Before the journal notes them: what is noted is on the disk.
         folders.sync(task.out / outcome.folder for outcome in outcomes if outcome.folder)
     return outcomes
 
 
 def failure(index: int, error: BaseException) -> VariantOutcome:
-    """The outcome of a variant that raised."""
+    """Return the outcome of a variant that raised an error."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         return VariantOutcome(index, NO_SPACE, reason=f"no space left ({error.filename or error.strerror})")
     if isinstance(error, Refusal):
@@ -115,8 +115,8 @@ def failure(index: int, error: BaseException) -> VariantOutcome:
     return VariantOutcome(index, FAILED, reason=" ".join(text.split()))
 
 
-def _here(job: Job, task: Task) -> VariantOutcome:
-    """Make a variant into its folder, by way of the cache on this disk."""
+def _locally(job: Job, task: Task) -> VariantOutcome:
+    """Make a variant into its folder, with the cache on this disk."""
     assert task.out is not None
     assert task.cache is not None
     spec = from_json(job.spec)
@@ -130,8 +130,8 @@ def _here(job: Job, task: Task) -> VariantOutcome:
     return _outcome(job, spec, folder.name, built.manifest, store.counts - before)
 
 
-def _away(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
-    """Make a variant in memory and hand it back: contents that the caller has are only named."""
+def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
+    """Make a variant in memory and return it: contents that the caller has are only named."""
     spec = from_json(job.spec)
     store = MemoryStore(known)
     product = make(spec, task.only, task.check, store, Stages())
@@ -162,7 +162,7 @@ def _outcome(job: Job, spec: Spec, folder: str, manifest: dict[str, Any], counts
 
 
 def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> dict[str, Any] | None:
-    """The manifest of a result that an earlier, interrupted run has completed, if it is what is asked for now.
+    """Return the manifest of a result that an interrupted run completed, if it is what is wanted now.
 
     Raises UnitcadError for a folder that holds something else.
     """
@@ -175,7 +175,7 @@ def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> dict[str, A
         folders.earlier_formats(folder, spec, ours=True)
         return None
     formats = folders.earlier_formats(folder, spec)
-    manifest = folders.whole(folder, hashes=True)  # nobody has noted it: it may not have reached the disk
+    manifest = folders.whole(folder, hashes=True)  # the journal lacks it: it may not have reached the disk
     if manifest is None:
         return None
     try:
@@ -192,13 +192,13 @@ def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> dict[str, A
 
 @cache
 def _store(root: Path) -> DiskStore:
-    """One store a process and cache: what it has verified once stays verified."""
+    """Return the process's store of a cache: contents that it has verified stay verified."""
     return DiskStore(root)
 
 
 @contextlib.contextmanager
 def _watch(timeout: float | None) -> Iterator[None]:
-    """End this process if the block takes longer: a C thread does it, so no kernel shelters from it."""
+    """End this process if the block takes longer: by a C thread, which runs even while a kernel holds the GIL."""
     if timeout is None:
         yield
         return

@@ -16,7 +16,7 @@ from unitcad.children import end_with_parent
 
 
 def serve(preload: tuple[str, ...]) -> None:
-    """Import `preload`, then run tasks until the parent goes."""
+    """Import `preload`, then run tasks until the parent ends."""
     end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     faulthandler.enable()
@@ -45,7 +45,7 @@ def serve(preload: tuple[str, ...]) -> None:
 
 
 def _read(tasks: IO[bytes], coming: queue.SimpleQueue[bytes]) -> None:
-    """Hand on every message; when the parent is gone, end this process, whatever it is doing."""
+    """Pass on every message; end this process when the parent has ended, whatever it is doing."""
     while True:
         try:
             coming.put(receive(tasks))

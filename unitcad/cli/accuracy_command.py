@@ -48,7 +48,7 @@ def accuracy(
                 result = runner.run(name, quick, say, specs)
         except KeyboardInterrupt:
             if specs is not None:
-                typer.echo(f"{runner.JOURNAL} keeps what was judged; the same command takes up the rest", err=True)
+                typer.echo(f"{runner.JOURNAL} keeps the finished specs; the same command resumes", err=True)
             raise
         results.append(result)
         if folder is not None:

@@ -29,18 +29,22 @@ def batch(
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler, such as tls://host:8786.")
     ] = None,
     tls_ca_file: Annotated[
-        Path | None, typer.Option(metavar="PEM", help="For tls://, who may vouch for the cluster; else as Dask has it.")
+        Path | None,
+        typer.Option(metavar="PEM", help="For tls://, the certificate authority; else from Dask's configuration."),
     ] = None,
     tls_cert: Annotated[
-        Path | None, typer.Option(metavar="PEM", help="For tls://, our certificate; else as Dask has it.")
+        Path | None,
+        typer.Option(metavar="PEM", help="For tls://, the client certificate; else from Dask's configuration."),
     ] = None,
     tls_key: Annotated[
-        Path | None, typer.Option(metavar="PEM", help="For tls://, its key; else as Dask has it.")
+        Path | None, typer.Option(metavar="PEM", help="For tls://, the client's key; else from Dask's configuration.")
     ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what there would be to make; make nothing.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print the number of variants, parts and files; make nothing.")
+    ] = False,
     verify: Annotated[
         bool,
-        typer.Option("--verify", help="Hold finished variants to their hashes, not only to their sizes."),
+        typer.Option("--verify", help="Compare hashes of finished variants, not only sizes."),
     ] = False,
     keep_going: Annotated[bool, typer.Option("--keep-going", help="Go on after a variant that fails.")] = False,
     timeout: Annotated[
@@ -59,7 +63,9 @@ def batch(
     page: Annotated[
         bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")
     ] = False,
-    no_check: Annotated[bool, typer.Option("--no-check", help="Leave out the laws and the mesh checks.")] = False,
+    no_check: Annotated[
+        bool, typer.Option("--no-check", help="Leave out the mould checks and the mesh checks.")
+    ] = False,
     code: AllowCode = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
     json_lines: Annotated[bool, typer.Option("--json-lines", help="One JSON object a line as variants end.")] = False,
@@ -98,11 +104,11 @@ def batch(
             certificates = Certificates(tls_ca_file, tls_cert, tls_key)
             opened = open_executor(jobs, scheduler, timeout, certificates)
             with opened as (executor, workers), watching(json_lines) as watch:
-                away = scheduler is not None
-                summary = run(wanted, folder, options, executor, workers=workers, away=away, watch=watch)
+                remote = scheduler is not None
+                summary = run(wanted, folder, options, executor, workers=workers, remote=remote, watch=watch)
             trim(options)
     except KeyboardInterrupt:
-        typer.echo(f"interrupted: what is done stays in {folder}; the next run takes up the rest", err=True)
+        typer.echo(f"interrupted: finished variants stay in {folder}; the same command resumes", err=True)
         sys.exit(130)
     if page or (folder / PAGE).is_file():
         from unitcad.report import write_report
@@ -126,7 +132,7 @@ def _print_summary(summary: Summary, folder: Path) -> None:
     if summary.failed > len(summary.failures):
         typer.echo(f"and {summary.failed - len(summary.failures)} more: see variants.csv", err=True)
     if summary.stopped:
-        warn(f"stopped: {summary.stopped}; the next run takes up the rest")
+        warn(f"stopped: {summary.stopped}; the same command resumes")
     before = f" ({summary.resumed} from before)" if summary.resumed else ""
     left = summary.variants - summary.done
     parts = [
@@ -150,6 +156,6 @@ def _print_preview(size: Preview) -> None:
     stored = f"{size.stored_mb:.1f} MB stored, {size.linked_mb:.1f} MB with every link counted"
     typer.echo(f"about {counted(size.files, 'file')}, {stored}")
     for refused in size.refused:
-        warn(f"variant {refused.index} can't be: {refused.reason}")
+        warn(f"variant {refused.index} is refused: {refused.reason}")
     if size.refused_count > len(size.refused):
         typer.echo(f"and {about}{size.refused_count - len(size.refused)} more", err=True)

@@ -1,4 +1,4 @@
-"""What a batch shows while it runs: a bar on a terminal, lines for machines, nothing in a pipe."""
+"""The progress of a batch: a bar on a terminal, lines for machines, nothing in a pipe."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from unitcad.cli.output import console
 
 @contextlib.contextmanager
 def watching(json_lines: bool) -> Iterator[Watch]:
-    """The function that a batch calls after each variant."""
+    """Yield the function that a batch calls after each variant."""
     if json_lines:
         yield _line
     elif sys.stderr.isatty():

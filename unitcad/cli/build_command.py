@@ -24,7 +24,9 @@ def build(
     page: Annotated[
         bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")
     ] = False,
-    no_check: Annotated[bool, typer.Option("--no-check", help="Leave out the laws and the mesh checks.")] = False,
+    no_check: Annotated[
+        bool, typer.Option("--no-check", help="Leave out the mould checks and the mesh checks.")
+    ] = False,
     no_slice: Annotated[
         bool, typer.Option("--no-slice", help="Leave out PrusaSlicer's print time and filament (slicer.json).")
     ] = False,
@@ -43,7 +45,7 @@ def build(
     overrides = [*(sets or []), *chosen_formats(formats)]
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
     allow_code(code)
-    # Every spec passes the door before the first one is built.
+    # Every spec is validated before the first one is built.
     wanted = [load(spec, overrides) for spec in specs]
     results, printing = [], []
     sliced = only is None and not no_slice
@@ -61,7 +63,7 @@ def build(
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
     else:
         for result, prints in zip(results, printing, strict=True):
-            _tell(result.manifest)
+            _print_result(result.manifest)
             if prints:
                 typer.echo(f"{result.manifest['name']}: {prints}")
             typer.echo(str(result.folder))
@@ -69,8 +71,8 @@ def build(
         sys.exit(1)
 
 
-def _tell(manifest: dict) -> None:
-    """What a person should know of a result: warnings, broken laws, bad files."""
+def _print_result(manifest: dict) -> None:
+    """Print what a person should know of a result: warnings, broken mould checks, bad files."""
     for warning in manifest["warnings"]:
         warn(f"warning: {warning}")
     for entry in manifest["left_out"]:

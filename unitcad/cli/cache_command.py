@@ -14,12 +14,14 @@ Json = Annotated[bool, typer.Option("--json", help="One JSON object on standard 
 
 @cache.command("ls")
 def ls(where: Where = None, as_json: Json = False) -> None:
-    """Say what the cache holds. The last line printed is its folder."""
+    """Print what the cache holds. The last line printed is its folder."""
     from unitcad.cache import default_root, usage
 
     root = where or default_root()
     found = usage(root)
-    _tell(f"{found.entries} entries, {found.contents} files, {found.bytes / 1e6:.1f} MB", root, vars(found), as_json)
+    _print_usage(
+        f"{found.entries} entries, {found.contents} files, {found.bytes / 1e6:.1f} MB", root, vars(found), as_json
+    )
 
 
 @cache.command("gc")
@@ -34,10 +36,10 @@ def gc(
     root = where or default_root()
     gone = collect(root, int(limit * 1e6))
     text = f"{gone.entries} entries, {gone.contents} files, {gone.bytes / 1e6:.1f} MB removed"
-    _tell(text, root, vars(gone), as_json)
+    _print_usage(text, root, vars(gone), as_json)
 
 
-def _tell(text: str, root: Path, data: dict, as_json: bool) -> None:
+def _print_usage(text: str, root: Path, data: dict, as_json: bool) -> None:
     from unitcad.cli.output import print_json
 
     if as_json:

@@ -1,4 +1,4 @@
-"""`unitcad check`: judge mesh files by the rules of unitcad.check."""
+"""`unitcad check`: mesh files against the rules of unitcad.check."""
 
 from __future__ import annotations
 
@@ -27,20 +27,21 @@ def check(
     as_json: Annotated[bool, typer.Option("--json", help="Short for --output-format json.")] = False,
     select: Annotated[
         list[str] | None,
-        typer.Option(help="Only codes with these prefixes (comma or repeated); what ended a file's judgement stays."),
+        typer.Option(help="Only codes with these prefixes (comma or repeated); errors that ended a file's check stay."),
     ] = None,
     ignore: Annotated[
-        list[str] | None, typer.Option(help="Not codes with these prefixes; what ended a file's judgement stays.")
+        list[str] | None, typer.Option(help="Not codes with these prefixes; errors that ended a file's check stay.")
     ] = None,
     extend_select: Annotated[list[str] | None, typer.Option(help="Prefixes added to --select.")] = None,
     fail_on: Annotated[str | None, typer.Option(help="error (default) or warning: what makes the exit code 1.")] = None,
-    printer: Annotated[str | None, typer.Option(help="Judge fit and printability (S002, D) for this printer.")] = None,
+    printer: Annotated[str | None, typer.Option(help="Check fit and printability (S002, D) for this printer.")] = None,
     unit: Annotated[str | None, typer.Option(help="Unit of files that have none: mm, cm, m, in, ft and so on")] = None,
     shells: Annotated[int | None, typer.Option(min=0, help="Number of shells expected (G005).")] = None,
     strict_3mf: Annotated[
         bool | None,
         typer.Option(
-            "--3mf-strict/--no-3mf-strict", help="Judge 3MF by the letter: vendors' attributes, lost thumbnails fail."
+            "--3mf-strict/--no-3mf-strict",
+            help="Follow the 3MF specification strictly: vendors' attributes, lost thumbnails fail.",
         ),
     ] = None,
     manifest: Annotated[str | None, typer.Option(help="manifest.json of a build, or its folder (M rules).")] = None,
@@ -65,7 +66,7 @@ def check(
         bool, typer.Option(help="Count findings by rule: in place of the text, beside other formats on stderr.")
     ] = False,
     explain: Annotated[
-        str | None, typer.Option(help="Say what a code means, why it matters and how to fix it.")
+        str | None, typer.Option(help="Print what a code means, why it matters and how to fix it.")
     ] = None,
 ) -> None:
     """Check mesh files as they are, before any repair.
@@ -163,7 +164,7 @@ def _run(
 
 
 def _drawn(show: str | None) -> Callable[[FileReport], FileReport] | None:
-    """What draws the findings of a report into the folder `show`."""
+    """Return the function that draws a report's findings into the folder `show`."""
     if show is None:
         return None
     from unitcad.export import finding_pictures
@@ -174,7 +175,7 @@ def _drawn(show: str | None) -> Callable[[FileReport], FileReport] | None:
 def _filters(
     found: Configuration, select: list[str] | None, ignore: list[str] | None, extend_select: list[str] | None
 ) -> Options:
-    """Which codes are wanted: those of the command line, else those of the settings."""
+    """Return the wanted codes: those of the command line, else those of the settings."""
     from unitcad.check import Options
     from unitcad.check.rules.registry import check_prefixes
 
@@ -190,7 +191,7 @@ def _filters(
 
 
 def _per_file(found: Configuration, options: Options) -> Callable[[str], Options]:
-    """The options of a path: `options` without what the settings ignore for it."""
+    """Return the options of a path: `options` without what the settings ignore for it."""
     from unitcad.check.rules.registry import check_prefixes
 
     for pattern, codes in found.settings.per_file_ignores.items():

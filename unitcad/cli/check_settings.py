@@ -21,7 +21,7 @@ NAMES = ("unitcad.toml", "pyproject.toml")
 
 
 class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename="kebab"):
-    """What a file may set; None where it does not. The keys are the options' names."""
+    """Keys that a file may set; None where it does not. They have the options' names."""
 
     select: list[str] | None = None
     ignore: list[str] | None = None
@@ -44,23 +44,23 @@ class Configuration(Struct, frozen=True, kw_only=True):
     table: str = ""
 
     def name(self, key: str) -> str:
-        """How an error names a key: file, table and key."""
+        """Name a key in an error: file, table and key."""
         return f"{self.shown}: {self.table}.{key}"
 
     @property
     def shown(self) -> str | None:
-        """The file's path from the working directory."""
+        """Path of the file from the working directory."""
         return None if self.path is None else seen_from(self.path)
 
     @property
     def baseline(self) -> Path | None:
-        """The baseline's path, which the file gives from its own folder."""
+        """Path of the baseline, which the file gives from its own folder."""
         if self.path is None or self.settings.baseline is None:
             return None
         return Path(seen_from(self.path.parent / self.settings.baseline))
 
     def ignored(self, path: str) -> list[str]:
-        """Prefixes of codes that per-file-ignores drops for a file; patterns are seen from the settings' folder."""
+        """Return prefixes of codes that per-file-ignores drops for a file; patterns start at the settings' folder."""
         if self.path is None:
             return []
         below = seen_from(path, self.path.parent)
@@ -73,7 +73,7 @@ class Configuration(Struct, frozen=True, kw_only=True):
 
 
 def find(named: str | None = None, *, wanted: bool = True) -> Configuration:
-    """The settings of the file `named`, else of the nearest one that has any; without `wanted` none.
+    """Read the settings of the file `named`, else of the nearest one that has any; without `wanted` none.
 
     Raises UnitcadError for a file that can't be read, Refusal for a key or value that can't be.
     """
@@ -100,7 +100,7 @@ def _table(path: Path, data: Mapping[str, Any]) -> str:
 
 
 def _read(path: Path) -> Configuration | None:
-    """What a file sets; None where it has no table for us. A unit's spec of the name unitcad.toml is no such file."""
+    """Read the settings of a file; None without such a table. A unit's spec named unitcad.toml has none."""
     shown = seen_from(path.absolute())
     try:
         data = tomllib.loads(files.read_text(path))

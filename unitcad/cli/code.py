@@ -12,7 +12,7 @@ AllowCode = Annotated[
 
 
 def allow_code(wanted: bool, nothing_else: bool = False) -> None:
-    """Let this process run what a spec brings along, or with `nothing_else` no design's code at all."""
+    """Let this process run the code inside a spec; with `nothing_else`, no design's code at all."""
     from unitcad.spec import custom_code
 
     if wanted:

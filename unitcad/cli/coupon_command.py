@@ -15,7 +15,7 @@ def coupon(
     out: Annotated[Path, typer.Option("-o", "--out", help="Where the coupon's folder goes.")] = Path("out"),
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
-    """Write a fit coupon to print first, and how to judge it. The last line printed is the folder."""
+    """Write a fit coupon to print first, and how to read it. The last line printed is the folder."""
     from unitcad import catalogue
     from unitcad.casting import coupon as drawn
     from unitcad.casting.coupon_files import write

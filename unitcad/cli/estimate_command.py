@@ -59,7 +59,7 @@ def estimate(
 
 
 def _warn_of_moulds(spec: Spec) -> None:
-    """Say on standard error that `build` would refuse the moulds of a unit that can be estimated."""
+    """Warn that `build` would refuse the moulds of a unit that can be estimated."""
     from unitcad.designs import design_named
     from unitcad.moulds.plan import plan
 
@@ -72,7 +72,7 @@ def _warn_of_moulds(spec: Spec) -> None:
 
 
 def frequencies(text: str) -> list[float]:
-    """HZ, or FROM:TO:STEP with both ends, as a list in Hz. Raises `Refusal`."""
+    """Parse HZ, or FROM:TO:STEP with both ends, into a list in Hz. Raises `Refusal`."""
     from unitcad.catalogue import FREQUENCIES_HZ
 
     parts = text.split(":")
@@ -101,6 +101,6 @@ def frequencies(text: str) -> list[float]:
 
 
 def _up(number: float) -> float:
-    """The number to six digits, not below it."""
+    """Round a number up to six digits."""
     shown = float(f"{number:.6g}")
     return shown if shown >= number else float(f"{number * (1 + 1e-5):.6g}")

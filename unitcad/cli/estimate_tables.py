@@ -11,7 +11,7 @@ from unitcad.cli.output import console
 
 
 def print_estimate(data: dict[str, Any]) -> None:
-    """Models against each other, the paper's constraints, the layered curve, what is assumed."""
+    """Print the models side by side, the paper's constraints, the layered curve, what is assumed."""
     screen = console()
     variant = data["variant"]
     layers = " / ".join(layer["material"] for layer in variant["layers"])
@@ -36,7 +36,7 @@ def print_estimate(data: dict[str, Any]) -> None:
 
 
 def print_frequencies(data: dict[str, Any]) -> None:
-    """A row per frequency: edge level by model, decay of the skin's motion by distance."""
+    """Print a row per frequency: edge level by model, decay of the skin's motion by distance."""
     rows = data["frequencies"]
     table = Table("Hz", title=f"{data['variant']['name']}: edge level (motor = 1); |u_z| over its value at the edge")
     for model in rows[0]["edge_level"]:
@@ -50,7 +50,7 @@ def print_frequencies(data: dict[str, Any]) -> None:
 
 
 def _models(data: dict[str, Any]) -> Table:
-    """Edge level and, against the control of each of the unit's materials, hierarchical / control."""
+    """Tabulate the edge level and, against the control of each of the unit's materials, hierarchical / control."""
     blocks, measured = data["models"], data["measured"] or {}
     controls = [one["control"] for one in next(iter(blocks.values()))["hierarchical_over_control"] or []]
     table = Table("model", "edge level %", *[f"over {name}" for name in controls])
@@ -66,7 +66,7 @@ def _models(data: dict[str, Any]) -> Table:
 
 
 def _errors(data: dict[str, Any]) -> Table:
-    """Each model against the measured table, beside the null of two constants."""
+    """Tabulate each model's error against the measured values, beside the null model of two constants."""
     table = Table("model", "levels", "unit left out", "ratios", "worst", "directions", title="error against the table")
     for name in (*data["models"], "null"):
         found = data["table_error"][name]
@@ -98,7 +98,7 @@ def _constraints(rows: list[dict[str, Any]]) -> Table:
 
 
 def _readings(rows: list[dict[str, Any]]) -> Table:
-    """Every reading of the print's eta: the exponents along the walls, and the ratio that it leads to."""
+    """Tabulate every reading of the paper's eta: the exponents along the walls, and the ratio that it leads to."""
     controls = [one["control"] for one in rows[0]["hierarchical_over_control"]]
     table = Table("eta read as", "exponents, S wave", "their unit", *[f"over {name}" for name in controls])
     table.title = "the paper's model by reading of eta"
@@ -112,7 +112,7 @@ def _readings(rows: list[dict[str, Any]]) -> Table:
 
 
 def _ranged(row: dict[str, Any], key: str) -> str:
-    """A value to three digits, or its range where it has no nominal one."""
+    """Format a value to three digits, or its range where it has no nominal one."""
     low, high = row.get(f"{key}_low"), row.get(f"{key}_high")
     if row[key] is not None:
         return f"{row[key]:.3g}"
@@ -131,7 +131,7 @@ def _curve(layered: dict[str, Any]) -> Table:
 
 
 def level(found: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) -> str:
-    """A value with its spread, or what there is of it, for a person."""
+    """Format a value with its range, or the one of the two that there is."""
     if not found:
         return "-"
     value, low, high = (None if found.get(k) is None else f"{found[k] * factor:.{digits}g}" for k in _PARTS)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def chosen_formats(formats: str | None) -> list[str]:
-    """What --formats overrides in a spec. Raises Refusal for a format that there is not."""
+    """Return what --formats overrides in a spec. Raises Refusal for an unknown format."""
     from unitcad.errors import unknown_name
     from unitcad.pipeline.build import FORMATS
 

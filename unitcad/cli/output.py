@@ -1,4 +1,4 @@
-"""How commands speak: one JSON object on standard output, or lines for a person; errors on standard error."""
+"""Output of the commands: one JSON object on standard output, or lines for a person; errors on standard error."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def print_json(data: Any) -> None:
 
 
 def speak_anywhere() -> None:
-    """Let a terminal that lacks a character show its code instead of an error."""
+    """Make standard output and error write the code of a character that their encoding lacks."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -33,19 +33,19 @@ def _unicode(stream: Any) -> bool:
 
 
 def say_error(error: UnitcadError, as_json: bool) -> None:
-    """One error: a line on standard error and, with `--json`, an object on standard output."""
+    """Print an error: a line on standard error and, with `--json`, an object on standard output."""
     sys.stderr.write(f"error: {printable(str(error))}\n")
     if as_json:
         print_json({"error": error.as_dict()})
 
 
 def warn(line: str) -> None:
-    """One line on standard error; what a terminal would take for an order is written out."""
+    """Print a line on standard error; control characters are written as escapes."""
     sys.stderr.write(printable(line) + "\n")
 
 
 def console(stderr: bool = False) -> Console:
-    """Where rich draws. Text is shown as it is: a name may hold square brackets, or colons that spell an emoji."""
+    """Return a rich console. Text is shown as it is: a name may hold square brackets, or colons that spell an emoji."""
     from rich.console import Console
 
     return Console(markup=False, emoji=False, highlight=False, stderr=stderr)
@@ -53,12 +53,12 @@ def console(stderr: bool = False) -> Console:
 
 @contextlib.contextmanager
 def progress(name: str) -> Iterator[Callable[[str], None]]:
-    """A spinner with the stage of work on a terminal; silent in a pipe. Yields the function that names the stage."""
+    """Show a spinner with the stage on a terminal, nothing in a pipe; yield the function that sets the stage."""
     if not sys.stderr.isatty():
         yield lambda stage: None
         return
     from rich.text import Text
 
-    # As Text: a spinner reads markup whatever its console is told.
+    # As Text: a spinner reads markup whatever its console's setting.
     with console(stderr=True).status(Text(name)) as status:
         yield lambda stage: status.update(Text(f"{name}: {stage}"))

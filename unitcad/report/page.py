@@ -108,7 +108,7 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
 
 
 def _models(records: list[dict[str, Any]], specs: Iterable[Spec | None]) -> dict[str, Any]:
-    """Each geometry once, by its key; a record whose geometry can't be made any more says why."""
+    """Return each geometry once, by its key; a record whose geometry can't be made gets the reason."""
     found: dict[str, Any] = {}
     for record, spec in zip(records, specs, strict=True):
         key = record["model"]
@@ -122,7 +122,7 @@ def _models(records: list[dict[str, Any]], specs: Iterable[Spec | None]) -> dict
 
 
 def page(data: dict[str, Any], title: str) -> str:
-    """The HTML of a page with `data`."""
+    """Return the HTML of a page with `data`."""
     scripts = [*(_asset(f"vendor/{name}") for name in VENDORED), *(_asset(f"app/{name}") for name in PROGRAMS)]
     styles = [_asset(name) for name in STYLES]
     licences = "\n\n".join(
@@ -164,13 +164,13 @@ def page(data: dict[str, Any], title: str) -> str:
 
 
 def vendored() -> dict[str, dict[str, Any]]:
-    """The libraries of others that every page carries, by name: version, licence, files, how they were made."""
+    """Return the libraries that every page carries, by name: version, licence, files, how they were made."""
     return tomllib.loads(_asset("vendor/versions.toml"))
 
 
 @cache
 def _asset(name: str) -> str:
-    """A shipped file. Scripts and styles of ours hold no end tag of their element; a test sees to it."""
+    """Read a shipped file. No own script or style holds the end tag of its element; a test checks it."""
     return (files("unitcad") / "report" / name).read_text("utf-8")
 
 

@@ -1,4 +1,4 @@
-"""Data that says everything once: equal parts of a tree are kept in a pool, and referred to."""
+"""Data without repetition: equal parts of a tree are kept in a pool, and referred to."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Pool:
         self._index: dict[str, int] = {}
 
     def put(self, data: Any) -> Any:
-        """`data` (what JSON can hold) with every larger part replaced by a reference."""
+        """Return `data` (what JSON can hold) with every larger part replaced by a reference."""
         if not isinstance(data, dict | list | tuple | str):
             return data
         text = json.dumps(data, allow_nan=False, ensure_ascii=False)

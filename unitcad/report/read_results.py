@@ -1,4 +1,4 @@
-"""What a result folder says, read back from its files. What is absent stays absent; the page says what to ask for.
+"""Reading a result folder. What is absent stays absent; the page names the option that makes it.
 
 A folder may be damaged, or made by somebody who means harm: nothing outside it is read, no link is followed, no special
 file opened, and no code of a spec run. What can't be read is named with its reason, and the rest is shown.
@@ -22,29 +22,29 @@ from unitcad.spec import Spec, to_data
 
 MANIFEST = "manifest.json"
 TIMINGS = "timings.json"
-"""Not on the page: how long a build took differs from run to run."""
+"""Left out of the page: the duration of a build differs from run to run."""
 OF_EVERY_BATCH = ("index", "status", "reason", "folder")
 """Columns that batch.json has before those that were swept, which end at `name`."""
 DAMAGED = "damaged"
 LARGEST_DRAWING = 4_000_000
-"""Bytes of a drawing."""
+"""Bytes of a drawing, at most."""
 MOST_FILES = 2000
-"""Files of a variant that the page lists."""
+"""Files of a variant that the page lists, at most."""
 
 
 def is_variant(folder: Path) -> bool:
-    """Whether a folder is one variant's result, damaged or not."""
+    """Check whether a folder is one variant's result, damaged or not."""
     return os.path.lexists(folder / MANIFEST)
 
 
 def variant_folders(folder: Path) -> list[Path]:
-    """The results directly below a folder, by name; unfinished ones and those behind links are left out."""
+    """List the results directly below a folder, by name, without unfinished ones and links."""
     there = [Path(entry.path) for entry in os.scandir(folder) if entry.is_dir(follow_symlinks=False)]
     return sorted(path for path in there if not path.name.startswith(TEMPORARY) and is_variant(path))
 
 
 def read_variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]:
-    """What a variant's folder holds, and its spec (None where it can't be read). Paths are relative to `root`.
+    """Read a variant's folder, and its spec (None where it can't be read). Paths are relative to `root`.
 
     Raises UnitcadError for a manifest that can't be read.
     """
@@ -69,7 +69,7 @@ def read_variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]
 
 
 def _sound(read: Any, damage: list[str]) -> Any:
-    """What `read` gives, None without the file; None and a line in `damage` where it can't be read."""
+    """Return what `read` returns; None without the file; None, and a line in `damage`, where it can't be read."""
     try:
         return read()
     except files.NotThere:
@@ -80,7 +80,7 @@ def _sound(read: Any, damage: list[str]) -> Any:
 
 
 def _regular(folder: Path, damage: list[str]) -> Iterator[str]:
-    """Regular files below a folder by their paths in it, sorted; `damage` gets what is none, and what is too much."""
+    """List regular files below a folder by their paths in it, sorted; `damage` gets links, special files and excess."""
     found: list[str] = []
     left = [folder]
     while left and len(found) < MOST_FILES:
@@ -108,7 +108,7 @@ def _drawing(path: Path) -> str:
 def results_table(
     said: dict[str, Any] | None, variants: list[dict[str, Any]], damaged: dict[str, str]
 ) -> dict[str, Any]:
-    """A batch's table: `columns` and `rows`, each row with the folder of its variant first ("" for one that failed).
+    """Return a batch's table: `columns`, and `rows` with the folder of the variant first ("" for one that failed).
 
     As batch.json lists them where there is one (`said`), else from the manifests. What was chosen comes first, then the
     levels at the edge, then the rest. `damaged`: why the result in a folder can't be read.
@@ -139,7 +139,7 @@ def results_table(
 
 
 def _in_order(columns: list[str]) -> list[str]:
-    """Name, what was swept (before `name` in a batch, of the spec without one), the edge's levels, the rest."""
+    """Order columns: name, swept values (before `name` in a batch; else the spec's), the edge's levels, the rest."""
     before = columns[: columns.index("name")] if "name" in columns else []
     swept = {name for name in before if name not in OF_EVERY_BATCH} | {"design", "diameter_mm"}
 
@@ -154,7 +154,7 @@ def _in_order(columns: list[str]) -> list[str]:
 
 
 def read_batch(folder: Path) -> dict[str, Any] | None:
-    """batch.json of a folder, None without one. Raises UnitcadError where it can't be read."""
+    """Read batch.json of a folder; None without one. Raises UnitcadError where it can't be read."""
     try:
         said = files.read_json(folder / "batch.json", largest=files.LARGEST_TABLE, links=False)
     except files.NotThere:
@@ -181,7 +181,7 @@ def _row(each: dict[str, Any]) -> dict[str, Any]:
 
 
 def _cell(value: Any) -> Any:
-    """A cell that the page can sort: a number, a text, or None."""
+    """Return a cell that the page can sort: a number, a text, or None."""
     if value is None or value == "":
         return None
     return value if isinstance(value, int | float | str) and not isinstance(value, bool) else json.dumps(value)

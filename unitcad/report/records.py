@@ -1,4 +1,4 @@
-"""What the page takes for granted of a result's files: no more than it reads."""
+"""The parts of a result's files that the page relies on."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from unitcad.errors import UnitcadError
 from unitcad.report.pool import REFERENCE
 
 DEEPEST = 40
-"""Lists and tables within each other that a result's file may have."""
+"""Nesting of lists and tables that a result's file may have."""
 
 
 class Law(Struct):
-    """A law of the moulds, kept or broken."""
+    """A mould check, passed or broken."""
 
     code: str
     ok: bool
@@ -33,7 +33,7 @@ class Found(Struct):
 
 
 class Checked(Struct):
-    """What the mesh check found."""
+    """Result of the mesh check."""
 
     errors: int
     findings: list[Found] = []
@@ -51,7 +51,7 @@ class Part(Struct):
 
 
 class LeftOut(Struct):
-    """What a build left out."""
+    """An output that a build left out."""
 
     what: str
     why: str

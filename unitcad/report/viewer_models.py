@@ -1,4 +1,4 @@
-"""What the viewer shows of a geometry: meshes as assembled, the moments of casting, where parts go when taken apart."""
+"""The viewer's data of a geometry: meshes as assembled, the moments of casting, where parts go when taken apart."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from unitcad.validation import from_data
 
 
 def spec_in(folder: Path) -> Spec:
-    """The effective spec of a result folder. Raises UnitcadError where it can't be read."""
+    """Read the effective spec of a result folder. Raises UnitcadError where it can't be read."""
     return from_data(read_toml(folder / "spec.toml", links=False))
 
 
 def model_key(spec: Spec) -> str:
-    """What a model depends on, whatever silicones and formats: sixteen hex digits."""
+    """Return the key of a geometry, without silicones and formats: sixteen hex digits."""
     return geometry_key(with_formats(spec), GEOMETRIC, False)[:16]
 
 
 def model(spec: Spec) -> dict[str, Any]:
-    """A geometry for the page; GLB files compressed and in base 64. Lengths in mm.
+    """Return a geometry for the page; GLB files compressed and in base 64. Lengths in mm.
 
     Raises UnitcadError where the geometry can't be made any more.
     """
@@ -44,13 +44,13 @@ def model(spec: Spec) -> dict[str, Any]:
 
 
 def cells(moulds: MouldSet) -> list[list[float]]:
-    """Where the unit's layers stand in the moulds: x, y (mm) and quarter turns about z, a cell each."""
+    """Return where the unit's layers stand in the moulds: x, y (mm) and quarter turns about z, a cell each."""
     one_sided = moulds.dimensions.sides == (1,)
     return [[cell.x, cell.y, 2 if one_sided and cell.sides == (-1,) else 0] for cell in moulds.plan.layout.cells]
 
 
 def unpacked(text: str) -> bytes:
-    """The bytes of an embedded file."""
+    """Return the bytes of an embedded file."""
     return gzip.decompress(base64.b64decode(text))
 
 
