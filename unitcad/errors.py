@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from collections.abc import Iterable
 
 from unitcad.text import toml
@@ -68,6 +69,17 @@ def unknown_key(field: str, value: object, known: Iterable[str], lists: str = ""
     more = len(known) - _MOST_KEYS
     rest = f" and {more} more{f' ({lists} lists all)' if lists else ''}" if more > 0 else ""
     return UnknownKey(field, value, f"unknown key; known here: {', '.join(alike[:_MOST_KEYS])}{rest}", nearest)
+
+
+def misfit(error: Exception) -> str:
+    """Say where data differs from what this program writes, from msgspec's error about it."""
+    what, _, place = str(error).partition(" - at `$")
+    if (byte := re.search(r"byte (\d+)", what)) or not re.match("Expected|Object|Invalid", what):
+        return f"it is not JSON{f' (byte {byte[1]})' if byte else ''}"
+    place = place.rstrip("`").lstrip(".").replace("[...]", ".*") or "its top level"
+    if key := re.search(r"(missing|unknown)[^`]*`([^`]*)`", what):
+        return f"{place} {'lacks the' if key[1] == 'missing' else 'has an unknown'} key {key[2]!r}"
+    return f"{place} has a value of the wrong kind"
 
 
 def _shown(value: object) -> str:

@@ -157,7 +157,7 @@ def test_what_was_swept_and_the_levels_come_first(sweep: Path) -> None:
     columns = ["index", "status", "reason", "folder", "motor", "moulds.draft_deg", "name", "design", "diameter_mm",
                "layer1_volume_mm3", "layer1_mass_g", "laws", "edge_paper", "edge_fitted"]  # fmt: skip
     said = {"name": "s", "columns": columns, "variants": [dict.fromkeys(columns)]}
-    assert read_results.results_table(said, [], {})["columns"] == [
+    assert read_results.results_table(said, [], {}).columns == [
         "name", "motor", "moulds.draft_deg", "design", "diameter_mm", "edge_paper", "edge_fitted",
         "index", "status", "reason", "layer1_volume_mm3", "layer1_mass_g", "laws",
     ]  # fmt: skip
@@ -189,9 +189,9 @@ def test_an_unreadable_spec_leaves_the_rest(built: Path, tmp_path: Path) -> None
     (tmp_path / "a" / "estimate.json").unlink()
     record, spec = read_results.read_variant(tmp_path / "a", tmp_path)
     assert spec is None
-    assert record["model"] is None
-    assert "spec.toml" in record["no_model"]
-    assert record["estimate"] is None
+    assert record.model is None
+    assert "spec.toml" in record.no_model
+    assert record.estimate is None
     write_report(tmp_path / "a")
 
 
@@ -205,7 +205,7 @@ def test_materials_share_a_model_and_walls_do_not() -> None:
 
 def test_budget_of_a_batch(built: Path) -> None:
     """1,000 variants, each with numbers of its own, over 20 geometries."""
-    record, _ = read_results.read_variant(built, built.parent)
+    record = read_results.read_variant(built, built.parent)[0].as_dict()
     pool, variants, models, rows = Pool(), [], {}, []
     for i in range(1000):
         mine = {**record, "folder": f"variant-{i}", "model": f"geometry{i % 20}"}

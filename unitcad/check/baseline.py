@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +19,7 @@ import numpy as np
 from unitcad import files
 from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, Location
 from unitcad.check.rules.registry import rules
-from unitcad.errors import UnitcadError
+from unitcad.errors import UnitcadError, misfit
 from unitcad.geometry.arrays import Bools, Floats
 
 NEAR = 1e-4
@@ -51,26 +50,13 @@ EMPTY = Baseline(1, {})
 _AGAIN = "remove it, and make it again with --write-baseline"
 
 
-def _fault(error: Exception) -> str:
-    """Say where a baseline differs from what this program writes."""
-    if not isinstance(error, msgspec.ValidationError):
-        byte = re.search(r"byte (\d+)", str(error))
-        return f"it is not JSON (byte {byte[1]})" if byte else "it is not JSON"
-    what, _, place = str(error).partition(" - at `$")
-    key = re.search(r"(missing|unknown)[^`]*`([^`]*)`", what)
-    place = place.rstrip("`").lstrip(".").replace("[...]", ".*") or "its top level"
-    if not key:
-        return f"{place} has a value of the wrong kind"
-    return f"{place} {'lacks the' if key[1] == 'missing' else 'has an unknown'} key {key[2]!r}"
-
-
 def read(path: Path) -> Baseline:
     """Read a baseline. Raises UnitcadError where there is none."""
     content = files.read(path, largest=_LARGEST)
     try:
         baseline = msgspec.json.decode(content, type=Baseline)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UnitcadError(f"{path}: not a baseline of `unitcad check`: {_fault(error)}; {_AGAIN}") from None
+        raise UnitcadError(f"{path}: not a baseline of `unitcad check`: {misfit(error)}; {_AGAIN}") from None
     if baseline.unitcad_baseline != 1:
         raise UnitcadError(f"{path}: a baseline of form {baseline.unitcad_baseline}; this version reads form 1")
     return baseline

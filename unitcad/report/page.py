@@ -18,6 +18,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from msgspec import structs
+
 from unitcad import __version__
 from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
@@ -25,7 +27,7 @@ from unitcad.files import write
 from unitcad.pipeline.folder import PAGE
 from unitcad.report import read_results
 from unitcad.report.pool import Pool
-from unitcad.report.read_results import DAMAGED
+from unitcad.report.records import VariantRecord
 from unitcad.report.viewer_models import model
 from unitcad.spec import Spec
 
@@ -68,7 +70,7 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
     if read_results.is_variant(folder):
         record, spec = read_results.read_variant(folder, folder)
         records, specs, table, batch = [record], [spec], None, None
-        title = str(record["manifest"].get("name") or folder.resolve().name)
+        title = str(record.manifest.get("name") or folder.resolve().name)
     else:
         records, specs, batch = [], [], None
         folders = read_results.variant_folders(folder)
@@ -90,35 +92,34 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
         table = read_results.results_table(
             batch, records, {name: why for name, why in damaged.items() if name != "batch.json"}
         )
-        title = f"{(batch or {}).get('name') or folder.resolve().name}: {len(table['rows'])} variants"
+        title = f"{(batch or {}).get('name') or folder.resolve().name}: {counted(len(table.rows), 'variant')}"
     models = _models(records, specs)
     pool = Pool()
     data = {
         "title": title,
         "version": __version__,
-        "variants": [[record["folder"], pool.put(record)] for record in records],
-        "table": table,
+        "variants": [[record.folder, pool.put(record.as_dict())] for record in records],
+        "table": structs.asdict(table) if table else None,
         "batch": {key: value for key, value in batch.items() if key != "variants"} if batch else None,
         "damaged": sorted(damaged.items()),
         "pool": pool.entries,
         "models": models,
     }
-    partly = {record["folder"] or folder.name: record[DAMAGED] for record in records if record[DAMAGED]}
+    partly = {record.folder or folder.name: record.damaged for record in records if record.damaged}
     return data, title, damaged | {name: whys[0] for name, whys in partly.items()}
 
 
-def _models(records: list[dict[str, Any]], specs: Iterable[Spec | None]) -> dict[str, Any]:
+def _models(records: list[VariantRecord], specs: Iterable[Spec | None]) -> dict[str, Any]:
     """Return each geometry once, by its key; a record whose geometry can't be made gets the reason."""
-    found: dict[str, Any] = {}
+    models: dict[str, Any] = {}
     for record, spec in zip(records, specs, strict=True):
-        key = record["model"]
-        if spec is None or key in found:
+        if spec is None or record.model is None or record.model in models:
             continue
         try:
-            found[key] = model(spec)
+            models[record.model] = model(spec)
         except UnitcadError as error:
-            record |= {"model": None, "no_model": str(error)}
-    return found
+            record.model, record.no_model = None, str(error)
+    return models
 
 
 def page(data: dict[str, Any], title: str) -> str:

@@ -16,11 +16,13 @@ from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.files import TEMPORARY
 from unitcad.pipeline.folder import PAGE
-from unitcad.report.records import BatchFile, Manifest, expect
+from unitcad.report.records import BatchFile, Manifest, ResultsTable, VariantRecord, expect
 from unitcad.report.viewer_models import model_key, spec_in
 from unitcad.spec import Spec, to_data
 
 MANIFEST = "manifest.json"
+TABLES = ("estimate", "casting", "slicer")
+"""JSON files of a variant that the page shows, without their ending."""
 TIMINGS = "timings.json"
 """Left out of the page: the duration of a build differs from run to run."""
 OF_EVERY_BATCH = ("index", "status", "reason", "folder")
@@ -43,7 +45,7 @@ def variant_folders(folder: Path) -> list[Path]:
     return sorted(path for path in there if not path.name.startswith(TEMPORARY) and is_variant(path))
 
 
-def read_variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]:
+def read_variant(folder: Path, root: Path) -> tuple[VariantRecord, Spec | None]:
     """Read a variant's folder, and its spec (None where it can't be read). Paths are relative to `root`.
 
     Raises UnitcadError for a manifest that can't be read.
@@ -51,21 +53,26 @@ def read_variant(folder: Path, root: Path) -> tuple[dict[str, Any], Spec | None]
     manifest = files.read_json(folder / MANIFEST, links=False)
     expect(manifest, Manifest, folder / MANIFEST)
     where = folder.relative_to(root).as_posix()
-    found: dict[str, Any] = {"folder": "" if where == "." else where, "manifest": manifest}
     damage: list[str] = []
-    for name in ("estimate", "casting", "slicer"):
-        found[name] = _sound(lambda file=folder / f"{name}.json": _json(file), damage)
+    tables = {name: _sound(lambda file=folder / f"{name}.json": _json(file), damage) for name in TABLES}
     listed = list(_regular(folder, damage))
     drawings = [path for path in listed if path.endswith(".svg")]
     read = {path: _sound(lambda file=folder / path: _drawing(file), damage) for path in drawings}
-    found["drawings"] = {path: text for path, text in read.items() if text is not None}
-    found["files"] = [[path, (folder / path).lstat().st_size] for path in listed if path not in (PAGE, TIMINGS)]
-    found[DAMAGED] = damage
+    record = VariantRecord(
+        folder="" if where == "." else where,
+        manifest=manifest,
+        **tables,
+        drawings={path: text for path, text in read.items() if text is not None},
+        files=[(path, (folder / path).lstat().st_size) for path in listed if path not in (PAGE, TIMINGS)],
+        damaged=damage,
+    )
     try:
         spec = spec_in(folder)
-        return {**found, "spec": to_data(spec), "model": model_key(spec)}, spec
+        record.spec, record.model = to_data(spec), model_key(spec)
     except UnitcadError as error:
-        return {**found, "spec": None, "model": None, "no_model": str(error)}, None
+        record.no_model = str(error)
+        return record, None
+    return record, spec
 
 
 def _sound(read: Any, damage: list[str]) -> Any:
@@ -81,9 +88,9 @@ def _sound(read: Any, damage: list[str]) -> Any:
 
 def _regular(folder: Path, damage: list[str]) -> Iterator[str]:
     """List regular files below a folder by their paths in it, sorted; `damage` gets links, special files and excess."""
-    found: list[str] = []
+    listed: list[str] = []
     left = [folder]
-    while left and len(found) < MOST_FILES:
+    while left and len(listed) < MOST_FILES:
         try:
             entries = list(os.scandir(left.pop()))
         except OSError as error:
@@ -93,30 +100,28 @@ def _regular(folder: Path, damage: list[str]) -> Iterator[str]:
             if entry.is_dir(follow_symlinks=False):
                 left.append(Path(entry.path))
             elif entry.is_file(follow_symlinks=False):
-                found.append(Path(entry.path).relative_to(folder).as_posix())
+                listed.append(Path(entry.path).relative_to(folder).as_posix())
             else:
                 damage.append(f"{entry.path}: is a link or a special file, left out")
-    if len(found) >= MOST_FILES:
+    if len(listed) >= MOST_FILES:
         damage.append(f"{folder}: has more than {MOST_FILES} files, the others are left out")
-    return iter(sorted(found)[:MOST_FILES])
+    return iter(sorted(listed)[:MOST_FILES])
 
 
 def _drawing(path: Path) -> str:
     return files.read_text(path, largest=LARGEST_DRAWING, links=False)
 
 
-def results_table(
-    said: dict[str, Any] | None, variants: list[dict[str, Any]], damaged: dict[str, str]
-) -> dict[str, Any]:
-    """Return a batch's table: `columns`, and `rows` with the folder of the variant first ("" for one that failed).
+def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], damaged: dict[str, str]) -> ResultsTable:
+    """Return a batch's table, as `batch` (its batch.json) lists it, else from the manifests.
 
-    As batch.json lists them where there is one (`said`), else from the manifests. What was chosen comes first, then the
-    levels at the edge, then the rest. `damaged`: why the result in a folder can't be read.
+    Chosen values come first, then the levels at the edge, then the rest. `damaged` says by folder why a result
+    can't be read.
     """
-    if said:
-        entries, columns = said["variants"], [name for name in said["columns"] if name != "folder"]
+    if batch:
+        entries, columns = batch["variants"], [name for name in batch["columns"] if name != "folder"]
     else:
-        entries = [{"folder": each["folder"], **_row(each)} for each in variants]
+        entries = [{"folder": each.folder, **_row(each)} for each in variants]
         entries += [{"folder": name, "name": name} for name in damaged]
         columns = [name for name in dict.fromkeys(name for entry in entries for name in entry) if name != "folder"]
     if damaged:
@@ -128,14 +133,12 @@ def results_table(
         ]
         columns = [*(name for name in ("status", "reason") if name not in columns), *columns]
     columns = _in_order(columns)
-    there = {each["folder"] for each in variants}
-    return {
-        "columns": columns,
-        "rows": [
-            [entry.get("folder") if entry.get("folder") in there else "", *(_cell(entry.get(c)) for c in columns)]
-            for entry in entries
-        ],
-    }
+    there = {each.folder for each in variants}
+    rows = [
+        [entry.get("folder") if entry.get("folder") in there else "", *(_cell(entry.get(c)) for c in columns)]
+        for entry in entries
+    ]
+    return ResultsTable(columns, rows)
 
 
 def _in_order(columns: list[str]) -> list[str]:
@@ -156,15 +159,16 @@ def _in_order(columns: list[str]) -> list[str]:
 def read_batch(folder: Path) -> dict[str, Any] | None:
     """Read batch.json of a folder; None without one. Raises UnitcadError where it can't be read."""
     try:
-        said = files.read_json(folder / "batch.json", largest=files.LARGEST_TABLE, links=False)
+        batch = files.read_json(folder / "batch.json", largest=files.LARGEST_TABLE, links=False)
     except files.NotThere:
         return None
-    expect(said, BatchFile, folder / "batch.json")
-    return said
+    expect(batch, BatchFile, folder / "batch.json")
+    return batch
 
 
-def _row(each: dict[str, Any]) -> dict[str, Any]:
-    manifest, spec = each["manifest"], each["spec"] or {}
+def _row(record: VariantRecord) -> dict[str, Any]:
+    """Return a variant's columns in the table of a folder without batch.json."""
+    manifest, spec = record.manifest, record.spec or {}
     row: dict[str, Any] = {"name": manifest.get("name"), "design": manifest.get("design")}
     row["diameter_mm"] = spec.get("diameter_mm")
     for i, layer in enumerate(spec.get("layers", [])):
@@ -172,10 +176,10 @@ def _row(each: dict[str, Any]) -> dict[str, Any]:
     for part in manifest.get("parts", []):
         if part.get("made") == "cast":
             row[f"{part['name']}_mm3"] = part.get("volume_mm3")
-    for model, said in ((manifest.get("estimate") or {}).get("models") or {}).items():
-        row[f"edge_{model}"] = said.get("edge")
-    laws = manifest.get("laws", [])
-    row["laws"] = ("hold" if all(law["ok"] for law in laws) else "broken") if laws else None
+    for model, level in ((manifest.get("estimate") or {}).get("models") or {}).items():
+        row[f"edge_{model}"] = level.get("edge")
+    checks = manifest.get("laws", [])
+    row["laws"] = ("hold" if all(check["ok"] for check in checks) else "broken") if checks else None
     row["warnings"] = len(manifest.get("warnings", []))
     return row
 
@@ -188,6 +192,7 @@ def _cell(value: Any) -> Any:
 
 
 def _json(path: Path) -> dict[str, Any]:
+    """Read a JSON file that holds a table."""
     data = files.read_json(path, links=False)
     expect(data, dict[str, Any], path)
     return data

@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from msgspec import Struct
+from msgspec import UNSET, Struct, UnsetType, structs
 
-from unitcad.errors import UnitcadError
+from unitcad.errors import UnitcadError, misfit
 from unitcad.report.pool import REFERENCE
 
 DEEPEST = 40
 """Nesting of lists and tables that a result's file may have."""
 
 
-class Law(Struct):
+class ListedCheck(Struct):
     """A mould check, passed or broken."""
 
     code: str
@@ -23,7 +23,7 @@ class Law(Struct):
     where: str = ""
 
 
-class Found(Struct):
+class ListedFinding(Struct):
     """A finding in a file."""
 
     code: str
@@ -36,10 +36,10 @@ class Checked(Struct):
     """Result of the mesh check."""
 
     errors: int
-    findings: list[Found] = []
+    findings: list[ListedFinding] = []
 
 
-class Part(Struct):
+class ListedPart(Struct):
     """A body."""
 
     name: str
@@ -76,16 +76,16 @@ class Manifest(Struct):
     design: str = ""
     hash: str = ""
     label: str | None = None
-    laws: list[Law] = []
+    laws: list[ListedCheck] = []
     check: Checked | None = None
-    parts: list[Part] = []
+    parts: list[ListedPart] = []
     warnings: list[str] = []
     left_out: list[LeftOut] = []
     estimate: Levels | None = None
     versions: dict[str, str] = {}
 
 
-class Row(Struct):
+class ListedVariant(Struct):
     """A variant of a batch."""
 
     folder: str | None = None
@@ -95,7 +95,38 @@ class BatchFile(Struct):
     """batch.json."""
 
     columns: list[str]
-    variants: list[Row]
+    variants: list[ListedVariant]
+
+
+class VariantRecord(Struct, kw_only=True):
+    """A variant on the page; a file that its folder lacks, or that can't be read, is None.
+
+    `drawings` are SVG by path, `files` (path, bytes); `damaged` says what can't be read; `model` is the key of the
+    geometry, and `no_model` says why there is none.
+    """
+
+    folder: str
+    manifest: dict[str, Any]
+    estimate: dict[str, Any] | None
+    casting: dict[str, Any] | None
+    slicer: dict[str, Any] | None
+    drawings: dict[str, str]
+    files: list[tuple[str, int]]
+    damaged: list[str]
+    spec: dict[str, Any] | None = None
+    model: str | None = None
+    no_model: str | UnsetType = UNSET
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the record as plain data."""
+        return {name: value for name, value in structs.asdict(self).items() if value is not UNSET}
+
+
+class ResultsTable(Struct, frozen=True):
+    """Table of a batch on the page: each row begins with the folder of its variant, "" for one that failed."""
+
+    columns: list[str]
+    rows: list[list[Any]]
 
 
 def expect(data: Any, kind: Any, path: Path) -> None:
@@ -115,4 +146,4 @@ def expect(data: Any, kind: Any, path: Path) -> None:
     try:
         msgspec.convert(data, kind)
     except msgspec.ValidationError as error:
-        raise UnitcadError(f"{path}: is not a result of unitcad: {error}") from None
+        raise UnitcadError(f"{path}: is not a result of unitcad: {misfit(error)}") from None
