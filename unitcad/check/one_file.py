@@ -15,11 +15,12 @@ import numpy as np
 from unitcad.check.detail import detailed
 from unitcad.check.findings import Facts, FileReport, Finding, ending, merge
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.options import UNITS_MM, Options
+from unitcad.check.options import Options
 from unitcad.check.readers import sniff
 from unitcad.check.resource_limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.rules.f_file import F001, F005, F012
 from unitcad.check.rules.p_package import P011
+from unitcad.check.units import UNITS_MM
 from unitcad.geometry.arrays import Floats, Ints
 
 _KINDS = {

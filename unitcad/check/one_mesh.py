@@ -45,7 +45,7 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Chec
     facts = replace(facts, bbox_mm=(tuple(low.tolist()), tuple(high.tolist())))
     findings: list[Finding] = []
     with keeping((), facts, lambda kept: in_file(kept, mesh)):
-        part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline, cross)
+        part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick, cross)
     topology = part.topology
     area = float(np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas)).sum()) / 2
     facts = replace(facts, shells=topology.n_shells, area_mm2=area, watertight=topology.watertight)

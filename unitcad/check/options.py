@@ -11,8 +11,6 @@ from unitcad.check.resource_limits import Limits
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
 
-UNITS_MM = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
-
 
 @dataclass(frozen=True)
 class Options:

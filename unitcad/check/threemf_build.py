@@ -16,7 +16,7 @@ from unitcad.check.findings import Facts, Finding, Location, counted, ending
 from unitcad.check.geometry.topology import diagonals, topology_of
 from unitcad.check.geometry.triangle_mesh import LARGEST, solid_of
 from unitcad.check.one_mesh import CheckedMesh, check_on_bed, check_surface
-from unitcad.check.options import UNITS_MM, Options
+from unitcad.check.options import Options
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import Model, Object
 from unitcad.check.readers.threemf.opc import Package, open_package
@@ -27,7 +27,9 @@ from unitcad.check.rules import g_shells, s_scale, v_values
 from unitcad.check.rules.g_shells import G002
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import V001
+from unitcad.check.units import UNITS_MM
 from unitcad.geometry.arrays import Floats, Ints, cross, extent
+from unitcad.geometry.boxes import box_pairs
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -201,7 +203,7 @@ def overlapping(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
     low, high = np.array([box[0] for box in boxes]), np.array([box[1] for box in boxes])
     solids: dict[int, Manifold] = {}
     places: list[Location] = []
-    pairs = g_shells.box_pairs(low, high, deadline)
+    pairs = box_pairs(low, high, deadline.tick)
     try:
         for a, b in pairs[:_PAIRS].tolist():
             deadline.tick()
@@ -252,7 +254,7 @@ def printed(
         if alike not in checked:
             mesh = mesh_of(model_object, instance.key[0], factor, instance.matrix)
             with keeping(findings):
-                part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline)
+                part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick)
                 checked[alike] = instance.matrix[3], check_on_bed(part, printer)
         begin, of = checked[alike]
         findings += _shifted(of, (instance.matrix[3] - begin) * factor)

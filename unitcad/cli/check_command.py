@@ -204,7 +204,7 @@ def _per_file(found: Configuration, options: Options) -> Callable[[str], Options
 
 
 def _unit(field: str, unit: str | None) -> str | None:
-    from unitcad.check.options import UNITS_MM
+    from unitcad.check.units import UNITS_MM
 
     if unit is None:
         return None

@@ -150,6 +150,21 @@ def meeting_between(boxes: Ints, others: Ints, tick: Tick = lambda: None) -> Ite
     yield from _descend(here, there, top[0], top[1], tick, own=False)
 
 
+def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
+    """Return pairs of boxes that meet (k, 2), the smaller number first, sorted; low and high corners (n, 3)."""
+    n = len(low)
+    corners = np.concatenate([low, high])
+    steps = frame_of(corners).steps(corners)
+    order = morton_order(steps, np.arange(n))
+    found = [np.empty((0, 2), np.int64)]
+    for i, j in meeting_pairs(boxes_of(steps, order, order + n), tick):
+        pair = np.sort(np.stack([order[i], order[j]], axis=1), axis=1).astype(np.int64)
+        one, other = pair.T
+        found.append(pair[((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)])
+    pairs = np.concatenate(found)
+    return pairs[np.lexsort(pairs.T[::-1])]
+
+
 def _levels(boxes: Ints, least: int) -> list[Ints]:
     """Return the tree's levels from the leaves up, for `least` leaves or more; the uppermost has few boxes."""
     levels = [_padded(boxes, max(least - len(boxes), 0))]

@@ -14,8 +14,8 @@ from pkgutil import iter_modules
 from unitcad.check import readers
 from unitcad.check.findings import Finding
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.options import UNITS_MM
 from unitcad.check.resource_limits import Deadline, Limits
+from unitcad.check.units import UNITS_MM
 
 Reader = Callable[[memoryview, Limits, Deadline], tuple[list[Mesh], list[Finding]]]
 _READ = "read_"

@@ -17,10 +17,10 @@ from unitcad.check.geometry.edges import components
 from unitcad.check.geometry.rays import Rays
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import solid_of
-from unitcad.check.resource_limits import Deadline
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.ticks import Tick
 
 if TYPE_CHECKING:
     from manifold3d import CrossSection, Manifold
@@ -57,8 +57,8 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
     if solid.is_empty():
         return
     places = _standing(part.topology, solid, least, float(printer.layer_mm))
-    part.deadline.tick()
-    places += _lying(part.topology, solid, part.material, least, part.deadline)
+    part.tick()
+    places += _lying(part.topology, solid, part.material, least, part.tick)
     if places:
         text = f"{counted(len(places), 'section')} smaller than {number(least)} mm both ways"
         yield D002.finding(text, len(places), places)
@@ -81,7 +81,7 @@ def _standing(topology: Topology, solid: Manifold, least: float, layer: float) -
     return places
 
 
-def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, deadline: Deadline) -> list[Location]:
+def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, tick: Tick) -> list[Location]:
     """Return one place for each connected patch of thin faces that a section across shows to be a whisker."""
     faces, vertices, edges = topology.mesh.faces, topology.mesh.vertices, topology.edges
     n = len(faces)
@@ -96,7 +96,7 @@ def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, deadli
     found: list[Location] = []
     labels, first = np.unique(group[thin], return_index=True)
     for label in labels[np.argsort(first)][:_GROUPS]:
-        deadline.tick()
+        tick()
         mine = np.flatnonzero(thin & (group == label))
         place = _whisker(vertices, faces[mine], solid, least)
         if place is not None:

@@ -66,7 +66,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
     for label in np.unique(region[leaning]):
         faces = np.flatnonzero(leaning & (region == label))
         area = float(double[faces].sum()) / 2
-        part.deadline.tick()
+        part.tick()
         if area < _LEAST:
             continue
         own = owner == label

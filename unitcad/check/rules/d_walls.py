@@ -58,7 +58,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
         text = f"{counted(len(walls), 'wall')} below the floor, the thinnest {number(walls[0][0], 3)} mm"
         yield D001.finding(text, len(walls), [place for _, place in walls])
     floors = float(printer.xy_play_mm), float(printer.layer_mm)
-    air = cast(part.topology, floors, 0.0, part.deadline.tick, side=-1)
+    air = cast(part.topology, floors, 0.0, part.tick, side=-1)
     gaps = _patches(part.topology, air, floors[0] * SLACK)
     if gaps:
         text = f"{counted(len(gaps), 'gap')} that the printer closes, the narrowest {number(gaps[0][0], 3)} mm"

@@ -11,11 +11,11 @@ from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.geometry.topology import Topology, diagonals
 from unitcad.check.geometry.triangle_mesh import solid_of
 from unitcad.check.geometry.volumes import winding_number
-from unitcad.check.resource_limits import Deadline, Unreadable
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Bools, Floats, Ints
-from unitcad.geometry.boxes import boxes_of, frame_of, meeting_pairs, morton_order
+from unitcad.geometry.boxes import box_pairs
+from unitcad.geometry.ticks import Interrupted, Tick
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -113,9 +113,9 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     depth, overlaps = np.zeros(n, int), list[tuple[int, int]]()
     try:
         if n > 1:
-            _relate(topology, np.asarray(sound), crossings.touching(), depth, overlaps, part.deadline)
-    except Unreadable as stop:
-        stop.findings = (*_overlapping(topology, overlaps), *stop.findings)
+            _relate(topology, np.asarray(sound), crossings.touching(), depth, overlaps, part.tick)
+    except Interrupted:
+        yield from _overlapping(topology, overlaps)
         raise
     overlaps += [(i, i) for i in np.flatnonzero(sound & (depth % 2 == 1) & (volumes > 0)).tolist()]
     yield from _overlapping(topology, overlaps)
@@ -157,7 +157,7 @@ def _overlapping(topology: Topology, overlaps: list[tuple[int, int]]) -> list[Fi
 
 
 def _relate(
-    topology: Topology, sound: Bools, touching: Ints, depth: Ints, overlaps: list[tuple[int, int]], deadline: Deadline
+    topology: Topology, sound: Bools, touching: Ints, depth: Ints, overlaps: list[tuple[int, int]], tick: Tick
 ) -> None:
     """Add to `depth` how many sound shells each one lies in, and to `overlaps` the pairs that touch and share volume.
 
@@ -165,7 +165,7 @@ def _relate(
     """
     vertices, faces, volumes = topology.mesh.vertices, topology.mesh.faces, topology.volumes
     low, high, n = topology.low, topology.high, topology.n_shells
-    pairs = box_pairs(low, high, deadline)
+    pairs = box_pairs(low, high, tick)
     pairs = pairs[sound[pairs].all(axis=1)]
     one, other = pairs.T
     touch = np.isin(one * n + other, np.sort(touching.astype(np.int64), axis=1) @ np.array([n, 1]))
@@ -176,7 +176,7 @@ def _relate(
     solids: dict[int, Manifold] = {}
     before = -1
     for at in close.tolist():
-        deadline.tick()
+        tick()
         a, b = pairs[at].tolist()
         if a != before:  # pairs are sorted: what comes before it comes no more
             before, solids = a, {i: solid for i, solid in solids.items() if i >= a}
@@ -188,7 +188,7 @@ def _relate(
     for inner, outer in ((one, other), (other, one)):
         within = (low[inner] >= low[outer]).all(axis=1) & (high[inner] <= high[outer]).all(axis=1)
         for at in np.flatnonzero(within & ~touch).tolist():
-            deadline.tick()
+            tick()
             point = vertices[faces[groups[inner[at]][0], 0]]
             depth[inner[at]] += winding_number(vertices, faces[groups[outer[at]]], point) != 0
 
@@ -204,21 +204,6 @@ def _where(topology: Topology, low: Floats, high: Floats, *shells: int) -> Locat
 def _faces_by_shell(labels: Ints, n: int) -> list[Ints]:
     order = np.argsort(labels, kind="stable")
     return np.split(order, np.cumsum(np.bincount(labels, minlength=n))[:-1])
-
-
-def box_pairs(low: Floats, high: Floats, deadline: Deadline) -> Ints:
-    """Return pairs of boxes that meet (k, 2), the smaller number first, sorted; low and high corners (n, 3)."""
-    n = len(low)
-    corners = np.concatenate([low, high])
-    steps = frame_of(corners).steps(corners)
-    order = morton_order(steps, np.arange(n))
-    found = [np.empty((0, 2), np.int64)]
-    for i, j in meeting_pairs(boxes_of(steps, order, order + n), deadline.tick):
-        pair = np.sort(np.stack([order[i], order[j]], axis=1), axis=1).astype(np.int64)
-        one, other = pair.T
-        found.append(pair[((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)])
-    pairs = np.concatenate(found)
-    return pairs[np.lexsort(pairs.T[::-1])]
 
 
 def _shared(topology: Topology, groups: list[Ints], a: int, b: int, solids: dict[int, Manifold]) -> float:

@@ -11,7 +11,7 @@ from unitcad.check.geometry.rays import Rays, cast
 from unitcad.check.geometry.self_crossing import Crossings, crossings_of
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.resource_limits import Deadline
+from unitcad.geometry.ticks import Tick
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 class Inspection:
     """A mesh with finite vertices, as the file has it, with its topology.
 
-    `deadline` is asked now and then by what takes long; `cross`: whether faces are compared with each other.
+    `tick` is called now and then by what takes long; `cross`: whether faces are compared with each other.
     """
 
     mesh: Mesh
     topology: Topology
-    deadline: Deadline
+    tick: Tick
     cross: bool = True
     printer: Printer | None = None
 
@@ -41,11 +41,11 @@ class Inspection:
         if not self.cross or not len(self.topology.kept):
             return Crossings()
         every = detail().meshes is not None
-        return crossings_of(self.topology.as_stored(), self.deadline.tick, every=every)
+        return crossings_of(self.topology.as_stored(), self.tick, every=every)
 
     @cached_property
     def material(self) -> Rays:
         """How much material lies behind points of its faces, as far as matters for the printer."""
         assert self.printer is not None
         floors = float(self.printer.least_wall_mm), float(self.printer.least_flat_wall_mm)
-        return cast(self.topology, floors, float(self.printer.least_feature_mm), self.deadline.tick, side=1)
+        return cast(self.topology, floors, float(self.printer.least_feature_mm), self.tick, side=1)

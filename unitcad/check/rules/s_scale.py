@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unitcad.check.findings import Facts, Finding, number
-from unitcad.check.options import UNITS_MM
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
+from unitcad.check.units import UNITS_MM
 from unitcad.geometry.arrays import extent
 
 if TYPE_CHECKING:
