@@ -14,11 +14,11 @@ from collections.abc import Callable
 import numpy as np
 
 from unitcad.accuracy.hankel_peers import adaptive
-from unitcad.attenuation.closed_form import Units
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels
 from unitcad.attenuation.inputs import TissueLayer, Variant, body
-from unitcad.attenuation.loads import UniformDisc
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.models import MODELS, edge_levels
+from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.estimating import variant_of
 from unitcad.validation import load
 

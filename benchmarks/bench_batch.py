@@ -26,7 +26,7 @@ from typing import Any
 
 import psutil
 
-from unitcad.attenuation.edge import model_block
+from unitcad.attenuation.edge.level import model_block
 from unitcad.batch import BatchOptions, estimate_table, run
 from unitcad.batch.executors import ProcessExecutor, SerialExecutor
 from unitcad.batch.sweep import Sweep, from_file

@@ -12,10 +12,10 @@ import numpy as np
 
 from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Plot
-from unitcad.attenuation import closed_form as cf
-from unitcad.attenuation.closed_form import Units
-from unitcad.attenuation.models import STORED_FIT, edge_levels, judgements, one_constant, scales
-from unitcad.attenuation.table import judge, measured_table
+from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.fitted_models import STORED_FIT, edge_levels, judgements, one_constant, scales
+from unitcad.attenuation.edge.measured_levels import judge, measured_table
 from unitcad.estimating import estimate_spec
 from unitcad.validation import load
 

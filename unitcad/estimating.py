@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Any, cast, get_args
 
 from unitcad.attenuation.curve import layered_block
-from unitcad.attenuation.estimate import Layered, estimate, frequency_table
+from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table
 from unitcad.attenuation.inputs import Design, Quantity, SiliconeLayer, TissueLayer, Variant
-from unitcad.attenuation.rheology import FractionalKelvinVoigt
+from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.catalogue import Material, Tissue, Value, choose, materials, motors, tissue
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
@@ -23,7 +23,7 @@ def estimate_spec(
     frequency_hz: float | None = None,
     layered: Layered = layered_block,
 ) -> dict[str, Any]:
-    """The estimate of a spec as JSON-ready data (`unitcad.attenuation.estimate`); the same spec gives the same data.
+    """The estimate of a spec as JSON-ready data (`attenuation.edge.estimates`); the same spec gives the same data.
 
     Raises `Refusal` where no frequency is known, for an unknown material or tissue, and for values no body has.
     """

@@ -8,11 +8,11 @@ import pytest
 pytest.importorskip("skfem")
 
 from unitcad.accuracy import fem
-from unitcad.accuracy.models import unit_spec
+from unitcad.accuracy.edge_levels import unit_spec
 from unitcad.accuracy.unit_fem import edge_level, pressed_skin
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.loads import UniformDisc
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.estimating import variant_of
 from unitcad.validation import load
 

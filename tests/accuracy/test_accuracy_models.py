@@ -9,8 +9,8 @@ import pytest
 from unitcad.accuracy.plot import LEGEND_LETTERS, svg
 from unitcad.accuracy.result import Plot
 from unitcad.accuracy.unexplained import NineLevels, unexplained
-from unitcad.attenuation.models import judgements
-from unitcad.attenuation.table import measured_table
+from unitcad.attenuation.edge.fitted_models import judgements
+from unitcad.attenuation.edge.measured_levels import measured_table
 
 NAMES = measured_table().names
 

@@ -6,7 +6,7 @@ import pytest
 from unitcad.accuracy.extreme_responses import Row, cases, promises, rows, survey
 from unitcad.accuracy.hankel import DISC, RADII
 from unitcad.accuracy.random_media import CLASSES, Trial
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 
 pytest.importorskip("flint")
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from unitcad.attenuation.loads import Point, UniformDisc
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.response import Response
-from unitcad.attenuation.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.loads import Point, UniformDisc
+from unitcad.attenuation.layered.response import Response
+from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.validation import load

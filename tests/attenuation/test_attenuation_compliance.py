@@ -10,8 +10,8 @@ import pytest
 import thomson_haskell
 from scipy import optimize
 
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.errors import Refusal
 
 CASES = json.loads((Path(__file__).parent / "references" / "compliance.json").read_text())

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 
 disba = pytest.importorskip("disba")
 MODELS = {  # thickness km, v_p km/s, v_s km/s, density g/cm3; frequencies Hz

@@ -10,10 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from unitcad.accuracy.result import Plot, Result, markdown
-from unitcad.attenuation.closed_form import Units
 from unitcad.attenuation.curve import NO_RATIO
-from unitcad.attenuation.edge import corners
-from unitcad.attenuation.models import edge_levels
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.fitted_models import edge_levels
+from unitcad.attenuation.edge.level import corners
 from unitcad.cli import app
 from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal

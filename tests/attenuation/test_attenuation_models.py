@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from unitcad.attenuation import closed_form as cf
-from unitcad.attenuation.models import (
+from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.fitted_models import (
     STORED_FIT,
     edge_levels,
     fit_divider,
@@ -14,7 +14,7 @@ from unitcad.attenuation.models import (
     paths,
     two_constants,
 )
-from unitcad.attenuation.table import judge
+from unitcad.attenuation.edge.measured_levels import judge
 from unitcad.catalogue import measurements
 
 E10, D10, D30 = 15e3, 250e3, 355e3

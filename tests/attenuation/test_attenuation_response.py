@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from unitcad.attenuation.loads import Point, UniformDisc
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import KelvinVoigt, LossFactor
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.loads import Point, UniformDisc
+from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
 from unitcad.errors import Refusal
 
 REFERENCES = Path(__file__).parent / "references"

@@ -5,9 +5,9 @@ import pytest
 
 from unitcad.accuracy.ball_reference import Kernel, response
 from unitcad.accuracy.random_media import CLASSES, trial
-from unitcad.attenuation.loads import Load, Point, UniformDisc
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import KelvinVoigt, LossFactor
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
+from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
 
 pytest.importorskip("flint")
 

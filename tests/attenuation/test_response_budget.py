@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from unitcad.attenuation.loads import Point, UniformDisc
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import KelvinVoigt, LossFactor
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.loads import Point, UniformDisc
+from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
 
 R = np.array([0.5e-3, 30e-3])
 

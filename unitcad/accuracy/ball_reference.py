@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from unitcad.attenuation.loads import Load, Point
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered.loads import Load, Point
+from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.errors import UnitcadError
 
 BITS = 320

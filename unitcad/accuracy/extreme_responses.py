@@ -11,8 +11,8 @@ from unitcad.accuracy import ball_reference
 from unitcad.accuracy.hankel import DISC, OMEGA, RADII
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.accuracy.result import Cell, Plot, Promise, Table
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import Damping, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.rheology import Damping, KelvinVoigt, LossFactor
 
 TOLERANCES = (0.1, 1e-3, 1e-5, 1e-7, 1e-9)
 LEAST_GAIN = 1.2

@@ -13,9 +13,9 @@ from unitcad.accuracy import hankel_peers as peers
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, fastest, frontier
 from unitcad.accuracy.timing import interleaved, machine
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.loads import UniformDisc
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import LossFactor
+from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.rheology import LossFactor
 from unitcad.estimating import variant_of
 from unitcad.validation import load
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.attenuation.loads import Load, Point, UniformDisc
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import Damping, FractionalKelvinVoigt, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
+from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.rheology import Damping, FractionalKelvinVoigt, KelvinVoigt, LossFactor
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ import numpy as np
 from unitcad.accuracy import extreme_responses, thomson_haskell
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Table
 from unitcad.accuracy.timing import machine
-from unitcad.attenuation.loads import Point, UniformDisc
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import Damping, KelvinVoigt, LossFactor
+from unitcad.attenuation.layered.loads import Point, UniformDisc
+from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.rheology import Damping, KelvinVoigt, LossFactor
 from unitcad.errors import UnitcadError
 
 LIMIT = 1e-13

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.attenuation.closed_form import wave_speed
-from unitcad.attenuation.table import Judgement, Table
+from unitcad.attenuation.edge.closed_form import wave_speed
+from unitcad.attenuation.edge.measured_levels import Judgement, Table
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ import math
 
 from unitcad.accuracy.fem import Block, Solid, Surface, solve
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import LossFactor, complex_shear_modulus
+from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.rheology import LossFactor, complex_shear_modulus
 from unitcad.designs import dimensions
 from unitcad.errors import UnitcadError
 from unitcad.estimating import variant_of

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from unitcad.attenuation import closed_form as cf
+from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.inputs import Quantity, Variant, body
-from unitcad.attenuation.loads import UniformDisc
+from unitcad.attenuation.layered.loads import UniformDisc
 
 EDGE_TO_MM = 30
 DEPTHS_MM = (1.0, 3.0)

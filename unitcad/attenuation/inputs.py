@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from unitcad.attenuation.medium import HalfSpace, Layer, LayeredMedium
-from unitcad.attenuation.rheology import KelvinVoigt, LossFactor
+from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
 
 Design = Literal["embedded", "encapsulating"]
 

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.closed_form import Units
-from unitcad.attenuation.models import edge_levels
-from unitcad.attenuation.table import CROSSINGS
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.fitted_models import edge_levels
+from unitcad.attenuation.edge.measured_levels import CROSSINGS
 from unitcad.batch import task as tasks
 from unitcad.batch.batch_records import Failure, JournalEntry, Summary
 from unitcad.batch.journal import Journal

@@ -34,7 +34,7 @@ def estimate(
     Each model gives the part of the motor's amplitude that reaches the edge, and the decay on the skin beyond it, with
     the model's error.
     """
-    from unitcad.attenuation.models import MODELS
+    from unitcad.attenuation.edge.fitted_models import MODELS
     from unitcad.estimating import estimate_spec, frequency_table_of_spec
     from unitcad.validation import load
 

@@ -232,7 +232,7 @@ class _Making:
         if "estimate" not in self.only:
             return None
         from unitcad.attenuation.curve import layered_block
-        from unitcad.attenuation.estimate import rounded, summary
+        from unitcad.attenuation.edge.estimates import rounded, summary
         from unitcad.attenuation.inputs import Variant as Asked
         from unitcad.estimating import estimate_spec
 

@@ -12,11 +12,11 @@ from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, frontier
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.accuracy.unexplained import NineLevels, unexplained
 from unitcad.accuracy.unit_fem import edge_level, pressed_skin
+from unitcad.attenuation.edge.fitted_models import STORED_FIT, edge_levels, fit_divider, judgements, null
+from unitcad.attenuation.edge.measured_levels import Fit, Judgement, judge, measured_table
+from unitcad.attenuation.edge.measured_levels import Table as Measured
 from unitcad.attenuation.inputs import body
-from unitcad.attenuation.loads import UniformDisc
-from unitcad.attenuation.models import STORED_FIT, edge_levels, fit_divider, judgements, null
-from unitcad.attenuation.table import Fit, Judgement, judge, measured_table
-from unitcad.attenuation.table import Table as Measured
+from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.estimating import variant_of
 from unitcad.spec import Spec
 from unitcad.validation import from_data, load

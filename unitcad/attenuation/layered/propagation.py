@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from unitcad.attenuation import waves as w
+from unitcad.attenuation.layered import waves as w
 
 
 class Plane(NamedTuple):

@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 from scipy.special import factorial2
 
-from unitcad.attenuation import waves as w
-from unitcad.attenuation.bessel import bessel, envelope
-from unitcad.attenuation.loads import Load
-from unitcad.attenuation.medium import LayeredMedium
-from unitcad.attenuation.rheology import LossFactor, finite
-from unitcad.attenuation.tail import measure_tail
+from unitcad.attenuation.layered import waves as w
+from unitcad.attenuation.layered.bessel import bessel, envelope
+from unitcad.attenuation.layered.loads import Load
+from unitcad.attenuation.layered.rheology import finite
+from unitcad.attenuation.layered.stack import Stack
+from unitcad.attenuation.layered.tail import measure_tail
 from unitcad.errors import Refusal, UnitcadError
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
@@ -64,7 +64,7 @@ class Response:
 
 @dataclass(frozen=True)
 class _Problem:
-    medium: LayeredMedium
+    medium: Stack
     load: Load
     omega: float
     r: np.ndarray
@@ -82,12 +82,6 @@ class _Problem:
         out = k * self.medium.transfer(traction, k, self.omega, self.z)
         return out - static_kernel(self.reference, self.column)[:, None] if self.reference else out
 
-    def with_loss(self, tan_delta: float) -> _Problem:
-        """The same with that loss in every body."""
-        law, medium = LossFactor(tan_delta), self.medium
-        layers = [replace(layer, damping=law) for layer in medium.layers]
-        return replace(self, medium=LayeredMedium(layers, replace(medium.half_space, damping=law)))
-
 
 def static_kernel(material: w.Material, column: int) -> w.Array:
     """k C(k) of a static half-space: (1 - nu) / mu along the load, -(1 - 2 nu) / (2 mu) across; nu by eps."""
@@ -96,7 +90,7 @@ def static_kernel(material: w.Material, column: int) -> w.Array:
     return np.array([across, along] if column == 1 else [along, across])
 
 
-def respond(medium: LayeredMedium, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
+def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
     """Displacement of `medium` under `load` at radii r (m), any shape, and one depth z (m), at omega (rad/s).
 
     rtol: wanted error over the largest |u| of all radii, 1e-12 to 0.1. Raises `Refusal` for values that can't be, and
@@ -112,7 +106,7 @@ def respond(medium: LayeredMedium, load: Load, omega: float, r: Any, z: float = 
     if load.reach == 0.0 and z == 0.0 and np.any(radii == 0.0):
         raise Refusal("r", 0.0, "under a point load the surface goes to infinity: give r > 0, z > 0 or a disc")
     # A layer of no thickness changes nothing, so its waves must not set the path.
-    medium = LayeredMedium([layer for layer in medium.layers if layer.thickness > 0], medium.half_space)
+    medium = medium.without_empty_layers()
     materials = medium.materials(omega)
     flat = radii.ravel()
     end = _last_pole(medium, materials, omega)
@@ -146,7 +140,10 @@ def _solve_lossless(bare: _Problem, end: float, rtol: float) -> _Found:
     best, count = None, 0
     for _ in range(_MOST_ATTEMPTS):
         wanted = max(0.008 * rtol, 2.0 * _ROUNDING / loss)
-        found = [_solve(bare.with_loss(i * loss), end, wanted) for i in range(1, _LIMIT.size + 1)]
+        found = [
+            _solve(replace(bare, medium=bare.medium.with_loss(i * loss)), end, wanted)
+            for i in range(1, _LIMIT.size + 1)
+        ]
         values, errors = np.array([one.total for one in found]), np.array([one.error for one in found])
         total = np.tensordot(_LIMIT, values, 1)
         integrals, limit = np.tensordot(abs(_LIMIT), errors, 1), np.abs(total - np.tensordot(_LOWER, values, 1))
@@ -200,7 +197,7 @@ def _static_part(problem: _Problem) -> np.ndarray:
     return static_kernel(problem.reference, problem.column)[:, None] * pair
 
 
-def _last_pole(medium: LayeredMedium, materials: tuple[w.Material, ...], omega: float) -> float:
+def _last_pole(medium: Stack, materials: tuple[w.Material, ...], omega: float) -> float:
     """A wavenumber above every pole and branch point (1/m): slow surface waves, and bending of the layers as plates.
 
     The softest layer bends with what it lies on, not as a plate.

@@ -13,19 +13,16 @@ Time factor e^{+i omega t}; z into the body; u_z with J0(kr), u_r with J1(kr), b
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation import waves as w
-from unitcad.attenuation.crossing import Plane, parameter, raised, underside
-from unitcad.attenuation.rheology import Damping, complex_shear_modulus, compressibility, finite
+from unitcad.attenuation.layered import waves as w
+from unitcad.attenuation.layered.propagation import Plane, parameter, raised, underside
+from unitcad.attenuation.layered.rheology import Damping, LossFactor, complex_shear_modulus, compressibility, finite
 from unitcad.errors import Refusal
-
-if TYPE_CHECKING:
-    from unitcad.attenuation.response import Load, Response
 
 
 @dataclass(frozen=True)
@@ -65,8 +62,8 @@ def _check_material(what: str, body: Layer | HalfSpace, above: bool) -> None:
     finite(f"{what}.poisson_ratio", nu, -1.0, above=True)
 
 
-class LayeredMedium:
-    """Layers, top first, on a half-space. Raises `Refusal` for values that no body has."""
+class Stack:
+    """Layers, top first, on a half-space: its compliance and its transfer to a depth, per wavenumber."""
 
     def __init__(self, layers: Iterable[Layer], half_space: HalfSpace) -> None:
         self.layers: tuple[Layer, ...] = tuple(layers)
@@ -87,11 +84,15 @@ class LayeredMedium:
             block = w.product(top.u, w.adjugate(top.t)) / w.determinant(top.t)
         return np.moveaxis(block, -1, 0).reshape(*k.shape, 2, 2)
 
-    def response(self, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
-        """Displacement at radii r (m) and depth z (m) under `load`; see `unitcad.attenuation.response.respond`."""
-        from unitcad.attenuation.response import respond
+    def without_empty_layers(self) -> Stack:
+        """Return the same stack without layers of no thickness, which change nothing."""
+        return Stack([layer for layer in self.layers if layer.thickness > 0], self.half_space)
 
-        return respond(self, load, omega, r, z, rtol)
+    def with_loss(self, tan_delta: float) -> Stack:
+        """Return the same stack with that loss factor in every body."""
+        law = LossFactor(tan_delta)
+        layers = [replace(layer, damping=law) for layer in self.layers]
+        return Stack(layers, replace(self.half_space, damping=law))
 
     def materials(self, omega: float) -> tuple[w.Material, ...]:
         """The layers' and the half-space's complex moduli at omega. Raises `Refusal` for a static free body."""

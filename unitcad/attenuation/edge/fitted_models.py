@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation import closed_form as cf
-from unitcad.attenuation.closed_form import Units
-from unitcad.attenuation.table import Fit, Judgement, Predict, Table, judge, measured_table
+from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.measured_levels import Fit, Judgement, Predict, Table, judge, measured_table
 
 MODELS = ("paper", "consistent", "fitted")
 STORED_FIT = {"kappa": 0.282048, "s": 0.659429, "left_out_levels": 1.3345, "left_out_ratios": 1.3299}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.closed_form import Units
+from unitcad.attenuation.edge.closed_form import Units
 from unitcad.catalogue import materials, measurements
 
 CROSSINGS = {"embedded": 1.0, "encapsulating": 2.0, "single": float(np.sqrt(2.0))}

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation import closed_form as cf
-from unitcad.attenuation.closed_form import Units
+from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.fitted_models import STORED_FIT, paths, scales
+from unitcad.attenuation.edge.measured_levels import CROSSINGS, measured_table
 from unitcad.attenuation.inputs import Quantity, SiliconeLayer, Variant
-from unitcad.attenuation.models import STORED_FIT, paths, scales
-from unitcad.attenuation.table import CROSSINGS, measured_table
 
 _MOST_CORNERS = 12
 _NOT_FINITE = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"

@@ -7,10 +7,10 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from unitcad.attenuation.curve import decay_at, layered_block
-from unitcad.attenuation.edge import measured_block, model_block, ranged, unknown
+from unitcad.attenuation.edge.fitted_models import MODELS, judgements
+from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown
+from unitcad.attenuation.edge.measured_levels import Judgement
 from unitcad.attenuation.inputs import Quantity, Variant
-from unitcad.attenuation.models import MODELS, judgements
-from unitcad.attenuation.table import Judgement
 
 SIGNIFICANT_DIGITS = 9
 ASSUMPTIONS = [

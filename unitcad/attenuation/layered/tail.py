@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.attenuation import waves as w
-from unitcad.attenuation.bessel import envelope
-from unitcad.attenuation.loads import Load
+from unitcad.attenuation.layered import waves as w
+from unitcad.attenuation.layered.bessel import envelope
+from unitcad.attenuation.layered.loads import Load
 
 _PER_DECADE = 16
 _MARGIN = 1.5

@@ -13,8 +13,8 @@ from typing import Any, Literal
 import numpy as np
 from scipy import special
 
-from unitcad.attenuation.bessel import bessel, moment
-from unitcad.attenuation.rheology import finite
+from unitcad.attenuation.layered.bessel import bessel, moment
+from unitcad.attenuation.layered.rheology import finite
 from unitcad.errors import Refusal, unknown_name
 
 Direction = Literal["normal", "radial"]
