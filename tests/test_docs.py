@@ -15,7 +15,7 @@ import pytest
 from unitcad.validation import from_data
 
 ROOT = Path(__file__).parent.parent
-BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^```(\w+(?: \w+)?)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
 def _blocks(language: str) -> list:
@@ -36,6 +36,23 @@ def test_toml_examples_are_specs(text: str) -> None:
 
 @pytest.mark.parametrize("text", _blocks("python"))
 def test_python_examples_run(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(text, "example", "exec"), {"__name__": "__main__"})
+
+
+def test_the_python_page_runs_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "python.md").read_text("utf-8")
+    cells = [text for language, text in BLOCK.findall(page) if language == "python notebook"]
+    assert len(cells) > 10
+    names: dict[str, object] = {"__name__": "__main__"}
+    for i, cell in enumerate(cells):
+        exec(compile(cell, f"cell {i}", "exec"), names)
+
+
+@pytest.mark.parametrize("text", _blocks("python brep"))
+def test_examples_with_a_brep_library_run(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("build123d")
     monkeypatch.chdir(tmp_path)
     exec(compile(text, "example", "exec"), {"__name__": "__main__"})
 

@@ -15,7 +15,9 @@ import unitcad
 PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
     {"cli"},
-    {"batch", "report", "accuracy"},
+    {"api"},
+    {"batch"},
+    {"report", "accuracy"},
     {"pipeline"},
     {"casting", "mould_checks"},
     {"moulds", "estimating"},
@@ -30,7 +32,7 @@ FLOORS = [
     {"catalogue"},
     {"files"},
     {"errors", "children"},
-    {"text", "geometry"},
+    {"text", "geometry", "notebook"},
 ]
 LEVEL = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 CAD = ("OCP", "build123d", "cadquery")
@@ -68,7 +70,9 @@ def test_imports_run_downward_only() -> None:
 def test_attenuation_and_check_know_nothing_of_cad() -> None:
     for room, below, file in _edges():
         if room in ("attenuation", "check"):
-            assert below in ("catalogue", "children", "files", "geometry", "text", "errors"), f"{file} imports {below}"
+            assert below in ("catalogue", "children", "files", "geometry", "notebook", "text", "errors"), (
+                f"{file} imports {below}"
+            )
 
 
 def _file_imports(folder: Path) -> dict[str, set[str]]:
@@ -114,6 +118,7 @@ def test_no_files_of_a_room_import_each_other_in_a_circle(room: str, least: int)
 def test_the_rooms_of_check_import_one_way() -> None:
     """Geometry knows no rules, rules know no files; neither rules, readers nor outputs know what runs them."""
     floors = [
+        {"check_call"},
         {"many_files", "manifest", "baseline"},
         {"one_file"},
         {"threemf_build"},

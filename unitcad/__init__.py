@@ -1,6 +1,134 @@
 """unitcad: haptic units, their casting moulds and an attenuation estimate, from a short TOML spec.
 
-Importing this package reads no file and loads no CAD library.
+    import unitcad
+
+    spec = unitcad.load("encapsulating", set={"diameter_mm": 15})
+    variant = unitcad.Variant(spec)
+    built = unitcad.build(spec, "out")
+    result = unitcad.check(built.folder)
+
+Everything listed in `__all__` is loaded when it is first used: importing this package reads no file and loads neither
+numpy nor a CAD library. `unitcad.check` and `unitcad.batch` are packages that may be called.
 """
 
+# pyright: strict
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from unitcad import attenuation as attenuation
+    from unitcad import catalogue as catalogue
+    from unitcad import shape as shape
+    from unitcad.api.build_call import build as build
+    from unitcad.api.estimate_call import EdgeEstimate as EdgeEstimate
+    from unitcad.api.estimate_call import estimate as estimate
+    from unitcad.batch.batch_call import BatchResult as BatchResult
+    from unitcad.batch.batch_call import batch as batch
+    from unitcad.catalogue import MaterialEntry as Material
+    from unitcad.catalogue import materials as materials
+    from unitcad.catalogue import motors as motors
+    from unitcad.catalogue import printers as printers
+    from unitcad.catalogue import tissue as tissue
+    from unitcad.check.check_call import CheckResult as CheckResult
+    from unitcad.check.check_call import check as check
+    from unitcad.errors import Refusal as Refusal
+    from unitcad.errors import UnitcadError as UnitcadError
+    from unitcad.pipeline.build import Built as Built
+    from unitcad.pipeline.variant import Variant as Variant
+    from unitcad.spec import Spec as Spec
+    from unitcad.spec.asked import CastingTable as Casting
+    from unitcad.spec.asked import EstimateTable as Estimate
+    from unitcad.spec.asked import FpcbTable as Fpcb
+    from unitcad.spec.asked import LayerTable as Layer
+    from unitcad.spec.asked import MotorTable as Motor
+    from unitcad.spec.asked import MouldsTable as Moulds
+    from unitcad.spec.asked import OutputTable as Output
+    from unitcad.spec.asked import WiresTable as Wires
+    from unitcad.validation import load as load
+    from unitcad.validation import templates as templates
+
 __version__ = "0.1.0"
+
+__all__ = [
+    "BatchResult",
+    "Built",
+    "Casting",
+    "CheckResult",
+    "EdgeEstimate",
+    "Estimate",
+    "Fpcb",
+    "Layer",
+    "Material",
+    "Motor",
+    "Moulds",
+    "Output",
+    "Refusal",
+    "Spec",
+    "UnitcadError",
+    "Variant",
+    "Wires",
+    "attenuation",
+    "batch",
+    "build",
+    "catalogue",
+    "check",
+    "estimate",
+    "load",
+    "materials",
+    "motors",
+    "printers",
+    "shape",
+    "templates",
+    "tissue",
+]
+
+_PLACES = {
+    "BatchResult": "batch.batch_call:BatchResult",
+    "Built": "pipeline.build:Built",
+    "Casting": "spec.asked:CastingTable",
+    "CheckResult": "check.check_call:CheckResult",
+    "EdgeEstimate": "api.estimate_call:EdgeEstimate",
+    "Estimate": "spec.asked:EstimateTable",
+    "Fpcb": "spec.asked:FpcbTable",
+    "Layer": "spec.asked:LayerTable",
+    "Material": "catalogue:MaterialEntry",
+    "Motor": "spec.asked:MotorTable",
+    "Moulds": "spec.asked:MouldsTable",
+    "Output": "spec.asked:OutputTable",
+    "Refusal": "errors:Refusal",
+    "Spec": "spec:Spec",
+    "UnitcadError": "errors:UnitcadError",
+    "Variant": "pipeline.variant:Variant",
+    "Wires": "spec.asked:WiresTable",
+    "attenuation": "attenuation",
+    "batch": "batch",
+    "build": "api.build_call:build",
+    "catalogue": "catalogue",
+    "check": "check",
+    "estimate": "api.estimate_call:estimate",
+    "load": "validation:load",
+    "materials": "catalogue:materials",
+    "motors": "catalogue:motors",
+    "printers": "catalogue:printers",
+    "shape": "shape",
+    "templates": "validation:templates",
+    "tissue": "catalogue:tissue",
+}
+"""Where each name is defined: a room, or a module and the name there."""
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first used. Raises AttributeError for any other."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, attribute = _PLACES[name].partition(":")
+    found = import_module(f"{__name__}.{module}")
+    value = getattr(found, attribute) if attribute else found
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -206,8 +206,30 @@ def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:
 
 
 if TYPE_CHECKING:
+    _Number = float | Value[float] | None
 
-    class MaterialEntry(Struct): ...
+    class MaterialEntry(Struct, frozen=True, kw_only=True):
+        """What a spec may give of a silicone, as `_entry_of` makes it; a test compares the two."""
+
+        like: str | None = None
+        status: Status | None = None
+        source: str | None = None
+        density_g_cm3: _Number = None
+        mixed_viscosity_cps: _Number = None
+        pot_life_min: _Number = None
+        cure_h: _Number = None
+        shore: str | Value[str] | None = None
+        modulus_100pct_kpa: _Number = None
+        tensile_mpa: _Number = None
+        elongation_pct: _Number = None
+        casting_floor_mm: _Number = None
+        poisson_ratio: _Number = None
+        loss_factor: _Number = None
+        mix_ratio: _Number = None
+        youngs_modulus_kpa: _Number = None
+        fractional_mu0_kpa: _Number = None
+        fractional_tau_us: _Number = None
+        fractional_n: _Number = None
 
     class MotorEntry(Struct): ...
 

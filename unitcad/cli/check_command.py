@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from unitcad.check import FileReport, Limits, Options
     from unitcad.cli.check_settings import Configuration
 
-_SHORT_UNITS = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "in": "inch", "inches": "inch", "ft": "foot"}
-
 
 def check(
     files: Annotated[list[str] | None, typer.Argument(help="Files, folders or globs.", show_default=False)] = None,
@@ -204,14 +202,9 @@ def _per_file(found: Configuration, options: Options) -> Callable[[str], Options
 
 
 def _unit(field: str, unit: str | None) -> str | None:
-    from unitcad.check.units import UNITS_MM
+    from unitcad.check.units import unit_named
 
-    if unit is None:
-        return None
-    known = _SHORT_UNITS.get(unit.lower(), unit.lower())
-    if known not in UNITS_MM:
-        raise unknown_name(field, unit, UNITS_MM)
-    return known
+    return unit_named(field, unit)
 
 
 def _printer(field: str, name: str | None) -> Printer | None:

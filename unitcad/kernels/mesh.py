@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import manifold3d
 import numpy as np
@@ -77,6 +78,14 @@ def arrays(solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
     """(vertices (n, 3) in mm, double; faces (m, 3))."""
     mesh = solid.to_mesh64()
     return np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.int64)
+
+
+def as_trimesh(solid: Manifold) -> Any:
+    """The mesh as a trimesh.Trimesh, vertices and faces as they are: nothing is merged."""
+    import trimesh
+
+    vertices, faces = arrays(solid)
+    return trimesh.Trimesh(vertices, faces, process=False)
 
 
 def bounds(solid: Manifold) -> tuple[float, ...]:

@@ -1,31 +1,109 @@
-"""A variant: a mould set with its ways to other CAD libraries."""
+"""A variant: a mould set with its ways to other libraries."""
 
+# pyright: strict
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
+from unitcad import notebook
+from unitcad.catalogue import materials
+from unitcad.errors import UnitcadError, unknown_name
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.validation import load
+from unitcad.shape.body import Body
+from unitcad.spec import Spec
+from unitcad.validation import Source, load
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
 
 
 @dataclass(frozen=True, eq=False)
 class Variant(MouldSet):
-    """A spec's unit, moulds and meshes. Lengths in mm, as assembled, z = 0 at the skin."""
+    """A spec's unit, moulds and meshes, each worked out when first asked for. Lengths in mm, as assembled, z = 0 at
+    the skin. Raises UnitcadError for a `spec` that is none.
+    """
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.spec, Spec):  # pyright: ignore[reportUnnecessaryIsInstance]
+            given = type(self.spec).__name__
+            raise UnitcadError(f"Variant takes a Spec, not a {given}; Variant.of takes a template's name or a file")
 
     @classmethod
-    def of(cls, source: str, *overrides: str) -> Variant:
-        """Return the variant of a spec file or a template. Raises Refusal or UnitcadError."""
+    def of(cls, source: Source, *overrides: str) -> Variant:
+        """Return the variant of a template, a file, plain data or a spec, with each "path=value" put in.
+
+        Raises Refusal or UnitcadError.
+        """
         return cls(load(source, overrides))
 
+    @property
+    def bodies(self) -> dict[str, Body]:
+        """The bodies of unit and tooling by name: "layer1", "motor", "base", "cup1" and so on.
+
+        Raises Refusal where the moulds can't be made.
+        """
+        tools = self.plan.tools if self.design.tooling else ()
+        return {body.name: body for body in (*self.unit, *tools)}
+
+    @overload
+    def mesh(self, body: Body | str, library: Literal["manifold3d"] = "manifold3d") -> Manifold: ...
+
+    @overload
+    def mesh(self, body: Body | str, library: Literal["trimesh"]) -> Any: ...
+
+    def mesh(self, body: Body | str, library: Literal["manifold3d", "trimesh"] = "manifold3d") -> Any:
+        """Return a body's closed mesh, mm, as a manifold3d.Manifold or a trimesh.Trimesh.
+
+        `body` is a body or the name of one. Vertices are doubles, shape (n, 3); faces are integers, shape (m, 3),
+        counter-clockwise from outside. Raises Refusal for a name or a library that there is not.
+        """
+        if library not in ("manifold3d", "trimesh"):
+            raise unknown_name("library", library, ("manifold3d", "trimesh"))
+        solid = super().mesh(self._body(body) if isinstance(body, str) else body)
+        if library == "manifold3d":
+            return solid
+        from unitcad.kernels.mesh import as_trimesh
+
+        return as_trimesh(solid)
+
     def to_build123d(self) -> Any:
-        """Return unit and moulds as a named, coloured build123d Compound. Raises UnitcadError without the extra."""
+        """Return unit and moulds as a named, coloured build123d Compound, mm. Raises UnitcadError without the extra."""
         from unitcad.kernels import build123d
 
-        return build123d.compound((*self.unit, *self.plan.tools))
+        return build123d.compound((*self.bodies.values(),))
 
     def to_cadquery(self) -> Any:
-        """Return unit and moulds as a named, coloured CadQuery Assembly. Raises UnitcadError without the extra."""
+        """Return unit and moulds as a named, coloured CadQuery Assembly, mm. Raises UnitcadError without the extra."""
         from unitcad.kernels import cadquery
 
-        return cadquery.assembly((*self.unit, *self.plan.tools))
+        return cadquery.assembly((*self.bodies.values(),))
+
+    def section(self) -> str:
+        """Return the drawing of the unit cut along its tail, with dimensions in mm, as SVG."""
+        from unitcad.export.svg import unit_section
+
+        return unit_section(self.unit, self.dimensions, self.segments)
+
+    def __repr__(self) -> str:
+        return f"Variant({self.spec.summary})"
+
+    def _repr_html_(self) -> str:
+        known, rows = materials(self.spec.materials), list[tuple[object, ...]]()
+        for body in self.unit:
+            if body.step is None:
+                continue
+            material, volume = known[self.spec.layers[body.step - 1].material], self.mesh(body).volume()
+            # g/cm3 times mm3 is mg.
+            mass = volume * float(material.density_g_cm3) / 1000
+            rows.append((body.name, material.name, round(volume, 2), round(mass, 3)))
+        head = ("layer", "material", "volume, mm³", "mass, g")
+        drawn = notebook.drawing(self.section(), f"section of {self.spec.name}")
+        return drawn + notebook.table(head, rows, self.spec.summary)
+
+    def _body(self, name: str) -> Body:
+        """Return the unit's body of that name, else the tool's: the moulds are drawn for a tool alone."""
+        found = next((body for body in self.unit if body.name == name), None) or self.bodies.get(name)
+        if found is None:
+            raise unknown_name("body", name, self.bodies)
+        return found

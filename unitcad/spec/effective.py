@@ -6,16 +6,34 @@ clear the air, as many cavities as the bed takes. Lengths in mm, the unit in eac
 
 from __future__ import annotations
 
-from typing import Literal
+import inspect
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal
 
-from msgspec import structs
+from msgspec import Struct, structs
 
+from unitcad import notebook
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
-from unitcad.spec.asked import CastingTable, Format, Model, OutputTable, Table, WiresTable
+from unitcad.spec.asked import (
+    AskedSpec,
+    CastingTable,
+    EstimateTable,
+    Format,
+    FpcbTable,
+    LayerTable,
+    Model,
+    MotorTable,
+    MouldsTable,
+    OutputTable,
+    Table,
+    WiresTable,
+)
 
 Casting = CastingTable
 Output = OutputTable
 Wires = WiresTable
+_MOST_LAYERS = 3
+"""Layers that a spec's summary lists."""
 
 
 class Motor(Table, frozen=True, kw_only=True):
@@ -87,10 +105,31 @@ class Estimate(Table, frozen=True, kw_only=True):
     models: tuple[Model, ...]
 
 
-class Spec(Table, frozen=True, kw_only=True):
-    """A haptic unit; `layers` run from the inside out, one entry being a single-layer control.
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
 
-    Made by `unitcad.validation`: the same unit as asked for, defaults written out and every limit checked.
+    _Validated = type(Struct)
+    _Keys = Mapping[str, object]
+else:
+
+    class _Validated(type(Struct)):
+        """Makes a call of the class take what a TOML file may hold, and check it like one."""
+
+        def __call__(cls, /, **keys: Any) -> Spec:
+            # Validation knows the designs and lies above this room: it is loaded when a spec is asked for.
+            return import_module("unitcad.validation").from_tables(keys)
+
+        @property
+        def __signature__(cls) -> inspect.Signature:
+            return inspect.signature(AskedSpec)
+
+
+class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
+    """A haptic unit; `layers` run from the inside out, one entry being a single-layer control. Lengths in mm.
+
+    `Spec(name=..., design=..., diameter_mm=..., layers=[...])` takes the keys of a TOML file, tables as the classes
+    of `unitcad.spec.asked` or as dicts. Defaults are written out and every limit is checked: raises Refusal with
+    the sentence that the same file would get.
     """
 
     name: str
@@ -110,6 +149,61 @@ class Spec(Table, frozen=True, kw_only=True):
     tissue: dict[str, dict[str, TissueEntry]]
     parameters: dict[str, bool | int | float | str]
     design_source: str | None
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            name: str,
+            design: str,
+            diameter_mm: float,
+            layers: Sequence[LayerTable | Layer | _Keys],
+            motor: MotorTable | Motor | _Keys = ...,
+            fpcb: FpcbTable | Circuit | _Keys | None = None,
+            wires: WiresTable | _Keys | None = None,
+            moulds: MouldsTable | Moulds | _Keys = ...,
+            casting: CastingTable | _Keys = ...,
+            estimate: EstimateTable | Estimate | _Keys = ...,
+            output: OutputTable | _Keys = ...,
+            materials: Mapping[str, MaterialEntry | _Keys] = ...,
+            motors: Mapping[str, MotorEntry | _Keys] = ...,
+            printers: Mapping[str, PrinterEntry | _Keys] = ...,
+            tissue: Mapping[str, Mapping[str, TissueEntry | _Keys]] = ...,
+            parameters: Mapping[str, bool | int | float | str] = ...,
+            design_source: str | None = None,
+        ) -> None: ...
+
+    @classmethod
+    def settled(cls, **values: Any) -> Spec:
+        """Return the spec of these values, all of them there, unchecked: for validation alone."""
+        return type(Struct).__call__(cls, **values)
+
+    @property
+    def summary(self) -> str:
+        """Name, design, diameter and layers in at most 160 characters."""
+        layers = [f"{layer.material} {layer.wall_mm:g}" for layer in self.layers]
+        listed = " / ".join(layers) if len(layers) <= _MOST_LAYERS else f"{len(layers)} layers"
+        unit = f"{notebook.shortened(self.design, 40)}, {self.diameter_mm:g} mm"
+        return notebook.shortened(f"{notebook.shortened(self.name, 40)!r}: {unit}, {listed}", 160)
+
+    def __repr__(self) -> str:
+        return f"Spec({self.summary})"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("design", self.design),
+            ("diameter_mm", self.diameter_mm),
+            ("motor", self.motor.part or f"{self.motor.diameter_mm:g} x {self.motor.thickness_mm:g} mm"),
+            ("circuit", self.fpcb and f"tail {self.fpcb.tail}, {self.fpcb.tail_width_mm:g} mm wide"),
+            *(
+                (f"layers.{i}", f"{layer.material}, wall {layer.wall_mm:g} mm, cap {layer.cap_mm:g} mm")
+                for i, layer in enumerate(self.layers)
+            ),
+            ("printer", self.moulds.printer),
+            ("estimate", f"{self.estimate.frequency_hz:g} Hz on {self.estimate.tissue}"),
+        ]
+        return notebook.table((), rows, self.name)
 
 
 def with_formats(spec: Spec, formats: tuple[Format, ...] = ()) -> Spec:

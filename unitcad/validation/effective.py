@@ -44,7 +44,7 @@ def _with_defaults(asked: AskedSpec, design: Design) -> Spec:
     estimate = _estimate(asked, part)
     for name in (asked.estimate.tissue, *asked.tissue):
         catalogue.tissue(name, asked.tissue)
-    return Spec(
+    return Spec.settled(
         name=asked.name,
         design=asked.design,
         diameter_mm=asked.diameter_mm,

@@ -1,4 +1,4 @@
-"""From a TOML file, a template's name or plain data to a validated `Spec`."""
+"""From a TOML file, a template's name, plain data or another spec to a validated `Spec`."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import index_in
 from unitcad.validation.effective import effective
+from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
 
 _MOST_LIMITS = 5
 """Limits of one field that are tried out in turn for a value to offer."""
@@ -28,13 +29,40 @@ def templates() -> dict[str, Path]:
     return {file.stem: file for file in sorted(folder.glob("*.toml"))}
 
 
-def load(source: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Spec:
-    """Return the effective spec of a file (a path separator or .toml in `source`) or of a template (a bare name).
+def load(source: Source, set: Changes = ()) -> Spec:
+    """Return the effective spec of a template, a file, plain data, or another spec or variant.
 
-    `overrides` are "path=value" with a value in TOML syntax (a bare word counts as a string). Raises Refusal or
-    UnitcadError, naming the field, for whatever can't be.
+    A text is a file where it holds a path separator or ends in .toml, else a template's name. `set` changes values:
+    a dict by dotted path ({"layers.0.wall_mm": 1.2}), or texts "path=value" with a value in TOML syntax (a bare word
+    counts as a string). Lengths in mm. Values that follow from others follow the changed ones. A custom design's
+    path starts at the file's folder, else at the working directory. Raises Refusal or UnitcadError, naming the
+    field, for whatever can't be.
     """
-    return from_data(override(read(source), overrides), Path())
+    changes = list(changes_of(set))
+    if isinstance(source, str | os.PathLike):
+        data = read(source)
+    elif isinstance(source, Mapping):
+        data = plain(source)
+    else:
+        spec = source if isinstance(source, Spec) else source.spec
+        if not changes:
+            return spec
+        data = asked_of(spec, from_data)
+    for change in changes:
+        if isinstance(change, str):
+            data = override(data, [change])
+        else:
+            data = override(data, ())
+            put(data, *change)
+    return from_data(data, Path())
+
+
+def from_tables(keys: Mapping[str, object]) -> Spec:
+    """Return the effective spec of a spec's keys, tables as their classes or as dicts: what calling `Spec` does.
+
+    Raises as `from_data`.
+    """
+    return from_data(plain(keys), Path())
 
 
 def read(source: str | os.PathLike[str]) -> dict[str, Any]:

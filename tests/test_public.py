@@ -1,0 +1,332 @@
+"""What `import unitcad` offers: lazily, typed, documented, short to print, and with a file's sentences."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import inspect
+import json
+import pickle
+import subprocess
+import sys
+import tomllib
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import manifold3d
+import msgspec
+import numpy as np
+import pytest
+import tomli_w
+import trimesh
+import typed_use
+
+import unitcad
+from unitcad.catalogue import entries
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.spec.asked import AskedSpec
+
+PACKAGE = Path(unitcad.__file__).parent
+LAYERS: list[dict[str, Any]] = [
+    {"material": "ecoflex-00-10", "wall_mm": 1.25, "cap_mm": 1.0},
+    {"material": "dragon-skin-30", "wall_mm": 1.25, "cap_mm": 1.0},
+]
+UNIT: dict[str, Any] = {"name": "unit", "design": "encapsulating", "diameter_mm": 14.0, "layers": LAYERS}
+
+
+def _run(code: str) -> str:
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_importing_loads_nothing() -> None:
+    code = "import sys\nbefore = set(sys.modules)\nimport unitcad\n"
+    loaded = _run(f"{code}print(*sorted({{m.split('.')[0] for m in set(sys.modules) - before}}))").split()
+    assert set(loaded) - sys.stdlib_module_names == {"unitcad"}
+
+
+def test_listing_the_names_loads_nothing() -> None:
+    code = "import sys, unitcad\nnames = dir(unitcad)\nassert 'Spec' in names and 'build' in names\n"
+    assert _run(f"{code}print([m for m in sys.modules if m.startswith('unitcad.')])") == "[]"
+
+
+@pytest.mark.parametrize("use", ["unitcad.Spec", "unitcad.Layer", "unitcad.materials()"])
+def test_what_is_data_needs_no_numpy(use: str) -> None:
+    heavy = ("numpy", "scipy", "manifold3d", "trimesh", "OCP")
+    assert _run(f"import sys, unitcad\n{use}\nprint([m for m in {heavy} if m in sys.modules])") == "[]"
+
+
+def test_loading_a_spec_needs_no_geometry() -> None:
+    heavy = ("scipy", "manifold3d", "trimesh", "OCP")
+    code = "import sys, unitcad\nunitcad.load('encapsulating')\n"
+    assert _run(f"{code}print([m for m in {heavy} if m in sys.modules])") == "[]"
+
+
+def test_names_places_and_types_agree() -> None:
+    text = Path(unitcad.__file__).read_text("utf-8")
+    typed = text.partition("if TYPE_CHECKING:")[2].partition("__version__")[0]
+    names = [line.rpartition(" as ")[2] for line in typed.splitlines() if " as " in line]
+    assert sorted(names) == sorted(unitcad.__all__) == sorted(unitcad._PLACES)
+    with pytest.raises(AttributeError, match="no attribute 'bild'"):
+        unitcad.bild  # type: ignore[attr-defined]  # noqa: B018
+
+
+@pytest.mark.parametrize("name", unitcad.__all__)
+def test_every_name_resolves_and_has_a_docstring(name: str) -> None:
+    found = getattr(unitcad, name)
+    assert inspect.getdoc(found)
+    assert getattr(unitcad, name) is found
+
+
+@pytest.mark.parametrize("name", ["build", "estimate", "check", "batch", "load", "materials", "motors", "printers"])
+def test_functions_say_what_they_raise_and_in_which_units(name: str) -> None:
+    found = getattr(unitcad, name)
+    text = inspect.getdoc(found.__call__ if inspect.ismodule(found) else found) or ""
+    assert "aises" in text, name
+    if name not in ("materials", "motors", "printers", "estimate"):
+        assert "mm" in text or "seconds" in text
+    assert inspect.signature(found).parameters
+
+
+def test_signatures_are_those_of_a_file() -> None:
+    keys = inspect.signature(unitcad.Spec).parameters
+    assert list(keys) == list(AskedSpec.__struct_fields__)
+    required = [name for name, key in keys.items() if key.default is key.empty]
+    assert required == ["name", "design", "diameter_mm", "layers"]
+    assert list(inspect.signature(unitcad.check).parameters)[:2] == ["files", "printer"]
+    assert list(inspect.signature(unitcad.batch).parameters)[:2] == ["sweep", "out"]
+
+
+@pytest.mark.parametrize("first", ["import unitcad.check", "from unitcad.check import Options", "unitcad.check"])
+def test_check_is_a_package_and_a_function(first: str) -> None:
+    code = (
+        f"import unitcad\n{first}\nimport unitcad.check as package\nfrom unitcad import check\n"
+        "from unitcad.check import Options, check_file\n"
+        "assert unitcad.check is check is package and package.Options is Options\n"
+        "print(unitcad.check('missing.stl').findings[0].code)"
+    )
+    assert _run(code) == "F012"
+
+
+def test_the_typed_material_is_the_one_that_a_spec_takes() -> None:
+    text = inspect.getsource(entries).partition("class MaterialEntry")[2].partition("class MotorEntry")[0]
+    typed = [line.split(":")[0].strip() for line in text.splitlines() if "= None" in line]
+    assert typed == list(unitcad.Material.__struct_fields__)
+
+
+def test_strict_typing_is_asked_for() -> None:
+    assert (PACKAGE / "py.typed").is_file()
+    for module, _, _ in {place.partition(":") for place in unitcad._PLACES.values()}:
+        file = PACKAGE / (module.replace(".", "/") + ".py")
+        if module.startswith("api") or module.endswith("_call"):
+            assert "\n# pyright: strict\n" in file.read_text("utf-8"), file
+    assert "\n# pyright: strict\n" in (PACKAGE / "__init__.py").read_text("utf-8")
+    assert (
+        "tests/typed_use.py"
+        in tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text("utf-8"))["tool"]["pyright"]["include"]
+    )
+
+
+def test_what_is_typed_runs(tmp_path: Path) -> None:
+    assert typed_use.silicones()["ecoflex-00-10"] == 1.04
+    volume, first, level = typed_use.use(tmp_path)
+    assert volume > 0
+    assert first.verdict == "pass"
+    assert level is not None
+    assert 0 < level < 1
+
+
+BAD: list[dict[str, Any]] = [
+    {"diameter_mm": "wide"},
+    {"diameter_mm": 3.0},
+    {"diameter_mm": float("inf")},
+    {"diameter_mm": 5000},
+    {"layers": []},
+    {"layers": [{**LAYERS[0], "wall_mm": 0.1}, LAYERS[1]]},
+    {"layers": [{**LAYERS[0], "material": "ecoflx"}, LAYERS[1]]},
+    {"design": "encapsulatng"},
+    {"desing": "embedded"},
+    {"motor": {"part": "none"}},
+    {"fpcb": {"tail": "three"}},
+    {"fpcb": {"tail_width_mm": 0.1}},
+    {"moulds": {"cavities": [2, 0]}},
+    {"estimate": {"models": []}},
+    {"output": {"formats": ["stp"]}},
+    {"materials": {"mine": {"like": "ecoflex"}}},
+    {"parameters": {"bulge": 1}},
+    {"name": "a\u202eb"},
+]
+
+
+@pytest.mark.parametrize("wrong", BAD, ids=lambda wrong: json.dumps(wrong)[:40])
+def test_a_spec_is_refused_with_the_sentence_of_its_file(wrong: dict[str, Any], tmp_path: Path) -> None:
+    data = {**UNIT, **wrong}
+    file = tmp_path / "unit.toml"
+    file.write_text(tomli_w.dumps(data), "utf-8")
+    with pytest.raises(Refusal) as of_file:
+        unitcad.load(file)
+    for source in (lambda: unitcad.Spec(**data), lambda: unitcad.load(data), lambda: unitcad.load(UNIT, set=wrong)):
+        with pytest.raises(Refusal) as typed:
+            source()
+        assert typed.value.as_dict() == of_file.value.as_dict()
+
+
+@pytest.mark.parametrize("missing", UNIT)
+def test_a_missing_key_is_refused_as_in_a_file(missing: str) -> None:
+    data = {key: value for key, value in UNIT.items() if key != missing}
+    with pytest.raises(Refusal, match=f"^{missing}: is required$"):
+        unitcad.Spec(**data)
+
+
+@pytest.mark.parametrize("wrong", [object(), 1j, np.ones(3), {1, 2}, b"wide"], ids=lambda wrong: type(wrong).__name__)
+def test_what_no_file_holds_is_refused_with_its_field(wrong: Any) -> None:
+    with pytest.raises(Refusal, match=r"^diameter_mm: takes no"):
+        unitcad.Spec(**{**UNIT, "diameter_mm": wrong})
+
+
+def test_a_spec_of_classes_is_that_of_the_file(tmp_path: Path) -> None:
+    typed = typed_use.typed_spec()
+    data = {
+        "name": "typed",
+        "design": "encapsulating",
+        "diameter_mm": 15,
+        "layers": [{**LAYERS[0], "material": "soft"}, LAYERS[1]],
+        "motor": {"part": "LCM0720A3463F", "fill": True},
+        "fpcb": {"tail": "both"},
+        "moulds": {"printer": "sla"},
+        "materials": {"soft": {"like": "ecoflex-00-10", "density_g_cm3": 1.05}},
+    }
+    file = tmp_path / "typed.toml"
+    file.write_text(tomli_w.dumps(data), "utf-8")
+    assert typed == unitcad.load(file)
+    assert isinstance(typed, unitcad.Spec)
+
+
+@pytest.mark.parametrize("name", sorted(unitcad.templates()))
+def test_a_spec_taken_apart_and_typed_again_is_the_same(name: str) -> None:
+    spec = unitcad.load(name)
+    keys = {key: getattr(spec, key) for key in spec.__struct_fields__}
+    assert unitcad.Spec(**keys) == spec
+    assert pickle.loads(pickle.dumps(spec)) == copy.deepcopy(spec) == spec
+    assert unitcad.load(spec) is spec
+    assert unitcad.load(spec, set={"name": spec.name}) == spec
+
+
+@pytest.mark.parametrize("name", ["encapsulating", "embedded"])
+def test_a_changed_spec_is_the_changed_file(name: str) -> None:
+    for change in ({"diameter_mm": 16.0}, {"moulds.printer": "sla"}, {"motor.fill": True}, {"fpcb.tail_width_mm": 3.5}):
+        assert unitcad.load(unitcad.load(name), set=change) == unitcad.load(name, set=change)
+    assert unitcad.load(name, set="diameter_mm=16") == unitcad.load(name, set={"diameter_mm": np.float64(16)})
+    pinned = unitcad.load(name, set={"moulds.bed_x_mm": 150.0})
+    changed = unitcad.load(pinned, set={"moulds.printer": "sla"})
+    assert changed.moulds.bed_x_mm == 150.0
+
+
+def test_a_spec_is_frozen() -> None:
+    with pytest.raises(AttributeError):
+        unitcad.load("encapsulating").diameter_mm = 15.0  # type: ignore[misc]
+
+
+def test_meshes_are_handed_out_in_both_libraries() -> None:
+    variant = unitcad.Variant(unitcad.Spec(**UNIT))
+    solid, mesh = variant.mesh("layer1"), variant.mesh("layer1", "trimesh")
+    assert isinstance(solid, manifold3d.Manifold)
+    assert isinstance(mesh, trimesh.Trimesh)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(solid.volume(), rel=1e-12)
+    assert variant.mesh(variant.bodies["cup1"]).volume() == variant.mesh("cup1").volume()
+    with pytest.raises(Refusal, match="body = 'layer3': not known; closest: layer2, layer1, blade"):
+        variant.mesh("layer3")
+    with pytest.raises(Refusal, match="library = 'open3d': not known"):
+        variant.mesh("layer1", "open3d")  # type: ignore[call-overload]
+    with pytest.raises(UnitcadError, match="Variant takes a Spec, not a str"):
+        unitcad.Variant("encapsulating")  # type: ignore[arg-type]
+
+
+class _Tags(HTMLParser):
+    """Start tags and attributes; raises for an end tag that ends nothing."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open, self.seen, self.images = list[str](), set[str](), list[str]()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen |= {tag, *(name for name, _ in attrs)}
+        self.images += [value or "" for name, value in attrs if name == "src"]
+        if tag != "img":
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def _shown(tmp_path: Path) -> dict[str, Any]:
+    hostile = {**UNIT, "name": "<script>alert(1)</script>&" + "long" * 22}
+    spec = unitcad.Spec(**hostile)
+    good, bad = tmp_path / "<b>good.stl", tmp_path / "bad.stl"
+    trimesh.creation.box((9, 9, 9)).export(good)
+    bad.write_text("solid x\nfacet\n")
+    sweep = tmp_path / "few.toml"
+    sweep.write_text('base = "encapsulating"\n[sweep]\ndiameter_mm = [14.0, 15.0]\n')
+    return {
+        "spec": spec,
+        "variant": unitcad.Variant(spec),
+        "estimate": unitcad.estimate(spec),
+        "check": unitcad.check(good, bad, tmp_path / "missing.stl"),
+        "batch": unitcad.batch(sweep, tmp_path / "few", only=["estimate"]),
+    }
+
+
+def test_reprs_are_short_and_html_holds_no_script(tmp_path: Path) -> None:
+    for name, value in _shown(tmp_path).items():
+        assert len(repr(value)) <= 200, name
+        assert "\n" not in repr(value)
+        html = value._repr_html_()
+        tags = _Tags()
+        tags.feed(html)
+        tags.close()
+        assert tags.open == [], name
+        assert tags.seen <= {"table", "caption", "tr", "th", "td", "img", "src", "alt"}, name
+        for image in tags.images:
+            kind, _, content = image.partition(",")
+            assert kind == "data:image/svg+xml;base64"
+            svg = base64.b64decode(content).decode()
+            assert svg.startswith("<svg")
+            assert "<script" not in svg
+    assert repr(unitcad.load("encapsulating")) == (
+        "Spec('encapsulating': encapsulating, 14 mm, ecoflex-00-10 1.25 / dragon-skin-30 1.25)"
+    )
+
+
+def test_results_tell_what_a_person_asks_first(tmp_path: Path) -> None:
+    shown = _shown(tmp_path)
+    assert [report.verdict for report in shown["check"].reports] == ["pass", "error", "error"]
+    assert not shown["check"].ok
+    assert shown["batch"].ok
+    assert [row["diameter_mm"] for row in shown["batch"].rows] == [14.0, 15.0]
+    estimated = shown["estimate"]
+    assert estimated.frequency_hz == 125
+    assert estimated.edge == {m: b["edge_level"]["value"] for m, b in estimated.data["models"].items()}
+
+
+def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(Refusal, match="printer = 'fdm': not known"):
+        unitcad.check("a.stl", printer="fdm")
+    with pytest.raises(Refusal, match="unit = 'yard': not known"):
+        unitcad.check("a.stl", unit="yard")
+    with pytest.raises(Refusal, match=r"timeout = 0: must be a number from 0\.001"):
+        unitcad.check("a.stl", timeout=0)
+    with pytest.raises(UnitcadError, match="check needs a file, a folder or a glob"):
+        unitcad.check()
+    with pytest.raises(Refusal, match=r"estimate\.frequency_hz = 9000: must be at most 5000"):
+        unitcad.estimate("encapsulating", frequency_hz=9000)
+    with pytest.raises(Refusal, match=r"estimate\.models\.0 = 'own': not known"):
+        unitcad.estimate("encapsulating", models=["own"])  # type: ignore[list-item]
+    with pytest.raises(Refusal, match=r"output\.formats\.0 = 'stp': not known"):
+        unitcad.build("encapsulating", tmp_path, formats=["stp"])  # type: ignore[list-item]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_table_of_a_spec_is_data() -> None:
+    layer = unitcad.Layer(material="ecoflex-00-10", wall_mm=1.25, cap_mm=1.0)
+    assert msgspec.to_builtins(layer) == LAYERS[0]

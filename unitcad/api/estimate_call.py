@@ -1,0 +1,74 @@
+"""`unitcad.estimate` and what it returns."""
+
+# pyright: strict
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from unitcad import notebook
+from unitcad.attenuation.edge.estimates import summary
+from unitcad.estimating import estimate_spec
+from unitcad.spec.asked import Model
+from unitcad.validation import Changes, Source, load
+
+
+@dataclass(frozen=True, repr=False)
+class EdgeEstimate:
+    """How much of the motor's vibration reaches the unit's edge, by model.
+
+    `data` is the whole estimate as JSON-ready data, as `unitcad estimate --json` prints it.
+    """
+
+    data: dict[str, Any]
+
+    @property
+    def edge(self) -> dict[str, float | None]:
+        """The amplitude at the edge over the motor's, by model; None where no number can be given."""
+        return {model: found["edge"] for model, found in summary(self.data)["models"].items()}
+
+    @property
+    def table_error(self) -> dict[str, float]:
+        """The geometric-mean factor by which each model misses the measured levels; 1 is exact."""
+        return {model: found["table_error"] for model, found in summary(self.data)["models"].items()}
+
+    @property
+    def measured(self) -> float | None:
+        """The measured amplitude at the edge over the motor's; None for a unit that nobody measured."""
+        return summary(self.data)["measured"]
+
+    @property
+    def frequency_hz(self) -> float:
+        """The frequency of the drive, Hz."""
+        return float(summary(self.data)["frequency_hz"])
+
+    def __repr__(self) -> str:
+        levels = ", ".join(f"{model} {notebook.shown(level)}" for model, level in self.edge.items())
+        name = notebook.shortened(str(self.data["variant"]["name"]), 40)
+        return f"EdgeEstimate({name!r}: {self.frequency_hz:g} Hz; edge over motor: {levels})"
+
+    def _repr_html_(self) -> str:
+        rows = [(model, level, self.table_error[model]) for model, level in self.edge.items()]
+        head = ("model", "edge over motor", "error against the measured table, factor")
+        measured = f"; measured {notebook.shown(self.measured)}" if self.measured is not None else ""
+        return notebook.table(head, rows, f"{self.data['variant']['name']}, {self.frequency_hz:g} Hz{measured}")
+
+
+def estimate(
+    source: Source,
+    *,
+    set: Changes = (),
+    models: Sequence[Model] | None = None,
+    frequency_hz: float | None = None,
+) -> EdgeEstimate:
+    """Estimate the vibration at a unit's edge, and on the skin beyond it.
+
+    `source` and `set` are as for `unitcad.load`. `models` ("paper", "consistent", "fitted") and `frequency_hz` stand in
+    for the spec's. Nothing is drawn or written. Raises Refusal for a value that can't be, and for a custom design
+    that no model describes.
+    """
+    spec = load(source, set)
+    chosen = {"estimate.models": models and list(models), "estimate.frequency_hz": frequency_hz}
+    wanted = {path: value for path, value in chosen.items() if value is not None}
+    return EdgeEstimate(estimate_spec(load(spec, wanted)))

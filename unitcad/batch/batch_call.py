@@ -1,0 +1,96 @@
+"""`unitcad.batch` as a function, and what it returns."""
+
+# pyright: strict
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from unitcad import notebook
+from unitcad.batch.estimate_table import write_estimates
+from unitcad.batch.executors import open_executor
+from unitcad.batch.run import BatchOptions, Summary, run, trim
+from unitcad.batch.sweep import Sweep, load_sweep
+from unitcad.pipeline.build import OUTPUTS
+from unitcad.spec.asked import Format
+
+
+@dataclass(frozen=True, repr=False)
+class BatchResult:
+    """Where a sweep's variants are, and what became of them."""
+
+    folder: Path
+    summary: Summary
+
+    @property
+    def ok(self) -> bool:
+        """Whether every variant was made and every check passed."""
+        return not self.summary.failed and not self.summary.stopped
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A row a variant, as in batch.json: what was swept, volumes in mm3, masses in g, edge levels.
+
+        Raises OSError where the folder has gone.
+        """
+        return json.loads((self.folder / "batch.json").read_text("utf-8"))["variants"]
+
+    def __repr__(self) -> str:
+        found = self.summary
+        stopped = f", stopped: {notebook.shortened(found.stopped, 60)}" if found.stopped else ""
+        return f"BatchResult({found.ok} of {found.variants} made, {found.failed} failed{stopped}; {self.folder.name})"
+
+    def _repr_html_(self) -> str:
+        rows, shown = self.rows, self.rows[:_MOST_ROWS]
+        head = list(dict.fromkeys(key for row in shown for key in row))
+        left = f" (the first {_MOST_ROWS} of {len(rows)})" if len(rows) > _MOST_ROWS else ""
+        return notebook.table(head, [[row.get(key) for key in head] for row in shown], f"{self.folder.name}{left}")
+
+
+_MOST_ROWS = 20
+"""Variants that a notebook's cell lists."""
+
+
+def batch(
+    sweep: str | os.PathLike[str] | Sweep,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    set: Sequence[str] = (),
+    formats: Sequence[Format] | None = None,
+    only: Sequence[str] = OUTPUTS,
+    check: bool = True,
+    jobs: int | None = None,
+    limit: int | None = None,
+    timeout: float | None = None,
+    keep_going: bool = False,
+    cache: str | os.PathLike[str] | None = None,
+    report: bool = False,
+) -> BatchResult:
+    """Make every variant of a sweep in the folder `out` (out/<name> by default), each distinct part once.
+
+    `sweep` is a file, the name of a shipped sweep, or a `unitcad.batch.Sweep`. `set` holds texts "path=value" for every
+    variant; `formats` and `only` are as for `unitcad.build`. `jobs` is the number of worker processes, one a core by
+    default, with 0 this process. `limit` makes the first variants only; `timeout` is in seconds a variant. The same
+    call again goes on where an earlier one ended. What becomes of a variant is in the result. Raises Refusal or
+    UnitcadError where nothing can be run.
+    """
+    chosen = sweep if isinstance(sweep, Sweep) else load_sweep(sweep)
+    wanted = chosen.overridden([*set, *([] if formats is None else [f"output.formats={list(formats)}"])])
+    folder = Path("out") / wanted.slug if out is None else Path(out)
+    where = None if cache is None else Path(cache)
+    options = BatchOptions(tuple(only), check, keep_going, timeout, limit, where)
+    if options.only == ("estimate",):
+        summary = write_estimates(wanted, folder, options)
+    else:
+        with open_executor(jobs, timeout=timeout) as (executor, workers):
+            summary = run(wanted, folder, options, executor, workers=workers)
+        trim(options)
+    if report:
+        from unitcad.report import write_report
+
+        write_report(folder)
+    return BatchResult(folder, summary)

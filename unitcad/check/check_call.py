@@ -1,0 +1,118 @@
+"""`unitcad.check` as a function, and what it returns."""
+
+# pyright: strict
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from unitcad import notebook
+from unitcad.catalogue import Printer, choose, printers
+from unitcad.check.findings import FileReport, Finding
+from unitcad.check.options import Options
+from unitcad.check.resource_limits import Limits
+from unitcad.check.units import unit_named
+from unitcad.errors import Refusal, UnitcadError
+
+if TYPE_CHECKING:
+    StrPath = str | os.PathLike[str]
+
+_MOST = 1e9
+"""What a limit is below: faces, seconds, processes."""
+_MOST_CODES = 5
+"""Codes that a result's repr lists."""
+
+
+@dataclass(frozen=True, repr=False)
+class CheckResult:
+    """The reports of some files, one a file, in order."""
+
+    reports: tuple[FileReport, ...]
+
+    @property
+    def verdict(self) -> str:
+        """The worst verdict of a file: "error", "warning" or "pass"."""
+        verdicts = {report.verdict for report in self.reports}
+        return next((found for found in ("error", "warning") if found in verdicts), "pass")
+
+    @property
+    def ok(self) -> bool:
+        """Whether no file has an error; warnings do not count."""
+        return self.verdict != "error"
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings of all files, in the order of the files."""
+        return tuple(finding for report in self.reports for finding in report.findings)
+
+    def __repr__(self) -> str:
+        files, codes = len(self.reports), Counter(finding.code for finding in self.findings)
+        listed = ", ".join(f"{code} x {count}" for code, count in sorted(codes.items())[:_MOST_CODES])
+        more = f" and {len(codes) - _MOST_CODES} more codes" if len(codes) > _MOST_CODES else ""
+        found = f"; {listed}{more}" if codes else ""
+        return f"CheckResult({files} {'file' if files == 1 else 'files'}: {self.verdict}{found})"
+
+    def _repr_html_(self) -> str:
+        rows: list[tuple[object, ...]] = []
+        for report in self.reports:
+            if not report.findings:
+                rows.append((report.path, report.verdict, "", ""))
+            rows += [(report.path, found.severity, found.code, found.message) for found in report.findings]
+        return notebook.table(("file", "verdict", "code", "finding"), rows)
+
+
+def check(
+    *files: StrPath,
+    printer: str | Printer | None = None,
+    unit: str | None = None,
+    select: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    shells: int | None = None,
+    strict_3mf: bool = False,
+    max_faces: int | None = None,
+    timeout: float | None = None,
+    jobs: int = 1,
+) -> CheckResult:
+    """Check mesh files as they are, before any repair: STL, 3MF, OBJ, PLY, OFF, GLB, and STEP with an extra.
+
+    `files` are files, folders or globs. `printer`, a name of the catalogue or an entry, asks for the rules of fit and
+    printability. `unit` ("mm", "in" and so on) is that of formats that have none. `select` and `ignore` are prefixes
+    of codes; `shells` is the number expected. `timeout` is in seconds a file. With `jobs` above 1 worker processes
+    check the files; a script that asks for them needs the guard `if __name__ == "__main__":`. What is wrong with a
+    file, or that it is missing, is in the result; lengths in mm. Raises Refusal or UnitcadError for an argument that
+    can't be.
+    """
+    from unitcad.check import many_files
+    from unitcad.check.rules.registry import check_prefixes
+
+    if not files:
+        raise UnitcadError("check needs a file, a folder or a glob")
+    for field, value, least in (("max_faces", max_faces, 1), ("timeout", timeout, 0.001), ("jobs", jobs, 1)):
+        if value is not None and not least <= value < _MOST:
+            raise Refusal(field, value, f"must be a number from {least:g} to {_MOST:g}", least)
+    default = Limits()
+    options = Options(
+        select=check_prefixes("select", _listed(select)),
+        ignore=check_prefixes("ignore", _listed(ignore)),
+        unit=unit_named("unit", unit),
+        printer=choose("printer", printer, printers()) if isinstance(printer, str) else printer,
+        shells=shells,
+        strict_3mf=strict_3mf,
+        limits=replace(
+            default,
+            max_faces=default.max_faces if max_faces is None else max_faces,
+            seconds=default.seconds if timeout is None else timeout,
+        ),
+    )
+    paths, missing = many_files.expand([os.fspath(file) for file in files])
+    work = [(path, options) for path in paths]
+    return CheckResult((*missing, *many_files.check_files(work, jobs=jobs)))
+
+
+def _listed(codes: Sequence[str]) -> list[str]:
+    """Return prefixes given as a list or as one text with commas."""
+    parts = codes.split(",") if isinstance(codes, str) else codes
+    return [part for part in parts if part.strip()]

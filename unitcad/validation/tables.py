@@ -1,0 +1,93 @@
+"""From what a person types in Python to plain data, as TOML has it; from a spec back to what was asked for."""
+
+# pyright: strict
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from numbers import Integral, Real
+from typing import Any, Protocol, cast
+
+from msgspec import Struct
+
+from unitcad.catalogue import Printer
+from unitcad.errors import Refusal
+from unitcad.spec import Spec, to_data
+from unitcad.spec.effective import Layer, Moulds
+
+
+class HasSpec(Protocol):
+    """A variant, or anything else with a spec."""
+
+    @property
+    def spec(self) -> Spec: ...
+
+
+Source = str | os.PathLike[str] | Mapping[str, object] | Spec | HasSpec
+"""A template's name, a file, plain data, a spec or a variant."""
+Changes = Mapping[str, object] | Iterable[str] | str
+"""Values by their dotted path ("layers.0.wall_mm"), or texts "path=value" with a value in TOML syntax."""
+
+_LENGTHS = tuple(set(Moulds.__struct_fields__) & set(Printer.__struct_fields__))
+_DERIVED = {
+    "motor": ("diameter_mm", "thickness_mm"),
+    "fpcb": ("pad_diameter_mm", "tail_end_width_mm"),
+    "moulds": _LENGTHS,
+    "estimate": ("frequency_hz", "amplitude_um"),
+}
+"""What validation works out from other values where a spec leaves it out."""
+
+
+def plain(node: object, field: str = "") -> Any:
+    """Return a value as TOML has it: tables as dicts without what is None, lists, numbers, texts.
+
+    Raises Refusal for a value of a class that no key takes.
+    """
+    if isinstance(node, Struct):
+        named = {name: getattr(node, name) for name in node.__struct_fields__}
+        if isinstance(node, Layer) and not node.cap_mm:  # an open ring, whose cap a file leaves out
+            del named["cap_mm"]
+        return plain({key: value for key, value in named.items() if value is not None}, field)
+    if isinstance(node, Mapping):
+        table = cast("Mapping[object, object]", node)
+        return {str(key): plain(value, f"{field}.{key}".lstrip(".")) for key, value in table.items()}
+    if isinstance(node, list | tuple):
+        entries = cast("Iterable[object]", node)
+        return [plain(value, f"{field}.{i}".lstrip(".")) for i, value in enumerate(entries)]
+    if node is None or isinstance(node, bool):
+        return node
+    if isinstance(node, str):
+        return str(node)
+    if isinstance(node, Integral):
+        return int(node)
+    if isinstance(node, Real):
+        return float(node)
+    if isinstance(node, os.PathLike):
+        return str(os.fspath(cast("os.PathLike[str]", node)))
+    raise Refusal(field, None, f"takes no {type(node).__name__}: only numbers, texts, lists and tables")
+
+
+def asked_of(spec: Spec, settle: Callable[[dict[str, Any]], Spec]) -> dict[str, Any]:
+    """Return a spec's data without the values that `settle` works out alike, so that they follow a change of others."""
+    data = to_data(spec)
+    bare = copy.deepcopy(data)
+    for table, keys in _DERIVED.items():
+        for key in keys if table in bare and (table != "motor" or spec.motor.part) else ():
+            bare[table].pop(key, None)
+    try:
+        again = to_data(settle(copy.deepcopy(bare)))
+        for table in _DERIVED:
+            bare.get(table, {}).update({k: v for k, v in data.get(table, {}).items() if again[table].get(k) != v})
+        return bare if settle(copy.deepcopy(bare)) == spec else data
+    except Refusal:  # one of these values was given because the one worked out can't be
+        return data
+
+
+def changes_of(changes: Changes) -> Iterator[str | tuple[str, Any]]:
+    """Yield each change: a text "path=value", or a path and its plain value."""
+    if isinstance(changes, Mapping):
+        table = cast("Mapping[str, object]", changes)
+        yield from ((path, plain(value, path)) for path, value in table.items())
+    else:
+        yield from [changes] if isinstance(changes, str) else changes
