@@ -183,9 +183,9 @@ def _block(
         )
         unknown = np.isnan(silicones).any(axis=(1, 2))
         for model in dict.fromkeys(model for entry in there for model in entry.models):
-            found = levels.setdefault(model, np.full(len(known), np.nan))
+            column = levels.setdefault(model, np.full(len(known), np.nan))
             asked = np.array([model in entry.models for entry in there])
-            found[chosen] = np.where(asked & ~unknown, edge_levels(units, model), np.nan)
+            column[chosen] = np.where(asked & ~unknown, edge_levels(units, model), np.nan)
     return Block(start, levels, known)
 
 
@@ -194,9 +194,9 @@ def _frequencies(sweep: Sweep, position: int, values: dict) -> np.ndarray | None
     key = ("frequencies", position, 0)
     if key not in values:
         axis = sweep.axes[position]
-        found = [axis.values[i] for i in range(len(axis))]
-        plain = all(isinstance(v, int | float) and not isinstance(v, bool) and 0 < v < np.inf for v in found)
-        values[key] = np.array(found, dtype=float) if plain else None
+        hertz = [axis.values[i] for i in range(len(axis))]
+        plain = all(isinstance(v, int | float) and not isinstance(v, bool) and 0 < v < np.inf for v in hertz)
+        values[key] = np.array(hertz, dtype=float) if plain else None
     return values[key]
 
 
@@ -216,7 +216,7 @@ def _free_value(sweep: Sweep, base: int, position: int, digit: int, values: dict
 
 def _entries(sweep: Sweep, blocks: list[Block]) -> Iterator[JournalEntry]:
     for block in blocks:
-        levels = {f"edge_{model}": found.tolist() for model, found in block.levels.items()}
+        levels = {f"edge_{model}": column.tolist() for model, column in block.levels.items()}
         for row, known in enumerate(block.known):
             index = block.start + row
             _, values = sweep.values(index)
@@ -224,7 +224,7 @@ def _entries(sweep: Sweep, blocks: list[Block]) -> Iterator[JournalEntry]:
                 failed = tasks.failure(index, known)
                 yield JournalEntry(index=index, status=failed.status, reason=failed.reason, values=values)
                 continue
-            edges = {name: _rounded(found[row]) for name, found in levels.items()}
+            edges = {name: _rounded(column[row]) for name, column in levels.items()}
             name = values.get("name", known.name)
             columns = {"name": name, "design": known.design, "diameter_mm": known.diameter_mm, **edges}
             yield JournalEntry(index=index, status=OK, values=values, row=columns)

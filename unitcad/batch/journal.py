@@ -182,14 +182,14 @@ def _entry(line: bytes, seed: int) -> JournalEntry | None:
 
 def _head(line: bytes) -> dict[str, Any] | None:
     """Return a journal's head; None where the line is none. Version 1 has no checksum."""
-    found = _unpacked(line, 0)
-    if found is None:
+    head = _unpacked(line, 0)
+    if head is None:
         try:
-            found = json.loads(line)
-            return found if found["batch"] and found["name"] and "format" not in found else None
+            head = json.loads(line)
+            return head if head["batch"] and head["name"] and "format" not in head else None
         except (ValueError, KeyError, TypeError, RecursionError):
             return None
-    return found
+    return head
 
 
 def _another(out: Path, name: str) -> UnitcadError:

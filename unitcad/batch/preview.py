@@ -65,12 +65,12 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
 
 def _distinct_parts(specs: list[Spec], only: tuple[str, ...]) -> int:
     """Count the different bodies of these specs."""
-    found = set()
+    keys = set()
     for spec in specs:
         moulds = MouldSet(spec)
         for group in parts.groups(moulds, possible_outputs(spec, only)):
-            found |= {parts.key(moulds, body, "record") for body in group.bodies}
-    return len(found)
+            keys |= {parts.key(moulds, body, "record") for body in group.bodies}
+    return len(keys)
 
 
 def _weight(spec: Spec, only: tuple[str, ...]) -> tuple[int, int, int]:

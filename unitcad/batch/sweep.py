@@ -150,14 +150,14 @@ class Sweep:
             return self.cases[index]
         per_base = self.count // len(self.bases)
         base, rest = divmod(index, per_base)
-        found: dict[str, Any] = {}
+        chosen: dict[str, Any] = {}
         for axis in reversed(self.axes):
             if self.mode == "product":
                 rest, here = divmod(rest, len(axis))
             else:
                 here = rest if len(axis) > 1 else 0
-            found[axis.path] = axis.values[here]
-        return self.bases[base][0], {axis.path: found[axis.path] for axis in self.axes}
+            chosen[axis.path] = axis.values[here]
+        return self.bases[base][0], {axis.path: chosen[axis.path] for axis in self.axes}
 
     def spec(self, index: int) -> Spec:
         """Return the effective spec of variant `index`. Raises Refusal."""

@@ -78,13 +78,13 @@ def _print_result(manifest: dict) -> None:
     for entry in manifest["left_out"]:
         if entry["what"] == "pictures":
             typer.echo(f"warning: no pictures: {entry['why']}", err=True)
-    for law in manifest["laws"]:
-        if not law["ok"]:
-            typer.echo(
-                f"{law['code']} {law['where']}: {law['value']:g} {law['unit']}, limit {law['limit']:g}", err=True
-            )
+    checks = manifest["laws"]
+    for check in checks:
+        if not check["ok"]:
+            measured = f"{check['value']:g} {check['unit']}, limit {check['limit']:g}"
+            typer.echo(f"{check['code']} {check['where']}: {measured}", err=True)
     for finding in manifest["check"]["findings"]:
         typer.echo(f"{finding['path']}: {finding['code']} {finding['message']}", err=True)
-    if manifest["laws"]:
-        held = sum(law["ok"] for law in manifest["laws"])
-        typer.echo(f"{manifest['name']}: {len(manifest['parts'])} bodies, {held} of {len(manifest['laws'])} laws hold")
+    if checks:
+        held = sum(check["ok"] for check in checks)
+        typer.echo(f"{manifest['name']}: {len(manifest['parts'])} bodies, {held} of {len(checks)} mould checks hold")

@@ -18,10 +18,8 @@ def ls(where: Where = None, as_json: Json = False) -> None:
     from unitcad.cache import default_root, usage
 
     root = where or default_root()
-    found = usage(root)
-    _print_usage(
-        f"{found.entries} entries, {found.contents} files, {found.bytes / 1e6:.1f} MB", root, vars(found), as_json
-    )
+    used = usage(root)
+    _print_usage(f"{used.entries} entries, {used.contents} files, {used.bytes / 1e6:.1f} MB", root, vars(used), as_json)
 
 
 @cache.command("gc")

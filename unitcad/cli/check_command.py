@@ -51,13 +51,13 @@ def check(
     ] = None,
     all_locations: Annotated[bool, typer.Option(help="List every location of a finding, up to 10000.")] = False,
     baseline: Annotated[str | None, typer.Option(help="File of known findings; they do not fail.")] = None,
-    write_baseline: Annotated[bool, typer.Option(help="Write what is found to the baseline.")] = False,
+    write_baseline: Annotated[bool, typer.Option(help="Write the findings to the baseline.")] = False,
     show: Annotated[
         str | None,
         typer.Option(help="Folder for pictures: each finding near and on the whole part, and coloured 3MF files."),
     ] = None,
     config: Annotated[
-        str | None, typer.Option(help="Settings: a TOML file with a table [check]; else the nearest is found.")
+        str | None, typer.Option(help="Settings: a TOML file with a table [check]; else from the nearest such file.")
     ] = None,
     no_config: Annotated[bool, typer.Option("--no-config", help="Read no settings.")] = False,
     statistics: Annotated[
@@ -83,12 +83,12 @@ def check(
     output_format = "json" if as_json else output_format
     if output_format not in FORMATS:
         raise unknown_name("--output-format", output_format, FORMATS)
-    found = check_settings.find(config, wanted=not no_config)
-    settings = found.settings
+    configuration = check_settings.find(config, wanted=not no_config)
+    settings = configuration.settings
     fail_on = fail_on or settings.fail_on or "error"
     if fail_on not in ("error", "warning"):
         raise unknown_name("--fail-on", fail_on, ("error", "warning"))
-    base = Path(baseline) if baseline is not None else found.baseline
+    base = Path(baseline) if baseline is not None else configuration.baseline
     if write_baseline and base is None:
         raise UnitcadError("--write-baseline needs a file: --baseline FILE, or the key baseline of the settings")
     if base is not None:
@@ -96,18 +96,20 @@ def check(
 
         known = baselines.read(base) if base.exists() or not write_baseline else baselines.EMPTY
     options = replace(
-        _filters(found, select, ignore, extend_select),
-        unit=_unit("--unit", unit) if unit is not None else _unit(found.name("unit"), settings.unit),
-        printer=_printer("--printer", printer) if printer else _printer(found.name("printer"), settings.printer),
+        _filters(configuration, select, ignore, extend_select),
+        unit=_unit("--unit", unit) if unit is not None else _unit(configuration.name("unit"), settings.unit),
+        printer=_printer("--printer", printer)
+        if printer
+        else _printer(configuration.name("printer"), settings.printer),
         shells=shells,
         strict_3mf=bool(settings.strict_3mf if strict_3mf is None else strict_3mf),
-        limits=_limits(found, max_faces, timeout),
+        limits=_limits(configuration, max_faces, timeout),
         locations=detail.MOST if all_locations or base is not None or show is not None else detail.SHOWN,
         draw=show is not None,
     )
     if not files and manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
-    per_file = _per_file(found, options)
+    per_file = _per_file(configuration, options)
     check_all = partial(
         many_files.check_files, jobs=jobs, memory_mb=memory or settings.memory or 8000, then=_drawn(show)
     )
@@ -122,7 +124,7 @@ def check(
         sys.stdout.write(table)
     else:
         used = None if base is None else base.as_posix()
-        report = render(reports, output_format, fail_on, found.shown, used)
+        report = render(reports, output_format, fail_on, configuration.shown, used)
         _write(report, plain=output_format == "text")
         sys.stderr.write(table)
     raise typer.Exit(many_files.worst(reports, fail_on))
@@ -171,32 +173,32 @@ def _drawn(show: str | None) -> Callable[[FileReport], FileReport] | None:
 
 
 def _filters(
-    found: Configuration, select: list[str] | None, ignore: list[str] | None, extend_select: list[str] | None
+    configuration: Configuration, select: list[str] | None, ignore: list[str] | None, extend_select: list[str] | None
 ) -> Options:
     """Return the wanted codes: those of the command line, else those of the settings."""
     from unitcad.check import Options
     from unitcad.check.rules.registry import check_prefixes
 
-    settings = found.settings
+    settings = configuration.settings
     wanted = check_prefixes("--select", _split(select))
     if select is None and settings.select:
-        wanted = check_prefixes(found.name("select"), settings.select)
+        wanted = check_prefixes(configuration.name("select"), settings.select)
     unwanted = check_prefixes("--ignore", _split(ignore))
     if ignore is None and settings.ignore:
-        unwanted = check_prefixes(found.name("ignore"), settings.ignore)
+        unwanted = check_prefixes(configuration.name("ignore"), settings.ignore)
     extra = check_prefixes("--extend-select", _split(extend_select))
     return Options(select=wanted + extra if wanted else (), ignore=unwanted)
 
 
-def _per_file(found: Configuration, options: Options) -> Callable[[str], Options]:
+def _per_file(configuration: Configuration, options: Options) -> Callable[[str], Options]:
     """Return the options of a path: `options` without what the settings ignore for it."""
     from unitcad.check.rules.registry import check_prefixes
 
-    for pattern, codes in found.settings.per_file_ignores.items():
-        check_prefixes(found.name(f"per-file-ignores.{pattern}"), codes)
+    for pattern, codes in configuration.settings.per_file_ignores.items():
+        check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
 
     def chosen(path: str) -> Options:
-        return replace(options, unwanted=tuple(code.strip().upper() for code in found.ignored(path)))
+        return replace(options, unwanted=tuple(code.strip().upper() for code in configuration.ignored(path)))
 
     return chosen
 
@@ -215,11 +217,11 @@ def _printer(field: str, name: str | None) -> Printer | None:
     return catalogue.choose(field, name, catalogue.printers())
 
 
-def _limits(found: Configuration, max_faces: int | None, timeout: float | None) -> Limits:
+def _limits(configuration: Configuration, max_faces: int | None, timeout: float | None) -> Limits:
     from unitcad.check import Limits
 
-    field = "--timeout" if timeout is not None else found.name("timeout")
-    settings, default = found.settings, Limits()
+    field = "--timeout" if timeout is not None else configuration.name("timeout")
+    settings, default = configuration.settings, Limits()
     seconds = timeout or settings.timeout or default.seconds
     if not seconds < 1e7:
         raise Refusal(field, seconds, "must be a number of seconds below 1e7", default.seconds)

@@ -82,15 +82,15 @@ def find(named: str | None = None, *, wanted: bool = True) -> Configuration:
             raise UnitcadError("--config and --no-config exclude each other")
         return Configuration()
     if named is not None:
-        found = _read(Path(named))
-        if found is None:
+        configuration = _read(Path(named))
+        if configuration is None:
             raise UnitcadError(f"--config {named}: has no table [{_table(Path(named), {})}]")
-        return found
+        return configuration
     here = Path.cwd()
     for folder in (here, *here.parents):
         for name in NAMES:
-            if (folder / name).is_file() and (found := _read(folder / name)):
-                return found
+            if (folder / name).is_file() and (configuration := _read(folder / name)):
+                return configuration
     return Configuration()
 
 

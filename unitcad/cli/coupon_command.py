@@ -24,11 +24,11 @@ def coupon(
     chosen = catalogue.choose("PRINTER", printer, catalogue.printers())
     folder = write(chosen, out)
     if as_json:
-        found = {
+        fits = {
             fit.key: {"feature": fit.feature, "choose": fit.choose, "values_mm": list(fit.values_mm)}
             for fit in drawn.fits(chosen)
         }
-        print_json({"folder": str(folder), "printer": printer, "fits": found})
+        print_json({"folder": str(folder), "printer": printer, "fits": fits})
     else:
         typer.echo(drawn.to_markdown(chosen))
         typer.echo(str(folder))

@@ -46,15 +46,15 @@ def estimate(
     for spec in loaded:
         _warn_of_moulds(spec)
     if ":" in frequency:
-        found = [frequency_table_of_spec(spec, hertz, models) for spec in loaded]
+        estimates = [frequency_table_of_spec(spec, hertz, models) for spec in loaded]
     else:
-        found = [estimate_spec(spec, models, hertz[0] if hertz else None) for spec in loaded]
+        estimates = [estimate_spec(spec, models, hertz[0] if hertz else None) for spec in loaded]
     if as_json:
-        print_json(found[0] if len(found) == 1 else {"estimates": found})
+        print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates})
         return
     from unitcad.cli.estimate_tables import print_estimate, print_frequencies
 
-    for one in found:
+    for one in estimates:
         (print_frequencies if ":" in frequency else print_estimate)(one)
 
 

@@ -69,21 +69,21 @@ def _errors(data: dict[str, Any]) -> Table:
     """Tabulate each model's error against the measured values, beside the null model of two constants."""
     table = Table("model", "levels", "unit left out", "ratios", "worst", "directions", title="error against the table")
     for name in (*data["models"], "null"):
-        found = data["table_error"][name]
+        error = data["table_error"][name]
         table.add_row(
             name,
-            f"x {found['levels']['geometric_mean']:.2f}",
-            f"x {found['leave_one_unit_out']['levels']['geometric_mean']:.2f}",
-            f"x {found['ratios']['geometric_mean']:.2f}",
-            f"x {found['ratios']['worst']:.2f}",
-            f"{found['directions']['right']} of {found['directions']['of']}",
+            f"x {error['levels']['geometric_mean']:.2f}",
+            f"x {error['leave_one_unit_out']['levels']['geometric_mean']:.2f}",
+            f"x {error['ratios']['geometric_mean']:.2f}",
+            f"x {error['ratios']['worst']:.2f}",
+            f"{error['directions']['right']} of {error['directions']['of']}",
         )
     return table
 
 
 def _reasons(data: dict[str, Any]) -> list[str]:
-    found = [block["edge_level"].get("reason") for block in data["models"].values()]
-    return [reason for reason in dict.fromkeys(found) if reason]
+    reasons = [block["edge_level"].get("reason") for block in data["models"].values()]
+    return [reason for reason in dict.fromkeys(reasons) if reason]
 
 
 def _constraints(rows: list[dict[str, Any]]) -> Table:
@@ -130,11 +130,11 @@ def _curve(layered: dict[str, Any]) -> Table:
     return table
 
 
-def level(found: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) -> str:
+def level(quantity: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) -> str:
     """Format a value with its range, or the one of the two that there is."""
-    if not found:
+    if not quantity:
         return "-"
-    value, low, high = (None if found.get(k) is None else f"{found[k] * factor:.{digits}g}" for k in _PARTS)
+    value, low, high = (None if quantity.get(k) is None else f"{quantity[k] * factor:.{digits}g}" for k in _PARTS)
     spread = f"{low} to {high}" if low and high and low != high else ""
     if value:
         return f"{value} ({spread})" if spread else value

@@ -51,10 +51,10 @@ def _entries(kind: str) -> dict[str, Any]:
         from unitcad.check.rules.registry import rules
 
         return {code: rule.title for code, rule in rules().items()}
-    found = {"materials": catalogue.materials, "motors": catalogue.motors, "printers": catalogue.printers}[kind]()
+    entries = {"materials": catalogue.materials, "motors": catalogue.motors, "printers": catalogue.printers}[kind]()
     return {
         name: {key: value for key, value in msgspec.to_builtins(entry).items() if isinstance(value, dict)}
-        for name, entry in found.items()
+        for name, entry in entries.items()
     }
 
 

@@ -24,6 +24,6 @@ def schema(
     if kind not in KINDS:
         raise unknown_name("schema", kind, KINDS)
     model = AskedSpec if kind == "spec" else SweepFile
-    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(model)}
-    found["title"] = f"unitcad {kind}"
-    print_json(found)
+    document = {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(model)}
+    document["title"] = f"unitcad {kind}"
+    print_json(document)
