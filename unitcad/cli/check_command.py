@@ -158,8 +158,7 @@ def _run(
 
     listed = listing.read(manifest)
     work = listing.work(listed, paths, options, printer_named)
-    judged = list(check_all(work))
-    compared = [listing.compare(listed, report, options(report.path)) for report in judged]
+    compared = [listing.compare(listed, report, options(report.path)) for report in check_all(work)]
     return reports + compared + listing.unchecked(listed, [path for path, _ in work], options)
 
 

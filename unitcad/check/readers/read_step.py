@@ -78,7 +78,7 @@ def measure(path: str, out: str) -> None:
     from OCP.TopAbs import TopAbs_SOLID
     from OCP.TopExp import TopExp_Explorer
 
-    found: dict[str, Any] = {}
+    measures: dict[str, Any] = {}
     reader = STEPControl_Reader()
     if reader.ReadFile(path) == IFSelect_RetDone and reader.TransferRoots() >= 1:
         shape = reader.OneShape()
@@ -89,9 +89,9 @@ def measure(path: str, out: str) -> None:
         volume, area = GProp_GProps(), GProp_GProps()
         BRepGProp.VolumeProperties_s(shape, volume)
         BRepGProp.SurfaceProperties_s(shape, area)
-        found = {"valid": BRepCheck_Analyzer(shape).IsValid(), "solids": solids, "box": _box(shape)}
-        found |= {"volume": float(volume.Mass()), "area": float(area.Mass())}
-    Path(out).write_text(json.dumps(found, allow_nan=False), "utf-8")
+        measures = {"valid": BRepCheck_Analyzer(shape).IsValid(), "solids": solids, "box": _box(shape)}
+        measures |= {"volume": float(volume.Mass()), "area": float(area.Mass())}
+    Path(out).write_text(json.dumps(measures, allow_nan=False), "utf-8")
 
 
 def _box(shape: Any) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:

@@ -93,15 +93,15 @@ def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, tick: 
     left, right = edges.order[pairs] // 3, edges.order[pairs + 1] // 3
     both = thin[left] & thin[right]
     group = components(n, left[both], right[both])
-    found: list[Location] = []
+    places: list[Location] = []
     labels, first = np.unique(group[thin], return_index=True)
     for label in labels[np.argsort(first)][:_GROUPS]:
         tick()
         mine = np.flatnonzero(thin & (group == label))
         place = _whisker(vertices, faces[mine], solid, least)
         if place is not None:
-            found.append(Location(face=int(topology.kept[mine[0]]), xyz=place, region=topology.kept[mine]))
-    return found
+            places.append(Location(face=int(topology.kept[mine[0]]), xyz=place, region=topology.kept[mine]))
+    return places
 
 
 def _whisker(vertices: Floats, faces: Ints, solid: Manifold, least: float) -> tuple[float, float, float] | None:

@@ -90,7 +90,7 @@ def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float
     group = patch[owner[thin]]
     through = thin[marked[rays.across[thin]]]
     wall = components(n, patch[owner[through]], patch[rays.across[through]])
-    found: dict[int, tuple[float, Location]] = {}
+    thinnest: dict[int, tuple[float, Location]] = {}
     for label in np.unique(group):
         mine = thin[group == label]
         of = owner[mine]
@@ -102,8 +102,8 @@ def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float
         region = topology.kept[np.unique(of)]
         place = Location(face=int(topology.kept[owner[worst]]), xyz=xyz, region=region)  # type: ignore[arg-type]
         here = (float(thickness[worst]), place)
-        found[int(wall[label])] = min(here, found.get(int(wall[label]), here), key=lambda item: item[0])
-    return sorted(found.values(), key=lambda item: item[0])
+        thinnest[int(wall[label])] = min(here, thinnest.get(int(wall[label]), here), key=lambda item: item[0])
+    return sorted(thinnest.values(), key=lambda item: item[0])
 
 
 def _reach(cloud: Floats, lying: bool) -> float:

@@ -142,7 +142,7 @@ def _places(
     region: Callable[[int], tuple[Ints, tuple[float, float, float]]] | None = None,
 ) -> list[Location]:
     """List where pairs meet, no point twice, with both faces; first the one that was not named before."""
-    found: dict[tuple[int, ...], Location] = {}
+    by_place: dict[tuple[int, ...], Location] = {}
     named: set[int] = set()
     grid = 4 * max(float32_step(faces.vertices), 1e-300)
     listed = max(_LISTED, detail().locations)
@@ -153,13 +153,15 @@ def _places(
         x, y, z = common_point(a, b) or (sum(values) / 3 for values in zip(*a, strict=True))
         xyz = x + 0.0, y + 0.0, z + 0.0  # no -0
         near = tuple(round(v / grid) for v in xyz)
-        if near in found:
+        if near in by_place:
             continue
         first, second = (other, one) if one in named else (one, other)
         named.add(first)
         drawn, centre = region(at) if region else (None, None)
-        found[near] = Location(faces=(first, second), xyz=xyz, object=topology.mesh.name, region=drawn, centre=centre)
-    return sorted(found.values(), key=lambda place: place.face or 0)
+        by_place[near] = Location(
+            faces=(first, second), xyz=xyz, object=topology.mesh.name, region=drawn, centre=centre
+        )
+    return sorted(by_place.values(), key=lambda place: place.face or 0)
 
 
 def _along_edges(topology: Topology) -> Iterator[Finding]:
