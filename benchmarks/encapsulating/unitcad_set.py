@@ -7,12 +7,13 @@ from typing import Any
 
 from run_script import main
 
-from unitcad.pipeline import Variant, parts
+from unitcad.pipeline import Variant
+from unitcad.pipeline import bodies as body_files
 
 
 def make(n: dict[str, Any]) -> dict[str, Any]:
     """The variant and its bodies. The numbers are ignored: unitcad works them out of its spec."""
-    parts.forget()
+    body_files.forget()
     variant = Variant.of("encapsulating")
     return {"variant": variant, "bodies": (variant.unit, variant.plan.tools)}
 
@@ -22,9 +23,9 @@ def write(made: dict[str, Any], out: Path, formats: str) -> None:
     for name, bodies in zip(("unit", "moulds"), made["bodies"], strict=True):
         if formats in ("stl", "both"):
             for body in bodies:
-                (out / f"{body.name}.stl").write_bytes(parts.stl_content(variant, body))
+                (out / f"{body.name}.stl").write_bytes(body_files.stl_content(variant, body))
         if formats in ("step", "both"):
-            (out / f"{name}.step").write_bytes(parts.step_content(bodies, name))
+            (out / f"{name}.step").write_bytes(body_files.step_content(bodies, name))
 
 
 if __name__ == "__main__":

@@ -266,7 +266,7 @@ def test_a_design_that_is_not_there(tmp_path: Path) -> None:
     data = {**read("embedded"), "design": f"{tmp_path / 'no.py'}:unit"}
     with pytest.raises(UnitcadError, match="no such file"):
         from_data(data, tmp_path)
-    with pytest.raises(UnitcadError, match="only a design of one's own"):
+    with pytest.raises(UnitcadError, match="only a custom design"):
         from_data({**read("embedded"), "parameters": {"x": 1}})
 
 

@@ -14,7 +14,7 @@ from unitcad.batch.paths import known_paths
 from unitcad.batch.run import counted
 from unitcad.batch.sweep import Range, from_file, shipped
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.pipeline.geometry import geometry_key
+from unitcad.pipeline.geometry import build_key
 from unitcad.validation import read
 
 SOFT, STIFF = "ecoflex-00-10", "dragon-skin-30"
@@ -73,7 +73,7 @@ def test_shipped_sweeps_hold_what_they_say(name: str, count: int, geometries: in
     sweep = load_sweep(name)
     assert sweep.count == count
     specs = [sweep.spec(i) for i in range(count)]
-    assert len({geometry_key(spec, ("unit", "moulds"), True) for spec in specs}) == geometries
+    assert len({build_key(spec, ("unit", "moulds"), True) for spec in specs}) == geometries
     assert set(shipped()) == {"paper", "thickness", "all-materials"}
 
 

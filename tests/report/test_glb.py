@@ -13,7 +13,7 @@ import trimesh
 
 from unitcad.export import glb
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.pipeline.parts import glb_content
+from unitcad.pipeline.bodies import glb_content
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import box, cylinder
 from unitcad.validation import templates

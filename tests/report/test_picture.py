@@ -117,7 +117,7 @@ def test_build_goes_on_without_pictures_and_says_so(tmp_path: Path) -> None:
 
 def test_every_picture_of_the_encapsulating_unit() -> None:
     variant = Variant.of("encapsulating")
-    scenes = pictures(variant)
+    scenes = {path: scene() for path, scene in pictures(variant).items()}
     assert list(scenes) == ["unit.png", "moulds/exploded.png", "moulds/step1.png", "moulds/step2.png"]
     images = dict(zip(scenes, draw(list(scenes.values())), strict=True))
     blue, green = variant.unit[0].colour, variant.unit[1].colour

@@ -8,8 +8,9 @@ from typing import Any
 from unitcad.accuracy.result import Result, Say, Table
 from unitcad.accuracy.timing import interleaved, machine
 from unitcad.cache import MemoryStore
-from unitcad.pipeline import parts
-from unitcad.pipeline.build import OUTPUTS, make
+from unitcad.pipeline import bodies
+from unitcad.pipeline.artifacts import OUTPUTS
+from unitcad.pipeline.product import make
 from unitcad.pipeline.stages import Stages
 from unitcad.validation import load, templates
 
@@ -35,7 +36,7 @@ def run(quick: bool, say: Say) -> Result:
 
         def build(request: str, name: str = name, manifests: dict[str, Any] = manifests) -> None:
             only, formats, check = REQUESTS[request]
-            parts.forget()
+            bodies.forget()
             spec = load(name, [f"output.formats={list(formats)}"])
             manifests[request] = make(spec, only, check, MemoryStore(), Stages()).manifest
 

@@ -10,7 +10,7 @@ from unitcad.accuracy.timing import machine, timing
 from unitcad.cache import MemoryStore
 from unitcad.errors import Refusal
 from unitcad.mould_checks import mould_checks
-from unitcad.pipeline.build import make
+from unitcad.pipeline.product import make
 from unitcad.pipeline.stages import Stages
 from unitcad.validation import from_data
 

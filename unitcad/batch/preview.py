@@ -8,9 +8,9 @@ from unitcad.batch.sweep import Sweep
 from unitcad.cache import MemoryStore
 from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline import parts
-from unitcad.pipeline.build import checked_outputs, make, possible_outputs
-from unitcad.pipeline.geometry import geometry_key
+from unitcad.pipeline.bodies import body_key, groups
+from unitcad.pipeline.geometry import build_key
+from unitcad.pipeline.product import checked_outputs, make, possible_outputs
 from unitcad.pipeline.stages import Stages
 from unitcad.spec import Spec
 
@@ -40,7 +40,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
             refused.append(RefusedVariant(index, str(error)))
             continue
         accepted += 1
-        geometries.setdefault(geometry_key(spec, only, options.check), spec)
+        geometries.setdefault(build_key(spec, only, options.check), spec)
     if refused and not accepted:
         raise UnitcadError(f"every variant is refused, the first: {refused[0].reason}")
     share = count / looked
@@ -68,8 +68,8 @@ def _distinct_parts(specs: list[Spec], only: tuple[str, ...]) -> int:
     keys = set()
     for spec in specs:
         moulds = MouldSet(spec)
-        for group in parts.groups(moulds, possible_outputs(spec, only)):
-            keys |= {parts.key(moulds, body, "record") for body in group.bodies}
+        for group in groups(moulds, possible_outputs(spec, only)):
+            keys |= {body_key(moulds, body, "record") for body in group.bodies}
     return len(keys)
 
 

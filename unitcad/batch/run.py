@@ -25,9 +25,10 @@ from unitcad.batch.sweep import MOST, Sweep
 from unitcad.batch.task import Job, Task, VariantOutcome
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.pipeline.build import OUTPUTS, checked_outputs
+from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.folder import clear_leftovers, folder_name, whole
-from unitcad.pipeline.geometry import geometry_key
+from unitcad.pipeline.geometry import build_key
+from unitcad.pipeline.product import checked_outputs
 from unitcad.pipeline.versions import kernel_versions
 from unitcad.spec import to_json
 
@@ -207,7 +208,7 @@ class _Batch:
                 self.journal.add(JournalEntry(index=index, same_as=first, values=self.sweep.values(index)[1]))
                 self._finished(VariantOutcome(index, tasks.OK), fresh=False)
                 continue
-            key = geometry_key(spec, self.only, self.options.check)
+            key = build_key(spec, self.only, self.options.check)
             damaged = entry.manifest if entry else ""
             self.groups.setdefault(key, _Group()).jobs.append(Job(index, to_json(spec), damaged))
             self.waiting += 1

@@ -20,7 +20,9 @@ from unitcad.batch.row import row
 from unitcad.cache import Bundle, DiskStore, MemoryStore, digest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import folder as folders
-from unitcad.pipeline.build import Product, build_into, json_bytes, make, possible_outputs
+from unitcad.pipeline.build import build_into
+from unitcad.pipeline.json_text import json_bytes
+from unitcad.pipeline.product import Product, make, possible_outputs
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import code_version
 from unitcad.spec import Spec, custom_code, from_json

@@ -20,7 +20,7 @@ UNPRINTED = "Nothing of this tooling has been printed yet: every clearance is a 
 
 
 def files(found: Procedure) -> dict[str, str]:
-    """casting.md, casting.json and bom.csv."""
+    """Return casting.md, casting.json and bom.csv."""
     return {"casting.md": to_markdown(found), "casting.json": to_json(found), "bom.csv": to_csv(found.bill)}
 
 

@@ -83,7 +83,7 @@ def batch(
     from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json
     from unitcad.errors import Refusal
-    from unitcad.pipeline.build import OUTPUTS
+    from unitcad.pipeline.artifacts import OUTPUTS
     from unitcad.pipeline.folder import PAGE
 
     chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())

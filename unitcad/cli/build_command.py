@@ -36,7 +36,7 @@ def build(
     """Make a unit and its casting moulds. The last line printed is the folder."""
     from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json, progress
-    from unitcad.pipeline.build import OUTPUTS
+    from unitcad.pipeline.artifacts import OUTPUTS
     from unitcad.pipeline.build import build as run
     from unitcad.pipeline.folder import PAGE, held
     from unitcad.pipeline.slicing import slice_tools

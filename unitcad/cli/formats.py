@@ -6,7 +6,7 @@ from __future__ import annotations
 def chosen_formats(formats: str | None) -> list[str]:
     """Return what --formats overrides in a spec. Raises Refusal for an unknown format."""
     from unitcad.errors import unknown_name
-    from unitcad.pipeline.build import FORMATS
+    from unitcad.pipeline.artifacts import FORMATS
 
     if formats is None:
         return []

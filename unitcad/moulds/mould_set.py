@@ -13,7 +13,7 @@ from unitcad.designs import Design, Dimensions, design_named, unit_bodies
 from unitcad.moulds.plan import Plan, plan
 from unitcad.shape import Shape
 from unitcad.shape.body import Body
-from unitcad.spec import Spec, from_json, to_json
+from unitcad.spec import Spec, from_json, to_json, with_formats
 from unitcad.spec.asked import CastingTable
 from unitcad.spec.effective import Estimate
 
@@ -76,6 +76,11 @@ class MouldSet:
         return self.design.dimensions(self.spec)
 
     @cached_property
+    def geometry(self) -> str:
+        """What the geometry reads, as JSON: the spec without formats and without what is no shape."""
+        return to_json(with_formats(geometric(self.spec)))
+
+    @cached_property
     def unit(self) -> tuple[Body, ...]:
         """The bodies of the unit."""
         return unit_bodies(self.spec)
@@ -85,7 +90,7 @@ class MouldSet:
         """Tools and pours. Raises Refusal where the moulds can't be."""
         if self.altered:
             return self.altered
-        drawn = _drawn(to_json(geometric(self.spec)))
+        drawn = _drawn(self.geometry)
         poured = zip(drawn.steps, self.spec.layers, strict=True)
         return replace(drawn, steps=tuple(replace(step, material=layer.material) for step, layer in poured))
 

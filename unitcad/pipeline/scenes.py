@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -115,18 +116,19 @@ def _top(moulds: MouldSet, name: str) -> float:
     return _extent(moulds, name)[1]
 
 
-def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict[str, Scene]:
-    """The pictures of a variant by the path of their file: the unit cut open, the set taken apart, each pour in
-    section.
+def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict[str, Callable[[], Scene]]:
+    """Return what draws each picture of a variant, by the path of its file.
+
+    The unit cut open, the set taken apart, each pour in section.
     """
-    found: dict[str, Scene] = {}
+    drawn: dict[str, Callable[[], Scene]] = {}
     if "unit" in only:
-        found["unit.png"] = unit_cut_open(moulds)
+        drawn["unit.png"] = partial(unit_cut_open, moulds)
     if "moulds" in only:
-        found["moulds/exploded.png"] = exploded(moulds)
+        drawn["moulds/exploded.png"] = partial(exploded, moulds)
         for step in moulds.plan.steps:
-            found[f"moulds/step{step.index}.png"] = step_in_section(moulds, step.index)
-    return found
+            drawn[f"moulds/step{step.index}.png"] = partial(step_in_section, moulds, step.index)
+    return drawn
 
 
 def unit_cut_open(moulds: MouldSet) -> Scene:

@@ -1,4 +1,4 @@
-"""The viewer's data of a geometry: meshes as assembled, the moments of casting, where parts go when taken apart."""
+"""What the viewer shows of a geometry: meshes as assembled, the moments of casting, where parts go when taken apart."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 
 from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline.geometry import GEOMETRIC, geometry_key
-from unitcad.pipeline.parts import glb_content
+from unitcad.pipeline.artifacts import GEOMETRIC
+from unitcad.pipeline.bodies import glb_content
+from unitcad.pipeline.geometry import build_key
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
 from unitcad.spec import Spec, read_toml, with_formats
 from unitcad.validation import from_data
@@ -23,7 +24,7 @@ def spec_in(folder: Path) -> Spec:
 
 def model_key(spec: Spec) -> str:
     """Return the key of a geometry, without silicones and formats: sixteen hex digits."""
-    return geometry_key(with_formats(spec), GEOMETRIC, False)[:16]
+    return build_key(with_formats(spec), GEOMETRIC, False)[:16]
 
 
 def model(spec: Spec) -> dict[str, Any]:

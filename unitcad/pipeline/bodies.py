@@ -1,8 +1,7 @@
-"""The files of bodies: one content per body and format, keyed by what it depends on and nothing else."""
+"""The bodies of a variant as files hold them: in groups, as printable meshes, with their record and key."""
 
 from __future__ import annotations
 
-import os
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.moulds import mould_set
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.shape import Shape, content_hash
 from unitcad.shape.body import Body
@@ -23,86 +23,65 @@ from unitcad.shape.body import Body
 if TYPE_CHECKING:
     import numpy as np
 
-    from unitcad.moulds.mould_set import MouldSet
-
-MESH_FORMATS = ("stl", "3mf")
-
 
 @dataclass(frozen=True)
 class Group:
-    """Bodies that share a 3MF and a STEP file, and the folder of their own files."""
+    """Bodies that share a 3MF, a GLB and a STEP file (`together`), and the folder of their own files."""
 
     name: str  # unit | moulds
     bodies: tuple[Body, ...]
-    folder: str
     together: str
+
+    @property
+    def printed(self) -> tuple[Body, ...]:
+        """The bodies that have mesh files."""
+        return tuple(body for body in self.bodies if printed(body))
 
 
 def groups(moulds: MouldSet, only: Sequence[str]) -> list[Group]:
-    """The groups of bodies that `only` asks for."""
-    found = []
-    if "unit" in only:
-        found.append(Group("unit", moulds.unit, "unit", "unit"))
-    if "moulds" in only:
-        found.append(Group("moulds", moulds.plan.tools, "moulds", "moulds/moulds"))
-    return found
-
-
-def file_stem(body: Body) -> str:
-    """A body's file name without suffix: cups begin with their step, so that a folder lists them in order."""
-    return f"step{body.step}-cup" if body.kind == "cup" else body.name
+    """Return the groups of bodies that `only` asks for."""
+    found = [Group("unit", moulds.unit, "unit")] if "unit" in only else []
+    return [*found, Group("moulds", moulds.plan.tools, "moulds/moulds")] if "moulds" in only else found
 
 
 def printed(body: Body) -> bool:
-    """Whether a body has mesh files: what is cut from film or filament has none."""
+    """Tell whether a body has mesh files: what is cut from film or filament has none."""
     return body.role == "unit" or body.made == "printed"
 
 
-def key(moulds: MouldSet, body: Body, form: str) -> str:
-    """What a body's file depends on: tree, name, colour, attitude, resolution, format, version of code and kernels."""
+def file_stem(body: Body) -> str:
+    """Return a body's file name without suffix: cups begin with their step, so that a folder lists them in order."""
+    return f"step{body.step}-cup" if body.kind == "cup" else body.name
+
+
+def body_key(moulds: MouldSet, body: Body, form: str) -> str:
+    """Return what a body's file depends on: tree, name, colour, attitude, resolution, format, code and kernels."""
     return content_hash(
         body.shape, body.name, body.role, body.step, body.made, body.colour, body.upside_down, moulds.segments, form,
         code_version(), sorted(kernel_versions(()).items()),
     )  # fmt: skip
 
 
-def threemf_key(moulds: MouldSet, bodies: Sequence[Body]) -> str:
-    """What the 3MF of several bodies depends on."""
-    return _joint_key(moulds, bodies, "3mf", moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm)
-
-
-def glb_key(moulds: MouldSet, bodies: Sequence[Body]) -> str:
-    """What the GLB of several bodies depends on."""
-    return _joint_key(moulds, bodies, "glb")
-
-
-def step_key(moulds: MouldSet, bodies: Sequence[Body], name: str) -> str:
-    """What the STEP of several bodies depends on, its date among it."""
-    return _joint_key(
-        moulds, bodies, "step", name, os.environ.get("SOURCE_DATE_EPOCH"), sorted(kernel_versions(("step",)).items())
-    )
-
-
-def _joint_key(moulds: MouldSet, bodies: Sequence[Body], *more: object) -> str:
-    return digest(repr(([key(moulds, body, "") for body in bodies], more)).encode())
+def joint_key(moulds: MouldSet, bodies: Sequence[Body], *more: object) -> str:
+    """Return what a file of several bodies depends on."""
+    return digest(repr(([body_key(moulds, body, "") for body in bodies], more)).encode())
 
 
 def stl_content(moulds: MouldSet, body: Body) -> bytes:
-    """A body's STL."""
+    """Return a body's STL."""
     return stl.content(*_ready(moulds, body), body.name)
 
 
 def threemf_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
-    """The 3MF of several bodies, side by side on the spec's bed."""
+    """Return the 3MF of several bodies, side by side on the spec's bed."""
     from unitcad.export import threemf
 
     bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
-    parts = [threemf.MeshPart(b.name, b.colour, *_ready(moulds, b)) for b in bodies if printed(b)]
-    return threemf.content(parts, bed)
+    return threemf.content([threemf.MeshPart(b.name, b.colour, *_ready(moulds, b)) for b in bodies], bed)
 
 
 def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
-    """The GLB of several bodies as assembled; what is cut or bought is in it too."""
+    """Return the GLB of several bodies as assembled; what is cut or bought is in it too."""
     from unitcad.export import glb
 
     return glb.content(
@@ -114,7 +93,7 @@ def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
 
 
 def step_content(bodies: Sequence[Body], name: str) -> bytes:
-    """The STEP of an assembly. Raises UnitcadError without a B-rep extra."""
+    """Return the STEP of an assembly. Raises UnitcadError without a B-rep extra."""
     try:
         from unitcad.export import step
     except ImportError as error:
@@ -126,7 +105,7 @@ def step_content(bodies: Sequence[Body], name: str) -> bytes:
 
 
 def record(moulds: MouldSet, body: Body) -> dict[str, Any]:
-    """A body's entry in the manifest, without material and files."""
+    """Return a body's entry in the manifest, without material and files."""
     solid = moulds.mesh(body)
     return {
         "name": body.name,
@@ -139,20 +118,20 @@ def record(moulds: MouldSet, body: Body) -> dict[str, Any]:
     }
 
 
+def forget() -> None:
+    """Drop plans, meshes and their roundings that are kept for the next call: what a measurement of times needs."""
+    _rounded.cache_clear()
+    mould_set.forget()
+
+
 def _ready(moulds: MouldSet, body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """The mesh as it is written: its count of faces and both mesh formats come from one rounding."""
+    """Return the mesh as it is written: its count of faces and both mesh formats come from one rounding."""
     return _rounded(body.shape, moulds.segments, body.upside_down)
 
 
 @lru_cache(maxsize=64)
 def _rounded(shape: Shape, segments: int, upside_down: bool) -> tuple[np.ndarray, np.ndarray]:
     return print_ready(*arrays(realise(shape, segments)), upside_down)
-
-
-def forget() -> None:
-    """Drop plans, meshes and their roundings that are kept for the next call: what a measurement of times needs."""
-    _rounded.cache_clear()
-    mould_set.forget()
 
 
 def _round(value: float) -> float:
