@@ -55,7 +55,7 @@ class _Known:
 
 
 @dataclass(frozen=True)
-class Block:
+class EstimateBlock:
     """Variants from `start` on: edge levels by model (NaN: no number), and the input of each or why it is refused."""
 
     start: int
@@ -86,7 +86,7 @@ def write_estimates(sweep: Sweep, out: Path, options: BatchOptions) -> Summary:
     return summary
 
 
-def evaluate(sweep: Sweep, count: int) -> Iterator[Block]:
+def evaluate(sweep: Sweep, count: int) -> Iterator[EstimateBlock]:
     """Yield edge levels of variants 0 to `count`, a block at a time."""
     free = _free_axes(sweep)
     combinations: dict[int, _Known | UnitcadError] = {}
@@ -148,7 +148,7 @@ def _silicone(layer: Any) -> list[float]:
 
 def _block(
     sweep: Sweep, start: int, digits: np.ndarray, known: list[_Known | UnitcadError], free: list[int], values: dict
-) -> Block:
+) -> EstimateBlock:
     """Evaluate one block: the combinations' inputs, with the free axes' values put in."""
     levels: dict[str, np.ndarray] = {}
     by_layers: dict[int, list[int]] = {}
@@ -186,7 +186,7 @@ def _block(
             column = levels.setdefault(model, np.full(len(known), np.nan))
             asked = np.array([model in entry.models for entry in there])
             column[chosen] = np.where(asked & ~unknown, edge_levels(units, model), np.nan)
-    return Block(start, levels, known)
+    return EstimateBlock(start, levels, known)
 
 
 def _frequencies(sweep: Sweep, position: int, values: dict) -> np.ndarray | None:
@@ -214,7 +214,7 @@ def _free_value(sweep: Sweep, base: int, position: int, digit: int, values: dict
     return values[key]
 
 
-def _entries(sweep: Sweep, blocks: list[Block]) -> Iterator[JournalEntry]:
+def _entries(sweep: Sweep, blocks: list[EstimateBlock]) -> Iterator[JournalEntry]:
     for block in blocks:
         levels = {f"edge_{model}": column.tolist() for model, column in block.levels.items()}
         for row, known in enumerate(block.known):
@@ -234,7 +234,7 @@ def _rounded(level: float) -> float | None:
     return None if level != level else float(f"{level:.6g}")
 
 
-def _count(summary: Summary, blocks: list[Block]) -> None:
+def _count(summary: Summary, blocks: list[EstimateBlock]) -> None:
     summary.done = sum(len(block.known) for block in blocks)
     failed = [
         tasks.failure(block.start + row, entry)

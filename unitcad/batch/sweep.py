@@ -76,7 +76,7 @@ class SweepTable(Struct, frozen=True):
     cases: tuple[dict[str, Any], ...] = ()
 
 
-class Case(Struct, frozen=True):
+class CaseKeys(Struct, frozen=True):
     """Keys of a case that are no paths: its base where it is not the file's first one, a name for its folder."""
 
     base: str | None = None
@@ -205,7 +205,7 @@ def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
     """Return a validated sweep of a sweep file's data; `folder` is where its relative paths start."""
     file = convert(data, SweepFile)
     table, values = _parted(file.sweep, SweepTable, "sweep")
-    typed = [_parted(case, Case, f"sweep.cases.{i}") for i, case in enumerate(table.cases)]
+    typed = [_parted(case, CaseKeys, f"sweep.cases.{i}") for i, case in enumerate(table.cases)]
     named = [file.base] if isinstance(file.base, str) else list(file.base)
     named += [case.base for case, _ in typed if case.base is not None]
     bases: dict[str, dict[str, Any]] = {}
