@@ -107,11 +107,11 @@ def test_a_circle_of_files_is_seen() -> None:
     assert _circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == {}
 
 
-@pytest.mark.parametrize(("room", "least"), [("check", 40), ("cli", 15), ("batch", 10), ("report", 5)])
-def test_no_files_of_a_room_import_each_other_in_a_circle(room: str, least: int) -> None:
-    graph = _file_imports(PACKAGE / room)
-    assert len(graph) > least
+def test_no_files_import_each_other_in_a_circle() -> None:
+    graph = _file_imports(PACKAGE)
+    assert len(graph) > 250
     assert graph.keys() >= set().union(*graph.values()) != set()
+    del graph["__init__.py"]  # it loads its names on first use, and holds the version
     assert _circles(graph) == {}
 
 
@@ -137,15 +137,39 @@ def test_the_rooms_of_check_import_one_way() -> None:
             assert room == "__init__" or level[room] < level[other], f"{file} imports {other}"
 
 
-@pytest.mark.parametrize("room", ["check", "cli", "batch", "report"])
-def test_no_file_of_a_room_has_the_name_of_another_file(room: str) -> None:
+def test_no_file_has_the_name_of_another_file() -> None:
     names = Counter(file.name for file in PACKAGE.rglob("*.py") if file.name != "__init__.py")
-    assert [file.name for file in (PACKAGE / room).rglob("*.py") if names[file.name] > 1] == []
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 def test_no_file_is_past_400_lines() -> None:
-    long = {str(f.relative_to(PACKAGE)): n for f in PACKAGE.rglob("*.py") if (n := f.read_text().count("\n")) > 410}
+    long = {str(f.relative_to(PACKAGE)): n for f in PACKAGE.rglob("*.py") if (n := f.read_text().count("\n")) > 400}
     assert long == {}
+
+
+def test_no_design_is_named_outside_its_own_file() -> None:
+    """Names of templates may be written where one is loaded, not compared. The studies are of the templates."""
+    named = []
+    for file in PACKAGE.rglob("*.py"):
+        room = file.relative_to(PACKAGE).parts[0]
+        if room in ("designs", "accuracy", "attenuation"):
+            continue
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(node, ast.Compare):
+                words = [n.value for n in ast.walk(node) if isinstance(n, ast.Constant)]
+                named += [f"{file.name}:{node.lineno}" for word in words if word in ("embedded", "encapsulating")]
+    assert named == []
+
+
+def test_no_piece_is_recognised_by_its_name() -> None:
+    kinds = ("base", "cup", "lid", "tongue", "stub", "blade", "layer", "wire", "motor")
+    found = []
+    for file in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "startswith":
+                words = [n.value for n in ast.walk(node) if isinstance(n, ast.Constant)]
+                found += [f"{file.name}:{node.lineno}" for word in words if word in kinds]
+    assert found == []
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from unitcad.designs import limits
 from unitcad.designs.design import Design
 from unitcad.designs.dimensions import MOTOR_CLEARANCE, Dimensions, Exit, concentric, wire_exit
 from unitcad.designs.parts import slots
-from unitcad.designs.strain import allowed_strain, pad_strain, tail_strain, widest_tail_end
+from unitcad.designs.stretch import allowed_strain, pad_strain, tail_strain, widest_tail_end
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
 from unitcad.spec import Spec

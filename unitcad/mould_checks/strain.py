@@ -14,7 +14,7 @@ import manifold3d
 from manifold3d import CrossSection, Manifold
 
 from unitcad import catalogue
-from unitcad.designs.strain import allowed_strain, tail_strain
+from unitcad.designs.stretch import allowed_strain, tail_strain
 from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_most

@@ -15,7 +15,7 @@ from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import index_in
-from unitcad.validation.effective import effective
+from unitcad.validation.defaults import effective
 from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
 
 _MOST_LIMITS = 5
