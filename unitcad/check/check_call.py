@@ -9,8 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from unitcad import notebook
-from unitcad.catalogue import Printer, choose, printers
 from unitcad.check.findings import FileReport, Finding
 from unitcad.check.options import Options
 from unitcad.check.resource_limits import Limits
@@ -18,6 +16,8 @@ from unitcad.check.units import unit_named
 from unitcad.errors import Refusal, UnitcadError
 
 if TYPE_CHECKING:
+    from unitcad.catalogue import Printer
+
     StrPath = str | os.PathLike[str]
 
 _MOST = 1e9
@@ -56,6 +56,8 @@ class CheckResult:
         return f"CheckResult({files} {'file' if files == 1 else 'files'}: {self.verdict}{found})"
 
     def _repr_html_(self) -> str:
+        from unitcad import notebook
+
         rows: list[tuple[object, ...]] = []
         for report in self.reports:
             if not report.findings:
@@ -88,6 +90,10 @@ def check(
     from unitcad.check import many_files
     from unitcad.check.rules.registry import check_prefixes
 
+    if isinstance(printer, str):
+        from unitcad.catalogue import choose, printers
+
+        printer = choose("printer", printer, printers())
     if not files:
         raise UnitcadError("check needs a file, a folder or a glob")
     for field, value, least in (("max_faces", max_faces, 1), ("timeout", timeout, 0.001), ("jobs", jobs, 1)):
@@ -98,7 +104,7 @@ def check(
         select=check_prefixes("select", _listed(select)),
         ignore=check_prefixes("ignore", _listed(ignore)),
         unit=unit_named("unit", unit),
-        printer=choose("printer", printer, printers()) if isinstance(printer, str) else printer,
+        printer=printer,
         shells=shells,
         strict_3mf=strict_3mf,
         limits=replace(
