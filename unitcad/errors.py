@@ -20,6 +20,10 @@ class UnitcadError(Exception):
         return {"message": str(self)}
 
 
+class Missing(UnitcadError):
+    """Something that this machine or installation lacks: a library of an extra, a folder that only a clone has."""
+
+
 class Refusal(UnitcadError):
     """A value that can't be: which field, its value, the limit it breaks and the nearest accepted value.
 

@@ -1,7 +1,7 @@
 """Surface compliance against 60-digit values, exact identities and refusals."""
 
 import json
-from pathlib import Path
+from importlib.resources import files
 
 import layered_mp
 import mpmath as mp
@@ -14,7 +14,7 @@ from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.errors import Refusal
 
-CASES = json.loads((Path(__file__).parent / "references" / "compliance.json").read_text())
+CASES = json.loads((files("unitcad.accuracy") / "references" / "compliance.json").read_text("utf-8"))
 LIMIT = 1e-13
 
 

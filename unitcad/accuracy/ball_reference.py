@@ -22,7 +22,7 @@ from scipy import special
 from unitcad.attenuation.layered.loads import Load, Point
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
-from unitcad.errors import UnitcadError
+from unitcad.errors import Missing
 
 BITS = 320
 _DEGREE = 16
@@ -88,8 +88,9 @@ class Kernel:
     def __init__(self, medium: LayeredMedium, omega: float, z: float) -> None:
         try:
             import flint
+            import mpmath  # noqa: F401 - of the static radial disc
         except ImportError:
-            raise UnitcadError("the independent reference needs python-flint: pip install 'unitcad[test]'") from None
+            raise Missing("the reference needs python-flint and mpmath: pip install 'unitcad[test]'") from None
         self.flint, self.omega, self.z, self.count = flint, omega, z, 0
         self.least_loss, self.slowest = math.inf, 0.0
         flint.ctx.prec = BITS

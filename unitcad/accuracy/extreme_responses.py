@@ -15,7 +15,7 @@ from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import Damping, KelvinVoigt, LossFactor
 
 TOLERANCES = (0.1, 1e-3, 1e-5, 1e-7, 1e-9)
-LEAST_GAIN = 1.2
+LEAST_GAIN = 1.25
 """A tighter rtol's bound over a looser one's is at most that: above 1 only where neither is met, since the panels that
 can be afforded are then spent a little differently, or rounding next to the poles is met at other wavenumbers.
 """

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import block_diag, csc_matrix, vstack
 from scipy.sparse.linalg import splu
 
-from unitcad.errors import UnitcadError
+from unitcad.errors import Missing
 
 if TYPE_CHECKING:
     from skfem import Basis
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 try:
     import skfem
 except ImportError as error:  # pragma: no cover - depends on the installation
-    raise UnitcadError("finite elements need scikit-fem: pip install 'unitcad[fem]'") from error
+    raise Missing("finite elements need scikit-fem: pip install 'unitcad[fem]'") from error
 
 SIZE, GROWTH, LARGEST = 1e-3, 0.3, 4e-3
 """The mesh of fineness 1: an element's size at corners of the geometry (m), what it gains for every length away from

@@ -15,8 +15,19 @@ from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Result, Say, from_dict, markdown
 from unitcad.errors import Refusal, UnitcadError
 
-SUITES = ("tessellation", "kernels", "moulds", "hankel", "stability", "models", "extremes", "left-out", "speed")
-"""In the order of the page; a suite is the module of that name, with one function `run(quick, say)`."""
+MODULES = {
+    "tessellation": "tessellation",
+    "kernels": "kernel_agreement",
+    "moulds": "mould_margins",
+    "hankel": "hankel",
+    "stability": "stability",
+    "models": "edge_levels",
+    "extremes": "extremes",
+    "left-out": "left_out",
+    "speed": "speed",
+}
+"""Suites in the order of the page, and the module of each, with one function `run(quick, say)`."""
+SUITES = tuple(MODULES)
 
 JOURNAL = Path("out") / "extremes.jsonl"
 """What a study of the extremes has judged, so that it can be taken up again."""
@@ -40,7 +51,7 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def run(name: str, quick: bool, say: Say, specs: int | None = None) -> Result:
-    """One suite's result. Raises UnitcadError without an extra that it needs.
+    """Return one suite's result. Raises Missing without an extra or a folder that it needs.
 
     `specs`: how many of the extremes; that study keeps a journal in out/ and is taken up again from it.
     """
@@ -48,7 +59,7 @@ def run(name: str, quick: bool, say: Say, specs: int | None = None) -> Result:
         from unitcad.accuracy.extremes import study
 
         return replace(study(specs, say, journal=JOURNAL), options=f"--specs {specs}")
-    result: Result = import_module(f"unitcad.accuracy.{name.replace('-', '_')}").run(quick, say)
+    result: Result = import_module(f"unitcad.accuracy.{MODULES[name]}").run(quick, say)
     return replace(result, options="--quick" if quick else "")
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from unitcad.accuracy.measures import mesh_volume
 from unitcad.accuracy.result import Promise, Result, Say, Table
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
-from unitcad.errors import UnitcadError
+from unitcad.errors import Missing, UnitcadError
 from unitcad.pipeline import Variant
 
 ROOT = Path(__file__).parents[2]
@@ -36,7 +36,7 @@ def run(quick: bool, say: Say) -> Result:
     """Cold and warm, STL and STEP; then the other benchmarks as they print themselves."""
     folder = ROOT / "benchmarks" / "encapsulating"
     if not folder.is_dir():
-        raise UnitcadError("the speed suite needs benchmarks/: run it in a clone of the repository")
+        raise Missing("the speed suite needs benchmarks/: run it in a clone of the repository")
     rounds, warm = (1, 1) if quick else (7, 5)
     with tempfile.TemporaryDirectory() as scratch:
         out = Path(scratch)

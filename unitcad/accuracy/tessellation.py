@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -209,9 +208,8 @@ def _ways(shape: Shape, radius: float, tolerance: float) -> dict[str, Callable[[
         return _Mesh(*mesh.arrays(mesh.realise(shape, mesh.segment_count(radius, tolerance))))
 
     def plain() -> _Mesh:
-        with _inscribed():
-            made = _Mesh(*mesh.arrays(mesh.realise(shape, _inscribed_count(radius, tolerance))))
-        return made
+        mesh.forget()
+        return _Mesh(*mesh.arrays(mesh.realise(shape, _inscribed_count(radius, tolerance), swell=1.0)))
 
     return {
         _TRUE: area_true,
@@ -219,19 +217,6 @@ def _ways(shape: Shape, radius: float, tolerance: float) -> dict[str, Callable[[
         "build123d": lambda: _by_build123d(shape, tolerance),
         "CadQuery": lambda: _by_cadquery(shape, tolerance),
     }
-
-
-@contextlib.contextmanager
-def _inscribed() -> Iterator[None]:
-    """Circles drawn through their own points: the peer that the area-true polygons are measured against."""
-    kept = mesh.area_true
-    mesh.forget()
-    mesh.area_true = lambda segments: 1.0
-    try:
-        yield
-    finally:
-        mesh.area_true = kept
-        mesh.forget()
 
 
 def _inscribed_count(radius: float, tolerance: float) -> int:

@@ -26,11 +26,14 @@ def accuracy(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
-    """Compute the tables of error against run time. Exit 1 when an error exceeds its promise."""
+    """Compute the tables of error against run time. Exit 1 when an error exceeds its promise.
+
+    Without a SUITE, those that need what this installation lacks are left out, each with the reason.
+    """
     from unitcad.accuracy import runner
     from unitcad.accuracy.result import markdown
     from unitcad.cli.output import print_json, progress
-    from unitcad.errors import Refusal
+    from unitcad.errors import Missing, Refusal
 
     names = runner.chosen(suites or [])
     if specs is not None and names != ("extremes",):
@@ -38,6 +41,7 @@ def accuracy(
     if specs is not None and quick:
         raise Refusal("--quick", "set", "does not go with --specs, which says how many; leave one out")
     results = []
+    left_out: dict[str, str] = {}
     folder = out if out is not None or quick else Path("docs")
     if folder is not None:
         runner.ready(folder)
@@ -46,6 +50,11 @@ def accuracy(
         try:
             with progress(name) as say:
                 result = runner.run(name, quick, say, specs)
+        except Missing as missing:
+            if suites:
+                raise
+            left_out[name] = str(missing)
+            continue
         except KeyboardInterrupt:
             if specs is not None:
                 typer.echo(f"{runner.JOURNAL} keeps the finished specs; the same command resumes", err=True)
@@ -56,7 +65,9 @@ def accuracy(
         if not as_json:
             typer.echo(markdown(result))
     if as_json:
-        print_json({"suites": [result.as_dict() for result in results]})
+        print_json({"suites": [result.as_dict() for result in results], "left_out": left_out})
+    for name, reason in left_out.items():
+        typer.echo(f"{name}: left out: {reason}", err=True)
     broken = [(result.suite, promise) for result in results for promise in result.promises if not promise.ok]
     for suite, promise in broken:
         typer.echo(f"{suite}: {promise.what}: {promise.value:g}, promised {promise.limit:g}", err=True)

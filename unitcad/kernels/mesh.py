@@ -36,17 +36,20 @@ def area_true(segments: int) -> float:
     return math.sqrt(step / math.sin(step))
 
 
-def realise(shape: Shape, segments: int) -> Manifold:
-    """The solid of `shape`, every full turn in `segments` sides; revolved radii are area-true, so mating ones mate."""
-    return _realise(shape, segments)
+def realise(shape: Shape, segments: int, swell: float | None = None) -> Manifold:
+    """Return the solid of `shape`, every full turn in `segments` sides.
+
+    swell: factor on the radii of what is revolved. By default they are area-true, so mating ones mate; 1 puts a
+    polygon's corners on the circle.
+    """
+    return _realise(shape, segments, area_true(segments) if swell is None else swell)
 
 
 @lru_cache(maxsize=512)
-def _realise(shape: Shape, segments: int) -> Manifold:
+def _realise(shape: Shape, segments: int, swell: float) -> Manifold:
     match shape:
         case Revolve(profile):
             # Scaled after revolving: CrossSection rounds to a grid that the scaled radii would not lie on.
-            swell = area_true(segments)
             return Manifold.revolve(CrossSection([points(profile, segments)]), segments).scale((swell, swell, 1.0))
         case Extrude(profile, z0, z1, holes, None):
             loops = [points(profile, segments), *(points(hole, segments)[::-1] for hole in holes)]
@@ -54,18 +57,20 @@ def _realise(shape: Shape, segments: int) -> Manifold:
         case Extrude(profile, z0, z1, _, Profile() as top):
             return _taper(points(profile, segments), points(top, segments), z0, z1)
         case Union(parts):
-            return Manifold.batch_boolean([_realise(part, segments) for part in parts], manifold3d.OpType.Add)
+            return Manifold.batch_boolean([_realise(part, segments, swell) for part in parts], manifold3d.OpType.Add)
         case Cut(body, tools):
-            bodies = [_realise(body, segments), *(_realise(tool, segments) for tool in tools)]
+            bodies = [_realise(body, segments, swell), *(_realise(tool, segments, swell) for tool in tools)]
             return Manifold.batch_boolean(bodies, manifold3d.OpType.Subtract)
         case Common(parts):
-            return Manifold.batch_boolean([_realise(part, segments) for part in parts], manifold3d.OpType.Intersect)
+            return Manifold.batch_boolean(
+                [_realise(part, segments, swell) for part in parts], manifold3d.OpType.Intersect
+            )
         case Component(inner, at):
-            return component(_realise(inner, segments), at)
+            return component(_realise(inner, segments, swell), at)
         case Below(inner, bottom):
-            return _below(_realise(inner, segments), bottom)
+            return _below(_realise(inner, segments, swell), bottom)
         case Place(inner, turn, move):
-            return _realise(inner, segments).transform(np.column_stack([turn, move]))
+            return _realise(inner, segments, swell).transform(np.column_stack([turn, move]))
     raise TypeError(f"not a shape: {shape!r}")
 
 

@@ -11,7 +11,7 @@ import importlib.metadata
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from unitcad.errors import UnitcadError
+from unitcad.errors import Missing
 
 WHEEL_VERSION = "7.9.3.1.1"
 WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")
@@ -23,7 +23,7 @@ def loading(library: str) -> Iterator[None]:
     try:
         yield
     except (ImportError, AttributeError) as error:
-        raise UnitcadError(advice(library, error, installed_wheels())) from error
+        raise Missing(advice(library, error, installed_wheels())) from error
 
 
 def installed_wheels() -> dict[str, str]:

@@ -13,6 +13,7 @@ from pathlib import Path
 import mpmath as mp
 
 HERE = Path(__file__).parent
+OUT = HERE.parents[2] / "unitcad" / "accuracy" / "references"
 sys.path.insert(0, str(HERE.parent))
 
 from layered_mp import Body, compliance, condition  # noqa: E402
@@ -78,7 +79,7 @@ def main() -> None:
                 }
             )
     text = ",\n".join(json.dumps(case) for case in cases)
-    (HERE / "compliance.json").write_text(f"[\n{text}\n]\n")
+    (OUT / "compliance.json").write_text(f"[\n{text}\n]\n")
 
 
 if __name__ == "__main__":

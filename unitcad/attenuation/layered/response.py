@@ -130,14 +130,14 @@ def _solve_lossless(bare: _Problem, end: float, rtol: float) -> _Found:
     """The limit of a loss that goes to 0: a polynomial through six small losses.
 
     What one of a degree less would give differs by the error. Waves decay little over the distance at these losses;
-    next to a frequency at which a wave is cut off the displacement changes sooner, and smaller ones are tried. The
-    first is not so small that rounding next to the poles outweighs the polynomial's error: a smaller rtol then gives
-    the same.
+    next to a frequency at which a wave is cut off the displacement changes sooner, and smaller ones are tried. Where
+    rounding next to the poles outweighs the polynomial's error, which it about does at the least of the first ones,
+    larger ones are tried.
     """
     phase = max(1.0, end * (float(bare.r.max()) + bare.load.reach))
     by_rounding = (80.0 * _ROUNDING * phase / 2.0) ** (1.0 / 6.0)
     loss = min(0.02, 2.0 * max((0.3 * rtol) ** 0.2, by_rounding) / phase)
-    best, count = None, 0
+    best, count, before = None, 0, None
     for _ in range(_MOST_ATTEMPTS):
         wanted = max(0.008 * rtol, 2.0 * _ROUNDING / loss)
         found = [
@@ -150,9 +150,12 @@ def _solve_lossless(bare: _Problem, end: float, rtol: float) -> _Found:
         count += sum(one.wavenumbers for one in found)
         if best is None or np.max(integrals + limit) < np.max(best.error):
             best = replace(found[0], total=total, error=integrals + limit)
-        if np.max(best.error) <= rtol * np.max(np.abs(best.total)) or np.max(integrals) > np.max(limit):
+        if np.max(best.error) <= rtol * np.max(np.abs(best.total)):
             break
-        loss /= 30.0
+        rounded = np.max(integrals) > np.max(limit)
+        if before not in (None, rounded):
+            break
+        before, loss = rounded, loss * (3.0 if rounded else 1.0 / 30.0)
     assert best is not None
     return replace(best, wavenumbers=count)
 

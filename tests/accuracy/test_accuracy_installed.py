@@ -1,0 +1,69 @@
+"""The studies outside a clone: what this installation lacks is left out with its reason, the rest runs."""
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from unitcad.accuracy import runner
+from unitcad.accuracy.result import Result
+from unitcad.cli.accuracy_command import accuracy
+from unitcad.errors import Missing
+
+CLONE = Path(__file__).parents[2]
+
+
+def test_what_is_missing_is_left_out_with_its_reason(monkeypatch, capsys):
+    def run(name, quick, say, specs):
+        if name in ("speed", "models"):
+            raise Missing(f"{name} needs what is not here")
+        return Result(name, name, "", (), (), (), {})
+
+    monkeypatch.setattr(runner, "run", run)
+    accuracy(quick=True, as_json=True)
+    shown = capsys.readouterr()
+    data = json.loads(shown.out)
+    assert [suite["suite"] for suite in data["suites"]] == [n for n in runner.SUITES if n not in ("speed", "models")]
+    assert data["left_out"] == {name: f"{name} needs what is not here" for name in ("models", "speed")}
+    assert "speed: left out: speed needs what is not here" in shown.err
+
+
+def test_a_suite_that_is_named_and_lacks_something_is_an_error(monkeypatch):
+    def run(name, quick, say, specs):
+        raise Missing("needs what is not here")
+
+    monkeypatch.setattr(runner, "run", run)
+    with pytest.raises(Missing):
+        accuracy(["speed"], quick=True)
+
+
+@pytest.mark.long
+def test_a_wheel_runs_outside_the_clone(tmp_path):
+    """Without anything of tests/ or benchmarks/: the 60-digit references are in it, speed is left out."""
+    pip = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--quiet", "-w", str(tmp_path)]
+    if subprocess.run([sys.executable, "-c", "import hatchling"], check=False, capture_output=True).returncode:
+        pytest.skip("needs hatchling")
+    subprocess.run([*pip, str(CLONE)], check=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as packed:
+        names = packed.namelist()
+        packed.extractall(tmp_path / "site")
+    assert "unitcad/accuracy/references/compliance.json" in names
+    assert not [name for name in names if name.startswith(("tests", "benchmarks"))]
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import unitcad; assert unitcad.__file__.startswith(sys.argv[1]), unitcad.__file__\n"
+        "from unitcad.accuracy import runner, stability\n"
+        "from unitcad.errors import Missing\n"
+        "assert len(stability.cases()) == 450\n"
+        "try: runner.run('speed', True, print)\n"
+        "except Missing as missing: print(missing)\n"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    command = [sys.executable, "-c", code, str(tmp_path / "site")]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert "speed suite needs benchmarks/" in done.stdout
