@@ -117,7 +117,7 @@ def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rto
         found = solve(_Problem(medium, load, omega, flat, z, None), end, rtol)
     u, error = found.total.reshape(2, *radii.shape), found.error.reshape(2, *radii.shape)
     if not (np.all(np.isfinite(u)) and np.all(np.isfinite(error))):
-        raise UnitcadError(f"no finite answer at omega = {omega:g} rad/s: a number overflows on the way")
+        raise _overflow(omega)
     return Response(u[0][()], u[1][()], error[0][()], error[1][()], found.wavenumbers)
 
 
@@ -182,6 +182,10 @@ def _solve(bare: _Problem, end: float, rtol: float) -> _Found:
             break
     assert best is not None
     return replace(best, wavenumbers=count)
+
+
+def _overflow(omega: float) -> UnitcadError:
+    return UnitcadError(f"no finite answer at omega = {omega:g} rad/s: a number overflows on the way")
 
 
 def _check_size(end: float, span: float, omega: float) -> None:
@@ -298,6 +302,8 @@ def _integrate(bare: _Problem, end: float, rtol: float, largest: float) -> _Foun
     pending = _graded(_panels(end, stop, span), materials)
     for _ in range(_MAX_ROUNDS):
         parts, errors, absolute, gains = _evaluate(problem, pending)
+        if not np.all(np.isfinite(parts)):
+            raise _overflow(bare.omega)
         count += pending.shape[0] * _NODES.size
         scale = min(float(np.max(np.abs(known + total + parts.sum(0)))) or 1.0, largest)
         done += pending.shape[0]
