@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
+import pytest
+from faulty_sets import broken, of_spec
+
+from unitcad.errors import Refusal
+from unitcad.kernels.mesh import realise
+from unitcad.mould_checks import check_moulds, mould_checks
+from unitcad.moulds.complement import complement
+from unitcad.moulds.cup import cup_blank
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import cast_layers
 from unitcad.pipeline.build import Built, build
+from unitcad.shape import Shape
 from unitcad.validation import load
 
 SPEC = """
@@ -47,3 +59,119 @@ def test_overlaps_inside_the_unit_are_errors_without_moulds_too(tmp_path: Path) 
     whole = built(tmp_path, code.replace("2.11", "2.0"), circuit="[fpcb]\nthickness_mm = 0.11\n")
     assert whole.ok
     assert [law["code"] for law in whole.manifest["laws"]] == ["C200"]
+
+
+LUGS = """
+def unit(spec):
+    roof, top = spec.motor.thickness_mm, spec.motor.thickness_mm + 2.5
+    inner = Extrude(rounded_rectangle(7, 6, 2), 0, roof + 1.25)
+    slots = [moved(box(-1, 1, -3, 3, -1, top + 1), x) for x in (-12.5, 12.5)]
+    lugs = Extrude(rounded_rectangle(15, HALF, 2), LOW, HIGH)
+    body = union((Extrude(rounded_rectangle(8.25, 7.25, 2.5), 0, top), lugs))
+    return {"layer1": cut(inner, [cylinder(4.2, -1, roof)]), "layer2": cut(body, [cut(inner, []), *slots])}
+"""
+
+
+def lugs(half: float = 4.5, low: float = 3.0, high: float = 4.5) -> str:
+    """A rounded rectangle with a lug and a strap slot on two sides."""
+    return LUGS.replace("HALF", str(half)).replace("LOW", str(low)).replace("HIGH", str(high))
+
+
+def moulds_of(folder: Path, code: str, *overrides: str, layers: int = 1) -> MouldSet:
+    """Return the mould set of a custom design."""
+    return of_spec(load(written(folder, code, layers=layers), overrides))
+
+
+def test_cup_base_layers_and_seals_fill_the_block(tmp_path: Path) -> None:
+    moulds = moulds_of(tmp_path, lugs(), layers=2)
+    spec, lay, drawn = moulds.spec, moulds.plan.layout, complement(moulds.spec, cast_layers(moulds.spec))
+    depths = {1: 0.0, 2: spec.moulds.groove_depth_mm}  # the supports' holes leave cup 1 no room for a groove
+    inner = drawn.dims.radii[1] + spec.moulds.land_mm
+    ring_area = math.pi * ((inner + spec.moulds.groove_width_mm) ** 2 - inner**2)
+    for step in moulds.plan.steps:
+
+        def volume(shape: Shape, top: float = step.rim) -> float:
+            solid = realise(shape, moulds.segments).trim_by_plane((0, 0, 1), 0.0)
+            return solid.trim_by_plane((0, 0, -1), -top).volume()
+
+        parts = [drawn.cups[step.index - 1], drawn.base, *drawn.seals[step.index - 1], *step.layer, *step.earlier]
+        block = volume(cup_blank(spec, lay, step.rim)) - depths[step.index] * ring_area
+        assert sum(map(volume, parts)) == pytest.approx(block, rel=1e-4)
+        assert volume(drawn.seals[step.index - 1][0]) > 1
+    assert len(moulds.solids["base"].trim_by_plane((0, 0, 1), 0.01).decompose()) == 3  # a core and two supports
+
+
+@pytest.mark.parametrize("overrides", [[], ["moulds.cavities=[2,1]"], ["moulds.printer=fdm-0.25"]])
+def test_strap_lugs_keep_every_check(tmp_path: Path, overrides: list[str]) -> None:
+    found = check_moulds(moulds_of(tmp_path, lugs(), *overrides, layers=2))
+    assert [finding for finding in found if not finding.ok] == []
+    assert {finding.code for finding in found} == set(mould_checks())
+
+
+def test_lugs_at_the_skin_hold_air(tmp_path: Path) -> None:
+    assert broken(moulds_of(tmp_path, lugs(low=0.0, high=1.5), layers=2)) == {"C400"}
+
+
+def test_a_support_with_a_knife_edge_has_no_clearance(tmp_path: Path) -> None:
+    """Lugs as wide as the body meet its round corner in an edge without thickness."""
+    assert broken(moulds_of(tmp_path, lugs(half=7.25), layers=2)) == {"C210"}
+
+
+def test_a_dome_has_no_opening_to_pour_into(tmp_path: Path) -> None:
+    arc = "Profile(((3.5, 0, 0), (7, 0, 0.15), (FLAT, 4, 0), (0, 4, 0), (0, 2, 0), (3.5, 2, 0)))"
+    dome = f"def unit(spec):\n    return Revolve({arc})\n"
+    pointed = dome.replace("(FLAT, 4, 0), ", "")
+    found = [f for f in check_moulds(moulds_of(tmp_path, pointed)) if not f.ok]
+    assert [finding.code for finding in found] == ["C410", "C410"]
+    assert found[0].where == "pour 1: opening at the rim, area"
+    assert found[0].value < 0.01
+    assert "no room to pour" in found[0].advice
+    (tmp_path / "flat").mkdir()
+    flat = check_moulds(moulds_of(tmp_path / "flat", dome.replace("FLAT", "2.0")))
+    area = next(f for f in flat if f.code == "C410")
+    assert area.ok
+    assert area.value == pytest.approx(math.pi * 4, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "layers", "why"),
+    [
+        ("cut(cylinder(7, 0, 4), [cylinder(5, 1, 5)])", 1, "pour 1 .* would hang in the silicone"),
+        ("cut(cylinder(7, 0, 4), [cylinder(5, 1, 3)])", 1, "pour 1 .* closed in by silicone below and above"),
+        ("cut(cylinder(7, 0, 4), [ring(6, 8, 1, 3)])", 1, "closed in by silicone below and above"),
+        ("cylinder(7, -1, 4)", 1, "pour 1 .* 1 mm below the skin"),
+        ("{'layer1': cylinder(7, 2, 4), 'layer2': cylinder(5, 0, 2)}", 2, "layer 2 lies under layer 1"),
+        ("{'layer1': ring(4, 7, 0, 2), 'layer2': cylinder(4, 0, 2)}", 2, "a later layer takes its place"),
+        ("{'frame': cylinder(7, 0, 4)}", 1, r"needs? each of the spec's 1 \[\[layers\]\] drawn"),
+    ],
+)
+def test_what_has_no_mould_is_refused_with_pour_and_place(tmp_path: Path, drawn: str, layers: int, why: str) -> None:
+    with pytest.raises(Refusal, match=why):
+        moulds_of(tmp_path, f"def unit(spec):\n    return {drawn}\n", layers=layers)
+
+
+def test_a_lid_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(Refusal, match="poured open"):
+        moulds_of(tmp_path, "def unit(spec):\n    return ring(4, 7, 0, 2)\n", "moulds.pour=injected")
+
+
+def test_a_ring_gets_the_tools_of_an_embedded_control(tmp_path: Path) -> None:
+    """The same tools, solid by solid, as those that are drawn from lengths; only the engraved label differs."""
+    known = of_spec(load("single-embedded"))
+    (radius,), inner, (height,) = known.dimensions.radii, known.dimensions.cavity_radius, known.dimensions.heights
+    code = f"def unit(spec):\n    return ring({inner}, {radius}, 0, {height})\n"
+    moulds = moulds_of(tmp_path, code, f"diameter_mm={2 * radius}", "output.tolerance_mm=0.01")
+    depth = moulds.spec.moulds.engraving_depth_mm
+    for name, top in (("base", -moulds.spec.moulds.plinth_height_mm), ("cup1", height)):
+        solid, other = moulds.solids[name], known.solids[name]
+        differ = (solid - other) + (other - solid)
+        assert differ.is_empty() or differ.trim_by_plane((0, 0, -1), -(top - depth - 0.01)).volume() < 1e-6
+    assert broken(moulds) == set()
+
+
+def test_a_build_writes_moulds_and_casting(tmp_path: Path) -> None:
+    done = built(tmp_path, lugs(), "unit", "moulds", "casting", "estimate", layers=2)
+    assert done.ok
+    assert done.manifest["outputs"] == ["unit", "moulds", "casting"]
+    assert {"casting.md", "moulds/base.stl", "moulds/step2-cup.stl"} <= set(done.manifest["files"])
+    assert {left["what"]: left["why"] for left in done.manifest["left_out"]}["estimate"].startswith("a custom design")

@@ -54,7 +54,7 @@ class Procedure:
 
 def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure:
     """Return the procedure of a mould set. `layer_volumes_mm3`: of each layer of one unit, from the inside out."""
-    spec, plan, dims = moulds.spec, moulds.plan, moulds.dimensions
+    spec, plan, dims = moulds.spec, moulds.plan, moulds.plan.dimensions
     known = catalogue.materials(spec.materials)
     silicones = [known[layer.material] for layer in spec.layers]
     mixes = [

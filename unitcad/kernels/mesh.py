@@ -11,6 +11,7 @@ import numpy as np
 from manifold3d import CrossSection, Manifold
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Revolve, Shape, Union
 from unitcad.shape.profile import Profile, points
@@ -100,6 +101,8 @@ def bounds(solid: Manifold) -> tuple[float, ...]:
 
 _PROBE = 1e-4
 """Edge of the cube that finds which piece holds a point, mm."""
+_SAME_LINE = 1e-9
+"""Distance in plan up to which two vertices lie on one vertical line, mm."""
 
 
 def component(solid: Manifold, at: tuple[float, float, float]) -> Manifold:
@@ -113,10 +116,23 @@ def component(solid: Manifold, at: tuple[float, float, float]) -> Manifold:
 def _below(solid: Manifold, bottom: float) -> Manifold:
     """Return what lies under the upward faces of `solid`, down to `bottom`: a prism a patch of faces that join."""
     vertices, faces = arrays(solid)
+    vertices = _plumb(vertices)
     corners = vertices[faces]
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     faces = faces[a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0] > 1e-12]
     return Manifold.batch_boolean([_prism(vertices, patch, bottom) for patch in _patches(faces)], manifold3d.OpType.Add)
+
+
+def _plumb(vertices: np.ndarray) -> np.ndarray:
+    """Return vertices of which those on one vertical line, but for a boolean's rounding, lie on it exactly.
+
+    Else two prisms that should share a wall keep a crack between them.
+    """
+    pairs = cKDTree(vertices[:, :2]).query_pairs(_SAME_LINE, output_type="ndarray")
+    n = len(vertices)
+    joined = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    _, first, line = np.unique(connected_components(joined, directed=False)[1], return_index=True, return_inverse=True)
+    return np.column_stack([vertices[first[line], :2], vertices[:, 2]])
 
 
 def _patches(faces: np.ndarray) -> list[np.ndarray]:

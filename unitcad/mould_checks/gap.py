@@ -2,17 +2,25 @@
 
 The skirt is measured below the seat, where cup and plinth touch on purpose; the lid's below the rim. Round corners are
 polygons of as many sides a turn on both pieces: midway along a facet their gap is the clearance's cosine of pi / n.
+In moulds by complement the gap to what stands on the base is that of sections: above it the cup may touch its edge.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
+from manifold3d import Manifold
+
+from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.profile import GRID_PER_MM
 
+KNIFE = "the base carries an edge thinner than that clearance: give the silicone over it a corner less sharp"
+THIN = 1e-3
+"""A slice between two heights nearer than this is left out, mm."""
 GRID = 2 / GRID_PER_MM
 """What snapping two faces to the grid may take from the clearance between them, mm."""
 
@@ -28,6 +36,10 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
         cup = solids[step.cup]
         gap = cup.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
         found.append(at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm"))
+        if moulds.plan.by_complement:
+            gap = _sideways(cup, solids["base"], window + 1)
+            where = f"{step.cup} and what stands on the base"
+            found.append(at_least("C210", where, gap, window * chord - GRID, "mm", KNIFE))
         for tongue in moulds.plan.standing(step, "tongue"):
             gap = cup.min_gap(solids[tongue.name], window + 1)
             found.append(at_least("C210", f"{step.cup} window and {tongue.name}", gap, window - GRID, "mm"))
@@ -35,6 +47,18 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
             gap = solids[step.lid].trim_by_plane((0, 0, -1), play - step.rim).min_gap(cup, play + 1)
             found.append(at_least("C210", f"{step.lid} skirt and {step.cup}", gap, play * chord - GRID, "mm"))
     return found
+
+
+def _sideways(cup: Manifold, base: Manifold, most: float) -> float:
+    """Return the least distance in any section above the seat, at most `most`, mm."""
+    heights = sorted({0.0, *(float(z) for solid in (cup, base) for z in arrays(solid)[0][:, 2] if z > 0)})
+    gaps = [most]
+    for below, above in pairwise(heights):
+        sections = [solid.slice((below + above) / 2) for solid in (cup, base)]
+        if above - below > THIN and not any(section.is_empty() for section in sections):
+            one, other = (Manifold.extrude(section, 1.0) for section in sections)
+            gaps.append(float(one.min_gap(other, most)))
+    return min(gaps)
 
 
 CHECK = MouldCheck("C210", "gap: faces that slide have the printer's clearance", findings)

@@ -16,6 +16,7 @@ Tools are drawn from the spec's lengths. None is made by subtracting the unit: C
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from unitcad.designs import Dimensions, design_named
 from unitcad.designs.dimensions import Exit
@@ -40,15 +41,19 @@ def plate_bottom(spec: Spec) -> float:
 
 def base(spec: Spec, dims: Dimensions, lay: Layout) -> Shape:
     """Draw plate, keyed plinth and cores in one piece, with pry slots, filament holes and grooves, and ledges."""
-    top, bottom = plate_top(spec), plate_bottom(spec)
-    plate = Extrude(outline(lay.plate, MARK), bottom, top)
-    body = union((plate, plinth(spec, lay), *(moved(core(dims), c.x, c.y) for c in lay.cells)))
-    tools: list[Shape] = [_pry_slot(lay, top, side) for side in (1, -1)]
+    tools: list[Shape] = []
     if design_named(spec.design).suction:
-        tools += [filament.way(spec, dims, lay, c, bottom) for c in lay.cells]
+        tools += [filament.way(spec, dims, lay, c, plate_bottom(spec)) for c in lay.cells]
     if dims.exit:
         tools += [moved(notch(spec, dims, dims.exit, s), c.x, c.y) for c in lay.cells for s in c.sides]
-    return cut(body, tools)
+    return stand(spec, lay, [moved(core(dims), c.x, c.y) for c in lay.cells], tools)
+
+
+def stand(spec: Spec, lay: Layout, standing: Sequence[Shape], tools: Sequence[Shape] = ()) -> Shape:
+    """Draw plate and plinth with what stands on them (its foot sunk in) in one piece, with pry slots, less `tools`."""
+    top, bottom = plate_top(spec), plate_bottom(spec)
+    plate = Extrude(outline(lay.plate, MARK), bottom, top)
+    return cut(union((plate, plinth(spec, lay), *standing)), [*(_pry_slot(lay, top, side) for side in (1, -1)), *tools])
 
 
 def plinth(spec: Spec, lay: Layout) -> Shape:

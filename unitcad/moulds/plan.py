@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.designs import Dimensions, design_named, dimensions, unit_bodies
+from unitcad.errors import Refusal
 from unitcad.moulds import dents, filament, lid
 from unitcad.moulds.base import base, plate_bottom
 from unitcad.moulds.blade import blade
+from unitcad.moulds.complement import Complement, complement
 from unitcad.moulds.cup import cup
 from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved
 from unitcad.moulds.layout import Cell, Layout, layout
@@ -58,12 +60,17 @@ class Step:
 
 @dataclass(frozen=True)
 class Plan:
-    """All tools as assembled, the pours in their order, and the four characters that their labels end in."""
+    """All tools as assembled, the pours in their order, and the four characters that their labels end in.
+
+    `dimensions` are those that the tools were drawn to; `by_complement`: from the cast shapes and not from lengths.
+    """
 
     tools: tuple[Body, ...]
     steps: tuple[Step, ...]
     layout: Layout
     label: str
+    dimensions: Dimensions
+    by_complement: bool = False
 
     def tool(self, name: str) -> Body:
         """The tool of that name. Raises KeyError."""
@@ -79,16 +86,18 @@ class Plan:
 
 
 def plan(spec: Spec) -> Plan:
-    """Return the plan of a spec.
+    """Return the plan of a spec: the design's own tooling, or moulds by complement of its cast layers.
 
     Raises Refusal where the moulds can't be: beyond the bed, a tail that reaches no edge, a lid whose vents or a tongue
-    whose width can't clear the air.
+    whose width can't clear the air, a piece that nothing holds.
     """
-    dims = dimensions(spec)
-    lay = layout(spec, dims)
-    dents.check_tongue(spec, dims)
-    blank = _tools(spec, dims, lay)
-    layers = tuple(body.shape for body in unit_bodies(spec) if body.made == "cast")
+    layers = cast_layers(spec)
+    made = complement(spec, layers) if design_named(spec.design).tooling is None else None
+    dims = made.dims if made else dimensions(spec)
+    lay = made.layout if made else layout(spec, dims)
+    if not made:
+        dents.check_tongue(spec, dims)
+    blank = _tools(spec, dims, lay, made)
     # Material variants share pieces: the label is of geometry alone, drawn before there is a label on it.
     label = content_hash(Union((*(tool.shape for tool in blank), *layers)))[:4].upper()
     tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in blank)
@@ -104,7 +113,7 @@ def plan(spec: Spec) -> Plan:
             tools=("base", f"cup{i + 1}", *([f"lid{i + 1}"] if injected else []), *around),
             layer=cast[i],
             earlier=tuple(shape for earlier in cast[:i] for shape in earlier),
-            seals=tuple(seals(spec, dims, lay, i)),
+            seals=made.seals[i] if made else tuple(seals(spec, dims, lay, i)),
             rim=dims.heights[i],
             top=lid.lid_top(dims, i) if injected else dims.heights[i],
             channels=tuple(lid.channels(spec, dims, lay, i)) if injected else (),
@@ -112,7 +121,20 @@ def plan(spec: Spec) -> Plan:
         )
         for i, layer in enumerate(spec.layers)
     )
-    return Plan(tools, steps, lay, label)
+    return Plan(tools, steps, lay, label, dims, by_complement=made is not None)
+
+
+def cast_layers(spec: Spec) -> tuple[Shape, ...]:
+    """Return the shapes of a unit's cast layers in the order of their pours.
+
+    Raises Refusal where the design draws others than the spec has layers for.
+    """
+    bodies = sorted((body for body in unit_bodies(spec) if body.made == "cast"), key=lambda body: body.step or 0)
+    if len(bodies) != len(spec.layers):
+        drawn = ", ".join(body.name for body in bodies) or "none"
+        limit = f"moulds need each of the spec's {len(spec.layers)} [[layers]] drawn as layer1 ...; it draws {drawn}"
+        raise Refusal("design", spec.design, f"{limit}; --only unit makes the unit alone")
+    return tuple(body.shape for body in bodies)
 
 
 def placed(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
@@ -120,12 +142,12 @@ def placed(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
     return moved(turned(shape, "z", 2 if cell.sides == (-1,) and dims.sides == (1,) else 0), cell.x, cell.y)
 
 
-def _tools(spec: Spec, dims: Dimensions, lay: Layout) -> list[Body]:
+def _tools(spec: Spec, dims: Dimensions, lay: Layout, drawn: Complement | None) -> list[Body]:
     """Draw every tool without its label, in the order in which a person needs them."""
-    found = [Body("base", "tool", "base", base(spec, dims, lay), _BASE)]
+    found = [Body("base", "tool", "base", drawn.base if drawn else base(spec, dims, lay), _BASE)]
     injected = spec.moulds.pour == "injected"
     for i in range(len(spec.layers)):
-        shape, colour = cup(spec, dims, lay, i), _CUP2 if i % 2 else _CUP
+        shape, colour = drawn.cups[i] if drawn else cup(spec, dims, lay, i), _CUP2 if i % 2 else _CUP
         found.append(Body(f"cup{i + 1}", "tool", "cup", shape, colour, step=i + 1, upside_down=True, removal=_UP))
         if injected:
             shape = lid.lid(spec, dims, lay, i)
@@ -137,7 +159,7 @@ def _tools(spec: Spec, dims: Dimensions, lay: Layout) -> list[Body]:
         Body(_numbered("tongue", i, strips), "tool", "tongue", shape, _TONGUE, made=made, removal=(side, 0, 0))
         for i, (side, shape) in enumerate(strips)
     ]
-    if design_named(spec.design).suction:
+    if design_named(spec.design).suction and not drawn:
         stubs = [filament.stub(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells]
         found += [
             Body(_numbered("stub", i, stubs), "tool", "stub", stub, _STUB, made="cut", removal=_DOWN)

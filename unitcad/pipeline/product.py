@@ -25,7 +25,7 @@ from unitcad.spec import Spec
 from unitcad.spec.custom_code import is_custom
 from unitcad.validation import warnings
 
-CUSTOM = "a custom design: tooling and estimate are known for the shipped designs only"
+CUSTOM = "a custom design: the estimate knows embedded and encapsulating units"
 NO_MOULDS = "no moulds were asked for: of the mould checks only C200 looked at the unit"
 
 
@@ -102,15 +102,10 @@ def checked_outputs(only: Sequence[str]) -> tuple[str, ...]:
 
 
 def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
-    """Return what of `only` there can be: a custom design is drawn, without tooling and without an estimate.
-
-    Raises Refusal where nothing is left.
-    """
-    possible = tuple(name for name in only if name == "unit" or not is_custom(spec.design))
+    """Return what of `only` there can be: a custom design has no estimate. Raises Refusal where nothing is left."""
+    possible = tuple(name for name in only if name != "estimate" or not is_custom(spec.design))
     if not possible:
-        raise Refusal(
-            "--only", ",".join(only), f"{spec.design} is a custom design, of which only the unit is made", "unit"
-        )
+        raise Refusal("--only", ",".join(only), f"{spec.design} is a custom design, which has no estimate", "unit")
     return possible
 
 

@@ -1,0 +1,203 @@
+"""Moulds for any cast shape, by complement: what is left of a block round the layers that are cast so far.
+
+        lug    .---------------------.   rim: the top of what is cast so far
+     ----------'                     |
+     | support |   .-------------.   |   cup      not under silicone, and joined to the block's outside
+     |         |   |    core     |   |   base     under silicone (core, support), or alone in a hole (post)
+    =======================================  seat, z = 0
+
+What is under silicone can't be lifted past it, so it stands on the base; the rest is lifted off upwards. Where cup and
+base slide along each other the cup is cut back by the printer's clearance, and that slit is the pour's seal.
+Balance (C100) holds by construction here and proves nothing: draw, strain, air, opening and printability decide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from manifold3d import Manifold, OpType
+
+from unitcad.designs import dimensions
+from unitcad.designs.dimensions import Dimensions
+from unitcad.designs.parts import BEYOND
+from unitcad.errors import Refusal
+from unitcad.kernels.mesh import area_true, arrays, bounds, realise, segment_count
+from unitcad.kernels.sections import widest
+from unitcad.moulds.base import stand
+from unitcad.moulds.cup import cup_blank, groove, recess, skirt_end
+from unitcad.moulds.layout import Layout, layout
+from unitcad.shape import Below, Common, Component, Cut, Shape, box, cut, moved, union
+from unitcad.shape.profile import GRID_PER_MM
+from unitcad.spec import Spec
+
+SLIVER = 1e-3
+"""Volume up to which a piece is what rounding leaves between two faces, mm3."""
+LEVEL = 1 / GRID_PER_MM
+"""Heights nearer than this are one, mm."""
+
+
+@dataclass(frozen=True)
+class Complement:
+    """Blank tools (without labels) as assembled, a cup and its seals a pour; `dims` hold the cast shapes' extent."""
+
+    dims: Dimensions
+    layout: Layout
+    base: Shape
+    cups: tuple[Shape, ...]
+    seals: tuple[tuple[Shape, ...], ...]
+
+
+def complement(spec: Spec, cast: Sequence[Shape]) -> Complement:
+    """Return the moulds of the layers `cast`, in the order of their pours, drawn about the unit's axis.
+
+    Raises Refusal, with the pour and the place, for layers that leave a piece of mould that nothing holds.
+    """
+    if spec.moulds.pour == "injected":
+        raise Refusal("moulds.pour", "injected", "moulds by complement have no lids; they are poured open", "open")
+    given = dimensions(spec)
+    segments = segment_count(given.outer_radius, spec.output.tolerance_mm)
+    solids = [realise(shape, segments) for shape in cast]
+    rims, radii = _extent(spec, solids, segments)
+    standing, tops = _standing(spec, cast, solids, rims, max(radii), segments)
+    dims = replace(given, radii=radii, heights=rims, core_height=tops, exit=None, sides=())
+    lay = layout(spec, dims)
+
+    def in_cells(shapes: Sequence[Shape]) -> list[Shape]:
+        return [moved(shape, cell.x, cell.y) for cell in lay.cells for shape in shapes]
+
+    base = stand(spec, lay, in_cells(standing))
+    solid_of = [realise(piece, segments).trim_by_plane((0, 0, 1), 0.0) for piece in standing]
+    cups, sealed = [], []
+    for i, rim in enumerate(rims):
+        blank, under = cup_blank(spec, lay, rim), Below(union(cast[: i + 1]), -BEYOND)
+        wall = Manifold.batch_boolean(
+            [realise(shape, segments) for shape in (blank, under, recess(spec, lay), *standing)], OpType.Subtract
+        )
+        clearance = spec.moulds.window_clearance_mm
+        slid = [
+            _slid(spec, piece, solid, wall, rim, segments)
+            for piece, solid in zip(standing, solid_of, strict=True)
+            if wall.min_gap(solid, 2 * clearance) < clearance
+        ]
+        grooves = [groove(spec, dims, i, cell) for cell in lay.cells]
+        if any((realise(grooves[0], segments) ^ realise(hole, segments)).volume() > 0 for hole in slid):
+            grooves = []
+        bores, holes = in_cells([under]), in_cells(slid)
+        cup = cut(blank, [recess(spec, lay), *bores, *holes, *grooves])
+        pieces = _pieces(realise(cup, segments))
+        if len(pieces) > 1:
+            cup = Component(cup, (lay.cup[0] - spec.moulds.skirt_wall_mm / 2, 0.0, skirt_end(spec) + LEVEL))
+            for lost in _pieces(Manifold.compose(pieces) - realise(cup, segments) - realise(base, segments)):
+                raise _refused(spec, i, f"the base goes all round a piece of the cup, {_place(lost)}")
+        cups.append(cup)
+        rest = Cut(blank, (recess(spec, lay), *bores))
+        sealed.append((Cut(Common((union(holes), rest)), tuple(in_cells(standing))),) if holes else ())
+    return Complement(dims, lay, base, tuple(cups), tuple(sealed))
+
+
+def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the rim plane and the bounding radius of what is cast up to each pour, mm."""
+    rims: list[float] = []
+    radii: list[float] = []
+    for i, solid in enumerate(solids):
+        if solid.is_empty():
+            raise _refused(spec, i, "the layer has no volume")
+        low, high = bounds(solid)[2], bounds(solid)[5]
+        if low < -LEVEL:
+            raise _refused(spec, i, f"the layer reaches {-low:.3g} mm below the skin z = 0, where the seat is")
+        # A circle's polygon has its area, so its corners stand out by that factor.
+        radius = float(np.hypot(*arrays(solid)[0][:, :2].T).max()) / area_true(segments)
+        # Rounded down, so that no film of mould lies over the layer's top.
+        rims.append(max([math.floor(high * GRID_PER_MM + 1e-6) / GRID_PER_MM, *rims]))
+        radii.append(max([math.ceil(radius * GRID_PER_MM - 0.01) / GRID_PER_MM, *radii]))
+    return tuple(rims), tuple(radii)
+
+
+def _standing(
+    spec: Spec, cast: Sequence[Shape], solids: Sequence[Manifold], rims: Sequence[float], radius: float, segments: int
+) -> tuple[list[Shape], float]:
+    """Return the pieces that stand on the base in every pour, sunk into it, and the height of the tallest.
+
+    Raises Refusal for a piece that would hang in the air, and for one that a later layer takes the place of.
+    """
+    under = Cut(Below(union(cast), 0.0), tuple(cast))
+    held = _pieces(realise(under, segments))
+    for piece in held:
+        if not _stands(piece):
+            raise _refused(spec, len(cast) - 1, f"a hollow of {_place(piece)} is closed in by silicone below and above")
+    found: list[Shape] = [Component(under, _inside(piece)) for piece in held]
+    edge = radius + BEYOND
+    for i, rim in reversed(list(enumerate(rims))):
+        beneath = Below(union(cast[: i + 1]), -BEYOND)
+        beside = Cut(box(-edge, edge, -edge, edge, -BEYOND, rim), (beneath,))
+        for piece in _pieces(realise(beside, segments)):
+            if bounds(piece)[3] > edge - LEVEL:
+                continue
+            if not _stands(piece):
+                why = f"a piece of {_place(piece)} would hang in the silicone: it touches neither base nor cup"
+                raise _refused(spec, i, why)
+            above = piece.trim_by_plane((0, 0, 1), 0.0)
+            if i == len(rims) - 1:
+                held.append(above)
+                found.append(Component(beside, _inside(piece)))
+            elif (above - Manifold.compose(held)).volume() > SLIVER:
+                why = f"a piece of {_place(above)} stands alone in layer {i + 1}, and a later layer takes its place"
+                raise _refused(spec, i, why)
+        needed = realise(Cut(Below(union(cast[: i + 1]), 0.0), tuple(cast[: i + 1])), segments)
+        for j in range(i + 1, len(cast)):
+            lost = needed ^ solids[j]
+            if lost.volume() > SLIVER:
+                why = f"layer {j + 1} lies under layer {i + 1} in a space of {_place(lost)}, where its core would stand"
+                raise _refused(spec, i, why)
+    return found, max([bounds(piece)[5] for piece in held], default=LEVEL)
+
+
+def _pieces(solid: Manifold) -> list[Manifold]:
+    """Return the connected pieces, lowest first, without what rounding leaves."""
+    return sorted((p for p in solid.decompose() if p.volume() > SLIVER), key=bounds)
+
+
+def _stands(piece: Manifold) -> bool:
+    """Tell whether a piece has a foot on the seat; by area, since rounding leaves films without thickness."""
+    return piece.slice(LEVEL / 2).area() > SLIVER
+
+
+def _inside(piece: Manifold) -> tuple[float, float, float]:
+    """Return a point well inside a piece."""
+    levels = sorted({float(z) for z in arrays(piece)[0][:, 2]})
+    low, high = max(pairwise(levels), key=lambda pair: pair[1] - pair[0])
+    z = (low + high) / 2
+    _, (x, y) = widest(piece.slice(z))
+    return x, y, z
+
+
+def _slid(spec: Spec, piece: Shape, solid: Manifold, wall: Manifold, rim: float, segments: int) -> Shape:
+    """Return the hole in a cup for a piece of the base: wider by the clearance, and open at the rim where it would
+    leave a skin there that is too thin to print, unless the cup would fall in two.
+    """
+    clearance = spec.moulds.window_clearance_mm
+    top = bounds(solid)[5]
+    if rim - spec.moulds.least_wall_mm < top < rim:
+        column = _grown(Below(moved(piece, z=rim), -BEYOND), clearance)
+        if len(_pieces(wall - realise(column, segments))) <= len(_pieces(wall)):
+            return column
+    return _grown(piece, clearance)
+
+
+def _grown(piece: Shape, clearance: float) -> Shape:
+    """Return a piece and four copies of it, moved diagonally: every upright face moves out by `clearance` or more."""
+    return union((piece, *(moved(piece, x, y) for x in (-clearance, clearance) for y in (-clearance, clearance))))
+
+
+def _place(piece: Manifold) -> str:
+    box_of = bounds(piece)
+    x, y, z = ((box_of[k] + box_of[k + 3]) / 2 for k in range(3))
+    return f"{piece.volume():.3g} mm3 at x = {x:.3g}, y = {y:.3g}, z = {z:.3g} mm"
+
+
+def _refused(spec: Spec, layer: int, why: str) -> Refusal:
+    return Refusal("design", spec.design, f"pour {layer + 1} can't be cast: {why}; --only unit makes the unit alone")
