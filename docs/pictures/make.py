@@ -49,10 +49,12 @@ def main() -> None:
 
 
 def pictures() -> dict[str, bytes]:
-    """Units cut open, the encapsulating set taken apart, and its second pour."""
+    """Units cut open, two sets taken apart, and the second pour of one."""
     variants = {name: Variant.of(name) for name in ("encapsulating", "embedded")}
+    lugs = Variant.of(str(HERE.parents[1] / "templates" / "custom" / "strap-lugs.toml"))
     scenes = {f"{name}-unit.png": unit_cut_open(variant) for name, variant in variants.items()}
     scenes["encapsulating-moulds.png"] = exploded(variants["encapsulating"])
+    scenes["strap-lugs-moulds.png"] = exploded(lugs)
     scenes["encapsulating-pour2.png"] = step_in_section(variants["encapsulating"], 2)
     return {name: small(image) for name, image in zip(scenes, draw(list(scenes.values())), strict=True)}
 

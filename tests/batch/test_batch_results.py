@@ -223,7 +223,7 @@ def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path: P
     spec = next(text for kind, text in blocks if kind == "toml" and "dome.py:" in text)
     (tmp_path / "dome.py").write_text(code)
     (tmp_path / "dome.toml").write_text(spec)
-    done = unitcad("build", tmp_path / "dome.toml", "-o", tmp_path / "out", "--formats", "stl,3mf")
+    done = unitcad("build", tmp_path / "dome.toml", "-o", tmp_path / "out", "--formats", "stl,3mf", "--only", "unit")
     assert done.returncode == 0, done.stderr
     folder = Path(done.stdout.splitlines()[-1])
     manifest = json.loads((folder / "manifest.json").read_text())
@@ -231,7 +231,7 @@ def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path: P
     assert manifest["check"]["errors"] == 0
     assert {left["what"] for left in manifest["left_out"]} >= {"moulds", "casting", "estimate"}
     (tmp_path / "dome.py").unlink()
-    again = [folder / "spec.toml", "-o", tmp_path / "out", "--formats", "stl,3mf"]
+    again = [folder / "spec.toml", "-o", tmp_path / "out", "--formats", "stl,3mf", "--only", "unit"]
     refused = unitcad("build", *again)
     assert refused.returncode == 2
     assert "--allow-code" in refused.stderr

@@ -18,7 +18,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import cast_layers
 from unitcad.pipeline.build import Built, build
 from unitcad.shape import Shape
-from unitcad.validation import load
+from unitcad.validation import load, templates
 
 SPEC = """
 name = "custom"
@@ -175,3 +175,11 @@ def test_a_build_writes_moulds_and_casting(tmp_path: Path) -> None:
     assert done.manifest["outputs"] == ["unit", "moulds", "casting"]
     assert {"casting.md", "moulds/base.stl", "moulds/step2-cup.stl"} <= set(done.manifest["files"])
     assert {left["what"]: left["why"] for left in done.manifest["left_out"]}["estimate"].startswith("a custom design")
+
+
+def test_the_worked_examples_become_what_the_page_says() -> None:
+    folder = templates()["embedded"].parent / "custom"
+    assert broken(of_spec(load(folder / "strap-lugs.toml"))) == set()
+    assert broken(of_spec(load(folder / "dome.toml"))) == {"C410"}
+    assert broken(of_spec(load(folder / "dome.toml", ["parameters.flat_mm=1.6"]))) == set()
+    assert not {file.stem for file in folder.glob("*.toml")} & set(templates())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from manifold3d import CrossSection, JoinType
 
 FINENESS = 1e-3
@@ -10,7 +9,7 @@ FINENESS = 1e-3
 
 
 def widest(section: CrossSection) -> tuple[float, tuple[float, float]]:
-    """Return the diameter of the largest circle that fits into a section, and its centre (mm).
+    """Return the diameter of the largest circle that fits into a section, and a centre for it (mm).
 
     By bisection over inward offsets, mitred, so that a corner does not count as a rounded one. 0 for an empty section.
     """
@@ -25,6 +24,6 @@ def widest(section: CrossSection) -> tuple[float, tuple[float, float]]:
             high = middle
         else:
             low, kept = middle, left
-    piece = max(kept.decompose(), key=lambda part: part.area())
-    centre = np.mean(piece.to_polygons()[0], axis=0)
-    return 2 * low, (float(centre[0]), float(centre[1]))
+    # Any corner of what is left lies so deep; its mean would not, were it a ring.
+    corner = min(tuple(map(float, point)) for loop in kept.to_polygons() for point in loop)
+    return 2 * low, (corner[0], corner[1])
