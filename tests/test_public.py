@@ -272,8 +272,9 @@ def _shown(tmp_path: Path) -> dict[str, Any]:
         "spec": spec,
         "variant": unitcad.Variant(spec),
         "estimate": unitcad.estimate(spec),
+        "build": unitcad.build(spec, tmp_path / "out", only=["unit"], formats=["stl"]),
         "check": unitcad.check(good, bad, tmp_path / "missing.stl"),
-        "batch": unitcad.batch(sweep, tmp_path / "few", only=["estimate"]),
+        "batch": unitcad.batch(sweep, tmp_path / "few", only=["estimate"], set={"layers.0.wall_mm": 1.3}),
     }
 
 
@@ -281,6 +282,7 @@ def test_reprs_are_short_and_html_holds_no_script(tmp_path: Path) -> None:
     for name, value in _shown(tmp_path).items():
         assert len(repr(value)) <= 200, name
         assert "\n" not in repr(value)
+        assert len(max(map(repr, getattr(value, "reports", ())), key=len, default="")) <= 200
         html = value._repr_html_()
         tags = _Tags()
         tags.feed(html)
@@ -303,6 +305,8 @@ def test_results_tell_what_a_person_asks_first(tmp_path: Path) -> None:
     assert [report.verdict for report in shown["check"].reports] == ["pass", "error", "error"]
     assert not shown["check"].ok
     assert shown["batch"].ok
+    assert shown["build"].ok
+    assert shown["build"].volumes["layer1"] == pytest.approx(shown["variant"].mesh("layer1").volume(), rel=1e-6)
     assert [row["diameter_mm"] for row in shown["batch"].rows] == [14.0, 15.0]
     estimated = shown["estimate"]
     assert estimated.frequency_hz == 125

@@ -34,7 +34,7 @@ def use(out: Path) -> tuple[float, FileReport, float | None]:
     spec: unitcad.Spec = unitcad.load(typed_spec(), set={"layers.0.wall_mm": 1.3})
     variant: unitcad.Variant = unitcad.Variant(spec)
     volume: float = variant.mesh("layer1").volume()
-    built: unitcad.Built = unitcad.build(variant, out, formats=["stl"], only=["unit"], check=False)
+    built: unitcad.BuildResult = unitcad.build(variant, out, formats=["stl"], only=["unit"], check=False)
     result: unitcad.CheckResult = unitcad.check(built.folder, printer="sla", select=["T"])
     first: FileReport = check_file(result.reports[0].path, Options())
     estimated: unitcad.EdgeEstimate = unitcad.estimate(spec, models=["fitted"], frequency_hz=125)

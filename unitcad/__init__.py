@@ -6,6 +6,7 @@
     variant = unitcad.Variant(spec)
     built = unitcad.build(spec, "out")
     result = unitcad.check(built.folder)
+    estimated = unitcad.estimate(spec)
 
 Everything listed in `__all__` is loaded when it is first used: importing this package reads no file and loads neither
 numpy nor a CAD library. `unitcad.check` and `unitcad.batch` are packages that may be called.
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from unitcad import attenuation as attenuation
     from unitcad import catalogue as catalogue
     from unitcad import shape as shape
+    from unitcad.api.build_call import BuildResult as BuildResult
     from unitcad.api.build_call import build as build
     from unitcad.api.estimate_call import EdgeEstimate as EdgeEstimate
     from unitcad.api.estimate_call import estimate as estimate
@@ -35,7 +37,6 @@ if TYPE_CHECKING:
     from unitcad.check.check_call import check as check
     from unitcad.errors import Refusal as Refusal
     from unitcad.errors import UnitcadError as UnitcadError
-    from unitcad.pipeline.build import Built as Built
     from unitcad.pipeline.variant import Variant as Variant
     from unitcad.spec import Spec as Spec
     from unitcad.spec.asked import CastingTable as Casting
@@ -53,7 +54,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "BatchResult",
-    "Built",
+    "BuildResult",
     "Casting",
     "CheckResult",
     "EdgeEstimate",
@@ -86,7 +87,7 @@ __all__ = [
 
 _PLACES = {
     "BatchResult": "batch.batch_call:BatchResult",
-    "Built": "pipeline.build:Built",
+    "BuildResult": "api.build_call:BuildResult",
     "Casting": "spec.asked:CastingTable",
     "CheckResult": "check.check_call:CheckResult",
     "EdgeEstimate": "api.estimate_call:EdgeEstimate",

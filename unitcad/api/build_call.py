@@ -1,17 +1,61 @@
-"""`unitcad.build`."""
+"""`unitcad.build` and what it returns."""
 
 # pyright: strict
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from unitcad import notebook
+from unitcad.pipeline import Variant
 from unitcad.pipeline.build import OUTPUTS, Built
 from unitcad.pipeline.build import build as build_spec
 from unitcad.pipeline.folder import PAGE, held
+from unitcad.spec import Spec
 from unitcad.spec.asked import Format
 from unitcad.validation import Changes, Source, load
+
+
+@dataclass(frozen=True, repr=False)
+class BuildResult(Built):
+    """Where a variant was built, its manifest, and its spec.
+
+    `manifest` is manifest.json as data: parts, mould checks, mesh checks, what was left out; mm, mm2 and mm3.
+    """
+
+    spec: Spec
+
+    @property
+    def volumes(self) -> dict[str, float]:
+        """The volume of each body's mesh by name, mm3."""
+        return {part["name"]: part["volume_mm3"] for part in self.manifest["parts"]}
+
+    def __repr__(self) -> str:
+        folder = notebook.shortened(self.folder.name, 80)
+        return f"BuildResult({folder}: {', '.join(f'{count} {what}' for what, count in self._counts)})"
+
+    def _repr_html_(self) -> str:
+        rows = [(part["name"], part["made"], part["material"], part["volume_mm3"]) for part in self.manifest["parts"]]
+        bodies = notebook.table(("body", "made", "material", "volume, mm³"), rows, str(self.folder))
+        broken = [
+            (law["code"], law["where"], law["value"], law["limit"]) for law in self.manifest["laws"] if not law["ok"]
+        ]
+        checks = notebook.table(("mould check", "place", "value", "limit"), broken, "broken") if broken else ""
+        drawn = notebook.drawing(Variant(self.spec).section(), f"section of {self.spec.name}")
+        return drawn + bodies + checks + notebook.table((), self._counts)
+
+    @property
+    def _counts(self) -> list[tuple[str, int]]:
+        """What a person looks at first, and how many there are."""
+        broken = sum(not law["ok"] for law in self.manifest["laws"])
+        return [
+            ("bodies", len(self.manifest["parts"])),
+            ("files", len(self.manifest["files"])),
+            ("broken mould checks", broken),
+            ("errors in meshes", self.manifest["check"]["errors"]),
+        ]
 
 
 def build(
@@ -24,13 +68,13 @@ def build(
     check: bool = True,
     report: bool = False,
     progress: Callable[[str], None] | None = None,
-) -> Built:
+) -> BuildResult:
     """Build a unit and its moulds into a folder below `out`, and return what was built.
 
     `source` and `set` are as for `unitcad.load`. `formats` ("stl", "3mf", "step", "svg", "png", "glb") and `only`
     ("unit", "moulds", "estimate", "casting") choose what is made. Without `check` mould checks and mesh checks are
     left out. `report` writes report.html, one offline page. `progress` is called with the name of each step.
-    `Built.ok` tells whether every check passed; `Built.manifest` holds figures in mm, mm3 and mm2.
+    `BuildResult.ok` tells whether every check passed; volumes and sizes of the result are in mm3 and mm.
     Raises Refusal or UnitcadError before anything is written.
     """
     spec = load(source, set)
@@ -42,7 +86,7 @@ def build(
 
         with held(built.folder):
             write_report(built.folder)
-    return built
+    return BuildResult(built.folder, built.manifest, spec)
 
 
 def _silent(step: str) -> None:

@@ -17,6 +17,9 @@ from unitcad.batch.run import BatchOptions, Summary, run, trim
 from unitcad.batch.sweep import Sweep, load_sweep
 from unitcad.pipeline.build import OUTPUTS
 from unitcad.spec.asked import Format
+from unitcad.text import toml
+from unitcad.validation import Changes
+from unitcad.validation.tables import changes_of
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,7 +62,7 @@ def batch(
     sweep: str | os.PathLike[str] | Sweep,
     out: str | os.PathLike[str] | None = None,
     *,
-    set: Sequence[str] = (),
+    set: Changes = (),
     formats: Sequence[Format] | None = None,
     only: Sequence[str] = OUTPUTS,
     check: bool = True,
@@ -72,14 +75,17 @@ def batch(
 ) -> BatchResult:
     """Make every variant of a sweep in the folder `out` (out/<name> by default), each distinct part once.
 
-    `sweep` is a file, the name of a shipped sweep, or a `unitcad.batch.Sweep`. `set` holds texts "path=value" for every
-    variant; `formats` and `only` are as for `unitcad.build`. `jobs` is the number of worker processes, one a core by
-    default, with 0 this process. `limit` makes the first variants only; `timeout` is in seconds a variant. The same
-    call again goes on where an earlier one ended. What becomes of a variant is in the result. Raises Refusal or
+    `sweep` is a file, the name of a shipped sweep, or a `unitcad.batch.Sweep`. `set` changes values of every variant,
+    `formats` and `only` choose what is made, as for `unitcad.build`. `jobs` is the number of worker processes, one a
+    core by default, with 0 this process. `limit` makes the first variants only; `timeout` is in seconds a variant. The
+    same call again goes on where an earlier one ended. What becomes of a variant is in the result. Raises Refusal or
     UnitcadError where nothing can be run.
     """
     chosen = sweep if isinstance(sweep, Sweep) else load_sweep(sweep)
-    wanted = chosen.overridden([*set, *([] if formats is None else [f"output.formats={list(formats)}"])])
+    overrides = [
+        change if isinstance(change, str) else "=".join((change[0], toml(change[1]))) for change in changes_of(set)
+    ]
+    wanted = chosen.overridden([*overrides, *([] if formats is None else [f"output.formats={list(formats)}"])])
     folder = Path("out") / wanted.slug if out is None else Path(out)
     where = None if cache is None else Path(cache)
     options = BatchOptions(tuple(only), check, keep_going, timeout, limit, where)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from unitcad.check.geometry.triangle_mesh import Mesh
 
 SEVERITIES = ("info", "warning", "error")
+_MOST_CODES = 5
+"""Codes that a report's repr lists."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ class Facts:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FileReport:
     """A file's findings, sorted by severity and code, its facts, and the wall time that the check took, if known.
 
@@ -141,6 +143,11 @@ class FileReport:
         """`error`, `warning` or `pass`: the worst finding, infos and known ones aside."""
         severities = {finding.severity for finding in self.findings if not finding.known}
         return "error" if "error" in severities else "warning" if "warning" in severities else "pass"
+
+    def __repr__(self) -> str:
+        codes = [f"{finding.code} x {finding.count}" for finding in self.findings]
+        more = [f"{len(codes) - _MOST_CODES} more codes"] if len(codes) > _MOST_CODES else []
+        return f"FileReport({self.path[-80:]!r}: {', '.join([self.verdict, *codes[:_MOST_CODES], *more])})"
 
     def has(self, code: str) -> bool:
         """Return whether a finding of that code is there."""
