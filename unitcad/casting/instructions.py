@@ -62,6 +62,8 @@ def pour_steps(spec: Spec, plan: Plan, step: Step, silicone: Material, mix: Mix,
             else ", the same way as the cup before: Layer 2 lies between two cup positions."
         )
     )
+    if step.seals and plan.by_complement:
+        found.append("Grease the flanks of what stands on the base beside the cavity thinly, and wipe off the rest.")
     if tongues:
         found.append(
             f"Grease {'the tongue' if len(tongues) == 1 else 'each tongue'} and the window thinly with petroleum "
@@ -137,7 +139,7 @@ def release(spec: Spec, plan: Plan, inner: Material) -> tuple[str, ...]:
 
 
 def measurements(
-    spec: Spec, dims: Dimensions, grams: Sequence[float], as_printed: float | None = None
+    spec: Spec, dims: Dimensions, grams: Sequence[float], as_printed: float | None = None, by_complement: bool = False
 ) -> tuple[str, ...]:
     """What to measure on the first part, and what it should be: `grams` of each layer of one unit, trimmed, and the
     slot's height if the slicer makes the tongue another one (mm).
@@ -145,7 +147,9 @@ def measurements(
     play = spec.moulds.plinth_clearance_mm
     found = [
         f"Height over all: {dims.heights[-1]:.2f} mm. A cup that did not seat shows here.",
-        f"Diameter at the skin: {2 * dims.outer_radius:.2f} mm, in two directions.",
+        f"Farthest corner from the motor's axis: {dims.outer_radius:.2f} mm."
+        if by_complement
+        else f"Diameter at the skin: {2 * dims.outer_radius:.2f} mm, in two directions.",
         "Walls at the skin, at four places: their spread is the cup's shift. Layer 1 may vary by "
         f"{play:g} mm either way"
         + (

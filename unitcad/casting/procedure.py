@@ -85,7 +85,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
         pours=tuple(pours),
         release=release(spec, plan, silicones[0]),
         assembly=tuple(moulds.design.assembly(spec, dims)),
-        measure=measurements(spec, dims, grams, _slot_as_printed(spec, plan, edges)),
+        measure=measurements(spec, dims, grams, _slot_as_printed(spec, plan, edges), plan.by_complement),
         walls=tuple(_walls(spec)),
         bill=bill(spec, dims, plan, list(zip(silicones, mixes, strict=True))),
     )

@@ -11,7 +11,7 @@ import numpy as np
 from manifold3d import CrossSection, Manifold
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Revolve, Shape, Union
 from unitcad.shape.profile import Profile, points
@@ -128,7 +128,7 @@ def _plumb(vertices: np.ndarray) -> np.ndarray:
 
     Else two prisms that should share a wall keep a crack between them.
     """
-    pairs = cKDTree(vertices[:, :2]).query_pairs(_SAME_LINE, output_type="ndarray")
+    pairs = KDTree(vertices[:, :2]).query_pairs(_SAME_LINE, output_type="ndarray")
     n = len(vertices)
     joined = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     _, first, line = np.unique(connected_components(joined, directed=False)[1], return_index=True, return_inverse=True)
