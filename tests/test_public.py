@@ -243,6 +243,14 @@ def test_meshes_are_handed_out_in_both_libraries() -> None:
         unitcad.Variant("encapsulating")  # type: ignore[arg-type]
 
 
+def test_a_custom_design_has_its_moulds_among_its_bodies(tmp_path: Path) -> None:
+    code = "from unitcad.shape import cut, cylinder\n\n\ndef tub(spec):\n"
+    (tmp_path / "tub.py").write_text(f"{code}    return cut(cylinder(7, 0, 4), [cylinder(3.5, 0, 2)])\n")
+    layer = {"material": "ecoflex-00-30", "wall_mm": 3.5, "cap_mm": 2.0}
+    spec = unitcad.Spec(name="tub", design=f"{tmp_path}/tub.py:tub", diameter_mm=14, layers=[layer])
+    assert list(unitcad.Variant(spec).bodies) == ["layer1", "motor", "base", "cup1", "blade"]
+
+
 class _Tags(HTMLParser):
     """Start tags and attributes; raises for an end tag that ends nothing."""
 

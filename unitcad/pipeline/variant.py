@@ -43,8 +43,7 @@ class Variant(MouldSet):
 
         Raises Refusal where the moulds can't be made.
         """
-        tools = self.plan.tools if self.design.tooling else ()
-        return {body.name: body for body in (*self.unit, *tools)}
+        return {body.name: body for body in (*self.unit, *self.plan.tools)}
 
     @overload
     def mesh(self, body: Body | str, library: Literal["manifold3d"] = "manifold3d") -> Manifold: ...
