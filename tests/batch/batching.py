@@ -96,7 +96,11 @@ def unitcad(*words: object, **more: Any) -> subprocess.CompletedProcess[str]:
 
 def command(*words: object) -> list[str]:
     """Return a command line; a batch of rings makes their units alone, which takes the kernel no time."""
-    rings = words[0] == "batch" and any(Path(str(word)).name.startswith("sweep-") for word in words)
+    rings = (
+        words[0] == "batch"
+        and "--only" not in words
+        and any(Path(str(word)).name.startswith("sweep-") for word in words)
+    )
     return [sys.executable, "-m", "unitcad", *map(str, words), *(["--only", "unit"] if rings else [])]
 
 

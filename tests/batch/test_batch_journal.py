@@ -78,7 +78,7 @@ def test_a_variant_whose_folder_is_gone_is_made_again(tmp_path: Path) -> None:
 def test_other_options_are_another_batch(tmp_path: Path) -> None:
     sweep, out = ring_sweep(tmp_path / "s", heights=[2.0]), tmp_path / "o"
     assert unitcad("batch", sweep, "-o", out, "-j", 0).returncode == 0
-    for words in (["--no-check"], ["--formats", "3mf"], ["--only", "unit"]):
+    for words in (["--no-check"], ["--formats", "3mf"], ["--only", "unit,moulds"]):
         done = unitcad("batch", sweep, "-o", out, "-j", 0, *words)
         assert done.returncode == 2
         assert "holds another batch" in done.stderr
