@@ -98,12 +98,12 @@ def test_the_docs_have_the_documented_ranges():
 
 
 def test_a_refusal_without_a_field_is_a_fault(monkeypatch):
-    import unitcad.spec
+    import unitcad.validation
 
     def refuse(data):
         raise Refusal("", 1, "nothing may be")
 
-    monkeypatch.setattr(unitcad.spec, "from_data", refuse)
+    monkeypatch.setattr(unitcad.validation, "from_data", refuse)
     assert build_outcome(seeded_spec(0)).kind not in GOOD
 
 
@@ -119,7 +119,7 @@ def test_faults_are_seen(monkeypatch):
     monkeypatch.setattr(outcomes, "put_in", lambda data, where, value: data)
     refused = next(data for data in map(seeded_spec, range(50)) if door(data) is not None)
     assert outcomes.outcome(refused).kind == CIRCLE
-    monkeypatch.setattr(plan.tooling, "seals", lambda *_: [])
+    monkeypatch.setattr(plan, "seals", lambda *_: [])
     data = {
         "name": "leaks",
         "design": "encapsulating",

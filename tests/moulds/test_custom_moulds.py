@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from faulty_sets import broken, of_spec
+from faulty_sets import broken, of_spec, set_of
 
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
@@ -183,3 +183,11 @@ def test_the_worked_examples_become_what_the_page_says() -> None:
     assert broken(of_spec(load(folder / "dome.toml"))) == {"C410"}
     assert broken(of_spec(load(folder / "dome.toml", ["parameters.flat_mm=1.6"]))) == set()
     assert not {file.stem for file in folder.glob("*.toml")} & set(templates())
+
+
+def test_an_opening_off_the_grid_is_seen() -> None:
+    """A rim's height that the kernels snap downwards, at 2.219 mm, has its opening just below."""
+    moulds = set_of("single-embedded", "motor.thickness_mm=2.219")
+    found = [finding for finding in check_moulds(moulds) if finding.code == "C410"]
+    assert [finding.ok for finding in found] == [True, True]
+    assert found[0].value == pytest.approx(math.pi * (7**2 - 4.5**2), rel=1e-3)

@@ -16,6 +16,7 @@ from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
+from unitcad.shape.profile import GRID_PER_MM
 
 LEAST_AREA = 2.0
 """Of an opening that silicone is poured or injected into, mm2 (assumed): a thread or a needle of 1.6 mm."""
@@ -23,6 +24,8 @@ LEAST_WIDTH = 0.4
 """Of that opening, and of a vent, mm (assumed): less than the thinnest wall that a spec may have."""
 _UNDER = 1 / 4096
 """How far under the plane of the opening the section lies, mm."""
+_SNAPPED = 1 / GRID_PER_MM
+"""What snapping to the grid may take from the height of that plane, mm."""
 
 
 def findings(moulds: MouldSet) -> list[MouldFinding]:
@@ -39,7 +42,8 @@ def of_pour(step: Step, cells: list[Manifold]) -> list[MouldFinding]:
 def _of_cell(step: Step, cavity: Manifold, cell: int | None) -> Iterator[MouldFinding]:
     where = f"pour {step.index}" + ("" if cell is None else f" cell {cell + 1}")
     opening = "sprue" if step.lid else "opening at the rim"
-    regions = sorted((widest(part)[0], part.area()) for part in cavity.slice(step.top - _UNDER).decompose())
+    top = max(cavity.bounding_box()[5], step.top - _SNAPPED)
+    regions = sorted((widest(part)[0], part.area()) for part in cavity.slice(top - _UNDER).decompose())
     width, area = regions[-1] if regions else (0.0, 0.0)
     advice = f"at z = {step.top:.4g} mm there is no room to pour: give the layer a flat top, or turn it over"
     yield at_least("C410", f"{where}: {opening}, area", area, LEAST_AREA, "mm2", advice)
