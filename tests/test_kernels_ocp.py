@@ -50,7 +50,7 @@ def test_a_broken_folder_ocp_becomes_one_error(tmp_path, kernel, fault):
     code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import unitcad.{kernel}"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     last = found.stderr.strip().splitlines()[-1]
-    assert last.startswith("unitcad.errors.UnitcadError: ")
+    assert last.startswith("unitcad.errors.Missing: ")
     assert "pip install" in last
 
 

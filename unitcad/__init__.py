@@ -13,10 +13,9 @@ numpy nor a CAD library. `unitcad.check` and `unitcad.batch` are packages that m
 """
 
 # pyright: strict
-from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+# Nothing is imported here: with `python -m unitcad` the working directory is still where Python looks first.
+TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from unitcad import attenuation as attenuation
@@ -120,10 +119,12 @@ _PLACES = {
 """Where each name is defined: a room, or a module and the name there."""
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Load a public name when it is first used. Raises AttributeError for any other."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
     module, _, attribute = _PLACES[name].partition(":")
     found = import_module(f"{__name__}.{module}")
     value = getattr(found, attribute) if attribute else found

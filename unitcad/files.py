@@ -32,6 +32,7 @@ MARK, LOCK = "unitcad-scratch", "unitcad-lock"
 maker lives. They are two, since Windows lets nobody read a locked file.
 """
 FORMAT = "unitcad scratch 1"
+_TOKEN = re.compile(re.escape(TEMPORARY) + "[0-9a-f]{16}")
 OLD, NEW = "old", "new"
 _DEVICE = re.compile(r"con|prn|aux|nul|com[0-9]|lpt[0-9]", re.IGNORECASE)
 
@@ -195,7 +196,7 @@ def scratch(parent: Path, name: str = "") -> Iterator[Path]:
 def _remove_scratch(folder: Path) -> None:
     """Remove a scratch folder: quickly where its work has left nothing but lock and mark."""
     try:
-        for name in (LOCK, MARK):
+        for name in (MARK, LOCK):
             with contextlib.suppress(FileNotFoundError):
                 os.unlink(folder / name)
         os.rmdir(folder)
@@ -206,7 +207,8 @@ def _remove_scratch(folder: Path) -> None:
 def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
     """Scratch folders in `parent` whose process is gone, each with the name it was for, locked while it is given out.
 
-    Only real folders with our mark and their own token inside are given out.
+    Only real folders with our mark and their own token inside are given out, and those that hold our empty lock and
+    nothing else: their process ended before it wrote the mark, or after it had removed it.
     """
     from filelock import FileLock
 
@@ -231,6 +233,8 @@ def _marked(folder: Path) -> str | None:
     try:
         if not stat.S_ISDIR(folder.lstat().st_mode):
             return None
+        if _TOKEN.fullmatch(folder.name) and [(e.name, e.lstat().st_size) for e in folder.iterdir()] == [(LOCK, 0)]:
+            return ""
         form, token, name, rest = read_text(folder / MARK, largest=1000, links=False).split("\n")
     except (UnitcadError, ValueError, OSError):
         return None

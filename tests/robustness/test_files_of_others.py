@@ -230,3 +230,15 @@ def test_no_command_hangs_on_or_swallows_what_is_no_spec(arguments: str, kind: s
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1
     assert ("larger than 16 MB" if "large" in kind else "not a regular file") in done.stderr
+
+
+def test_scratch_of_a_process_that_ended_before_its_mark_is_removed(tmp_path: Path) -> None:
+    """A folder with our token and nothing but the empty lock; one with anything else in it stays."""
+    ours, theirs = tmp_path / ".tmp-0123456789abcdef", tmp_path / ".tmp-fedcba9876543210"
+    for folder in (ours, theirs):
+        folder.mkdir()
+        (folder / files.LOCK).touch()
+    (theirs / "photo.jpg").write_bytes(b"1")
+    clear_leftovers(tmp_path)
+    assert [folder.name for folder in sorted(tmp_path.iterdir())] == [theirs.name]
+    assert sorted(file.name for file in theirs.iterdir()) == ["photo.jpg", files.LOCK]
