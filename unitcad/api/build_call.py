@@ -10,7 +10,8 @@ from pathlib import Path
 
 from unitcad import notebook
 from unitcad.pipeline import Variant
-from unitcad.pipeline.build import OUTPUTS, Built
+from unitcad.pipeline.artifacts import OUTPUTS
+from unitcad.pipeline.build import Built
 from unitcad.pipeline.build import build as build_spec
 from unitcad.pipeline.folder import PAGE, held
 from unitcad.spec import Spec

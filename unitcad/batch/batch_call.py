@@ -15,7 +15,7 @@ from unitcad.batch.estimate_table import write_estimates
 from unitcad.batch.executors import open_executor
 from unitcad.batch.run import BatchOptions, Summary, run, trim
 from unitcad.batch.sweep import Sweep, load_sweep
-from unitcad.pipeline.build import OUTPUTS
+from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.spec.asked import Format
 from unitcad.text import toml
 from unitcad.validation import Changes

@@ -11,7 +11,7 @@ from unitcad import catalogue
 from unitcad.designs import limits
 from unitcad.designs.design import Design, Reason
 from unitcad.designs.dimensions import Dimensions, concentric, wire_exit
-from unitcad.designs.parts import slots
+from unitcad.designs.parts import motor_hold, slots
 from unitcad.errors import Refusal
 from unitcad.shape import Shape, cut, ring
 from unitcad.spec import Spec
@@ -99,10 +99,8 @@ def assembly(spec: Spec, dims: Dimensions) -> list[str]:
         ]
     else:
         steps = ["Push the motor in from the skin's side."]
-    if spec.motor.fill:
-        return [*steps, "Layer 1 holds the motor all round."]
-    if spec.fpcb:
-        return [*steps, f"A ring of air of {dims.air_ring:.2f} mm stays round the motor: what it is fixed to holds it."]
+    if spec.motor.fill or spec.fpcb:
+        return [*steps, motor_hold(spec, dims)]
     return [
         *steps,
         f"Nothing else holds it: lay the body on a greased flat, centre the motor, and fill the ring of "

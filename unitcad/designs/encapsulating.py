@@ -14,7 +14,7 @@ from unitcad import catalogue
 from unitcad.designs import limits
 from unitcad.designs.design import Design
 from unitcad.designs.dimensions import MOTOR_CLEARANCE, Dimensions, Exit, concentric, wire_exit
-from unitcad.designs.parts import slots
+from unitcad.designs.parts import motor_hold, slots
 from unitcad.designs.stretch import allowed_strain, pad_strain, tail_strain, widest_tail_end
 from unitcad.errors import Refusal
 from unitcad.shape import Revolve, Shape, cut, polygon
@@ -138,9 +138,7 @@ def assembly(spec: Spec, dims: Dimensions) -> list[str]:
         "A smear of Layer 1's silicone between the back and the cap holds it (assumed: silicone bonds poorly to bare "
         "metal and polyimide; a primer or a silicone adhesive holds better)."
     )
-    if spec.motor.fill:
-        return [*steps, "Layer 1 holds the motor all round."]
-    return [*steps, f"A ring of air of {dims.air_ring:.2f} mm stays round the motor: what it is fixed to holds it."]
+    return [*steps, motor_hold(spec, dims)]
 
 
 DESIGN = Design(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from unitcad.designs.dimensions import WIRE_GAP, Dimensions, Pad
 from unitcad.shape import Shape, box, cut, cylinder, moved, turned, union
+from unitcad.spec import Spec
 from unitcad.spec.effective import Circuit, Wires
 
 BEYOND = 1.0
@@ -19,6 +20,13 @@ BEYOND = 1.0
 def motor(dims: Dimensions) -> Shape:
     """Draw the motor as a cylinder standing on the skin."""
     return cylinder(dims.motor_radius, 0, dims.motor_height)
+
+
+def motor_hold(spec: Spec, dims: Dimensions) -> str:
+    """Write what is round the motor once it is in, where something holds it."""
+    if spec.motor.fill:
+        return "Layer 1 holds the motor all round."
+    return f"A ring of air of {dims.air_ring:.2f} mm stays round the motor: what it is fixed to holds it."
 
 
 def circuit(fpcb: Circuit, pad: Pad, dims: Dimensions) -> Shape:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from unitcad.designs import Dimensions, design_named, dimensions, unit_bodies
 from unitcad.errors import Refusal
 from unitcad.moulds import dents, filament, lid
 from unitcad.moulds.base import base, plate_bottom
 from unitcad.moulds.blade import blade
-from unitcad.moulds.complement import Complement, complement
 from unitcad.moulds.cup import cup
 from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved
 from unitcad.moulds.layout import Cell, Layout, layout
@@ -19,6 +19,9 @@ from unitcad.moulds.tongue import tongues
 from unitcad.shape import Shape, Union, content_hash, moved, turned
 from unitcad.shape.body import Body, Kind
 from unitcad.spec import Spec, printer_of
+
+if TYPE_CHECKING:
+    from unitcad.moulds.complement import Complement
 
 _BASE, _CUP, _CUP2, _TONGUE = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.73, 0.83, 0.93), (0.90, 0.30, 0.30)
 _UP, _DOWN = (0, 0, 1), (0, 0, -1)
@@ -92,7 +95,11 @@ def plan(spec: Spec) -> Plan:
     whose width can't clear the air, a piece that nothing holds.
     """
     layers = cast_layers(spec)
-    made = complement(spec, layers) if design_named(spec.design).tooling is None else None
+    made = None
+    if design_named(spec.design).tooling is None:
+        from unitcad.moulds.complement import complement  # it meshes: the other designs' plans load no kernel
+
+        made = complement(spec, layers)
     dims = made.dims if made else dimensions(spec)
     lay = made.layout if made else layout(spec, dims)
     if not made:

@@ -35,13 +35,13 @@ class Artifact:
     """One file: its path in the variant's folder, the stage that makes it, the hash of what it reads, and how.
 
     `form` is the format that asks for it, "" where its output alone does. `bodies` are the names of what it holds. A
-    variant's own file has no key.
+    variant's own file has no key. The key is worked out when it is called for: it hashes every shape in the file.
     """
 
     path: str
     form: str
     stage: str
-    key: str
+    key: Callable[[], str]
     make: Callable[[], bytes]
     bodies: tuple[str, ...] = ()
 
@@ -62,7 +62,7 @@ def _of_bodies(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
                 path=f"{group.name}/{file_stem(body)}.stl",
                 form="stl",
                 stage="meshes",
-                key=body_key(moulds, body, "stl"),
+                key=lambda body=body: body_key(moulds, body, "stl"),
                 make=lambda body=body: body_files.stl_content(moulds, body),
                 bodies=(body.name,),
             )
@@ -70,7 +70,7 @@ def _of_bodies(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
             path=f"{group.together}.3mf",
             form="3mf",
             stage="meshes",
-            key=joint_key(moulds, every, "3mf", *bed),
+            key=lambda every=every: joint_key(moulds, every, "3mf", *bed),
             make=lambda printed=printed: body_files.threemf_content(moulds, printed),
             bodies=tuple(body.name for body in printed),
         )
@@ -78,7 +78,7 @@ def _of_bodies(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
             path=f"{group.together}.glb",
             form="glb",
             stage="meshes",
-            key=joint_key(moulds, every, "glb"),
+            key=lambda every=every: joint_key(moulds, every, "glb"),
             make=lambda every=every: body_files.glb_content(moulds, every),
             bodies=tuple(body.name for body in every),
         )
@@ -86,31 +86,32 @@ def _of_bodies(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
             path=f"{group.together}.step",
             form="step",
             stage="step",
-            key=joint_key(moulds, every, "step", group.name, *_brep()),
+            key=lambda group=group: joint_key(moulds, group.bodies, "step", group.name, *_brep()),
             make=lambda group=group: body_files.step_content(group.bodies, group.name),
             bodies=tuple(body.name for body in every),
         )
 
 
 def _drawings(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
-    from unitcad.casting.written import step_section
-    from unitcad.export import svg
-
     if "unit" in only:
+        from unitcad.export import svg
+
         yield Artifact(
             path="section.svg",
             form="",
             stage="drawing",
-            key=geometry_key(moulds, "section"),
+            key=lambda: geometry_key(moulds, "section"),
             make=lambda: svg.unit_section(moulds.unit, moulds.dimensions, moulds.segments).encode(),
         )
     if "casting" in only:
+        from unitcad.casting.written import step_section
+
         for step in moulds.plan.steps:
             yield Artifact(
                 path=f"step{step.index}-section.svg",
                 form="",
                 stage="drawing",
-                key=geometry_key(moulds, f"section of pour {step.index}"),
+                key=lambda step=step: geometry_key(moulds, f"section of pour {step.index}"),
                 make=lambda step=step: step_section(moulds, step).encode(),
             )
 
@@ -128,7 +129,7 @@ def _pictures(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
             path=path,
             form="png",
             stage="pictures",
-            key=geometry_key(moulds, path, *versions),
+            key=lambda path=path: geometry_key(moulds, path, *versions),
             make=lambda path=path: drawn()[path],
         )
 
@@ -145,12 +146,16 @@ def _brep() -> tuple[object, ...]:
 
 def own(moulds: MouldSet, only: Sequence[str], layer_volumes_mm3: Sequence[float], store: Store) -> Iterator[Artifact]:
     """Yield the variant's own files but for the manifest, which lists them all. `layer_volumes_mm3`: of one unit."""
-    yield Artifact("spec.toml", "", "spec", "", lambda: to_toml(moulds.spec).encode())
+    yield Artifact("spec.toml", "", "spec", _no_key, lambda: to_toml(moulds.spec).encode())
     if "estimate" in only:
-        yield Artifact("estimate.json", "", "estimate", "", lambda: json_bytes(estimated(moulds, store)))
+        yield Artifact("estimate.json", "", "estimate", _no_key, lambda: json_bytes(estimated(moulds, store)))
     if "casting" in only:
         for path in CASTING:
-            yield Artifact(path, "", "casting", "", lambda path=path: _casting(moulds, layer_volumes_mm3)[path])
+            yield Artifact(path, "", "casting", _no_key, lambda path=path: _casting(moulds, layer_volumes_mm3)[path])
+
+
+def _no_key() -> str:
+    return ""
 
 
 def estimated(moulds: MouldSet, store: Store) -> dict[str, Any]:

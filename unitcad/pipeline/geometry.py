@@ -61,7 +61,7 @@ def pictures(spec: Spec, only: Sequence[str], store: Store) -> dict[str, str]:
     Raises NoPicture where this machine can't draw; that is not remembered, so another try may succeed.
     """
     table = artifacts.shared(MouldSet(geometric(spec)), _geometric_outputs(only), ("png",))
-    return {a.path: store.file(a.key, a.make) for a in table if a.form == "png"}
+    return {a.path: store.file(a.key(), a.make) for a in table if a.form == "png"}
 
 
 def _geometric_outputs(only: Sequence[str]) -> tuple[str, ...]:
@@ -85,7 +85,7 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, stag
     files: dict[str, str] = {}
     for artifact in artifacts.shared(moulds, only, forms):
         with stages(artifact.stage):
-            files[artifact.path] = store.file(artifact.key, artifact.make)
+            files[artifact.path] = store.file(artifact.key(), artifact.make)
         for name in artifact.bodies:
             records[name]["files"][artifact.form] = {"path": artifact.path, "sha256": files[artifact.path]}
     with stages("laws"):

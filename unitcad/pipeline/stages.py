@@ -12,14 +12,15 @@ Say = Callable[[str], None]
 
 @dataclass
 class Stages:
-    """`with stages("laws"): ...` tells `say` and adds to `seconds`."""
+    """`with stages("laws"): ...` tells `say`, once a stage, and adds to `seconds`."""
 
     say: Say = lambda stage: None
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextlib.contextmanager
     def __call__(self, stage: str) -> Iterator[None]:
-        self.say(stage)
+        if stage not in self.seconds:
+            self.say(stage)
         start = time.perf_counter()
         try:
             yield
