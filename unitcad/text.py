@@ -60,3 +60,8 @@ def toml(value: Any) -> str:
     if isinstance(value, str):
         return _quoted(value).replace("\x7f", "\\u007f")
     return str(value).lower() if isinstance(value, bool) else repr(value) if isinstance(value, float) else str(value)
+
+
+def spaced(name: str) -> str:
+    """Return a body's name as it is read: "cup1" as "cup 1"."""
+    return re.sub(r"(?<=\D)(?=\d+$)", " ", name)

@@ -41,7 +41,7 @@ def test_only_ecoflex_00_30_clears_by_itself() -> None:
         assert pour.verdict.startswith("Bubbles clear") == (name == "ecoflex-00-30")
 
 
-def test_no_vacuum_is_said() -> None:
+def test_without_a_vacuum_the_verdict_names_a_way() -> None:
     assert "brush a thin coat" in procedure("encapsulating", "casting.vacuum=false").pours[0].verdict
 
 
@@ -81,9 +81,10 @@ def test_play_moves_walls() -> None:
 def test_weep_goes_with_the_cube_of_the_clearance() -> None:
     one, two = (set_of("encapsulating", f"moulds.window_clearance_mm={c}") for c in (0.05, 0.1))
     silicone = materials()["ecoflex-00-30"]
-    weep = [figures.weep_mm3(m.spec, m.dimensions, m.plan.layout, 0, silicone) for m in (one, two)]
+    weep = [figures.weep_mm3(m, m.plan.steps[0], silicone) for m in (one, two)]
     assert weep[1] / weep[0] == pytest.approx(8, rel=1e-9)
-    assert figures.weep_mm3(one.spec, set_of("no-fpcb").dimensions, one.plan.layout, 0, silicone) == 0
+    closed = set_of("no-fpcb")
+    assert figures.weep_mm3(closed, closed.plan.steps[0], silicone) == 0
 
 
 def test_cure_follows_the_room() -> None:
@@ -151,13 +152,12 @@ def test_bill_counts_pieces() -> None:
 
 def test_edges_off_the_layer_grid() -> None:
     moulds = set_of("encapsulating")
-    found = {(e.piece, e.edge): e for e in off_grid(moulds.spec, moulds.dimensions)}
+    found = {(e.piece, e.edge): e for e in off_grid(moulds)}
     # As printed, upside down, the window's edges lie 3.36 - 1.705 and 3.36 - 2.405 above the bed.
     assert found["cup1", "window's lower edge"].height_mm == pytest.approx(1.655)
     assert found["cup1", "window's upper edge"].nearest_mm == pytest.approx(1.0)
     assert ("base", "seat") not in found
-    fine = set_of("encapsulating", "moulds.layer_mm=0.005")
-    assert off_grid(fine.spec, fine.dimensions) == []
+    assert off_grid(set_of("encapsulating", "moulds.layer_mm=0.005")) == []
 
 
 def test_drawing_of_every_pour_names_its_pieces() -> None:

@@ -1,4 +1,4 @@
-"""A fit coupon: what a person prints first, to find the clearances that his printer needs.
+"""A fit coupon: what a person prints first, to learn the clearances that the printer needs.
 
 Five stations at 0.5 to 1.5 times the catalogue's value. At each: a recess for the plug (the plinth's fit), a window for
 the tongue, a hole for the filament, a wall, and the station's own number, engraved.
@@ -38,7 +38,7 @@ _ROWS = {"recess": 13.0, "hole": 22.0, "wall": 28.0, "number": 35.0}
 
 @dataclass(frozen=True)
 class Fit:
-    """What one feature settles: the printer's key, how to judge, and the value that each station stands for."""
+    """One feature of the coupon: the printer's key that it settles, what to choose, the value of each station (mm)."""
 
     feature: str
     key: str
@@ -47,43 +47,38 @@ class Fit:
 
 
 def fits(printer: Printer) -> tuple[Fit, ...]:
-    """What the coupon settles, with the five values of each."""
+    """Return what the coupon settles, with the five values of each."""
 
-    def values(key: str, least: float = 0.0) -> tuple[float, ...]:
+    def fit(feature: str, key: str, choose: str, least: float = 0.0) -> Fit:
         nominal = float(getattr(printer, key))
-        return tuple(round(least + (nominal - least) * share, 4) for share in SHARES)
+        return Fit(feature, key, choose, tuple(round(least + (nominal - least) * share, 4) for share in SHARES))
 
     return (
-        Fit(
-            "recess",
-            "plinth_clearance_mm",
-            "least where the plug drops in",
-            values("plinth_clearance_mm"),
-        ),
-        Fit("window", "window_clearance_mm", "least where the greased tongue slides", values("window_clearance_mm")),
-        Fit("hole", "filament_hole_mm", "least that takes the filament by hand", values("filament_hole_mm", FILAMENT)),
-        Fit("wall", "least_wall_mm", "thinnest that stands closed and stiff", values("least_wall_mm")),
-        Fit("number", "engraving_stroke_mm", "narrowest that reads", values("engraving_stroke_mm")),
+        fit("recess", "plinth_clearance_mm", "least where the plug drops in"),
+        fit("window", "window_clearance_mm", "least where the greased tongue slides"),
+        fit("hole", "filament_hole_mm", "least that takes the filament by hand", FILAMENT),
+        fit("wall", "least_wall_mm", "thinnest that stands closed and stiff"),
+        fit("number", "engraving_stroke_mm", "narrowest that reads"),
     )
 
 
 def toml(printer: Printer, fit: Fit, station: int) -> str:
-    """The line of TOML for the result at a station (from 0), under [printers.NAME] with like = the printer."""
+    """Return the line of TOML for a station (from 0), to stand under [printers.NAME] with like = the printer."""
     return f"{fit.key} = {fit.values_mm[station]:g}"
 
 
 def bodies(printer: Printer) -> tuple[Body, ...]:
-    """The coupon's pieces as they lie on the bed: the plate, the plug and the tongue."""
-    found = [
+    """Draw the coupon's pieces as they lie on the bed: the plate, the plug and the tongue."""
+    made = "cut" if _resin(printer) else "printed"
+    return (
         Body("coupon-plate", "tool", "coupon", _plate(printer), _COLOUR),
         Body("coupon-plug", "tool", "coupon", _plug(), _PLUG_COLOUR),
-    ]
-    made = "cut" if _resin(printer) else "printed"
-    return (*found, Body("coupon-tongue", "tool", "coupon", _tongue(printer), _TONGUE_COLOUR, made=made))
+        Body("coupon-tongue", "tool", "coupon", _tongue(printer), _TONGUE_COLOUR, made=made),
+    )
 
 
 def to_markdown(printer: Printer) -> str:
-    """How to judge the coupon, and the line of TOML for every station."""
+    """Explain how to read the coupon, with the line of TOML for every station."""
     thick, wide = float(printer.slot_height_mm), _tongue_width(printer)
     pieces = "plate and plug" if _resin(printer) else "plate, plug and tongue"
     lines = [
@@ -133,14 +128,14 @@ def to_markdown(printer: Printer) -> str:
 
 
 def window_heights_as_printed(printer: Printer) -> list[float]:
-    """What layers leave open of each station's window, mm: a slicer cuts each layer at its middle."""
+    """Return the height that layers leave of each station's window, mm: a slicer cuts each layer at its middle."""
     layer = float(printer.layer_mm)
     middles = [layer * (k + 0.5) for k in range(math.ceil(PLATE / layer))]
     return [layer * sum(low + 1e-6 < middle < high - 1e-6 for middle in middles) for low, high in _windows(printer)]
 
 
 def _windows(printer: Printer) -> list[tuple[float, float]]:
-    """Lower and upper edge of each station's window, mm above the bed."""
+    """Return lower and upper edge of each station's window, mm above the bed."""
     around = next(fit.values_mm for fit in fits(printer) if fit.feature == "window")
     return [(WINDOW_Z - each, WINDOW_Z + float(printer.slot_height_mm) + each) for each in around]
 
@@ -153,7 +148,7 @@ def _plate(printer: Printer) -> Shape:
     stroke = float(printer.engraving_stroke_mm)
     length = PITCH * len(SHARES) + 2 * MARGIN
     depth = _ROWS["number"] + HEIGHT * stroke * SHARES[-1] / 2 + MARGIN
-    found: list[Shape] = [box(0, length, 0, depth, 0, PLATE)]
+    solids: list[Shape] = [box(0, length, 0, depth, 0, PLATE)]
     tools: list[Shape] = []
     by_feature, windows = {fit.feature: fit.values_mm for fit in fits(printer)}, _windows(printer)
     for i in range(len(SHARES)):
@@ -164,15 +159,15 @@ def _plate(printer: Printer) -> Shape:
         tools.append(box(x - half, x + half, -1, WINDOW_DEPTH, *windows[i]))
         wall = by_feature["wall"][i] / 2
         y = _ROWS["wall"]
-        found.append(box(x - WALL_LENGTH / 2, x + WALL_LENGTH / 2, y - wall, y + wall, PLATE - 1, PLATE + WALL_HEIGHT))
+        solids.append(box(x - WALL_LENGTH / 2, x + WALL_LENGTH / 2, y - wall, y + wall, PLATE - 1, PLATE + WALL_HEIGHT))
         own, text = by_feature["number"][i], str(i + 1)
         number = engraving(text, own, PLATE - float(printer.engraving_depth_mm), PLATE + 1)
         tools.append(moved(number, x - text_width(text, own) / 2, _ROWS["number"] - HEIGHT * own / 2))
-    return cut(union(found), tools)
+    return cut(union(solids), tools)
 
 
 def _taper(clearance: float, relief: float = 0.0, beyond: float = 0.0) -> Shape:
-    """The plug's taper upside down, its top at z = 0, `clearance` wider on every side; longer by `relief` below."""
+    """Draw the plug's taper upside down, its top at z = 0, wider by `clearance` all round, longer by `relief` below."""
     square, slope = clearance / math.cos(math.radians(PLINTH_DRAFT_DEG)), math.tan(math.radians(PLINTH_DRAFT_DEG))
 
     def section(height: float) -> Profile:
@@ -184,7 +179,7 @@ def _taper(clearance: float, relief: float = 0.0, beyond: float = 0.0) -> Shape:
 
 
 def _plug() -> Shape:
-    """A plinth on a handle, printed plinth up, as the base's is."""
+    """Draw a plinth on a handle, printed plinth up, as the base's is."""
     handle = box(-6, 6, -6, 6, 0, 4)
     return union((handle, moved(turned(_taper(0.0), "x", 2), 0, 0, 4 + PLUG_HEIGHT)))
 

@@ -1,4 +1,4 @@
-"""The coupon's files: an STL a piece, one 3MF, and the page that says how to judge it."""
+"""The coupon's files: an STL a piece, one 3MF, and the page that says how to read it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SEGMENTS = 64
 
 
 def write(printer: Printer, out: Path) -> Path:
-    """Write `out`/coupon-<printer>; returns that folder. Raises UnitcadError where it can't be written."""
+    """Write `out`/coupon-<printer>; return that folder. Raises UnitcadError where it can't be written."""
     folder = out / f"coupon-{printer.name}"
     parts = []
     try:

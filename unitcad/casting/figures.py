@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from unitcad.catalogue import Material, Value
-from unitcad.designs import Dimensions
-from unitcad.moulds.layout import Layout
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
 from unitcad.spec import Spec
 
 GRAVITY = 9.80665
@@ -35,7 +35,7 @@ class Figure:
 
 
 def sourced(value: Value) -> str:
-    """A catalogue value's origin in words: its status, then its source."""
+    """Return a catalogue value's origin in words: its status, then its source."""
     return f"{value.status}: {value.source}"
 
 
@@ -53,7 +53,7 @@ class Mix:
 
 
 def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
-    """What to weigh for `volume_mm3` of silicone. The error is half the scale's digit over the smaller part's grams."""
+    """Return what to weigh for `volume_mm3` of silicone; errors are half the scale's digit over the smaller part."""
     casting, ratio = spec.casting, float(material.mix_ratio)
     net = volume_mm3 * float(material.density_g_cm3) / 1000
     total = max(net * (1 + casting.waste), casting.minimum_mix_g)
@@ -68,7 +68,7 @@ def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
 
 
 def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE_MM) -> float:
-    """Seconds for a bubble to rise through a depth by Stokes' law, at the viscosity just mixed, so optimistic.
+    """Return the seconds that a bubble takes through a depth by Stokes' law, at the viscosity just mixed: optimistic.
 
     v = 2/9 (density of silicone) g radius^2 / viscosity; the air's own density is left out.
     """
@@ -78,21 +78,22 @@ def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE
 
 
 def at_room(value: float, room_c: float) -> float:
-    """A time at 23 degC (pot life, cure) at the room's temperature, by the rule of thumb above."""
+    """Convert a time at 23 degC (pot life, cure) to the room's temperature, by the rule of thumb above."""
     return value * 2 ** ((DATASHEET_C - room_c) / DOUBLING_K)
 
 
-def weep_mm3(spec: Spec, dims: Dimensions, lay: Layout, layer: int, material: Material) -> float:
-    """What flows out beside the tongues of one cell during the whole pot life without grease, mm3.
+def weep_mm3(moulds: MouldSet, step: Step, material: Material) -> float:
+    """Return what flows out beside the tongues of one cell during the whole pot life without grease, mm3.
 
     Plane Poiseuille flow through the window's clearance: clearance^3 perimeter pressure / (12 viscosity length).
     """
+    spec, dims, lay = moulds.spec, moulds.plan.dimensions, moulds.plan.layout
     if not dims.exit:
         return 0.0
     clearance = spec.moulds.window_clearance_mm / 1000
     around = 2 * (dims.exit.width + dims.exit.height) / 1000
-    length = (lay.cup[0] - max(abs(c.x) for c in lay.cells) - dims.radii[layer]) / 1000
-    head = max(dims.heights[layer] - (dims.exit.low + dims.exit.high) / 2, 0.0) / 1000
+    length = (lay.cup[0] - max(abs(c.x) for c in lay.cells) - dims.radii[step.index - 1]) / 1000
+    head = max(step.rim - (dims.exit.low + dims.exit.high) / 2, 0.0) / 1000
     pressure = 1000 * float(material.density_g_cm3) * GRAVITY * head
     flow = clearance**3 * around * pressure / (12 * float(material.mixed_viscosity_cps) / 1000 * length)
     seconds = 60 * at_room(float(material.pot_life_min), spec.casting.room_c)
@@ -100,7 +101,7 @@ def weep_mm3(spec: Spec, dims: Dimensions, lay: Layout, layer: int, material: Ma
 
 
 def wall_range(spec: Spec, layer: int) -> tuple[float, float]:
-    """Thinnest and thickest wall of a layer (from 0) that the cups' play on the plinth allows, mm.
+    """Return the thinnest and thickest wall of a layer (from 0) that the cups' play on the plinth allows, mm.
 
     Layer 1 lies between the core and one cup position, each further layer between two.
     """

@@ -7,173 +7,160 @@ from collections.abc import Sequence
 
 from unitcad.casting.figures import MIXING_MIN, MOST_ERROR_PCT, Mix
 from unitcad.catalogue import Material
-from unitcad.designs import Dimensions
 from unitcad.moulds.lid import SKIRT_WALL
-from unitcad.moulds.plan import Plan, Step
-from unitcad.spec import Spec
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
+from unitcad.spec import printer_of
 
 STRIKE_AGAIN_MIN = 10
 
 
-def preparation(spec: Spec, plan: Plan, resin: bool) -> tuple[str, ...]:
-    """From the printer to an empty mould."""
-    found = [
-        f"Print the pieces as they lie in their files: cups and blade upside down, the rest as drawn. Base "
-        f"and cups are engraved {plan.label}.",
+def preparation(moulds: MouldSet) -> tuple[str, ...]:
+    """Describe the way from the printer to an empty mould."""
+    plan = moulds.plan
+    lines = [
+        "Print the pieces as they lie in their files: cups and blade upside down, the rest as drawn. Base and cups are "
+        f"engraved {plan.label}.",
         "Brush off strings and loose bits. Put each cup on the plinth once, dry: its cut corner lets it on one way "
-        "only, "
-        "and it must sit down until seat and plinth touch.",
+        "only, and it must sit down until seat and plinth touch.",
     ]
-    if resin:
-        found.append(
-            "Resin keeps many platinum silicones from curing: wash, post-cure, bake (60 degC for 8 h, assumed), "
-            "then cure a "
-            "drop of each silicone on a spot of the base that is no cavity. If it stays tacky, coat or reprint."
+    if printer_of(moulds.spec).technology.value == "sla":
+        lines.append(
+            "Resin keeps many platinum silicones from curing: wash, post-cure, bake (60 degC for 8 h, assumed), then "
+            "cure a drop of each silicone on a spot of the base that is no cavity. If it stays tacky, coat or reprint."
         )
     if plan.of_kind("stub"):
-        found.append(
-            f"Push {'the' if len(plan.layout.cells) == 1 else 'each'} filament stub up through the core from below "
-            "until its end is flush with the core's top, its bent end lying in the groove under the plate and on the "
-            "bench. Trim its tip flush with a blade: 0.5 mm low shows."
+        lines.append(
+            f"Push {_each(moulds)} filament stub up through the core from below until its end is flush with the core's "
+            "top, its bent end lying in the groove under the plate and on the bench. Trim its tip flush with a blade: "
+            "0.5 mm low shows."
         )
-    return tuple(found)
+    return tuple(lines)
 
 
-def pour_steps(spec: Spec, plan: Plan, step: Step, silicone: Material, mix: Mix, verdict: str) -> tuple[str, ...]:
-    """One pour, from an empty mould to a cured layer on the core."""
-    first, tongues = step.index == 1, plan.standing(step, "tongue")
-    cells = len(plan.layout.cells)
-    found = []
+def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdict: str) -> tuple[str, ...]:
+    """Describe one pour, from an empty mould to a cured layer on the core."""
+    first, tongues = step.index == 1, moulds.plan.standing(step, "tongue")
+    cells, sprue = len(moulds.plan.layout.cells), moulds.spec.moulds.sprue_mm
+    lines = []
     if not first:
-        found.append(
+        lines.append(
             f"Wipe Layer {step.index - 1} with isopropanol and let it dry. Its outside is the bond face: no release "
-            "agent on it, "
-            "ever, no grease, no fingers. No sourced window exists for when to pour the next layer; as soon as it "
-            "is firm "
-            "and no longer tacky is the usual practice (assumed), and silicone bonds to cured silicone of its kind."
+            "agent on it, ever, no grease, no fingers. No sourced window exists for when to pour the next layer; as "
+            "soon as it is firm and no longer tacky is the usual practice (assumed), and silicone bonds to cured "
+            "silicone of its kind."
         )
-    found.append(
-        f"Release agent, if any, only on the bore of cup {step.index}"
-        + (" and on the core, sparingly." if first else ".")
-        + f" Put cup {step.index} on and push it towards the cut corner"
-        + (
-            ": the play is then on one side."
-            if first
-            else ", the same way as the cup before: Layer 2 lies between two cup positions."
-        )
+    core = " and on the core, sparingly" if first else ""
+    pushed = (
+        ": the play is then on one side."
+        if first
+        else ", the same way as the cup before: Layer 2 lies between two cup positions."
     )
-    if step.seals and plan.by_complement:
-        found.append("Grease the flanks of what stands on the base beside the cavity thinly, and wipe off the rest.")
+    lines.append(
+        f"Release agent, if any, only on the bore of cup {step.index}{core}. Put cup {step.index} on and push it "
+        f"towards the cut corner{pushed}"
+    )
+    if step.seals and moulds.plan.by_complement:
+        lines.append("Grease the flanks of what stands on the base beside the cavity thinly, and wipe off the rest.")
     if tongues:
-        found.append(
+        slot = "" if first else " and the slot that it left in the layer before"
+        lines.append(
             f"Grease {'the tongue' if len(tongues) == 1 else 'each tongue'} and the window thinly with petroleum "
-            f"jelly, the tip "
-            "not; wipe off what comes out into the bore. Push it in through the window"
-            + ("" if first else " and the slot that it left in the layer before")
-            + " until its round tip stops in the core and it lies on the ledge."
+            "jelly, the tip not; wipe off what comes out into the bore. Push it in through the window"
+            f"{slot} until its round tip stops in the core and it lies on the ledge."
         )
     if step.lid:
-        found.append(
-            f"Put lid {step.index} on. Seal it with a thin line of petroleum jelly on the rim outside the groove, "
-            f"and hold it "
-            f"down with a rubber band or a clamp across its skirt ({SKIRT_WALL:g} mm)."
+        lines.append(
+            f"Put lid {step.index} on. Seal it with a thin line of petroleum jelly on the rim outside the groove, and "
+            f"hold it down with a rubber band or a clamp across its skirt ({SKIRT_WALL:g} mm)."
         )
-    found.append(
-        f"Weigh {mix.part_a_g:.2f} g of {silicone.name} part A and {mix.part_b_g:.2f} g of part B ({mix.net_g:.3f} "
-        f"g go into "
-        f"{cells} cavit{'y' if cells == 1 else 'ies'}; so small a batch would be {mix.net_error_pct:.1f} % wrong in "
-        "the ratio, "
-        f"this one {mix.mix_error_pct:.2f} %{_more(mix)}). Mix for {MIXING_MIN:g} min (assumed), scraping the walls; "
-        "the pot life runs from now."
+    lines.append(
+        f"Weigh {mix.part_a_g:.2f} g of {silicone.name} part A and {mix.part_b_g:.2f} g of part B ({mix.net_g:.3f} g "
+        f"go into {cells} cavit{'y' if cells == 1 else 'ies'}; so small a batch would be {mix.net_error_pct:.1f} % "
+        f"wrong in the ratio, this one {mix.mix_error_pct:.2f} %{_larger_batch(mix)}). Mix for {MIXING_MIN:g} min "
+        "(assumed), scraping the walls; the pot life runs from now."
     )
-    found.append(verdict)
+    lines.append(verdict)
     if step.lid:
-        found.append(
-            f"Draw the silicone into a syringe, press its tip into the sprue ({spec.moulds.sprue_mm:g} mm) and "
-            f"inject slowly until "
+        lines.append(
+            f"Draw the silicone into a syringe, press its tip into the sprue ({sprue:g} mm) and inject slowly until "
             "every vent shows a bead without bubbles. Leave sprue and vents filled."
         )
     else:
-        found.append(
+        lines.append(
             f"Pour in a thin thread at one place until {'the' if cells == 1 else 'every'} cavity stands over its rim. "
-            "Wait for the bubbles, prick what you see. "
-            "Strike off along the rim with the blade held upright; what it takes goes into the groove."
+            "Wait for the bubbles, prick what you see. Strike off along the rim with the blade held upright; what it "
+            "takes goes into the groove."
         )
         again = " The window weeps a little." if tongues else ""
-        found.append(f"Top up and strike again after {STRIKE_AGAIN_MIN} min (assumed).{again}")
-    found.append(
+        lines.append(f"Top up and strike again after {STRIKE_AGAIN_MIN} min (assumed).{again}")
+    lines.append(
         "Let it cure, level, for the time above. Touch the overflow, not the layer, to see whether it is done."
     )
     if tongues:
         each = "the tongue" if len(tongues) == 1 else "every tongue"
-        found.append(f"Pull {each} out FIRST, sideways. A cup lifted over a tongue tears the layer.")
+        lines.append(f"Pull {each} out FIRST, sideways. A cup lifted over a tongue tears the layer.")
     if step.lid:
-        found.append("Lift the lid: sprue and vents tear off at the layer. Trim them flush with a blade.")
-    found.append(
+        lines.append("Lift the lid: sprue and vents tear off at the layer. Trim them flush with a blade.")
+    lines.append(
         f"Lift cup {step.index} straight up, a screwdriver in each pry slot. Layer {step.index} stays on the core."
     )
-    return tuple(found)
+    return tuple(lines)
 
 
-def _more(mix: Mix) -> str:
-    """The batch that would be right enough in the ratio, where this one isn't."""
+def release(moulds: MouldSet, inner: Material) -> tuple[str, ...]:
+    """Describe the way from the last cured layer to a unit in the hand; `inner` is Layer 1's silicone."""
+    tear = float(inner.tensile_mpa) * math.pi * (moulds.spec.moulds.filament_mm / 2) ** 2
+    lines = []
+    if moulds.plan.of_kind("stub"):
+        lines.append(
+            f"Pull {_each(moulds)} filament out downwards: it lets air in under the unit. Never push it through: "
+            f"{tear:.1f} N on its end tear {inner.name} (computed: tensile strength, {inner.tensile_mpa.status}, x its "
+            "area)."
+        )
+    lines.append("Peel the unit off the core straight up, all round first. Trim the flash.")
+    return tuple(lines)
+
+
+def measurements(moulds: MouldSet, grams: Sequence[float], slot_height: float | None) -> tuple[str, ...]:
+    """Name what to measure on the first part, and what it should be.
+
+    `grams`: of each layer of one unit, trimmed. `slot_height`: of the slot as the slicer makes the tongue (mm), None
+    where it is the drawn one.
+    """
+    spec, dims = moulds.spec, moulds.plan.dimensions
+    play = spec.moulds.plinth_clearance_mm
+    width = (
+        f"Farthest corner from the motor's axis: {dims.outer_radius:.2f} mm."
+        if moulds.plan.by_complement
+        else f"Diameter at the skin: {2 * dims.outer_radius:.2f} mm, in two directions."
+    )
+    further = f", each further layer by {2 * play:g} mm unless both cups were pushed the same way"
+    lines = [
+        f"Height over all: {dims.heights[-1]:.2f} mm. A cup that did not seat shows here.",
+        width,
+        "Walls at the skin, at four places: their spread is the cup's shift. Layer 1 may vary by "
+        f"{play:g} mm either way{further if len(grams) > 1 else ''}.",
+    ]
+    if dims.exit:
+        opening = "notch" if dims.exit.high >= dims.heights[0] else "slot"
+        layers = f"in layers of {spec.moulds.layer_mm:g}"
+        printed = f" ({slot_height:.2f} if the tongue was printed {layers})" if slot_height else ""
+        size = f"{dims.exit.width:.2f} wide, {dims.exit.height:.2f} high{printed}"
+        lines.append(f"The {opening}: {size}, open all the way.")
+    weights = " + ".join(f"{each:.3f}" for each in grams) + (f" = {sum(grams):.3f}" if len(grams) > 1 else "")
+    low = "" if spec.moulds.pour == "injected" else " or a low strike"
+    lines.append(f"Weigh one unit, trimmed, without motor and circuit: {weights} g. Less means air{low}.")
+    return tuple(lines)
+
+
+def _each(moulds: MouldSet) -> str:
+    return "the" if len(moulds.plan.layout.cells) == 1 else "each"
+
+
+def _larger_batch(mix: Mix) -> str:
+    """Name the batch that would be accurate enough in the ratio, where this one isn't."""
     if mix.mix_error_pct <= MOST_ERROR_PCT:
         return ""
     enough = mix.mix_g * mix.mix_error_pct / MOST_ERROR_PCT
     return f": too much; mix at least {enough:.3g} g (casting.minimum_mix_g) or use a finer scale"
-
-
-def release(spec: Spec, plan: Plan, inner: Material) -> tuple[str, ...]:
-    """From the last cured layer to a unit in the hand; `inner` is Layer 1's silicone."""
-    tear = float(inner.tensile_mpa) * math.pi * (spec.moulds.filament_mm / 2) ** 2
-    found = []
-    if plan.of_kind("stub"):
-        found.append(
-            f"Pull {'the' if len(plan.layout.cells) == 1 else 'each'} filament out downwards: it lets air in under "
-            "the unit. Never push it through: "
-            f"{tear:.1f} N on its end tear {inner.name} (computed: tensile strength, {inner.tensile_mpa.status}, x "
-            f"its area)."
-        )
-    found.append("Peel the unit off the core straight up, all round first. Trim the flash.")
-    return tuple(found)
-
-
-def measurements(
-    spec: Spec, dims: Dimensions, grams: Sequence[float], as_printed: float | None = None, by_complement: bool = False
-) -> tuple[str, ...]:
-    """What to measure on the first part, and what it should be: `grams` of each layer of one unit, trimmed, and the
-    slot's height if the slicer makes the tongue another one (mm).
-    """
-    play = spec.moulds.plinth_clearance_mm
-    found = [
-        f"Height over all: {dims.heights[-1]:.2f} mm. A cup that did not seat shows here.",
-        f"Farthest corner from the motor's axis: {dims.outer_radius:.2f} mm."
-        if by_complement
-        else f"Diameter at the skin: {2 * dims.outer_radius:.2f} mm, in two directions.",
-        "Walls at the skin, at four places: their spread is the cup's shift. Layer 1 may vary by "
-        f"{play:g} mm either way"
-        + (
-            f", each further layer by {2 * play:g} mm unless both cups were pushed the same way."
-            if len(spec.layers) > 1
-            else "."
-        ),
-    ]
-    if dims.exit:
-        found.append(
-            f"The {'notch' if dims.exit.high >= dims.heights[0] else 'slot'}: {dims.exit.width:.2f} wide, "
-            f"{dims.exit.height:.2f} high"
-            + (
-                f" ({as_printed:.2f} if the tongue was printed in layers of {spec.moulds.layer_mm:g})"
-                if as_printed
-                else ""
-            )
-            + ", open all the way."
-        )
-    sum_of = " + ".join(f"{each:.3f}" for each in grams)
-    low = "" if spec.moulds.pour == "injected" else " or a low strike"
-    found.append(
-        f"Weigh one unit, trimmed, without motor and circuit: {sum_of}"
-        + (f" = {sum(grams):.3f}" if len(grams) > 1 else "")
-        + f" g. Less means air{low}."
-    )
-    return tuple(found)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from unitcad.designs import Dimensions
 from unitcad.moulds.base import plate_bottom
 from unitcad.moulds.cup import groove_depth_of
-from unitcad.spec import Spec
+from unitcad.moulds.mould_set import MouldSet
 
 NEAR = 0.02
 """Share of a layer within which a height counts as on the grid."""
@@ -23,18 +22,20 @@ class OffGrid:
     nearest_mm: float
 
 
-def off_grid(spec: Spec, dims: Dimensions) -> list[OffGrid]:
-    """The edges that matter to a cavity and are off the grid. Cups lie upside down: heights count from the rim."""
-    layer = spec.moulds.layer_mm
-    found = []
-    for piece, edge, height in _edges(spec, dims):
-        nearest = round(height / layer) * layer
-        if abs(height - nearest) > NEAR * layer:
-            found.append(OffGrid(piece, edge, round(height, 4), round(nearest, 4)))
-    return found
+def off_grid(moulds: MouldSet) -> list[OffGrid]:
+    """Return the edges that matter to a cavity and are off the grid."""
+    layer = moulds.spec.moulds.layer_mm
+    nearest = [(*edge, round(edge[2] / layer) * layer) for edge in _edges(moulds)]
+    return [
+        OffGrid(piece, edge, round(height, 4), round(near, 4))
+        for piece, edge, height, near in nearest
+        if abs(height - near) > NEAR * layer
+    ]
 
 
-def _edges(spec: Spec, dims: Dimensions) -> list[tuple[str, str, float]]:
+def _edges(moulds: MouldSet) -> list[tuple[str, str, float]]:
+    """Return piece, edge and height above the bed, mm. Cups lie upside down: theirs count from the rim."""
+    spec, dims = moulds.spec, moulds.plan.dimensions
     bottom, clearance = plate_bottom(spec), spec.moulds.window_clearance_mm
     edges = [("base", "seat", -bottom), ("base", "core's top", dims.core_height - bottom)]
     if dims.exit:

@@ -11,6 +11,7 @@ import numpy as np
 
 from unitcad.export.picture import Drawn, Scene
 from unitcad.kernels.mesh import arrays, bounds, realise
+from unitcad.text import spaced
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -156,15 +157,9 @@ def exploded(moulds: MouldSet) -> Scene:
     parts = []
     for name, offset in offsets.items():
         for i, solid in enumerate(_solids(moulds, name)):
-            label = "" if i or name in unnamed else name.rstrip("1") if name in numbered else spoken(name)
+            label = "" if i or name in unnamed else name.rstrip("1") if name in numbered else spaced(name)
             parts.append(_drawn(solid.translate(offset), colours[name], label))
     return Scene(tuple(p for p in parts if p), (0.55, -1.0, 0.5), (1000, 1300))
-
-
-def spoken(name: str) -> str:
-    """layer1 as "layer 1"."""
-    stem = name.rstrip("0123456789")
-    return f"{stem} {name[len(stem) :]}".strip()
 
 
 def _colours(moulds: MouldSet) -> Mapping[str, tuple[float, float, float]]:
