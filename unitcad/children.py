@@ -70,7 +70,7 @@ def started(
 
 @contextlib.contextmanager
 def safe_path() -> Iterator[None]:
-    """Python processes that are started in this block import nothing from the folder that they start in.
+    """Keep Python processes that are started in this block from importing anything from the folder they start in.
 
     For `multiprocessing`, whose commands are its own; a command of ours has -P.
     """
@@ -101,7 +101,7 @@ def _write(pipe, content: bytes) -> None:
 
 
 def _keep(command: list[str]) -> int:
-    """The keeper: run a program until it ends or the pipe does; returns its exit code, as a shell counts it."""
+    """Run a program, as its keeper, until it ends or the pipe does; return its exit code, as a shell counts it."""
     lifeline = sys.stdin.buffer
     # The whole content first: nothing that the program does can keep us from reading the pipe's end.
     size = int.from_bytes(lifeline.read(8), "little")

@@ -16,7 +16,7 @@ class UnitcadError(Exception):
     exit_code = 2
 
     def as_dict(self) -> dict[str, object]:
-        """The error as JSON-ready data."""
+        """Return the error as JSON-ready data."""
         return {"message": str(self)}
 
 
@@ -53,7 +53,7 @@ class UnknownKey(Refusal):
 
 
 def unknown_name(field: str, value: str, known: Iterable[str]) -> Refusal:
-    """A refusal of a name that is not in `known`, with the closest names that are."""
+    """Return a refusal of a name that is not in `known`, with the closest names that are."""
     known = sorted(known)
     close = difflib.get_close_matches(value, known, n=3, cutoff=0.4)
     names = f"closest: {', '.join(close)}" if close else f"known: {', '.join(known)}"
@@ -61,7 +61,7 @@ def unknown_name(field: str, value: str, known: Iterable[str]) -> Refusal:
 
 
 def unknown_key(field: str, value: object, known: Iterable[str], lists: str = "") -> UnknownKey:
-    """A refusal of a key that no table has; `field` is its whole path, `known` the keys of that table.
+    """Return a refusal of a key that no table has; `field` is its whole path, `known` the keys of that table.
 
     The limit names the most similar keys first, and the command `lists`, which prints all, where it leaves any out.
     """
@@ -94,7 +94,7 @@ def _shown(value: object) -> str:
 
 
 def _plain(value: object) -> bool | int | float | str | None:
-    """A value as JSON has it, and short: numbers that JSON lacks and whatever is long become text."""
+    """Return a value as JSON has it, and short: numbers that JSON lacks and whatever is long become text."""
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**_LONGEST:

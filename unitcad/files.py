@@ -42,7 +42,7 @@ class NotThere(UnitcadError):
 
 
 def read(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> bytes:
-    """The content of a regular file of at most `largest` bytes; without `links` a symbolic link is refused.
+    """Return the content of a regular file of at most `largest` bytes; without `links` a symbolic link is refused.
 
     Raises NotThere where there is no such file, UnitcadError for whatever else keeps it from being read.
     """
@@ -61,7 +61,7 @@ def read(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = 
 
 
 def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> str:
-    """The text of a file in UTF-8; else as `read`."""
+    """Return the text of a file in UTF-8; else as `read`."""
     try:
         return read(path, largest=largest, links=links).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -69,7 +69,7 @@ def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bo
 
 
 def read_json(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bool = True) -> Any:
-    """The data of a JSON file, all of its numbers finite; else as `read`."""
+    """Return the data of a JSON file, all of its numbers finite; else as `read`."""
     text = read_text(path, largest=largest, links=links)
     try:
         return json.loads(text, parse_constant=_no_number, parse_float=_finite)
@@ -78,7 +78,7 @@ def read_json(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bo
 
 
 def regular(links: bool = True) -> Callable[[str, int], int]:
-    """An `opener` for `open` that opens regular files only, and makes them; without `links` no symbolic link.
+    """Return an `opener` for `open` that opens or makes regular files only; without `links` no symbolic link.
 
     Raises UnitcadError for anything else, which is not opened.
     """
@@ -111,7 +111,7 @@ def write(path: Path, content: bytes, *, sync: bool = False) -> None:
 
 @contextlib.contextmanager
 def writing(path: Path, *, sync: bool = False) -> Iterator[IO[bytes]]:
-    """A new file that takes the place of what is at `path` when the block ends well, and goes when it does not.
+    """Open a new file that replaces what is at `path` when the block ends well, and is removed when it does not.
 
     With `sync` content and name are on the disk when the block has ended. Raises OSError.
     """
@@ -145,7 +145,7 @@ def write_new(path: Path, content: bytes, *, sync: bool = False) -> None:
 
 
 def seen_from(path: str | os.PathLike[str], folder: str | os.PathLike[str] = ".") -> str:
-    """A path as seen from a folder, with slashes; the whole path where that is on another drive of Windows."""
+    """Return a path as seen from a folder, with slashes; the whole path where that is on another drive of Windows."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:
@@ -153,7 +153,7 @@ def seen_from(path: str | os.PathLike[str], folder: str | os.PathLike[str] = "."
 
 
 def names_device(name: str) -> bool:
-    """Whether a file of this name would be a device on Windows, whatever its ending."""
+    """Tell whether a file of this name would be a device on Windows, whatever its ending."""
     return _DEVICE.fullmatch(name.partition(".")[0].rstrip()) is not None
 
 
@@ -170,7 +170,7 @@ def sync_folder(folder: Path) -> None:
 
 @contextlib.contextmanager
 def scratch(parent: Path, name: str = "") -> Iterator[Path]:
-    """A fresh folder in `parent`, of an unpredictable name and with our mark inside, that goes with the block.
+    """Make a folder in `parent` with an unpredictable name and our mark inside, removed with the block.
 
     `name` is what in `parent` the work is for: what a killed process leaves is handed out with it by `leftovers`.
     """
@@ -205,7 +205,7 @@ def _remove_scratch(folder: Path) -> None:
 
 
 def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
-    """Scratch folders in `parent` whose process is gone, each with the name it was for, locked while it is given out.
+    """Yield the scratch folders in `parent` whose process is gone, each with its name, locked meanwhile.
 
     Only real folders with our mark and their own token inside are given out, and those that hold our empty lock and
     nothing else: their process ended before it wrote the mark, or after it had removed it.
@@ -229,7 +229,7 @@ def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _marked(folder: Path) -> str | None:
-    """The name in a scratch folder's mark; None for a folder that is not ours."""
+    """Return the name in a scratch folder's mark; None for a folder that is not ours."""
     try:
         if not stat.S_ISDIR(folder.lstat().st_mode):
             return None

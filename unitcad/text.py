@@ -18,29 +18,29 @@ _MARKUP = re.compile(r"[\\`*_\[\]|~]")
 
 
 def invisible(text: str) -> str | None:
-    """The first character of a text that no name needs and that deceives: control characters, turned directions."""
+    """Return the first character of a text that no name needs and that deceives, such as a control character."""
     found = _INVISIBLE.search(text)
     return found[0] if found else None
 
 
 def without_invisible(text: str) -> str:
-    """A text without such characters."""
+    """Return a text without such characters."""
     return _INVISIBLE.sub("", text)
 
 
 def printable(text: str) -> str:
-    """A text for a terminal, in one line: such characters as Python writes them in a string."""
+    """Return a text for a terminal, in one line: such characters as Python writes them in a string."""
     return _INVISIBLE.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def markdown(text: str) -> str:
-    """A text in one line that Markdown shows as it is: no markup, no HTML."""
+    """Return a text in one line that Markdown shows unchanged: no markup, no HTML."""
     plain = _INVISIBLE.sub(" ", text).replace("&", "&amp;").replace("<", "&lt;")
     return _MARKUP.sub(r"\\\g<0>", plain)
 
 
 def cell(text: str) -> str:
-    """A text for a cell of a CSV table: one that begins like a formula is one to a spreadsheet, so it gets a quote."""
+    """Return a text for a cell of a CSV table, quoted where a spreadsheet would take it for a formula."""
     return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
 
 

@@ -51,7 +51,7 @@ class TooHard(Exception):
 
 
 def response(medium: LayeredMedium, load: Load, omega: float, r: np.ndarray, z: float = 0.0) -> Reference:
-    """Displacement (m per pascal or newton) at radii r (m) and depth z (m), r > 0 under a surface point load.
+    """Return the displacement (m per pascal or newton) at radii r and depth z (m); r > 0 under a surface point load.
 
     Raises UnitcadError without python-flint, TooHard where it takes too many points.
     """
@@ -70,7 +70,7 @@ def response(medium: LayeredMedium, load: Load, omega: float, r: np.ndarray, z: 
 
 
 def _with_loss(medium: LayeredMedium, tan_delta: float) -> LayeredMedium:
-    """The same, bodies without damping with that loss."""
+    """Return the medium with that loss factor in the bodies without damping."""
     law = LossFactor(tan_delta)
     layers = [layer if layer.damping else replace(layer, damping=law) for layer in medium.layers]
     base = medium.half_space
@@ -78,7 +78,7 @@ def _with_loss(medium: LayeredMedium, tan_delta: float) -> LayeredMedium:
 
 
 def _weights_at_0(x: np.ndarray) -> np.ndarray:
-    """Lagrange's weights of values at `x` in their polynomial's value at 0."""
+    """Return Lagrange's weights of values at `x` in their polynomial's value at 0."""
     return np.array([np.prod([other / (other - one) for other in x if other != one]) for one in x])
 
 
@@ -127,7 +127,7 @@ class Kernel:
 
     @staticmethod
     def _static(mu: complex, eps: float) -> np.ndarray:
-        """What k C(k) of the top layer as a half-space tends to for large k (Boussinesq and Cerruti)."""
+        """Return the limit of k C(k) for large k: the top layer as a half-space (Boussinesq and Cerruti)."""
         along = 1.0 / (2.0 * mu * (1.0 - eps))
         across = -eps / (2.0 * mu * (1.0 - eps))
         return np.array([[along, across], [across, along]])
@@ -145,7 +145,7 @@ class Kernel:
         seen = [[acb(0)] * size for _ in range(2)]
 
         def place(interface: int, column: int, state: list[Any]) -> None:
-            """Tractions at the surface and at a free underside, all four at an interface."""
+            """Enter tractions at the surface and at a free underside, all four components at an interface."""
             underside = free and interface == last
             first = 4 * interface - (4 if underside else 2)
             for c in range(2 if interface == 0 or underside else 0, 4):
@@ -182,7 +182,7 @@ class Kernel:
         return np.array([[complex(at * found[a, b]) for b in range(2)] for a in range(2)])
 
     def _waves(self, mu: Any, eps: Any, ks2: Any, k: Any) -> list[tuple[Callable[[Any], list[Any]], Any]]:
-        """The two waves that go down: (u_r, u_z, t_r, t_z) at a depth less its exponential, and that one's rate."""
+        """Return the two waves that go down: (u_r, u_z, t_r, t_z) at a depth less its exponential, and its rate."""
         if self.omega == 0.0:
             turn = -(1 + eps) / (1 - eps)
 
@@ -202,14 +202,14 @@ _MIRROR = (1, -1, -1, 1)
 
 
 def _root(squared: Any) -> Any:
-    """The root of a wave that decays downwards, or, undamped, runs downwards."""
+    """Return the root of a wave that decays downwards or, undamped, runs downwards."""
     root = squared.sqrt()
     value = complex(root)
     return -root if value.real < 0 or (value.real == 0 and value.imag < 0) else root
 
 
 def _along(kernel: Kernel, load: Load, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The integral along the real axis."""
+    """Integrate along the real axis; return the integral and its doubt."""
     column = 1 if load.direction == "normal" else 0
     order = [column, 1 - column]  # rows of the kernel that go with (along, across)
     total = np.zeros((2, r.size), dtype=complex)
@@ -235,7 +235,10 @@ def _along(kernel: Kernel, load: Load, r: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _tail(load: Load, k: float, r: np.ndarray) -> np.ndarray:
-    """What lies beyond k at most, over |kernel| there: envelopes, by parts where they oscillate; falling as 1/k^2."""
+    """Bound what lies beyond k, over |kernel| there, for a kernel that falls as 1/k^2.
+
+    By envelopes, and by parts where they oscillate.
+    """
     wave = np.minimum(1.0, 1.0 / np.sqrt(np.maximum(k * r, 1e-300)))
     return _size(load, k) * wave * np.minimum(k, 4.0 / np.maximum(np.abs(r - load.reach), 1e-300))
 
@@ -256,7 +259,9 @@ def _panels(
     scale: float,
     known: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """The integral over the panels between `corners`, halved where the kernel is no polynomial yet; (it, doubt, scale).
+    """Integrate over the panels between `corners`; return (integral, doubt, scale).
+
+    A panel on which the kernel is no polynomial yet is halved.
 
     Doubt: the last two Legendre coefficients of the kernel times the largest that the rest of the integrand can be.
     """
@@ -288,7 +293,7 @@ def _panels(
 
 
 def _dense(load: Load, r: np.ndarray, a: float, b: float, coefficients: np.ndarray) -> np.ndarray:
-    """Integral from a to b of the kernel's polynomial times transform and Bessel functions."""
+    """Integrate the kernel's polynomial times transform and Bessel functions from a to b."""
     pieces = max(1, math.ceil(abs(b - a) * (float(r.max()) + load.reach) / 12.0))
     out = np.zeros((2, r.size), dtype=complex)
     step = max(1, 2_000_000 // (32 * r.size))
@@ -304,7 +309,7 @@ def _dense(load: Load, r: np.ndarray, a: float, b: float, coefficients: np.ndarr
 
 
 def _transform(load: Load, k: np.ndarray) -> np.ndarray:
-    """Integral of the load times J(kr) r dr."""
+    """Integrate the load times J(kr) r dr."""
     if isinstance(load, Point):
         return np.full(k.shape, 1.0 / (2.0 * math.pi))
     a, x = load.radius, k * load.radius
@@ -321,7 +326,7 @@ def _transform(load: Load, k: np.ndarray) -> np.ndarray:
 
 
 def _static_pair(load: Load, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Integrals of q(k) J(kr) dk with the load's own Bessel function and with the other one, as hypergeometric."""
+    """Integrate q(k) J(kr) dk with the load's own Bessel function and with the other, as hypergeometric functions."""
     if isinstance(load, Point):
         return 1.0 / (2 * np.pi * r), 1.0 / (2 * np.pi * r)
     a, s = load.radius, r / load.radius
@@ -333,7 +338,10 @@ def _static_pair(load: Load, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _radial(s: float) -> float:
-    """The radial disc of radius 1 as rings of radius x: each gives 2 (K - E)(m) / (pi min(s, x)), m = (min / max)^2."""
+    """Integrate the radial disc of radius 1 over rings of radius x.
+
+    Each ring gives 2 (K - E)(m) / (pi min(s, x)), m = (min / max)^2.
+    """
     import mpmath as mp
 
     with mp.workdps(40):

@@ -27,7 +27,10 @@ _RADII = np.array([0, 2, 5, 7, 10, 15, 20, 30]) * 1e-3
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Closed forms, null and finite elements against nine levels and twelve ratios; bare skin; mesh convergence."""
+    """Compare closed forms, null model and finite elements with the measured levels and ratios.
+
+    Bare skin and mesh convergence come with them.
+    """
     table = measured_table()
     found: dict[str, tuple[Judgement, Timing, str]] = {}
     calls: dict[str, Callable[[], object]] = {
@@ -115,7 +118,7 @@ _SHOWN = ("embedded E10/D30", "encapsulating E10/D30", "embedded D10", "encapsul
 
 
 def unit_spec(design: str, unit: str) -> Spec:
-    """The spec of a unit of the paper, "E10/D30" or a control "D10": 14 mm, walls and caps of 2.5 in all."""
+    """Return the spec of a unit of the paper, "E10/D30" or a control "D10": 14 mm, walls and caps of 2.5 in all."""
     from unitcad.catalogue import measurements
 
     names = [measurements()["names"][short] for short in unit.split("/")]
@@ -128,8 +131,9 @@ def unit_spec(design: str, unit: str) -> Spec:
 
 @cache
 def finite_element_levels(fineness: float, pad: bool) -> tuple[NineLevels, list[float]]:
-    """The units' levels, a control's in both shapes since the paper does not say which one was measured, and the
-    seconds of each solution.
+    """Return the units' levels and the seconds of each solution.
+
+    A control has a level in both shapes, since the paper does not say which one was measured.
     """
     import time
 
@@ -145,13 +149,13 @@ def finite_element_levels(fineness: float, pad: bool) -> tuple[NineLevels, list[
 
 
 def _by_name(table: Measured, model: str, two_levels: Callable[[Measured], np.ndarray]) -> dict[str, dict[str, float]]:
-    """The levels of a model that knows no shape."""
+    """Return the levels of a model that knows no shape."""
     found = two_levels(table) if model == "null" else [edge_levels(table.units(i), model) for i in range(9)]
     return {name: {"": float(level)} for name, level in zip(table.names, found, strict=True)}
 
 
 def _measured(table: Measured, unit: str) -> float:
-    """The measured level of a unit of the page, whose controls have a shape."""
+    """Return the measured level of a unit of the page, whose controls have a shape."""
     name = unit if unit in table.names else f"single {unit.split(' ')[1]}"
     return float(table.levels[table.names.index(name)])
 
@@ -172,7 +176,10 @@ def _units_table(table: Measured, closed: dict[str, NineLevels], solved: dict[st
 
 
 def bare_skin(finenesses: Sequence[float], repeats: int) -> tuple[Table, float]:
-    """u_z of the forearm under the motor's disc by both ways, and their difference over the mesh's own error."""
+    """Compare u_z of the forearm under the motor's disc by both methods.
+
+    Returns the table, and the difference over the mesh's own error.
+    """
     variant = variant_of(load("embedded"))
     omega, disc = 2 * math.pi * variant.frequency.middle, variant.motor_diameter / 2
     medium = body(variant.tissue)

@@ -50,7 +50,7 @@ class Row:
 
 
 def rows(trials: Iterable[Trial], tolerances: Iterable[float] = TOLERANCES) -> Iterator[Row]:
-    """Every trial at every tolerance; without those that are too hard for the reference."""
+    """Yield every trial at every tolerance, without those that are too hard for the reference."""
     for one in trials:
         try:
             exact = ball_reference.response(one.medium, one.load, one.omega, one.r, one.z)
@@ -74,7 +74,7 @@ def rows(trials: Iterable[Trial], tolerances: Iterable[float] = TOLERANCES) -> I
 
 
 def cases() -> list[Trial]:
-    """Stiff on soft and soft on stiff by 1e6, next to nu = 1/2, low frequency, films, little or no damping."""
+    """Return media of extreme contrast, Poisson's ratio, frequency, thickness and damping."""
 
     def two(
         name: str, top: float, below: float, nu: float, thickness: float, damping: Damping, omega: float = OMEGA
@@ -96,12 +96,12 @@ def cases() -> list[Trial]:
 
 
 def survey(each: int, seed: int = 20) -> list[Trial]:
-    """So many of each of the `CLASSES`."""
+    """Return `each` trials of every one of the `CLASSES`."""
     return [trial(kind, seed + i) for kind in CLASSES for i in range(each)]
 
 
 def tables(extreme: Sequence[Row], surveyed: Sequence[Row]) -> tuple[Table, ...]:
-    """The extreme media one by one, the random ones by class and by tolerance."""
+    """Tabulate the extreme media one by one, the random ones by class and by tolerance."""
     columns = (
         "media",
         "within rtol by their bound",
@@ -137,7 +137,7 @@ def tables(extreme: Sequence[Row], surveyed: Sequence[Row]) -> tuple[Table, ...]
 
 
 def plot(surveyed: Sequence[Row]) -> Plot:
-    """The bound against the true error; a point above the line is a broken bound."""
+    """Plot the bound against the true error; a point above the line is a broken bound."""
     ends = [f(r.bound for r in surveyed) for f in (min, max)]
     line = "error = bound"
     points = {k: tuple((r.bound, max(r.error, _LEAST)) for r in surveyed if r.kind == k) for k in CLASSES}
@@ -152,7 +152,7 @@ def plot(surveyed: Sequence[Row]) -> Plot:
 
 
 def promises(extreme: Sequence[Row], surveyed: Sequence[Row]) -> tuple[Promise, ...]:
-    """Each can be broken by a solver whose bounds do not hold, or by a reference that can't tell."""
+    """Return what a solver whose bounds do not hold, or a reference that can't decide, would break."""
     both = (*extreme, *surveyed)
     return (
         Promise("responses: largest error over its bound", max(r.over_bound for r in both), 1.0),
@@ -162,7 +162,7 @@ def promises(extreme: Sequence[Row], surveyed: Sequence[Row]) -> tuple[Promise, 
 
 
 def _worsening(found: Sequence[Row]) -> float:
-    """The largest bound over the least one of the same medium at a larger rtol."""
+    """Return the largest ratio of a bound to the least one of the same medium at a larger rtol."""
     worst = 0.0
     for row in found:
         looser = [r.bound for r in found if r.case == row.case and r.rtol > row.rtol]

@@ -34,12 +34,12 @@ Job = tuple[str, dict[str, Any]]
 
 
 def run(quick: bool, say: Say) -> Result:
-    """The sweeps and a sample of random specs; `study` takes any number."""
+    """Run the sweeps and a sample of random specs; `study` takes any number."""
     return study(40 if quick else 100, say, sweeps=2 if quick else None)
 
 
 def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None = None) -> Result:
-    """All sweeps (`sweeps`: that many values of each) and `count` random specs, three in a hundred of them extreme.
+    """Run all sweeps (`sweeps`: that many values of each) and `count` random specs, 3 % of them extreme.
 
     Outcomes that this code wrote into `journal` before are taken from there, new ones are appended.
     """
@@ -103,12 +103,12 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
 
 
 def judge(job: Job) -> tuple[str, Outcome]:
-    """What becomes of one spec; runs in a process of its own."""
+    """Return what becomes of one spec; runs in a process of its own."""
     return job[0], outcome(job[1])
 
 
 def _journalled(jobs: Sequence[Job], journal: Path) -> Iterator[tuple[str, Outcome]]:
-    """The same with a line of JSON a finished spec in `journal`, so that an interrupted study is taken up again.
+    """Yield the same, with a line of JSON for each finished spec in `journal`, from which a study resumes.
 
     Raises UnitcadError for a file that is no such journal.
     """
@@ -139,7 +139,10 @@ def _journalled(jobs: Sequence[Job], journal: Path) -> Iterator[tuple[str, Outco
 
 
 def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:
-    """In order. Many jobs go to worker processes: one that dies or hangs is a fault of its spec, not the end."""
+    """Yield the outcomes in order.
+
+    Many jobs go to worker processes: one that dies or hangs is a fault of its spec, not the end.
+    """
     if len(jobs) < _SERIAL:
         yield from map(judge, jobs)
         return
@@ -163,7 +166,7 @@ def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:
 
 
 def _sweeps(values: int | None) -> Iterator[Job]:
-    """Each extreme of the issue on a template, to the limit and past it."""
+    """Yield each extreme on a template, to the limit and past it."""
 
     def some(of: Iterable[Any]) -> list[Any]:
         chosen = list(of)

@@ -63,7 +63,7 @@ class Surface:
     unknowns: int
 
     def at(self, r: Sequence[float] | np.ndarray) -> np.ndarray:
-        """u_z at radii r (m), by the elements' own quadratics."""
+        """Return u_z at radii r (m), by the elements' own quadratics."""
         x = np.asarray(r, dtype=float)
         i = 2 * np.clip(np.searchsorted(self.r[::2], x, side="right") - 1, 0, (len(self.r) - 3) // 2)
         low, high = self.r[i], self.r[i + 2]
@@ -72,7 +72,7 @@ class Surface:
 
 
 def lines(breaks: Sequence[float], focus: Sequence[float], fineness: float) -> np.ndarray:
-    """Grid lines (m) through all `breaks`: fine at a focus, coarser with the distance from it."""
+    """Return grid lines (m) through all `breaks`: fine at a focus, coarser with the distance from it."""
     near = np.asarray(focus)
     found = [float(breaks[0])]
     for low, high in itertools.pairwise(breaks):
@@ -117,7 +117,7 @@ def solve(
 
 
 def _assemble(basis: Basis, materials: Sequence[Any], omega: float) -> csc_matrix:
-    """Stiffness less omega^2 mass; the bulk part through the eliminated pressure."""
+    """Assemble the stiffness less omega^2 mass; the bulk part through the eliminated pressure."""
     shape = (basis.nelems, basis.X.shape[-1])
 
     def spread(values: Sequence[complex]) -> np.ndarray:

@@ -51,7 +51,7 @@ class Case:
         return self.static * DISC.static(RADII)[0]
 
     def remainder(self, k: np.ndarray) -> np.ndarray:
-        """What is left to integrate, without Bessel functions, m/Pa m; k (1/m) real or complex."""
+        """Return what is left to integrate, without Bessel functions, m/Pa m; k (1/m) real or complex."""
         k = np.asarray(k)
         return (k * self.medium.compliance(k, self.omega)[..., 1, 1] - self.static) * DISC.transform(k)
 
@@ -87,7 +87,7 @@ TEXT = (
 
 
 def cases() -> list[Case]:
-    """Damped (the forearm), without any damping, and next to incompressible with little damping."""
+    """Return the forearm, the same without damping, and the same next to incompressible with little damping."""
     forearm = body(variant_of(load("embedded")).tissue)
     bare = [Layer(la.thickness, la.density, la.youngs_modulus, la.poisson_ratio) for la in forearm.layers]
     stiff = [Layer(la.thickness, la.density, la.youngs_modulus, 0.4999999, LossFactor(0.01)) for la in forearm.layers]
@@ -100,7 +100,7 @@ def cases() -> list[Case]:
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Every case by every way."""
+    """Solve every case by every method."""
     tables, plots, promises = [], [], []
     ends: dict[str, list[tuple[str, float, float]]] = {}
     for case in cases():
@@ -161,8 +161,10 @@ _NODES = 40 * (400 + _PANELS)  # of `brute_force`
 def brute_force(
     case: Case, end: float = _END, poles: float = 6000.0, height: float = 50.0, panels: int = _PANELS
 ) -> np.ndarray:
-    """u_z (m/Pa) at `RADII` by a half-ellipse into the upper half-plane up to `poles` (1/m), then `panels` along the
-    real axis to `end`, 40 nodes a panel.
+    """Return u_z (m/Pa) at `RADII` by a contour that no other method here uses.
+
+    A half-ellipse into the upper half-plane up to `poles` (1/m), then `panels` along the real axis to `end`, 40 nodes a
+    panel.
     """
     nodes, weights = np.polynomial.legendre.leggauss(40)
     turns = np.linspace(0.0, 1.0, 401)
@@ -181,7 +183,7 @@ def brute_force(
 
 
 def second_path(case: Case) -> np.ndarray:
-    """As `brute_force`, on another path: what the two differ by is the reference's doubt."""
+    """Return `brute_force` on another path: the difference of the two is the reference's doubt."""
     return brute_force(case, end=6e5, poles=9000.0, height=25.0)
 
 

@@ -33,8 +33,9 @@ FFTLOG_BIAS = -0.25
 
 
 def adaptive(f: Integrand, r: np.ndarray, tolerance: float, lifted: bool) -> tuple[np.ndarray, float]:
-    """scipy's quad_vec to an absolute `tolerance`, on the real axis or on a path lifted off its poles: (value, its
-    estimate of the error).
+    """Integrate by scipy's quad_vec to an absolute `tolerance`; return (value, its estimate of the error).
+
+    On the real axis, or on a path lifted off its poles.
     """
     corners = [1e-9, HEIGHT * (1 + 1j), POLES + HEIGHT * 1j, POLES, END] if lifted else [1e-9, POLES, END]
     legs = list(pairwise(corners))
@@ -55,7 +56,7 @@ def adaptive(f: Integrand, r: np.ndarray, tolerance: float, lifted: bool) -> tup
 
 
 def filtered(f: Integrand, r: np.ndarray, name: str) -> np.ndarray:
-    """A digital filter of libdlf, f evaluated anew at each radius. Raises UnitcadError without libdlf."""
+    """Apply a digital filter of libdlf, f evaluated anew at each radius. Raises UnitcadError without libdlf."""
     try:
         import libdlf
     except ImportError as error:
@@ -66,7 +67,7 @@ def filtered(f: Integrand, r: np.ndarray, name: str) -> np.ndarray:
 
 
 def logarithmic(f: Integrand, r: np.ndarray, n: int) -> np.ndarray:
-    """FFTLog (scipy's fht) on n points, then a cubic spline in log r."""
+    """Apply FFTLog (scipy's fht) on n points, then a cubic spline in log r."""
     k = np.geomspace(*FFTLOG_K, n)
     step = math.log(k[1] / k[0])
     offset = fft.fhtoffset(step, mu=0.0, initial=-math.log(k[n // 2] * 5e-3), bias=FFTLOG_BIAS)
@@ -80,7 +81,7 @@ def logarithmic(f: Integrand, r: np.ndarray, n: int) -> np.ndarray:
 
 
 def uniform(f: Integrand, r: np.ndarray, n: int) -> np.ndarray:
-    """n midpoints, evenly spaced in k up to `END`."""
+    """Sum n midpoints, evenly spaced in k up to `END`."""
     k = (np.arange(n) + 0.5) * END / n
     with np.errstate(all="ignore"):
         sampled = f(k) * (END / n)

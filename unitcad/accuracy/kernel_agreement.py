@@ -21,7 +21,7 @@ _QUANTITIES: tuple[str, ...] = ("solids", "volume", "area", "box", "centre")
 
 
 def run(quick: bool, say: Say) -> Result:
-    """manifold3d against OCCT, and OCCT by three libraries against itself."""
+    """Compare manifold3d with OCCT, and OCCT by three libraries with itself."""
     random = 3 if quick else 100
     chosen = ("encapsulating", "embedded", "chain") if quick else tuple(templates())
     worst: dict[str, dict[str, float]] = {

@@ -27,7 +27,7 @@ REQUESTS: dict[str, tuple[Sequence[str], Sequence[str], bool]] = {
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Every template and request, from an empty store each time."""
+    """Build every template and request, from an empty store each time."""
     chosen = ("encapsulating",) if quick else tuple(templates())
     rows: list[tuple[Any, ...]] = []
     for name in chosen:

@@ -25,14 +25,14 @@ class Measures:
 
 
 def of_mesh(solid: Any) -> Measures:
-    """Of a manifold3d solid."""
+    """Measure a manifold3d solid."""
     vertices, faces = arrays(solid)
     volume, centre = mesh_volume(vertices, faces)
     return Measures(len(solid.decompose()), volume, solid.surface_area(), tuple(solid.bounding_box()), tuple(centre))
 
 
 def mesh_volume(vertices: np.ndarray, faces: np.ndarray) -> tuple[float, np.ndarray]:
-    """Volume (mm3) and centre (mm) of a closed mesh, about its middle: no digits are lost far from the origin."""
+    """Return volume (mm3) and centre (mm) of a closed mesh, about its middle so that no digits are lost far away."""
     middle = vertices.mean(axis=0)
     a, b, c = np.moveaxis((vertices - middle)[faces], 1, 0)
     six = np.einsum("ij,ij->i", a, np.cross(b, c))
@@ -41,7 +41,7 @@ def mesh_volume(vertices: np.ndarray, faces: np.ndarray) -> tuple[float, np.ndar
 
 
 def of_brep(solid: Any) -> Measures:
-    """Of an OCCT body (what build123d and CadQuery call `wrapped`)."""
+    """Measure an OCCT body (what build123d and CadQuery call `wrapped`)."""
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
 
@@ -56,7 +56,7 @@ def of_brep(solid: Any) -> Measures:
 
 
 def makers() -> dict[str, Callable[[list[Shape]], list[Any]]]:
-    """The B-rep kernels by name, each from trees to OCCT bodies. Raises UnitcadError where one is not installed."""
+    """Return the B-rep kernels by name, each from trees to OCCT bodies. Raises UnitcadError if one is not installed."""
     from unitcad.kernels import build123d, cadquery, occt
 
     return {
@@ -67,7 +67,7 @@ def makers() -> dict[str, Callable[[list[Shape]], list[Any]]]:
 
 
 def timed(call: Callable[[], Any]) -> tuple[Any, float]:
-    """What a call returns, and its seconds."""
+    """Return what a call returns, and its seconds."""
     start = time.perf_counter()
     result = call()
     return result, time.perf_counter() - start

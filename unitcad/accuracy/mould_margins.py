@@ -16,7 +16,7 @@ from unitcad.validation import from_data
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Laws over random specs from the documented ranges that pass the door."""
+    """Check the moulds of random specs from the documented ranges that validation accepts."""
     wanted, seed, refused = (8 if quick else 100), 0, 0
     margins: dict[str, tuple[float, dict[str, Any], int]] = {}
     counts: dict[str, int] = {}
@@ -64,8 +64,9 @@ def run(quick: bool, say: Say) -> Result:
 
 
 def _worst(law: dict[str, Any]) -> tuple[float | None, float | None, str]:
-    """Value, limit and unit. A count that must be met exactly (C000's solids) is as wanted, or it is broken: no number
-    comes closest.
+    """Return value, limit and unit.
+
+    A count that must be met exactly (C000's solids) has none: it is as wanted, or the check fails.
     """
     if law["ok"] and law["code"] == "C000":
         return None, None, ""
@@ -73,7 +74,7 @@ def _worst(law: dict[str, Any]) -> tuple[float | None, float | None, str]:
 
 
 def _share(law: dict[str, Any]) -> float:
-    """How much of its limit a finding uses; a broken one counts as all."""
+    """Return how much of its limit a finding uses; a broken one counts as infinite."""
     if not law["ok"]:
         return float("inf")
     if law["code"] == "C210":

@@ -66,7 +66,7 @@ def build_outcome(data: dict[str, Any]) -> Outcome:
 
 
 def outcome(data: dict[str, Any], follow: bool = True) -> Outcome:
-    """`build_outcome`, and after a refusal what putting in its nearest accepted value leads to, until it builds.
+    """Return `build_outcome`; after a refusal, follow its nearest accepted values until the spec builds.
 
     A fault is also a refusal whose nearest value meets the very limit again, or a chain of them that never ends
     (`CIRCLE`), and whatever goes wrong with the spec at the chain's end.
@@ -94,7 +94,7 @@ def outcome(data: dict[str, Any], follow: bool = True) -> Outcome:
 
 
 def door(data: dict[str, Any]) -> Refusal | None:
-    """The refusal that a spec's data meets at the door or in the plan of its moulds; None if it passes both."""
+    """Return the refusal that a spec's data meets in validation or in its moulds' plan; None if it passes both."""
     from unitcad.moulds.plan import plan
     from unitcad.validation import from_data
 
@@ -106,7 +106,7 @@ def door(data: dict[str, Any]) -> Refusal | None:
 
 
 def put_in(data: dict[str, Any], where: str, value: object) -> dict[str, Any]:
-    """`data` with `value` at the dotted path of a refusal."""
+    """Return `data` with `value` at the dotted path of a refusal."""
     from unitcad.validation import put
 
     changed = copy.deepcopy(data)

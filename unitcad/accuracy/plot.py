@@ -22,7 +22,7 @@ _CORNERS = (
 
 
 def svg(plot: Plot) -> str:
-    """The plot as an SVG document. Points that an axis can't show (not above zero, infinite) are left out."""
+    """Return the plot as an SVG document. Points that an axis can't show (not above zero, infinite) are left out."""
     least = -math.inf if plot.linear_x else 0.0
     series = {
         name: sorted((x, y) for x, y in points if x > least and y > 0 and math.isfinite(x) and math.isfinite(y))
@@ -95,7 +95,7 @@ def _best(series: dict[str, list[tuple[float, float]]]) -> set[tuple[float, floa
 
 
 def _marker(kind: int, x: float, y: float, size: float, colour: str, full: bool) -> str:
-    """A circle, square, diamond or triangle of that half-width; hollow ones let others be seen through them."""
+    """Draw a circle, square, diamond or triangle of that half-width; hollow ones let others be seen through them."""
     fill = f'fill="{colour}" stroke="#ffffff" stroke-width="0.7"' if full else f'fill="none" stroke="{colour}"'
     if kind % len(_CORNERS) == 0:
         return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size:g}" {fill}/>'
@@ -109,7 +109,7 @@ def _powers(low: int, high: int) -> list[tuple[float, str]]:
 
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:
-    """Six round numbers or fewer between the ends."""
+    """Return six round numbers or fewer between the ends."""
     rough = max(high - low, 1e-300) / 6
     unit = 10.0 ** math.floor(math.log10(rough))
     step = next(unit * k for k in (1, 2, 5, 10) if unit * k >= rough)

@@ -27,7 +27,7 @@ class Trial:
 
 
 def trial(kind: str, seed: int) -> Trial:
-    """One of the `CLASSES`, drawn from `seed`: every load, two in five at depth."""
+    """Draw one of the `CLASSES` from `seed`: every load, two in five at depth."""
     rng = np.random.default_rng([seed, CLASSES.index(kind)])
     medium = _MEDIA[kind](rng)
     omega = 2 * math.pi * (_between(rng, 1e3, 2e4) if kind == "large k a" else _between(rng, 20, 500))
@@ -67,7 +67,7 @@ def _ordinary(rng: np.random.Generator) -> LayeredMedium:
 
 
 def _forearm(rng: np.random.Generator) -> tuple[list[Layer], HalfSpace]:
-    """The catalogue's kind of body: skin, fat, muscle on bone, each modulus within a factor of two."""
+    """Draw the catalogue's kind of body: skin, fat, muscle on bone, each modulus within a factor of two."""
 
     def about(value: float) -> float:
         return value * _between(rng, 0.5, 2.0)
@@ -81,14 +81,14 @@ def _forearm(rng: np.random.Generator) -> tuple[list[Layer], HalfSpace]:
 
 
 def _film_on_the_forearm(rng: np.random.Generator) -> LayeredMedium:
-    """Gel or rubber between unit and skin."""
+    """Draw gel or rubber between unit and skin."""
     layers, bone = _forearm(rng)
     film = Layer(_between(rng, 1e-5, 1e-3), 1000, _between(rng, 1e2, 1e6), 0.4999, LossFactor(_between(rng, 0.05, 0.5)))
     return LayeredMedium([film, *layers], bone)
 
 
 def _nearly_fluid_film(rng: np.random.Generator) -> LayeredMedium:
-    """Water, oil or a thin gel, anywhere in the stack."""
+    """Draw water, oil or a thin gel, anywhere in the stack."""
     layers, bone = _forearm(rng) if rng.random() < 0.5 else ([], HalfSpace(*_material(rng)))
     film = Layer(
         _between(rng, 1e-5, 1e-3),
@@ -102,14 +102,14 @@ def _nearly_fluid_film(rng: np.random.Generator) -> LayeredMedium:
 
 
 def _inverted(rng: np.random.Generator) -> LayeredMedium:
-    """Stiff over soft, each layer by up to 1e4."""
+    """Draw stiff layers over soft ones, each by up to 1e4."""
     moduli = sorted((_between(rng, 1e3, 1e8) for _ in range(rng.integers(2, 5))), reverse=True)
     parts = [(float(rng.uniform(800, 2000)), e, float(rng.choice([0.3, 0.45, 0.4999])), _law(rng)) for e in moduli]
     return LayeredMedium([Layer(_between(rng, 3e-5, 5e-3), *part) for part in parts[:-1]], HalfSpace(*parts[-1]))
 
 
 def _zero_thickness(rng: np.random.Generator) -> LayeredMedium:
-    """One or two layers of no thickness, of any material, among ordinary ones."""
+    """Draw one or two layers of no thickness, of any material, among ordinary ones."""
     medium = _ordinary(rng)
     layers = list(medium.layers)
     for _ in range(rng.integers(1, 3)):
@@ -118,7 +118,7 @@ def _zero_thickness(rng: np.random.Generator) -> LayeredMedium:
 
 
 def _large(rng: np.random.Generator) -> LayeredMedium:
-    """Soft under a wide disc at kilohertz, little layered."""
+    """Draw soft media under a wide disc at kilohertz, with few layers."""
     layers = [Layer(_between(rng, 3e-4, 1e-2), *_material(rng, 5e3, 1e6)) for _ in range(rng.integers(0, 3))]
     return LayeredMedium(layers, HalfSpace(*_material(rng, 5e3, 1e6)))
 
@@ -131,7 +131,7 @@ def _undamped(rng: np.random.Generator) -> LayeredMedium:
 
 
 def _wide_contrast(rng: np.random.Generator) -> LayeredMedium:
-    """1 kPa to 1 GPa in any order, from 3 micrometres on, damped or not."""
+    """Draw moduli of 1 kPa to 1 GPa in any order, layers from 3 micrometres on, damped or not."""
     damped = rng.random() < 0.7
 
     def part() -> tuple[float, float, float, Damping]:
@@ -144,7 +144,7 @@ def _wide_contrast(rng: np.random.Generator) -> LayeredMedium:
 
 
 def _extreme_contrast(rng: np.random.Generator) -> LayeredMedium:
-    """Moduli 1e6 to 1e12 apart: a stiff layer on, under or between soft ones, damped or not."""
+    """Draw moduli 1e6 to 1e12 apart: a stiff layer on, under or between soft ones, damped or not."""
     ratio = _between(rng, 1e6, 1e12)
     soft = _between(rng, 1e2, 1e5)
     damped = rng.random() < 0.7

@@ -21,11 +21,11 @@ class Choose(Protocol):
     """Who decides: a seed or hypothesis."""
 
     def whole(self, low: int, high: int, /) -> int:
-        """A whole number, both ends included."""
+        """Return a whole number, both ends included."""
         ...
 
     def pick(self, options: Sequence[T], /) -> T:
-        """One of `options`."""
+        """Return one of `options`."""
         ...
 
 
@@ -56,7 +56,7 @@ class Ranges:
     singles: float = 0.0
 
     def rows(self) -> list[tuple[str, float, float]]:
-        """(field, least, largest) for a table."""
+        """Return (field, least, largest) for a table."""
         return [(f.name, *getattr(self, f.name)) for f in fields(self) if isinstance(getattr(self, f.name), tuple)]
 
 
@@ -114,7 +114,7 @@ class Seeded:
 
 
 def random_spec(choose: Choose, ranges: Ranges = DOCUMENTED, formats: Sequence[str] = ("stl",)) -> dict[str, Any]:
-    """The data of one spec (as `unitcad.spec.from_data` takes it), with every field drawn from `ranges`."""
+    """Return the data of one spec (as `unitcad.validation.from_data` takes it), each field drawn from `ranges`."""
 
     def length(of: tuple[float, float]) -> float:
         if ranges.edges and choose.whole(1, 100) <= 100 * ranges.edges:
@@ -122,7 +122,7 @@ def random_spec(choose: Choose, ranges: Ranges = DOCUMENTED, formats: Sequence[s
         return choose.whole(round(of[0] * _STEP), round(of[1] * _STEP)) / _STEP
 
     def spread(of: tuple[float, float], digits: int = 4) -> float:
-        """Uniform in the logarithm: a range over decades has as many small ones as large."""
+        """Draw uniformly in the logarithm: a range over decades has as many small values as large."""
         share = choose.whole(0, 1000) / 1000
         return round(math.exp(math.log(of[0]) + share * math.log(of[1] / of[0])), digits)
 
@@ -170,5 +170,5 @@ def random_spec(choose: Choose, ranges: Ranges = DOCUMENTED, formats: Sequence[s
 
 
 def seeded_spec(seed: int, ranges: str = "documented") -> dict[str, Any]:
-    """The spec of one seed in the named ranges ("documented" or "extreme")."""
+    """Return the spec of one seed in the named ranges ("documented" or "extreme")."""
     return random_spec(Seeded(seed), RANGES[ranges])

@@ -74,7 +74,7 @@ class Result:
         return all(promise.ok for promise in self.promises)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready data; what is no number becomes null, in a table its name."""
+        """Return JSON-ready data; NaN and infinity become null, in a table their name."""
         data = asdict(self)
         for table in data["tables"]:
             table["rows"] = [[shown(cell) if _endless(cell) else cell for cell in row] for row in table["rows"]]
@@ -84,7 +84,7 @@ class Result:
 
 
 def from_dict(data: dict[str, Any]) -> Result:
-    """The result of what `as_dict` gave."""
+    """Return the result of which `as_dict` gave `data`."""
     return Result(
         suite=data["suite"],
         title=data["title"],
@@ -111,7 +111,7 @@ def from_dict(data: dict[str, Any]) -> Result:
 
 
 def frontier(points: Sequence[tuple[float, float]]) -> list[bool]:
-    """Which (cost, error) no other point beats in both: what to pick for a given error."""
+    """Tell which (cost, error) no other point beats in both: what to pick for a given error."""
     return [
         math.isfinite(c) and math.isfinite(e) and not any((x <= c and y < e) or (x < c and y <= e) for x, y in points)
         for c, e in points
@@ -119,12 +119,12 @@ def frontier(points: Sequence[tuple[float, float]]) -> list[bool]:
 
 
 def fastest(points: Sequence[tuple[str, float, float]], error: float) -> str | None:
-    """The name of the cheapest of (name, cost, error) that is no further off than `error`; None if none is."""
+    """Return the name of the cheapest (name, cost, error) whose error is at most `error`; None if there is none."""
     return min(((cost, name) for name, cost, found in points if found <= error), default=(0.0, None))[1]
 
 
 def shown(value: Cell) -> str:
-    """A cell as text."""
+    """Return a cell as text."""
     if value is None:
         return "-"
     if isinstance(value, bool):
@@ -137,7 +137,7 @@ def shown(value: Cell) -> str:
 
 
 def markdown(result: Result, picture: Sequence[str] | None = None) -> str:
-    """The suite's section; `picture[i]` is the file of plot i. None: no pictures are written, so none is linked."""
+    """Return the suite's section; `picture[i]` is the file of plot i, None links no pictures."""
     lines = [f"## {result.title}", "", result.text, ""]
     size = ", ".join(f"{k} {v}" for k, v in result.measured.items())
     command = f"unitcad accuracy {result.suite} {result.options}".strip()
@@ -156,7 +156,7 @@ def markdown(result: Result, picture: Sequence[str] | None = None) -> str:
 
 
 def table_lines(table: Table) -> list[str]:
-    """A table in Markdown."""
+    """Return a table in Markdown."""
     if not table.columns:
         return ["```text", *(str(line) for (line,) in table.rows), "```"]
     rows = ["| " + " | ".join(shown(cell) for cell in row) + " |" for row in table.rows]

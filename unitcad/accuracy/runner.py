@@ -42,7 +42,7 @@ seconds differ between machines. A star marks the frontier: nothing in the table
 
 
 def chosen(names: Sequence[str]) -> tuple[str, ...]:
-    """The suites called `names`, or all of them. Raises Refusal for an unknown one."""
+    """Return the suites called `names`, or all of them. Raises Refusal for an unknown one."""
     for name in names:
         if name not in SUITES:
             close = difflib.get_close_matches(name.lower().replace("_", "-"), SUITES, n=1, cutoff=0.5)
@@ -96,7 +96,7 @@ def write(results: Sequence[Result], folder: Path) -> None:
 
 
 def read(folder: Path) -> list[Result]:
-    """The results in a folder's accuracy.json, none without such a file. Raises UnitcadError if it is not ours."""
+    """Return the results in a folder's accuracy.json, none without the file. Raises UnitcadError if it holds others."""
     file = folder / "accuracy.json"
     try:
         return [from_dict(data) for data in files.read_json(file)["suites"]]

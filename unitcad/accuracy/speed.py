@@ -33,7 +33,7 @@ OTHERS = (("bench_check.py",), ("bench_attenuation.py",), ("bench_batch.py", "--
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Cold and warm, STL and STEP; then the other benchmarks as they print themselves."""
+    """Time the set cold and warm, STL and STEP; then run the other benchmarks."""
     folder = ROOT / "benchmarks" / "encapsulating"
     if not folder.is_dir():
         raise Missing("the speed suite needs benchmarks/: run it in a clone of the repository")
@@ -135,7 +135,7 @@ def _build(out: Path, formats: str) -> None:
 
 
 def _installed() -> dict[str, str]:
-    """The environment, with bytecode kept as an installed package has it: a clone may run where none is written."""
+    """Return the environment, with bytecode kept as an installed package has it: a clone may run without any."""
     return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
@@ -144,7 +144,7 @@ def _warm(script: Path, lengths: Path, out: Path, formats: str, runs: int) -> Ti
 
 
 def _volume_error(folder: Path) -> dict[str, float]:
-    """Relative volume error of every STL in a folder against OCCT's volume of the same tree."""
+    """Return the relative volume error of every STL in a folder against OCCT's volume of the same tree."""
     from unitcad.kernels import occt
 
     variant = Variant.of("encapsulating")
@@ -158,7 +158,7 @@ def _volume_error(folder: Path) -> dict[str, float]:
 
 
 def _read_stl(file: Path) -> np.ndarray:
-    """Corners (n, 3, 3) in mm of a binary or ASCII STL."""
+    """Return the corners (n, 3, 3) in mm of a binary or ASCII STL."""
     raw = file.read_bytes()
     if raw[:5] == b"solid" and b"facet" in raw[:400]:
         numbers = [line.split()[1:] for line in raw.decode().splitlines() if line.strip().startswith("vertex")]
@@ -184,7 +184,7 @@ def _time_table(title: str, times: dict[str, Timing], base: str) -> Table:
 
 
 def _aims(cold: dict[str, Timing], step: dict[str, Timing], step_warm: dict[str, Timing]) -> Table:
-    """Ratios of the medians against what is aimed at. Times are never promises: CI does not look at them."""
+    """Tabulate the ratios of the medians beside their aims. Times are never promises: CI does not look at them."""
 
     def row(what: str, times: dict[str, Timing], peer: str, wanted: float) -> tuple:
         ratio = times[peer].median / times[OURS].median
@@ -204,7 +204,7 @@ def _aims(cold: dict[str, Timing], step: dict[str, Timing], step_warm: dict[str,
 
 
 def _printed(command: tuple[str, ...]) -> Table:
-    """What another benchmark prints, as it stands."""
+    """Return what another benchmark prints, unchanged."""
     lines = [
         line.rstrip() for line in _call(ROOT / "benchmarks" / command[0], *command[1:]).splitlines() if line.strip()
     ]

@@ -62,7 +62,7 @@ def cases() -> list[Case]:
 
 
 def run(quick: bool, say: Say) -> Result:
-    """All frozen cases, grouped by each thing that is extreme; exact answers of the response."""
+    """Compute all frozen cases, grouped by each thing that is extreme, and exact answers of the response."""
     known = cases()[:: 3 if quick else 1]
     say(f"{len(known)} cases")
     condition = np.array([case.condition for case in known])
@@ -196,7 +196,7 @@ def _share(errors: np.ndarray) -> str:
 
 
 def _error(found: np.ndarray, case: Case) -> float:
-    """Normwise, relative; no number counts as infinitely wrong."""
+    """Return the normwise relative error; infinite for what is no number."""
     with np.errstate(all="ignore"):
         error = float(np.linalg.norm(found - case.exact) / np.linalg.norm(case.exact))
     return error if math.isfinite(error) else math.inf
@@ -217,7 +217,7 @@ def _damping(tan_delta: float, viscosity: float) -> Damping:
 
 
 def _exact_answers() -> list[tuple[str, float, float]]:
-    """(case, relative error, promise): closed forms and identities of the response."""
+    """Return (case, relative error, promise) of closed forms and identities of the response."""
     a, e, found = 3.5e-3, 3e4, []
     for nu in (0.0, 0.3, 0.5):
         disc = LayeredMedium([], HalfSpace(1000, e, nu)).response(UniformDisc(a), 0.0, [0.0, a])

@@ -45,7 +45,7 @@ class _Row:
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Bodies of the encapsulating template by every way and tolerance."""
+    """Mesh bodies of the encapsulating template by every method and tolerance."""
     tolerances = (0.1, DEFAULT, 0.003) if quick else TOLERANCES
     variant = Variant.of("encapsulating")
     parts = {body.name: body.shape for body in (*variant.unit, *variant.plan.tools)}
@@ -143,7 +143,7 @@ def _plots(name: str, rows: list[_Row]) -> list[Plot]:
 
 
 def _same_triangles(found: dict[str, list[_Row]]) -> str:
-    """Which tolerances OCCT's meshes of a body don't tell apart."""
+    """Say at which tolerances OCCT's meshes of a body have the same number of triangles."""
     said = []
     for name, rows in found.items():
         counts: dict[int, list[float]] = {}
@@ -159,7 +159,7 @@ def _same_triangles(found: dict[str, list[_Row]]) -> str:
 
 
 def _default(found: dict[str, list[_Row]], tolerances: tuple[float, ...]) -> str:
-    """What unitcad's default costs and gives, against the next finer tolerance."""
+    """Say what unitcad's default costs and gives, against the next finer tolerance."""
     said = []
     finer = max(t for t in tolerances if t < DEFAULT)
     for name, rows in found.items():
@@ -220,7 +220,7 @@ def _ways(shape: Shape, radius: float, tolerance: float) -> dict[str, Callable[[
 
 
 def _inscribed_count(radius: float, tolerance: float) -> int:
-    """Sides of an inscribed polygon within `tolerance`, a multiple of 8 like the area-true one's."""
+    """Return the sides of an inscribed polygon within `tolerance`, a multiple of 8 like the area-true one's."""
     n = mesh.COARSEST
     while n < mesh.FINEST and radius * (1 - np.cos(np.pi / n)) > tolerance:
         n += 8
@@ -248,7 +248,7 @@ def _volume(brep: Any) -> float:
 
 
 def _distance(made: _Mesh, brep: Any) -> float:
-    """The farthest of the sampled points from the B-rep's faces, mm."""
+    """Return the farthest of the sampled points from the B-rep's faces, mm."""
     from OCP.BRep import BRep_Builder
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
     from OCP.BRepExtrema import BRepExtrema_DistShapeShape

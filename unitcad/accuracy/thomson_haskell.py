@@ -25,7 +25,7 @@ def _columns(body: Layer | HalfSpace, k: complex, omega: float) -> tuple[np.ndar
 
 
 def compliance(medium: LayeredMedium, k: float, omega: float) -> np.ndarray:
-    """2x2 surface compliance at one wavenumber; NaN or wrong where the method breaks down."""
+    """Return the 2x2 surface compliance at one wavenumber; NaN or wrong where the method breaks down."""
     with np.errstate(all="ignore"):
         plane = _columns(medium.half_space, k, omega)[0][:, :2]
         for layer in reversed(medium.layers):

@@ -42,7 +42,7 @@ def interleaved(calls: Mapping[str, Callable[[], Any]], repeats: int, warm: bool
 
 
 def timing(seconds: list[float]) -> Timing:
-    """The median and quartiles of some runs."""
+    """Return the median and quartiles of some runs."""
     if len(seconds) < 2:
         return Timing(seconds[0], seconds[0], seconds[0])
     low, middle, high = statistics.quantiles(seconds, n=4, method="inclusive")
@@ -50,7 +50,7 @@ def timing(seconds: list[float]) -> Timing:
 
 
 def machine(*packages: str) -> dict[str, Any]:
-    """What a measurement was made on: processor, cores, commit of a clone, Python and the versions of `packages`."""
+    """Return what a measurement was made on: processor, cores, commit of a clone, versions of Python and `packages`."""
     found: dict[str, Any] = {"processor": _processor(), "cores": _cores()}
     if commit := _commit():
         found["commit"] = commit
@@ -74,7 +74,7 @@ def _processor() -> str:
 
 
 def _commit() -> str:
-    """The commit of the clone that runs, with a plus if its code differs; nothing outside a clone."""
+    """Return the commit of the clone that runs, with a plus if its code differs; nothing outside a clone."""
     root = Path(__file__).parents[2]
     if not (root / ".git").exists():
         return ""

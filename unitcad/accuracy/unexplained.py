@@ -20,20 +20,20 @@ class NineLevels:
     levels: Mapping[str, Mapping[str, float]]
 
     def of(self, name: str) -> float:
-        """One level a unit: the geometric mean over its shapes."""
+        """Return one level a unit: the geometric mean over its shapes."""
         return math.exp(sum(map(math.log, self.levels[name].values())) / len(self.levels[name]))
 
     def in_order(self, table: Table) -> tuple[float, ...]:
-        """Of every unit, in the table's order."""
+        """Return the level of every unit, in the table's order."""
         return tuple(self.of(name) for name in table.names)
 
     def range(self, names: tuple[str, ...]) -> tuple[float, float]:
-        """Least and largest of single solutions, no means."""
+        """Return the least and largest of single solutions, no means."""
         found = [level for name in names for level in self.levels[name].values()]
         return min(found), max(found)
 
     def shown(self, name: str) -> str:
-        """The level, and a control's by shape."""
+        """Return the level as text, and a control's by shape."""
         shapes = self.levels[name]
         apart = ", ".join(f"{level:.3f} {shape}" for shape, level in shapes.items())
         return f"{self.of(name):.3f}" + (f" ({apart})" if len(shapes) > 1 else "")
@@ -42,7 +42,10 @@ class NineLevels:
 def unexplained(
     table: Table, solved: Mapping[str, NineLevels], closed: Mapping[str, NineLevels], paper: Judgement
 ) -> str:
-    """`solved`: finite elements by variant, as drawn first; `closed`: the models; `paper`: the paper's judgement."""
+    """Write the paragraph.
+
+    `solved`: finite elements by variant, as drawn first; `closed`: the models; `paper`: the paper's judgement.
+    """
     soft = tuple(name for name, inside in zip(table.names, table.soft_inside, strict=True) if inside)
     controls = tuple(name for name in table.names if name.startswith("single"))
     measured = dict(zip(table.names, table.levels.tolist(), strict=True))
@@ -73,7 +76,7 @@ def unexplained(
 
 
 def _orders(table: Table, models: Mapping[str, NineLevels]) -> str:
-    """Which models give the measured order of the controls, and that of E10/D30 and E10/D10."""
+    """Say which models give the measured order of the controls, and that of E10/D30 and E10/D10."""
     measured = dict(zip(table.names, table.levels.tolist(), strict=True))
     controls = sorted((name for name in table.names if name.startswith("single")), key=measured.__getitem__)
     same = [name for name, m in models.items() if _rising([m.of(control) for control in controls])]
@@ -95,7 +98,7 @@ def _named(names: list[str]) -> str:
 
 
 def _thinness(table: Table) -> str:
-    """The layers of the layered units over their shear wavelength, thickest and thinnest."""
+    """Return the layers of the layered units over their shear wavelength, thickest and thinnest."""
     shares = []
     for i, layers in enumerate(table.layers):
         u = table.units(i)

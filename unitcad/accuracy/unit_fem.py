@@ -25,7 +25,7 @@ _MM = 1e-3
 
 
 def edge_level(spec: Spec, fineness: float, pad: bool = True) -> tuple[float, int]:
-    """|u_z| of the skin at r = D/2 over the motor's, and the unknowns solved for; without `pad`, no circuit.
+    """Return |u_z| of the skin at r = D/2 over the motor's, and the number of unknowns; without `pad`, no circuit.
 
     Raises UnitcadError for a material without a small-strain modulus.
     """
@@ -37,12 +37,12 @@ def edge_level(spec: Spec, fineness: float, pad: bool = True) -> tuple[float, in
 
 
 def pressed_skin(medium: LayeredMedium, omega: float, disc: float, fineness: float) -> Surface:
-    """Bare skin under 1 Pa on a disc of that radius (m); the medium's half-space is the rigid floor."""
+    """Solve bare skin under 1 Pa on a disc of that radius (m); the medium's half-space is the rigid floor."""
     return solve(medium_blocks(medium, omega), omega, fineness, radius=RADIUS, pressure_radius=disc)
 
 
 def unit_blocks(spec: Spec, omega: float, pad: bool) -> list[Block]:
-    """Layers, pad and motor (m, z upwards from the skin)."""
+    """Return the blocks of layers, pad and motor (m, z upwards from the skin)."""
     dims = dimensions(spec)
     found = []
     inner, below = dims.cavity_radius, dims.core_height
@@ -70,7 +70,7 @@ def unit_blocks(spec: Spec, omega: float, pad: bool) -> list[Block]:
 
 
 def medium_blocks(medium: LayeredMedium, omega: float) -> list[Block]:
-    """The layers of a medium from the skin down, out to `RADIUS`; its half-space becomes the floor."""
+    """Return the layers of a medium from the skin down, out to `RADIUS`; its half-space becomes the floor."""
     found, top = [], 0.0
     for layer in medium.layers:
         found.append(Block(0.0, RADIUS, top - layer.thickness, top, _solid(layer, omega)))

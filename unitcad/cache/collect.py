@@ -28,7 +28,7 @@ class Usage:
 
 
 def usage(root: Path) -> Usage:
-    """What the cache at `root` holds. Raises UnitcadError where there is none."""
+    """Return what the cache at `root` holds. Raises UnitcadError where there is none."""
     _expect(root)
     entries, contents = _scan(root, "data") + _scan(root, "files"), _scan(root, "content")
     return Usage(len(entries), len(contents), sum(size for _, size, _ in entries + contents))
@@ -50,7 +50,7 @@ def collect(root: Path, limit_bytes: int) -> Usage:
 
 
 def _alone(root: Path, held: contextlib.ExitStack) -> bool:
-    """Whether nobody else has the cache open; nobody can then open it until `held` ends.
+    """Tell whether no other process has the cache open; none can then open it until `held` ends.
 
     Locks that processes left behind when they died are removed.
     """
@@ -99,7 +99,7 @@ def _collect(root: Path, limit: int, newest: float | None) -> Usage:
 
 
 def _contents_of(entry: Path) -> list[str]:
-    """The contents that a file's entry keeps; data keep none: what they name is checked when they are read."""
+    """Return the contents that a file's entry keeps; data keep none: what they name is checked when they are read."""
     if entry.parent.parent.name != "files":
         return []
     try:
@@ -109,7 +109,7 @@ def _contents_of(entry: Path) -> list[str]:
 
 
 def _scan(root: Path, kind: str) -> list[tuple[Path, int, float]]:
-    """Files of a kind: path, size, when it was used last; the oldest are those whose time is yet to come."""
+    """List files of a kind: path, size, time of last use; one whose time is yet to come counts as the oldest."""
     found, latest = [], time.time() + GRACE_S
     for folder, _, names in os.walk(root / kind):
         for name in names:

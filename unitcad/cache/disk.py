@@ -121,7 +121,7 @@ class DiskStore:
             raise self._missing(sha256) from None
 
     def place(self, sha256: str, target: Path) -> None:
-        """A hard link at `target`; a copy where links fail (other disk, no right, no support)."""
+        """Make a hard link at `target`; a copy where links fail (other disk, no right, no support)."""
         if not self.has(sha256):
             raise self._missing(sha256)
         if sha256 in self._held:
@@ -147,7 +147,7 @@ class DiskStore:
                 self._verified[sha256] = _signature(name)
 
     def peek(self, key: str) -> Any:
-        """The data under `key`, or None."""
+        """Return the data under `key`, or None."""
         return self._read("data", key, lambda data: True)
 
     def forget(self, key: str) -> None:
@@ -173,7 +173,7 @@ class DiskStore:
         return found
 
     def _read(self, kind: str, key: str, intact: Intact) -> Any:
-        """An entry's data, or None; what is damaged, or was written for another key, is removed."""
+        """Return an entry's data, or None; an entry that is damaged or was written for another key is removed."""
         path = self._path(kind, key)
         try:
             checksum, _, payload = read(path).partition(b"\n")
@@ -237,7 +237,7 @@ class DiskStore:
 
 
 def default_root() -> Path:
-    """UNITCAD_CACHE, or unitcad in the person's cache folder, where the system keeps such folders.
+    """Return UNITCAD_CACHE, or unitcad in the user's cache folder, where the system keeps such folders.
 
     Raises UnitcadError where there is no home.
     """
@@ -251,7 +251,7 @@ def default_root() -> Path:
 
 
 def read(path: Path) -> bytes:
-    """The content of a regular file of the cache. Raises OSError; UnitcadError for a link, a pipe, a folder."""
+    """Return the content of a regular file of the cache. Raises OSError; UnitcadError for a link, a pipe, a folder."""
     with open(path, "rb", opener=regular(links=False)) as file:
         return file.read()
 
@@ -266,7 +266,7 @@ def remove(path: Path) -> None:
 
 
 def _checksum(kind: str, key: str, payload: bytes) -> bytes:
-    """Of an entry, bound to what it was written for: another one's entry under this key does not match."""
+    """Return an entry's checksum, bound to its key: another key's entry does not match."""
     return digest(f"{kind} {key}\n".encode() + payload).encode()
 
 
@@ -294,7 +294,7 @@ def _claim(root: Path) -> None:
 
 
 def lock(path: Path) -> FileLock:
-    """A lock on a file, not taken yet; the system lets go of it when its process dies."""
+    """Return a lock on a file, not acquired yet; the system releases it when its process dies."""
     return FileLock(path, thread_local=False, poll_interval=_POLL_S)
 
 
@@ -315,7 +315,7 @@ def held(path: Path) -> Iterator[None]:
 
 
 def free(path: Path) -> bool:
-    """Whether nobody holds the lock on a file, which is removed then: it was left by a process that died."""
+    """Tell whether nobody holds the lock on a file; the file, left by a process that died, is then removed."""
     taken = lock(path)
     try:
         taken.acquire(blocking=False)

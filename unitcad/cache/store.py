@@ -29,23 +29,23 @@ class Store(Protocol):
     """"built" and "reused" entries, by kind ("data", "file")."""
 
     def data(self, key: str, make: Make, intact: Intact = lambda data: True) -> Any:
-        """The JSON data under `key`; made if it is not there, damaged, or not `intact` any more."""
+        """Return the JSON data under `key`; made if it is not there, damaged, or not `intact` any more."""
         ...
 
     def file(self, key: str, make: Callable[[], bytes]) -> str:
-        """The SHA-256 (hex) of the file under `key`, its content made if need be."""
+        """Return the SHA-256 (hex) of the file under `key`, its content made if need be."""
         ...
 
     def has(self, sha256: str) -> bool:
-        """Whether that content is there and whole."""
+        """Tell whether that content is there and whole."""
         ...
 
     def size(self, sha256: str) -> int:
-        """Bytes of a content by its SHA-256. Raises MissingContent."""
+        """Return a content's bytes, by its SHA-256. Raises MissingContent."""
         ...
 
     def content(self, sha256: str) -> bytes:
-        """Content by its SHA-256. Raises MissingContent."""
+        """Return content by its SHA-256. Raises MissingContent."""
         ...
 
     def place(self, sha256: str, target: Path) -> None:
@@ -77,7 +77,7 @@ class MemoryStore:
         self._elsewhere = dict(known.sizes) if known else {}
 
     def bundle(self) -> Bundle:
-        """What is here now."""
+        """Return what is here now."""
         return Bundle(dict(self._data), dict(self._files), {sha: self.size(sha) for sha in self._files.values()})
 
     def data(self, key: str, make: Make, intact: Intact = lambda data: True) -> Any:
@@ -112,5 +112,5 @@ class MemoryStore:
 
 
 def digest(content: bytes) -> str:
-    """SHA-256 in hex digits."""
+    """Return the SHA-256 in hex digits."""
     return hashlib.sha256(content).hexdigest()

@@ -15,22 +15,22 @@ Point = tuple[float, float]
 
 
 def number(value: float) -> str:
-    """A coordinate: two decimals, no trailing zeros, no minus zero."""
+    """Format a coordinate: two decimals, no trailing zeros, no minus zero."""
     return f"{round(value, 2) + 0.0:.2f}".rstrip("0").rstrip(".")
 
 
 def millimetres(value: float) -> str:
-    """A length as a drawing shows it: three decimals at most."""
+    """Format a length as a drawing shows it: three decimals at most."""
     return f"{value + 0.0:.3f}".rstrip("0").rstrip(".")
 
 
 def text_width(text: str) -> float:
-    """Room (px) that `text` takes."""
+    """Return the room (px) that `text` takes."""
     return len(text) * CHARACTER_PX
 
 
 def spread(wanted: Sequence[float], sizes: Sequence[float], gap: float = 4.0) -> list[float]:
-    """Middles of items of `sizes` in a row, in the order of `wanted`, `gap` apart or more, close to what is wanted.
+    """Return middles of items of `sizes` in a row, `gap` apart or more, in the order of `wanted` and close to it.
 
     Items that would overlap are joined into a run about the mean of their wishes (pool adjacent violators).
     """
@@ -52,30 +52,30 @@ def spread(wanted: Sequence[float], sizes: Sequence[float], gap: float = 4.0) ->
 
 
 def line(start: Point, end: Point, kind: str) -> str:
-    """A line of the style `kind`."""
+    """Draw a line of the style `kind`."""
     (x1, y1), (x2, y2) = start, end
     return f'<line class="{kind}" x1="{number(x1)}" y1="{number(y1)}" x2="{number(x2)}" y2="{number(y2)}"/>'
 
 
 def text(content: str, at: Point, anchor: str = "middle") -> str:
-    """A line of text, its middle at the height of `at`."""
+    """Draw a line of text, its middle at the height of `at`."""
     x, y = at
     return f'<text x="{number(x)}" y="{number(y + 0.35 * TEXT_PX)}" text-anchor="{anchor}">{escape(content)}</text>'
 
 
 def dot(at: Point) -> str:
-    """The end of a leader."""
+    """Draw the end of a leader."""
     return f'<circle class="dot" cx="{number(at[0])}" cy="{number(at[1])}" r="2.2"/>'
 
 
 def outline(loops: Sequence[Sequence[Point]], fill: str, name: str) -> str:
-    """A filled region with holes, titled."""
+    """Draw a filled region with holes, titled."""
     path = "".join("M" + "L".join(f"{number(x)} {number(y)}" for x, y in loop) + "Z" for loop in loops)
     return f'<path d="{path}" fill={quoteattr(fill)} fill-rule="evenodd"><title>{escape(name)}</title></path>'
 
 
 def dimension(start: Point, end: Point) -> list[str]:
-    """A dimension line between two points on a level or upright line, its arrows outside if they don't fit inside."""
+    """Draw a horizontal or vertical dimension line; arrows that don't fit inside stand outside."""
     along = (end[0] - start[0], end[1] - start[1])
     length = (along[0] ** 2 + along[1] ** 2) ** 0.5
     unit = (along[0] / length, along[1] / length)

@@ -69,7 +69,7 @@ def write(folder: Path, report: FileReport) -> FileReport:
 
 
 def folder_name(path: str) -> str:
-    """A name for a file's pictures on any system: its path where that is a plain name, else that and a hash."""
+    """Return a name for a file's pictures on any system: its path where that is a plain name, else that and a hash."""
     shown = os.path.relpath(path) if os.path.isabs(path) else os.path.normpath(path)
     name = re.sub(r"[^A-Za-z0-9._-]+", "_", shown).strip("._-") or "file"
     if name == shown and len(name) <= 80 and not re.match(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\.|$)", name):
@@ -78,7 +78,7 @@ def folder_name(path: str) -> str:
 
 
 def coloured(report: FileReport) -> bytes:
-    """A 3MF of the report's meshes, faces coloured by the worst severity that concerns them."""
+    """Return a 3MF of the report's meshes, faces coloured by the worst severity that concerns them."""
     parts = []
     for number, mesh in enumerate(report.meshes):
         if not len(mesh.faces) or not (np.abs(mesh.vertices) <= LARGEST).all():
@@ -98,7 +98,7 @@ def coloured(report: FileReport) -> bytes:
 
 
 def draw(report: FileReport, found: Finding, scenes: Sequence[Scene | None]) -> str | None:
-    """A finding as SVG; None where nothing of it can be drawn."""
+    """Draw a finding as SVG; None where nothing of it can be drawn."""
     places = [place for place in found.locations if place.mesh is not None and scenes[place.mesh]]
     number = places[0].mesh if places else next(i for i, scene in enumerate(scenes) if scene)
     assert number is not None
@@ -129,7 +129,7 @@ def _scene(mesh: Mesh) -> Scene | None:
 
 
 def _sharp(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Sides (m, 3) that have not just one neighbour, or one at more than 25 degrees."""
+    """Mark sides (m, 3) that do not have one neighbour, or have one at more than 25 degrees."""
     ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     _, side, count = np.unique(
         ends[:, 0].astype(np.int64) * len(vertices) + ends[:, 1], return_inverse=True, return_counts=True
@@ -144,7 +144,7 @@ def _sharp(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def _near(scene: Scene, marks: Marks) -> tuple[np.ndarray, float]:
-    """Middle and reach (mm) of the near view: the first place, and those that lie close to it."""
+    """Return middle and reach (mm) of the near view: the first place, and those close to it."""
     low, high = marks.boxes[0]
     for other_low, other_high in marks.boxes[1:]:
         both = np.minimum(low, other_low), np.maximum(high, other_high)
@@ -159,7 +159,7 @@ def _near(scene: Scene, marks: Marks) -> tuple[np.ndarray, float]:
 def _direction(
     scene: Scene, marks: Marks, middle: np.ndarray, reach: float
 ) -> tuple[tuple[float, float, float], float]:
-    """From where the place is seen best, and how near to the eye the part is cut off so that it can be seen at all."""
+    """Return from where the place is seen best, and how near to the eye the part is cut so that it is seen at all."""
     best, most = _DIRECTIONS[0], 0.0
     samples = marks.samples()
     for i, towards in enumerate(_DIRECTIONS[:4] if len(scene.faces) > _MANY else _DIRECTIONS):
@@ -179,7 +179,7 @@ def _direction(
 
 
 def _shown(points: np.ndarray, seen: raster.Seen, view: raster.Camera, deep: float = 0.0) -> float:
-    """The part of the points that no face hides by more than `deep` mm."""
+    """Return the share of the points that no face hides by more than `deep` mm."""
     at = view.project(points)
     column, row = at[:, 0].astype(int), at[:, 1].astype(int)
     height, width = seen.depth.shape
@@ -229,7 +229,7 @@ class _View:
         self.colour = threemf.colour_hex(colour)
 
     def svg(self, left: float, top: float) -> list[str]:
-        """The view with its marks, its upper left corner at (`left`, `top`)."""
+        """Draw the view with its marks, its upper left corner at (`left`, `top`)."""
         width, height = SIZE
         data = base64.b64encode(raster.png(self.pixels)).decode()
         over = [*self._segments(), *self._points(), *self._where(), *self._scale(), *self._axes()]
@@ -265,7 +265,7 @@ class _View:
         return [form % (drawing.number(x), drawing.number(y)) for x, y in at.tolist()]
 
     def _where(self) -> list[str]:
-        """In the whole view: a circle round what the near view shows."""
+        """Draw, in the whole view, a circle round what the near view shows."""
         if self.frame is None:
             return []
         middle, reach = self.frame
@@ -275,7 +275,7 @@ class _View:
         return [f'<circle class="ring halo" {ring}/>', f'<circle class="ring" {ring}/>']
 
     def _scale(self) -> list[str]:
-        """A bar of a round length."""
+        """Draw a bar of a round length."""
         room = 0.25 * SIZE[0] / self.view.scale
         length = 10.0 ** np.floor(np.log10(room))
         length = float(next(length * step for step in (5.0, 2.0, 1.0) if length * step <= room))
@@ -286,7 +286,7 @@ class _View:
         return ['<g class="scale">', f'<path class="halo" d="{bar}"/>', f'<path class="bar" d="{bar}"/>', said, "</g>"]
 
     def _axes(self) -> list[str]:
-        """The three axes, so that a view from below is known for one."""
+        """Draw the three axes, which show a view from below."""
         drawn = ['<g class="scale">']
         start = (40.0, SIZE[1] - 40.0)
         for name, axis in zip("xyz", np.eye(3), strict=True):
@@ -312,7 +312,7 @@ _STYLE = (
 
 
 def _page(title: str, found: Finding, views: Sequence[_View], place: Location | None) -> str:
-    """Title and message, the views side by side, and below them what each shows."""
+    """Draw title and message, the views side by side, and below them what each shows."""
     lines = [*_wrapped(found.message), *_wrapped(f"Fix: {rules()[found.code].fix}")]
     top = 2 * _MARGIN + 20 + 17 * len(lines)
     width = _MARGIN + len(views) * (SIZE[0] + _MARGIN)
@@ -347,7 +347,7 @@ def _caption(view: _View, found: Finding, place: Location | None) -> str:
 
 
 def _wrapped(text: str) -> list[str]:
-    """Lines of at most _WORDS characters."""
+    """Return lines of at most _WORDS characters."""
     lines = [""]
     for word in printable(text).split(" "):
         if lines[-1] and len(lines[-1]) + 1 + len(word) > _WORDS * 1.4:

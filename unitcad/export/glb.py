@@ -36,7 +36,7 @@ class GlbPart:
 
 
 def content(parts: Sequence[GlbPart]) -> bytes:
-    """The bytes of the file. Raises UnitcadError for a mesh that single precision can't hold."""
+    """Return the bytes of the file. Raises UnitcadError for a mesh that single precision can't hold."""
     buffer = bytearray()
     views: list[dict[str, Any]] = []
     accessors: list[dict[str, Any]] = []
@@ -90,7 +90,7 @@ def content(parts: Sequence[GlbPart]) -> bytes:
 
 
 def shaded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A mesh for shading: vertices (n, 3), unit normals (n, 3), faces; a vertex on a crease becomes several.
+    """Return vertices (n, 3), unit normals (n, 3) and faces for shading; a vertex on a crease becomes several.
 
     A corner's normal is the mean, weighted by angle, of the faces round its vertex that meet its own face at less than
     CREASE_DEG.
@@ -112,7 +112,7 @@ def shaded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _pairs_round(vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Every ordered pair of corners that share a vertex, a corner with itself too."""
+    """Return every ordered pair of corners that share a vertex, a corner with itself too."""
     order = np.argsort(vertex, kind="stable")
     _, start, count = np.unique(vertex[order], return_index=True, return_counts=True)
     per_corner = np.repeat(count, count)
@@ -128,7 +128,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def _material(part: GlbPart) -> dict[str, Any]:
-    """Colours of glTF are linear; ours are sRGB (IEC 61966-2-1)."""
+    """Return a glTF material, whose colours are linear, of a part's sRGB colour (IEC 61966-2-1)."""
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in part.colour]
     return {
         "name": part.name,

@@ -36,18 +36,18 @@ class Marks:
     across: np.ndarray | None = None
 
     def askew(self, eye: np.ndarray) -> float:
-        """How well a thin wall's thickness shows from a direction, 0 to 1; 1 for other findings."""
+        """Return how well a thin wall's thickness shows from a direction, 0 to 1; 1 for other findings."""
         return 1.0 if self.across is None else 1.0 - float(self.across @ eye) ** 4
 
     def samples(self) -> np.ndarray:
-        """Points (n, 3) of the first place that ought to be seen."""
+        """Return points (n, 3) of the first place that ought to be seen."""
         if len(self.segments):
             return self.segments[0].mean(axis=0)[None]
         return self.point[None]
 
 
 def marks_of(code: str, mesh: Mesh, places: Sequence[Location]) -> Marks:
-    """The marks of a finding's places on the mesh to which they belong."""
+    """Return the marks of a finding's places on the mesh to which they belong."""
     places = places[:_MOST]
     segments, points, boxes = [], [], []
     regions = [np.asarray(place.region if place.region is not None else _NONE, np.int64) for place in places]
@@ -78,7 +78,7 @@ def marks_of(code: str, mesh: Mesh, places: Sequence[Location]) -> Marks:
 
 
 def _across(mesh: Mesh, region: np.ndarray) -> np.ndarray:
-    """The normal of a region's largest face."""
+    """Return the normal of a region's largest face."""
     corners = mesh.vertices[mesh.faces[region]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1)
@@ -86,8 +86,11 @@ def _across(mesh: Mesh, region: np.ndarray) -> np.ndarray:
 
 
 def _lines(code: str, corners: np.ndarray, centre: np.ndarray) -> list[np.ndarray]:
-    """Lines (2, 3) that a place is drawn by: the side of a face that has its middle there, the line of two faces that
-    cross, the sides of a face that has no area."""
+    """Return the lines (2, 3) that a place is drawn by.
+
+    The side of a face that has its middle there, the line of two faces that cross, the sides of a face that has no
+    area.
+    """
     if code in _EDGES and len(corners):
         sides = np.stack([corners[0], np.roll(corners[0], -1, axis=0)], axis=1)
         away = np.linalg.norm(sides.mean(axis=1) - centre, axis=1)
@@ -101,7 +104,7 @@ def _lines(code: str, corners: np.ndarray, centre: np.ndarray) -> list[np.ndarra
 
 
 def common_line(a: np.ndarray, b: np.ndarray) -> np.ndarray | None:
-    """The line (2, 3) on which two triangles (3, 3) cross, to rounding; None where they lie in one plane or apart."""
+    """Return the line (2, 3) on which two triangles (3, 3) cross, to rounding; None if in one plane or apart."""
     along = np.cross(np.cross(a[1] - a[0], a[2] - a[0]), np.cross(b[1] - b[0], b[2] - b[0]))
     if not along.any():
         return None

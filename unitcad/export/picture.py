@@ -51,7 +51,7 @@ class NoPicture(UnitcadError):
 
 
 def draw(scenes: Sequence[Scene]) -> list[bytes]:
-    """The scenes as PNG files. Raises NoPicture, with what to install, where this machine can't draw."""
+    """Draw the scenes as PNG files. Raises NoPicture, with what to install, where this machine can't draw."""
     if importlib.util.find_spec("vtkmodules") is None:
         raise NoPicture("pictures need VTK: pip install 'unitcad[cadquery]'")
     request = pickle.dumps([(s.size, s.towards_eye, [vars(part) for part in s.parts]) for s in scenes])
@@ -65,7 +65,7 @@ def draw(scenes: Sequence[Scene]) -> list[bytes]:
 
 
 def _ask(request: bytes, environment: dict[str, str]) -> list[bytes] | None:
-    """The child's pictures; None where it fell."""
+    """Return the child's pictures; None where it crashed."""
     child = [sys.executable, "-P", "-m", "unitcad.export.picture_child"]
     try:
         done = children.run(child, content=request, timeout=SECONDS, env=environment)
@@ -76,7 +76,7 @@ def _ask(request: bytes, environment: dict[str, str]) -> list[bytes] | None:
 
 @contextlib.contextmanager
 def _virtual_display() -> Iterator[str]:
-    """An X server of our own for a while; yields its display. It picks a free number and prints it."""
+    """Run an X server of our own for a while; yield its display. It picks a free number and prints it."""
     command = ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]
     with children.started(command, stderr=subprocess.DEVNULL) as server:
         assert server.stdout is not None

@@ -30,7 +30,7 @@ INK = (0.13, 0.15, 0.18)
 
 
 def picture(size: tuple[int, int], towards_eye: tuple[float, float, float], parts: list[dict[str, Any]]) -> bytes:
-    """One PNG."""
+    """Draw one PNG."""
     renderer = vtkRenderer()
     renderer.SetBackground(1, 1, 1)
     for part in parts:
@@ -101,7 +101,7 @@ def _edges(mesh: vtkPolyData) -> vtkActor:
 
 
 def _light(renderer: vtkRenderer) -> None:
-    """A light at the eye, so that a cut face is the brightest, one from the upper left, one from the right above."""
+    """Add a light at the eye, which makes a cut face the brightest, one from the upper left, one from the upper right."""
     renderer.SetAutomaticLightCreation(False)
     for x, y, z, strength in ((0.0, 0.0, 1.0, 0.70), (-0.7, 0.6, 0.6, 0.50), (0.9, 0.8, 0.2, 0.30)):
         light = vtkLight()
@@ -135,7 +135,7 @@ def _fit(renderer: vtkRenderer, parts: list[dict[str, Any]], size: tuple[int, in
 
 
 def _label(renderer: vtkRenderer, part: dict[str, Any], parts: list[dict[str, Any]]) -> vtkTextActor:
-    """The part's name left of everything drawn, level with the part's middle."""
+    """Write the part's name left of everything drawn, level with the part's middle."""
     x, _ = _on_screen(renderer, np.vstack([p["vertices"] for p in parts])).min(axis=0)
     spots = _on_screen(renderer, part["vertices"])
     text = vtkTextActor()
@@ -150,14 +150,14 @@ def _label(renderer: vtkRenderer, part: dict[str, Any], parts: list[dict[str, An
 
 
 def _on_screen(renderer: vtkRenderer, points: np.ndarray) -> np.ndarray:
-    """Where points (n, 3) fall in the picture, (n, 2) pixels from its lower left corner."""
+    """Return where points (n, 3) fall in the picture, (n, 2) pixels from its lower left corner."""
     width, height = renderer.GetSize()
     seen = _projected(renderer, points, width / height)
     return (seen + 1) / 2 * (width, height)
 
 
 def _projected(renderer: vtkRenderer, points: np.ndarray, aspect: float) -> np.ndarray:
-    """The same from -1 to 1."""
+    """Return the same from -1 to 1."""
     matrix = renderer.GetActiveCamera().GetCompositeProjectionTransformMatrix(aspect, -1, 1)
     projection = np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
     seen = np.column_stack([points, np.ones(len(points))]) @ projection.T

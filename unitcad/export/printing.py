@@ -11,23 +11,23 @@ ROUNDS = 6
 
 
 def print_ready(vertices: np.ndarray, faces: np.ndarray, upside_down: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """A closed mesh (vertices (n, 3) mm, faces (m, 3)) laid on the bed and rounded to single precision, still closed.
+    """Lay a closed mesh (vertices (n, 3) mm, faces (m, 3)) on the bed, rounded to single precision, still closed.
 
     Returns float32 vertices and faces in a canonical order (vertices sorted, each face from its least vertex, faces
-    sorted), every face thicker than single precision resolves at this size. Raises UnitcadError where
-    that can't be had.
+    sorted), every face thicker than single precision resolves at this size. Raises UnitcadError where that can't be
+    had.
     """
     return single_precision(laid_down(vertices, upside_down), faces)
 
 
 def laid_down(vertices: np.ndarray, upside_down: bool) -> np.ndarray:
-    """Vertices (n, 3) in print attitude: turned by 180 degrees about x if `upside_down`, then standing on z = 0."""
+    """Return vertices (n, 3) in print attitude: turned by 180 degrees about x if `upside_down`, standing on z = 0."""
     turned = vertices * ((1.0, -1.0, -1.0) if upside_down else (1.0, 1.0, 1.0))
     return turned - (0.0, 0.0, turned[:, 2].min())
 
 
 def resolution(vertices: np.ndarray) -> float:
-    """The spacing of single precision numbers at the largest coordinate of `vertices` (mm)."""
+    """Return the spacing of single precision numbers at the largest coordinate of `vertices` (mm)."""
     return float(np.spacing(np.float32(np.abs(vertices).max())))
 
 
@@ -53,7 +53,7 @@ def single_precision(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarra
 
 
 def _rounded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices equal in float32 made one, faces that collapse left out, all in canonical order."""
+    """Return the mesh in float32: equal vertices merged, collapsed faces left out, in canonical order."""
     # Adding zero turns -0.0 into 0.0, which would otherwise be another vertex in the bytes.
     merged, index = np.unique(vertices.astype(np.float32) + np.float32(0), axis=0, return_inverse=True)
     faces = index.reshape(-1)[faces]
@@ -65,7 +65,7 @@ def _rounded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _closed(faces: np.ndarray) -> bool:
-    """Whether every edge is used once in each direction, so that the mesh is closed, oriented, manifold."""
+    """Tell whether every edge is used once in each direction, so that the mesh is closed, oriented, manifold."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = int(faces.max()) + 1
     forward = np.sort(start * count + end)
@@ -73,7 +73,7 @@ def _closed(faces: np.ndarray) -> bool:
 
 
 def _thinnest(vertices: np.ndarray, faces: np.ndarray) -> float:
-    """The least altitude of any face (mm)."""
+    """Return the least altitude of any face (mm)."""
     corners = vertices.astype(np.float64)[faces]
     edges = corners[:, (1, 2, 0)] - corners
     doubled_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)

@@ -36,7 +36,7 @@ class Camera:
     size: tuple[int, int]
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Points (n, 3) mm as pixels from the left, pixels from the top, and mm towards the eye."""
+        """Return points (n, 3) mm as pixels from the left, pixels from the top, and mm towards the eye."""
         seen = (np.asarray(points, float).reshape(-1, 3) - self.middle) @ np.stack([self.right, self.up, self.eye]).T
         seen[:, 0] = self.size[0] / 2 + seen[:, 0] * self.scale
         seen[:, 1] = self.size[1] / 2 - seen[:, 1] * self.scale
@@ -49,7 +49,7 @@ def camera(
     reach: float | np.ndarray,
     size: tuple[int, int],
 ) -> Camera:
-    """A view that holds a ball of radius `reach` mm round `middle`; given points (n, 3) in place of it, all of them."""
+    """Return a view that holds a ball of radius `reach` mm round `middle`; given points (n, 3) instead, all of them."""
     eye = np.array(towards_eye, float) / np.linalg.norm(towards_eye)
     upwards = np.array([0.0, 0.0, 1.0]) if abs(eye[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
     right = np.cross(upwards, eye)
@@ -76,7 +76,7 @@ class Seen:
 def look(
     vertices: np.ndarray, faces: np.ndarray, view: Camera, cut: float = np.inf, first: np.ndarray | None = None
 ) -> Seen:
-    """What is seen of a mesh (n, 3) mm, (m, 3), without what is nearer to the eye than `cut` (mm from the middle).
+    """Return what is seen of a mesh (n, 3) mm, (m, 3), without what is nearer the eye than `cut` (mm from the middle).
 
     Faces that `first` (m,) marks are seen before others of the same depth.
     """
@@ -99,7 +99,7 @@ def look(
 def _fragments(
     points: np.ndarray, faces: np.ndarray, width: int, height: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Face, pixel and depth of every pixel's middle that lies in a face, in blocks."""
+    """Yield face, pixel and depth of every pixel's middle that lies in a face, in blocks."""
     for begin in range(0, len(faces), _FACES):
         corners = points[faces[begin : begin + _FACES]]
         low = np.ceil(corners[:, :, :2].min(axis=1) - 0.5)
@@ -128,7 +128,7 @@ def _fragments(
 
 
 def _weights(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates (n, 3) of points in plan in triangles (n, 3, 3)."""
+    """Return barycentric coordinates (n, 3) of points in plan in triangles (n, 3, 3)."""
     (x0, y0), (x1, y1), (x2, y2) = (corners[:, k, :2].T for k in range(3))
     area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
     one = ((x2 - x) * (y0 - y) - (x0 - x) * (y2 - y)) / area
@@ -146,7 +146,7 @@ def shade(
     lines: np.ndarray,
     cut: bool = False,
 ) -> np.ndarray:
-    """Pixels (height, width, 3), 0 to 1: faces in their `colours` (m, 3), lighter towards the light.
+    """Return pixels (height, width, 3), 0 to 1: faces in their `colours` (m, 3), lighter towards the light.
 
     From behind, `plain` faces (m,) have the colour INSIDE, others their own one, darker. `lines` (m, 3): how wide, in
     pixels, the side from corner k to the next is drawn on its face. Where the part is `cut`, what lies behind the cut
@@ -191,7 +191,7 @@ def shade(
 
 
 def _side_lines(corners: np.ndarray) -> np.ndarray:
-    """Of each side of triangles (n, 3, 3) in px: the numbers (a, b, c) by which a x + b y + c is the distance to it."""
+    """Return, for each side of triangles (n, 3, 3) in px, (a, b, c) by which a x + b y + c is the distance to it."""
     along = (np.roll(corners, -1, axis=1) - corners)[:, :, :2]
     length = np.maximum(np.linalg.norm(along, axis=2), 1e-9)
     a, b = -along[:, :, 1] / length, along[:, :, 0] / length
@@ -199,13 +199,13 @@ def _side_lines(corners: np.ndarray) -> np.ndarray:
 
 
 def shrunk(picture: np.ndarray, times: int) -> np.ndarray:
-    """A picture of which every pixel is the mean of `times` by `times`."""
+    """Return a picture of which every pixel is the mean of `times` by `times`."""
     height, width, _ = picture.shape
     return picture.reshape(height // times, times, width // times, times, 3).mean(axis=(1, 3))
 
 
 def png(picture: np.ndarray) -> bytes:
-    """A picture (height, width, 3), 0 to 1, as a PNG file (ISO/IEC 15948): the same bytes for the same pixels."""
+    """Return a picture (height, width, 3), 0 to 1, as a PNG file (ISO/IEC 15948): same pixels, same bytes."""
     height, width, _ = picture.shape
     pixels = np.clip(np.round(picture * 255), 0, 255).astype(np.uint8).reshape(height, width * 3)
     up = pixels.copy()

@@ -48,17 +48,17 @@ class Sliced:
 
 
 def program() -> str | None:
-    """PrusaSlicer's command: on the path, or where its installer puts it; None where there is none."""
+    """Return PrusaSlicer's command: on the path, or where its installer puts it; None where there is none."""
     return next((found for name in (*PROGRAMS, *PLACES.get(sys.platform, ())) if (found := shutil.which(name))), None)
 
 
 def installed() -> bool:
-    """Whether PrusaSlicer is on this machine."""
+    """Tell whether PrusaSlicer is on this machine."""
     return program() is not None
 
 
 def needs_repair(path: Path) -> bool:
-    """Whether PrusaSlicer finds anything to mend in a mesh file; fast, nothing is sliced.
+    """Tell whether PrusaSlicer finds anything to repair in a mesh file; fast, nothing is sliced.
 
     Raises UnitcadError where the slicer is missing or does not read the file.
     """
@@ -97,7 +97,7 @@ def slice_file(path: Path, printer: Printer) -> Sliced:
 def report(
     files: Sequence[Path], printer: Printer, earlier: dict[str, Any] | None = None, say: Say = lambda message: None
 ) -> dict[str, Any] | None:
-    """What slicer.json holds of STL files; None without PrusaSlicer, or for a printer that it does not slice for.
+    """Return what slicer.json holds of STL files; None without PrusaSlicer or for a printer that it can't slice for.
 
     Two at a time. Pieces of an `earlier` report with the same content, printer and slicer are taken from it.
     """
@@ -127,7 +127,7 @@ def report(
 
 
 def _version() -> str:
-    """The slicer's own name and version."""
+    """Return the slicer's own name and version."""
     found = re.search(r"^(PrusaSlicer-\S+)", _run("--help"), re.M)
     return found.group(1) if found else "PrusaSlicer"
 
@@ -152,6 +152,6 @@ def _found(text: str, name: str) -> str:
 
 
 def _seconds(text: str) -> int:
-    """ "1d 2h 3m 4s" in seconds."""
+    """Read "1d 2h 3m 4s" as seconds."""
     units = {"d": 86400, "h": 3600, "m": 60, "s": 1}
     return sum(int(number) * units[unit] for number, unit in re.findall(r"(\d+)([dhms])", text))

@@ -68,7 +68,7 @@ def write(path: Path, bodies: Sequence[Body], name: str) -> None:
 
 
 def content(bodies: Sequence[Body], name: str) -> bytes:
-    """The bytes of the file. Its time stamp is SOURCE_DATE_EPOCH, or 1980-01-01 without one.
+    """Return the bytes of the file. Its time stamp is SOURCE_DATE_EPOCH, or 1980-01-01 without one.
 
     Raises UnitcadError where OCCT fails, or makes a body that differs from its mesh.
     """
@@ -90,7 +90,7 @@ def content(bodies: Sequence[Body], name: str) -> bytes:
 
 
 def read(path: Path) -> list[StepBody]:
-    """The bodies of a STEP assembly in the order of the file. Raises UnitcadError where OCCT can't read it."""
+    """Return the bodies of a STEP assembly in the order of the file. Raises UnitcadError where OCCT can't read it."""
     document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
     with _quiet():
         reader = STEPCAFControl_Reader()
@@ -153,7 +153,7 @@ def _read_body(label: TDF_Label, colours: XCAFDoc_ColorTool) -> StepBody:
 
 
 def _with_header(text: str, name: str) -> str:
-    """The file with a header of ours: OCCT's holds the time of writing."""
+    """Return the file with a header of ours: OCCT's holds the time of writing."""
     when = datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH", "315532800")), UTC)
     shown = name.replace("\\", "\\\\").replace("'", "''").encode("ascii", "replace").decode()
     header = f"FILE_NAME('{shown}.step','{when:%Y-%m-%dT%H:%M:%S}',('unitcad'),(''),'Open CASCADE','unitcad','');"
@@ -164,7 +164,7 @@ def _with_header(text: str, name: str) -> str:
 
 
 def _settled(text: str) -> str:
-    """The file with one record a line, reals to 1e-11, and its assembly's occurrences counted from 1.
+    """Return the file with one record a line, reals to 1e-11, and its assembly's occurrences counted from 1.
 
     OCCT merges vertices in the order of their addresses, which leaves 1e-17 here or there; it wraps lines by what that
     takes to print; and it counts occurrences on from the file before.
@@ -176,7 +176,7 @@ def _settled(text: str) -> str:
 
 
 def _with_styles(text: str, colours: Sequence[tuple[float, float, float]]) -> str:
-    """The file with a surface colour for every solid: `colours` by body, in the order of the file's representations.
+    """Return the file with a surface colour for every solid: `colours` by body, in the order of its representations.
 
     Laid out after the recommended practices for model styling of the MBx Interoperability Forum (CAx-IF).
     """
@@ -204,13 +204,13 @@ def _with_styles(text: str, colours: Sequence[tuple[float, float, float]]) -> st
 
 
 def _real(value: float) -> str:
-    """A number as the format wants it: with a point, always."""
+    """Format a number as STEP requires: with a point, always."""
     return f"{round(value, 11) + 0.0:.11f}".rstrip("0")
 
 
 @contextmanager
 def _settings(wanted: Mapping[str, int]) -> Iterator[None]:
-    """The settings belong to the whole process: put back afterwards."""
+    """Set OCCT's settings for a block; they belong to the whole process, so put them back afterwards."""
     before = {key: Interface_Static.IVal_s(key) for key in wanted}
     try:
         for key, value in wanted.items():
@@ -223,7 +223,7 @@ def _settings(wanted: Mapping[str, int]) -> Iterator[None]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """OCCT reports its progress on standard output, where nothing but the answer belongs."""
+    """Keep OCCT's progress off standard output, which is for the answer."""
     printers = list(Message.DefaultMessenger_s().Printers())
     levels = [printer.GetTraceLevel() for printer in printers]
     for printer in printers:

@@ -20,7 +20,7 @@ def write(path: Path, vertices: np.ndarray, faces: np.ndarray, name: str) -> Non
 
 
 def content(vertices: np.ndarray, faces: np.ndarray, name: str) -> bytes:
-    """The bytes of the file."""
+    """Return the bytes of the file."""
     corners = np.asarray(vertices, dtype=np.float32)[faces]
     edges = corners[:, 1:].astype(np.float64) - corners[:, :1]
     normals = np.cross(edges[:, 0], edges[:, 1])

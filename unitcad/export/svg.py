@@ -70,7 +70,7 @@ class Note:
 
 
 def cut(bodies: Sequence[Body], segments: int, y: float = 0.0, reach: float = math.inf) -> list[Region]:
-    """What the plane at `y` (mm) cuts of `bodies`, no farther from x = 0 than `reach`; what it misses is left out."""
+    """Return what the plane at `y` (mm) cuts of `bodies`, up to |x| = `reach`; what it misses is left out."""
     window = CrossSection.square((2 * reach, 2e4), True) if math.isfinite(reach) else None
     found = []
     for body in bodies:
@@ -91,7 +91,7 @@ def section(
     labels: Mapping[str, str] | None = None,
     ground: str = "skin",
 ) -> str:
-    """The drawing of `regions`: every one named (by `labels`, else its own name), the measures round about.
+    """Draw `regions`: every one named (by `labels`, else its own name), with its measures.
 
     `ground` is what the line z = 0 is called. The same arguments give the same text.
     """
@@ -125,7 +125,7 @@ def unit_section(
     title: str = "",
     labels: Mapping[str, str] | None = None,
 ) -> str:
-    """The unit cut along its tail, in the plane y = 0: main dimensions, layers and air named."""
+    """Draw the unit cut along its tail, in the plane y = 0: main dimensions, layers and air named."""
     regions = cut(bodies, segments, reach=dims.outer_radius + TAIL_MM)
     notes = []
     if dims.air_ring > 0:
@@ -176,12 +176,12 @@ class _Page:
         self.height = self.top + (self.high[1] - self.low[1]) * self.scale + 30 + ROW_PX * rows["below"]
 
     def at(self, point: Point) -> Point:
-        """px of (x, z) in mm."""
+        """Return px of (x, z) in mm."""
         x, z = point
         return self.left + (x - self.low[0]) * self.scale, self.top + (self.high[1] - z) * self.scale
 
     def frame(self, ground: str) -> list[str]:
-        """The line z = 0 and the axis."""
+        """Draw the line z = 0 and the axis."""
         skin = self.at((self.low[0], 0.0)), self.at((self.high[0], 0.0))
         top, bottom = self.at((0.0, self.high[1])), self.at((0.0, self.low[1]))
         return [
@@ -191,7 +191,7 @@ class _Page:
         ]
 
     def measures(self, measures: Sequence[Measure]) -> list[str]:
-        """Dimension lines of one side, their extension lines and their texts."""
+        """Draw the dimension lines of one side, their extension lines and their texts."""
         marks = []
         for row in sorted({measure.row for measure in measures}):
             there = [measure for measure in measures if measure.row == row]
@@ -204,7 +204,7 @@ class _Page:
         return marks
 
     def labels(self, notes: Sequence[Note]) -> list[str]:
-        """Names in a row above the drawing, each with a leader to its point."""
+        """Draw names in a row above the drawing, each with a leader to its point."""
         anchors = [self.at(note.at) for note in notes]
         widths = [drawing.text_width(note.text) for note in notes]
         middles = drawing.spread([x for x, _ in anchors], widths, 14.0)
@@ -220,7 +220,7 @@ class _Page:
         return marks
 
     def _ends(self, measure: Measure) -> tuple[Point, Point]:
-        """Where a dimension line runs (px)."""
+        """Return where a dimension line runs (px)."""
         start, end = (self.at(self._point(measure, value)) for value in (measure.start, measure.end))
         if measure.side == "below":
             y = self.at((0.0, self.low[1]))[1] + ROW_PX * (measure.row + 1)
@@ -240,7 +240,7 @@ class _Page:
 
     @staticmethod
     def _texts(measures: Sequence[Measure], ends: Sequence[tuple[Point, Point]]) -> list[str]:
-        """Texts of one row: under a level dimension line, beside an upright one."""
+        """Draw the texts of one row: under a horizontal dimension line, beside a vertical one."""
         if measures[0].side == "below":
             middles = [(start[0] + end[0]) / 2 for start, end in ends]
             found = drawing.spread(middles, [drawing.text_width(m.text) for m in measures])
@@ -253,7 +253,7 @@ class _Page:
 
 
 def _anchors(regions: Sequence[Region], widths: Sequence[float]) -> list[Point]:
-    """A point in each region for its leader: well inside, and below where a label of its width will find room."""
+    """Return a point in each region for its leader: well inside, and below where a label of its width has room."""
     ends = [point[0] for region in regions for loop in region.loops for point in loop]
     low, span = min(ends, default=0.0), max(ends, default=0.0) - min(ends, default=0.0)
     room, total, found = 0.0, sum(widths) or 1.0, []
@@ -274,7 +274,7 @@ def _anchors(regions: Sequence[Region], widths: Sequence[float]) -> list[Point]:
 
 
 def _middles(starts: np.ndarray, stops: np.ndarray, x: float) -> np.ndarray:
-    """Middles of the stretches in which the upright line at `x` runs inside a region, mm."""
+    """Return middles (mm) of the stretches in which the vertical line at `x` runs inside a region."""
     across = (starts[:, 0] > x) != (stops[:, 0] > x)
     (x0, z0), (x1, z1) = starts[across].T, stops[across].T
     crossings = np.sort(z0 + (z1 - z0) * (x - x0) / (x1 - x0))
@@ -282,7 +282,7 @@ def _middles(starts: np.ndarray, stops: np.ndarray, x: float) -> np.ndarray:
 
 
 def _distance(starts: np.ndarray, stops: np.ndarray, point: np.ndarray) -> float:
-    """From `point` to the nearest side of a region, mm."""
+    """Return the distance (mm) from `point` to the nearest side of a region."""
     along = stops - starts
     share = np.einsum("ij,ij->i", point - starts, along) / np.maximum(np.einsum("ij,ij->i", along, along), 1e-18)
     nearest = starts + np.clip(share, 0, 1)[:, None] * along

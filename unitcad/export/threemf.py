@@ -52,7 +52,7 @@ def write(path: Path, parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (
 
 
 def content(parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220.0)) -> bytes:
-    """The bytes of the package: fixed dates, order and compression."""
+    """Return the bytes of the package: fixed dates, order and compression."""
     entries = {
         "[Content_Types].xml": _CONTENT_TYPES,
         "_rels/.rels": _RELATIONSHIPS,
@@ -69,8 +69,10 @@ def content(parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220
 
 
 def layout(footprints: Sequence[tuple[float, float]], bed_mm: tuple[float, float]) -> list[tuple[float, float]]:
-    """Where each footprint's (x, y) lower left corner goes (mm): rows along x, a new one where the bed's width ends,
-    all about the bed's middle. What does not fit on it runs over its far edges; nothing overlaps.
+    """Return where each footprint's (x, y) lower left corner goes (mm), about the bed's middle.
+
+    In rows along x, a new one where the bed's width ends. What does not fit on it runs over its far edges; nothing
+    overlaps.
     """
     corners: list[tuple[float, float]] = []
     x = y = row_depth = reach = 0.0
@@ -85,7 +87,7 @@ def layout(footprints: Sequence[tuple[float, float]], bed_mm: tuple[float, float
 
 
 def colour_hex(colour: tuple[float, float, float]) -> str:
-    """#RRGGBB of three numbers 0 to 1."""
+    """Return #RRGGBB of three numbers 0 to 1."""
     return "#" + "".join(f"{round(channel * 255):02X}" for channel in colour)
 
 
@@ -129,7 +131,7 @@ def _model(parts: Sequence[MeshPart], bed_mm: tuple[float, float]) -> str:
 
 
 def _triangles(part: MeshPart, base: int) -> list[str]:
-    """The faces; those of another colour than the palette's first one name theirs."""
+    """Write the faces; those of another colour than the palette's first one name theirs."""
     if part.paint is None:
         return _rows('<triangle v1="%s" v2="%s" v3="%s"/>', part.faces)
     return [

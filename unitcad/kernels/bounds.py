@@ -26,17 +26,17 @@ from unitcad.shape.profile import arc_centre, sides
 
 
 def deviation(shape: Shape, segments: int) -> float:
-    """The farthest (mm) that any leaf's mesh of `segments` a turn lies from the leaf's surface."""
+    """Return the farthest (mm) that any leaf's mesh of `segments` a turn lies from the leaf's surface."""
     return max(_deviation(leaf, segments) for leaf, _ in _leaves(shape))
 
 
 def box_bound(shape: Shape, segments: int) -> float:
-    """The most (mm) by which a face of the mesh's box may lie off, its faces meeting at 30 degrees or more."""
+    """Return how far (mm) a face of the mesh's box may lie off, its faces meeting at 30 degrees or more."""
     return 2 * deviation(shape, segments)
 
 
 def volume_bound(shape: Shape, segments: int) -> float:
-    """The most (mm3) by which the mesh's volume may differ from the shape's."""
+    """Return how much (mm3) the mesh's volume may differ from the shape's."""
     return sum(times * _deviation(leaf, segments) * _curved_area(leaf) for leaf, times in _leaves(shape))
 
 
@@ -75,7 +75,7 @@ def _deviation(leaf: Revolve | Extrude, segments: int) -> float:
 
 
 def _curved_area(leaf: Revolve | Extrude) -> float:
-    """Area (mm2) of a leaf's curved faces, or a little more."""
+    """Return the area (mm2) of a leaf's curved faces, or a little more."""
     match leaf:
         case Revolve(profile):
             flat = sum(
@@ -96,13 +96,13 @@ def _outlines(leaf: Extrude) -> tuple[Profile, ...]:
 
 
 def _lean(leaf: Extrude) -> float:
-    """The farthest (mm) that a taper's corner moves sideways on its way up."""
+    """Return the farthest (mm) that a taper's corner moves sideways on its way up."""
     above = leaf.top.vertices if leaf.top else leaf.profile.vertices
     return max(math.dist(low[:2], high[:2]) for low, high in zip(leaf.profile.vertices, above, strict=True))
 
 
 def _arcs(profile: Profile) -> Iterator[tuple[float, float]]:
-    """Radius and length (mm) of each arc."""
+    """Yield radius and length (mm) of each arc."""
     for (x0, y0, bulge), (x1, y1, _) in sides(profile.vertices):
         if bulge:
             radius = arc_centre((x0, y0), (x1, y1), bulge)[2]

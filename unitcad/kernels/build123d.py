@@ -18,12 +18,12 @@ with loading("build123d"):
 
 
 def solid(shape: Shape) -> B3dShape:
-    """The Solid of `shape`, or a Compound where it has several; faces that continue each other are one."""
+    """Return the Solid of `shape`, or a Compound where it has several; faces that continue each other are merged."""
     return _solids([shape])[0]
 
 
 def compound(bodies: Sequence[Body], name: str = "unitcad") -> b3d.Compound:
-    """An assembly called `name`, as assembled (mm): one child a body, with its label and colour."""
+    """Return an assembly called `name`, as assembled (mm): one child a body, with its label and colour."""
     children = _solids([body.shape for body in bodies])
     for child, body in zip(children, bodies, strict=True):
         child.label = body.name

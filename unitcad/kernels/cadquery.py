@@ -16,12 +16,12 @@ with loading("cadquery"):
 
 
 def solid(shape: Shape) -> cq.Shape:
-    """The Solid of `shape`, or a Compound where it has several; faces that continue each other are one."""
+    """Return the Solid of `shape`, or a Compound where it has several; faces that continue each other are merged."""
     return _solids([shape])[0]
 
 
 def assembly(bodies: Sequence[Body], name: str = "unitcad") -> cq.Assembly:
-    """An assembly called `name`, as assembled (mm): one child a body, with its name and colour."""
+    """Return an assembly called `name`, as assembled (mm): one child a body, with its name and colour."""
     whole = cq.Assembly(name=name)
     for body, shape in zip(bodies, _solids([body.shape for body in bodies]), strict=True):
         whole.add(shape, name=body.name, color=cq.Color(*body.colour))

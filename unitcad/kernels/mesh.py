@@ -20,10 +20,10 @@ FINEST, COARSEST = 4096, 24
 
 
 def segment_count(radius: float, tolerance: float) -> int:
-    """Sides of an area-true polygon whose distance from a circle of `radius` nowhere exceeds `tolerance` (both mm).
+    """Return the sides of an area-true polygon within `tolerance` of a circle of `radius` (both mm).
 
-    Its corners stand r (a - 1) outside, a = sqrt(x / sin x) with x = 2 pi / n; the middles of its sides
-    half as far inside. A multiple of 8, so that the axes and diagonals are vertices.
+    Its corners stand r (a - 1) outside, a = sqrt(x / sin x) with x = 2 pi / n; the middles of its sides half as far
+    inside. A multiple of 8, so that the axes and diagonals are vertices.
     """
     n = COARSEST
     while n < FINEST and radius * (area_true(n) - 1) > tolerance:
@@ -32,7 +32,7 @@ def segment_count(radius: float, tolerance: float) -> int:
 
 
 def area_true(segments: int) -> float:
-    """The factor on a regular polygon's circumradius that gives it the circle's area."""
+    """Return the factor on a regular polygon's circumradius that gives it the circle's area."""
     step = 2 * math.pi / segments
     return math.sqrt(step / math.sin(step))
 
@@ -81,13 +81,13 @@ def forget() -> None:
 
 
 def arrays(solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
-    """(vertices (n, 3) in mm, double; faces (m, 3))."""
+    """Return (vertices (n, 3) in mm, double; faces (m, 3))."""
     mesh = solid.to_mesh64()
     return np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.int64)
 
 
 def as_trimesh(solid: Manifold) -> Any:
-    """The mesh as a trimesh.Trimesh, vertices and faces as they are: nothing is merged."""
+    """Return the mesh as a trimesh.Trimesh, vertices and faces unchanged: nothing is merged."""
     import trimesh
 
     vertices, faces = arrays(solid)
@@ -95,7 +95,7 @@ def as_trimesh(solid: Manifold) -> Any:
 
 
 def bounds(solid: Manifold) -> tuple[float, ...]:
-    """(x0, y0, z0, x1, y1, z1) in mm."""
+    """Return (x0, y0, z0, x1, y1, z1) in mm."""
     return tuple(solid.bounding_box())
 
 
@@ -163,7 +163,7 @@ def _prism(vertices: np.ndarray, patch: np.ndarray, bottom: float) -> Manifold:
 
 
 def _taper(below: np.ndarray, above: np.ndarray, z0: float, z1: float) -> Manifold:
-    """A ruled solid between two polygons with as many corners, the lower one counter-clockwise."""
+    """Return a ruled solid between two polygons with as many corners, the lower one counter-clockwise."""
     n = len(below)
     floor = np.column_stack([below, np.full(n, z0)])
     roof = np.column_stack([above, np.full(n, z1)])

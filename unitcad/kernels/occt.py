@@ -46,13 +46,15 @@ class Measures:
 
 
 def solids(shapes: Iterable[Shape]) -> list[TopoDS_Shape]:
-    """The bodies of `shapes`, faces that continue each other made one."""
+    """Return the bodies of `shapes`, faces that continue each other merged."""
     return [_unified(solid) for solid in brep.realise(shapes, _library())]
 
 
 def confirm(shape: Shape, solid: TopoDS_Shape, segments: int = 96) -> None:
-    """Raises UnitcadError where OCCT's `solid` differs from manifold3d's mesh of `shape` in count, or in volume by more
-    than `segments` a turn explain: OCCT can lose a part of a body, and calls the rest valid.
+    """Refuse a `solid` that differs from manifold3d's mesh of `shape` in count or volume.
+
+    OCCT can lose a part of a body and call the rest valid. Raises UnitcadError for another count, or for a volume that
+    differs by more than `segments` a turn explain.
     """
     properties, other = GProp_GProps(), mesh.realise(shape, segments)
     BRepGProp.VolumeProperties_s(solid, properties)
@@ -66,7 +68,7 @@ def confirm(shape: Shape, solid: TopoDS_Shape, segments: int = 96) -> None:
 
 
 def measure(solid: TopoDS_Shape) -> Measures:
-    """Count, volume and box of a body; the box is that of the surfaces themselves, to about 1e-7 mm."""
+    """Return count, volume and box of a body; the box is that of the surfaces themselves, to about 1e-7 mm."""
     properties, box = GProp_GProps(), Bnd_Box()
     BRepGProp.VolumeProperties_s(solid, properties, 1e-12)
     BRepBndLib.AddOptimal_s(solid, box, False, False)

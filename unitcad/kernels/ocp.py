@@ -27,7 +27,7 @@ def loading(library: str) -> Iterator[None]:
 
 
 def installed_wheels() -> dict[str, str]:
-    """Version by name of every installed wheel that fills the folder OCP."""
+    """Return the version by name of every installed wheel that fills the folder OCP."""
     found = {}
     for name in WHEELS:
         try:
@@ -38,7 +38,7 @@ def installed_wheels() -> dict[str, str]:
 
 
 def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
-    """What to tell a person whose import of `library` failed with `error`, given the installed OCP wheels."""
+    """Say what to do when an import of `library` fails with `error`, given the installed OCP wheels."""
     missing = isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] == library
     extra = "cadquery" if library == "cadquery" else "build123d"
     if missing and (not wheels or library != "OCP"):

@@ -15,20 +15,20 @@ _LEAST = 1e-220  # where the downward recurrence starts: at |x| = _SERIES it gro
 
 
 def bessel(order: int, x: Any) -> Any:
-    """J0 or J1 of a real or complex array."""
+    """Return J0 or J1 of a real or complex array."""
     if np.iscomplexobj(x):
         return special.jv(order, x)
     return special.j0(x) if order == 0 else special.j1(x)
 
 
 def envelope(x: Any) -> Any:
-    """A bound of |J0| and |J1| for real x >= 0, shape of x."""
+    """Return a bound of |J0| and |J1| for real x >= 0, shape of x."""
     with np.errstate(divide="ignore"):
         return np.minimum(1.0, 1.01 * np.sqrt(2.0 / (np.pi * x)))
 
 
 def moment(x: Any) -> Any:
-    """Integral of t J1(x t) over t from 0 to 1, for real or complex x with Re x >= 0, any shape.
+    """Integrate t J1(x t) over t from 0 to 1, for real or complex x with Re x >= 0, any shape.
 
     Equal to (pi / 2x) (J1 H0 - J0 H1) with Struve's H, which scipy has for real x only, and not for all of them.
     """
@@ -44,7 +44,7 @@ def moment(x: Any) -> Any:
 
 
 def _by_series(x: Any) -> Any:
-    """Power series: (-1)^m (x/2)^(2m+1) / (m! (m+1)! (2m+3))."""
+    """Sum the power series: (-1)^m (x/2)^(2m+1) / (m! (m+1)! (2m+3))."""
     quarter = -(x * x) / 4.0
     term, total = x / 2.0, x / 6.0
     for m in range(1, 12):
@@ -54,7 +54,10 @@ def _by_series(x: Any) -> Any:
 
 
 def _by_recurrence(x: Any) -> Any:
-    """Neumann series: x^2 times the moment is x J2 + 2 (J3 + J5 + ...), the orders by downward recurrence."""
+    """Sum the Neumann series, the orders by downward recurrence.
+
+    x^2 times the moment is x J2 + 2 (J3 + J5 + ...).
+    """
     above, here = np.zeros_like(x), np.full_like(x, _LEAST)
     odd = np.zeros_like(x)
     inverse = 2.0 / x
@@ -72,7 +75,10 @@ def _by_recurrence(x: Any) -> Any:
 
 
 def _by_expansion(x: Any) -> Any:
-    """1 / x^2 + (pi / 2x) (J1 K0 - J0 K1), K = H - Y by its expansion in 1/x (the Wronskian gives the first term)."""
+    """Expand in 1/x: 1 / x^2 + (pi / 2x) (J1 K0 - J0 K1), K = H - Y.
+
+    The Wronskian gives the first term.
+    """
     inverse = 1.0 / (x * x)
     zero, one = np.zeros_like(x), np.zeros_like(x)
     for of_zero, of_one in reversed(_coefficients()):  # Horner
@@ -82,7 +88,7 @@ def _by_expansion(x: Any) -> Any:
 
 @cache
 def _coefficients() -> tuple[tuple[float, float], ...]:
-    """Of x^-2n in (pi/2) x K0 and (pi/2) K1: 1, -1, 9, -225, ... and 1, 1, -3, 45, ..."""
+    """Return those of x^-2n in (pi/2) x K0 and (pi/2) K1: 1, -1, 9, -225, ... and 1, 1, -3, 45, ..."""
     zero, one = [1.0], [1.0]
     for n in range(20):
         zero.append(-zero[-1] * (2 * n + 1) ** 2)

@@ -49,15 +49,15 @@ class Point:
         return 1.0 / (2.0 * np.pi)
 
     def transform(self, k: Any) -> Any:
-        """q(k) per newton: 1 / (2 pi)."""
+        """Return q(k) per newton: 1 / (2 pi)."""
         return np.full(np.shape(k), 1.0 / (2.0 * np.pi))
 
     def envelope(self, k: Any) -> Any:
-        """A bound of |q(k)| for real k."""
+        """Return a bound of |q(k)| for real k."""
         return self.transform(k)
 
     def static(self, r: Any) -> tuple[Any, Any]:
-        """(along, across): integrals of q(k) J(kr) dk with the load's own Bessel function and with the other one."""
+        """Return (along, across): integrals of q(k) J(kr) dk with the load's own Bessel function and with the other."""
         if np.any(r == 0):
             raise Refusal("r", 0.0, "under a point load the surface goes to infinity: give r > 0, z > 0 or a disc")
         return 1.0 / (2.0 * np.pi * r), 1.0 / (2.0 * np.pi * r)
@@ -84,21 +84,21 @@ class UniformDisc:
         return self.radius**2 * (0.5 if self.direction == "normal" else 1.0 / np.pi)
 
     def transform(self, k: Any) -> Any:
-        """q(k) in m2 per pascal: a J1(ka) / k, or the integral of J1(kr) r dr up to a."""
+        """Return q(k) in m2 per pascal: a J1(ka) / k, or the integral of J1(kr) r dr up to a."""
         a = self.radius
         if self.direction == "normal":
             return a * bessel(1, k * a) / k
         return a * a * moment(k * a)
 
     def envelope(self, k: Any) -> Any:
-        """A bound of |q(k)| for real k."""
+        """Return a bound of |q(k)| for real k."""
         x = np.asarray(k) * self.radius
         if self.direction == "normal":
             return self.radius**2 * np.minimum(0.5, 1.01 * np.sqrt(2.0 / (np.pi * x)) / x)
         return self.radius**2 * np.minimum(0.3, (1.0 + np.sqrt(2.0 * x / np.pi)) * 1.1 / x**2)
 
     def static(self, r: Any) -> tuple[Any, Any]:
-        """(along, across): integrals of q(k) J(kr) dk with the load's own Bessel function and with the other one.
+        """Return (along, across): integrals of q(k) J(kr) dk with the load's own Bessel function and with the other.
 
         Normal: Weber and Schafheitlin's integrals of J1(ka) J0(kr) / k and J1(ka) J1(kr) / k.
         """
@@ -116,10 +116,10 @@ Load = Point | UniformDisc
 
 
 def _radial_static(s: Any) -> Any:
-    """1/a times the integral of J1(kr) q(k) dk for the radial disc at s = r/a: K - E of Legendre, integrated.
+    """Return 1/a times the integral of J1(kr) q(k) dk for the radial disc at s = r/a: K - E of Legendre, integrated.
 
-    The kernel of a ring of radius x a is the integral of J1(kxa) J1(kr) dk = 2 (K - E)(m) / (pi max(r, xa)), with
-    m = (min / max)^2.
+    The kernel of a ring of radius x a is the integral of J1(kxa) J1(kr) dk = 2 (K - E)(m) / (pi max(r, xa)), with m =
+    (min / max)^2.
     """
     s = np.asarray(s, dtype=float)
     inside, outside = np.clip(s, 1e-300, 1.0), np.maximum(s, 1.0)
@@ -132,7 +132,7 @@ _SMALL = 2.0**-30  # of x: below it (K - E)(x^2) is pi x^2 / 4
 
 
 def _legendre_integral(x: Any, power: int) -> Any:
-    """Integral of (K - E)(t^2) / t^power from 0 (power 0) or from `_SMALL` (power 3) to x, 0 < x <= 1."""
+    """Integrate (K - E)(t^2) / t^power from 0 (power 0) or from `_SMALL` (power 3) to x, 0 < x <= 1."""
     edges, sums = _legendre_sums(power)
     x = np.asarray(x, dtype=float)
     whole = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, edges.size - 2)
@@ -144,7 +144,7 @@ def _legendre_integral(x: Any, power: int) -> Any:
 
 @cache
 def _legendre_sums(power: int) -> tuple[np.ndarray, np.ndarray]:
-    """Edges from `_SMALL` to 1, graded towards both ends, and the integral up to each of them."""
+    """Return edges from `_SMALL` to 1, graded towards both ends, and the integral up to each of them."""
     halves = 2.0 ** -np.arange(1, 50)
     edges = np.unique([_SMALL, *halves[halves > _SMALL], *(1.0 - halves), 1.0])
     panels = _legendre_panel(edges[:-1], edges[1:], power)
@@ -153,7 +153,7 @@ def _legendre_sums(power: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _legendre_panel(low: Any, high: Any, power: int) -> Any:
-    """Gauss-Legendre with 20 nodes over each panel."""
+    """Integrate each panel by Gauss-Legendre with 20 nodes."""
     nodes, weights = np.polynomial.legendre.leggauss(20)
     low, high = np.broadcast_arrays(low, high)
     x = ((low + high) / 2.0)[..., None] + ((high - low) / 2.0)[..., None] * nodes

@@ -22,7 +22,7 @@ class Plane(NamedTuple):
 
 
 def underside(material: w.Material, k: w.Array) -> Plane:
-    """The plane at the top of a half-space (or of nothing, if its modulus is 0)."""
+    """Return the plane at the top of a half-space (or of nothing, if its modulus is 0)."""
     if material.shear == 0:
         return Plane(_identity(k.size), np.zeros((2, 2, k.size), dtype=np.complex128))
     found = w.waves(material, k)
@@ -30,7 +30,7 @@ def underside(material: w.Material, k: w.Array) -> Plane:
 
 
 def raised(material: w.Material, h: float, k: w.Array, below: Plane, with_bottom: bool = False) -> Plane:
-    """The plane at a layer's top from the plane at its bottom, each wavenumber by the way that keeps its digits."""
+    """Return the plane at a layer's top from the plane at its bottom, each wavenumber by the method that suits it."""
     below = Plane(below.u, below.t, (below.u, below.t) if with_bottom else None)
     if h == 0.0:
         return below
@@ -54,7 +54,7 @@ def raised(material: w.Material, h: float, k: w.Array, below: Plane, with_bottom
 
 
 def route(material: w.Material, h: float, k: w.Array) -> np.ndarray:
-    """Per wavenumber how a layer is crossed: 0 thin (series), 1 grazing (squared series), 2 thick (reflection).
+    """Choose a layer's method for each wavenumber: 0 thin (series), 1 grazing (squared series), 2 thick (reflection).
 
     Grazing: one of the two waves hardly changes over the layer (next to its branch point, or k h small where k_s h is
     not), so that its way down and its way up look alike and reflection would lose digits.
@@ -71,7 +71,7 @@ def _thin(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
 
 
 def _grazing(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
-    """In pieces across which nothing grows by more than e; the piece's propagator by squaring the series."""
+    """Propagate by squaring the series, in pieces across which nothing grows by more than e."""
     growth = max(float(np.max(rate.real)) for rate in w.rates(material, k)) * h
     pieces = max(1, int(np.ceil(growth)))
     gained = w.squared_step(material, k, h / pieces)
@@ -83,7 +83,10 @@ def _grazing(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
 
 
 def _thick(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
-    """By reflection: amplitudes a down at the top and R E a up at the bottom, R from the plane's equation T u = U t."""
+    """Propagate by reflection.
+
+    The amplitudes are a down at the top and R E a up at the bottom, with R from the plane's equation T u = U t.
+    """
     found = w.waves(material, k)
     d, tr = found.displacement, found.traction
     jd, jt = w.mirrored(d), -w.mirrored(tr)
@@ -105,7 +108,7 @@ _WAYS = (_thin, _grazing, _thick)
 
 
 def charted(raw: Plane) -> Plane:
-    """The same plane with u or t the identity, whichever inverse is better conditioned."""
+    """Return the same plane with u or t the identity, whichever inverse is better conditioned."""
     det_u, det_t = w.determinant(raw.u), w.determinant(raw.t)
     by_u = _square(raw.u) * np.abs(det_t) <= _square(raw.t) * np.abs(det_u)
     inverse = w.adjugate(np.where(by_u, raw.u, raw.t)) / np.where(by_u, det_u, det_t)
@@ -116,7 +119,7 @@ def charted(raw: Plane) -> Plane:
 
 
 def parameter(plane: Plane, u: w.Array, t: w.Array, stiffness: w.Array) -> w.Array:
-    """The c, shape (2, m, n), of a state (u, t) that lies on a plane and comes from a layer above it.
+    """Return the c, shape (2, m, n), of a state (u, t) that lies on a plane and comes from a layer above it.
 
     stiffness: traction over displacement of that layer's waves (Pa/m), which is how their rounding compares. On
     something stiffer u is what is left of waves that cancel, on something softer t is: each would lose the contrast.

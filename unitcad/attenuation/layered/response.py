@@ -76,7 +76,7 @@ class _Problem:
         return 1 if self.load.direction == "normal" else 0
 
     def kernel(self, k: w.Array) -> w.Array:
-        """k C(k), less the static one, of (u_r, u_z), shape (2, n); the load's transform is not in it."""
+        """Return k C(k), less the static one, of (u_r, u_z), shape (2, n); the load's transform is not in it."""
         traction = np.zeros((2, k.size), dtype=np.complex128)
         traction[self.column] = 1.0
         out = k * self.medium.transfer(traction, k, self.omega, self.z)
@@ -84,18 +84,18 @@ class _Problem:
 
 
 def static_kernel(material: w.Material, column: int) -> w.Array:
-    """k C(k) of a static half-space: (1 - nu) / mu along the load, -(1 - 2 nu) / (2 mu) across; nu by eps."""
+    """Return k C(k) of a static half-space: (1 - nu) / mu along the load, -(1 - 2 nu) / (2 mu) across; nu by eps."""
     nu = (1.0 - 2.0 * material.eps) / (2.0 * (1.0 - material.eps))
     along, across = (1.0 - nu) / material.shear, -(1.0 - 2.0 * nu) / (2.0 * material.shear)
     return np.array([across, along] if column == 1 else [along, across])
 
 
 def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
-    """Displacement of `medium` under `load` at radii r (m), any shape, and one depth z (m), at omega (rad/s).
+    """Return the displacement of `medium` under `load` at radii r (m), any shape, depth z (m) and omega (rad/s).
 
     rtol: wanted error over the largest |u| of all radii, 1e-12 to 0.1. Raises `Refusal` for values that can't be, and
-    for r = 0 under a surface point load, `UnitcadError` where no finite answer was found. If rtol can't be reached
-    the errors say so.
+    for r = 0 under a surface point load, `UnitcadError` where no finite answer was found. If rtol can't be reached the
+    errors say so.
     """
     radii = np.asarray(r, dtype=float)
     if radii.size == 0 or not np.all(np.isfinite(radii)) or np.any(radii < 0):
@@ -127,7 +127,7 @@ _LOWER = np.array([5.0, -10.0, 10.0, -5.0, 1.0, 0.0])
 
 
 def _solve_lossless(bare: _Problem, end: float, rtol: float) -> _Found:
-    """The limit of a loss that goes to 0: a polynomial through six small losses.
+    """Take the limit of a loss that goes to 0: a polynomial through six small losses.
 
     What one of a degree less would give differs by the error. Waves decay little over the distance at these losses;
     next to a frequency at which a wave is cut off the displacement changes sooner, and smaller ones are tried. Where
@@ -161,7 +161,7 @@ def _solve_lossless(bare: _Problem, end: float, rtol: float) -> _Found:
 
 
 def _solve(bare: _Problem, end: float, rtol: float) -> _Found:
-    """The best that is reached, in a few attempts.
+    """Integrate in a few attempts and return the best.
 
     What was integrated first may have been accepted beside a largest |u| that the rest then took away: again, beside
     the one that came out. Where the panels do not suffice for rtol, a larger one may spend them better.
@@ -205,7 +205,7 @@ def _static_part(problem: _Problem) -> np.ndarray:
 
 
 def _last_pole(medium: Stack, materials: tuple[w.Material, ...], omega: float) -> float:
-    """A wavenumber above every pole and branch point (1/m): slow surface waves, and bending of the layers as plates.
+    """Return a wavenumber (1/m) above all poles and branch points: slow surface waves, bending of layers as plates.
 
     The softest layer bends with what it lies on, not as a plate.
     """
@@ -222,7 +222,7 @@ def _last_pole(medium: Stack, materials: tuple[w.Material, ...], omega: float) -
 
 
 def _graded(panels: np.ndarray, materials: tuple[w.Material, ...]) -> np.ndarray:
-    """`panels` with the one at k = 0 halved towards 0 until it is shorter than the least wavenumber of a material.
+    """Halve the panel at k = 0 towards 0 until it is shorter than the least wavenumber of a material.
 
     A stiff half-space's branch points and pole lie there, too small a feature for a long panel's last coefficients.
     """
@@ -250,7 +250,7 @@ class _Found:
 
 
 def _panels(end: float, stop: float, span: float, start: float = 0.0) -> np.ndarray:
-    """Panels (n, 2) from `start` to `stop`, all of one length up to `end`; span: phase per unit wavenumber (m)."""
+    """Return panels (n, 2) from `start` to `stop`, of one length up to `end`; span: phase per unit wavenumber (m)."""
     longest = _PHASE / span if span > 0 else np.inf
     line = [start]
     if start < end:
@@ -270,13 +270,13 @@ def _panels(end: float, stop: float, span: float, start: float = 0.0) -> np.ndar
 
 
 def _cut(panels: np.ndarray, pieces: int) -> np.ndarray:
-    """Each panel in so many equal pieces."""
+    """Cut each panel into that many equal pieces."""
     edges = panels[:, :1] + (panels[:, 1:] - panels[:, :1]) * (np.arange(pieces + 1) / pieces)
     return np.stack([edges[:, :-1].ravel(), edges[:, 1:].ravel()], axis=1)
 
 
 def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
-    """Of the `bad` panels the `room` worst ones."""
+    """Mark the `room` worst of the `bad` panels."""
     if np.count_nonzero(bad) <= room:
         return bad
     found = np.zeros_like(bad)
@@ -285,7 +285,7 @@ def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
 
 
 def _integrate(bare: _Problem, end: float, rtol: float, largest: float) -> _Found:
-    """To rtol times the largest |u| that is met on the way, or times `largest`, where that is less."""
+    """Integrate to rtol times the largest |u| that is met, or times `largest`, where that is less."""
     load, r, z = bare.load, bare.r, bare.z
     materials = bare.medium.materials(bare.omega)
     r_max = float(r.max())
@@ -336,7 +336,7 @@ def _integrate(bare: _Problem, end: float, rtol: float, largest: float) -> _Foun
 
 
 def _evaluate(problem: _Problem, panels: w.Array) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Per panel, of (u_r, u_z) at each radius: its integral, a bound of its error and its absolute size.
+    """Return each panel's integral, its error bound and its absolute size, of (u_r, u_z) at each radius.
 
     And, per panel, the largest part of that error that halving it would lessen.
     """
@@ -360,7 +360,7 @@ def _evaluate(problem: _Problem, panels: w.Array) -> tuple[np.ndarray, np.ndarra
 def _sizes_and_errors(
     problem: _Problem, panels: w.Array, kernel: w.Array, waves: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Per panel, component and radius: the absolute size of the integral and a bound of its error.
+    """Return, per panel, component and radius, the absolute size of the integral and a bound of its error.
 
     Per panel: the largest part of the error that halving would lessen.
 
@@ -370,9 +370,9 @@ def _sizes_and_errors(
     that were seen, as soon as they halve within n degrees or so (to count on the rate at which they seem to fall was
     too bold: a pole of small residue next to the panel shows in the last ones only); it enters the integral and the
     rule. The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `weight`: their coefficient of degree m is
-    at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
-    meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
-    six halves: there their envelope takes the place of the weight.
+    at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j meets an error of
+    the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within six halves: there
+    their envelope takes the place of the weight.
 
     Next to a pole the wavenumber's own rounding, times the kernel's slope of at most itself over the panel, is all that
     is left of the last coefficients: halving does not lessen that.

@@ -13,7 +13,7 @@ from unitcad.errors import Refusal
 
 
 def finite(field: str, value: object, least: float | None = 0.0, above: bool = False) -> float:
-    """`value` as a float that is finite and at least (or `above`) `least`. Raises `Refusal` otherwise."""
+    """Return `value` as a float that is finite and at least (or `above`) `least`. Raises `Refusal` otherwise."""
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
@@ -73,11 +73,11 @@ Damping = KelvinVoigt | LossFactor | FractionalKelvinVoigt | None
 
 
 def complex_shear_modulus(youngs_modulus: float, poisson_ratio: float, damping: Damping, omega: float) -> complex:
-    """mu* in Pa from E in Pa, nu and the damping law at omega in rad/s: mu = E / (2 (1 + nu))."""
+    """Return mu* in Pa from E in Pa, nu and the damping at omega in rad/s: mu = E / (2 (1 + nu))."""
     shear = youngs_modulus / (2.0 * (1.0 + poisson_ratio))
     return complex(shear) if damping is None else damping.complex_shear(shear, omega)
 
 
 def compressibility(poisson_ratio: float) -> float:
-    """eps = mu / (lambda + 2 mu) = (v_s / v_p)^2 = (1 - 2 nu) / (2 (1 - nu)): 0 where incompressible."""
+    """Return eps = mu / (lambda + 2 mu) = (v_s / v_p)^2 = (1 - 2 nu) / (2 (1 - nu)): 0 where incompressible."""
     return (1.0 - 2.0 * poisson_ratio) / (2.0 * (1.0 - poisson_ratio))

@@ -70,11 +70,11 @@ class Stack:
         self.half_space = half_space
 
     def compliance(self, k: Any, omega: float) -> w.Array:
-        """Surface displacement (u_r, u_z) per surface traction (t_r, t_z), in m/Pa, shape k.shape + (2, 2).
+        """Return surface displacement (u_r, u_z) per surface traction (t_r, t_z), in m/Pa, shape k.shape + (2, 2).
 
-        k: wavenumbers (1/m) with positive real part, real or complex, any shape; omega >= 0 (rad/s). The traction
-        acts on the body in +r and +z, so a positive pressure pushes into it and counts as t_z. Symmetric. Raises
-        `Refusal` for k, for omega and for a body that nothing holds at omega = 0.
+        k: wavenumbers (1/m) with positive real part, real or complex, any shape; omega >= 0 (rad/s). The traction acts
+        on the body in +r and +z, so a positive pressure pushes into it and counts as t_z. Symmetric. Raises `Refusal`
+        for k, for omega and for a body that nothing holds at omega = 0.
         """
         k = np.asarray(k, dtype=np.complex128)
         if not (np.all(np.isfinite(k)) and np.all(k.real > 0)):
@@ -95,14 +95,14 @@ class Stack:
         return Stack(layers, replace(self.half_space, damping=law))
 
     def materials(self, omega: float) -> tuple[w.Material, ...]:
-        """The layers' and the half-space's complex moduli at omega. Raises `Refusal` for a static free body."""
+        """Return the layers' and the half-space's complex moduli at omega. Raises `Refusal` for a static free body."""
         omega = finite("omega", omega)
         if self.half_space.youngs_modulus == 0.0 and omega == 0.0:
             raise Refusal("omega", omega, "nothing holds this body: static loads would carry it away")
         return tuple(_material(body, omega) for body in (*self.layers, self.half_space))
 
     def planes(self, k: w.Array, omega: float, depth: float = 0.0) -> list[Plane]:
-        """The stack's planes, top first, down to the cut at `depth` (m), for k of shape (n,).
+        """Return the stack's planes, top first, down to the cut at `depth` (m), for k of shape (n,).
 
         The cut (in a layer or in the half-space) changes no result.
         """
@@ -113,7 +113,7 @@ class Stack:
         return planes[::-1]
 
     def transfer(self, traction: w.Array, k: w.Array, omega: float, depth: float) -> w.Array:
-        """(u_r, u_z) at `depth`, shape (2, n), for surface tractions of shape (2, n) at wavenumbers k (n,)."""
+        """Return (u_r, u_z) at `depth`, shape (2, n), for surface tractions of shape (2, n) at wavenumbers k (n,)."""
         planes = self.planes(k, omega, depth)
         state = traction[:, None]
         top = planes[0]
@@ -138,7 +138,7 @@ def _material(body: Layer | HalfSpace, omega: float) -> w.Material:
 
 
 def _cut(thicknesses: list[float], depth: float) -> list[tuple[int, float, bool]]:
-    """Pieces of the stack, top first: (index of the material, thickness, lies above `depth`)."""
+    """Cut the stack into pieces, top first: (index of the material, thickness, lies above `depth`)."""
     pieces: list[tuple[int, float, bool]] = []
     top = 0.0
     for i, h in enumerate(thicknesses):

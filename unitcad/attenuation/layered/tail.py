@@ -28,12 +28,12 @@ class Tail:
     scale: float  # a first guess of the largest displacement
 
     def start(self, scale: float, rtol: float) -> float:
-        """The least wavenumber (1/m) beyond which less than 0.4 rtol scale is missing; the last one if none is."""
+        """Return the least wavenumber (1/m) beyond which less than 0.4 rtol scale is missing; else the last one."""
         good = np.nonzero(self.bounds.max(axis=(1, 2)) <= 0.4 * rtol * scale)[0]
         return float(self.k[good[0]] if good.size else self.k[-1])
 
     def bound(self, stop: float) -> np.ndarray:
-        """The bounds at `stop`, one of `k`; shape (2, radii)."""
+        """Return the bounds at `stop`, one of `k`; shape (2, radii)."""
         return self.bounds[min(np.searchsorted(self.k, stop), self.k.size - 1)]
 
 
@@ -75,7 +75,7 @@ def measure_tail(
     ]
 
     def left(tail: Tail) -> tuple[float, float]:
-        """What it leaves where it stops, nothing below the tolerance being better, and how far that is."""
+        """Return what a tail leaves where it stops (nothing below the tolerance being better), and where that is."""
         stop = tail.start(scale, rtol)
         return max(float(tail.bound(stop).max()), 0.4 * rtol * scale), stop
 
@@ -95,7 +95,7 @@ def _bounds(k: np.ndarray, kernel: w.Array, load: Load, r: np.ndarray) -> np.nda
 
 
 def _from_right(k: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """Trapezoids from each k (first axis) to the last, and beyond it as k^-1.5 (or faster, as it was falling)."""
+    """Integrate by trapezoids from each k (first axis) to the last, beyond it as k^-1.5 or as it was falling."""
     pieces = (f[1:] + f[:-1]) / 2.0 * np.diff(k)[:, None, None]
     last = np.maximum(f[-1], 1e-300)
     power = np.log(np.maximum(f[-8], 1e-300) / last) / np.log(k[-1] / k[-8])

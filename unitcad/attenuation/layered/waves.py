@@ -41,39 +41,39 @@ class Waves:
 
 
 def product(a: Array, b: Array) -> Array:
-    """Matrix product of two (2, 2, n) blocks (or of a block and an (2, m, n) one)."""
+    """Return the matrix product of two (2, 2, n) blocks (or of a block and an (2, m, n) one)."""
     return a[:, 0, None] * b[None, 0] + a[:, 1, None] * b[None, 1]
 
 
 def determinant(a: Array) -> Array:
-    """Determinant of a (2, 2, n) block, shape (n,)."""
+    """Return the determinant of a (2, 2, n) block, shape (n,)."""
     return a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
 
 
 def adjugate(a: Array) -> Array:
-    """Adjugate of a (2, 2, n) block: its inverse times its determinant."""
+    """Return the adjugate of a (2, 2, n) block: its inverse times its determinant."""
     return np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]])
 
 
 def mirrored(a: Array) -> Array:
-    """J a with J = diag(1, -1): the block of the waves that go up."""
+    """Return J a with J = diag(1, -1): the block of the waves that go up."""
     return np.array([a[0], -a[1]])
 
 
 def decaying_root(squared: Array) -> Array:
-    """sqrt with Re >= 0, and +i on the negative real axis: waves decay or leave downwards under e^{+i omega t}."""
+    """Return sqrt with Re >= 0, and +i on the negative real axis: waves decay or leave downwards."""
     return np.sqrt(squared.real + 1j * (squared.imag + 0.0))
 
 
 def rates(material: Material, k: Array) -> tuple[Array, Array]:
-    """Vertical rates g_p and g_s (1/m); factored, so that they keep their digits next to the branch points."""
+    """Return vertical rates g_p and g_s (1/m), factored so that they keep their digits next to the branch points."""
     ks = np.sqrt(material.ks2)
     kp = np.sqrt(material.eps) * ks
     return decaying_root((k - kp) * (k + kp)), decaying_root((k - ks) * (k + ks))
 
 
 def waves(material: Material, k: Array) -> Waves:
-    """The waves P and Q of `material` at complex wavenumbers k, shape (n,), in 1/m."""
+    """Return the waves P and Q of `material` at complex wavenumbers k, shape (n,), in 1/m."""
     eps, ks2, mu = material.eps, material.ks2, material.shear
     gp, gs = rates(material, k)
     below_p, below_s = 1.0 / (gp + k), 1.0 / (gs + k)
@@ -85,7 +85,7 @@ def waves(material: Material, k: Array) -> Waves:
 
 
 def decay(material: Material, found: Waves, h: float) -> Array:
-    """E(h): amplitudes of (P, Q) a depth h lower, upper triangular; only decaying exponentials are formed."""
+    """Return E(h): amplitudes of (P, Q) a depth h lower, upper triangular; only decaying exponentials are formed."""
     ep, es = np.exp(-found.gp * h), np.exp(-found.gs * h)
     sum_ = found.gp + found.gs
     phase = material.ks2 * (1.0 - material.eps) * h / sum_  # (g_p - g_s) h
@@ -96,13 +96,13 @@ def decay(material: Material, found: Waves, h: float) -> Array:
 
 
 def _expm1_over(x: Array) -> Array:
-    """(e^x - 1) / x, 1 at x = 0."""
+    """Return (e^x - 1) / x, 1 at x = 0."""
     safe = np.where(x == 0, 1.0, x)
     return np.where(x == 0, 1.0, np.expm1(safe) / safe)
 
 
 def thin_step(material: Material, k: Array, h: float, u: Array, t: Array, up: bool = True) -> tuple[Array, Array]:
-    """What (u, t), shape (2, m, n), gain over a thin layer of thickness h: the series of exp(-+A h) - 1 times (u, t).
+    """Return what (u, t), shape (2, m, n), gain over a thin layer of thickness h: the series of exp(-+A h) - 1.
 
     `up`: from the layer's bottom to its top, else from top to bottom. Equation y' = A y of elastodynamics in (u, t).
     """
@@ -127,7 +127,7 @@ def thin_step(material: Material, k: Array, h: float, u: Array, t: Array, up: bo
 
 
 def squared_step(material: Material, k: Array, h: float) -> Array:
-    """exp(-A h) - 1 as (4, 4, n) in (u_r, u_z, t_r, t_z): a thin layer's, doubled until it is h thick."""
+    """Return exp(-A h) - 1 as (4, 4, n) in (u_r, u_z, t_r, t_z): a thin layer's, doubled until it is h thick."""
     size = max(float(np.max(np.abs(k))), abs(material.ks2) ** 0.5) * h
     doublings = max(0, int(np.ceil(np.log2(size / THIN))))
     one: Array = np.zeros((4, 4, k.size), dtype=np.complex128)
