@@ -101,7 +101,7 @@ def _edges(mesh: vtkPolyData) -> vtkActor:
 
 
 def _light(renderer: vtkRenderer) -> None:
-    """Add a light at the eye, which makes a cut face the brightest, one from the upper left, one from the upper right."""
+    """Add lights at the eye, which makes a cut face the brightest, from the upper left and from the upper right."""
     renderer.SetAutomaticLightCreation(False)
     for x, y, z, strength in ((0.0, 0.0, 1.0, 0.70), (-0.7, 0.6, 0.6, 0.50), (0.9, 0.8, 0.2, 0.30)):
         light = vtkLight()
