@@ -17,9 +17,9 @@ from unitcad.accuracy.hankel_peers import adaptive
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels
-from unitcad.attenuation.inputs import TissueLayer, Variant, body
+from unitcad.attenuation.inputs import EstimateInput, TissueLayer, body
 from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.estimating import variant_of
+from unitcad.estimating import estimate_input
 from unitcad.validation import load
 
 RADII = np.geomspace(1e-4, 50e-3, 13)
@@ -60,7 +60,7 @@ def cold(rounds: int) -> None:
     print(f"  ratio {estimate / bare:.2f} (at most 4 wanted)")
 
 
-def undamped(variant: Variant) -> LayeredMedium:
+def undamped(variant: EstimateInput) -> LayeredMedium:
     """The variant's body with the damping left out."""
     full: tuple[TissueLayer, ...] = variant.tissue
     damped = body(full)
@@ -90,7 +90,7 @@ def by_quad_vec(medium: LayeredMedium, lifted: bool) -> tuple[np.ndarray, float,
 
 def response(rounds: int) -> None:
     """Thirteen radii on the forearm at rtol 1e-6, beside quad_vec where it converges."""
-    variant = variant_of(load("encapsulating"))
+    variant = estimate_input(load("encapsulating"))
     for name, medium in (("damped", body(variant.tissue)), ("undamped", undamped(variant))):
         truth = medium.response(UniformDisc(A), OMEGA, RADII, rtol=1e-9)
         scale = float(np.max(np.abs(truth.u_z)))

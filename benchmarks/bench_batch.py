@@ -32,7 +32,7 @@ from unitcad.batch.executors import ProcessExecutor, SerialExecutor
 from unitcad.batch.sweep import Sweep, from_file
 from unitcad.batch.task import VariantOutcome
 from unitcad.cache import usage
-from unitcad.estimating import variant_of
+from unitcad.estimating import estimate_input
 
 SILICONES = ["ecoflex-00-10", "ecoflex-00-30", "ecoflex-00-50", "dragon-skin-10-medium", "dragon-skin-30"]
 GEOMETRIES = 20
@@ -251,7 +251,7 @@ def estimates(scratch: Path, variants: int) -> dict[str, Any]:
 
     def loop() -> None:
         for index in some:
-            asked = variant_of(sweep.spec(index))
+            asked = estimate_input(sweep.spec(index))
             for model in models:
                 model_block(asked, model)["edge_level"]
 

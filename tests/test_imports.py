@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -11,6 +12,8 @@ from pathlib import Path
 import pytest
 
 import unitcad
+from unitcad.designs import shipped
+from unitcad.validation import default_template, templates
 
 PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
@@ -147,18 +150,28 @@ def test_no_file_is_past_400_lines() -> None:
     assert long == {}
 
 
+def _names_of_designs(text: str) -> list[str]:
+    """The words of a file's code, texts and comments that are a shipped design's name, each with its line."""
+    word = re.compile(rf"(?<![a-z])({'|'.join(shipped())})(?![a-z])", re.IGNORECASE)
+    return [f"{line}: {named[0]}" for line, row in enumerate(text.splitlines(), 1) for named in word.finditer(row)]
+
+
+def test_a_design_that_is_named_is_seen() -> None:
+    lines = ["if EMBEDDED_RING:", "# a single-encapsulating unit", "embeddings = encapsulated", '"like encapsulating"']
+    assert _names_of_designs("\n".join(lines)) == ["1: EMBEDDED", "2: encapsulating", "4: encapsulating"]
+
+
 def test_no_design_is_named_outside_its_own_file() -> None:
-    """Names of templates may be written where one is loaded, not compared. The studies are of the templates."""
-    named = []
-    for file in PACKAGE.rglob("*.py"):
-        room = file.relative_to(PACKAGE).parts[0]
-        if room in ("designs", "accuracy", "attenuation"):
-            continue
-        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
-            if isinstance(node, ast.Compare):
-                words = [n.value for n in ast.walk(node) if isinstance(n, ast.Constant)]
-                named += [f"{file.name}:{node.lineno}" for word in words if word in ("embedded", "encapsulating")]
-    assert named == []
+    own = {Path(sys.modules[design.layers.__module__].__file__ or "") for design in shipped().values()}
+    assert len(own) == len(shipped()) > 0
+    named = {file.name: found for file in PACKAGE.rglob("*.py") if (found := _names_of_designs(file.read_text()))}
+    assert named.keys() >= {file.name for file in own}
+    assert {name: found for name, found in named.items() if name not in {file.name for file in own}} == {}
+
+
+def test_every_design_has_a_template_and_one_is_the_default() -> None:
+    assert templates().keys() >= shipped().keys()
+    assert [name for name, design in shipped().items() if design.default] == [default_template()]
 
 
 def test_no_piece_is_recognised_by_its_name() -> None:

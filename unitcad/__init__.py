@@ -2,7 +2,7 @@
 
     import unitcad
 
-    spec = unitcad.load("encapsulating", set={"diameter_mm": 15})
+    spec = unitcad.load("unit.toml", set={"diameter_mm": 15})
     variant = unitcad.Variant(spec)
     built = unitcad.build(spec, "out")
     result = unitcad.check(built.folder)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, cast, get_args
+from typing import Any
 
 from unitcad.attenuation.curve import layered_block
+from unitcad.attenuation.edge.closed_form import CONTROL_PASSES
 from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table
-from unitcad.attenuation.inputs import Design, Quantity, SiliconeLayer, TissueLayer, Variant
+from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.catalogue import Material, Tissue, Value, choose, materials, motors, tissue
+from unitcad.designs import design_named, no_estimate
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
 
@@ -27,23 +29,22 @@ def estimate_spec(
 
     Raises `Refusal` where no frequency is known, for an unknown material or tissue, and for values no body has.
     """
-    return estimate(variant_of(spec, frequency_hz), tuple(models or spec.estimate.models), layered)
+    return estimate(estimate_input(spec, frequency_hz), tuple(models or spec.estimate.models), layered)
 
 
 def frequency_table_of_spec(
     spec: Spec, frequencies_hz: Sequence[float], models: Sequence[str] | None = None
 ) -> dict[str, Any]:
     """A table over frequencies (Hz): edge level by model, and the layered decay; raises as `estimate_spec`."""
-    variant = variant_of(spec, frequencies_hz[0])
+    variant = estimate_input(spec, frequencies_hz[0])
     return frequency_table(variant, frequencies_hz, tuple(models or spec.estimate.models))
 
 
-def variant_of(spec: Spec, frequency_hz: float | None = None) -> Variant:
+def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
     """A spec's unit on its body, in SI. `frequency_hz` overrides the spec's and the motor's."""
-    if spec.design not in get_args(Design):
-        raise Refusal(
-            "design", spec.design, "is a custom design, and the estimate knows embedded and encapsulating units"
-        )
+    passes = design_named(spec.design).passes
+    if passes is None:
+        raise Refusal("design", spec.design, f"has no estimate: {no_estimate()}")
     known = motors(spec.motors)
     motor = choose("motor.part", spec.motor.part, known) if spec.motor.part else None
     asked = spec.estimate.frequency_hz if frequency_hz is None else frequency_hz
@@ -51,9 +52,10 @@ def variant_of(spec: Spec, frequency_hz: float | None = None) -> Variant:
     if motor and motor.frequency_hz and frequency_hz is None and asked == float(motor.frequency_hz):
         frequency = _quantity(motor.frequency_hz)  # the motor's own value: keep its range
     silicones = materials(spec.materials)
-    return Variant(
+    return EstimateInput(
         name=spec.name,
-        design=cast("Design", spec.design),
+        design=spec.design,
+        passes=CONTROL_PASSES if len(spec.layers) == 1 else passes,
         diameter=spec.diameter_mm * 1e-3,
         motor_diameter=spec.motor.diameter_mm * 1e-3,
         layers=tuple(

@@ -13,7 +13,7 @@ from unitcad.accuracy.unit_fem import edge_level, pressed_skin
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.estimating import variant_of
+from unitcad.estimating import estimate_input
 from unitcad.validation import load
 
 RADII = np.array([0, 2, 5, 7, 10, 15, 20, 30]) * 1e-3
@@ -22,7 +22,7 @@ DISC, OMEGA = 3.5e-3, 2 * math.pi * 125
 
 @pytest.fixture(scope="module")
 def skin():
-    medium = body(variant_of(load("embedded")).tissue)
+    medium = body(estimate_input(load("embedded")).tissue)
     exact = medium.response(UniformDisc(DISC), OMEGA, RADII, rtol=1e-8).u_z
     coarse, fine = (pressed_skin(medium, OMEGA, DISC, n) for n in (1, 2))
     return exact, -coarse.at(RADII), -fine.at(RADII)
@@ -47,7 +47,7 @@ def test_halving_the_mesh_cuts_the_error(skin):
 
 def test_a_wrong_load_or_layer_is_seen(skin):
     exact, _, fine = skin
-    medium = body(variant_of(load("embedded")).tissue)
+    medium = body(estimate_input(load("embedded")).tissue)
     assert off(medium.response(UniformDisc(1.02 * DISC), OMEGA, RADII).u_z, fine) > 5e-3
     thinner = LayeredMedium([Layer(0.00147, *_rest(medium.layers[0])), *medium.layers[1:]], medium.half_space)
     assert off(thinner.response(UniformDisc(DISC), OMEGA, RADII).u_z, fine) > 3e-3

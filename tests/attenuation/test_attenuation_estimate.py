@@ -17,7 +17,7 @@ from unitcad.attenuation.edge.level import corners
 from unitcad.cli import app
 from unitcad.cli.estimate_command import frequencies
 from unitcad.errors import Refusal
-from unitcad.estimating import estimate_spec, frequency_table_of_spec, variant_of
+from unitcad.estimating import estimate_input, estimate_spec, frequency_table_of_spec
 from unitcad.validation import load
 
 SOFT, MEDIUM, STIFF = "ecoflex-00-10", "dragon-skin-10-medium", "dragon-skin-30"
@@ -146,7 +146,7 @@ def test_poisson_at_one_half_gives_no_pressure_wave():
 
 
 def test_spread_holds_every_corner(encapsulating):
-    units = corners(variant_of(load("encapsulating")))
+    units = corners(estimate_input(load("encapsulating")))
     columns = [units.poisson_ratio, units.tan_delta, units.omega[:, None]]
     assert len(np.unique(np.concatenate(columns, axis=1)[1:], axis=0)) == 2**5
     levels = edge_levels(units, "paper")
@@ -162,7 +162,7 @@ def test_many_ranges_are_taken_one_at_a_time():
     for name in names:
         text += [f"materials.{name}.like=ecoflex-00-10"]
     spec = load("encapsulating", [])
-    variant = variant_of(spec)
+    variant = estimate_input(spec)
     layers = tuple(type(variant.layers[0])(**{**vars(variant.layers[0]), "material": name}) for name in names)
     many = type(variant)(**{**vars(variant), "layers": layers})
     assert corners(many).omega.size == 1 + 2 * (7 * 2 + 1)
@@ -305,6 +305,6 @@ def test_a_custom_design_has_no_estimate(layers: int) -> None:
 
     own = {**read("embedded"), "design": "d.py:f", "design_source": "def f(spec): ..."}
     own["layers"] = own["layers"][:layers]
-    with pytest.raises(Refusal, match="custom design") as refused:
+    with pytest.raises(Refusal, match="describe embedded and encapsulating units only") as refused:
         estimate_spec(from_data(own))
     assert refused.value.field == "design"

@@ -16,11 +16,12 @@ from unitcad.attenuation.edge.fitted_models import (
 )
 from unitcad.attenuation.edge.measured_levels import judge
 from unitcad.catalogue import measurements
+from unitcad.designs import shipped
 
 E10, D10, D30 = 15e3, 250e3, 355e3
 
 
-def units(*moduli, nu=0.4999, tan_delta=0.2, density=1070.0, wall=1.25e-3, crossings=1.0, hertz=125.0):
+def units(*moduli, nu=0.4999, tan_delta=0.2, density=1070.0, wall=1.25e-3, passes=1.0, hertz=125.0):
     return cf.Units(
         youngs_modulus=moduli,
         density=[density] * len(moduli),
@@ -28,7 +29,7 @@ def units(*moduli, nu=0.4999, tan_delta=0.2, density=1070.0, wall=1.25e-3, cross
         tan_delta=[tan_delta] * len(moduli),
         thickness=[wall] * len(moduli),
         omega=2 * np.pi * hertz,
-        crossings=crossings,
+        passes=passes,
     )
 
 
@@ -150,8 +151,14 @@ def test_the_table_is_the_catalogues():
     table = measured_table()
     assert len(table.names) == 9
     assert len(table.pairs) == 12
-    assert set(table.levels) == {
-        v for design in ("single", "embedded", "encapsulating") for v in measurements()[design].values()
+    data = measurements()
+    tables = (data.controls, *(measured.levels for measured in data.designs.values()))
+    assert set(table.levels) == {level for one in tables for level in one.values()}
+
+
+def test_the_measured_designs_are_the_shipped_ones() -> None:
+    assert {name: design.passes for name, design in shipped().items()} == {
+        name: measured.passes for name, measured in measurements().designs.items()
     }
 
 

@@ -81,23 +81,14 @@ def test_the_paper_sweep_has_every_measured_unit() -> None:
     from unitcad import catalogue
 
     table = catalogue.measurements()
-    names = table["names"]
     sweep = load_sweep("paper")
     there = {
         (spec.design, "/".join(layer.material for layer in spec.layers))
         for spec in (sweep.spec(i) for i in range(sweep.count))
     }
-    for design in ("embedded", "encapsulating"):
-        for pair in table[design]:
-            assert (design, "/".join(names[short] for short in pair.split("/"))) in there
-        for short in table["single"]:
-            assert (design, names[short]) in there
-    for pair in table["amplified"]:
-        assert ("embedded", "/".join(names[short] for short in pair.split("/"))) in there
-    for told in table["directions"]:
-        design, _, pair = told.partition(" ")
-        if "/" in pair:
-            assert (design, "/".join(names[short] for short in pair.split("/"))) in there
+    for design, measured in table.designs.items():
+        for unit in (*table.controls, *measured.levels, *measured.over_a_control_not_named, *measured.directions):
+            assert (design, "/".join(table.layers(unit))) in there
 
 
 @pytest.mark.parametrize(

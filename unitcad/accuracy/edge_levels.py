@@ -13,13 +13,15 @@ from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.accuracy.unexplained import NineLevels, unexplained
 from unitcad.accuracy.unit_fem import edge_level, pressed_skin
 from unitcad.attenuation.edge.fitted_models import STORED_FIT, edge_levels, fit_divider, judgements, null
-from unitcad.attenuation.edge.measured_levels import Fit, Judgement, judge, measured_table
+from unitcad.attenuation.edge.measured_levels import CONTROL, Fit, Judgement, judge, measured_table
 from unitcad.attenuation.edge.measured_levels import Table as Measured
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.estimating import variant_of
+from unitcad.catalogue import measurements
+from unitcad.designs import shipped
+from unitcad.estimating import estimate_input
 from unitcad.spec import Spec
-from unitcad.validation import from_data, load
+from unitcad.validation import default_template, from_data, load
 
 _WALL = 1.25
 _DRAWN, _BARE = "finite elements, as drawn", "finite elements, without the circuit"
@@ -84,7 +86,11 @@ def run(quick: bool, say: Say) -> Result:
     )
     say("mesh convergence")
     finenesses = (1.0, 2.0) if quick else (1.0, 2.0, 4.0)
-    convergence = tuple(_converging(name, unit_spec(*name.split(" ")), finenesses) for name in _SHOWN)
+    convergence = tuple(
+        _converging(f"{design} {unit}", unit_spec(design, unit), finenesses)
+        for unit in _SHOWN
+        for design in measurements().designs
+    )
     shrink = max(abs(row[-2] - row[-3]) / row[-2] for row in convergence)
     apart = min(abs(row[-2] - _measured(table, row[0])) / row[-2] for row in convergence)
     meshes = Table(
@@ -114,17 +120,16 @@ def run(quick: bool, say: Say) -> Result:
     )
 
 
-_SHOWN = ("embedded E10/D30", "encapsulating E10/D30", "embedded D10", "encapsulating D10")
+_SHOWN = ("E10/D30", "D10")
+"""Units whose convergence is shown, in each measured design."""
 
 
 def unit_spec(design: str, unit: str) -> Spec:
     """Return the spec of a unit of the paper, "E10/D30" or a control "D10": 14 mm, walls and caps of 2.5 in all."""
-    from unitcad.catalogue import measurements
-
-    names = [measurements()["names"][short] for short in unit.split("/")]
+    names = measurements().layers(unit)
     wall = 2 * _WALL / len(names)
     layers = [
-        {"material": name, "wall_mm": wall, **({"cap_mm": wall} if design == "encapsulating" else {})} for name in names
+        {"material": name, "wall_mm": wall, **({"cap_mm": wall} if shipped()[design].caps else {})} for name in names
     ]
     return from_data({"name": unit, "design": design, "diameter_mm": 14.0, "fpcb": {}, "layers": layers})
 
@@ -141,7 +146,7 @@ def finite_element_levels(fineness: float, pad: bool) -> tuple[NineLevels, list[
     levels: dict[str, dict[str, float]] = {}
     for name in measured_table().names:
         design, unit = name.split(" ")
-        for shape in ("embedded", "encapsulating") if design == "single" else (design,):
+        for shape in measurements().designs if design == CONTROL else (design,):
             start = time.perf_counter()
             levels.setdefault(name, {})[shape] = edge_level(unit_spec(shape, unit), fineness, pad)[0]
             seconds.append(time.perf_counter() - start)
@@ -156,7 +161,7 @@ def _by_name(table: Measured, model: str, two_levels: Callable[[Measured], np.nd
 
 def _measured(table: Measured, unit: str) -> float:
     """Return the measured level of a unit of the page, whose controls have a shape."""
-    name = unit if unit in table.names else f"single {unit.split(' ')[1]}"
+    name = unit if unit in table.names else f"{CONTROL} {unit.split(' ')[1]}"
     return float(table.levels[table.names.index(name)])
 
 
@@ -180,7 +185,7 @@ def bare_skin(finenesses: Sequence[float], repeats: int) -> tuple[Table, float]:
 
     Returns the table, and the difference over the mesh's own error.
     """
-    variant = variant_of(load("embedded"))
+    variant = estimate_input(load(default_template()))
     omega, disc = 2 * math.pi * variant.frequency.middle, variant.motor_diameter / 2
     medium = body(variant.tissue)
     exact = medium.response(UniformDisc(disc), omega, _RADII, rtol=1e-9).u_z

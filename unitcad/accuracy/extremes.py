@@ -16,9 +16,10 @@ from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, NO_VALUE, REFUS
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
 from unitcad.accuracy.result import Promise, Result, Say, Table
 from unitcad.accuracy.timing import Timing, machine, timing
+from unitcad.designs import shipped
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.versions import code_version
-from unitcad.validation import override, read
+from unitcad.validation import default_template, override, read
 
 PATIENCE = 1800.0
 """Seconds after which a spec counts as hung."""
@@ -65,7 +66,7 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
         suite="extremes",
         title="Extreme geometry and random specs",
         text=(
-            f"{len(jobs)} specs: sweeps of the encapsulating and embedded templates to each limit and past it, and "
+            f"{len(jobs)} specs: sweeps of the {' and '.join(shipped())} templates to each limit and past it, and "
             f"random specs from the documented ranges below ({documented}) and from the extreme ones "
             f"({count - documented}, half of them with one cavity), every field drawn by itself. Each is "
             "built (unit, moulds, STL, all laws, all mesh checks) or refused with a field; after a refusal its nearest "
@@ -185,7 +186,7 @@ def _sweeps(values: int | None) -> Iterator[Job]:
     def room(*walls: float) -> str:
         return f"diameter_mm={2 * (4.5 + sum(walls)):.3f}"
 
-    for base, cap in (("encapsulating", True), ("embedded", False)):
+    for base, cap in ((name, design.caps) for name, design in shipped().items()):
         yield from each(
             f"{base}: walls 0.4 to 12 mm",
             base,
@@ -218,25 +219,25 @@ def _sweeps(values: int | None) -> Iterator[Job]:
         )
     yield from each(
         "tail 0.3 to 7 mm, one side and both",
-        "encapsulating",
+        default_template(),
         lambda t: [f"fpcb.tail_width_mm={t[0]}", f"fpcb.tail={t[1]}"],
         [(w, s) for w in (0.3, 0.5, 2.0, 5.0, 6.0, 6.29, 6.3, 7.0) for s in ("one", "both")],
     )
     yield from each(
         "window clearance 0.001 to 0.6 mm",
-        "encapsulating",
+        default_template(),
         lambda c: [f"moulds.window_clearance_mm={c}"],
         (0.001, 0.01, 0.05, 0.2, 0.24, 0.3, 0.6),
     )
     yield from each(
         "caps at the floor and below",
-        "encapsulating",
+        default_template(),
         lambda c: [f"layers.0.cap_mm={c}", f"layers.1.cap_mm={c}"],
         (0.49, 0.5, 0.8, 1.09, 1.094, 1.095, 1.1, 1.25),
     )
     yield from each(
         "second cap at the floor and below",
-        "encapsulating",
+        default_template(),
         lambda c: [f"layers.1.cap_mm={c}"],
         (0.4, 0.5, 0.51, 0.6, 0.8),
     )

@@ -16,8 +16,8 @@ from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import LossFactor
-from unitcad.estimating import variant_of
-from unitcad.validation import load
+from unitcad.estimating import estimate_input
+from unitcad.validation import default_template, load
 
 OMEGA = 2 * math.pi * 125.0
 DISC = UniformDisc(3.5e-3)
@@ -88,7 +88,7 @@ TEXT = (
 
 def cases() -> list[Case]:
     """Return the forearm, the same without damping, and the same next to incompressible with little damping."""
-    forearm = body(variant_of(load("embedded")).tissue)
+    forearm = body(estimate_input(load(default_template())).tissue)
     bare = [Layer(la.thickness, la.density, la.youngs_modulus, la.poisson_ratio) for la in forearm.layers]
     stiff = [Layer(la.thickness, la.density, la.youngs_modulus, 0.4999999, LossFactor(0.01)) for la in forearm.layers]
     rock = HalfSpace(forearm.half_space.density, forearm.half_space.youngs_modulus, forearm.half_space.poisson_ratio)

@@ -11,6 +11,7 @@ from unitcad.accuracy.measures import Measures, makers, of_brep, of_mesh, timed
 from unitcad.accuracy.random_specs import seeded_spec
 from unitcad.accuracy.result import Promise, Result, Say, Table
 from unitcad.accuracy.timing import machine, timing
+from unitcad.designs import shipped
 from unitcad.errors import Refusal
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline import Variant
@@ -23,7 +24,7 @@ _QUANTITIES: tuple[str, ...] = ("solids", "volume", "area", "box", "centre")
 def run(quick: bool, say: Say) -> Result:
     """Compare manifold3d with OCCT, and OCCT by three libraries with itself."""
     random = 3 if quick else 100
-    chosen = ("encapsulating", "embedded", "chain") if quick else tuple(templates())
+    chosen = (*shipped(), "chain") if quick else tuple(templates())
     worst: dict[str, dict[str, float]] = {
         name: dict.fromkeys(_QUANTITIES, 0.0) for name in ("build123d", "CadQuery", "manifold3d")
     }

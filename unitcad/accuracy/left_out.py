@@ -12,7 +12,7 @@ from unitcad.pipeline import bodies
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.product import make
 from unitcad.pipeline.stages import Stages
-from unitcad.validation import load, templates
+from unitcad.validation import default_template, load, templates
 
 _ALL = ("step", "stl", "3mf", "svg", "glb")
 REQUESTS: dict[str, tuple[Sequence[str], Sequence[str], bool]] = {
@@ -28,7 +28,7 @@ REQUESTS: dict[str, tuple[Sequence[str], Sequence[str], bool]] = {
 
 def run(quick: bool, say: Say) -> Result:
     """Build every template and request, from an empty store each time."""
-    chosen = ("encapsulating",) if quick else tuple(templates())
+    chosen = (default_template(),) if quick else tuple(templates())
     rows: list[tuple[Any, ...]] = []
     for name in chosen:
         say(name)

@@ -1,4 +1,4 @@
-"""Speed as ratios inside one run: the encapsulating set against plain CadQuery, plain build123d and bare manifold3d.
+"""Speed as ratios in one run: the default template's set against plain CadQuery, plain build123d and bare manifold3d.
 
 The scripts lie in benchmarks/, beside those of the other rooms, which are run too; so this suite needs a clone.
 """
@@ -18,6 +18,7 @@ from unitcad.accuracy.result import Promise, Result, Say, Table
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.errors import Missing, UnitcadError
 from unitcad.pipeline import Variant
+from unitcad.validation import default_template
 
 ROOT = Path(__file__).parents[2]
 SCRIPTS = {
@@ -34,7 +35,7 @@ OTHERS = (("bench_check.py",), ("bench_attenuation.py",), ("bench_batch.py", "--
 
 def run(quick: bool, say: Say) -> Result:
     """Time the set cold and warm, STL and STEP; then run the other benchmarks."""
-    folder = ROOT / "benchmarks" / "encapsulating"
+    folder = ROOT / "benchmarks" / default_template()
     if not folder.is_dir():
         raise Missing("the speed suite needs benchmarks/: run it in a clone of the repository")
     rounds, warm = (1, 1) if quick else (7, 5)
@@ -59,7 +60,7 @@ def run(quick: bool, say: Say) -> Result:
             },
             rounds,
         )
-        tables.append(_time_table("Encapsulating set, parameters to STL, cold processes", cold, CADQUERY))
+        tables.append(_time_table(f"The {default_template()} set, parameters to STL, cold processes", cold, CADQUERY))
         say("cold, STL and STEP")
         with_step = interleaved(
             {
@@ -99,10 +100,10 @@ def run(quick: bool, say: Say) -> Result:
         suite="speed",
         title="Speed",
         text=(
-            "Ten bodies of the encapsulating template with its moulds: two layers, motor, circuit, base, two cups, "
-            "tongue, filament stub and blade. The plain scripts draw the same parts as a user would, from the same "
-            "lengths, with one boolean after the other; the angle of their STL is chosen so that the largest volume "
-            "error is near that of unitcad's meshes, which the promises hold. Cold: a new process each, taken in turn. "
+            f"Ten bodies of the {default_template()} template with its moulds: two layers, motor, circuit, base, "
+            "two cups, tongue, filament stub and blade. The plain scripts draw the same parts as a user would, from "
+            "the same lengths, with one boolean after the other; the angle of their STL is chosen so that the largest "
+            "volume error is near that of unitcad's meshes, which the promises hold. Cold: a new process each. "
             "Warm times come from one process a script, so they are not interleaved. The benchmarks of checks, "
             "estimates and batches stand below as they print themselves."
         ),
@@ -130,7 +131,7 @@ def _call(script: Path, *arguments: object) -> str:
 
 
 def _build(out: Path, formats: str) -> None:
-    words = ["build", "encapsulating", "--no-slice", "--formats", formats, "-o", str(out)]
+    words = ["build", default_template(), "--no-slice", "--formats", formats, "-o", str(out)]
     subprocess.run([sys.executable, "-m", "unitcad", *words], capture_output=True, check=True, env=_installed())
 
 
@@ -147,7 +148,7 @@ def _volume_error(folder: Path) -> dict[str, float]:
     """Return the relative volume error of every STL in a folder against OCCT's volume of the same tree."""
     from unitcad.kernels import occt
 
-    variant = Variant.of("encapsulating")
+    variant = Variant.of(default_template())
     bodies = (*variant.unit, *variant.plan.tools)
     found = {}
     for body, solid in zip(bodies, occt.solids([body.shape for body in bodies]), strict=True):

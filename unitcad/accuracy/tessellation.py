@@ -15,7 +15,7 @@ from unitcad.kernels import bounds, mesh
 from unitcad.pipeline import Variant
 from unitcad.shape import Shape
 from unitcad.spec.asked import OutputTable
-from unitcad.validation import load
+from unitcad.validation import default_template, load
 
 TOLERANCES = (0.1, 0.03, 0.01, 0.003, 0.001)
 ANGLE = 0.1
@@ -45,9 +45,9 @@ class _Row:
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Mesh bodies of the encapsulating template by every method and tolerance."""
+    """Mesh bodies of the default template by every method and tolerance."""
     tolerances = (0.1, DEFAULT, 0.003) if quick else TOLERANCES
-    variant = Variant.of("encapsulating")
+    variant = Variant.of(default_template())
     parts = {body.name: body.shape for body in (*variant.unit, *variant.plan.tools)}
     tables, plots, promises, found = [], [], [], {}
     for name in BODIES[:2] if quick else BODIES:
@@ -97,7 +97,7 @@ def _table(name: str, rows: list[_Row]) -> Table:
         for error in (lambda row: row.volume_error, lambda row: row.distance)
     ]
     return Table(
-        f"{name} of the encapsulating template",
+        f"{name} of the {default_template()} template",
         (
             "way",
             "tolerance, mm",
@@ -169,7 +169,7 @@ def _default(found: dict[str, list[_Row]], tolerances: tuple[float, ...]) -> str
             f"{here.time} (at {finer:g} mm: {shown(there.volume_error)}, {shown(there.distance)} mm, "
             f"{there.triangles}, {there.time})"
         )
-    play = load("encapsulating").moulds.plinth_clearance_mm
+    play = load(default_template()).moulds.plinth_clearance_mm
     return (
         f"The default of {DEFAULT:g} mm is 1/{play / DEFAULT:.0f} of the play between printed faces ({play:g} mm): "
         f"{'; '.join(said)}."

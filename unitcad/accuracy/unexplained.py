@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.attenuation.edge.closed_form import wave_speed
-from unitcad.attenuation.edge.measured_levels import Judgement, Table
+from unitcad.attenuation.edge.measured_levels import CONTROL, Judgement, Table
+from unitcad.catalogue import measurements
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ def unexplained(
     `solved`: finite elements by variant, as drawn first; `closed`: the models; `paper`: the paper's judgement.
     """
     soft = tuple(name for name, inside in zip(table.names, table.soft_inside, strict=True) if inside)
-    controls = tuple(name for name in table.names if name.startswith("single"))
+    controls = tuple(name for name in table.names if name.startswith(CONTROL))
     measured = dict(zip(table.names, table.levels.tolist(), strict=True))
     everywhere = ", ".join(f"{_span(levels.range(table.names))} ({name})" for name, levels in solved.items())
     drawn, bare = list(solved.values())[:2]
@@ -78,11 +79,11 @@ def unexplained(
 def _orders(table: Table, models: Mapping[str, NineLevels]) -> str:
     """Say which models give the measured order of the controls, and that of E10/D30 and E10/D10."""
     measured = dict(zip(table.names, table.levels.tolist(), strict=True))
-    controls = sorted((name for name in table.names if name.startswith("single")), key=measured.__getitem__)
+    controls = sorted((name for name in table.names if name.startswith(CONTROL)), key=measured.__getitem__)
     same = [name for name, m in models.items() if _rising([m.of(control) for control in controls])]
     order = " < ".join(control.split(" ")[1] for control in controls)
     found = [f"The measured order of the controls, {order}, is given by {_named(same)}."]
-    for design in ("embedded", "encapsulating"):
+    for design in measurements().designs:
         low, high = sorted((f"{design} E10/D30", f"{design} E10/D10"), key=measured.__getitem__)
         above = [name for name, m in models.items() if _rising([m.of(low), m.of(high)])]
         found.append(f"{high} above {low.split(' ')[1]}, as was measured, is given by {_named(above)}.")

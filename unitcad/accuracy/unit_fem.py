@@ -14,7 +14,7 @@ from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import LossFactor, complex_shear_modulus
 from unitcad.designs import dimensions
 from unitcad.errors import UnitcadError
-from unitcad.estimating import variant_of
+from unitcad.estimating import estimate_input
 from unitcad.spec import Spec
 
 CIRCUIT = HalfSpace(density=1900.0, youngs_modulus=3e9, poisson_ratio=0.34)
@@ -29,7 +29,7 @@ def edge_level(spec: Spec, fineness: float, pad: bool = True) -> tuple[float, in
 
     Raises UnitcadError for a material without a small-strain modulus.
     """
-    variant = variant_of(spec)
+    variant = estimate_input(spec)
     omega = 2 * math.pi * variant.frequency.middle
     blocks = [*medium_blocks(body(variant.tissue), omega), *unit_blocks(spec, omega, pad)]
     surface = solve(blocks, omega, fineness, radius=RADIUS)
@@ -46,7 +46,7 @@ def unit_blocks(spec: Spec, omega: float, pad: bool) -> list[Block]:
     dims = dimensions(spec)
     found = []
     inner, below = dims.cavity_radius, dims.core_height
-    walls = zip(variant_of(spec).layers, spec.layers, dims.radii, dims.heights, strict=True)
+    walls = zip(estimate_input(spec).layers, spec.layers, dims.radii, dims.heights, strict=True)
     for silicone, layer, radius, top in walls:
         if not silicone.youngs_modulus.known:
             raise UnitcadError(f"{silicone.material} has no small-strain modulus")

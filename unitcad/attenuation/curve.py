@@ -8,7 +8,7 @@ import numpy as np
 from scipy import special
 
 from unitcad.attenuation.edge import closed_form as cf
-from unitcad.attenuation.inputs import Quantity, Variant, body
+from unitcad.attenuation.inputs import EstimateInput, Quantity, body
 from unitcad.attenuation.layered.loads import UniformDisc
 
 EDGE_TO_MM = 30
@@ -25,7 +25,7 @@ ASSUMPTIONS = [
 _SPREAD_RTOL = 1e-3
 
 
-def layered_block(variant: Variant, rtol: float = 1e-4) -> dict[str, Any]:
+def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
     """The estimate's `layered`: |u_z| and |u_r| over |u_z| at the edge, at the surface and at `DEPTHS_MM`, with spread.
 
     The spread takes each kind of input (moduli, damping, thicknesses, frequency) by itself to its low and high end.
@@ -60,7 +60,7 @@ def layered_block(variant: Variant, rtol: float = 1e-4) -> dict[str, Any]:
     }
 
 
-def decay_at(variant: Variant, frequency: float, distances_mm: tuple[float, ...]) -> list[float]:
+def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float, ...]) -> list[float]:
     """|u_z| over its value at the edge at some distances (mm) from the edge, at one frequency (Hz), nominal body."""
     r = variant.diameter / 2.0 + 1e-3 * np.array([0.0, *distances_mm])
     load = UniformDisc(variant.motor_diameter / 2.0)
@@ -72,14 +72,14 @@ def _curve(value: np.ndarray, low: np.ndarray, high: np.ndarray) -> dict[str, li
     return {name: [float(v) for v in data] for name, data in (("value", value), ("low", low), ("high", high))}
 
 
-def _ends(variant: Variant) -> list[dict[str, int]]:
+def _ends(variant: EstimateInput) -> list[dict[str, int]]:
     kinds = ["moduli", "damping", "thicknesses"] + (
         ["frequency"] if variant.frequency.ends[0] < variant.frequency.ends[1] else []
     )
     return [{kind: end} for kind in kinds for end in (0, 1)]
 
 
-def _at_ends(variant: Variant, load: UniformDisc, r: np.ndarray, end: dict[str, int]) -> tuple[Any, Any]:
+def _at_ends(variant: EstimateInput, load: UniformDisc, r: np.ndarray, end: dict[str, int]) -> tuple[Any, Any]:
     frequency: Quantity = variant.frequency
     hertz = frequency.ends[end["frequency"]] if "frequency" in end else frequency.middle
     found = body(variant.tissue, end).response(load, 2.0 * np.pi * hertz, r, rtol=_SPREAD_RTOL)
@@ -87,7 +87,7 @@ def _at_ends(variant: Variant, load: UniformDisc, r: np.ndarray, end: dict[str, 
 
 
 def _at_depth(
-    variant: Variant, load: UniformDisc, omega: float, r: np.ndarray, z_mm: float, edge: float, rtol: float
+    variant: EstimateInput, load: UniformDisc, omega: float, r: np.ndarray, z_mm: float, edge: float, rtol: float
 ) -> dict[str, Any]:
     found = body(variant.tissue).response(load, omega, r, z=z_mm * 1e-3, rtol=rtol)
     return {
@@ -98,7 +98,7 @@ def _at_depth(
     }
 
 
-def _paper_curves(variant: Variant, radius: float, r: np.ndarray) -> dict[str, Any]:
+def _paper_curves(variant: EstimateInput, radius: float, r: np.ndarray) -> dict[str, Any]:
     """Equation 3b's factors for the skin, over their value at the edge: |J0(kr)|, k = omega/v_s, the exponential."""
     skin = variant.tissue[0]
     omega = 2.0 * np.pi * variant.frequency.middle

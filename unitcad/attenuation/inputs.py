@@ -10,8 +10,6 @@ import numpy as np
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
 
-Design = Literal["embedded", "encapsulating"]
-
 
 @dataclass(frozen=True)
 class Quantity:
@@ -74,11 +72,15 @@ class TissueLayer:
 
 
 @dataclass(frozen=True)
-class Variant:
-    """A unit on a body: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known)."""
+class EstimateInput:
+    """A unit on a body: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known).
+
+    `passes`: how often the wave from motor to skin passes the border between the layers.
+    """
 
     name: str
-    design: Design
+    design: str
+    passes: float
     diameter: float
     motor_diameter: float
     layers: tuple[SiliconeLayer, ...]

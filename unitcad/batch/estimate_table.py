@@ -18,7 +18,6 @@ import numpy as np
 
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import edge_levels
-from unitcad.attenuation.edge.measured_levels import CROSSINGS
 from unitcad.batch import task as tasks
 from unitcad.batch.batch_records import Failure, JournalEntry, Summary
 from unitcad.batch.journal import Journal
@@ -27,7 +26,7 @@ from unitcad.batch.run import MOST_FAILURES_TOLD, BatchOptions, batch_head, coun
 from unitcad.batch.sweep import Sweep
 from unitcad.batch.task import OK
 from unitcad.errors import UnitcadError
-from unitcad.estimating import variant_of
+from unitcad.estimating import estimate_input
 from unitcad.spec import Spec
 from unitcad.validation import from_data, put
 
@@ -39,7 +38,7 @@ FIELDS = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
 
 @dataclass(frozen=True)
 class _Known:
-    """Input of the models for one combination: crossings, walls (m), omega, and (N, 4) of the layers' FIELDS.
+    """Input of the models for one combination: passes, walls (m), omega, and (N, 4) of the layers' FIELDS.
 
     A silicone that is known as a range only has NaN: no number can be given.
     """
@@ -47,7 +46,7 @@ class _Known:
     design: str
     name: str
     diameter_mm: float
-    crossings: float
+    passes: float
     omega: float
     walls: tuple[float, ...]
     silicones: np.ndarray
@@ -126,13 +125,12 @@ def _of(sweep: Sweep, index: int, free: set[str]) -> _Known | UnitcadError:
 
 
 def _known(spec: Spec) -> _Known:
-    asked = variant_of(spec)
-    single = len(asked.layers) == 1
+    asked = estimate_input(spec)
     return _Known(
         design=spec.design,
         name=spec.name,
         diameter_mm=spec.diameter_mm,
-        crossings=CROSSINGS["single" if single else asked.design],
+        passes=asked.passes,
         omega=2.0 * np.pi * asked.frequency.middle,
         walls=tuple(layer.thickness for layer in asked.layers),
         silicones=np.array([_silicone(layer) for layer in asked.layers]),
@@ -179,7 +177,7 @@ def _block(
             **{field: silicones[..., i] for i, field in enumerate(FIELDS)},
             thickness=np.array([entry.walls for entry in there]),
             omega=omega,
-            crossings=np.array([entry.crossings for entry in there]),
+            passes=np.array([entry.passes for entry in there]),
         )
         unknown = np.isnan(silicones).any(axis=(1, 2))
         for model in dict.fromkeys(model for entry in there for model in entry.models):

@@ -1,6 +1,6 @@
 """The sweep file: which specs, over which values. Variants are expanded one at a time.
 
-base = "encapsulating"                    # a template, a spec file beside this one, or a list of them
+base = "unit.toml"                        # a template, a spec file beside this one, or a list of them
 name = "walls"                            # else the file's name
 [set]                                     # the same for every variant
 "output.formats" = ["stl"]

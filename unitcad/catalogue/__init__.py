@@ -30,12 +30,14 @@ from unitcad.catalogue.entries import (
     kinds_of,
     required_of,
 )
+from unitcad.catalogue.measured import Measurements
 from unitcad.errors import Refusal, unknown_name
 
 __all__ = [
     "FREQUENCIES_HZ",
     "Material",
     "MaterialEntry",
+    "Measurements",
     "Motor",
     "MotorEntry",
     "Printer",
@@ -100,9 +102,9 @@ def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] |
 
 
 @cache
-def measurements() -> dict[str, Any]:
-    """The paper's measured amplitudes at the edge, as printed; see the comments in measurements.toml."""
-    return _raw("measurements.toml")
+def measurements() -> Measurements:
+    """Return the paper's measured amplitudes at the edge, as printed."""
+    return msgspec.convert(_raw("measurements.toml"), Measurements)
 
 
 def choose(kind: str, name: str, known: Mapping[str, _Entry]) -> _Entry:

@@ -11,7 +11,9 @@ import typer
 
 def init(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Of the variant and of the file, NAME.toml.")],
-    template: Annotated[str, typer.Option(help="What to start from: see `unitcad list templates`.")] = "encapsulating",
+    template: Annotated[
+        str | None, typer.Option(help="What to start from: see `unitcad list templates`; else the default design's.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
 ) -> None:
     """Write a commented spec to start from. The last line printed is the file."""

@@ -15,7 +15,17 @@ from unitcad.shape.body import Body
 from unitcad.spec import Spec
 from unitcad.spec.custom_code import is_custom
 
-__all__ = ["Design", "Dimensions", "design_named", "dimensions", "layer_colour", "shipped", "unit_bodies"]
+__all__ = [
+    "Design",
+    "Dimensions",
+    "default_design",
+    "design_named",
+    "dimensions",
+    "layer_colour",
+    "no_estimate",
+    "shipped",
+    "unit_bodies",
+]
 
 _LAYER_COLOURS = (
     (0.38, 0.65, 1.00),
@@ -47,6 +57,17 @@ def design_named(name: str) -> Design:
 def dimensions(spec: Spec) -> Dimensions:
     """Return the lengths that follow from a spec, mm."""
     return design_named(spec.design).dimensions(spec)
+
+
+def no_estimate() -> str:
+    """Write why a design that states no `passes` has no estimate."""
+    known = " and ".join(name for name, design in shipped().items() if design.passes)
+    return f"the models describe {known} units only"
+
+
+def default_design() -> Design:
+    """Return the design to start from where none is named."""
+    return next(design for design in shipped().values() if design.default)
 
 
 def layer_colour(index: int) -> tuple[float, float, float]:

@@ -46,9 +46,11 @@ class Design:
     tooling      "concentric": base, cups, tongues and blade drawn from the dimensions; None: no moulds
     suction      whether a unit closed at the top holds to its core, so that a filament must let air in
     opens        where motor and circuit go in: "above" or "below" (the skin)
+    caps         whether a layer has a cap over the one inside it, or is an open ring
     passes       how often the wave from motor to skin passes the border between the layers; None: no estimate
     assembly     how motor and circuit go into the body, a sentence each
     left_out     pieces that this variant does without, and why
+    default      whether to start from it where none is named; one design's is True
     """
 
     name: str
@@ -62,6 +64,8 @@ class Design:
     tooling: Literal["concentric"] | None = None
     suction: bool = False
     opens: Literal["above", "below"] = "below"
+    caps: bool = False
     passes: float | None = None
     assembly: Callable[[Spec, Dimensions], list[str]] = _nothing
     left_out: Callable[[Spec], list[Reason]] = _nothing_left_out
+    default: bool = False

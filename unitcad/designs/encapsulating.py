@@ -151,6 +151,8 @@ DESIGN = Design(
     wire_sides=2,
     tooling="concentric",
     suction=True,
+    caps=True,
     passes=2.0,
     assembly=assembly,
+    default=True,
 )

@@ -162,10 +162,10 @@ def estimated(moulds: MouldSet, store: Store) -> dict[str, Any]:
     """Return the estimate of a variant. The layered solver's part reads no silicone: the store shares it."""
     from unitcad.attenuation.curve import layered_block
     from unitcad.attenuation.edge.estimates import rounded
-    from unitcad.attenuation.inputs import Variant as Asked
+    from unitcad.attenuation.inputs import EstimateInput
     from unitcad.estimating import estimate_spec
 
-    def layered(asked: Asked) -> dict[str, Any]:
+    def layered(asked: EstimateInput) -> dict[str, Any]:
         reads = (asked.tissue_name, asked.tissue, asked.frequency, asked.diameter, asked.motor_diameter)
         key = digest(repr((reads, code_version())).encode())
         return store.data(key, lambda: rounded(layered_block(asked)))

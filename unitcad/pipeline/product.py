@@ -10,7 +10,7 @@ from typing import Any
 
 from unitcad import __version__, files
 from unitcad.cache import Store, digest
-from unitcad.designs import design_named
+from unitcad.designs import design_named, no_estimate
 from unitcad.designs.design import Reason
 from unitcad.errors import Refusal, unknown_name
 from unitcad.moulds.mould_set import MouldSet
@@ -22,10 +22,8 @@ from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import kernel_versions
 from unitcad.spec import Spec
-from unitcad.spec.custom_code import is_custom
 from unitcad.validation import warnings
 
-CUSTOM = "a custom design: the estimate knows embedded and encapsulating units"
 NO_MOULDS = "no moulds were asked for: of the mould checks only C200 looked at the unit"
 
 
@@ -102,10 +100,10 @@ def checked_outputs(only: Sequence[str]) -> tuple[str, ...]:
 
 
 def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
-    """Return what of `only` there can be: a custom design has no estimate. Raises Refusal where nothing is left."""
-    possible = tuple(name for name in only if name != "estimate" or not is_custom(spec.design))
+    """Return what of `only` there can be: not every design has an estimate. Raises Refusal where nothing is left."""
+    possible = tuple(name for name in only if name != "estimate" or design_named(spec.design).passes)
     if not possible:
-        raise Refusal("--only", ",".join(only), f"{spec.design} is a custom design, which has no estimate", "unit")
+        raise Refusal("--only", ",".join(only), f"{spec.design} has no estimate: {no_estimate()}", "unit")
     return possible
 
 
@@ -164,7 +162,9 @@ def _left_out(spec: Spec, asked: Sequence[str], only: Sequence[str], check: bool
     if not check:
         reasons.append(("mesh checks", folders.UNCHECKED))
     reasons += _tooling_left_out(spec)
-    reasons += [(name, CUSTOM if name in asked else "not asked for (--only)") for name in OUTPUTS if name not in only]
+    reasons += [
+        (name, no_estimate() if name in asked else "not asked for (--only)") for name in OUTPUTS if name not in only
+    ]
     if "step" not in spec.output.formats:
         reasons.append(("boundary representation", "no STEP asked for"))
     return reasons

@@ -35,8 +35,8 @@ def model(spec: Spec) -> dict[str, Any]:
     moulds = MouldSet(spec)
     plan = moulds.plan
     return {
-        "unit": _embedded(glb_content(moulds, moulds.unit)),
-        "moulds": _embedded(glb_content(moulds, plan.tools)),
+        "unit": _packed(glb_content(moulds, moulds.unit)),
+        "moulds": _packed(glb_content(moulds, plan.tools)),
         "cells": cells(moulds),
         "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(moulds)],
         "unit_apart": {name: list(offset) for name, offset in unit_apart(moulds).items()},
@@ -51,11 +51,11 @@ def cells(moulds: MouldSet) -> list[list[float]]:
 
 
 def unpacked(text: str) -> bytes:
-    """Return the bytes of an embedded file."""
+    """Return the bytes of a file within the page."""
     return gzip.decompress(base64.b64decode(text))
 
 
-def _embedded(content: bytes) -> str:
+def _packed(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 

@@ -64,7 +64,7 @@ class WiresTable(Table, frozen=True, kw_only=True):
 
 
 class LayerTable(Table, frozen=True, kw_only=True):
-    """One silicone layer: a wall and, in the encapsulating design, a cap."""
+    """One silicone layer: a wall and, in a design of closed layers, a cap."""
 
     material: str
     wall_mm: Thickness

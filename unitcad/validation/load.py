@@ -10,6 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from unitcad.designs import default_design
 from unitcad.errors import Refusal, UnknownKey, unknown_name
 from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.asked import AskedSpec
@@ -27,6 +28,11 @@ def templates() -> dict[str, Path]:
     package = Path(str(files("unitcad")))
     folder = next((f for f in (package / "templates", package.parent / "templates") if f.is_dir()), package)
     return {file.stem: file for file in sorted(folder.glob("*.toml"))}
+
+
+def default_template() -> str:
+    """Return the template to start from where none is named: the one with the default design's name."""
+    return default_design().name
 
 
 def load(source: Source, set: Changes = ()) -> Spec:

@@ -13,14 +13,17 @@ from unitcad.errors import UnitcadError
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import entry_in, fields_of, meaning, table_in
 from unitcad.spec.toml import read_toml
-from unitcad.validation.load import templates
+from unitcad.validation.load import default_template, templates
 
 _NOT_OFFERED = ("design_source",)
 
 
-def starter(name: str, template: str = "encapsulating") -> str:
-    """The text of a spec file named `name`. Raises UnitcadError for an unknown template."""
-    known = templates()
+def starter(name: str, template: str | None = None) -> str:
+    """Return the text of a spec file named `name`, from `default_template()` where none is given.
+
+    Raises UnitcadError for an unknown template.
+    """
+    known, template = templates(), template or default_template()
     if template not in known:
         raise UnitcadError(f"--template {template}: not known; one of {', '.join(known)}")
     there = read_toml(known[template])

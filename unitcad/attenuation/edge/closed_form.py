@@ -1,4 +1,4 @@
-"""The paper's closed forms, as printed and mended, and the empirical divider, over arrays of variants. SI.
+"""The paper's closed forms, as printed and corrected, and the empirical divider, over arrays of variants. SI.
 
 Every function broadcasts: a `Units` holds any number of variants of N layers each. A path runs from the motor outwards
 through the walls of the layers, inside out, at the skin, and ends at the outer face, in air (equations 4 to 6).
@@ -6,6 +6,7 @@ through the walls of the layers, inside out, at the skin, and ends at the outer 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
@@ -21,6 +22,8 @@ READINGS: dict[str, str] = {
     "literal": "eta is a viscosity in Pa s and the exponent is taken as printed: its unit is a second, not a number",
 }
 AIR_IMPEDANCE: dict[str, float] = {"p": 1.204 * 343.0, "s": 0.0}  # Pa s/m at 20 degC; air carries no shear wave
+CONTROL_PASSES = math.sqrt(2.0)
+"""Of a single-layer control: the geometric mean of 1 and 2, since the paper does not say which shape it measured."""
 
 
 def _quiet() -> np.errstate:
@@ -30,10 +33,11 @@ def _quiet() -> np.errstate:
 
 @dataclass(frozen=True)
 class Units:
-    """Variants of N layers: arrays whose last axis runs over the layers, inside out; omega and crossings lack it.
+    """Variants of N layers: arrays whose last axis runs over the layers, inside out; omega and passes lack it.
 
-    youngs_modulus Pa, density kg/m3, poisson_ratio, tan_delta, thickness m (of the walls), omega rad/s; crossings is
-    the divider's n: 1 embedded, 2 encapsulating, sqrt(2) for a single-layer control.
+    youngs_modulus Pa, density kg/m3, poisson_ratio, tan_delta, thickness m (of the walls), omega rad/s; passes is the
+    divider's n: how often the wave from motor to skin passes the border between the layers; `CONTROL_PASSES` for a
+    control.
     """
 
     youngs_modulus: Any
@@ -42,7 +46,7 @@ class Units:
     tan_delta: Any
     thickness: Any
     omega: Any
-    crossings: Any
+    passes: Any
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -52,7 +56,7 @@ class Units:
         """Own-material controls: one layer of all the walls' thickness, of the material of `layer`, the same omega."""
         one = {name: getattr(self, name)[..., layer, None] for name in _MATERIAL}
         total = np.sum(np.broadcast_to(self.thickness, np.broadcast_shapes(*self._layered)), -1, keepdims=True)
-        return Units(**one, thickness=total, omega=self.omega, crossings=np.sqrt(2.0))
+        return Units(**one, thickness=total, omega=self.omega, passes=CONTROL_PASSES)
 
     @property
     def _layered(self) -> list[tuple[int, ...]]:
@@ -127,16 +131,16 @@ def consistent_path(units: Units, wave: Wave = "s") -> Any:
         return passed * np.exp(-np.sum(rate * units.thickness, axis=-1))
 
 
-def crossed_path(units: Units) -> Any:
-    """k_t of shear waves to the power of `crossings` and no exponential: a reading that the print does not have."""
+def transmission_only(units: Units) -> Any:
+    """k_t of shear waves to the power of `passes` and no exponential: a reading that the print does not have."""
     inner = np.prod(paper_transmissions(units)[..., :-1], axis=-1)
-    return inner**units.crossings
+    return inner**units.passes
 
 
 def divider(units: Units, kappa: Any) -> Any:
     """1/(1 + kappa n E_outer/E_inner): the empirical divider without its constant s; outermost and innermost layer."""
     e = units.youngs_modulus
-    return 1.0 / (1.0 + kappa * units.crossings * e[..., -1] / e[..., 0])
+    return 1.0 / (1.0 + kappa * units.passes * e[..., -1] / e[..., 0])
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from unitcad.attenuation.curve import decay_at, layered_block
 from unitcad.attenuation.edge.fitted_models import MODELS, judgements
 from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown
 from unitcad.attenuation.edge.measured_levels import Judgement
-from unitcad.attenuation.inputs import Quantity, Variant
+from unitcad.attenuation.inputs import EstimateInput, Quantity
 
 SIGNIFICANT_DIGITS = 9
 ASSUMPTIONS = [
@@ -28,10 +28,12 @@ TABLE_NOTE = (
 DECAY_AT_MM = (5.0, 10.0, 20.0, 30.0)
 
 
-Layered = Callable[[Variant], dict[str, Any]]
+Layered = Callable[[EstimateInput], dict[str, Any]]
 
 
-def estimate(variant: Variant, models: Sequence[str] = MODELS, layered: Layered = layered_block) -> dict[str, Any]:
+def estimate(
+    variant: EstimateInput, models: Sequence[str] = MODELS, layered: Layered = layered_block
+) -> dict[str, Any]:
     """{variant, models, layered, measured, table_error, assumptions}; numbers to nine significant digits.
 
     `layered` gives the layered solver's block, which reads no silicone: variants on one body share it.
@@ -71,7 +73,9 @@ def summary(estimated: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def frequency_table(variant: Variant, frequencies: Sequence[float], models: Sequence[str] = MODELS) -> dict[str, Any]:
+def frequency_table(
+    variant: EstimateInput, frequencies: Sequence[float], models: Sequence[str] = MODELS
+) -> dict[str, Any]:
     """{variant, frequencies}: per frequency (Hz) each model's edge level and the layered decay at some distances."""
     rows = []
     for hertz in frequencies:
@@ -91,7 +95,7 @@ def frequency_table(variant: Variant, frequencies: Sequence[float], models: Sequ
     return rounded({"variant": block, "frequencies": rows, "assumptions": ASSUMPTIONS})
 
 
-def variant_block(variant: Variant) -> dict[str, Any]:
+def variant_block(variant: EstimateInput) -> dict[str, Any]:
     """The inputs as they were used, in the units of the spec."""
     return {
         "name": variant.name,

@@ -82,18 +82,18 @@ def null(table: Table, chosen: np.ndarray) -> Callable[[Table], np.ndarray]:
 
 
 def paths() -> dict[str, Predict]:
-    """Of each model, and of the reading with crossings, what it makes of a unit before any constant."""
+    """Of each model, and of the reading with k_t alone, what it makes of a unit before any constant."""
     return {
         "paper": cf.paper_path,
         "consistent": cf.consistent_path,
         "fitted": lambda units: cf.divider(units, STORED_FIT["kappa"]),
-        "crossings": cf.crossed_path,
+        "crossings": cf.transmission_only,
     }
 
 
 @cache
 def judgements() -> dict[str, Judgement]:
-    """Every model, the crossings reading and the null against the measured table; made on first use."""
+    """Every model, the reading with k_t alone and the null against the measured table; made on first use."""
     found = paths()
     fits: dict[str, tuple[Fit, bool]] = {
         "paper": (one_constant(found["paper"]), False),

@@ -10,8 +10,9 @@ import numpy as np
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import STORED_FIT, paths, scales
-from unitcad.attenuation.edge.measured_levels import CROSSINGS, measured_table
-from unitcad.attenuation.inputs import Quantity, SiliconeLayer, Variant
+from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
+from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
+from unitcad.catalogue import measurements
 
 _MOST_CORNERS = 12
 _NOT_FINITE = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"
@@ -28,7 +29,8 @@ ASSUMPTIONS = {
         "Plane waves cross each interface at right angles as if both sides were half-spaces; a layer is 1/14 to 1/67 "
         "of a shear wavelength thick.",
         "u_z decays and transmits as a shear wave, u_r as a pressure wave, though both components carry both.",
-        "The path back into the skin has no coefficient; embedded and encapsulating units give the same number.",
+        "The path back into the skin has no coefficient: layers that close over the motor give the same number as open "
+        "rings.",
         "The pressure wave depends on how Poisson's ratio is fixed just below 1/2; at 1/2 it has no answer.",
     ],
     "consistent": [
@@ -43,12 +45,12 @@ ASSUMPTIONS = {
 }
 
 
-def nominal(variant: Variant) -> Units:
+def nominal(variant: EstimateInput) -> Units:
     """The variant's middle values as closed-form input."""
     return _units(variant, np.array([[q.middle for _, q in _inputs(variant)]]), [0])
 
 
-def corners(variant: Variant) -> Units:
+def corners(variant: EstimateInput) -> Units:
     """The variant with its inputs at the ends of their ranges: all corners, or one input at a time if there are many.
 
     Layers of one material move together.
@@ -69,7 +71,7 @@ def corners(variant: Variant) -> Units:
     return _units(variant, np.concatenate([middle[None], rows]), None)
 
 
-def _inputs(variant: Variant) -> Iterator[tuple[tuple[str, str], Quantity]]:
+def _inputs(variant: EstimateInput) -> Iterator[tuple[tuple[str, str], Quantity]]:
     """((material, field), quantity) of every distinct input, the frequency last."""
     seen: dict[str, SiliconeLayer] = {}
     for layer in variant.layers:
@@ -80,22 +82,21 @@ def _inputs(variant: Variant) -> Iterator[tuple[tuple[str, str], Quantity]]:
     yield ("", "frequency"), variant.frequency
 
 
-def _units(variant: Variant, rows: np.ndarray, only: list[int] | None) -> Units:
+def _units(variant: EstimateInput, rows: np.ndarray, only: list[int] | None) -> Units:
     at = {key: i for i, (key, _) in enumerate(_inputs(variant))}
     if only is not None:
         rows = rows[only]
     columns = {field: rows[:, [at[layer.material, field] for layer in variant.layers]] for field in _FIELDS}
-    count = len(variant.layers)
     return Units(
         **columns,
         density=np.tile([layer.density for layer in variant.layers], (len(rows), 1)),
         thickness=np.tile([layer.thickness for layer in variant.layers], (len(rows), 1)),
         omega=2.0 * np.pi * rows[:, -1],
-        crossings=CROSSINGS["single"] if count == 1 else CROSSINGS[variant.design],
+        passes=variant.passes,
     )
 
 
-def unknown(variant: Variant) -> str:
+def unknown(variant: EstimateInput) -> str:
     """Why there can be no number: the first input that is not known; empty if all are."""
     for (name, field), quantity in _inputs(variant):
         if not quantity.known:
@@ -103,7 +104,7 @@ def unknown(variant: Variant) -> str:
     return ""
 
 
-def ranged(variant: Variant) -> list[str]:
+def ranged(variant: EstimateInput) -> list[str]:
     """Assumptions of the inputs that are known as a range only: their result is a range, without a value."""
     return [
         f"{name} {field}: {quantity.note}"
@@ -112,7 +113,7 @@ def ranged(variant: Variant) -> list[str]:
     ]
 
 
-def spread(variant: Variant, predict: Callable[[Units], Any]) -> dict[str, Any]:
+def spread(variant: EstimateInput, predict: Callable[[Units], Any]) -> dict[str, Any]:
     """{value, low, high} of `predict`; value null if an input has a range only, all null if it can't be, and why."""
     reason = unknown(variant)
     if reason:
@@ -129,7 +130,7 @@ def spread(variant: Variant, predict: Callable[[Units], Any]) -> dict[str, Any]:
     return found
 
 
-def model_block(variant: Variant, model: str) -> dict[str, Any]:
+def model_block(variant: EstimateInput, model: str) -> dict[str, Any]:
     """One entry of the estimate's `models`, without its error against the table."""
     path, scale = paths()[model], scales()[model]
     block: dict[str, Any] = {
@@ -159,7 +160,7 @@ def model_block(variant: Variant, model: str) -> dict[str, Any]:
     return block
 
 
-def _controls(variant: Variant) -> list[int]:
+def _controls(variant: EstimateInput) -> list[int]:
     """A layer's index for each distinct material, if the unit has more than one layer."""
     if len(variant.layers) == 1:
         return []
@@ -167,7 +168,7 @@ def _controls(variant: Variant) -> list[int]:
     return [names.index(name) for name in dict.fromkeys(names)]
 
 
-def _ratio(variant: Variant, model: str, index: int) -> dict[str, Any]:
+def _ratio(variant: EstimateInput, model: str, index: int) -> dict[str, Any]:
     """hierarchical/control against the control of layer `index`: by wave where the model has waves."""
     name = variant.layers[index].material
     if model == "fitted":
@@ -181,7 +182,7 @@ def _ratio(variant: Variant, model: str, index: int) -> dict[str, Any]:
     return {"control": name, **by_wave["s"], "wave": "s", "p": by_wave["p"]}
 
 
-def _paper_details(variant: Variant, controls: list[int]) -> dict[str, Any]:
+def _paper_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any]:
     if unknown(variant):
         return {"wave_of_the_level": "s", "reading_of_eta": "loss_modulus", "constraints": None, "readings": None}
     units = corners(variant) if ranged(variant) else nominal(variant)
@@ -203,7 +204,7 @@ def _paper_details(variant: Variant, controls: list[int]) -> dict[str, Any]:
     }
 
 
-def _constraints(variant: Variant, units: Units, controls: list[int]) -> list[dict[str, Any]]:
+def _constraints(variant: EstimateInput, units: Units, controls: list[int]) -> list[dict[str, Any]]:
     """6a and 6b for each control, 6c and 6d, which need none, once."""
     return [
         _constraint(found, variant.layers[index].material if found.name in ("6a", "6b") else None, variant)
@@ -213,7 +214,7 @@ def _constraints(variant: Variant, units: Units, controls: list[int]) -> list[di
     ]
 
 
-def _reading(variant: Variant, units: Units, reading: str, controls: list[int]) -> dict[str, Any]:
+def _reading(variant: EstimateInput, units: Units, reading: str, controls: list[int]) -> dict[str, Any]:
     def ratio(index: int, wave: cf.Wave) -> dict[str, Any]:
         control = cf.paper_path(units.control(index), wave, reading)  # type: ignore[arg-type]
         return _told(wave, cf.paper_path(units, wave, reading) / control, variant)  # type: ignore[arg-type]
@@ -230,7 +231,7 @@ def _reading(variant: Variant, units: Units, reading: str, controls: list[int]) 
     }
 
 
-def _constraint(found: cf.Constraint, control: str | None, variant: Variant) -> dict[str, Any]:
+def _constraint(found: cf.Constraint, control: str | None, variant: EstimateInput) -> dict[str, Any]:
     margins = np.asarray(found.margin)
     finite = bool(np.all(np.isfinite(margins)))
     always, never = bool(np.all(margins > 0)), bool(np.all(margins <= 0))
@@ -250,7 +251,7 @@ def _constraint(found: cf.Constraint, control: str | None, variant: Variant) -> 
     return block
 
 
-def _told(name: str, values: Any, variant: Variant) -> dict[str, Any]:
+def _told(name: str, values: Any, variant: EstimateInput) -> dict[str, Any]:
     """`values`, a row for each corner, as {name}; of an input known as a range only: null, {name}_low, {name}_high."""
 
     def plain(row: Any) -> Any:
@@ -267,10 +268,10 @@ def _number(value: Any) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def measured_block(variant: Variant) -> dict[str, Any] | None:
+def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
     """What the paper measured for this unit's design and materials, in both prints; None if it measured none."""
     table, layers = measured_table(), tuple(layer.material for layer in variant.layers)
-    design = "single" if len(layers) == 1 else variant.design
+    design = CONTROL if len(layers) == 1 else variant.design
     found = [i for i in range(len(table.names)) if table.designs[i] == design and table.layers[i] == layers]
     extra = printed_besides(design, layers)
     if not found:
@@ -290,24 +291,20 @@ def measured_block(variant: Variant) -> dict[str, Any] | None:
         "same_size": same,
         "note": "measured at 0 mm by laser vibrometer on a skin phantom; axis and phantom are not given"
         + ("" if same else "; this variant has another size than the measured unit")
-        + ("; the paper does not say which shape its controls had" if design == "single" else ""),
+        + ("; the paper does not say which shape its controls had" if design == CONTROL else ""),
     }
 
 
 def printed_besides(design: str, layers: tuple[str, ...]) -> dict[str, Any] | None:
     """The second print of a level, a ratio to an unnamed control, and directions stated without a figure."""
-    from unitcad.catalogue import measurements
-
     data = measurements()
-    short = {full: name for name, full in data["names"].items()}
-    if any(layer not in short for layer in layers):
+    short = {full: name for name, full in data.names.items()}
+    if design not in data.designs or any(layer not in short for layer in layers):
         return None
-    pair = "/".join(short[layer] for layer in layers)
-    found: dict[str, Any] = {}
-    if f"{design} {pair}" in data["also_printed"]:
-        found["also_printed"] = float(data["also_printed"][f"{design} {pair}"])
-    if design == "embedded" and pair in data["amplified"]:
-        found["over_a_control_not_named"] = float(data["amplified"][pair])
-    if f"{design} {pair}" in data["directions"]:
-        found["direction_stated"] = data["directions"][f"{design} {pair}"]
-    return found or None
+    measured, pair = data.designs[design], "/".join(short[layer] for layer in layers)
+    found = {
+        "also_printed": measured.also_printed.get(pair),
+        "over_a_control_not_named": measured.over_a_control_not_named.get(pair),
+        "direction_stated": measured.directions.get(pair),
+    }
+    return {key: value for key, value in found.items() if value is not None} or None

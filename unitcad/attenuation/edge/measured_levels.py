@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.closed_form import CONTROL_PASSES, Units
 from unitcad.catalogue import materials, measurements
 
-CROSSINGS = {"embedded": 1.0, "encapsulating": 2.0, "single": float(np.sqrt(2.0))}
+CONTROL = "single"
+"""What stands for the design in a control's name."""
 _WALL = 1.25e-3  # m, section II-B
 _OMEGA = 2 * np.pi * 125.0  # rad/s, the middle of the 100 to 150 Hz of section III-A
 
@@ -24,7 +25,7 @@ Fit = Callable[["Table", np.ndarray], "Callable[[Table], np.ndarray]"]
 
 @dataclass(frozen=True)
 class Table:
-    """The measured units, controls first: names, design (embedded, encapsulating, single), layers, level."""
+    """The measured units, controls first: names, design (`CONTROL`: one layer), layers inside out, level."""
 
     names: tuple[str, ...]
     designs: tuple[str, ...]
@@ -54,7 +55,7 @@ class Table:
     @property
     def contrast(self) -> np.ndarray:
         """n E_outer/E_inner of every unit, the divider's variable."""
-        return self.evaluate(lambda u: u.crossings * u.youngs_modulus[..., -1] / u.youngs_modulus[..., 0])
+        return self.evaluate(lambda u: u.passes * u.youngs_modulus[..., -1] / u.youngs_modulus[..., 0])
 
     def units(self, index: int) -> Units:
         """The closed forms' input for one unit of the table."""
@@ -71,7 +72,7 @@ def _units(design: str, layers: tuple[str, ...]) -> Units:
         tan_delta=[float(m.loss_factor) for m in known],
         thickness=[2 * _WALL / len(known)] * len(known),
         omega=_OMEGA,
-        crossings=CROSSINGS[design],
+        passes=CONTROL_PASSES if design == CONTROL else measurements().designs[design].passes,
     )
 
 
@@ -80,12 +81,12 @@ def measured_table() -> Table:
     """The nine levels of the catalogue's measurements, as the results section prints them."""
     data = measurements()
     names, designs, layers, levels = [], [], [], []
-    for design in ("single", "embedded", "encapsulating"):
-        for unit, level in data[design].items():
+    for design, measured in {CONTROL: data.controls, **{name: d.levels for name, d in data.designs.items()}}.items():
+        for unit, level in measured.items():
             names.append(f"{design} {unit}")
             designs.append(design)
-            layers.append(tuple(data["names"][short] for short in unit.split("/")))
-            levels.append(float(level))
+            layers.append(data.layers(unit))
+            levels.append(level)
     return Table(tuple(names), tuple(designs), tuple(layers), np.array(levels))
 
 

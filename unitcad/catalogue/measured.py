@@ -1,0 +1,36 @@
+"""The paper's measured levels at the edge, typed: see the comments in measurements.toml."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+Level = Annotated[float, Meta(gt=0, description="amplitude at the edge over the motor's")]
+
+
+class MeasuredDesign(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What was measured of one design, by "Layer 1/Layer 2" in short names.
+
+    `passes`: how often the wave from motor to skin passes the border between the layers. `also_printed`: a second
+    figure of the paper for a level. `directions`: a comparison that the paper states without a figure.
+    """
+
+    passes: Annotated[float, Meta(gt=0)]
+    levels: dict[str, Level]
+    also_printed: dict[str, Level] = {}
+    over_a_control_not_named: dict[str, Level] = {}
+    directions: dict[str, str] = {}
+
+
+class Measurements(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The measured levels: short names of silicones, one-layer controls, and units by their design."""
+
+    source: str
+    names: dict[str, str]
+    controls: dict[str, Level]
+    designs: dict[str, MeasuredDesign]
+
+    def layers(self, unit: str) -> tuple[str, ...]:
+        """Return the silicones of "E10/D30" from the inside out, by their names in the catalogue."""
+        return tuple(self.names[short] for short in unit.split("/"))
