@@ -29,7 +29,7 @@ RESULT = Result(
 )
 
 
-def test_a_promise_is_kept_up_to_its_limit_and_never_by_what_is_no_number():
+def test_a_promise_is_kept_up_to_its_limit_and_never_by_nan():
     assert Promise("", 1.0, 1.0).ok
     assert not Promise("", 1.1, 1.0).ok
     assert not Promise("", math.nan, 1.0).ok
@@ -46,35 +46,35 @@ def test_frontier_is_what_no_other_point_beats():
     assert frontier([(1, math.nan), (1, 1)]) == [False, True]
 
 
-def test_the_page_says_what_was_measured_on_what():
+def test_the_page_names_command_and_machine():
     text = markdown(RESULT, ["p.svg"])
     assert "`unitcad accuracy stability --specs 9`; measured on: cores 2." in text
     assert "| y | - |" in text
     assert "| broken | nan | 1 | BROKEN |" in text
 
 
-def test_lines_of_text_stand_as_they_are():
+def test_lines_of_text_are_unchanged():
     text = markdown(Result("speed", "Speed", "", (Table("it prints", (), (("a | b   c",), ("d",))),)))
     assert "**it prints**\n\n```text\na | b   c\nd\n```" in text
 
 
 def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
     runner.write([RESULT], tmp_path)
-    other = Result("moulds", "Laws", "More.")
+    other = Result("moulds", "Mould checks", "More.")
     runner.write([other], tmp_path)
     there = runner.read(tmp_path)
     assert [r.suite for r in there] == ["moulds", "stability"]
     assert markdown(there[1], ["p.svg"]) == markdown(RESULT, ["p.svg"])
     assert there[1].plots == RESULT.plots
     page = (tmp_path / "accuracy.md").read_text()
-    assert page.index("## Laws") < page.index("## Stability")
+    assert page.index("## Mould checks") < page.index("## Stability")
     assert (tmp_path / "accuracy-stability-1.svg").is_file()
     (tmp_path / "accuracy.json").write_text("{}")
     with pytest.raises(UnitcadError, match="not a result"):
         runner.read(tmp_path)
 
 
-def test_what_can_not_be_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_bad_option_or_folder_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(runner, "run", lambda *_: pytest.fail("worked"))
     (tmp_path / "file").touch()
     (tmp_path / "damaged").mkdir()
@@ -83,10 +83,10 @@ def test_what_can_not_be_is_refused_before_the_work(tmp_path: Path, monkeypatch:
         accuracy(["stability"], quick=False, specs=10, out=None, as_json=False)
     with pytest.raises(Refusal, match="--quick"):
         accuracy(["extremes"], quick=True, specs=10, out=None, as_json=False)
-    with pytest.raises(Refusal, match=r"speed; nearest accepted: 'left-out'"):
+    with pytest.raises(Refusal, match=r"closest: left-out; nearest accepted: 'left-out'"):
         accuracy(["Left_Out"], quick=True, specs=None, out=None, as_json=False)
-    for place, said in (("file", "no folder that can be written"), ("damaged", "not a result")):
-        with pytest.raises(UnitcadError, match=said):
+    for place, message in (("file", "no folder that can be written"), ("damaged", "not a result")):
+        with pytest.raises(UnitcadError, match=message):
             accuracy(["stability"], quick=True, specs=None, out=tmp_path / place, as_json=False)
 
 
@@ -98,9 +98,9 @@ def test_plots_repeat_and_leave_out_what_has_no_logarithm():
 
 def test_timing_is_interleaved_and_shows_its_spread():
     order = []
-    found = interleaved({"a": lambda: order.append("a"), "b": lambda: (order.append("b"), time.sleep(0.002))}, 3)
+    times = interleaved({"a": lambda: order.append("a"), "b": lambda: (order.append("b"), time.sleep(0.002))}, 3)
     assert order == ["a", "b"] * 4
-    assert found["b"].median >= 0.002
+    assert times["b"].median >= 0.002
     assert str(timing([1.0, 2.0, 3.0])) == "2 s (1.5 s to 2.5 s)"
     assert shown(1.23456e-7) == "1.2e-07"
 
@@ -111,8 +111,6 @@ def test_unknown_suite_names_the_known():
 
 
 def test_the_command_fails_on_a_broken_promise_alone(tmp_path: Path, monkeypatch, capsys):
-    from unitcad.cli.accuracy_command import accuracy
-
     monkeypatch.setattr(runner, "run", lambda *_: RESULT)
     with pytest.raises(SystemExit) as stopped:
         accuracy(["stability"], quick=True, specs=None, out=tmp_path, as_json=True)

@@ -22,15 +22,15 @@ def test_a_complex_modes_pole_below_the_path():
         ],
         HalfSpace(1577.8305940170262, 14700304.505067958, 0.45),
     )
-    (found,) = rows([Trial("complex mode", "extreme", medium, DISC, 456.47726234772875, RADII, 0.0)], (1e-6,))
-    assert found.judged
-    assert found.met
-    assert found.over_bound <= 1
+    (response,) = rows([Trial("complex mode", "extreme", medium, DISC, 456.47726234772875, RADII, 0.0)], (1e-6,))
+    assert response.decided
+    assert response.met
+    assert response.over_bound <= 1
 
 
 def test_films_and_contrast_of_the_page():
-    found = list(rows([cases()[0], cases()[-1]], (1e-3, 1e-6)))
-    assert all(row.judged and row.met and row.over_bound <= 1 for row in found)
+    responses = list(rows([cases()[0], cases()[-1]], (1e-3, 1e-6)))
+    assert all(row.decided and row.met and row.over_bound <= 1 for row in responses)
 
 
 def test_the_survey_has_every_class_the_same_from_its_seed():
@@ -47,7 +47,7 @@ def test_what_is_promised_can_be_broken():
     good = [Row("a", "x", rtol, 0.1 * rtol, rtol, 1e-13, 0.1, 100) for rtol in (1e-3, 1e-6)]
     assert all(promise.ok for promise in promises(good, good))
     over = [Row("a", "x", 1e-3, 2e-3, 1e-3, 1e-13, 2.0, 100)]
-    unjudged = [Row("a", "x", 1e-3, 2e-3, 1e-3, 1e-3, 0.0, 100)]
+    undecided = [Row("a", "x", 1e-3, 2e-3, 1e-3, 1e-3, 0.0, 100)]
     worse = [Row("a", "x", rtol, 0.0, bound, 1e-13, 0.0, 100) for rtol, bound in ((1e-5, 4e-6), (1e-9, 0.48))]
-    for at, bad in enumerate((over, unjudged, worse)):
+    for at, bad in enumerate((over, undecided, worse)):
         assert [promise.ok for promise in promises(bad, bad)] == [i != at for i in range(3)]

@@ -1,4 +1,4 @@
-"""Random specs: exit 0 with every law kept, or a refusal that names a field and offers a value that leads on."""
+"""Random specs: exit 0 with every check passed, or a refusal whose nearest value leads on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from unitcad.accuracy import extremes
-from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, LAW, REFUSED, Outcome, build_outcome, door, outcome, put_in
+from unitcad.accuracy.outcomes import (
+    BUILT,
+    CIRCLE,
+    GOOD,
+    MOULD_CHECK,
+    REFUSED,
+    Outcome,
+    build_outcome,
+    outcome,
+    put_in,
+    refusal_of,
+)
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, random_spec, seeded_spec
 from unitcad.accuracy.runner import JOURNAL
 from unitcad.errors import Refusal, UnitcadError
@@ -47,17 +58,17 @@ COARSE = dataclasses.replace(EXTREME, tolerance_mm=(0.02, 0.2), cavities=(1, 2))
 @pytest.mark.parametrize("ranges", [DOCUMENTED, COARSE], ids=["documented", "extreme"])
 @settings(max_examples=EXAMPLES // 2, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
-def test_a_random_spec_builds_with_its_laws_kept_or_is_refused_with_a_field(ranges, data):
+def test_a_random_spec_passes_its_checks_or_is_refused_with_a_field(ranges, data):
     data = data.draw(specs(ranges))
-    found = outcome(data)
-    assert found.kind in GOOD, found
-    assert found.kind == BUILT or found.field
+    result = outcome(data)
+    assert result.kind in GOOD, result
+    assert result.kind == BUILT or result.field
 
 
 def test_most_of_the_documented_ranges_builds():
-    """The door and the plan decide; that what passes them keeps its laws is the test above."""
+    """Validation and plan decide; that what passes them passes its checks too is the test above."""
     seeds = range(300)
-    passed = sum(door(seeded_spec(seed)) is None for seed in seeds)
+    passed = sum(refusal_of(seeded_spec(seed)) is None for seed in seeds)
     assert passed >= extremes.LEAST_BUILT * len(seeds)
 
 
@@ -65,11 +76,11 @@ def test_nearest_values_lead_to_a_build_or_another_limit():
     for seed in range(150):
         data = seeded_spec(seed, "extreme")
         for _ in range(41):
-            refusal = door(data)
+            refusal = refusal_of(data)
             if refusal is None or refusal.nearest is None:
                 break
             data = put_in(data, refusal.field, refusal.nearest)
-            after = door(data)
+            after = refusal_of(data)
             assert after is None or (after.field, after.limit) != (refusal.field, refusal.limit), (seed, str(after))
         else:
             pytest.fail(f"seed {seed}: the nearest values never end")
@@ -77,13 +88,13 @@ def test_nearest_values_lead_to_a_build_or_another_limit():
 
 @pytest.mark.parametrize(("seed", "ranges"), [(0, "documented"), (1, "documented"), (0, "extreme"), (1, "extreme")])
 def test_the_command_ends_as_the_outcome_says(seed, ranges, tmp_path):
-    """What the study judges through functions is what a person gets: exit 0, or 2 and the field named, and no trace."""
+    """Check that a user gets what the study gets from functions: exit 0, or 2 and the field named, and no traceback."""
     data = seeded_spec(seed, ranges)
     file = tmp_path / "spec.toml"
     file.write_text(text_of(data), "utf-8")
     command = [sys.executable, "-m", "unitcad", "build", str(file), "--no-slice", "-o", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    refused = door(data)
+    refused = refusal_of(data)
     assert done.returncode == (2 if refused else 0), done.stderr
     if refused:
         assert refused.field in done.stderr
@@ -112,12 +123,12 @@ def test_a_seed_is_a_spec():
 
 
 def test_faults_are_seen(monkeypatch):
-    """A refusal whose value changes nothing is a circle; a broken law is no build."""
+    """A refusal whose value changes nothing is a circle; a failed mould check is no build."""
     import unitcad.accuracy.outcomes as outcomes
     from unitcad.moulds import plan
 
     monkeypatch.setattr(outcomes, "put_in", lambda data, where, value: data)
-    refused = next(data for data in map(seeded_spec, range(50)) if door(data) is not None)
+    refused = next(data for data in map(seeded_spec, range(50)) if refusal_of(data) is not None)
     assert outcomes.outcome(refused).kind == CIRCLE
     monkeypatch.setattr(plan, "seals", lambda *_: [])
     data = {
@@ -128,26 +139,25 @@ def test_faults_are_seen(monkeypatch):
         "layers": [{"material": "ecoflex-00-30", "wall_mm": 2.5, "cap_mm": 2.5}],
         "output": {"formats": ["stl"], "tolerance_mm": 0.1},
     }
-    assert build_outcome(data).kind == LAW
-    assert REFUSED in GOOD
+    assert build_outcome(data).kind == MOULD_CHECK
 
 
 @pytest.mark.long
 def test_ten_thousand_random_specs():
-    found = extremes.study(extremes.LONG, print, journal=JOURNAL)
-    assert found.ok, [promise for promise in found.promises if not promise.ok]
+    result = extremes.study(10_000, print, journal=JOURNAL)
+    assert result.ok, [promise for promise in result.promises if not promise.ok]
 
 
-def test_an_interrupted_study_is_taken_up_again(tmp_path, monkeypatch):
-    """Twelve specs, stopped after five with a line cut short: seven are judged, and the result is that of one go."""
-    judged = []
+def test_an_interrupted_study_resumes(tmp_path, monkeypatch):
+    """Twelve specs, stopped after five with a line cut short: seven are built, and the result is that of one run."""
+    run = []
 
     def quick(job):
-        judged.append(job)
-        return job[0], Outcome(BUILT if len(judged) % 2 else REFUSED, field="x", chain=("a", "b"), seconds=0.5)
+        run.append(job)
+        return job[0], Outcome(BUILT if len(run) % 2 else REFUSED, field="x", chain=("a", "b"), seconds=0.5)
 
     jobs = [("documented", seeded_spec(seed)) for seed in range(12)]
-    monkeypatch.setattr(extremes, "judge", quick)
+    monkeypatch.setattr(extremes, "run_job", quick)
     journal = tmp_path / "out" / "study.jsonl"
     going = extremes._journalled(jobs, journal)
     first = [next(going) for _ in range(5)]
@@ -156,7 +166,7 @@ def test_an_interrupted_study_is_taken_up_again(tmp_path, monkeypatch):
         file.write(b'["cut')
     again = list(extremes._journalled(jobs, journal))
     assert again[:5] == first
-    assert judged == jobs
+    assert run == jobs
     assert list(extremes._journalled(jobs, journal)) == again
     journal.write_text("something else\n")
     with pytest.raises(UnitcadError, match="not a journal"):

@@ -1,11 +1,11 @@
-"""The response of a layered medium by another road: global matrix in ball arithmetic, own path, own closed forms.
+"""The response of a layered medium by another method: global matrix in ball arithmetic, own path, own closed forms.
 
 Nothing here is shared with `unitcad.attenuation` but the description of the medium. Per wavenumber the amplitudes of
 the P and S waves of all layers solve one linear system (the global matrix method) in balls of 320 bits
-(python-flint), so that neither growing exponentials nor P and S alike cost a digit. k C(k) is interpolated on panels
+(python-flint). So neither growing exponentials nor similar P and S waves cost a digit. k C(k) is interpolated on panels
 that are halved until it is a polynomial there; its products with the Bessel functions are then integrated on as many
-points as they need. The path is the real axis itself: damping puts each pole on the side where it belongs. Bodies
-without damping get small losses, and the result is taken to no loss by a polynomial.
+points as they need. The path is the real axis: damping puts each pole on its side. Bodies without damping get small
+losses, from which a polynomial extrapolates to no loss.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _DEGREE = 16
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_DEGREE)
 _TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_NODES, _DEGREE - 1))
 _DENSE, _DENSE_WEIGHTS = np.polynomial.legendre.leggauss(32)
-_DENSE_TABLE = np.polynomial.legendre.legvander(_DENSE, _DEGREE - 1)
+
 _DEEPEST = 60  # halvings of a panel
 _MOST_POINTS = 3_000_000
 _FINE = 1e-12
@@ -39,7 +39,7 @@ _LOSSES = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
 
 @dataclass(frozen=True)
 class Reference:
-    """(u_r, u_z) at the radii, shape (2, n), what it doubts of each, and the wavenumbers that it took."""
+    """(u_r, u_z) at the radii, shape (2, n), the estimated error of each, and the number of wavenumbers."""
 
     u: np.ndarray
     doubt: np.ndarray
@@ -47,7 +47,7 @@ class Reference:
 
 
 class TooHard(Exception):
-    """A medium that the reference can't do in reasonable time."""
+    """A medium for which the reference needs too long."""
 
 
 def response(medium: LayeredMedium, load: Load, omega: float, r: np.ndarray, z: float = 0.0) -> Reference:
@@ -71,10 +71,10 @@ def response(medium: LayeredMedium, load: Load, omega: float, r: np.ndarray, z: 
 
 def _with_loss(medium: LayeredMedium, tan_delta: float) -> LayeredMedium:
     """Return the medium with that loss factor in the bodies without damping."""
-    law = LossFactor(tan_delta)
-    layers = [layer if layer.damping else replace(layer, damping=law) for layer in medium.layers]
+    loss = LossFactor(tan_delta)
+    layers = [layer if layer.damping else replace(layer, damping=loss) for layer in medium.layers]
     base = medium.half_space
-    return LayeredMedium(layers, base if base.damping else replace(base, damping=law))
+    return LayeredMedium(layers, base if base.damping else replace(base, damping=loss))
 
 
 def _weights_at_0(x: np.ndarray) -> np.ndarray:
@@ -88,7 +88,7 @@ class Kernel:
     def __init__(self, medium: LayeredMedium, omega: float, z: float) -> None:
         try:
             import flint
-            import mpmath  # noqa: F401 - of the static radial disc
+            import mpmath  # noqa: F401  for the static radial disc
         except ImportError:
             raise Missing("the reference needs python-flint and mpmath: pip install 'unitcad[test]'") from None
         self.flint, self.omega, self.z, self.count = flint, omega, z, 0
@@ -114,14 +114,14 @@ class Kernel:
 
     def _material(self, body: Layer | HalfSpace) -> tuple[Any, Any, Any]:
         arb, acb = self.flint.arb, self.flint.acb
-        nu, omega, law = arb(body.poisson_ratio), arb(self.omega), body.damping
+        nu, omega, damping = arb(body.poisson_ratio), arb(self.omega), body.damping
         mu = acb(arb(body.youngs_modulus) / (2 * (1 + nu)))
-        if isinstance(law, LossFactor):
-            mu = mu * acb(1, law.tan_delta)
-        elif isinstance(law, KelvinVoigt):
-            mu = mu + acb(0, omega * arb(law.viscosity))
-        elif isinstance(law, FractionalKelvinVoigt) and self.omega > 0:
-            mu = mu * (1 + acb(0, omega * arb(law.tau)) ** acb(arb(law.n)))
+        if isinstance(damping, LossFactor):
+            mu = mu * acb(1, damping.tan_delta)
+        elif isinstance(damping, KelvinVoigt):
+            mu = mu + acb(0, omega * arb(damping.viscosity))
+        elif isinstance(damping, FractionalKelvinVoigt) and self.omega > 0:
+            mu = mu * (1 + acb(0, omega * arb(damping.tau)) ** acb(arb(damping.n)))
         ks2 = arb(body.density) * omega**2 / mu if body.youngs_modulus else acb(0)
         return mu, (1 - 2 * nu) / (2 * (1 - nu)), ks2
 
@@ -178,8 +178,8 @@ class Kernel:
         for one, given in zip(rows, right, strict=True):
             most = acb(max(abs(complex(value)) for value in one))
             one[:], given[:] = [value / most for value in one], [value / most for value in given]
-        found = mat(seen) * mat(rows).solve(mat(right))
-        return np.array([[complex(at * found[a, b]) for b in range(2)] for a in range(2)])
+        solved = mat(seen) * mat(rows).solve(mat(right))
+        return np.array([[complex(at * solved[a, b]) for b in range(2)] for a in range(2)])
 
     def _waves(self, mu: Any, eps: Any, ks2: Any, k: Any) -> list[tuple[Callable[[Any], list[Any]], Any]]:
         """Return the two waves that go down: (u_r, u_z, t_r, t_z) at a depth less its exponential, and its rate."""
@@ -352,5 +352,5 @@ def _radial(s: float) -> float:
             return mp.mpf(0) if m == 1 or m == 0 else 2 * (mp.ellipk(m) - mp.ellipe(m)) / (mp.pi * low) * x
 
         cuts = sorted({mp.mpf(0), mp.mpf(1), *([mp.mpf(s)] if 0 < s < 1 else [])})
-        found: Any = mp.quad(ring, cuts) if s > 0 else 0.0
-        return float(found)
+        integral: Any = mp.quad(ring, cuts) if s > 0 else 0.0
+        return float(integral)

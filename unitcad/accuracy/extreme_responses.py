@@ -1,4 +1,4 @@
-"""Responses of extreme and of random media beside `ball_reference`: the true error and what the bounds say of it."""
+"""Responses of extreme and of random media beside `ball_reference`: the true error and its stated bound."""
 
 from __future__ import annotations
 
@@ -16,17 +16,21 @@ from unitcad.attenuation.layered.rheology import Damping, KelvinVoigt, LossFacto
 
 TOLERANCES = (0.1, 1e-3, 1e-5, 1e-7, 1e-9)
 LEAST_GAIN = 1.25
-"""A tighter rtol's bound over a looser one's is at most that: above 1 only where neither is met, since the panels that
-can be afforded are then spent a little differently, or rounding next to the poles is met at other wavenumbers.
+"""The most that a tighter rtol's bound may be over a looser one's.
+
+It is above 1 only where neither rtol is met: the panels are then spent differently, or rounding next to the poles
+enters at other wavenumbers.
 """
 _LEAST = 1e-15
-"""Where a true error of nothing stands in the plot."""
+"""Where a true error of 0 is drawn."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A response beside the reference. error, bound, doubt: the largest of u_r and u_z over the radii, over the
-    largest |u|; over_bound: the largest (error - doubt) / bound of one radius and component.
+    """A response beside the reference.
+
+    error, bound, doubt: the largest of u_r and u_z over the radii, over the largest |u|. over_bound: the largest
+    (error - doubt) / bound of one radius and component.
     """
 
     case: str
@@ -40,12 +44,12 @@ class Row:
 
     @property
     def met(self) -> bool:
-        """Whether the response says that it is within rtol."""
+        """Whether the response's bound is within rtol."""
         return self.bound <= self.rtol
 
     @property
-    def judged(self) -> bool:
-        """Whether the reference is good enough to tell."""
+    def decided(self) -> bool:
+        """Whether the reference is good enough to decide."""
         return self.doubt <= 0.1 * max(self.bound, 1e-12)
 
 
@@ -58,18 +62,18 @@ def rows(trials: Iterable[Trial], tolerances: Iterable[float] = TOLERANCES) -> I
             continue
         scale = float(np.max(np.abs(exact.u)))
         for rtol in tolerances:
-            found = one.medium.response(one.load, one.omega, one.r, z=one.z, rtol=rtol)
-            wrong = np.abs(np.array([found.u_r, found.u_z]) - exact.u)
-            bound = np.array([found.error_r, found.error_z])
+            response = one.medium.response(one.load, one.omega, one.r, z=one.z, rtol=rtol)
+            wrong = np.abs(np.array([response.u_r, response.u_z]) - exact.u)
+            bound = np.array([response.error_r, response.error_z])
             yield Row(
                 one.name,
                 one.kind,
                 rtol,
                 float(np.max(wrong)) / scale,
-                found.error / scale,
+                response.error / scale,
                 float(np.max(exact.doubt)) / scale,
                 float(np.max(np.maximum(wrong - exact.doubt, 0.0) / bound)),
-                found.wavenumbers,
+                response.wavenumbers,
             )
 
 
@@ -109,7 +113,7 @@ def tables(extreme: Sequence[Row], surveyed: Sequence[Row]) -> tuple[Table, ...]
         "largest error",
         "bounds broken",
         "largest error over its bound",
-        "the reference can tell",
+        "the reference decides",
         "most wavenumbers",
     )
     return (
@@ -125,7 +129,7 @@ def tables(extreme: Sequence[Row], surveyed: Sequence[Row]) -> tuple[Table, ...]
             tuple((kind, *_summary([r for r in surveyed if r.kind == kind])) for kind in CLASSES),
             "A disc or a point, pushing or radial, at the surface or at depth, four radii, five tolerances, seeded. A "
             "bound is broken where the error at one radius of one component exceeds it by more than the reference's "
-            "doubt. The reference can tell where that doubt is below a tenth of the bound. Media that take it too long "
+            "doubt. The reference decides where that doubt is below a tenth of the bound. Media that take it too long "
             "are left out.",
         ),
         Table(
@@ -156,28 +160,28 @@ def promises(extreme: Sequence[Row], surveyed: Sequence[Row]) -> tuple[Promise, 
     both = (*extreme, *surveyed)
     return (
         Promise("responses: largest error over its bound", max(r.over_bound for r in both), 1.0),
-        Promise("responses: share that the reference can't judge", float(np.mean([not r.judged for r in both])), 0.1),
+        Promise("responses: share that the reference can't decide", float(np.mean([not r.decided for r in both])), 0.1),
         Promise("responses: a tighter rtol's bound over a looser one's", _worsening(both), LEAST_GAIN),
     )
 
 
-def _worsening(found: Sequence[Row]) -> float:
+def _worsening(responses: Sequence[Row]) -> float:
     """Return the largest ratio of a bound to the least one of the same medium at a larger rtol."""
     worst = 0.0
-    for row in found:
-        looser = [r.bound for r in found if r.case == row.case and r.rtol > row.rtol]
+    for row in responses:
+        looser = [r.bound for r in responses if r.case == row.case and r.rtol > row.rtol]
         worst = max(worst, row.bound / min(looser, default=float("inf")))
     return worst
 
 
-def _summary(found: Sequence[Row]) -> tuple[Cell, ...]:
+def _summary(group: Sequence[Row]) -> tuple[Cell, ...]:
     return (
-        len({row.case for row in found}),
-        sum(row.met for row in found),
-        max(row.bound for row in found),
-        max(row.error for row in found),
-        sum(row.over_bound > 1 for row in found),
-        max(row.over_bound for row in found),
-        sum(row.judged for row in found),
-        max(row.wavenumbers for row in found),
+        len({row.case for row in group}),
+        sum(row.met for row in group),
+        max(row.bound for row in group),
+        max(row.error for row in group),
+        sum(row.over_bound > 1 for row in group),
+        max(row.over_bound for row in group),
+        sum(row.decided for row in group),
+        max(row.wavenumbers for row in group),
     )

@@ -1,4 +1,4 @@
-"""Extreme geometry and random specs: what becomes of each is a build with every law kept, or a refusal with a field."""
+"""Extreme geometry and random specs: each builds and passes every check, or is refused with a field."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, NO_VALUE, REFUSED, Outcome, outcome
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
 from unitcad.accuracy.result import Promise, Result, Say, Table
-from unitcad.accuracy.timing import Timing, machine, timing
+from unitcad.accuracy.timing import machine, timing
 from unitcad.designs import shipped
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.versions import code_version
@@ -25,7 +25,6 @@ PATIENCE = 1800.0
 """Seconds after which a spec counts as hung."""
 LEAST_BUILT = 0.6
 """Share of the documented ranges that builds, at least."""
-LONG = 10_000
 _DOCUMENTED = 0.97
 """Share of the random specs that is drawn from the documented ranges; an extreme one takes several times as long."""
 _SERIAL = 60
@@ -48,19 +47,19 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
     number = {"documented": documented, "extreme": count - documented}
     jobs: list[Job] = [(f"sweep {name}", data) for name, data in _sweeps(sweeps)]
     jobs += [(ranges, seeded_spec(seed, ranges)) for ranges in number for seed in range(number[ranges])]
-    found: dict[str, list[tuple[int, Outcome]]] = {}
+    groups: dict[str, list[Outcome]] = {}
     for i, (group, result) in enumerate(_journalled(jobs, journal) if journal else _outcomes(jobs)):
         say(f"{i + 1} of {len(jobs)}: {group} {result.kind}")
-        found.setdefault(group, []).append((len(found.get(group, [])), result))
-    random = {name: found.get(name, []) for name in number}
-    everything = [result for rows in found.values() for _, result in rows]
+        groups.setdefault(group, []).append(result)
+    everything = [result for outcomes in groups.values() for result in outcomes]
     faults = [
-        (group, index, o.kind, _plain(o.message))
-        for group, rows in found.items()
-        for index, o in rows
+        (group, index, o.kind, o.message.replace("|", "/").replace("\n", " ")[:200])
+        for group, outcomes in groups.items()
+        for index, o in enumerate(outcomes)
         if o.kind not in GOOD
     ]
-    built = {name: sum(o.kind == BUILT for _, o in rows) / max(1, len(rows)) for name, rows in random.items()}
+    tried = groups.get("documented", [])
+    built = sum(o.kind == BUILT for o in tried) / max(1, len(tried))
     refused = [o for o in everything if o.kind == REFUSED]
     return Result(
         suite="extremes",
@@ -69,11 +68,11 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
             f"{len(jobs)} specs: sweeps of the {' and '.join(shipped())} templates to each limit and past it, and "
             f"random specs from the documented ranges below ({documented}) and from the extreme ones "
             f"({count - documented}, half of them with one cavity), every field drawn by itself. Each is "
-            "built (unit, moulds, STL, all laws, all mesh checks) or refused with a field; after a refusal its nearest "
-            "accepted value is put in until it builds or no value is offered. Anything else is a fault."
+            "built (unit, moulds, STL, all mould checks, all mesh checks) or refused with a field; after a refusal its "
+            "nearest accepted value is put in until it builds or no value is offered. Anything else is a fault."
         ),
         tables=(
-            _outcome_table(found),
+            _outcome_table(groups),
             Table(
                 "Ranges of the random specs (mm; diameters and tolerances uniform in the logarithm)",
                 ("field", "documented, least", "largest", "extreme, least", "largest"),
@@ -81,13 +80,7 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
             ),
             Table(
                 "Refusals by field",
-                (
-                    "field",
-                    "refusals",
-                    "builds once the nearest values are in",
-                    "ends at another limit",
-                    "no value offered",
-                ),
+                ("field", "refusals", "builds with the nearest values", "ends at another limit", "no value offered"),
                 tuple(_refusal_rows(refused)),
                 "Nearest values are followed from limit to limit, until it builds or a limit offers none: at once, or "
                 "at another limit than the first.",
@@ -97,13 +90,13 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
         promises=(
             Promise("specs that end in anything but a build or a refusal", len(faults), 0),
             Promise("refusals whose nearest value meets the same limit", sum(o.kind == CIRCLE for o in everything), 0),
-            Promise("documented ranges: share that does not build", 1 - built["documented"], 1 - LEAST_BUILT),
+            Promise("documented ranges: share that does not build", 1 - built, 1 - LEAST_BUILT),
         ),
         measured={**machine("manifold3d"), "random specs": count},
     )
 
 
-def judge(job: Job) -> tuple[str, Outcome]:
+def run_job(job: Job) -> tuple[str, Outcome]:
     """Return what becomes of one spec; runs in a process of its own."""
     return job[0], outcome(job[1])
 
@@ -133,10 +126,10 @@ def _journalled(jobs: Sequence[Job], journal: Path) -> Iterator[tuple[str, Outco
             if name in known:
                 yield job[0], known[name]
                 continue
-            group, found = next(fresh)
-            file.write(json.dumps([name, asdict(found)]).encode() + b"\n")
+            group, result = next(fresh)
+            file.write(json.dumps([name, asdict(result)]).encode() + b"\n")
             file.flush()
-            yield group, found
+            yield group, result
 
 
 def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:
@@ -145,7 +138,7 @@ def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:
     Many jobs go to worker processes: one that dies or hangs is a fault of its spec, not the end.
     """
     if len(jobs) < _SERIAL:
-        yield from map(judge, jobs)
+        yield from map(run_job, jobs)
         return
     workers = os.cpu_count() or 1
     context = multiprocessing.get_context("spawn")
@@ -156,7 +149,7 @@ def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:
             while waiting or running:
                 while waiting and len(running) < _AHEAD * workers:
                     job = waiting.popleft()
-                    running.append((job, pool.apply_async(judge, (job,))))
+                    running.append((job, pool.apply_async(run_job, (job,))))
                 job, answer = running.popleft()
                 try:
                     yield answer.get(PATIENCE)
@@ -243,23 +236,14 @@ def _sweeps(values: int | None) -> Iterator[Job]:
     )
 
 
-def _outcome_table(found: dict[str, list[tuple[int, Outcome]]]) -> Table:
+def _outcome_table(groups: dict[str, list[Outcome]]) -> Table:
     rows = []
-    for group, outcomes in found.items():
-        kinds = Counter(o.kind for _, o in outcomes)
-        built = [o.seconds for _, o in outcomes if o.kind == BUILT]
-        time: Timing | None = timing(built) if built else None
-        rows.append(
-            (
-                group,
-                len(outcomes),
-                kinds[BUILT],
-                kinds[REFUSED],
-                len(outcomes) - kinds[BUILT] - kinds[REFUSED],
-                str(time) if time else None,
-                max(built, default=None),
-            )
-        )
+    for group, outcomes in groups.items():
+        kinds = Counter(o.kind for o in outcomes)
+        built = [o.seconds for o in outcomes if o.kind == BUILT]
+        faults = len(outcomes) - kinds[BUILT] - kinds[REFUSED]
+        time = str(timing(built)) if built else None
+        rows.append((group, len(outcomes), kinds[BUILT], kinds[REFUSED], faults, time, max(built, default=None)))
     columns = ("specs", "number", "built", "refused", "faults", "time of a build", "longest, s")
     return Table("Outcomes", columns, tuple(rows))
 
@@ -278,7 +262,3 @@ def _range_rows() -> Iterator[tuple]:
         yield (name, *ends, *extreme.pop(name))
     for name, ends in extreme.items():
         yield (name, None, None, *ends)
-
-
-def _plain(message: str) -> str:
-    return message.replace("|", "/").replace("\n", " ")[:200]

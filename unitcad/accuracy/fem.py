@@ -1,7 +1,7 @@
-"""Axisymmetric harmonic finite elements (m = 0) for bare skin and for a unit on it: the peer of the layered solver.
+"""Axisymmetric harmonic finite elements (m = 0) for bare skin and for a unit on it, compared with the layered solver.
 
 Biquadratic displacement on rectangles; the pressure, linear and discontinuous, is eliminated element by element, so
-that nearly incompressible silicone does not lock (the pair Q2 / P1). What lies deepest stands on a rigid floor.
+that nearly incompressible silicone does not lock (the pair Q2 / P1). The lowest blocks stand on a rigid floor.
 SI throughout, e^{+i omega t}; z upwards from the skin's surface (the unit's frame). Needs scikit-fem (extra `fem`).
 """
 
@@ -28,8 +28,8 @@ except ImportError as error:  # pragma: no cover - depends on the installation
     raise Missing("finite elements need scikit-fem: pip install 'unitcad[fem]'") from error
 
 SIZE, GROWTH, LARGEST = 1e-3, 0.3, 4e-3
-"""The mesh of fineness 1: an element's size at corners of the geometry (m), what it gains for every length away from
-one, and its largest size (m). Fineness n divides all three, so that errors fall as the elements' order says."""
+"""The mesh of fineness 1: an element's size at corners of the geometry (m), its growth per distance from one, and its
+largest size (m). Fineness n divides all three, so that errors fall with the elements' order."""
 _TINY = 1e-9
 
 
@@ -74,14 +74,14 @@ class Surface:
 def lines(breaks: Sequence[float], focus: Sequence[float], fineness: float) -> np.ndarray:
     """Return grid lines (m) through all `breaks`: fine at a focus, coarser with the distance from it."""
     near = np.asarray(focus)
-    found = [float(breaks[0])]
+    grid = [float(breaks[0])]
     for low, high in itertools.pairwise(breaks):
         x = np.linspace(low, high, 400)
         wanted = np.minimum(LARGEST, SIZE + GROWTH * np.min(np.abs(x[:, None] - near[None]), axis=1)) / fineness
         count = np.concatenate([[0.0], np.cumsum(np.diff(x) * (1 / wanted[1:] + 1 / wanted[:-1]) / 2)])
         elements = max(1, math.ceil(count[-1] - 1e-9))
-        found += [*np.interp(np.linspace(0, count[-1], elements + 1)[1:-1], count, x), float(high)]
-    return np.array(found)
+        grid += [*np.interp(np.linspace(0, count[-1], elements + 1)[1:-1], count, x), float(high)]
+    return np.array(grid)
 
 
 def solve(
@@ -94,7 +94,7 @@ def solve(
     """
     corners = sorted({x for b in blocks for x in (b.r0, b.r1) if x < radius} | {0.0, pressure_radius or 0.0})
     levels = sorted({z for b in blocks for z in (b.z0, b.z1)})
-    # Interfaces deep in the body need no fine elements: nothing happens there on a unit's scale.
+    # Interfaces deep in the body need no fine elements: nothing changes there on a unit's scale.
     near = [z for z in levels if z > -_TINY]
     grid = skfem.MeshQuad.init_tensor(lines([*corners, radius], corners[1:], fineness), lines(levels, near, fineness))
     middle = grid.p[:, grid.t].mean(axis=1)

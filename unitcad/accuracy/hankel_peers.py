@@ -1,7 +1,7 @@
-"""Four other ways to do a Hankel integral: adaptive quadrature, digital filters, FFTLog, midpoints uniform in k.
+"""Four other methods for a Hankel integral: adaptive quadrature, digital filters, FFTLog, midpoints uniform in k.
 
-Each gives the integral of f(k) J0(kr) over k from 0 to infinity at radii r (m). f takes an array of wavenumbers (1/m)
-and is in no need of a Bessel function of its own; it may overflow where a way asks it to go too far.
+Each gives the integral of f(k) J0(kr) over k from 0 to infinity at radii r (m). f takes an array of wavenumbers (1/m).
+It may overflow at wavenumbers where a method needs no value.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ Integrand = Callable[[np.ndarray], np.ndarray]
 END = 2e4
 """Where the adaptive quadrature and the uniform grid stop, 1/m."""
 INTERVALS = 300
-"""Of the adaptive quadrature on each leg of its path, at most."""
+"""The most intervals of the adaptive quadrature on each leg of its path."""
 POLES, HEIGHT = 1500.0, 20.0
-"""The lifted path, 1/m: how far along the real axis it stays off it, and how far off."""
+"""The lifted path, 1/m: up to where it is off the real axis, and by how much."""
 FILTERS = ("gupt_61_1997", "gupt_120_1997", "key_201_2012", "key_401_2009", "anderson_801_1982", "wer_2001_2018")
-"""Of libdlf's, for each length the one that did best on exp(-kz) and on the damped forearm."""
+"""Filters of libdlf: of each length the best one on exp(-kz) and on the damped forearm."""
 FFTLOG_K = (1e-8, 1e8)
-"""The ends of FFTLog's grid, 1/m: so far out that what it takes for periodic there does not come back at the radii."""
+"""The ends of FFTLog's grid, 1/m: so far out that its periodic images do not reach the radii."""
 FFTLOG_BIAS = -0.25
-"""FFTLog takes f k^0.25 for periodic in log k: f itself does not vanish at the low end, f k^0.25 does."""
+"""FFTLog treats f k^0.25 as periodic in log k: at the low end f does not vanish, f k^0.25 does."""
 
 
 def adaptive(f: Integrand, r: np.ndarray, tolerance: float, lifted: bool) -> tuple[np.ndarray, float]:

@@ -1,4 +1,4 @@
-"""Volume, area, box, centre and solid count of a body, by whichever kernel made it: what can be compared."""
+"""Volume, area, box, centre and solid count of a body of any kernel, and the time that it took."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from unitcad.shape import Shape
 
 @dataclass(frozen=True)
 class Measures:
-    """mm, mm2, mm3; the box as (x0, y0, z0, x1, y1, z1)."""
+    """Measures of a body in mm, mm2, mm3; the box as (x0, y0, z0, x1, y1, z1)."""
 
     solids: int
     volume: float

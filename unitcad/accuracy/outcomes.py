@@ -1,4 +1,4 @@
-"""What becomes of a spec: built with every law kept, refused with a field named, or a fault of ours."""
+"""What becomes of a spec: a build that passes every check, a refusal with a field, or a fault of this program."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 from unitcad.errors import Refusal, UnitcadError
 
 BUILT, REFUSED = "built", "refused"
-LAW, CHECK, ERROR, CRASH, HANG, CIRCLE = "law", "check", "error", "crash", "hang", "circle"
+MOULD_CHECK, MESH_CHECK, ERROR, CRASH, HANG, CIRCLE = "mould check", "mesh check", "error", "crash", "hang", "circle"
 NO_VALUE = "no value"
 """How a chain ends at a refusal that offers none."""
 GOOD = (BUILT, REFUSED)
@@ -22,8 +22,10 @@ _MOST_STEPS = 40
 
 @dataclass(frozen=True)
 class Outcome:
-    """`kind` is `BUILT`, `REFUSED` or a fault; `worst` the largest value met by law code; `chain` the fields that the
-    nearest accepted values led through after a first refusal, and how that chain ended.
+    """What became of a spec.
+
+    `kind` is `BUILT`, `REFUSED` or a fault; `worst` the largest value met by each mould check's code; `chain` the
+    fields that the nearest accepted values led through after a first refusal, and `chain_end` how that chain ended.
     """
 
     kind: str
@@ -36,7 +38,7 @@ class Outcome:
 
 
 def build_outcome(data: dict[str, Any]) -> Outcome:
-    """Build unit and moulds of a spec's data into a folder that is thrown away: laws, mesh files and their checks."""
+    """Build unit and moulds of a spec's data, with all checks, into a folder that is removed afterwards."""
     from unitcad.pipeline.build import build
     from unitcad.validation import from_data
 
@@ -54,46 +56,43 @@ def build_outcome(data: dict[str, Any]) -> Outcome:
         return Outcome(CRASH, f"{type(error).__name__}: {error}", seconds=time.perf_counter() - start)
     seconds = time.perf_counter() - start
     worst: dict[str, float] = {}
-    for law in manifest["laws"]:
-        worst[law["code"]] = max(worst.get(law["code"], 0.0), abs(law["value"]))
-    broken = [f"{law['code']} {law['where']} = {law['value']:g}" for law in manifest["laws"] if not law["ok"]]
-    if broken:
-        return Outcome(LAW, "; ".join(broken), worst=worst, seconds=seconds)
+    for finding in manifest["laws"]:
+        worst[finding["code"]] = max(worst.get(finding["code"], 0.0), abs(finding["value"]))
+    if broken := [f"{f['code']} {f['where']} = {f['value']:g}" for f in manifest["laws"] if not f["ok"]]:
+        return Outcome(MOULD_CHECK, "; ".join(broken), worst=worst, seconds=seconds)
     if manifest["check"]["errors"]:
-        found = [f"{f['code']} {f['message']}" for f in manifest["check"]["findings"] if f["severity"] == "error"]
-        return Outcome(CHECK, "; ".join(found), worst=worst, seconds=seconds)
+        errors = [f"{f['code']} {f['message']}" for f in manifest["check"]["findings"] if f["severity"] == "error"]
+        return Outcome(MESH_CHECK, "; ".join(errors), worst=worst, seconds=seconds)
     return Outcome(BUILT, worst=worst, seconds=seconds)
 
 
-def outcome(data: dict[str, Any], follow: bool = True) -> Outcome:
+def outcome(data: dict[str, Any]) -> Outcome:
     """Return `build_outcome`; after a refusal, follow its nearest accepted values until the spec builds.
 
     A fault is also a refusal whose nearest value meets the very limit again, or a chain of them that never ends
     (`CIRCLE`), and whatever goes wrong with the spec at the chain's end.
     """
     first = build_outcome(data)
-    if first.kind != REFUSED or not follow:
+    if first.kind != REFUSED:
         return first
     chain: list[str] = []
-    data = copy.deepcopy(data)
-    while True:
-        refusal = door(data)
-        if refusal is None:
-            last = build_outcome(data)
-            kind = REFUSED if last.kind in GOOD else last.kind
-            message = first.message if last.kind in GOOD else f"after {' > '.join(chain)}: {last.message}"
-            return Outcome(kind, message, first.field, last.worst, tuple(chain), last.kind, first.seconds)
+    refusal = refusal_of(data)
+    while refusal is not None:
         chain.append(refusal.field)
         if refusal.nearest is None:
             return Outcome(REFUSED, first.message, first.field, {}, tuple(chain), NO_VALUE, first.seconds)
-        before, data = refusal, put_in(data, refusal.field, refusal.nearest)
-        after = door(data)
-        same = after is not None and (after.field, after.limit) == (before.field, before.limit)
+        data = put_in(data, refusal.field, refusal.nearest)
+        before, refusal = refusal, refusal_of(data)
+        same = refusal is not None and (refusal.field, refusal.limit) == (before.field, before.limit)
         if same or len(chain) > _MOST_STEPS:
-            return Outcome(CIRCLE, f"{before} -> {after}", first.field, {}, tuple(chain), CIRCLE, first.seconds)
+            return Outcome(CIRCLE, f"{before} -> {refusal}", first.field, {}, tuple(chain), CIRCLE, first.seconds)
+    last = build_outcome(data)
+    kind = REFUSED if last.kind in GOOD else last.kind
+    message = first.message if last.kind in GOOD else f"after {' > '.join(chain)}: {last.message}"
+    return Outcome(kind, message, first.field, last.worst, tuple(chain), last.kind, first.seconds)
 
 
-def door(data: dict[str, Any]) -> Refusal | None:
+def refusal_of(data: dict[str, Any]) -> Refusal | None:
     """Return the refusal that a spec's data meets in validation or in its moulds' plan; None if it passes both."""
     from unitcad.moulds.plan import plan
     from unitcad.validation import from_data

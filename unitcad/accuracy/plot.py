@@ -18,7 +18,7 @@ _CORNERS = (
     ((0, -1.3), (1.3, 0), (0, 1.3), (-1.3, 0)),
     ((-1.1, 1), (0, -1.2), (1.1, 1)),
 )
-"""Of each marker after the circle, about its middle."""
+"""Corners of each marker, about its middle; the first one is a circle."""
 
 
 def svg(plot: Plot) -> str:
@@ -28,9 +28,10 @@ def svg(plot: Plot) -> str:
         name: sorted((x, y) for x, y in points if x > least and y > 0 and math.isfinite(x) and math.isfinite(y))
         for name, points in plot.series.items()
     }
-    xs = [x for points in series.values() for x, _ in points]
+    everything = [point for points in series.values() for point in points]
+    xs = [x for x, _ in everything]
     x0, x1 = (min(xs, default=0.0), max(xs, default=1.0)) if plot.linear_x else _decades(xs)
-    y0, y1 = _decades([y for points in series.values() for _, y in points])
+    y0, y1 = _decades([y for _, y in everything])
 
     def at(x: float, y: float) -> tuple[float, float]:
         across = ((x if plot.linear_x else math.log10(x)) - x0) / ((x1 - x0) or 1)
@@ -56,7 +57,7 @@ def svg(plot: Plot) -> str:
         f'<text transform="translate(16 {(TOP + HEIGHT - BOTTOM) / 2:.1f}) rotate(-90)" text-anchor="middle">'
         f"{escape(plot.y_label)}</text>",
     ]
-    best = _best(series) if plot.frontier else None
+    best = {point for point, on in zip(everything, frontier(everything), strict=True) if on} if plot.frontier else None
     drawn, legend, y, marked = [], [], TOP + 12, 0
     for i, (name, points) in enumerate(series.items()):
         colour = COLOURS[i % len(COLOURS)]
@@ -89,23 +90,20 @@ def svg(plot: Plot) -> str:
     return "\n".join([*parts, *(part for one in reversed(drawn) for part in one), *legend, "</svg>", ""])
 
 
-def _best(series: dict[str, list[tuple[float, float]]]) -> set[tuple[float, float]]:
-    points = [point for some in series.values() for point in some]
-    return {point for point, mark in zip(points, frontier(points), strict=True) if mark}
-
-
 def _marker(kind: int, x: float, y: float, size: float, colour: str, full: bool) -> str:
     """Draw a circle, square, diamond or triangle of that half-width; hollow ones let others be seen through them."""
     fill = f'fill="{colour}" stroke="#ffffff" stroke-width="0.7"' if full else f'fill="none" stroke="{colour}"'
-    if kind % len(_CORNERS) == 0:
-        return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size:g}" {fill}/>'
     corners = _CORNERS[kind % len(_CORNERS)]
+    if not corners:
+        return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size:g}" {fill}/>'
     path = " ".join(f"{x + size * dx:.1f},{y + size * dy:.1f}" for dx, dy in corners)
     return f'<polygon points="{path}" {fill}/>'
 
 
 def _powers(low: int, high: int) -> list[tuple[float, str]]:
-    return [(10.0**decade, _power(decade)) for decade in range(low, high + 1, _every(high - low))]
+    """Return nine powers of ten or fewer between the ends, and how they are written."""
+    decades = range(low, high + 1, max(1, math.ceil((high - low) / 8)))
+    return [(10.0**d, f"{10.0**d:g}" if -3 <= d <= 4 else f"1e{d}") for d in decades]
 
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:
@@ -123,14 +121,6 @@ def _decades(values: list[float]) -> tuple[int, int]:
         return 0, 1
     low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
     return low, max(high, low + 1)
-
-
-def _every(decades: int) -> int:
-    return max(1, math.ceil(decades / 8))
-
-
-def _power(decade: int) -> str:
-    return f"{10.0**decade:g}" if -3 <= decade <= 4 else f"1e{decade}"
 
 
 def _line(x0: float, y0: float, x1: float, y1: float, colour: str) -> str:

@@ -15,7 +15,7 @@ from unitcad.attenuation.layered.rheology import Damping, FractionalKelvinVoigt,
 
 @dataclass(frozen=True)
 class Trial:
-    """A response to be judged: SI, `r` above 0."""
+    """A response to compute: SI, `r` above 0."""
 
     name: str
     kind: str
@@ -47,18 +47,18 @@ def _between(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-def _law(rng: np.random.Generator) -> Damping:
-    laws = (
+def _damping(rng: np.random.Generator) -> Damping:
+    dampings = (
         LossFactor(_between(rng, 0.01, 0.5)),
         KelvinVoigt(_between(rng, 0.3, 30.0)),
         FractionalKelvinVoigt(_between(rng, 1e-5, 1e-3), 0.3),
     )
-    return laws[rng.integers(0, 3)]
+    return dampings[rng.integers(0, 3)]
 
 
 def _material(rng: np.random.Generator, low: float = 3e3, high: float = 1e7) -> tuple[float, float, float, Damping]:
     nu = float(rng.choice([-0.3, 0.0, 0.3, 0.45, 0.49, 0.4999, 0.4999999, 0.5]))
-    return float(rng.uniform(800, 2000)), _between(rng, low, high), nu, _law(rng)
+    return float(rng.uniform(800, 2000)), _between(rng, low, high), nu, _damping(rng)
 
 
 def _ordinary(rng: np.random.Generator) -> LayeredMedium:
@@ -104,7 +104,7 @@ def _nearly_fluid_film(rng: np.random.Generator) -> LayeredMedium:
 def _inverted(rng: np.random.Generator) -> LayeredMedium:
     """Draw stiff layers over soft ones, each by up to 1e4."""
     moduli = sorted((_between(rng, 1e3, 1e8) for _ in range(rng.integers(2, 5))), reverse=True)
-    parts = [(float(rng.uniform(800, 2000)), e, float(rng.choice([0.3, 0.45, 0.4999])), _law(rng)) for e in moduli]
+    parts = [(float(rng.uniform(800, 2000)), e, float(rng.choice([0.3, 0.45, 0.4999])), _damping(rng)) for e in moduli]
     return LayeredMedium([Layer(_between(rng, 3e-5, 5e-3), *part) for part in parts[:-1]], HalfSpace(*parts[-1]))
 
 
@@ -136,8 +136,8 @@ def _wide_contrast(rng: np.random.Generator) -> LayeredMedium:
 
     def part() -> tuple[float, float, float, Damping]:
         nu = float(rng.choice([0.0, 0.3, 0.45, 0.49, 0.4999999, 0.5]))
-        law = LossFactor(_between(rng, 0.01, 0.5)) if damped else None
-        return float(rng.uniform(900, 2000)), _between(rng, 1e3, 1e9), nu, law
+        damping = LossFactor(_between(rng, 0.01, 0.5)) if damped else None
+        return float(rng.uniform(900, 2000)), _between(rng, 1e3, 1e9), nu, damping
 
     layers = [Layer(_between(rng, 3e-6, 0.02), *part()) for _ in range(rng.integers(1, 5))]
     return LayeredMedium(layers, HalfSpace(*part()))
@@ -151,8 +151,8 @@ def _extreme_contrast(rng: np.random.Generator) -> LayeredMedium:
 
     def part(modulus: float) -> tuple[float, float, float, Damping]:
         nu = float(rng.choice([0.0, 0.3, 0.45, 0.4999999, 0.5]))
-        law = LossFactor(_between(rng, 0.01, 0.5)) if damped else None
-        return float(rng.uniform(900, 2000)), modulus, nu, law
+        damping = LossFactor(_between(rng, 0.01, 0.5)) if damped else None
+        return float(rng.uniform(900, 2000)), modulus, nu, damping
 
     start = int(rng.integers(0, 2))
     moduli = [soft * _between(rng, 1.0, 10.0) * (ratio if i % 2 == start else 1.0) for i in range(rng.integers(2, 5))]

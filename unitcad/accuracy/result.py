@@ -1,11 +1,13 @@
-"""What a suite hands back: tables, plots and promises, on what they were measured; as data and as Markdown."""
+"""A suite's result: tables, plots and promises, and what they were measured on; as data and as Markdown."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
+
+import msgspec
 
 Cell = str | float | int | None
 Say = Callable[[str], None]
@@ -13,8 +15,9 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under columns; a number is shown with three significant digits, None as a dash. Without columns each row is
-    a line of text, shown as it stands.
+    """Rows under columns; a number is shown with three significant digits, None as a dash.
+
+    Without columns each row is a line of text, shown unchanged.
     """
 
     title: str
@@ -26,13 +29,14 @@ class Table:
 @dataclass(frozen=True)
 class Plot:
     """Series of (x, y) points over logarithmic axes, or x over a linear one; `curves` are lines without points.
+
     `frontier`: markers are hollow unless no other point is lower in both.
     """
 
     title: str
     x_label: str
     y_label: str
-    series: dict[str, tuple[tuple[float, float], ...]]
+    series: dict[str, tuple[tuple[float | int, float | int], ...]]
     lines: bool = True
     curves: tuple[str, ...] = ()
     linear_x: bool = False
@@ -44,8 +48,8 @@ class Promise:
     """An error that may not exceed its limit: what CI fails on. A time is never one."""
 
     what: str
-    value: float
-    limit: float
+    value: float | int
+    limit: float | int
 
     @property
     def ok(self) -> bool:
@@ -55,8 +59,10 @@ class Promise:
 
 @dataclass(frozen=True)
 class Result:
-    """One suite's findings. `measured` says on what: machine, versions, size of the run; `options` are the words after
-    the suite's name in the command that makes it again.
+    """One suite's tables, plots and promises.
+
+    `measured` says on what: machine, versions, size of the run. `options` are the options of the command that makes it
+    again.
     """
 
     suite: str
@@ -65,7 +71,7 @@ class Result:
     tables: tuple[Table, ...] = ()
     plots: tuple[Plot, ...] = ()
     promises: tuple[Promise, ...] = ()
-    measured: dict[str, Any] = field(default_factory=dict)
+    measured: dict[str, str | int] = field(default_factory=dict)
     options: str = ""
 
     @property
@@ -75,39 +81,18 @@ class Result:
 
     def as_dict(self) -> dict[str, Any]:
         """Return JSON-ready data; NaN and infinity become null, in a table their name."""
-        data = asdict(self)
-        for table in data["tables"]:
-            table["rows"] = [[shown(cell) if _endless(cell) else cell for cell in row] for row in table["rows"]]
-        for promise, there in zip(data["promises"], self.promises, strict=True):
-            promise["ok"] = there.ok
-        return _finite(data)
+        tables = [replace(t, rows=tuple(tuple(map(_with_names, row)) for row in t.rows)) for t in self.tables]
+        text = msgspec.json.encode(replace(self, tables=tuple(tables)), enc_hook=lambda number: number.item())
+        data = msgspec.json.decode(text)  # JSON has no NaN and no infinity: both are null
+        for written, promise in zip(data["promises"], self.promises, strict=True):
+            written["ok"] = promise.ok
+        return data
 
 
 def from_dict(data: dict[str, Any]) -> Result:
     """Return the result of which `as_dict` gave `data`."""
-    return Result(
-        suite=data["suite"],
-        title=data["title"],
-        text=data["text"],
-        tables=tuple(
-            Table(t["title"], tuple(t["columns"]), tuple(map(tuple, t["rows"])), t["note"]) for t in data["tables"]
-        ),
-        plots=tuple(
-            Plot(
-                **{
-                    **p,
-                    "series": {k: tuple(map(tuple, v)) for k, v in p["series"].items()},
-                    "curves": tuple(p["curves"]),
-                }
-            )
-            for p in data["plots"]
-        ),
-        promises=tuple(
-            Promise(p["what"], math.nan if p["value"] is None else p["value"], p["limit"]) for p in data["promises"]
-        ),
-        measured=data["measured"],
-        options=data.get("options", ""),
-    )
+    promises = [{**p, "value": math.nan if p["value"] is None else p["value"]} for p in data["promises"]]
+    return msgspec.convert({**data, "promises": promises}, Result)
 
 
 def frontier(points: Sequence[tuple[float, float]]) -> list[bool]:
@@ -118,9 +103,14 @@ def frontier(points: Sequence[tuple[float, float]]) -> list[bool]:
     ]
 
 
+def stars(points: Sequence[tuple[float, float]]) -> list[str]:
+    """Return a star for each point on the frontier, for a column of a table."""
+    return ["*" if best else "" for best in frontier(points)]
+
+
 def fastest(points: Sequence[tuple[str, float, float]], error: float) -> str | None:
     """Return the name of the cheapest (name, cost, error) whose error is at most `error`; None if there is none."""
-    return min(((cost, name) for name, cost, found in points if found <= error), default=(0.0, None))[1]
+    return min(((cost, name) for name, cost, own in points if own <= error), default=(0.0, None))[1]
 
 
 def shown(value: Cell) -> str:
@@ -163,15 +153,5 @@ def table_lines(table: Table) -> list[str]:
     return ["| " + " | ".join(table.columns) + " |", "|" + " --- |" * len(table.columns), *rows]
 
 
-def _endless(value: Any) -> bool:
-    return isinstance(value, float) and not math.isfinite(value)
-
-
-def _finite(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    if hasattr(data, "item"):
-        data = data.item()
-    return None if _endless(data) else data
+def _with_names(cell: Cell) -> Cell:
+    return shown(cell) if isinstance(cell, float) and not math.isfinite(cell) else cell

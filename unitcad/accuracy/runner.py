@@ -1,8 +1,7 @@
-"""Runs suites, prints what they find, and writes docs/accuracy.md, its plots and accuracy.json from the same data."""
+"""Running suites, and writing docs/accuracy.md, its plots and accuracy.json from the same data."""
 
 from __future__ import annotations
 
-import difflib
 import json
 import tempfile
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ from pathlib import Path
 from unitcad import files
 from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Result, Say, from_dict, markdown
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import UnitcadError, unknown_name
 
 MODULES = {
     "tessellation": "tessellation",
@@ -26,11 +25,11 @@ MODULES = {
     "left-out": "left_out",
     "speed": "speed",
 }
-"""Suites in the order of the page, and the module of each, with one function `run(quick, say)`."""
+"""Suites in the order of the page, and the module of each, whose function `run(quick, say)` returns its result."""
 SUITES = tuple(MODULES)
 
 JOURNAL = Path("out") / "extremes.jsonl"
-"""What a study of the extremes has judged, so that it can be taken up again."""
+"""The outcomes that a study of the extremes has so far, from which it resumes."""
 
 HEAD = """# Error against run time, and what holds at the extremes
 
@@ -45,26 +44,25 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
     """Return the suites called `names`, or all of them. Raises Refusal for an unknown one."""
     for name in names:
         if name not in SUITES:
-            close = difflib.get_close_matches(name.lower().replace("_", "-"), SUITES, n=1, cutoff=0.5)
-            raise Refusal("SUITE", name, f"not known; there are {', '.join(SUITES)}", close[0] if close else None)
+            raise unknown_name("SUITE", name, SUITES)
     return tuple(name for name in SUITES if not names or name in names)
 
 
 def run(name: str, quick: bool, say: Say, specs: int | None = None) -> Result:
     """Return one suite's result. Raises Missing without an extra or a folder that it needs.
 
-    `specs`: how many of the extremes; that study keeps a journal in out/ and is taken up again from it.
+    `specs`: how many of the extremes; that study keeps a journal in out/ and resumes from it.
     """
     if specs is not None and name == "extremes":
         from unitcad.accuracy.extremes import study
 
         return replace(study(specs, say, journal=JOURNAL), options=f"--specs {specs}")
-    result: Result = import_module(f"unitcad.accuracy.{MODULES[name]}").run(quick, say)
+    result = import_module(f"unitcad.accuracy.{MODULES[name]}").run(quick, say)
     return replace(result, options="--quick" if quick else "")
 
 
 def ready(folder: Path) -> list[Result]:
-    """Make sure that `folder` can take results, and return those there: to be asked before the work, not after it.
+    """Check, before the work, that `folder` can take results, and return those in it.
 
     Raises UnitcadError for a folder that can't be written, or whose accuracy.json is not ours.
     """

@@ -1,8 +1,9 @@
-"""Run times: interleaved, so that whatever else the machine does falls on all alike; medians with their spread."""
+"""Run times: calls are timed in turn, so that other load on the machine falls on all alike; medians with quartiles."""
 
 from __future__ import annotations
 
 import gc
+import os
 import platform
 import statistics
 import subprocess
@@ -28,7 +29,7 @@ class Timing:
 
 
 def interleaved(calls: Mapping[str, Callable[[], Any]], repeats: int, warm: bool = True) -> dict[str, Timing]:
-    """Time every call `repeats` times, one after the other in turn; a first round warms up and does not count."""
+    """Time every call `repeats` times, in turn; a first round warms up and does not count."""
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     for round_ in range(repeats + (1 if warm else 0)):
         for name, call in calls.items():
@@ -49,18 +50,18 @@ def timing(seconds: list[float]) -> Timing:
     return Timing(middle, low, high)
 
 
-def machine(*packages: str) -> dict[str, Any]:
+def machine(*packages: str) -> dict[str, str | int]:
     """Return what a measurement was made on: processor, cores, commit of a clone, versions of Python and `packages`."""
-    found: dict[str, Any] = {"processor": _processor(), "cores": _cores()}
+    facts: dict[str, str | int] = {"processor": _processor(), "cores": os.cpu_count() or 1}
     if commit := _commit():
-        found["commit"] = commit
-    found["Python"] = platform.python_version()
+        facts["commit"] = commit
+    facts["Python"] = platform.python_version()
     for name in packages:
         try:
-            found[name] = version(name)
+            facts[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            facts[name] = "not installed"
+    return facts
 
 
 def _processor() -> str:
@@ -87,12 +88,6 @@ def _commit() -> str:
         return f"{commit}+" if commit and git("status", "--porcelain", "unitcad", "benchmarks").strip() else commit
     except OSError:
         return ""
-
-
-def _cores() -> int:
-    import os
-
-    return os.cpu_count() or 1
 
 
 def _seconds(value: float) -> str:
