@@ -85,7 +85,7 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     from unitcad.check.geometry import self_crossing
     from unitcad.check.geometry.topology import topology_of
     from unitcad.check.geometry.triangle_mesh import Mesh
-    from unitcad.check.resource_limits import Deadline
+    from unitcad.check.rules.f_limits import Deadline
 
     vertices, faces = getattr(meshes, shape)(size)
     found = topology_of(Mesh(vertices, faces), Deadline(600).tick).as_stored()
@@ -122,7 +122,7 @@ def measure(size: int, peer: str | None, rounds: int, folder: Path) -> list[str]
     from unitcad.check import check_file, check_mesh
     from unitcad.check.geometry.topology import topology_of
     from unitcad.check.geometry.triangle_mesh import Mesh
-    from unitcad.check.resource_limits import Deadline
+    from unitcad.check.rules.f_limits import Deadline
 
     vertices, faces = torus(size)
     path = folder / f"torus-{size}.stl"

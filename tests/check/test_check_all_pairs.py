@@ -10,7 +10,7 @@ from shapes import CUBE_CORNERS, CUBE_FACES
 from unitcad.check.geometry import self_crossing
 from unitcad.check.geometry.topology import topology_of
 from unitcad.check.geometry.triangle_mesh import Mesh, weld_exact
-from unitcad.check.resource_limits import Deadline
+from unitcad.check.rules.f_limits import Deadline
 from unitcad.geometry import boxes
 
 KINDS = ["lattice", "lattice of tenths", "random", "one tilted plane", "sheared lattice", "slivers", "about a vertex",

@@ -13,7 +13,7 @@ from shapes import CUBE_CORNERS, CUBE_FACES
 from unitcad.check import check_mesh
 from unitcad.check.geometry.predicates import integers, orient2d, orient3d
 from unitcad.check.geometry.triangles import common_point, coplanar, meet
-from unitcad.check.resource_limits import Deadline
+from unitcad.check.rules.f_limits import Deadline
 from unitcad.check.rules.registry import explain
 from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, meeting_pairs, morton_order
 

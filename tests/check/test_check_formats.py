@@ -22,7 +22,7 @@ from unitcad.check.many_files import check_files
 from unitcad.check.one_mesh import check_surface, in_file
 from unitcad.check.output import as_text
 from unitcad.check.output.render import FORMATS, render
-from unitcad.check.resource_limits import Deadline
+from unitcad.check.rules.f_limits import Deadline
 from unitcad.check.rules.registry import FAMILIES, check_prefixes, explain, markdown, rules
 from unitcad.errors import Refusal
 

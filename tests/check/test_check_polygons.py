@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from polygon_files import every_way, obj, off, ply
 from shapes import CUBE_CORNERS
 
+from unitcad.check.findings import Finding
 from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.readers.sniff import reader_of
-from unitcad.check.resource_limits import Deadline, Limits
+from unitcad.check.rules.f_limits import Deadline, Limits
 
 QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
 HALF = [[0, 1, 3], [0, 3, 2], *QUADS[1:]]  # a cube of five quads and two triangles
@@ -26,8 +27,10 @@ NOTCHED = [(0, 0), (3, 0), (6, 0), (6, 5), (4, 5), (4, 2), (2, 2), (2, 5), (0, 5
 
 
 def read(name: str, content: bytes) -> Mesh:
-    (mesh,), findings = reader_of(name.rpartition(".")[2])(memoryview(content), Limits(), Deadline(60))
+    findings: list[Finding] = []
+    mesh = reader_of(name.rpartition(".")[2])(memoryview(content), Limits(), Deadline(60), findings)
     assert findings == []
+    assert mesh is not None
     return mesh
 
 
@@ -163,7 +166,8 @@ def test_any_polygons_keep_their_corners_and_area_in_every_format(corners: list,
     faces = [[i % len(points) for i in face] for face in drawn]
     expected = np.array([area_vector(points, face) for face in faces])
     for name, content in every_way(points, faces).items():
-        found = reader_of(name.rpartition(".")[2])(memoryview(content), Limits(), Deadline(60))[0][0]
+        found = reader_of(name.rpartition(".")[2])(memoryview(content), Limits(), Deadline(60), [])
+        assert found is not None
         assert found.source is not None
         assert len(found.faces) == sum(len(face) - 2 for face in faces)
         of = np.arange(len(found.faces)) if found.source.polygons is None else found.source.polygons

@@ -15,7 +15,7 @@ from polygon_files import obj, off, ply
 from shapes import CUBE_CORNERS, box, text_stl
 
 from unitcad.check.readers.sniff import reader_of
-from unitcad.check.resource_limits import Deadline, Limits, Unreadable
+from unitcad.check.rules.f_limits import Deadline, Limits, Unreadable
 
 FACET = "\n".join(text_stl(box()).split("\n")[1:8]) + "\n"
 CUBE = obj(CUBE_CORNERS, [[0, 1, 3], [0, 3, 2], [4, 6, 7]])
@@ -23,7 +23,7 @@ CUBE = obj(CUBE_CORNERS, [[0, 1, 3], [0, 3, 2], [4, 6, 7]])
 
 def read(name: str, content: bytes) -> None:
     try:
-        reader_of(name.rpartition(".")[2])(memoryview(content), Limits(), Deadline(600))
+        reader_of(name.rpartition(".")[2])(memoryview(content), Limits(), Deadline(600), [])
     except Unreadable as stop:
         assert not any(found.code == "F011" for found in stop.findings)
 

@@ -11,7 +11,7 @@ from unitcad.check import check_bytes
 from unitcad.check.findings import Facts, FileReport
 from unitcad.check.geometry import self_crossing
 from unitcad.check.options import Options
-from unitcad.check.resource_limits import Deadline, OutOfTime, Unreadable
+from unitcad.check.rules.f_limits import Deadline, OutOfTime, Unreadable
 from unitcad.geometry import boxes
 
 
@@ -116,8 +116,8 @@ def test_the_alarm_of_code_that_never_looks_at_the_clock(monkeypatch: pytest.Mon
     import time
 
     from unitcad.check import many_files
-    from unitcad.check.resource_limits import Limits
     from unitcad.check.rules import g_shells
+    from unitcad.check.rules.f_limits import Limits
 
     if not hasattr(signal, "setitimer"):
         pytest.skip("no interval timer")

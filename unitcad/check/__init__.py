@@ -13,7 +13,7 @@ from unitcad.check.check_call import CheckResult, check
 from unitcad.check.findings import Facts, FileReport, Finding, Location
 from unitcad.check.one_file import check_bytes, check_file, check_mesh
 from unitcad.check.options import Options
-from unitcad.check.resource_limits import Limits
+from unitcad.check.rules.f_limits import Limits
 
 __all__ = [
     "CheckResult",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from unitcad.check.findings import FileReport, Finding
 from unitcad.check.options import Options
-from unitcad.check.resource_limits import Limits
+from unitcad.check.rules.f_limits import Limits
 from unitcad.check.units import unit_named
 from unitcad.errors import Refusal, UnitcadError
 

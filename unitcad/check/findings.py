@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from unitcad.check.detail import detail
+from unitcad.geometry.ticks import Interrupted
 
 if TYPE_CHECKING:
     from unitcad.check.geometry.triangle_mesh import Mesh
@@ -166,6 +167,18 @@ class FileReport:
             "findings": [finding.as_dict() for finding in self.findings],
             "facts": self.facts.as_dict(),
         }
+
+
+class Unreadable(Interrupted):
+    """An end of the check before its last rule; no filter drops the errors among its findings.
+
+    What was found before, and the facts known by then, are added on the way up (`f_limits.keeping`).
+    """
+
+    def __init__(self, *findings: Finding) -> None:
+        self.findings = ending(findings)
+        self.facts = Facts()
+        super().__init__("; ".join(finding.message for finding in findings))
 
 
 def ending(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -21,8 +21,8 @@ from unitcad.check.one_file import check_file
 from unitcad.check.options import Options
 from unitcad.check.readers import read_step
 from unitcad.check.readers.sniff import SUFFIXES
-from unitcad.check.resource_limits import OutOfTime, Unreadable
-from unitcad.check.rules.f_file import F011, F012
+from unitcad.check.rules.f_file import F012
+from unitcad.check.rules.f_limits import F011, OutOfTime, Unreadable
 
 _GRACE = 5.0  # s, beyond half of the limit more, until code that never looks at the clock is interrupted
 

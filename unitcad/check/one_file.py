@@ -17,8 +17,8 @@ from unitcad.check.findings import Facts, FileReport, Finding, ending, merge
 from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.options import Options
 from unitcad.check.readers import sniff
-from unitcad.check.resource_limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.rules.f_file import F001, F005, F012
+from unitcad.check.rules.f_limits import F011, Deadline, Limits, Unreadable, keeping
 from unitcad.check.rules.p_package import P011
 from unitcad.check.units import UNITS_MM
 from unitcad.geometry.arrays import Floats, Ints
@@ -40,9 +40,8 @@ def check_mesh(vertices: Floats, faces: Ints, options: Options | None = None) ->
 
     def work(deadline: Deadline) -> tuple[Sequence[Finding], Facts]:
         if triangles.size and (triangles.min() < 0 or triangles.max() >= len(points)):
-            raise Unreadable(P011.finding("a face names a vertex that is not there"))
-        mesh = Mesh(points, np.ascontiguousarray(triangles, dtype=np.int32))
-        return _check_all([mesh], options, deadline)
+            raise P011.unreadable("a face names a vertex that is not there")
+        return _check_surface(Mesh(points, np.ascontiguousarray(triangles, dtype=np.int32)), options, deadline)
 
     return _guarded("", options, work)
 
@@ -74,20 +73,16 @@ def _guarded(path: str, options: Options, work: Callable[[Deadline], tuple[Seque
     return FileReport(path, kept, facts, meshes=tuple(meshes or ()))
 
 
-def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
+def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tuple[Sequence[Finding], Facts]:
     kind = sniff.kind_of(path.name)
     if not kind:
         known = ", ".join(sorted(sniff.SUFFIXES))
-        raise Unreadable(F005.finding(f"suffix {path.suffix!r} is no mesh's; known: {known}"))
+        raise F005.unreadable(f"suffix {path.suffix!r} is no mesh's; known: {known}")
     if not data:
-        raise Unreadable(F001.finding("the file is empty"))
-    strange = sniff.foreign(data[:2048])
-    if strange and (kind, strange) not in {("3mf", "zip"), ("step", "step"), ("glb", "glb")}:
-        raise Unreadable(F005.finding(f"named {path.suffix}, but the content is {strange}"))
-    if kind == "3mf" and strange != "zip":
-        raise Unreadable(F005.finding(f"named {path.suffix}, but the content is no zip"))
-    if kind == "glb" and strange != "glb":
-        raise Unreadable(F005.finding(f"named {path.suffix}, but the content is no binary glTF"))
+        raise F001.unreadable("the file is empty")
+    content, wanted = sniff.foreign(data[:2048]), {"3mf": "zip", "step": "STEP", "glb": "binary glTF"}.get(kind)
+    if content != wanted:
+        raise F005.unreadable(f"named {path.suffix}, but the content is {content or f'no {wanted}'}")
     view = memoryview(data)
     if kind == "3mf":
         from unitcad.check.threemf_build import check_3mf
@@ -99,53 +94,45 @@ def _check(data: bytes, path: Path, options: Options, deadline: Deadline) -> tup
         return check_step(path, view, options)
     if kind == "glb" and options.unit is None:
         options = replace(options, unit="meter")  # as the format says
-    meshes, findings = sniff.reader_of(kind, options.unit)(view, options.limits, deadline)
+    findings: list[Finding] = []
+    with keeping(findings, change=ending):
+        mesh = sniff.reader_of(kind, options.unit)(view, options.limits, deadline, findings)
     del view, data
-    if not meshes:
-        return list(ending(findings)), Facts()
+    if mesh is None:
+        return ending(findings), Facts()
     factor = UNITS_MM[options.unit] if options.unit and kind != "glb" else 1.0
     if factor != 1.0:
-        meshes = [replace(mesh, vertices=mesh.vertices * factor) for mesh in meshes]
+        mesh = replace(mesh, vertices=mesh.vertices * factor)
     with keeping(findings):
-        more, facts = _check_all(meshes, options, deadline)
+        more, facts = _check_surface(mesh, options, deadline)
     return findings + more, facts
 
 
 def _bytes_of(path: Path, limits: Limits) -> bytes:
-    """Read the content; its size is looked at first, and what is no regular file is never opened (a FIFO would
-    wait).
-    """
+    """Read the content of a regular file, once its size is known. A FIFO is never opened, since that would wait."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
-            raise Unreadable(
-                F012.finding(f"{_KINDS.get(stat.S_IFMT(status.st_mode), 'a special file')}, not a regular file")
-            )
+            raise F012.unreadable(f"{_KINDS.get(stat.S_IFMT(status.st_mode), 'a special file')}, not a regular file")
         if status.st_size > limits.max_bytes:
-            raise over_limit(f"{status.st_size} bytes, more than the limit of {limits.max_bytes}")
+            raise F011.unreadable(f"{status.st_size} bytes, more than the limit of {limits.max_bytes}")
         with path.open("rb") as file:
             return file.read(status.st_size)
     except FileNotFoundError as error:
-        raise Unreadable(F012.finding("no such file")) from error
+        raise F012.unreadable("no such file") from error
     except (OSError, ValueError) as error:
-        raise Unreadable(F012.finding(f"cannot be read: {getattr(error, 'strerror', None) or error}")) from error
+        raise F012.unreadable(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
 
 
-def _check_all(meshes: Sequence[Mesh], options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
-    """Check the meshes of a file that has no instances, each by itself; the facts are those of the last one."""
+def _check_surface(mesh: Mesh, options: Options, deadline: Deadline) -> tuple[list[Finding], Facts]:
+    """Check the mesh of a file that has no instances."""
     from unitcad.check.one_mesh import check_on_bed, check_surface
     from unitcad.check.rules import g_shells, s_scale
 
-    findings: list[Finding] = []
-    facts = Facts()
-    for mesh in meshes:
-        with keeping(findings):
-            checked = check_surface(mesh, deadline, cross=options.cross)
-        facts = checked.facts
-        findings += checked.findings
-        findings += s_scale.likely_unit(facts, options.unit)
-        if options.printer is not None and checked.inspection is not None:
-            with keeping(findings, facts):
-                findings += check_on_bed(checked.inspection, options.printer)
+    checked = check_surface(mesh, deadline, cross=options.cross)
+    findings, facts = [*checked.findings, *s_scale.likely_unit(checked.facts, options.unit)], checked.facts
+    if options.printer is not None and checked.inspection is not None:
+        with keeping(findings, facts):
+            findings += check_on_bed(checked.inspection, options.printer)
     findings += g_shells.expected(facts.shells, options.shells)
     return findings, facts

@@ -13,9 +13,9 @@ from unitcad.check.findings import Facts, Finding, Location, ending
 from unitcad.check.geometry.source import Source
 from unitcad.check.geometry.topology import topology_of
 from unitcad.check.geometry.triangle_mesh import Mesh, representable
-from unitcad.check.resource_limits import Deadline, keeping
 from unitcad.check.rules import registry
 from unitcad.check.rules.f_file import F001
+from unitcad.check.rules.f_limits import Deadline, keeping
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import not_finite
 from unitcad.geometry.arrays import extent

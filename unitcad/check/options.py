@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from unitcad.check.detail import SHOWN
-from unitcad.check.resource_limits import Limits
+from unitcad.check.rules.f_limits import Limits
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer

@@ -22,8 +22,8 @@ from unitcad.check.readers.threemf.model_data import Model, Object
 from unitcad.check.readers.threemf.opc import Package, open_package
 from unitcad.check.readers.threemf.placement import Instance, Key, mesh_of
 from unitcad.check.readers.threemf.read_3mf import Build, read_build
-from unitcad.check.resource_limits import Deadline, Unreadable, keeping
 from unitcad.check.rules import g_shells, s_scale, v_values
+from unitcad.check.rules.f_limits import Deadline, Unreadable, keeping
 from unitcad.check.rules.g_shells import G002
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import V001

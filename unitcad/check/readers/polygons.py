@@ -6,94 +6,90 @@ polygons, and those with corners on a line, are cut by manifold3d.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, number
 from unitcad.check.geometry.source import Source
 from unitcad.check.geometry.triangle_mesh import LARGEST, Mesh, weld_points
-from unitcad.check.resource_limits import Deadline, Limits, Unreadable, over_limit
-from unitcad.check.rules.f_file import F001, F008, F013
+from unitcad.check.rules.f_file import F001, F002, F008, F013
+from unitcad.check.rules.f_limits import F011, Deadline, Limits
 from unitcad.check.rules.p_package import P011
-from unitcad.check.rules.rule import Rule
-from unitcad.check.rules.v_values import V001
+from unitcad.check.rules.v_values import faces_not_finite
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 FLAT = 1e-3  # F013: distance of a corner from the polygon's plane, as part of the polygon's size
 _CHUNK = 50_000  # corners looked at together
 _PROPER = 1e-12  # least area of a fan's triangle, as part of the squared length of its polygon
-_PLACES = 9
 
 
 @dataclass(frozen=True)
 class Polygons:
     """Vertices (n, 3) mm, the corners of all polygons one after the other (c,), and how many each has (p,).
 
-    `lines` (p,) from 1, `starts` and `names` of objects are those of `Source`. `counts_from` is the format's first
-    index, for messages.
+    `source` says where they stand in the file. `counts_from` is the format's first index, for messages.
     """
 
     vertices: Floats
     corners: Ints
     sizes: Ints
-    lines: Ints | None = None
-    starts: Ints = field(default_factory=lambda: np.empty(0, np.int64))
-    names: bytes = b""
+    source: Source
     counts_from: int = 0
 
 
-def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    """Return the mesh, none where a vertex is not finite, and what is wrong with the polygons.
+def check_promise(n: int, size: int, limits: Limits) -> None:
+    """Raise `Unreadable` where a header promises more vertices or faces than the limits (F011) or the file (F002)."""
+    if n > 3 * limits.max_faces:
+        raise F011.unreadable(f"{n} vertices or faces promised")
+    if n > size:
+        raise F002.unreadable(f"{n} vertices or faces promised in {size} bytes")
+
+
+def mesh_of(polygons: Polygons, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
+    """Return the mesh, none where a vertex is not finite, and add what is wrong with the polygons to the findings.
 
     Raises `Unreadable` where there is no polygon (F001), too many (F011), or one names a missing vertex (P011).
     """
-    sizes, findings = polygons.sizes, []
-    source = Source(lines=polygons.lines, starts=polygons.starts, names=polygons.names)
+    sizes, source = polygons.sizes, polygons.source
     short = np.flatnonzero(sizes < 3)
     if len(short):
         text = f"{counted(len(short), 'face')} with fewer than three vertices"
-        findings.append(_at(F008, text, short, source))
-    if not len(sizes) - len(short):
-        raise Unreadable(*findings, F001.finding("the file has no face"))
-    triangles = int(sizes.sum()) - 2 * len(sizes) + int((2 - sizes[short]).sum())
-    if triangles > limits.max_faces:
-        raise Unreadable(
-            *findings, *over_limit(f"{counted(triangles, 'face')}, more than --max-faces {limits.max_faces}").findings
-        )
+        findings.append(F008.finding(text, len(short), _places(source, short)))
+    if len(sizes) == len(short):
+        raise F001.unreadable("the file has no face")
+    limits.check_faces(int(np.maximum(sizes - 2, 0).sum()))
     vertices, corners = polygons.vertices, polygons.corners
-    if int(corners.min()) < 0 or int(corners.max()) >= len(vertices):
-        wrong = int(np.flatnonzero((corners < 0) | (corners >= len(vertices)))[0])
-        polygon = np.searchsorted(np.cumsum(sizes), wrong, "right")
+    missing = np.flatnonzero((corners < 0) | (corners >= len(vertices)))
+    if len(missing):
+        wrong = missing[0]
         counting = "" if polygons.counts_from else ", counted from 0"
         text = f"a face names vertex {corners[wrong] + polygons.counts_from} of {len(vertices)}{counting}"
-        raise Unreadable(*findings, _at(P011, text, np.array([polygon]), source))
+        raise P011.unreadable(text, places=_places(source, np.searchsorted(np.cumsum(sizes), [wrong], "right")))
     used = np.zeros(len(vertices), bool)
     used[corners] = True
-    finite = np.ones(len(vertices), bool)
+    finite = ~used
     finite[used] = (np.abs(vertices[used]) <= LARGEST).all(axis=1)
     if not finite.all():
         bad = np.unique(np.searchsorted(np.cumsum(sizes), np.flatnonzero(~finite[corners]), "right"))
-        text = f"{counted(len(bad), 'face')} with a vertex that is not finite"
-        return [], [*findings, _at(V001, text, bad, source)]
+        findings.append(faces_not_finite(len(bad), _places(source, bad)))
+        return None
     faces, of, bent = _in_triangles(vertices, corners, sizes, deadline)
     if bent is not None and bent.any():
-        findings.append(_at(F013, _bent(bent), np.flatnonzero(bent), source))
+        folded = np.flatnonzero(bent)
+        few = counted(len(folded), "face of four or more corners", "faces of four or more corners")
+        text = f"{few} not in a plane: a corner lies up to {number(bent.max())} mm off"
+        findings.append(F013.finding(text, len(folded), _places(source, folded)))
     points, index = weld_points(vertices[used])  # OBJ splits vertices along texture seams
     place = np.zeros(len(vertices), np.int32)
     place[used] = index
-    source = Source(of, polygons.lines, starts=polygons.starts, names=polygons.names)
-    return [Mesh(points, place[faces], indexed=False, source=source)], findings
+    return Mesh(points, place[faces], indexed=False, source=replace(source, polygons=of))
 
 
-def _at(rule: Rule, message: str, polygons: Ints, source: Source) -> Finding:
-    places = [Location(face=int(i), line=source.line(int(i)), object=source.object(int(i))) for i in polygons[:_PLACES]]
-    return rule.finding(message, len(polygons), places)
-
-
-def _bent(bent: Floats) -> str:
-    few = counted(int(np.count_nonzero(bent)), "face of four or more corners", "faces of four or more corners")
-    return f"{few} not in a plane: a corner lies up to {number(float(bent.max()))} mm off"
+def _places(source: Source, polygons: Ints) -> Iterator[Location]:
+    for i in polygons.tolist():
+        yield Location(face=i, line=source.line(i), object=source.object(i))
 
 
 def _in_triangles(

@@ -11,12 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from unitcad.check.findings import Finding, Location
+from unitcad.check.geometry.source import Source
 from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.readers import rows
 from unitcad.check.readers.polygons import Polygons, mesh_of
 from unitcad.check.readers.rows import BLANK, JOINED, NEWLINE, SLASH, SPACE
-from unitcad.check.resource_limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.rules.f_file import F005
+from unitcad.check.rules.f_limits import F011, Deadline, Limits
 from unitcad.check.rules.p_package import P011
 from unitcad.geometry.arrays import Floats, Ints
 
@@ -38,35 +39,31 @@ class _Read:
     n_corners: int = 0
 
 
-def read_obj(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    """Read the mesh of an OBJ file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh
-    remains.
-    """
-    raw, findings = rows.plain(bytes(data))
+def read_obj(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
+    """Read an OBJ file, as `sniff.Reader` says."""
+    raw = rows.plain(bytes(data), findings)
     if not _ANY.search(raw):
-        raise Unreadable(F005.finding("named .obj, but has no line of one"))
+        raise F005.unreadable("named .obj, but has no line of one")
     raw = raw.replace(b"\\\n", b" \v")
     state = _Read()
-    with keeping(findings):
-        for block, line in rows.blocks(raw, 0, deadline):
-            _take(block, line, state)
-            if max(state.n_vertices, state.n_corners) > 3 * limits.max_faces + 2:
-                raise over_limit(f"more faces or vertices than --max-faces {limits.max_faces} allows")
-        meshes, more = mesh_of(_polygons(state), limits, deadline)
-    return meshes, findings + more
+    for block, line in rows.blocks(raw, 0, deadline):
+        _take(block, line, state)
+        if max(state.n_vertices, state.n_corners) > 3 * limits.max_faces + 2:
+            raise F011.unreadable(f"more faces or vertices than --max-faces {limits.max_faces} allows")
+    return mesh_of(_polygons(state), limits, deadline, findings)
 
 
 def _polygons(state: _Read) -> Polygons:
     named = state.objects or state.groups
     empty = np.empty(0, np.int64)
+    source = Source(
+        lines=np.concatenate([empty, *state.lines]).astype(np.int32),
+        starts=np.concatenate([empty, *(starts for starts, _ in named)]),
+        names=b"".join(names for _, names in named),
+    )
+    vertices = np.concatenate([np.empty((0, 3)), *state.vertices])
     return Polygons(
-        np.concatenate(state.vertices) if state.vertices else np.empty((0, 3)),
-        np.concatenate([empty, *state.corners]),
-        np.concatenate([empty, *state.sizes]),
-        np.concatenate([empty, *state.lines]).astype(np.int32),
-        np.concatenate([empty, *(starts for starts, _ in named)]),
-        b"".join(names for _, names in named),
-        counts_from=1,
+        vertices, np.concatenate([empty, *state.corners]), np.concatenate([empty, *state.sizes]), source, counts_from=1
     )
 
 
@@ -96,12 +93,10 @@ def _take(block: Ints, line: int, state: _Read) -> None:
         state.vertices.append(rows.columns(numbers, slice(None), 3))
     faces, arguments = statements(b"f")
     for letter, names in ((b"o", state.objects), (b"g", state.groups)):
-        if (letters == ord(letter)).any():
-            named, _ = statements(letter)
-            begins = np.flatnonzero(block == NEWLINE)[named] - widths[named] + 1
-            places = rows.spread(
-                keys[letters == ord(letter)] + 1, begins + widths[named] - keys[letters == ord(letter)] - 1
-            )
+        ours = letters == ord(letter)
+        if ours.any():
+            named, begins = lines[ours], keys[ours] + 1
+            places = rows.spread(begins, np.flatnonzero(block == NEWLINE)[named] + 1 - begins)
             names.append((state.n_polygons + np.searchsorted(faces, named), block[places].tobytes()))
     if len(faces):
         above = state.n_vertices + np.searchsorted(points, faces)
@@ -121,7 +116,7 @@ def _take_faces(text: Ints, line: int, faces: Ints, above: Ints, state: _Read) -
         at = int(refs.lines[np.searchsorted(refs.starts, wrong[0], "right") - 1])
         index = ids[wrong[0]]
         why = f"vertex {index}, of {before[wrong[0]]} above it" if index else "vertex 0; OBJ counts from 1"
-        raise Unreadable(P011.finding(f"a face names {why}", places=[Location(line=at)]))
+        raise P011.unreadable(f"a face names {why}", places=[Location(line=at)])
     state.corners.append(np.where(ids > 0, ids - 1, before + ids))
     state.sizes.append(sizes)
     state.lines.append(refs.lines)

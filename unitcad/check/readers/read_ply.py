@@ -14,12 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.geometry.source import Source
 from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.readers import rows
-from unitcad.check.readers.polygons import Polygons, mesh_of
+from unitcad.check.readers.polygons import Polygons, check_promise, mesh_of
 from unitcad.check.readers.rows import Rows
-from unitcad.check.resource_limits import Deadline, Limits, Unreadable, keeping, over_limit
 from unitcad.check.rules.f_file import F001, F002, F003, F005, F006
+from unitcad.check.rules.f_limits import Deadline, Limits, Unreadable
 from unitcad.geometry.arrays import Floats, Ints
 
 _TYPES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}
@@ -31,6 +32,7 @@ _HEADER = 100_000  # bytes
 _WANTED = {"vertex": ("x", "y", "z"), "face": ("vertex_indices", "vertex_index")}
 _TICK = 100_000
 Column = tuple[Ints | None, Floats]  # lengths of lists, None for a plain property, and its numbers
+Tables = dict[str, dict[str, Column]]  # the wanted columns of each element
 
 
 @dataclass(frozen=True)
@@ -46,44 +48,35 @@ class _Element:
         return any(length for _, length, _ in self.properties)
 
 
-def read_ply(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    """Read the mesh of a PLY file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh
-    remains.
-    """
-    raw, findings = bytes(data), list[Finding]()
+def read_ply(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
+    """Read a PLY file, as `sniff.Reader` says."""
+    raw = bytes(data)
     if _TEXT.search(raw[:1000]):
-        raw, findings = rows.plain(raw)
+        raw = rows.plain(raw, findings)
     if not raw.startswith(b"ply"):
-        raise Unreadable(F005.finding("named .ply, but does not begin with ply"))
+        raise F005.unreadable("named .ply, but does not begin with ply")
     if b"end_header" not in raw[:_HEADER]:
-        raise Unreadable(F003.finding("the header has no end"))
-    with keeping(findings):
-        order, elements, at = _header(raw)
-        largest = max((element.count for element in elements), default=0)
-        if largest > 3 * limits.max_faces:
-            raise over_limit(f"{largest} vertices or faces promised")
-        if largest > len(raw):
-            raise Unreadable(F002.finding(f"{largest} vertices or faces promised in {len(raw)} bytes"))
-        lines = None
-        if order == "ascii":
-            tables, lines, more = _text(raw, at, elements, deadline)
-        else:
-            tables, more = _binary(raw, at, order, elements, deadline)
-        findings += more
-        meshes, more = mesh_of(_polygons(elements, tables, lines), limits, deadline)
-    return meshes, findings + more
+        raise F003.unreadable("the header has no end")
+    order, elements, at = _header(raw)
+    check_promise(max((element.count for element in elements), default=0), len(raw), limits)
+    lines = None
+    if order == "ascii":
+        tables, lines = _text(raw, at, elements, deadline, findings)
+    else:
+        tables = _binary(raw, at, order, elements, deadline, findings)
+    return mesh_of(_polygons(elements, tables, lines), limits, deadline, findings)
 
 
-def _polygons(elements: list[_Element], tables: dict[str, dict[str, Column]], lines: Ints | None) -> Polygons:
+def _polygons(elements: list[_Element], tables: Tables, lines: Ints | None) -> Polygons:
     if not any(element.name == "face" and element.count for element in elements):
-        raise Unreadable(F001.finding("the file has no face"))
+        raise F001.unreadable("the file has no face")
     points = [tables.get("vertex", {}).get(axis, (None, None)) for axis in "xyz"]
     sizes, corners = next(iter(tables["face"].values()), (None, None))
     if sizes is None or corners is None or any(column is None or of is not None for of, column in points):
-        raise Unreadable(F003.finding("cannot be read as PLY: its elements are not those of a mesh"))
+        raise F003.unreadable("cannot be read as PLY: its elements are not those of a mesh")
     vertices = np.stack([np.asarray(column, np.float64) for _, column in points], axis=1)
     indices = rows.integers(corners) if corners.dtype.kind == "f" else corners.astype(np.int64)
-    return Polygons(vertices, indices, sizes, lines)
+    return Polygons(vertices, indices, sizes, Source(lines=lines))
 
 
 def _header(raw: bytes) -> tuple[str, list[_Element], int]:
@@ -94,52 +87,46 @@ def _header(raw: bytes) -> tuple[str, list[_Element], int]:
         words = raw[at : end if end >= 0 else len(raw)].decode("ascii", "replace").split()
         if end < 0 or words[:1] == ["end_header"]:
             break
-        at = end + 1
+        at, line = end + 1, " ".join(words)[:60]
         if words[:1] == ["format"]:
             order = "ascii" if words[1:2] == ["ascii"] else _ORDERS.get(" ".join(words[1:2]), "")
         elif words[:1] == ["element"]:
             if len(words) != 3 or not words[2].isdecimal():
-                raise _no("element and count", words)
+                raise F003.unreadable(f"the header's line {line!r} names no element and count")
             if any(element.name == words[1] for element in elements):
-                raise Unreadable(F003.finding(f"the header names element {words[1][:30]} twice"))
+                raise F003.unreadable(f"the header names element {words[1][:30]} twice")
             elements.append(_Element(words[1], int(words[2][:18]), []))
         elif words[:1] == ["property"] and elements:
             kinds = words[2:4] if words[1:2] == ["list"] else ["", *words[1:2]]
             if len(kinds) < 2 or any(kind not in _TYPES for kind in kinds if kind):
-                text = f"the header's line {' '.join(words)[:60]!r} is no property"
-                raise Unreadable(F003.finding(text))
+                raise F003.unreadable(f"the header's line {line!r} is no property")
             elements[-1].properties.append((" ".join(words[-1:]), _TYPES.get(kinds[0], ""), _TYPES[kinds[1]]))
     if not order:
-        raise Unreadable(F003.finding("the header names no format that is known"))
+        raise F003.unreadable("the header names no format that is known")
     return order, elements, end + 1 if end >= 0 else len(raw)
 
 
-def _no(what: str, words: list[str]) -> Unreadable:
-    return Unreadable(F003.finding(f"the header's line {' '.join(words)[:60]!r} names no {what}"))
-
-
 def _text(
-    raw: bytes, at: int, elements: list[_Element], deadline: Deadline
-) -> tuple[dict[str, dict[str, Column]], Ints | None, list[Finding]]:
-    """Return the wanted columns of each element, the lines of the faces, and findings."""
+    raw: bytes, at: int, elements: list[_Element], deadline: Deadline, findings: list[Finding]
+) -> tuple[Tables, Ints | None]:
+    """Return the wanted columns, and the lines of the faces."""
     table = rows.all_rows(raw, at, raw.count(b"\n", 0, at) + 1, deadline, comments=False)
     promised = sum(element.count for element in elements)
-    if len(table) < promised:
-        text = (
-            f"the header promises {counted(promised, 'line')} of vertices, faces and other elements, not {len(table)}"
-        )
-        raise Unreadable(F002.finding(text, promised - len(table)))
     extra, longer, tables, lines, row = len(table) - promised, 0, {}, None, 0
+    if extra < 0:
+        what = f"{counted(promised, 'line')} of vertices, faces and other elements"
+        raise F002.unreadable(f"the header promises {what}, not {len(table)}", -extra)
     for element in elements:
         which = slice(row, row + element.count)
         tables[element.name], more = _text_element(table, which, element)
         longer += more
         lines = table.lines[which] if element.name == "face" else lines
         row += element.count
-    findings = [F006.finding(f"{counted(extra, 'line')} after the last element", extra)] if extra else []
+    if extra:
+        findings.append(F006.finding(f"{counted(extra, 'line')} after the last element", extra))
     if longer:  # as MeshLab writes, which announces colours of faces and writes a list
         findings.append(F006.finding(f"{counted(longer, 'line')} with more numbers than the properties take", longer))
-    return tables, lines, findings
+    return tables, lines
 
 
 def _text_element(table: Rows, which: slice, element: _Element) -> tuple[dict[str, Column], int]:
@@ -163,22 +150,22 @@ def _refuse(wrong: Ints, element: _Element, lines: Ints) -> None:
     """Raise `Unreadable` (F003) where a record of the element has more or fewer numbers than its properties."""
     if wrong.any():
         text = f"a {element.name} with more or fewer numbers than its properties take"
-        raise Unreadable(F003.finding(text, int(wrong.sum()), [Location(line=int(lines[int(np.argmax(wrong))]))]))
+        raise F003.unreadable(text, int(wrong.sum()), [Location(line=int(lines[int(np.argmax(wrong))]))])
 
 
 def _binary(
-    raw: bytes, at: int, order: str, elements: list[_Element], deadline: Deadline
-) -> tuple[dict[str, dict[str, Column]], list[Finding]]:
-    """Return the wanted columns of each element, and findings."""
-    tables = {}
+    raw: bytes, at: int, order: str, elements: list[_Element], deadline: Deadline, findings: list[Finding]
+) -> Tables:
+    """Return the wanted columns of each element."""
+    tables: Tables = {}
     for element in elements:
         if element.lists and not _alike(raw, at, element, order):
             tables[element.name], at = _walked(raw, at, element, order, deadline)
         else:
             tables[element.name], at = _records(raw, at, element, order)
-    extra = len(raw) - at
-    more = [F006.finding(f"{counted(extra, 'byte')} after the last element", extra)] if extra else []
-    return tables, more
+    if extra := len(raw) - at:
+        findings.append(F006.finding(f"{counted(extra, 'byte')} after the last element", extra))
+    return tables
 
 
 def _layout(raw: bytes, at: int, element: _Element, order: str) -> np.dtype | None:
@@ -263,4 +250,4 @@ def _walked(raw: bytes, at: int, element: _Element, order: str, deadline: Deadli
 
 def _short(element: _Element, room: int) -> Unreadable:
     text = f"the header promises {counted(element.count, f'{element.name} record')}, the file has room for {room}"
-    return Unreadable(F002.finding(text, max(element.count - room, 1)))
+    return F002.unreadable(text, max(element.count - room, 1))

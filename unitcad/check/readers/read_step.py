@@ -13,8 +13,8 @@ from typing import Any
 from unitcad import children
 from unitcad.check.findings import Facts, Finding, number
 from unitcad.check.options import Options
-from unitcad.check.resource_limits import Limits, Unreadable, over_limit
-from unitcad.check.rules.f_file import F003, F005, F011, F012
+from unitcad.check.rules.f_file import F003, F012
+from unitcad.check.rules.f_limits import F011
 from unitcad.check.rules.g_crossing import G001
 from unitcad.check.rules.g_shells import G007, T008, expected
 
@@ -28,12 +28,13 @@ def installed() -> bool:
 
 def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Finding], Facts]:
     """Return findings about a STEP file's text and, with OCP there, about its solids."""
-    _text(data, options.limits)
+    if b"END-ISO-10303-21" not in bytes(data[-2000:]):  # OCCT must not be handed a fragment
+        raise F003.unreadable("the text ends before END-ISO-10303-21")
     if not installed():
-        raise Unreadable(F012.finding(NEEDS))
+        raise F012.unreadable(NEEDS)
     measured = _from_child(path, options.limits.seconds)
     if not measured:
-        raise Unreadable(F003.finding("the STEP file holds no shape that can be read"))
+        raise F003.unreadable("the STEP file holds no shape that can be read")
     solids, volume = measured["solids"], measured["volume"]
     findings: list[Finding] = []
     if not measured["valid"]:
@@ -56,13 +57,13 @@ def _from_child(path: Path, seconds: float) -> dict[str, Any]:
         try:
             done = children.run([sys.executable, "-P", "-c", _CHILD, str(path), str(out)], timeout=seconds)
         except subprocess.TimeoutExpired as error:
-            raise over_limit(f"not finished within --timeout {seconds:g} s") from error
+            raise F011.unreadable(f"not finished within --timeout {seconds:g} s") from error
         if done.returncode == 0 and out.exists():
             return json.loads(out.read_text("utf-8"))
     last = done.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
     if last.startswith(("ImportError", "ModuleNotFoundError")):
-        raise Unreadable(F012.finding(f"{NEEDS} ({last[:200]})"))
-    raise Unreadable(F003.finding(f"the STEP reader died of the file (exit code {done.returncode})"))
+        raise F012.unreadable(f"{NEEDS} ({last[:200]})")
+    raise F003.unreadable(f"the STEP reader died of the file (exit code {done.returncode})")
 
 
 _CHILD = "import sys; from unitcad.check.readers.read_step import measure; measure(sys.argv[1], sys.argv[2])"
@@ -104,13 +105,3 @@ def _box(shape: Any) -> tuple[tuple[float, float, float], tuple[float, float, fl
         return None
     x0, y0, z0, x1, y1, z1 = box.Get()
     return (x0, y0, z0), (x1, y1, z1)
-
-
-def _text(data: memoryview, limits: Limits) -> None:
-    """Begin and end of ISO 10303-21, before OCCT sees the file: it must not be handed a fragment."""
-    if bytes(data[:12]) != b"ISO-10303-21":
-        raise Unreadable(F005.finding("named STEP, but does not begin with ISO-10303-21"))
-    if b"END-ISO-10303-21" not in bytes(data[-2000:]):
-        raise Unreadable(F003.finding("the text ends before END-ISO-10303-21"))
-    if len(data) > limits.max_bytes:
-        raise Unreadable(F011.finding(f"more than {limits.max_bytes} bytes"))

@@ -6,6 +6,7 @@ StereoLithography Interface Specification; keywords in either case.
 
 from __future__ import annotations
 
+import codecs
 import re
 from dataclasses import dataclass, field
 
@@ -14,11 +15,12 @@ import numpy as np
 from unitcad.check.detail import SHOWN
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.geometry.triangle_mesh import Mesh, weld_exact
+from unitcad.check.readers import rows
 from unitcad.check.readers.rows import NUMBER
-from unitcad.check.resource_limits import Deadline, Limits, Unreadable, over_limit
-from unitcad.check.rules.f_file import F001, F002, F003, F004, F005, F006, F007, F008, F009, F010
+from unitcad.check.rules.f_file import F001, F002, F003, F005, F006, F007, F008, F009, F010, not_a_number
+from unitcad.check.rules.f_limits import Deadline, Limits, Unreadable
 from unitcad.check.rules.rule import Rule
-from unitcad.check.rules.v_values import V001
+from unitcad.check.rules.v_values import faces_not_finite
 from unitcad.geometry.arrays import Floats
 
 RECORD = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -31,136 +33,104 @@ _PRINTABLE = bytes(b for b in range(256) if b in b"\t\n\v\f\r" or (b >= 32 and b
 _BLOCK = 8_000_000
 
 
-def read_stl(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    """Read the mesh of an STL file's bytes and what the file itself breaks. Raises `Unreadable` where no mesh
-    remains.
-    """
+def read_stl(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
+    """Read an STL file, as `sniff.Reader` says."""
     size = len(data)
-    if size == 0:
-        raise Unreadable(F001.finding("the file is empty"))
-    head = bytes(data[: min(size, 2048)])
+    head = bytes(data[:2048])
     if _is_text(head, data):
-        return _read_text(data, limits, deadline)
-    if not head.translate(None, _PRINTABLE) and size != 84 + 50 * int.from_bytes(data[80:84], "little"):
+        return _read_text(data, limits, deadline, findings)
+    if not head.translate(None, _PRINTABLE) and size != _binary_size(data):
         first = head.split(None, 1)[0][:20].decode("utf-8", "replace") if head.strip() else ""
-        raise Unreadable(F005.finding(f"text that does not begin with solid but with {first!r}"))
+        raise F005.unreadable(f"text that does not begin with solid but with {first!r}")
     if size < 84:
-        raise Unreadable(F001.finding(f"{counted(size, 'byte')}: shorter than a binary STL's header of 84"))
-    count = int.from_bytes(data[80:84], "little")
-    findings: list[Finding] = []
+        raise F001.unreadable(f"{counted(size, 'byte')}: shorter than a binary STL's header of 84")
     if head[:5].lower() == b"solid":
         findings.append(F007.finding("the binary header starts with 'solid'"))
+    count = int.from_bytes(data[80:84], "little")
     room, rest = divmod(size - 84, 50)
+    promise = f"the header promises {counted(count, 'facet')}, the file"
     if count > room:
-        findings.append(
-            F002.finding(f"the header promises {counted(count, 'facet')}, the file has room for {room}", count - room)
-        )
-    elif count < room and (rest == 0 and any(data[84 + 50 * count : 84 + 50 * count + 100])):
-        findings.append(
-            F002.finding(f"the header promises {counted(count, 'facet')}, the file holds {room}", room - count)
-        )
-    elif size > 84 + 50 * count:
-        extra = size - 84 - 50 * count
+        findings.append(F002.finding(f"{promise} has room for {room}", count - room))
+        if room:
+            raise Unreadable()  # a geometry of what is left would only blame the wrong thing
+    elif count < room and rest == 0 and any(data[84 + 50 * count : 84 + 50 * count + 100]):
+        findings.append(F002.finding(f"{promise} holds {room}", room - count))
+    elif extra := size - _binary_size(data):
         findings.append(F006.finding(f"{counted(extra, 'byte')} after the last facet", extra))
     facets = min(count, room)
-    if count > room and room:
-        raise Unreadable(*findings)  # a geometry of what is left would only blame the wrong thing
-    if facets > limits.max_faces:
-        raise Unreadable(
-            *findings, over_limit(f"{counted(facets, 'face')}, more than --max-faces {limits.max_faces}").findings[0]
-        )
+    limits.check_faces(facets)
     if facets == 0:
-        raise Unreadable(*findings, F001.finding("the file has no facet"))
+        raise F001.unreadable("the file has no facet")
     records = np.frombuffer(data, RECORD, facets, 84)
     deadline.tick()
-    corners = records["corners"]
-    finite = np.isfinite(corners)
+    return _mesh(records["corners"], np.ascontiguousarray(records["normal"]), findings)
+
+
+def _binary_size(data: memoryview) -> int:
+    """Return the size of the binary STL whose header this is."""
+    return 84 + 50 * int.from_bytes(data[80:84], "little")
+
+
+def _mesh(corners: Floats, normals: Floats, findings: list[Finding]) -> Mesh | None:
+    """Return the mesh of corners (m, 3, 3); none where one is no float32 number (V001)."""
+    with np.errstate(over="ignore"):
+        finite = np.isfinite(corners.astype(np.float32, copy=False)).all(axis=(1, 2))
     if not finite.all():
-        findings.append(_not_finite(np.asarray(finite.all(axis=(1, 2)))))
-        return [], findings
+        bad = np.flatnonzero(~finite)
+        findings.append(faces_not_finite(len(bad), (Location(face=int(i)) for i in bad)))
+        return None
     vertices, faces = weld_exact(corners)
-    normals = np.ascontiguousarray(records["normal"])
-    return [Mesh(vertices, faces, normals, indexed=False, single=True)], findings
+    return Mesh(vertices, faces, normals, indexed=False)
 
 
 def _is_text(head: bytes, data: memoryview) -> bool:
     start = head.lstrip(b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n")[:5].lower()
-    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return True
     if start != b"solid" and not head.lstrip().lower().startswith(b"facet"):
         return False
-    size = len(data)
-    if size >= 84 and size == 84 + 50 * int.from_bytes(data[80:84], "little"):
-        return False
-    return b"\x00" not in head[:512]
-
-
-def _not_finite(good: Floats) -> Finding:
-    bad = np.flatnonzero(~good)
-    return V001.finding(
-        f"{counted(len(bad), 'face')} with a vertex that is not finite",
-        len(bad),
-        (Location(face=int(i)) for i in bad),
-    )
+    return not (len(data) >= 84 and len(data) == _binary_size(data)) and b"\x00" not in head[:512]
 
 
 @dataclass
 class _Text:
     """What has been read of a text STL."""
 
+    findings: list[Finding]
     corners: list[Floats] = field(default_factory=list)
     normals: list[Floats] = field(default_factory=list)
     facets: int = 0
     solids: int = 0
     nested: int = 0
     nested_at: list[int] = field(default_factory=list)
-    findings: list[Finding] = field(default_factory=list)
 
 
-def _read_text(data: memoryview, limits: Limits, deadline: Deadline) -> tuple[list[Mesh], list[Finding]]:
-    state = _Text()
-    raw = _decoded(data.obj if isinstance(data.obj, bytes) else bytes(data), state.findings)
-    _walk(raw, state, limits, deadline)
+def _read_text(data: memoryview, limits: Limits, deadline: Deadline, findings: list[Finding]) -> Mesh | None:
+    state = _Text(findings)
+    _walk(_decoded(data.obj if isinstance(data.obj, bytes) else bytes(data), findings), state, limits, deadline)
     if state.nested:  # one finding for all of them: a file may have a hundred thousand
         places = [Location(line=line) for line in state.nested_at]
-        state.findings.append(F003.finding("solid begins before the last one ended", state.nested, places))
+        findings.append(F003.finding("solid begins before the last one ended", state.nested, places))
     if not state.facets:
-        raise Unreadable(*state.findings, F001.finding("the file has no facet"))
+        raise F001.unreadable("the file has no facet")
     if state.solids > 1:
-        state.findings.append(F010.finding(f"{state.solids} solids in one file", state.solids))
-    corners = np.concatenate(state.corners) if state.corners else np.empty((0, 3, 3))
-    normals = np.concatenate(state.normals) if state.normals else np.empty((0, 3))
-    if not len(corners) or any(item.code == "F004" for item in state.findings):
-        return [], state.findings
-    with np.errstate(over="ignore"):
-        single = corners.astype(np.float32)
-    finite = np.isfinite(single)
-    if not finite.all():
-        state.findings.append(_not_finite(np.asarray(finite.all(axis=(1, 2)))))
-        return [], state.findings
-    del single
-    vertices, faces = weld_exact(corners)
-    return [Mesh(vertices, faces, normals, indexed=False)], state.findings
+        findings.append(F010.finding(f"{state.solids} solids in one file", state.solids))
+    if not state.corners or any(item.code == "F004" for item in findings):
+        return None
+    return _mesh(np.concatenate(state.corners), np.concatenate(state.normals), findings)
 
 
 def _decoded(raw: bytes, findings: list[Finding]) -> bytes:
     """Return the text as bytes with LF line ends, whatever it was stored as; oddities become findings."""
-    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         findings.append(F009.finding("UTF-16 text with a byte order mark"))
         raw = raw.decode("utf-16", "replace").encode("utf-8")
-    elif raw[:3] == b"\xef\xbb\xbf":
-        findings.append(F009.finding("a UTF-8 byte order mark at the start"))
-        raw = raw[3:]
-    if not raw.isascii():
+    elif not raw.isascii():
         try:
             raw.decode("utf-8")
         except UnicodeDecodeError as error:
             findings.append(F009.finding(f"bytes that are not UTF-8, first at {error.start}"))
-    if b"\r" in raw:
-        if b"\n" not in raw:
-            findings.append(F009.finding("CR-only line ends"))
-        raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return raw
+    return rows.plain(raw, findings)
 
 
 def _walk(raw: bytes, state: _Text, limits: Limits, deadline: Deadline) -> None:
@@ -179,7 +149,7 @@ def _walk(raw: bytes, state: _Text, limits: Limits, deadline: Deadline) -> None:
             if inside:
                 state.nested += 1
                 if state.nested <= SHOWN:
-                    state.nested_at.append(raw.count(b"\n", 0, at) + 1)
+                    state.nested_at.append(_line(raw, at))
             inside, state.solids, at = True, state.solids + 1, line_end
         elif word == b"endsolid":
             inside, at = False, line_end
@@ -226,7 +196,8 @@ def _facets(raw: bytes, at: int, state: _Text, limits: Limits, deadline: Deadlin
         block = raw[at:cut]
         tokens = block.lower().split()
         if len(tokens) % _TOKENS or any(set(tokens[i::_TOKENS]) != {word} for i, word in _WORDS.items()):
-            return _explain(raw, at, cut, state, limits)
+            _explain(raw, at, cut, state, limits)
+            return -1
         _take(block, tokens, state, limits)
         at = cut
     return stop
@@ -234,8 +205,7 @@ def _facets(raw: bytes, at: int, state: _Text, limits: Limits, deadline: Deadlin
 
 def _take(block: bytes, tokens: list[bytes], state: _Text, limits: Limits) -> None:
     blocks = len(tokens) // _TOKENS
-    if state.facets + blocks > limits.max_faces:
-        raise over_limit(f"more faces than --max-faces {limits.max_faces}")
+    limits.check_faces(state.facets + blocks)
     columns = []
     plain = block.isascii() and b"_" not in block  # numpy takes 1_0 for ten, as Python does
     for column in _NUMBERS:
@@ -258,14 +228,11 @@ def _slow_numbers(texts: list[bytes], state: _Text) -> Floats:
         elif _NAN_SPELLINGS.match(text):
             values[i] = np.nan
         else:
-            shown = text[:30].decode("utf-8", "replace")
-            why = " (a decimal comma)" if b"," in text else ""
-            place = [Location(face=state.facets + i)]
-            state.findings.append(F004.finding(f"{shown!r} is not a number{why}", places=place))
+            state.findings.append(not_a_number(text, [Location(face=state.facets + i)]))
     return values
 
 
-def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> int:
+def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> None:
     """Read one irregular block token by token up to the first one that breaks the grammar, and end the reading.
 
     Facets with more or fewer vertices than three (F008) and words in a number's place (F004) break it no further.
@@ -281,13 +248,11 @@ def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> int
         elif word != wanted[0] if wanted else word in _KEYWORDS or not _is_number(word):
             if match.end() == len(raw) and (_begins(word, wanted)):
                 break  # the text was cut within the word
-            shown = word[:30].decode("utf-8", "replace")
             if wanted or word in _KEYWORDS:
-                expected = b" or ".join(wanted).decode() or "a number"
+                shown, expected = word[:30].decode("utf-8", "replace"), b" or ".join(wanted).decode() or "a number"
                 state.findings.append(_at(F003, f"{shown!r} where {expected} belongs", raw, here))
-                return -1
-            why = " (a decimal comma)" if b"," in word else ""
-            state.findings.append(_at(F004, f"{shown!r} is not a number{why}", raw, here))
+                return
+            state.findings.append(not_a_number(word, [Location(line=_line(raw, here))]))
         if place == 0:
             start, vertices = here, 0
             state.facets += 1
@@ -296,16 +261,15 @@ def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> int
             state.findings.append(_at(F008, f"a facet with {counted(vertices, 'vertex', 'vertices')}", raw, start))
         place = (place + 1) % len(_GRAMMAR)
         if len(state.findings) > 50 or state.facets > limits.max_faces:
-            return -1
+            return
     else:
         if place == 0:
-            return -1
+            return
     if raw[cut:].strip():
         state.findings.append(_at(F003, "the solid ends inside a facet", raw, _skip_blank(raw, cut)))
     else:
         inside = "inside a facet" if place else "before endsolid"
         state.findings.append(_at(F003, f"the text ends {inside}", raw, len(raw.rstrip())))
-    return -1
 
 
 _GRAMMAR: tuple[tuple[bytes, ...], ...] = (
@@ -327,4 +291,8 @@ def _is_number(word: bytes) -> bool:
 
 
 def _at(rule: Rule, message: str, raw: bytes, place: int) -> Finding:
-    return rule.finding(message, places=[Location(line=raw.count(b"\n", 0, place) + 1)])
+    return rule.finding(message, places=[Location(line=_line(raw, place))])
+
+
+def _line(raw: bytes, place: int) -> int:
+    return raw.count(b"\n", 0, place) + 1

@@ -5,6 +5,7 @@ A text is taken in blocks of whole lines, so that what is made on the way has th
 
 from __future__ import annotations
 
+import codecs
 import re
 import warnings
 from collections.abc import Iterator
@@ -12,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.resource_limits import Deadline, Unreadable
-from unitcad.check.rules.f_file import F003, F004, F009
+from unitcad.check.findings import Finding, Location, Unreadable, counted
+from unitcad.check.rules.f_file import F003, F004, F009, not_a_number
+from unitcad.check.rules.f_limits import Deadline
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
 NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.IGNORECASE)
@@ -54,17 +55,16 @@ class Rows:
         return np.diff(self.starts)
 
 
-def plain(raw: bytes) -> tuple[bytes, list[Finding]]:
+def plain(raw: bytes, findings: list[Finding]) -> bytes:
     """Return a text with LF line ends and without a byte order mark; what had to be changed is a finding."""
-    findings = []
-    if raw[:3] == b"\xef\xbb\xbf":
+    if raw.startswith(codecs.BOM_UTF8):
         findings.append(F009.finding("a UTF-8 byte order mark at the start"))
         raw = raw[3:]
     if b"\r" in raw:
         if b"\n" not in raw:
             findings.append(F009.finding("CR-only line ends"))
         raw = raw.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return raw.replace(b"\v", b" "), findings
+    return raw.replace(b"\v", b" ")
 
 
 def blocks(raw: bytes, at: int, deadline: Deadline, line: int = 1) -> Iterator[tuple[Ints, int]]:
@@ -150,7 +150,7 @@ def columns(table: Rows, which: slice, most: int) -> Floats:
     short = np.flatnonzero(sizes < most)
     if len(short):
         text = f"a vertex with {counted(int(sizes[short[0]]), 'number')}"
-        raise Unreadable(F003.finding(text, len(short), [Location(line=int(lines[short[0]]))]))
+        raise F003.unreadable(text, len(short), [Location(line=int(lines[short[0]]))])
     return table.values[table.starts[:-1][which, None] + np.arange(most)]
 
 
@@ -163,7 +163,7 @@ def lengths(counts: Floats, room: Ints, lines: Ints, what: str = "face") -> Ints
         row = int(bad[0])
         of = f"{counts[row]:.15g}"
         text = f"a {what} of {of} {'vertex' if of == '1' else 'vertices'} names {max(int(room[row]), 0)}"
-        raise Unreadable(F003.finding(text, len(bad), [Location(line=int(lines[row]))]))
+        raise F003.unreadable(text, len(bad), [Location(line=int(lines[row]))])
     return counts.astype(np.int64)
 
 
@@ -171,7 +171,7 @@ def integers(values: Floats) -> Ints:
     """Return indices from numbers. Raises `Unreadable` (F004) for one that is no integer."""
     bad = np.flatnonzero(~((values == np.floor(values)) & (np.abs(values) < 2**53)))
     if len(bad):
-        raise Unreadable(F004.finding(f"'{values[bad[0]]:.15g}' is not a vertex's index", len(bad)))
+        raise F004.unreadable(f"'{values[bad[0]]:.15g}' is not a vertex's index", len(bad))
     return values.astype(np.int64)
 
 
@@ -210,9 +210,10 @@ def _slowly(block: Ints, line: int, integers: bool) -> Floats:
         word = match.group()
         good = _INTEGER.fullmatch(word) if integers else NUMBER.fullmatch(word) or _NOT_FINITE.fullmatch(word)
         if not good:
-            shown = word[:30].decode("utf-8", "replace")
-            why = "a vertex's index" if integers else "a number (a decimal comma)" if b"," in word else "a number"
-            at = line + sum(text.count(mark, 0, match.start()) for mark in (b"\n", b"\v"))
-            raise Unreadable(F004.finding(f"{shown!r} is not {why}", places=[Location(line=at)]))
+            place = [Location(line=line + sum(text.count(mark, 0, match.start()) for mark in (b"\n", b"\v")))]
+            if integers:
+                shown = word[:30].decode("utf-8", "replace")
+                raise F004.unreadable(f"{shown!r} is not a vertex's index", places=place)
+            raise Unreadable(not_a_number(word, place))
         values.append(int(word) if integers else float(word))
     return np.array(values, np.int64 if integers else np.float64)

@@ -14,10 +14,14 @@ from pkgutil import iter_modules
 from unitcad.check import readers
 from unitcad.check.findings import Finding
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.resource_limits import Deadline, Limits
+from unitcad.check.rules.f_limits import Deadline, Limits
 from unitcad.check.units import UNITS_MM
 
-Reader = Callable[[memoryview, Limits, Deadline], tuple[list[Mesh], list[Finding]]]
+Reader = Callable[[memoryview, Limits, Deadline, list[Finding]], Mesh | None]
+"""A function that reads a mesh from bytes and adds what the file itself breaks to the findings.
+
+It returns None where the findings leave no mesh, and raises `Unreadable` where reading cannot go on.
+"""
 _READ = "read_"
 SUFFIXES = {f".{name.removeprefix(_READ)}" for _, name, _ in iter_modules(readers.__path__) if name.startswith(_READ)}
 SUFFIXES |= {".3mf", ".stp"}
@@ -33,9 +37,9 @@ _MAGIC = (
     (b"\xff\xd8\xff", "jpeg"),
     (b"GIF8", "gif"),
     (b"%PDF", "pdf"),
-    (b"ISO-10303-21", "step"),
+    (b"ISO-10303-21", "STEP"),
     (b"version https://git-lfs", "a Git LFS pointer"),
-    (b"glTF", "glb"),
+    (b"glTF", "binary glTF"),
 )
 _TEXT_MARKS = (b"<!doctype html", b"<html", b"<head", b"<body")
 

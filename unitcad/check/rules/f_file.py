@@ -1,7 +1,10 @@
-"""Files, F001 to F013: what the readers find before there is a mesh."""
+"""Files, F001 to F013 but for F011: what the readers find before there is a mesh."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from unitcad.check.findings import Finding, Location
 from unitcad.check.rules.rule import Rule
 
 F001 = Rule(
@@ -117,21 +120,6 @@ F010 = Rule(
     fix="Nothing, if the reader takes them all; else one file for each.",
 )
 
-F011 = Rule(
-    "F011",
-    "error",
-    "resource limit reached",
-    cause=(
-        "The file asks for more bytes, faces, time or memory than the limits allow, so it was not checked to its "
-        "end. It never passes."
-    ),
-    example="A mesh has 12 million faces, and --max-faces is 10 million.",
-    fix=(
-        "If the file is meant to be so large, raise the limit that the message names: --timeout, --max-faces or "
-        "--memory. Limits without an option, such as 4 GB a file and 100,000 instances of a 3MF, are fixed."
-    ),
-)
-
 F012 = Rule(
     "F012",
     "error",
@@ -155,3 +143,10 @@ F013 = Rule(
     example="A quad of an OBJ is 10 mm wide, and one corner lies 0.5 mm above the plane of the others.",
     fix="Triangulate before export, or move the corners into one plane.",
 )
+
+
+def not_a_number(word: str | bytes, places: Iterable[Location] = ()) -> Finding:
+    """Make the finding F004 about a word in the place of a number."""
+    text = word.decode("utf-8", "replace") if isinstance(word, bytes) else word
+    why = " (a decimal comma)" if "," in text else ""
+    return F004.finding(f"{text[:30]!r} is not a number{why}", places=places)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from unitcad.check.detail import detail
-from unitcad.check.findings import Finding, Location
+from unitcad.check.findings import Finding, Location, Unreadable
 
 
 @dataclass(frozen=True)
@@ -32,3 +32,9 @@ class Rule:
         """Make a finding, with the rule's severity unless another one is given."""
         kept = tuple(islice(places, detail().locations))
         return Finding(self.code, severity or self.severity, message, int(count), kept)
+
+    def unreadable(
+        self, message: str, count: int = 1, places: Iterable[Location] = (), severity: str | None = None
+    ) -> Unreadable:
+        """Make the error that ends the check of a file with such a finding."""
+        return Unreadable(self.finding(message, count, places, severity))

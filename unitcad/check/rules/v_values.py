@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -52,6 +52,11 @@ def not_finite(mesh: Mesh) -> tuple[Finding, ...]:
     places = (Location(face=int(i), object=mesh.name) for i in bad)
     text = counted(len(finite) - int(finite.sum()), "non-finite vertex", "non-finite vertices")
     return ending([V001.finding(text, len(bad) or 1, places)])
+
+
+def faces_not_finite(n: int, places: Iterable[Location]) -> Finding:
+    """Make the finding V001 of a reader, which gives no mesh then."""
+    return V001.finding(f"{counted(n, 'face')} with a vertex that is not finite", n, places)
 
 
 def too_far(corners: Floats, size: Floats) -> list[Finding]:

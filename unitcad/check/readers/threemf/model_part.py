@@ -16,8 +16,8 @@ from unitcad.check.geometry.triangle_mesh import LARGEST
 from unitcad.check.readers.threemf import elements
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Use
 from unitcad.check.readers.threemf.xml_stream import forbidden, new_parser, stream
-from unitcad.check.resource_limits import Limits, Unreadable, over_limit
 from unitcad.check.rules.f_file import F004
+from unitcad.check.rules.f_limits import F011, Limits, Unreadable
 from unitcad.check.rules.p_package import P010, P013, P015, P016, P017, P018
 from unitcad.check.rules.v_values import V001
 from unitcad.geometry.arrays import Floats, Ints
@@ -73,7 +73,7 @@ class _Reader:
         if self.skip:
             self.skip += 1
             if self.skip > _DEPTH:
-                raise over_limit(f"elements nest deeper than {_DEPTH}")
+                raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
             return
         above = self.stack[-1]
         if name == _VERTEX and flat[::2] == _XYZ and above.name == "vertices" and above.space == elements.CORE:
@@ -84,7 +84,7 @@ class _Reader:
                 self._flush_vertices()
             return
         if len(self.stack) > _DEPTH:
-            raise over_limit(f"elements nest deeper than {_DEPTH}")
+            raise F011.unreadable(f"elements nest deeper than {_DEPTH}")
         space, _, local = name.rpartition(" ")
         attributes = dict(zip(flat[::2], flat[1::2], strict=True))
         rules = elements.ELEMENTS.get(space, {}).get(local)
@@ -137,10 +137,8 @@ class _Reader:
             return
         if not parent.name:
             if (space, local) != (elements.CORE, "model"):
-                raise Unreadable(
-                    P017.finding(f"the root is <{local}> in {space or 'no namespace'!r}, not the core's <model>",
-                            places=[Location(part=self.model.part)])
-                )  # fmt: skip
+                raise P017.unreadable(f"the root is <{local}> in {space or 'no namespace'!r}, not the core's <model>",
+                            places=[Location(part=self.model.part)])  # fmt: skip
             return
         if space != parent.space:
             if not space:
@@ -208,7 +206,7 @@ class _Reader:
             self.resource.count += 1
             self.resource.members.append({"": local, **attributes})
             if len(self.resource.members) > self.limits.max_faces:
-                raise over_limit("more properties than --max-faces")
+                raise F011.unreadable("more properties than --max-faces")
 
     def _resource(self, resource: Resource) -> None:
         if resource.id in self.model.resources or resource.id in self.model.foreign:
@@ -253,7 +251,7 @@ class _Reader:
         self.rows.append((*row, self.parser.CurrentLineNumber))
         self.faces += 1
         if self.faces > self.limits.max_faces:
-            raise over_limit(f"more faces than --max-faces {self.limits.max_faces}")
+            raise F011.unreadable(f"more faces than --max-faces {self.limits.max_faces}")
         if len(self.rows) >= _BATCH:
             self._flush_triangles()
 
@@ -275,7 +273,7 @@ class _Reader:
     def _use(self, attributes: dict[str, str]) -> Use:
         self.uses += 1
         if self.uses > self.limits.max_instances:
-            raise over_limit(f"more items and components than the limit of {self.limits.max_instances} instances")
+            raise F011.unreadable(f"more items and components than the limit of {self.limits.max_instances} instances")
         uuid = attributes.get(f"{elements.PRODUCTION} UUID")
         if uuid is not None and not elements.uuid(uuid):
             self.model.say(P017, f"UUID {uuid[:40]!r} is none")
@@ -322,7 +320,7 @@ class _Reader:
         elif local == "ref":
             self.resource.beam_refs.append(int(attributes["index"]))
         if len(self.resource.beams) > self.limits.max_faces:
-            raise over_limit("more beams than --max-faces")
+            raise F011.unreadable("more beams than --max-faces")
 
     def _flush_vertices(self) -> None:
         if not self.numbers:
@@ -341,7 +339,7 @@ class _Reader:
         self.vertices.append(values.reshape(-1, 3))
         self.numbers, self.lines = [], []
         if sum(len(block) for block in self.vertices) > 3 * self.limits.max_faces + 3:
-            raise over_limit("more vertices than three times --max-faces")
+            raise F011.unreadable("more vertices than three times --max-faces")
 
     def _number(self, text: str, line: int) -> float:
         text = text.strip()

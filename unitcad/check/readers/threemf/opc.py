@@ -16,8 +16,8 @@ from urllib.parse import unquote
 
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.readers.threemf.xml_stream import Element, read_small
-from unitcad.check.resource_limits import Deadline, Limits, OutOfTime, Unreadable, over_limit
 from unitcad.check.rules.f_file import F003, F006
+from unitcad.check.rules.f_limits import F011, Deadline, Limits, OutOfTime, Unreadable
 from unitcad.check.rules.p_package import P001, P002, P003, P004, P005, P007, P008
 from unitcad.check.rules.rule import Rule
 
@@ -76,13 +76,13 @@ class Package:
         info = self.parts[name]
         if info.flag_bits & 1 or info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             what = "encrypted" if info.flag_bits & 1 else f"packed with method {info.compress_type}"
-            raise Unreadable(P008.finding(f"{info.filename} is {what}", places=[Location(part=info.filename)]))
+            raise P008.unreadable(f"{info.filename} is {what}", places=[Location(part=info.filename)])
         try:
             with self.archive.open(info) as stream:
                 while piece := stream.read(_CHUNK):
                     self.spent += len(piece)
                     if self.spent > self.limits.max_package_bytes:
-                        raise over_limit(f"the package inflates beyond {self.limits.max_package_bytes} bytes")
+                        raise F011.unreadable(f"the package inflates beyond {self.limits.max_package_bytes} bytes")
                     self.deadline.tick()
                     yield piece
         except (
@@ -95,7 +95,7 @@ class Package:
             ValueError,
         ) as error:
             text = f"{info.filename} cannot be unpacked: {error}"
-            raise Unreadable(F003.finding(text, places=[Location(part=info.filename)])) from error
+            raise F003.unreadable(text, places=[Location(part=info.filename)]) from error
 
     def shown(self, name: str) -> str:
         """Return a part's name as the package writes it; `parts` has it in lower case, since OPC compares names so."""
@@ -162,13 +162,13 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, ValueError, OSError, EOFError, NotImplementedError) as error:
-        raise Unreadable(F003.finding(f"the zip cannot be read: {error}")) from error
+        raise F003.unreadable(f"the zip cannot be read: {error}") from error
     package = Package(archive, limits, deadline, strict=strict)
     if extra := _after_the_end(data):
         package.findings.append(F006.finding(f"{counted(extra, 'byte')} after the zip's end record", extra))
     entries = archive.infolist()
     if len(entries) > limits.max_entries:
-        raise over_limit(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
+        raise F011.unreadable(f"{counted(len(entries), 'zip entry', 'zip entries')}, more than {limits.max_entries}")
     bombs = []
     for info in entries:
         if why := _unsafe(info.filename):

@@ -11,7 +11,7 @@ from unitcad.check.findings import Finding
 from unitcad.check.geometry.source import Source
 from unitcad.check.geometry.triangle_mesh import Mesh
 from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Use
-from unitcad.check.resource_limits import Limits, Unreadable, over_limit
+from unitcad.check.rules.f_limits import F011, Limits
 from unitcad.check.rules.p_package import P009, P012
 from unitcad.geometry.arrays import Floats
 
@@ -45,9 +45,9 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         if model_object is None:
             return 0, 0
         if key in trail:
-            raise Unreadable(P012.finding(f"object {key[1]} contains itself"))
+            raise P012.unreadable(f"object {key[1]} contains itself")
         if len(trail) >= limits.max_depth:
-            raise Unreadable(P009.finding(f"components nest deeper than {limits.max_depth}"))
+            raise P009.unreadable(f"components nest deeper than {limits.max_depth}")
         faces, nodes = (0 if model_object.triangles is None else len(model_object.triangles)), 1
         for use in model_object.components:
             more, below = size(key_of(key[0], use), (*trail, key))
@@ -61,9 +61,9 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         total, nodes = total + faces, nodes + below
     if total > limits.max_faces:
         text = f"{_large(total)} faces in {_large(nodes)} instances, more than --max-faces {limits.max_faces}"
-        raise Unreadable(P009.finding(text))
+        raise P009.unreadable(text)
     if nodes > limits.max_instances:
-        raise over_limit(f"{_large(nodes)} instances, more than the limit of {limits.max_instances}")
+        raise F011.unreadable(f"{_large(nodes)} instances, more than the limit of {limits.max_instances}")
     instances: list[Instance] = []
 
     def place(key: Key, matrix: Floats, depth: int) -> None:

@@ -11,8 +11,8 @@ from unitcad.check.readers.threemf.model_data import Model
 from unitcad.check.readers.threemf.model_part import read_model
 from unitcad.check.readers.threemf.opc import Package, Relation
 from unitcad.check.readers.threemf.placement import Instance, expand
-from unitcad.check.resource_limits import Limits, OutOfTime, Unreadable
 from unitcad.check.rules.f_file import F003
+from unitcad.check.rules.f_limits import Limits, OutOfTime, Unreadable
 from unitcad.check.rules.p_package import P001, P002, P003, P012, P014, P019, P020
 from unitcad.check.rules.rule import Rule
 

@@ -9,8 +9,8 @@ from typing import Any
 from xml.parsers import expat
 
 from unitcad.check.findings import Location
-from unitcad.check.resource_limits import Unreadable, over_limit
 from unitcad.check.rules.f_file import F003, F009
+from unitcad.check.rules.f_limits import F011
 from unitcad.check.rules.p_package import P006
 
 XML_SPACE = "http://www.w3.org/XML/1998/namespace "
@@ -60,7 +60,7 @@ def stream(
     parser = parser or new_parser()
 
     def refuse(*_: object) -> None:
-        raise Unreadable(P006.finding("a document type declaration", places=place))
+        raise P006.unreadable("a document type declaration", places=place)
 
     parser.StartDoctypeDeclHandler = refuse
     parser.EntityDeclHandler = refuse
@@ -81,8 +81,8 @@ def stream(
         reason = expat.ErrorString(error.code)
         at = parser.ErrorByteIndex - seen
         if 0 <= at < len(chunk) and any(byte > 127 for byte in chunk[at : at + 4]):
-            raise Unreadable(F009.finding("bytes that are not UTF-8", places=line, severity="error")) from error
-        raise Unreadable(F003.finding(f"XML not well formed: {reason}", places=line)) from error
+            raise F009.unreadable("bytes that are not UTF-8", places=line, severity="error") from error
+        raise F003.unreadable(f"XML not well formed: {reason}", places=line) from error
 
 
 def _with_head(chunks: Iterable[bytes]) -> Iterator[bytes]:
@@ -102,11 +102,11 @@ def _with_head(chunks: Iterable[bytes]) -> Iterator[bytes]:
 
 def _utf8_only(head: bytes, place: list[Location]) -> None:
     if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:8]:
-        raise Unreadable(F009.finding("UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error"))
+        raise F009.unreadable("UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error")
     match = _ENCODING.match(head)
     if match and match.group(1).lower() != b"utf-8":
         named = match.group(1).decode("ascii", "replace")
-        raise Unreadable(F009.finding(f"encoding {named!r} instead of UTF-8", places=place, severity="error"))
+        raise F009.unreadable(f"encoding {named!r} instead of UTF-8", places=place, severity="error")
 
 
 def forbidden(name: str) -> str | None:
@@ -124,7 +124,7 @@ def read_small(chunks: Iterable[bytes], part: str) -> Element:
 
     def start(name: str, attributes: list[str]) -> None:
         if len(stack) > _DEPTH:
-            raise over_limit(f"{part}: elements nest deeper than {_DEPTH}")
+            raise F011.unreadable(f"{part}: elements nest deeper than {_DEPTH}")
         element = Element(name, dict(zip(attributes[::2], attributes[1::2], strict=True)))
         stack[-1].children.append(element)
         stack.append(element)
@@ -134,7 +134,7 @@ def read_small(chunks: Iterable[bytes], part: str) -> Element:
         for chunk in chunks:
             size += len(chunk)
             if size > _SMALL:
-                raise over_limit(f"{part}: more than {_SMALL} bytes")
+                raise F011.unreadable(f"{part}: more than {_SMALL} bytes")
             yield chunk
 
     stream(bounded(), part, start, lambda _: stack.pop())
