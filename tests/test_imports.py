@@ -127,7 +127,6 @@ def test_the_rooms_of_check_import_one_way() -> None:
         {"threemf_build"},
         {"readers", "one_mesh", "output"},
         {"options"},
-        {"resource_limits"},
         {"rules"},
         {"findings"},
         {"detail", "units"},

@@ -17,9 +17,12 @@ LONG = """
 from unitcad.check.findings import counted
 from unitcad.check.rules.rule import Rule
 
-G999 = Rule(
-    "G999", "warning", "long shell", cause="Two times as long as wide.", example="A rod.", fix="Cut it in two."
-)
+G999 = Rule('''
+    G999 warning: long shell
+    Two times as long as wide.
+    Example: A rod.
+    Fix: Cut it in two.
+''')
 
 
 def check_mesh(part):

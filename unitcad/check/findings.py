@@ -18,6 +18,15 @@ _MOST_CODES = 5
 """Codes that a report's repr lists."""
 
 
+Point = tuple[float, float, float]
+
+
+def point(values: Iterable[SupportsFloat]) -> Point:
+    """Return three coordinates as plain numbers."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
 @dataclass(frozen=True)
 class Location:
     """Where: faces' indices (from 0, file order), a point in mm, a line (from 1), a part of the package, an object.
@@ -29,14 +38,14 @@ class Location:
     """
 
     face: int | None = None
-    xyz: tuple[float, float, float] | None = None
+    xyz: Point | None = None
     line: int | None = None
     part: str | None = None
     object: str | None = None
     faces: tuple[int, ...] = ()
     region: Any = field(default=None, compare=False, repr=False)
     mesh: int | None = field(default=None, compare=False, repr=False)
-    centre: tuple[float, float, float] | None = field(default=None, compare=False, repr=False)
+    centre: Point | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.faces and self.face is None:
@@ -110,7 +119,7 @@ class Facts:
     shells: int | None = None
     volume_mm3: float | None = None
     area_mm2: float | None = None
-    bbox_mm: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+    bbox_mm: tuple[Point, Point] | None = None
     watertight: bool | None = None
 
     def as_dict(self) -> dict[str, Any]:

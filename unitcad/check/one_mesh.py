@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unitcad.check.detail import detail
-from unitcad.check.findings import Facts, Finding, Location, ending
-from unitcad.check.geometry.source import Source
+from unitcad.check.findings import Facts, Finding, Location, ending, point
 from unitcad.check.geometry.topology import topology_of
 from unitcad.check.geometry.triangle_mesh import Mesh, representable
 from unitcad.check.rules import registry
@@ -76,11 +75,10 @@ def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
     meshes = detail().meshes
     if meshes is not None and not any(known is mesh for known in meshes):
         meshes.append(mesh)
-    drawn = tuple(replace(item, locations=tuple(_drawn(place, mesh) for place in item.locations)) for item in findings)
-    source = mesh.source
-    if source is None:
-        return drawn
-    return tuple(replace(item, locations=tuple(_located(place, source) for place in item.locations)) for item in drawn)
+    return tuple(
+        replace(item, locations=tuple(_located(_drawn(place, mesh), mesh) for place in item.locations))
+        for item in findings
+    )
 
 
 def _drawn(place: Location, mesh: Mesh) -> Location:
@@ -89,24 +87,24 @@ def _drawn(place: Location, mesh: Mesh) -> Location:
         return place
     whole, meshes = place.region is not None, detail().meshes
     region = place.region if whole else np.array(place.faces, np.int64)
-    centre = place.xyz
-    if place.centre is not None:
-        centre = place.centre
-    elif len(region) and (whole or len(region) > 1 or centre is None):
+    centre = place.centre or place.xyz
+    if place.centre is None and len(region) and (whole or len(region) > 1 or centre is None):
         low, high = extent(mesh.vertices[mesh.faces[region]].reshape(-1, 3))
-        x, y, z = ((low + high) / 2).tolist()
-        centre = (x, y, z)
+        centre = point((low + high) / 2)
     if meshes is None or (not len(region) and centre is None):
         return replace(place, region=None, centre=centre)
     number = next(i for i, known in enumerate(meshes) if known is mesh)
     return replace(place, region=region, mesh=number, centre=centre)
 
 
-def _located(place: Location, source: Source) -> Location:
+def _located(place: Location, mesh: Mesh) -> Location:
     """Return the location with its triangles' faces, line, part and object as the file has them."""
-    part = place.part or source.part
+    place, source = replace(place, object=place.object or mesh.name), mesh.source
+    if source is None:
+        return place
+    place = replace(place, part=place.part or source.part)
     if place.face is None:
-        return replace(place, part=part)
+        return place
     faces = [face if source.polygons is None else int(source.polygons[face]) for face in place.faces]
     names = dict.fromkeys(name for face in faces if (name := source.object(face)))
     return replace(
@@ -114,6 +112,5 @@ def _located(place: Location, source: Source) -> Location:
         face=faces[0],
         faces=tuple(dict.fromkeys(faces)),
         line=source.line(faces[0]) if place.line is None else place.line,
-        part=part,
         object=place.object or " and ".join(names) or None,
     )

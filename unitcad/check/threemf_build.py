@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.check.findings import Facts, Finding, Location, counted, ending
+from unitcad.check.findings import Facts, Finding, Location, counted, ending, point
 from unitcad.check.geometry.topology import diagonals, topology_of
 from unitcad.check.geometry.triangle_mesh import LARGEST, solid_of
 from unitcad.check.one_mesh import CheckedMesh, check_on_bed, check_surface
@@ -213,8 +213,7 @@ def overlapping(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
                 continue
             if _shared(a, b, some, solids) > _SHARE * least:
                 centre = (np.maximum(low[a], low[b]) + np.minimum(high[a], high[b])) / 2
-                xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
-                places.append(Location(xyz=xyz, object=f"{some[a].name} and {some[b].name}"))
+                places.append(Location(xyz=point(centre), object=f"{some[a].name} and {some[b].name}"))
     except Unreadable as stop:
         stop.findings = (*_overlaps(places, among=True), *stop.findings)
         raise
@@ -267,8 +266,5 @@ def _shifted(findings: Sequence[Finding], by: Floats) -> Iterator[Finding]:
         yield from findings
         return
     for item in findings:
-        places = (
-            replace(place, xyz=tuple(float(v) for v in place.xyz + by)) if place.xyz else place
-            for place in item.locations
-        )
+        places = (replace(place, xyz=point(place.xyz + by)) if place.xyz else place for place in item.locations)
         yield replace(item, locations=tuple(places))

@@ -11,32 +11,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location, counted, number
+from unitcad.check.findings import Finding, counted, number
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.volumes import winding_number
 from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
 
-D004 = Rule(
-    "D004",
-    "warning",
-    "trapped volume",
-    cause="A hollow has no opening, so that support, resin or powder cannot leave it.",
-    example="A hollow ball has no drain.",
-    fix="Open it, or fill it.",
-)
+D004 = Rule("""
+    D004 warning: trapped volume
+    A hollow has no opening, so that support, resin or powder cannot leave it.
+    Example: A hollow ball has no drain.
+    Fix: Open it, or fill it.
+""")
 
-D005 = Rule(
-    "D005",
-    "warning",
-    "not on the bed",
-    cause="The lowest point is not at z = 0, or no flat of the part lies there to stand on.",
-    example="The underside of a part lies at z = 5 mm.",
-    fix="Place the part with a flat on z = 0.",
-)
+D005 = Rule("""
+    D005 warning: not on the bed
+    The lowest point is not at z = 0, or no flat of the part lies there to stand on.
+    Example: The underside of a part lies at z = 5 mm.
+    Fix: Place the part with a flat on z = 0.
+""")
 
 ON_BED = 0.02  # mm; an STL rounds to less, a layer is ten times more
 STAND = 1.0  # mm2 of flat that a part needs to stand on
@@ -71,11 +68,7 @@ def _trapped(topology: Topology) -> Iterator[Finding]:
     places = []
     for i in np.flatnonzero(volumes < 0)[:50]:
         own = topology.shells == i
-        point = vertices[faces[np.argmax(own), 0]]
-        if winding_number(vertices, faces[~own], point) > 0:
-            centre = (low[i] + high[i]) / 2
-            region = topology.kept[own]
-            xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
-            places.append(Location(face=int(region[0]), xyz=xyz, region=region))
+        if winding_number(vertices, faces[~own], vertices[faces[np.argmax(own), 0]]) > 0:
+            places.append(at_region(topology.kept[own], (low[i] + high[i]) / 2))
     if places:
         yield D004.finding(f"{counted(len(places), 'hollow')} without an opening", len(places), places)

@@ -18,6 +18,7 @@ from unitcad.check.geometry.rays import Rays
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import solid_of
 from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Floats, Ints
 from unitcad.geometry.ticks import Tick
@@ -27,18 +28,13 @@ if TYPE_CHECKING:
 
     from unitcad.catalogue import Printer
 
-D002 = Rule(
-    "D002",
-    "warning",
-    "feature below the printer's floor",
-    cause=(
-        "A pin, a tip or a whisker, standing, lying or sticking out, is narrower than the printer's least feature "
-        "in both directions across: it will not be printed. Ribs that are joined to the body along their length "
-        "are none."
-    ),
-    example="A pin of 0.2 mm in diameter.",
-    fix="Make it larger, or leave it out.",
-)
+D002 = Rule("""
+    D002 warning: feature below the printer's floor
+    A pin, a tip or a whisker, standing, lying or sticking out, is narrower than the printer's least feature in both
+    directions across: it will not be printed. Ribs that are joined to the body along their length are none.
+    Example: A pin of 0.2 mm in diameter.
+    Fix: Make it larger, or leave it out.
+""")
 
 _LEVELS = 40
 _GROUPS = 40  # thin places looked at
@@ -100,11 +96,11 @@ def _lying(topology: Topology, solid: Manifold, rays: Rays, least: float, tick: 
         mine = np.flatnonzero(thin & (group == label))
         place = _whisker(vertices, faces[mine], solid, least)
         if place is not None:
-            places.append(Location(face=int(topology.kept[mine[0]]), xyz=place, region=topology.kept[mine]))
+            places.append(at_region(topology.kept[mine], place))
     return places
 
 
-def _whisker(vertices: Floats, faces: Ints, solid: Manifold, least: float) -> tuple[float, float, float] | None:
+def _whisker(vertices: Floats, faces: Ints, solid: Manifold, least: float) -> Floats | None:
     """Return the middle of a face of the patch where the solid, cut across its length, is narrow both ways."""
     corners = vertices[faces]
     sides = corners[:, [1, 2, 0]] - corners
@@ -119,7 +115,7 @@ def _whisker(vertices: Floats, faces: Ints, solid: Manifold, least: float) -> tu
             frame = _frame(along)
             turned = solid.transform(np.column_stack([frame, np.zeros(3)]))
             if all(_narrow_at(turned, frame @ middle, shift, least) for shift in (0, -0.75 * least, 0.75 * least)):
-                return float(middle[0]), float(middle[1]), float(middle[2])
+                return middle
     return None
 
 

@@ -15,22 +15,19 @@ from unitcad.check.findings import Finding, Location, number
 from unitcad.check.geometry.edges import components
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Floats, Ints
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
 
-D003 = Rule(
-    "D003",
-    "warning",
-    "overhang",
-    cause=(
-        "Faces lean out further than the printer can hold without support, and no bridge of its span reaches across."
-    ),
-    example="A level arm reaches 10 mm out of a wall.",
-    fix="Turn the part, chamfer the overhang, or print with support.",
-)
+D003 = Rule("""
+    D003 warning: overhang
+    Faces lean out further than the printer can hold without support, and no bridge of its span reaches across.
+    Example: A level arm reaches 10 mm out of a wall.
+    Fix: Turn the part, chamfer the overhang, or print with support.
+""")
 
 _ANGLES = 16
 _POINTS = 300  # sample points a region
@@ -73,8 +70,7 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
         if _bridged(topology, faces, segments[own], supported[own], printer):
             continue
         centre = mesh.vertices[mesh.faces[faces[0]]].mean(axis=0)
-        xyz = (float(centre[0]), float(centre[1]), float(centre[2]))
-        bad.append((area, Location(face=int(topology.kept[faces[0]]), xyz=xyz, region=topology.kept[faces])))
+        bad.append((area, at_region(topology.kept[faces], centre)))
     if not bad:
         return
     bad.sort(key=lambda item: -item[0])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location, counted, number
+from unitcad.check.findings import Finding, Location, counted, number, point
 from unitcad.check.geometry.edges import components
 from unitcad.check.geometry.rays import SLACK, Rays, cast, lying
 from unitcad.check.geometry.topology import Topology
@@ -22,31 +22,23 @@ from unitcad.geometry.arrays import Floats
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
 
-D001 = Rule(
-    "D001",
-    "warning",
-    "wall below the printer's floor",
-    cause=(
-        "A wall, measured between two faces within 12 degrees of parallel, is thinner than the printer's least "
-        "wall (its least flat wall where the faces lie flat), and reaches farther than that in two directions. "
-        "Bevels, tapered edges and the strips between engraved strokes are no walls."
-    ),
-    example="A wall of 0.3 mm for a printer whose least wall is 0.8 mm.",
-    fix="Thicken the wall.",
-)
+D001 = Rule("""
+    D001 warning: wall below the printer's floor
+    A wall, measured between two faces within 12 degrees of parallel, is thinner than the printer's least wall (its
+    least flat wall where the faces lie flat), and reaches farther than that in two directions. Bevels, tapered edges
+    and the strips between engraved strokes are no walls.
+    Example: A wall of 0.3 mm for a printer whose least wall is 0.8 mm.
+    Fix: Thicken the wall.
+""")
 
-D006 = Rule(
-    "D006",
-    "warning",
-    "gap that the printer closes",
-    cause=(
-        "A gap between two faces within 12 degrees of parallel is narrower than the printer's play (xy_play_mm; "
-        "where the faces lie flat, than a layer, layer_mm), and reaches farther than that in two directions. What "
-        "lies on its two sides is printed as one."
-    ),
-    example="A slot of 0.05 mm lies between a lid and its frame.",
-    fix="Widen the gap, or close it.",
-)
+D006 = Rule("""
+    D006 warning: gap that the printer closes
+    A gap between two faces within 12 degrees of parallel is narrower than the printer's play (xy_play_mm; where the
+    faces lie flat, than a layer, layer_mm), and reaches farther than that in two directions. What lies on its two sides
+    is printed as one.
+    Example: A slot of 0.05 mm lies between a lid and its frame.
+    Fix: Widen the gap, or close it.
+""")
 
 
 def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
@@ -98,9 +90,8 @@ def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float
         if _reach(cloud, bool(level[of[0]])) < upright:
             continue
         worst = mine[np.argmin(thickness[mine])]
-        xyz = tuple(float(v) for v in points[worst])
-        region = topology.kept[np.unique(of)]
-        place = Location(face=int(topology.kept[owner[worst]]), xyz=xyz, region=region)  # type: ignore[arg-type]
+        first, region = int(topology.kept[owner[worst]]), topology.kept[np.unique(of)]
+        place = Location(face=first, xyz=point(points[worst]), region=region)
         here = (float(thickness[worst]), place)
         thinnest[int(wall[label])] = min(here, thinnest.get(int(wall[label]), here), key=lambda item: item[0])
     return sorted(thinnest.values(), key=lambda item: item[0])

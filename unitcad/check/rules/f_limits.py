@@ -10,20 +10,14 @@ from dataclasses import dataclass
 from unitcad.check.findings import Facts, Finding, Unreadable, counted
 from unitcad.check.rules.rule import Rule
 
-F011 = Rule(
-    "F011",
-    "error",
-    "resource limit reached",
-    cause=(
-        "The file asks for more bytes, faces, time or memory than the limits allow, so it was not checked to its "
-        "end. It never passes."
-    ),
-    example="A mesh has 12 million faces, and --max-faces is 10 million.",
-    fix=(
-        "If the file is meant to be so large, raise the limit that the message names: --timeout, --max-faces or "
-        "--memory. Limits without an option, such as 4 GB a file and 100,000 instances of a 3MF, are fixed."
-    ),
-)
+F011 = Rule("""
+    F011 error: resource limit reached
+    The file asks for more bytes, faces, time or memory than the limits allow, so it was not checked to its end. It
+    never passes.
+    Example: A mesh has 12 million faces, and --max-faces is 10 million.
+    Fix: If the file is meant to be so large, raise the limit that the message names: --timeout, --max-faces or
+    --memory. Limits without an option, such as 4 GB a file and 100,000 instances of a 3MF, are fixed.
+""")
 
 
 @dataclass(frozen=True)

@@ -9,75 +9,57 @@ import numpy as np
 from unitcad.check.detail import detail
 from unitcad.check.findings import Finding, Location, counted
 from unitcad.check.geometry.coverings import folded_edges, kinds, through_edges
-from unitcad.check.geometry.edges import Edges, edges_of
+from unitcad.check.geometry.edges import edges_of
 from unitcad.check.geometry.self_crossing import Crossings, Faces, facing, joined
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import float32_step, same_place
 from unitcad.check.geometry.triangles import common_point
 from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.places import at_edges
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Ints
 
-G001 = Rule(
-    "G001",
-    "error",
-    "self-crossing",
-    cause=(
-        "Two faces pass through each other. Decided exactly: touching is not crossing. In a 3MF file a warning, "
-        "since the core specification (4.1) says what is solid."
-    ),
-    example="A bolt passes through a wall and is not united with it.",
-    fix="Unite the bodies with a boolean, or move the surfaces apart.",
-)
+G001 = Rule("""
+    G001 error: self-crossing
+    Two faces pass through each other. Decided exactly: touching is not crossing. In a 3MF file a warning, since the
+    core specification (4.1) says what is solid.
+    Example: A bolt passes through a wall and is not united with it.
+    Fix: Unite the bodies with a boolean, or move the surfaces apart.
+""")
 
-G003 = Rule(
-    "G003",
-    "warning",
-    "shells touch",
-    cause=(
-        "Two shells meet in a point, line or face and do not pass through each other there. What they share is a "
-        "millionth of the smaller one at most; if it is more, G002 says so too. Rounding decides whether they "
-        "print as one."
-    ),
-    example="The tip of a cone meets the top of a box.",
-    fix="Overlap them and unite, or leave a gap.",
-)
+G003 = Rule("""
+    G003 warning: shells touch
+    Two shells meet in a point, line or face and do not pass through each other there. What they share is a millionth of
+    the smaller one at most; if it is more, G002 says so too. Rounding decides whether they print as one.
+    Example: The tip of a cone meets the top of a box.
+    Fix: Overlap them and unite, or leave a gap.
+""")
 
-G004 = Rule(
-    "G004",
-    "warning",
-    "coplanar overlap",
-    cause="Two faces lie in one plane and cover each other in part.",
-    example="A box stands on a larger one: its underside covers a part of the other's top.",
-    fix="Unite the bodies with a boolean.",
-)
+G004 = Rule("""
+    G004 warning: coplanar overlap
+    Two faces lie in one plane and cover each other in part.
+    Example: A box stands on a larger one: its underside covers a part of the other's top.
+    Fix: Unite the bodies with a boolean.
+""")
 
-G008 = Rule(
-    "G008",
-    "error",
-    "shell overlaps itself",
-    cause=(
-        "A shell passes through itself along edges that four or more of its faces share, or two of its faces "
-        "cover each other in one plane and look the same way: its winding number takes another value than 0 and "
-        "1, such as 2 in the middle of a pentagram or -1 in one half of a bow tie. In a 3MF file a warning, since "
-        "the core specification (4.1) says what is solid."
-    ),
-    example="A prism stands on a pentagram that is drawn in one stroke.",
-    fix="Unite the body with itself by a boolean, or correct the outline that it was made from.",
-)
+G008 = Rule("""
+    G008 error: shell overlaps itself
+    A shell passes through itself along edges that four or more of its faces share, or two of its faces cover each other
+    in one plane and look the same way: its winding number takes another value than 0 and 1, such as 2 in the middle of
+    a pentagram or -1 in one half of a bow tie. In a 3MF file a warning, since the core specification (4.1) says what is
+    solid.
+    Example: A prism stands on a pentagram that is drawn in one stroke.
+    Fix: Unite the body with itself by a boolean, or correct the outline that it was made from.
+""")
 
-G009 = Rule(
-    "G009",
-    "error",
-    "wall or gap without thickness",
-    cause=(
-        "Two faces cover each other in one plane and look opposite ways, and they do not belong to two solids "
-        "that lie side by side: a fin, a fold, a crack, or a cavity that reaches the surface. Also where two "
-        "neighbours fold onto each other to within two float32 steps."
-    ),
-    example="A fin is drawn as one surface and exported with both of its sides.",
-    fix="Give the wall or the gap a thickness, or remove both faces.",
-)
+G009 = Rule("""
+    G009 error: wall or gap without thickness
+    Two faces cover each other in one plane and look opposite ways, and they do not belong to two solids that lie side
+    by side: a fin, a fold, a crack, or a cavity that reaches the surface. Also where two neighbours fold onto each
+    other to within two float32 steps.
+    Example: A fin is drawn as one surface and exported with both of its sides.
+    Fix: Give the wall or the gap a thickness, or remove both faces.
+""")
 
 
 _LISTED = 16  # pairs whose places are computed, unless more are kept: some fall together
@@ -158,9 +140,7 @@ def _places(
         first, second = (other, one) if one in named else (one, other)
         named.add(first)
         drawn, centre = region(at) if region else (None, None)
-        by_place[near] = Location(
-            faces=(first, second), xyz=xyz, object=topology.mesh.name, region=drawn, centre=centre
-        )
+        by_place[near] = Location(faces=(first, second), xyz=xyz, region=drawn, centre=centre)
     return sorted(by_place.values(), key=lambda place: place.face or 0)
 
 
@@ -180,11 +160,5 @@ def _along_edges(topology: Topology) -> Iterator[Finding]:
         (G009, folded_edges(mesh.vertices, faces, edges, areas), "at which two faces fold onto each other"),
     ):
         if len(which):
-            places = (_at(topology, kept, edges, i) for i in which.tolist())
+            places = at_edges(mesh.vertices, edges, kept, which)
             yield rule.finding(f"{counted(len(which), 'edge')} {text}", len(which), places)
-
-
-def _at(topology: Topology, kept: Ints, edges: Edges, edge: int) -> Location:
-    vertices = topology.mesh.vertices
-    x, y, z = ((vertices[edges.low[edge]] + vertices[edges.high[edge]]) / 2).tolist()
-    return Location(face=int(kept[edges.order[edges.first[edge]] // 3]), xyz=(x, y, z), object=topology.mesh.name)

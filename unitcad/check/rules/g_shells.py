@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location, counted, number
+from unitcad.check.findings import Finding, Location, counted, number, point
 from unitcad.check.geometry.topology import Topology, diagonals
 from unitcad.check.geometry.triangle_mesh import solid_of
 from unitcad.check.geometry.volumes import winding_number
 from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Bools, Floats, Ints
 from unitcad.geometry.boxes import box_pairs
@@ -20,71 +21,54 @@ from unitcad.geometry.ticks import Interrupted, Tick
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-G002 = Rule(
-    "G002",
-    "error",
-    "shells overlap",
-    cause=(
-        "Two shells share volume: one faces outwards inside the other, or where their faces meet, they share more "
-        "than a millionth of the smaller one. Fill rules decide what is solid, and they differ between slicers. "
-        "In a 3MF file a warning, since the core specification (4.1) says what is solid."
-    ),
-    example="A box lies inside a larger one, and both face outwards.",
-    fix="Unite the bodies with a boolean.",
-)
+G002 = Rule("""
+    G002 error: shells overlap
+    Two shells share volume: one faces outwards inside the other, or where their faces meet, they share more than a
+    millionth of the smaller one. Fill rules decide what is solid, and they differ between slicers. In a 3MF file a
+    warning, since the core specification (4.1) says what is solid.
+    Example: A box lies inside a larger one, and both face outwards.
+    Fix: Unite the bodies with a boolean.
+""")
 
 G005 = Rule(
-    "G005",
-    "warning",
-    "shell count other than expected",
-    cause="The file has more or fewer shells than --shells or the manifest says: a loose chip, or a lost piece.",
-    example="`--shells 1` for a file that holds a part and a chip beside it.",
-    fix="Look for loose pieces.",
+    """
+    G005 warning: shell count other than expected
+    The file has more or fewer shells than --shells or the manifest says: a loose chip, or a lost piece.
+    Example: `--shells 1` for a file that holds a part and a chip beside it.
+    Fix: Look for loose pieces.
+""",
     count_is_size=True,
 )
 
-G006 = Rule(
-    "G006",
-    "warning",
-    "closed cavity",
-    cause=(
-        "A shell lies inside another one and faces inwards: a hollow with no way in or out. Resin and support "
-        "stay inside."
-    ),
-    example="A box has a bubble inside.",
-    fix="Open it, or fill it.",
-)
+G006 = Rule("""
+    G006 warning: closed cavity
+    A shell lies inside another one and faces inwards: a hollow with no way in or out. Resin and support stay inside.
+    Example: A box has a bubble inside.
+    Fix: Open it, or fill it.
+""")
 
-G007 = Rule(
-    "G007",
-    "error",
-    "volume about zero",
-    cause="A shell encloses less than a millionth of its area times its diagonal: a sheet without thickness.",
-    example="A sheet is drawn as two faces back to back.",
-    fix="Give it thickness.",
-)
+G007 = Rule("""
+    G007 error: volume about zero
+    A shell encloses less than a millionth of its area times its diagonal: a sheet without thickness.
+    Example: A sheet is drawn as two faces back to back.
+    Fix: Give it thickness.
+""")
 
-G010 = Rule(
-    "G010",
-    "warning",
-    "speck",
-    cause=(
-        "A closed shell or an instance is less than 0.02 mm across, a tenth of the least feature of the finest "
-        "printer in the catalogue, beside a body of 1 mm or more: what a boolean or a scan left over. No printer "
-        "makes it, and it counts as a shell."
-    ),
-    example="A closed shell of 0.005 mm lies beside a bracket of 40 mm.",
-    fix="Delete it.",
-)
+G010 = Rule("""
+    G010 warning: speck
+    A closed shell or an instance is less than 0.02 mm across, a tenth of the least feature of the finest printer in the
+    catalogue, beside a body of 1 mm or more: what a boolean or a scan left over. No printer makes it, and it counts as
+    a shell.
+    Example: A closed shell of 0.005 mm lies beside a bracket of 40 mm.
+    Fix: Delete it.
+""")
 
-T008 = Rule(
-    "T008",
-    "error",
-    "inverted shell",
-    cause="An outermost shell encloses a negative volume: all its faces point inwards.",
-    example="All faces of a box are flipped.",
-    fix="Flip the normals.",
-)
+T008 = Rule("""
+    T008 error: inverted shell
+    An outermost shell encloses a negative volume: all its faces point inwards.
+    Example: All faces of a box are flipped.
+    Fix: Flip the normals.
+""")
 
 FLAT = 1e-6  # G007: a shell's volume over its area times its diagonal
 SPECK = 0.02  # G010, mm; a tenth of the least feature of the finest printer in the catalogue
@@ -107,7 +91,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     if len(which):
         worst = which[np.argmax(area[which])]
         text = f"volume {number(volumes[worst], 3)} mm3 over {number(area[worst], 3)} mm2 of surface"
-        yield G007.finding(text, len(which), (_where(topology, low, high, i) for i in which.tolist()))
+        yield G007.finding(text, len(which), (_where(topology, i) for i in which.tolist()))
     sound = sound & ~flat
     yield from specks(low, high, sound & (volumes > 0))
     depth, overlaps = np.zeros(n, int), list[tuple[int, int]]()
@@ -125,7 +109,7 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
         (G006, np.flatnonzero(inwards & (depth % 2 == 1)), "closed cavity", "closed cavities"),
     ):
         if len(which) and not (rule is T008 and n == 1 and crossings.crossed):
-            places = (_where(topology, low, high, i) for i in which.tolist())
+            places = (_where(topology, i) for i in which.tolist())
             yield rule.finding(counted(len(which), one, many), len(which), places)
 
 
@@ -143,8 +127,7 @@ def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
     tiny = np.flatnonzero(asked & (side < SPECK))
     if not len(tiny) or side.max() < BODY:
         return []
-    middle = ((low + high) / 2)[tiny].tolist()
-    places = [Location(xyz=(x, y, z)) for x, y, z in middle]
+    places = [Location(xyz=point(middle)) for middle in (low[tiny] + high[tiny]) / 2]
     text = f"{counted(len(tiny), 'speck')}, the largest {number(side[tiny].max(), 3)} mm across"
     return [G010.finding(text, len(tiny), places)]
 
@@ -152,7 +135,7 @@ def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
 def _overlapping(topology: Topology, overlaps: list[tuple[int, int]]) -> list[Finding]:
     if not overlaps:
         return []
-    places = (_where(topology, topology.low, topology.high, *pair) for pair in overlaps)
+    places = (_where(topology, *pair) for pair in overlaps)
     return [G002.finding(f"{counted(len(overlaps), 'pair')} of shells that share volume", len(overlaps), places)]
 
 
@@ -193,12 +176,11 @@ def _relate(
             depth[inner[at]] += winding_number(vertices, faces[groups[outer[at]]], point) != 0
 
 
-def _where(topology: Topology, low: Floats, high: Floats, *shells: int) -> Location:
+def _where(topology: Topology, *shells: int) -> Location:
     """Return the middle of what the boxes of the shells have in common, with all faces of the shells."""
     which = list(shells)
-    x, y, z = ((low[which].max(axis=0) + high[which].min(axis=0)) / 2).tolist()
-    region = topology.kept[np.isin(topology.shells, which)]
-    return Location(face=int(region[0]), xyz=(x, y, z), object=topology.mesh.name, region=region)
+    middle = (topology.low[which].max(axis=0) + topology.high[which].min(axis=0)) / 2
+    return at_region(topology.kept[np.isin(topology.shells, which)], middle)
 
 
 def _faces_by_shell(labels: Ints, n: int) -> list[Ints]:

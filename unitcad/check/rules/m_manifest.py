@@ -11,53 +11,41 @@ from pathlib import Path
 from unitcad.check.findings import FileReport, Finding, counted, number
 from unitcad.check.rules.rule import Rule
 
-M001 = Rule(
-    "M001",
-    "error",
-    "volume differs from the manifest's",
-    cause="The mesh encloses another volume than the manifest or the B-rep says, by more than a thousandth.",
-    example="The manifest says 1200 mm3, the mesh encloses 1180 mm3.",
-    fix="Build again; if it stays, the tessellation is at fault.",
-)
+M001 = Rule("""
+    M001 error: volume differs from the manifest's
+    The mesh encloses another volume than the manifest or the B-rep says, by more than a thousandth.
+    Example: The manifest says 1200 mm3, the mesh encloses 1180 mm3.
+    Fix: Build again; if it stays, the tessellation is at fault.
+""")
 
-M002 = Rule(
-    "M002",
-    "error",
-    "solid count",
-    cause="The file holds another number of solids than the manifest says.",
-    example="The manifest counts one solid, and the file holds two pieces.",
-    fix="Build again; look for loose pieces.",
-)
+M002 = Rule("""
+    M002 error: solid count
+    The file holds another number of solids than the manifest says.
+    Example: The manifest counts one solid, and the file holds two pieces.
+    Fix: Build again; look for loose pieces.
+""")
 
-M003 = Rule(
-    "M003",
-    "error",
-    "hash differs from the manifest's",
-    cause="The file's SHA-256 is not the one in the manifest: it was changed after it was built.",
-    example="Another program opened the file and saved it.",
-    fix="Build again.",
-)
+M003 = Rule("""
+    M003 error: hash differs from the manifest's
+    The file's SHA-256 is not the one in the manifest: it was changed after it was built.
+    Example: Another program opened the file and saved it.
+    Fix: Build again.
+""")
 
-M004 = Rule(
-    "M004",
-    "error",
-    "file and manifest do not name each other",
-    cause="The manifest lists a file that is not there, or does not list the file that was to be compared with it.",
-    example="lid.stl was renamed after the build.",
-    fix="Build again.",
-)
+M004 = Rule("""
+    M004 error: file and manifest do not name each other
+    The manifest lists a file that is not there, or does not list the file that was to be compared with it.
+    Example: lid.stl was renamed after the build.
+    Fix: Build again.
+""")
 
-M005 = Rule(
-    "M005",
-    "error",
-    "path outside the manifest's folder",
-    cause=(
-        "The manifest lists an absolute path, one that climbs with .., or a link that leads out of its folder. "
-        "Such a file is not read."
-    ),
-    example="The manifest lists ../lid.stl.",
-    fix="Keep a build's files in its folder, and list them by paths relative to it.",
-)
+M005 = Rule("""
+    M005 error: path outside the manifest's folder
+    The manifest lists an absolute path, one that climbs with .., or a link that leads out of its folder. Such a file is
+    not read.
+    Example: The manifest lists ../lid.stl.
+    Fix: Keep a build's files in its folder, and list them by paths relative to it.
+""")
 
 VOLUME = 1e-3  # M001: a mesh's share of a B-rep's volume that tessellation may cost
 

@@ -16,26 +16,20 @@ from unitcad.geometry.arrays import extent
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
 
-S001 = Rule(
-    "S001",
-    "warning",
-    "size suggests another unit",
-    cause=(
-        "The largest side is under 1 mm or over 2 m as read: metres or inches were taken for millimetres, or the "
-        "other way round."
-    ),
-    example="A bracket of 40 mm was exported in metres, so that its largest side is 0.04.",
-    fix="Export in millimetres, or say the unit with --unit.",
-)
+S001 = Rule("""
+    S001 warning: size suggests another unit
+    The largest side is under 1 mm or over 2 m as read: metres or inches were taken for millimetres, or the other way
+    round.
+    Example: A bracket of 40 mm was exported in metres, so that its largest side is 0.04.
+    Fix: Export in millimetres, or say the unit with --unit.
+""")
 
-S002 = Rule(
-    "S002",
-    "error",
-    "does not fit the printer",
-    cause="The part is larger than the bed in every attitude about the vertical axis by quarter turns.",
-    example="A plate of 300 mm for a bed of 210 mm.",
-    fix="Turn it, cut it, or choose another printer.",
-)
+S002 = Rule("""
+    S002 error: does not fit the printer
+    The part is larger than the bed in every attitude about the vertical axis by quarter turns.
+    Example: A plate of 300 mm for a bed of 210 mm.
+    Fix: Turn it, cut it, or choose another printer.
+""")
 
 SMALL, LARGE = 1.0, 2000.0  # mm; a printed part lies between
 

@@ -3,151 +3,113 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from fractions import Fraction
 from itertools import chain
 
 import numpy as np
 
-from unitcad.check.findings import Finding, Location, counted
-from unitcad.check.geometry.edges import Edges
+from unitcad.check.findings import Finding, Location, counted, point
+from unitcad.check.geometry.predicates import orient2d
 from unitcad.check.geometry.topology import Topology, diagonals, max_side_squared
 from unitcad.check.geometry.triangle_mesh import Mesh, float32_step, float32_steps
 from unitcad.check.rules.inspection import Inspection
+from unitcad.check.rules.places import at_edges, at_faces
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Bools, Floats, Ints
 
-T001 = Rule(
-    "T001",
-    "error",
-    "boundary edge",
-    cause="An edge has one face only: the surface has a hole, so inside and outside are undefined.",
-    example="A box without its lid has four.",
-    fix="Close the hole in the CAD model; a slicer's repair guesses.",
-)
+T001 = Rule("""
+    T001 error: boundary edge
+    An edge has one face only: the surface has a hole, so inside and outside are undefined.
+    Example: A box without its lid has four.
+    Fix: Close the hole in the CAD model; a slicer's repair guesses.
+""")
 
-T002 = Rule(
-    "T002",
-    "error",
-    "edge with more than two faces, an odd number",
-    cause="Three or five faces meet at an edge: a loose face hangs on the surface.",
-    example="A triangle stands on an edge of a box: three faces meet there.",
-    fix="Remove the inner or hanging face.",
-)
+T002 = Rule("""
+    T002 error: edge with more than two faces, an odd number
+    Three or five faces meet at an edge: a loose face hangs on the surface.
+    Example: A triangle stands on an edge of a box: three faces meet there.
+    Fix: Remove the inner or hanging face.
+""")
 
-T003 = Rule(
-    "T003",
-    "warning",
-    "edge with more than two faces, an even number",
-    cause=(
-        "Two shells meet along an edge. Slicers pair the faces in different ways; shells are counted here with "
-        "the solid between the faces of a pair."
-    ),
-    example="Two boxes share one edge: four faces meet there.",
-    fix="Move the shells apart, or unite them with some overlap.",
-)
+T003 = Rule("""
+    T003 warning: edge with more than two faces, an even number
+    Two shells meet along an edge. Slicers pair the faces in different ways; shells are counted here with the solid
+    between the faces of a pair.
+    Example: Two boxes share one edge: four faces meet there.
+    Fix: Move the shells apart, or unite them with some overlap.
+""")
 
-T004 = Rule(
-    "T004",
-    "warning",
-    "pinch vertex",
-    cause="Two fans of faces share one vertex only: the solid has no thickness there.",
-    example="Two boxes share one corner.",
-    fix="Move the parts apart, or unite them with some overlap.",
-)
+T004 = Rule("""
+    T004 warning: pinch vertex
+    Two fans of faces share one vertex only: the solid has no thickness there.
+    Example: Two boxes share one corner.
+    Fix: Move the parts apart, or unite them with some overlap.
+""")
 
-T005 = Rule(
-    "T005",
-    "error",
-    "T-junction",
-    cause="A vertex lies on an open edge of a face that does not use it: the crack has no width, but it is one.",
-    example="The upper side of a wall is one edge, and the face above has a vertex in the middle of it.",
-    fix="Weld after meshing, or mesh all faces together.",
-)
+T005 = Rule("""
+    T005 error: T-junction
+    A vertex lies on an open edge of a face that does not use it: the crack has no width, but it is one.
+    Example: The upper side of a wall is one edge, and the face above has a vertex in the middle of it.
+    Fix: Weld after meshing, or mesh all faces together.
+""")
 
-T006 = Rule(
-    "T006",
-    "warning",
-    "closed only after welding",
-    cause=(
-        "Edges match only once vertices are joined that are listed apart. Two are joined where they are in one "
-        "place, or where they are nearer than 1e-5 of their own shell's diagonal (or two float32 steps there) and "
-        "than a tenth of the shortest edge at either. So a gap wider than that stays a boundary (T001), no face "
-        "collapses, and other shells of the file have no influence. Crossings, stored normals and slivers are "
-        "checked on the faces as stored."
-    ),
-    example="Two halves of a ball were exported apart, and their rims differ by 0.000001 mm.",
-    fix="Weld vertices at export.",
-)
+T006 = Rule("""
+    T006 warning: closed only after welding
+    Edges match only once vertices are joined that are listed apart. Two are joined where they are in one place, or
+    where they are nearer than 1e-5 of their own shell's diagonal (or two float32 steps there) and than a tenth of the
+    shortest edge at either. So a gap wider than that stays a boundary (T001), no face collapses, and other shells of
+    the file have no influence. Crossings, stored normals and slivers are checked on the faces as stored.
+    Example: Two halves of a ball were exported apart, and their rims differ by 0.000001 mm.
+    Fix: Weld vertices at export.
+""")
 
-T007 = Rule(
-    "T007",
-    "error",
-    "inconsistent winding",
-    cause="Two neighbours run along their common edge in the same direction, so one of them faces inwards.",
-    example="One face of a box is flipped.",
-    fix="Recalculate normals outside.",
-)
+T007 = Rule("""
+    T007 error: inconsistent winding
+    Two neighbours run along their common edge in the same direction, so one of them faces inwards.
+    Example: One face of a box is flipped.
+    Fix: Recalculate normals outside.
+""")
 
-T009 = Rule(
-    "T009",
-    "error",
-    "duplicate face",
-    cause=(
-        "Two faces have the same three vertices. Where two closed shells stand side by side there, they touch "
-        "instead (G003, T003)."
-    ),
-    example="The lid of a box is in the file twice.",
-    fix="Remove one, or both if they face each other.",
-)
+T009 = Rule("""
+    T009 error: duplicate face
+    Two faces have the same three vertices. Where two closed shells stand side by side there, they touch instead (G003,
+    T003).
+    Example: The lid of a box is in the file twice.
+    Fix: Remove one, or both if they face each other.
+""")
 
-T010 = Rule(
-    "T010",
-    "warning",
-    "degenerate face",
-    cause=(
-        "A face uses a vertex twice, or its three vertices lie on one line exactly. Repair programs drop it, and "
-        "open the mesh."
-    ),
-    example="A face has the corners (0, 0, 0), (1, 0, 0) and (2, 0, 0).",
-    fix="Weld and collapse short edges at export.",
-)
+T010 = Rule("""
+    T010 warning: degenerate face
+    A face uses a vertex twice, or its three vertices lie on one line exactly. Repair programs drop it, and open the
+    mesh.
+    Example: A face has the corners (0, 0, 0), (1, 0, 0) and (2, 0, 0).
+    Fix: Weld and collapse short edges at export.
+""")
 
-T011 = Rule(
-    "T011",
-    "warning",
-    "sliver",
-    cause=(
-        "A face is longer than a thousandth of its shell's diagonal but lower than the grid of float32 numbers "
-        "there: its direction is rounding noise, and welding turns it over."
-    ),
-    example="A face is 10 mm long and 0.0000001 mm high.",
-    fix="Mesh with a minimum edge length, or collapse short edges.",
-)
+T011 = Rule("""
+    T011 warning: sliver
+    A face is longer than a thousandth of its shell's diagonal but lower than the grid of float32 numbers there: its
+    direction is rounding noise, and welding turns it over.
+    Example: A face is 10 mm long and 0.0000001 mm high.
+    Fix: Mesh with a minimum edge length, or collapse short edges.
+""")
 
-T012 = Rule(
-    "T012",
-    "info",
-    "unreferenced vertex",
-    cause="A vertex is listed and no face uses it.",
-    example="An OBJ lists nine vertices, and its faces use eight.",
-    fix="Nothing; it costs space only.",
-)
+T012 = Rule("""
+    T012 info: unreferenced vertex
+    A vertex is listed and no face uses it.
+    Example: An OBJ lists nine vertices, and its faces use eight.
+    Fix: Nothing; it costs space only.
+""")
 
-T013 = Rule(
-    "T013",
-    "warning",
-    "stored normals disagree",
-    cause=(
-        "A facet's stored normal differs from the one of its vertices by more than 15 degrees, or is not a "
-        "number. Programs that trust it shade or orient the part wrongly."
-    ),
-    example="A level facet has the stored normal (1, 0, 0).",
-    fix="Write normals from the vertices, or zeros.",
-)
+T013 = Rule("""
+    T013 warning: stored normals disagree
+    A facet's stored normal differs from the one of its vertices by more than 15 degrees, or is not a number. Programs
+    that trust it shade or orient the part wrongly.
+    Example: A level facet has the stored normal (1, 0, 0).
+    Fix: Write normals from the vertices, or zeros.
+""")
 
 SLIVER = 1e-3  # T011: shortest length of a sliver, as part of the diagonal
 NORMAL_COS = float(np.cos(np.radians(15.0)))  # T013
-_EXACT = 2000  # faces looked at with exact arithmetic before the float verdict is taken
 
 
 def check_mesh(part: Inspection) -> Iterator[Finding]:
@@ -164,30 +126,12 @@ def check_mesh(part: Inspection) -> Iterator[Finding]:
     yield from _thin(topology)
     if n := len(topology.pinched):
         text = counted(n, "pinch vertex", "pinch vertices")
-        yield T004.finding(text, n, _points(mesh, mesh.vertices[topology.pinched]))
+        yield T004.finding(text, n, (Location(xyz=point(xyz)) for xyz in mesh.vertices[topology.pinched]))
     if n := len(topology.twice):
-        yield T009.finding(counted(n, "duplicate face"), n, _at_faces(mesh, kept, mesh.faces, topology.twice))
+        yield T009.finding(counted(n, "duplicate face"), n, at_faces(mesh.vertices, mesh.faces, kept, topology.twice))
     if n := len(topology.unbalanced):
         text = f"{counted(n, 'edge')} along which more faces run one way than the other"
-        yield T007.finding(text, n, _at_edges(mesh, edges, kept, topology.unbalanced))
-
-
-def _points(mesh: Mesh, points: Floats) -> Iterator[Location]:
-    for point in points:
-        yield Location(xyz=(float(point[0]), float(point[1]), float(point[2])), object=mesh.name)
-
-
-def _at_faces(mesh: Mesh, kept: Ints, faces: Ints, which: Ints) -> Iterator[Location]:
-    for i in which:
-        centre = mesh.vertices[faces[i]].mean(axis=0)
-        yield Location(face=int(kept[i]), xyz=tuple(float(v) for v in centre), object=mesh.name)  # type: ignore[arg-type]
-
-
-def _at_edges(mesh: Mesh, edges: Edges, kept: Ints, which: Ints) -> Iterator[Location]:
-    for i in which:
-        middle = (mesh.vertices[edges.low[i]] + mesh.vertices[edges.high[i]]) / 2
-        face = int(kept[edges.order[edges.first[i]] // 3])
-        yield Location(face=face, xyz=tuple(float(v) for v in middle), object=mesh.name)  # type: ignore[arg-type]
+        yield T007.finding(text, n, at_edges(mesh.vertices, edges, kept, topology.unbalanced))
 
 
 def _open_edges(topology: Topology) -> Iterator[Finding]:
@@ -197,12 +141,12 @@ def _open_edges(topology: Topology) -> Iterator[Finding]:
         return
     if n := len(opened.shut):
         text = f"{counted(n, 'open edge')} that welding within the tolerance closes"
-        yield T006.finding(text, n, _at_edges(mesh, opened.edges, opened.kept, opened.shut))
+        yield T006.finding(text, n, at_edges(mesh.vertices, opened.edges, opened.kept, opened.shut))
     if len(split := opened.left[opened.split]):
-        places = _at_edges(mesh, topology.edges, topology.kept, split)
+        places = at_edges(mesh.vertices, topology.edges, topology.kept, split)
         yield T005.finding(f"{counted(len(split), 'open edge')} with a vertex in between", len(split), places)
     if n := len(opened.left):
-        places = _at_edges(mesh, topology.edges, topology.kept, opened.left)
+        places = at_edges(mesh.vertices, topology.edges, topology.kept, opened.left)
         yield T001.finding(counted(n, "boundary edge"), n, places)
 
 
@@ -214,7 +158,7 @@ def _many_faces(topology: Topology) -> Iterator[Finding]:
         which = np.flatnonzero((edges.size > 2) & (edges.size % 2 == odd))
         if len(which):
             text = f"{counted(len(which), 'edge')} with more than two faces, an {word} number"
-            yield rule.finding(text, len(which), _at_edges(topology.mesh, edges, topology.kept, which))
+            yield rule.finding(text, len(which), at_edges(topology.mesh.vertices, edges, topology.kept, which))
 
 
 def _thin(topology: Topology) -> Iterator[Finding]:
@@ -231,39 +175,27 @@ def _thin(topology: Topology) -> Iterator[Finding]:
     suspect = np.flatnonzero(double < 8 * max(step, 1e-7 * whole) * whole)
     corners = vertices[faces[suspect]]
     longest = np.sqrt(max_side_squared(corners))
-    flat = _exactly_flat(corners, areas[suspect])
+    flat = _exactly_flat(corners)
     lines = suspect[flat]
     n = len(repeated) + len(lines)
     if n:
-        places = (Location(face=int(i), object=mesh.name) for i in repeated)
+        places = (Location(face=int(i)) for i in repeated)
         text = f"{counted(n, 'face')} without area"
-        yield T010.finding(text, n, chain(places, _at_faces(mesh, kept, faces, lines)))
+        yield T010.finding(text, n, chain(places, at_faces(vertices, faces, kept, lines)))
     height = np.sqrt(np.einsum("ij,ij->i", areas[suspect], areas[suspect])) / np.maximum(longest, 1e-300)
     thin = suspect[~flat & (height < float32_steps(corners)) & (longest > SLIVER * size[suspect])]
     if len(thin):
-        yield T011.finding(counted(len(thin), "sliver"), len(thin), _at_faces(mesh, kept, faces, thin))
+        yield T011.finding(counted(len(thin), "sliver"), len(thin), at_faces(vertices, faces, kept, thin))
 
 
-def _exactly_flat(corners: Floats, double: Floats) -> Bools:
-    """Return whether three points lie on one line: the float answer where its error bound decides, fractions on the
-    rest.
-    """
-    first = np.abs(corners[:, 1] - corners[:, 0])
-    second = np.abs(corners[:, 2] - corners[:, 0])
-    bound = 8 * np.finfo(float).eps * (_abs_cross(first, second) + np.abs(corners).max(axis=(1, 2), initial=0)[:, None]
-                                       * (first + second + second[:, [1, 2, 0]] + first[:, [1, 2, 0]]))  # fmt: skip
-    maybe = (np.abs(double) <= bound).all(axis=1)
-    for i in np.flatnonzero(maybe)[:_EXACT]:
-        a, b, c = ([Fraction(float(v)) for v in point] for point in corners[i])
-        u = [q - p for p, q in zip(a, b, strict=True)]
-        v = [q - p for p, q in zip(a, c, strict=True)]
-        maybe[i] = all(u[j] * v[k] == u[k] * v[j] for j, k in ((0, 1), (1, 2), (2, 0)))
-    return maybe
-
-
-def _abs_cross(a: Floats, b: Floats) -> Floats:
-    pairs = ((1, 2), (2, 0), (0, 1))
-    return np.stack([a[:, i] * b[:, j] + a[:, j] * b[:, i] for i, j in pairs], axis=1)
+def _exactly_flat(corners: Floats) -> Bools:
+    """Return whether the corners of each face (n, 3, 3) lie on one line: seen along no axis do they have an area."""
+    flat = np.ones(len(corners), bool)
+    for axis in range(3):
+        left = np.flatnonzero(flat)
+        plan = np.delete(corners[left], axis, axis=2)
+        flat[left] = orient2d(plan[:, 0], plan[:, 1], plan[:, 2]) == 0
+    return flat
 
 
 def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats) -> Iterator[Finding]:
@@ -282,4 +214,4 @@ def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats) -> I
     wrong = off[(sound & (lengths[off] > 0)) | ~np.isfinite(lengths[off])]
     if len(wrong):
         text = f"{counted(len(wrong), 'stored normal')} unlike the face's own"
-        yield T013.finding(text, len(wrong), (Location(face=int(kept[i]), object=mesh.name) for i in wrong))
+        yield T013.finding(text, len(wrong), (Location(face=int(kept[i])) for i in wrong))

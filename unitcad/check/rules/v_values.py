@@ -13,26 +13,20 @@ from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Floats
 
-V001 = Rule(
-    "V001",
-    "error",
-    "NaN or infinity",
-    cause="A vertex is not a finite float32 number.",
-    example="A vertex lies at (nan, 0, 0).",
-    fix="Find the operation that divided by zero, and export again.",
-)
+V001 = Rule("""
+    V001 error: NaN or infinity
+    A vertex is not a finite float32 number.
+    Example: A vertex lies at (nan, 0, 0).
+    Fix: Find the operation that divided by zero, and export again.
+""")
 
-V002 = Rule(
-    "V002",
-    "warning",
-    "beyond float32 precision at this size",
-    cause=(
-        "The grid of float32 numbers at a shell's farthest coordinate is coarser than a ten-thousandth of the "
-        "shell's diagonal: it lies too far from the origin."
-    ),
-    example="A part of 10 mm lies 100 m from the origin, where float32 numbers are 0.008 mm apart.",
-    fix="Move the part to the origin before export.",
-)
+V002 = Rule("""
+    V002 warning: beyond float32 precision at this size
+    The grid of float32 numbers at a shell's farthest coordinate is coarser than a ten-thousandth of the shell's
+    diagonal: it lies too far from the origin.
+    Example: A part of 10 mm lies 100 m from the origin, where float32 numbers are 0.008 mm apart.
+    Fix: Move the part to the origin before export.
+""")
 
 FAR = 1e-4  # V002: float32 step over the diagonal
 
@@ -49,7 +43,7 @@ def not_finite(mesh: Mesh) -> tuple[Finding, ...]:
     if finite.all():
         return ()
     bad = np.flatnonzero(~finite[mesh.faces].all(axis=1))
-    places = (Location(face=int(i), object=mesh.name) for i in bad)
+    places = (Location(face=int(i)) for i in bad)
     text = counted(len(finite) - int(finite.sum()), "non-finite vertex", "non-finite vertices")
     return ending([V001.finding(text, len(bad) or 1, places)])
 
