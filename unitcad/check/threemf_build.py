@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,17 +19,16 @@ from unitcad.check.geometry.triangle_mesh import LARGEST, solid_of
 from unitcad.check.one_mesh import CheckedMesh, check_on_bed, check_surface
 from unitcad.check.options import Options
 from unitcad.check.readers.threemf import elements
-from unitcad.check.readers.threemf.model_data import Model, Object
 from unitcad.check.readers.threemf.opc import Package, open_package
-from unitcad.check.readers.threemf.placement import Instance, Key, mesh_of
+from unitcad.check.readers.threemf.placement import Instance, Key
 from unitcad.check.readers.threemf.read_3mf import Build, read_build
+from unitcad.check.readers.threemf.references import SOLID
 from unitcad.check.rules import g_shells, s_scale, v_values
 from unitcad.check.rules.f_limits import Deadline, Unreadable, keeping
 from unitcad.check.rules.g_shells import G002
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.v_values import V001
-from unitcad.check.units import UNITS_MM
-from unitcad.geometry.arrays import Floats, Ints, cross, extent
+from unitcad.geometry.arrays import Floats, cross, extent
 from unitcad.geometry.boxes import box_pairs
 
 if TYPE_CHECKING:
@@ -75,100 +75,69 @@ class _Turned:
     scale: float
 
 
-def _turned(model_object: Object, linear: Floats, factor: float) -> _Turned:
+def _turned(instance: Instance) -> _Turned:
     """Measure once for all instances that differ by a shift: adding it to the box rounds as it does every vertex."""
-    assert model_object.vertices is not None
-    assert model_object.triangles is not None
+    linear = instance.matrix[:3]
     with np.errstate(all="ignore"):
-        points = (model_object.vertices @ linear) * factor
-        a, b, c = (points[model_object.triangles[:, i]] for i in range(3))
+        points = (instance.triangles.vertices @ linear) * instance.unit_mm
+        a, b, c = (points[instance.triangles.rows[:, i]] for i in range(3))
         area = float(np.linalg.norm(cross(b - a, c - a), axis=1).sum()) / 2
         return _Turned(np.stack(extent(points)), area, abs(float(np.linalg.det(linear))))
 
 
 def _geometry(
-    build: Build, options: Options, deadline: Deadline, findings: list[Finding]
-) -> tuple[list[Finding], Facts]:
+    build: Build | None, options: Options, deadline: Deadline, findings: list[Finding]
+) -> tuple[Sequence[Finding], Facts]:
     """Add what the geometry rules find in the objects that are built, and in their instances beside each other."""
-    models, instances = build.models, build.instances
+    if build is None or any(item.code in ("P011", "V001", "F004") for item in findings):
+        return ending(findings), Facts()
+    instances = [instance for instance in build.instances if len(instance.triangles.rows)]
+    if not instances:
+        return ending(findings), Facts(triangles=0, vertices=0, shells=0)
     checked: dict[Key, CheckedMesh] = {}
     turned: dict[tuple[Key, bytes], _Turned] = {}
-    broken = any(item.code in ("P011", "V001", "F004") for item in findings)
-    if broken or not models:
-        return list(ending(findings)), Facts()
-    boxes, shifts, placed = list[Floats](), list[Floats](), list[int]()
-    triangles = vertices = shells = 0
-    volume = area = 0.0
-    watertight = known = bool(instances)
-    compared, solids = options.cross and len(instances) > 1, list[Placed]()
     for instance in instances:
-        model_object = models[instance.key[0]].resources[instance.key[1]]
-        assert isinstance(model_object, Object)
-        assert model_object.vertices is not None
-        assert model_object.triangles is not None
-        if not len(model_object.triangles):
-            continue
-        factor = UNITS_MM.get(models[instance.key[0]].unit, 1.0)
         if instance.key not in checked:
-            checked[instance.key] = _check_object(model_object, instance.key[0], factor, options, deadline)
+            checked[instance.key] = _check_object(instance, options, deadline)
             findings += checked[instance.key].findings
-        facts = checked[instance.key].facts
-        linear = instance.key, instance.matrix[:3].tobytes()
-        if linear not in turned:
-            turned[linear] = _turned(model_object, instance.matrix[:3], factor)
-        one = turned[linear]
-        boxes.append(one.box)
-        shifts.append(instance.matrix[3] * factor)
-        placed.append(model_object.id)
-        triangles += facts.triangles or 0
-        vertices += facts.vertices or 0
-        shells += facts.shells or 0
-        size = (facts.volume_mm3 or 0.0) * one.scale
-        volume += size
-        area += one.area
-        watertight = watertight and bool(facts.watertight)
-        known = known and facts.volume_mm3 is not None
-        if compared and facts.watertight and size > 0 and len(solids) <= MOST:
-            with np.errstate(all="ignore"):
-                mesh = mesh_of(model_object, instance.key[0], factor, instance.matrix)
-            solids.append(Placed(mesh.vertices, mesh.faces, size, str(model_object.id)))
+        if instance.linear not in turned:
+            turned[instance.linear] = _turned(instance)
         deadline.tick()
-    if not triangles:
-        return list(ending(findings)), Facts(triangles=0, vertices=vertices, shells=0)
+    each = [(checked[instance.key].facts, turned[instance.linear]) for instance in instances]
+    boxes = np.stack([one.box for _, one in each])
     with np.errstate(all="ignore"):
-        corners = np.stack(boxes) + np.stack(shifts)[:, None]
+        corners = boxes + np.stack([instance.shift for instance in instances])[:, None]
     beyond = ~(np.abs(corners) <= LARGEST).all(axis=(1, 2))
     if beyond.any():
-        worst = placed[int(beyond.argmax())]
+        worst = instances[int(beyond.argmax())].object.id
         findings.append(V001.finding(f"an instance of object {worst} reaches beyond the float32 numbers"))
-        return list(ending(findings)), Facts()
-    findings += v_values.too_far(corners, diagonals(*np.swapaxes(np.stack(boxes), 0, 1)))
+        return ending(findings), Facts()
+    findings += v_values.too_far(corners, diagonals(boxes[:, 0], boxes[:, 1]))
     findings += g_shells.specks(corners[:, 0], corners[:, 1], np.ones(len(corners), bool))
-    low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
-    facts = Facts(
-        triangles,
-        vertices,
-        shells,
-        volume if known else None,
-        area,
-        (tuple(low.tolist()), tuple(high.tolist())),
-        watertight,
+    volumes = [(facts.volume_mm3 or 0.0) * one.scale for facts, one in each]
+    whole = Facts(
+        triangles=sum(facts.triangles or 0 for facts, _ in each),
+        vertices=sum(facts.vertices or 0 for facts, _ in each),
+        shells=sum(facts.shells or 0 for facts, _ in each),
+        volume_mm3=sum(volumes) if all(facts.volume_mm3 is not None for facts, _ in each) else None,
+        area_mm2=sum(one.area for _, one in each),
+        bbox_mm=(point(corners[:, 0].min(axis=0)), point(corners[:, 1].max(axis=0))),
+        watertight=all(facts.watertight for facts, _ in each),
     )
-    findings += overlapping(solids, deadline)
-    findings += s_scale.likely_unit(facts, next(iter(models.values())).unit)
-    findings += g_shells.expected(shells, options.shells)
+    if options.cross:
+        solids = ((facts.watertight and volume > 0) for (facts, _), volume in zip(each, volumes, strict=True))
+        findings += overlapping(list(compress(zip(instances, volumes, strict=True), solids)), deadline)
+    findings += s_scale.likely_unit(whole, build.unit)
+    findings += g_shells.expected(whole.shells, options.shells)
     if options.printer is not None:
-        findings += printed(models, instances, options.printer, deadline)
-    return findings, facts
+        findings += printed(instances, options.printer, deadline)
+    return findings, whole
 
 
-def _check_object(model_object: Object, part: str, factor: float, options: Options, deadline: Deadline) -> CheckedMesh:
-    """Return the geometry rules for one object; only model and solidsupport objects must be solids, unless slices stand
-    in.
-    """
-    mesh = mesh_of(model_object, part, factor)
-    stand_in = model_object.attributes.get(f"{elements.SLICE} meshresolution") == "lowres"
-    if model_object.type not in ("model", "solidsupport") or stand_in:
+def _check_object(instance: Instance, options: Options, deadline: Deadline) -> CheckedMesh:
+    """Apply the geometry rules to one object, if it must be a solid and no slices stand in for its mesh."""
+    mesh, one = instance.mesh(placed=False), instance.object
+    if one.type not in SOLID or one.attributes.get(f"{elements.SLICE} meshresolution") == "lowres":
         return CheckedMesh((), Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices)))
     with keeping(change=_filled):
         checked = check_surface(mesh, deadline, cross=options.cross)
@@ -184,40 +153,32 @@ def _filled(findings: Iterable[Finding]) -> Iterator[Finding]:
             yield item
 
 
-@dataclass(frozen=True)
-class Placed:
-    """A sound solid in its place: vertices (n, 3) mm, faces (m, 3) outwards, volume mm3, its object's id."""
-
-    vertices: Floats
-    faces: Ints
-    volume: float
-    name: str
-
-
-def overlapping(placed: Sequence[Placed], deadline: Deadline) -> list[Finding]:
-    """Apply G002, as a warning, to pairs that share volume, by manifold3d's boolean of those whose boxes do."""
-    some = placed[:MOST]
-    if len(some) < 2:
+def overlapping(solids: Sequence[tuple[Instance, float]], deadline: Deadline) -> list[Finding]:
+    """Apply G002, as a warning, to pairs of sound solids that share volume, mm3 each, by manifold3d's boolean."""
+    meshes = [instance.mesh(placed=True) for instance, _ in solids[:MOST]]
+    if len(meshes) < 2:
         return []
-    boxes = [extent(solid.vertices) for solid in some]
-    low, high = np.array([box[0] for box in boxes]), np.array([box[1] for box in boxes])
-    solids: dict[int, Manifold] = {}
+    boxes = np.array([extent(mesh.vertices) for mesh in meshes])
+    low, high = boxes[:, 0], boxes[:, 1]
+    made: dict[int, Manifold] = {}
     places: list[Location] = []
     pairs = box_pairs(low, high, deadline.tick)
     try:
         for a, b in pairs[:_PAIRS].tolist():
             deadline.tick()
-            least = min(some[a].volume, some[b].volume)
-            room = float(np.prod(np.minimum(high[a], high[b]) - np.maximum(low[a], low[b])))
-            if room <= _SHARE * least:
+            least = _SHARE * min(solids[a][1], solids[b][1])
+            inner, outer = np.maximum(low[a], low[b]), np.minimum(high[a], high[b])
+            if float(np.prod(outer - inner)) <= least:
                 continue
-            if _shared(a, b, some, solids) > _SHARE * least:
-                centre = (np.maximum(low[a], low[b]) + np.minimum(high[a], high[b])) / 2
-                places.append(Location(xyz=point(centre), object=f"{some[a].name} and {some[b].name}"))
+            for i in {a, b} - made.keys():
+                made[i] = solid_of(meshes[i].vertices, meshes[i].faces)
+            if (made[a] ^ made[b]).volume() > least:  # 0 where manifold3d refuses one, whose faults are reported
+                names = f"{solids[a][0].object.id} and {solids[b][0].object.id}"
+                places.append(Location(xyz=point((inner + outer) / 2), object=names))
     except Unreadable as stop:
         stop.findings = (*_overlaps(places, among=True), *stop.findings)
         raise
-    return _overlaps(places, among=len(placed) > MOST or len(pairs) > _PAIRS)
+    return _overlaps(places, among=len(solids) > MOST or len(pairs) > _PAIRS)
 
 
 def _overlaps(places: list[Location], *, among: bool) -> list[Finding]:
@@ -227,36 +188,21 @@ def _overlaps(places: list[Location], *, among: bool) -> list[Finding]:
     return [G002.finding(f"{text} (3MF's fill rule says what is solid)", len(places), places, "warning")]
 
 
-def _shared(a: int, b: int, some: Sequence[Placed], solids: dict[int, Manifold]) -> float:
-    """Return the volume that two share, mm3; 0 where manifold3d refuses one (its own faults are reported)."""
-    for i in (a, b):
-        if i not in solids:
-            solids[i] = solid_of(some[i].vertices, some[i].faces)
-    return (solids[a] ^ solids[b]).volume()
-
-
-def printed(
-    models: dict[str, Model], instances: Sequence[Instance], printer: Printer, deadline: Deadline
-) -> list[Finding]:
-    """Apply the printer's rules to each instance; those that differ by their place on the bed alone are
-    checked once.
-    """
+def printed(instances: Sequence[Instance], printer: Printer, deadline: Deadline) -> list[Finding]:
+    """Apply the printer's rules to instances; those that differ by their place on the bed alone are checked once."""
     findings: list[Finding] = []
     checked: dict[tuple[Key, bytes, float], tuple[Floats, tuple[Finding, ...]]] = {}
     for instance in instances:
-        model_object = models[instance.key[0]].resources[instance.key[1]]
-        assert isinstance(model_object, Object)
-        if model_object.type != "model" or model_object.triangles is None or not len(model_object.triangles):
+        if instance.object.type != "model":
             continue
-        factor = UNITS_MM.get(models[instance.key[0]].unit, 1.0)
-        alike = instance.key, instance.matrix[:3].tobytes(), float(instance.matrix[3, 2])
+        alike = *instance.linear, float(instance.matrix[3, 2])
         if alike not in checked:
-            mesh = mesh_of(model_object, instance.key[0], factor, instance.matrix)
+            mesh = instance.mesh(placed=True)
             with keeping(findings):
                 part = Inspection(mesh, topology_of(mesh, deadline.tick), deadline.tick)
-                checked[alike] = instance.matrix[3], check_on_bed(part, printer)
+                checked[alike] = instance.shift, check_on_bed(part, printer)
         begin, of = checked[alike]
-        findings += _shifted(of, (instance.matrix[3] - begin) * factor)
+        findings += _shifted(of, instance.shift - begin)
     return findings
 
 

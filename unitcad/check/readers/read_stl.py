@@ -18,7 +18,7 @@ from unitcad.check.geometry.triangle_mesh import Mesh, weld_exact
 from unitcad.check.readers import rows
 from unitcad.check.readers.rows import NUMBER
 from unitcad.check.rules.f_file import F001, F002, F003, F005, F006, F007, F008, F009, F010, not_a_number
-from unitcad.check.rules.f_limits import Deadline, Limits, Unreadable
+from unitcad.check.rules.f_limits import F011, Deadline, Limits, Unreadable
 from unitcad.check.rules.rule import Rule
 from unitcad.check.rules.v_values import faces_not_finite
 from unitcad.geometry.arrays import Floats
@@ -205,7 +205,8 @@ def _facets(raw: bytes, at: int, state: _Text, limits: Limits, deadline: Deadlin
 
 def _take(block: bytes, tokens: list[bytes], state: _Text, limits: Limits) -> None:
     blocks = len(tokens) // _TOKENS
-    limits.check_faces(state.facets + blocks)
+    if state.facets + blocks > limits.max_faces:
+        raise F011.unreadable(f"more faces than --max-faces {limits.max_faces}")
     columns = []
     plain = block.isascii() and b"_" not in block  # numpy takes 1_0 for ten, as Python does
     for column in _NUMBERS:

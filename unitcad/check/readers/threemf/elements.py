@@ -6,7 +6,7 @@ Core 1.3, materials 1.2, production 1.1, slice 1.0, beam lattice 1.2, written fr
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
@@ -28,73 +28,46 @@ KNOWN = {CORE, MATERIAL, PRODUCTION, SLICE, BEAM, BALLS, TRIANGLE_SETS, BOOLEAN,
 KNOWN |= {OLD_DISPLACEMENT, ALTERNATIVES, VOLUMETRIC, IMPLICIT}
 
 UNITS = ("micron", "millimeter", "centimeter", "inch", "foot", "meter")
-_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-_number = re.compile(_NUMBER, re.ASCII)
-_integer = re.compile(r"\+?\d{1,12}", re.ASCII)
-_color = re.compile(r"#(?:[0-9A-Fa-f]{6}|[0-9A-Fa-f]{8})", re.ASCII)
-_uuid = re.compile(r"[0-9a-fA-F]{8}(?:-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}", re.ASCII)
 _LIMIT = 2**31
-Test = Callable[[str], bool]
+Test = Callable[[str], object]
+"""Whether an attribute's text is of its type, as the 3MF schemas name it, by truth."""
 
 
-def number(text: str) -> bool:
-    """Test for ST_Number."""
-    return _number.fullmatch(text.strip()) is not None
+def _pattern(pattern: str) -> Test:
+    return re.compile(pattern, re.ASCII).fullmatch
+
+
+number = _pattern(r"\s*[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?\s*")
+boolean = _pattern(r"\s*(?:true|false|0|1)\s*")
+uuid = _pattern(r"\s*[0-9a-fA-F]{8}(?:-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}\s*")
+color = _pattern(r"#(?:[0-9A-Fa-f]{6}|[0-9A-Fa-f]{8})")
+part_name = _pattern(r"(?s:/.*)")
+text = _pattern(r"(?s:.*)")
+_integer = _pattern(r"\s*\+?\d{1,12}\s*")
 
 
 def positive(text: str) -> bool:
     """Test for ST_PositiveNumber."""
-    return number(text) and float(text) >= 0
-
-
-def resource_id(text: str) -> bool:
-    """Test for ST_ResourceID: 1 to 2^31 - 1."""
-    return _integer.fullmatch(text.strip()) is not None and 0 < int(text) < _LIMIT
+    return bool(number(text)) and float(text) >= 0
 
 
 def index(text: str) -> bool:
     """Test for ST_ResourceIndex: 0 to 2^31 - 1."""
-    return _integer.fullmatch(text.strip()) is not None and int(text) < _LIMIT
+    return bool(_integer(text)) and int(text) < _LIMIT
 
 
-def matrix(text: str) -> bool:
-    """Test for ST_Matrix3D: twelve numbers."""
-    parts = text.split()
-    return len(parts) == 12 and all(number(part) for part in parts)
-
-
-def color(text: str) -> bool:
-    """Test for ST_ColorValue."""
-    return _color.fullmatch(text) is not None
-
-
-def boolean(text: str) -> bool:
-    """Test for xs:boolean."""
-    return text.strip() in ("true", "false", "0", "1")
-
-
-def part_name(text: str) -> bool:
-    """Test for ST_UriReference: an absolute part name."""
-    return text.startswith("/")
-
-
-def uuid(text: str) -> bool:
-    """Test for ST_UUID of the production extension."""
-    return _uuid.fullmatch(text.strip()) is not None
-
-
-def text(_: str) -> bool:
-    """Test for xs:string, which any text is."""
-    return True
+def resource_id(text: str) -> bool:
+    """Test for ST_ResourceID: 1 to 2^31 - 1."""
+    return index(text) and int(text) > 0
 
 
 def one_of(*values: str) -> Test:
-    """Return an enumeration."""
+    """Return the test of an enumeration."""
     return lambda text: text in values
 
 
 def many(test: Test) -> Test:
-    """Return a space-separated list, at least one."""
+    """Return the test of a space-separated list, at least one."""
     return lambda text: bool(text.split()) and all(test(part) for part in text.split())
 
 
@@ -102,8 +75,8 @@ def many(test: Test) -> Test:
 class ElementSchema:
     """What one element must and may have; `children` are (name, least, most) in order; `open_`: foreign attributes."""
 
-    required: dict[str, Test] = field(default_factory=dict)
-    optional: dict[str, Test] = field(default_factory=dict)
+    required: Mapping[str, Test] = field(default_factory=dict)
+    optional: Mapping[str, Test] = field(default_factory=dict)
     children: tuple[tuple[str, int, int], ...] = ()
     ordered: bool = True
     open_: bool = True

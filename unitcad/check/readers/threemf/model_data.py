@@ -38,16 +38,20 @@ class Use:
     line: int | None = None
 
 
+@dataclass(frozen=True)
+class Triangles:
+    """An object's mesh: vertices (n, 3) and rows (m, 8) of v1 v2 v3 p1 p2 p3 pid line, -1 for what is not there."""
+
+    vertices: Floats
+    rows: Ints
+
+
 @dataclass
 class Object(Resource):
-    """An object: a mesh (vertices (n, 3), triangles (m, 8)) or components.
-
-    A triangle's row is v1 v2 v3 p1 p2 p3 pid line, -1 for what is not there.
-    """
+    """An object: a mesh or components."""
 
     type: str = "model"
-    vertices: Floats | None = None
-    triangles: Ints | None = None
+    mesh: Triangles | None = None
     components: list[Use] = field(default_factory=list)
     lattice: dict[str, str] | None = None
     beams: list[dict[str, str]] = field(default_factory=list)
@@ -86,4 +90,4 @@ class Model:
 
     def objects(self) -> dict[int, Object]:
         """Return the object resources by id."""
-        return {id_: found for id_, found in self.resources.items() if isinstance(found, Object)}
+        return {id_: resource for id_, resource in self.resources.items() if isinstance(resource, Object)}

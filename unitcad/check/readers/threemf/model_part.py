@@ -14,9 +14,9 @@ import numpy as np
 from unitcad.check.findings import Location
 from unitcad.check.geometry.triangle_mesh import LARGEST
 from unitcad.check.readers.threemf import elements
-from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Use
+from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.check.readers.threemf.xml_stream import forbidden, new_parser, stream
-from unitcad.check.rules.f_file import F004
+from unitcad.check.rules.f_file import F004, not_a_number
 from unitcad.check.rules.f_limits import F011, Limits, Unreadable
 from unitcad.check.rules.p_package import P010, P013, P015, P016, P017, P018
 from unitcad.check.rules.v_values import V001
@@ -58,8 +58,8 @@ class _Reader:
         self.numbers: list[str] = []
         self.lines: list[int] = []
         self.vertices: list[Floats] = []
-        self.rows: list[tuple[int, ...]] = []
-        self.triangles: list[Ints] = []
+        self.triangles: list[tuple[int, ...]] = []
+        self.rows: list[Ints] = []
         self.text: dict[str, str] = {}
 
     def _where(self) -> Location:
@@ -93,7 +93,8 @@ class _Reader:
             if space in _SHAPES and isinstance(self.resource, Object):
                 self.resource.other_shape = True
             if self.stack[-1].name == "resources" and attributes.get("id", "").isdecimal():
-                self._foreign(int(attributes["id"]))
+                self._once(int(attributes["id"]))
+                self.model.foreign.add(int(attributes["id"]))
             for attribute in attributes:
                 if why := forbidden(attribute):
                     self.model.say(P017, f"{why} in <{local}>")
@@ -130,7 +131,7 @@ class _Reader:
         return isinstance(self.resource, Object) and self.resource.lattice is not None
 
     def _child(self, space: str, local: str, rules: elements.ElementSchema | None) -> None:
-        """Return whether this child may stand here, and in this order."""
+        """Check that this child may stand here, and in this order."""
         parent = self.stack[-1]
         if parent is _LEAF:
             self.model.say(P017, f"<{local}> inside <vertex>")
@@ -163,7 +164,7 @@ class _Reader:
             self.model.say(P017, f"<{local}> inside <{parent.name}>")
 
     def _attributes(self, local: str, rules: elements.ElementSchema, attributes: dict[str, str]) -> bool:
-        """Check them; whether all required ones are there and well typed."""
+        """Check them; return whether all required ones are there and well typed."""
         good = True
         for name in rules.required:
             if name not in attributes:
@@ -185,11 +186,6 @@ class _Reader:
                 self.model.say(P017, f"attribute {name.split()[-1]!r} of <{local}>, which takes none of others")
         return good
 
-    def _foreign(self, id_: int) -> None:
-        if id_ in self.model.resources or id_ in self.model.foreign:
-            self.model.say(P018, f"id {id_} twice")
-        self.model.foreign.add(id_)
-
     def _take(self, space: str, local: str, attributes: dict[str, str]) -> None:
         """Keep what the element says."""
         parent = self.stack[-2].name
@@ -208,9 +204,12 @@ class _Reader:
             if len(self.resource.members) > self.limits.max_faces:
                 raise F011.unreadable("more properties than --max-faces")
 
+    def _once(self, id_: int) -> None:
+        if id_ in self.model.resources or id_ in self.model.foreign:
+            self.model.say(P018, f"id {id_} twice")
+
     def _resource(self, resource: Resource) -> None:
-        if resource.id in self.model.resources or resource.id in self.model.foreign:
-            self.model.say(P018, f"id {resource.id} twice")
+        self._once(resource.id)
         resource.line = self.parser.CurrentLineNumber
         self.model.resources.setdefault(resource.id, resource)
         self.resource = resource
@@ -239,20 +238,17 @@ class _Reader:
                 self.model.say_lenient(P017, f"metadata {name!r} twice")
             self.names.add(name)
 
-    def _take_basematerials(self, attributes: dict[str, str]) -> None:
-        self._resource(Resource("basematerials", int(attributes["id"]), self.rank, attributes))
-
     def _take_object(self, attributes: dict[str, str]) -> None:
         kind = attributes.get("type", "model")
         self._resource(Object("object", int(attributes["id"]), self.rank, attributes, type=kind))
 
     def _take_triangle(self, attributes: dict[str, str]) -> None:
         row = tuple(int(attributes.get(name, -1)) for name in ("v1", "v2", "v3", "p1", "p2", "p3", "pid"))
-        self.rows.append((*row, self.parser.CurrentLineNumber))
+        self.triangles.append((*row, self.parser.CurrentLineNumber))
         self.faces += 1
         if self.faces > self.limits.max_faces:
             raise F011.unreadable(f"more faces than --max-faces {self.limits.max_faces}")
-        if len(self.rows) >= _BATCH:
+        if len(self.triangles) >= _BATCH:
             self._flush_triangles()
 
     def _take_vertex(self, attributes: dict[str, str]) -> None:
@@ -347,26 +343,24 @@ class _Reader:
             return float(text)
         if text.lower() in _NAMES:
             return math.nan
-        why = " (a decimal comma)" if "," in text else ""
-        self.model.say(F004, f"{text[:40]!r} is not a number{why}", line=line)
+        self.model.say(F004, not_a_number(text).message, line=line)
         return 0.0
 
     def _flush_triangles(self) -> None:
-        if self.rows:
-            self.triangles.append(np.array(self.rows, dtype=np.int64))
-            self.rows = []
+        if self.triangles:
+            self.rows.append(np.array(self.triangles, dtype=np.int64))
+            self.triangles = []
 
     def _close_mesh(self) -> None:
-        vertices = np.concatenate(self.vertices) if self.vertices else np.empty((0, 3))
-        triangles = np.concatenate(self.triangles) if self.triangles else np.empty((0, LINE + 1), np.int64)
-        self.vertices, self.triangles = [], []
         if isinstance(self.resource, Object):
-            self.resource.vertices, self.resource.triangles = vertices, triangles
+            vertices = np.concatenate([np.empty((0, 3)), *self.vertices])
+            self.resource.mesh = Triangles(vertices, np.concatenate([np.empty((0, LINE + 1), np.int64), *self.rows]))
+        self.vertices, self.rows = [], []
 
     def _close_object(self, resource: Object) -> None:
-        if resource.vertices is None and not resource.components and not resource.other_shape:
+        if resource.mesh is None and not resource.components and not resource.other_shape:
             self.model.say(P017, f"object {resource.id} has neither mesh nor components")
-        if resource.vertices is not None and resource.components:
+        if resource.mesh is not None and resource.components:
             self.model.say(P017, f"object {resource.id} has a mesh and components")
 
 

@@ -10,9 +10,10 @@ import numpy as np
 from unitcad.check.findings import Finding
 from unitcad.check.geometry.source import Source
 from unitcad.check.geometry.triangle_mesh import Mesh
-from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Use
+from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Triangles, Use
 from unitcad.check.rules.f_limits import F011, Limits
 from unitcad.check.rules.p_package import P009, P012
+from unitcad.check.units import UNITS_MM
 from unitcad.geometry.arrays import Floats
 
 Key = tuple[str, int]
@@ -21,10 +22,34 @@ Key = tuple[str, int]
 
 @dataclass(frozen=True)
 class Instance:
-    """An object of the build with its whole transform (4, 3), in the model's unit."""
+    """An object of the build with its mesh, its whole transform (4, 3) in the model's unit, and that unit in mm."""
 
     key: Key
+    object: Object
+    triangles: Triangles
     matrix: Floats
+    unit_mm: float
+
+    @property
+    def linear(self) -> tuple[Key, bytes]:
+        """What instances have in common that differ by a shift."""
+        return self.key, self.matrix[:3].tobytes()
+
+    @property
+    def shift(self) -> Floats:
+        """Where the object's origin lies, mm."""
+        return self.matrix[3] * self.unit_mm
+
+    def mesh(self, *, placed: bool) -> Mesh:
+        """Return the object's mesh, mm: `placed` where the instance is, else where the object has it."""
+        points, faces = self.triangles.vertices, self.triangles.rows[:, :3].astype(np.int32)
+        if placed:
+            with np.errstate(all="ignore"):  # what comes out too large is found where it is used
+                points = points @ self.matrix[:3] + self.matrix[3]
+            if np.linalg.det(self.matrix[:3]) < 0:
+                faces = faces[:, ::-1]
+        source = Source(lines=self.triangles.rows[:, LINE], part=self.key[0])
+        return Mesh(points * self.unit_mm, np.ascontiguousarray(faces), name=str(self.object.id), source=source)
 
 
 def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list[Finding]) -> list[Instance]:
@@ -48,7 +73,7 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
             raise P012.unreadable(f"object {key[1]} contains itself")
         if len(trail) >= limits.max_depth:
             raise P009.unreadable(f"components nest deeper than {limits.max_depth}")
-        faces, nodes = (0 if model_object.triangles is None else len(model_object.triangles)), 1
+        faces, nodes = (0 if model_object.mesh is None else len(model_object.mesh.rows)), 1
         for use in model_object.components:
             more, below = size(key_of(key[0], use), (*trail, key))
             faces, nodes = faces + more, nodes + below
@@ -72,8 +97,9 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
             return
         if model_object.type == "other" and not model_object.components:
             findings.append(P012.finding(f"the build uses object {key[1]} of type other"))
-        if model_object.vertices is not None:
-            instances.append(Instance(key, matrix))
+        if model_object.mesh is not None:
+            unit_mm = UNITS_MM.get(models[key[0]].unit, 1.0)
+            instances.append(Instance(key, model_object, model_object.mesh, matrix, unit_mm))
         for use in model_object.components:
             place(key_of(key[0], use), _times(use.matrix, matrix), depth + 1)
 
@@ -94,15 +120,3 @@ def _times(first: Floats, then: Floats) -> Floats:
     """Return the transform `first` followed by `then`, rows as 3MF writes them."""
     with np.errstate(all="ignore"):  # what comes out too large is found where it is used
         return np.vstack([first[:3] @ then[:3], first[3] @ then[:3] + then[3]])
-
-
-def mesh_of(model_object: Object, part: str, factor: float, matrix: Floats | None = None) -> Mesh:
-    """Return the object, of a part of the package, in its own place or that of an instance; `factor` mm a unit."""
-    assert model_object.vertices is not None
-    assert model_object.triangles is not None
-    points = model_object.vertices if matrix is None else model_object.vertices @ matrix[:3] + matrix[3]
-    faces = model_object.triangles[:, :3].astype(np.int32)
-    if matrix is not None and np.linalg.det(matrix[:3]) < 0:
-        faces = faces[:, ::-1]
-    source = Source(lines=model_object.triangles[:, LINE], part=part)
-    return Mesh(points * factor, np.ascontiguousarray(faces), name=str(model_object.id), source=source)

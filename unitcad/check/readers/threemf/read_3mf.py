@@ -22,27 +22,27 @@ _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
 
 @dataclass(frozen=True)
 class Build:
-    """What a 3MF file asks a printer to make: its model parts by name, the start part's first, and the instances."""
+    """What a 3MF file asks a printer to make: the instances, and the unit that its start part names."""
 
-    models: dict[str, Model]
+    unit: str
     instances: list[Instance]
 
 
-def read_build(package: Package, limits: Limits) -> Build:
+def read_build(package: Package, limits: Limits) -> Build | None:
     """Read the model parts and place the objects of the build; what is wrong is added to the package's findings.
 
-    Raises `Unreadable` where components nest without end or a limit is reached.
+    None where no start part can be read. Raises `Unreadable` where components nest without end or a limit is reached.
     """
     models = _models(package, limits)
     for model in models.values():
         references.check_references(model)
         package.findings += model.findings
     if not models:
-        return Build({}, [])
+        return None
     root = next(iter(models.values()))
     if not root.items and root.has_build:
         package.findings.append(replace(P014.finding("the build has no item"), ends=True))
-    return Build(models, expand(models, root, limits, package.findings))
+    return Build(root.unit, expand(models, root, limits, package.findings))
 
 
 def _models(package: Package, limits: Limits) -> dict[str, Model]:
@@ -72,7 +72,7 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
         except Unreadable as stop:
             package.findings += stop.findings
             continue
-        faces += sum(len(o.triangles) for o in model.objects().values() if o.triangles is not None)
+        faces += sum(len(one.mesh.rows) for one in model.objects().values() if one.mesh is not None)
         models[part] = model
         related = package.relations(part)
         _singletons(package, related, part, (opc.TICKET,))

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
 from unitcad.check.findings import Location, counted
 from unitcad.check.readers.threemf import elements
-from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Use
+from unitcad.check.readers.threemf.model_data import LINE, Model, Object, Resource, Triangles, Use
 from unitcad.check.rules.p_package import P011, P012, P017, P019
 from unitcad.geometry.arrays import Ints
 
 _MATERIALS = ("basematerials", "compositematerials")
 _GROUPS = (*_MATERIALS, "colorgroup", "texture2dgroup", "multiproperties")
 _TEXTURED = ("speculartextureid", "glossinesstextureid", "metallictextureid", "roughnesstextureid")
-_SOLID = ("model", "solidsupport")
+SOLID = ("model", "solidsupport")
 _STACK = f"{elements.SLICE} slicestackid"
 
 
@@ -63,10 +62,10 @@ def _object(model: Model, resource: Object) -> None:
     group = _group(model, int(pid), resource.rank, who) if pid is not None else None
     if group is not None and "pindex" in resource.attributes:
         _in_range(model, int(resource.attributes["pindex"]), group.count, f"pindex of {who}")
-    if resource.vertices is not None and resource.triangles is not None:
-        _mesh(model, resource, pid is not None)
+    if resource.mesh is not None:
+        _mesh(model, resource, resource.mesh)
     if resource.lattice is not None:
-        _lattice(model, resource)
+        _lattice(model, resource, resource.lattice)
     _sliced(model, resource)
 
 
@@ -90,36 +89,32 @@ def _in_range(model: Model, index: int, count: int, what: str) -> None:
         model.say(P011, f"{what} is {index}, the list has {count}")
 
 
-def _mesh(model: Model, resource: Object, has_default: bool) -> None:
-    assert resource.vertices is not None
-    assert resource.triangles is not None
-    who, rows = f"object {resource.id}", resource.triangles
-    solid = resource.type in _SOLID and resource.lattice is None
-    if len(resource.vertices) < 3 and not resource.other_shape:
-        model.say(P017, f"the mesh of {who} has {counted(len(resource.vertices), 'vertex', 'vertices')}")
+def _mesh(model: Model, resource: Object, mesh: Triangles) -> None:
+    who, rows, n = f"object {resource.id}", mesh.rows, len(mesh.vertices)
+    solid = resource.type in SOLID and resource.lattice is None
+    if n < 3 and not resource.other_shape:
+        model.say(P017, f"the mesh of {who} has {counted(n, 'vertex', 'vertices')}")
     if len(rows) < (4 if solid and resource.type == "model" else 1) and resource.lattice is None:
         model.say(P017, f"the mesh of {who} has {counted(len(rows), 'triangle')}")
     corners = rows[:, :3]
-    outside = (corners >= len(resource.vertices)).any(axis=1)
-    if outside.any():
-        first = int(np.flatnonzero(outside)[0])
-        some = counted(int(outside.sum()), "triangle")
-        line = int(rows[first, LINE])
-        model.say(P011, f"{some} of {who} (first {first}) with a vertex that is not there", line=line)
+    outside = np.flatnonzero((corners >= n).any(axis=1))
+    if len(outside):
+        text = f"{counted(len(outside), 'triangle')} of {who} (first {outside[0]}) with a vertex that is not there"
+        model.say(P011, text, line=int(rows[outside[0], LINE]))
     same = (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2]) | (corners[:, 2] == corners[:, 0])
     if same.any():
         line = int(rows[same.argmax(), LINE])
         model.say(P017, f"{counted(int(same.sum()), 'triangle')} of {who} with one vertex twice", line=line)
-    _triangle_properties(model, resource, rows, has_default)
+    _triangle_properties(model, resource, rows)
 
 
-def _triangle_properties(model: Model, resource: Object, rows: Ints, has_default: bool) -> None:
+def _triangle_properties(model: Model, resource: Object, rows: Ints) -> None:
     who = f"object {resource.id}"
     used = (rows[:, 3:LINE] >= 0).any(axis=1)
     if not used.any():
         return
     rows = rows[used]
-    if not has_default:
+    if "pid" not in resource.attributes:
         model.say_lenient(P019, f"triangles of {who} have properties, the object has no pid as default")
     if ((rows[:, 3] < 0) & (rows[:, 4:6] >= 0).any(axis=1)).any():
         model.say(P019, f"a triangle of {who} has p2 or p3 without p1")
@@ -204,7 +199,7 @@ def _multi(model: Model, resource: Resource) -> None:
 
 def _solid_stacks(model: Model) -> set[int]:
     """Return slice stacks of objects that must be solids: their polygons must be closed."""
-    named = (thing.attributes.get(_STACK, "") for thing in model.objects().values() if thing.type in _SOLID)
+    named = (thing.attributes.get(_STACK, "") for thing in model.objects().values() if thing.type in SOLID)
     return {int(text) for text in named if elements.resource_id(text)}
 
 
@@ -260,13 +255,10 @@ def _sliced(model: Model, resource: Object) -> None:
             _earlier(model, int(stack), resource.rank, who, "slicestack")
 
 
-def _lattice(model: Model, resource: Object) -> None:
-    """Check beam lattice 1.2: ends exist and differ, sets name beams that exist, clipping meshes are earlier
-    mesh objects.
-    """
-    assert resource.lattice is not None
-    who, count = f"the lattice of object {resource.id}", 0 if resource.vertices is None else len(resource.vertices)
-    if resource.type not in _SOLID:
+def _lattice(model: Model, resource: Object, lattice: dict[str, str]) -> None:
+    """Check beam lattice 1.2: ends exist and differ, sets name beams that exist, clipping meshes come earlier."""
+    who, count = f"the lattice of object {resource.id}", 0 if resource.mesh is None else len(resource.mesh.vertices)
+    if resource.type not in SOLID:
         model.say(P017, f"{who} is in an object of type {resource.type}")
     for beam in resource.beams:
         ends = int(beam["v1"]), int(beam["v2"])
@@ -279,31 +271,19 @@ def _lattice(model: Model, resource: Object) -> None:
         _in_range(model, int(ball["vindex"]), count, f"a ball's vertex in {who}")
     for index in resource.beam_refs:
         _in_range(model, index, len(resource.beams), f"a beam set's index in {who}")
-    if resource.lattice.get("clippingmode", "none") != "none" and "clippingmesh" not in resource.lattice:
+    if lattice.get("clippingmode", "none") != "none" and "clippingmesh" not in lattice:
         model.say(P019, f"{who} clips without a clipping mesh")
-    for name in ("clippingmesh", "representationmesh"):
-        if name not in resource.lattice:
-            continue
-        other = model.resources.get(int(resource.lattice[name]))
+    for name in [name for name in ("clippingmesh", "representationmesh") if name in lattice]:
+        other = model.resources.get(int(lattice[name]))
         if not isinstance(other, Object) or other.rank >= resource.rank:
             model.say(P019, f"the {name} of {who} is no earlier object")
         elif other.lattice is not None or other.components:
             model.say(P019, f"the {name} of {who} is no plain mesh")
-    for holder, index in _lattice_properties(resource):
-        group = _group(model, holder, resource.rank, who)
-        if group is not None and index is not None:
-            _in_range(model, index, group.count, f"a property index in {who}")
-
-
-def _lattice_properties(resource: Object) -> Iterator[tuple[int, int | None]]:
-    assert resource.lattice is not None
-    if "pid" in resource.lattice:
-        yield int(resource.lattice["pid"]), int(resource.lattice["pindex"]) if "pindex" in resource.lattice else None
-    for beam in resource.beams:
-        if "pid" in beam:
-            for name in ("p1", "p2"):
-                if name in beam:
-                    yield int(beam["pid"]), int(beam[name])
+    for holder, names in ((lattice, ["pindex"]), *((beam, ["p1", "p2"]) for beam in resource.beams)):
+        group = _group(model, int(holder["pid"]), resource.rank, who) if "pid" in holder else None
+        for name in names:
+            if group is not None and name in holder:
+                _in_range(model, int(holder[name]), group.count, f"a property index in {who}")
 
 
 def _uuids(model: Model) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable, Iterator
+import codecs
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 from xml.parsers import expat
@@ -17,7 +17,6 @@ XML_SPACE = "http://www.w3.org/XML/1998/namespace "
 XSI = "http://www.w3.org/2001/XMLSchema-instance "
 _DEPTH = 100
 _SMALL = 5_000_000  # bytes a small part may have
-_ENCODING = re.compile(rb"""^(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*["']([^"']*)["']""")
 
 
 @dataclass
@@ -51,10 +50,8 @@ def stream(
 ) -> None:
     """Feed a part to `start` and `end`; names are "namespace local", attributes a flat list.
 
-    A caller that wants to know line numbers gives the `parser`, made by `new_parser`.
-
-    Raises `Unreadable`: P006 for a DTD, F009 (as an error) for another encoding than UTF-8, F003 for XML that is not
-    well formed.
+    A caller that needs line numbers gives the `parser`, made by `new_parser`. Raises `Unreadable`: P006 for a DTD, F009
+    (as an error) for another encoding than UTF-8, F003 for XML that is not well formed.
     """
     place = [Location(part=part)]
     parser = parser or new_parser()
@@ -62,51 +59,30 @@ def stream(
     def refuse(*_: object) -> None:
         raise P006.unreadable("a document type declaration", places=place)
 
+    def declared(_version: str, encoding: str | None, _standalone: int) -> None:
+        if encoding is not None and encoding.lower() != "utf-8":
+            raise F009.unreadable(f"encoding {encoding!r} instead of UTF-8", places=place, severity="error")
+
+    parser.XmlDeclHandler = declared
     parser.StartDoctypeDeclHandler = refuse
     parser.EntityDeclHandler = refuse
     parser.StartElementHandler = start
     parser.EndElementHandler = end
-    if namespace is not None:
-        parser.StartNamespaceDeclHandler = namespace
+    parser.StartNamespaceDeclHandler = namespace
     seen, chunk = 0, b""
     try:
-        for chunk in _with_head(chunks):
-            if not seen:
-                _utf8_only(chunk, place)
+        for chunk in chunks:
+            if not seen and (chunk[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) or b"\x00" in chunk[:8]):
+                raise F009.unreadable("UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error")
             parser.Parse(chunk, False)
             seen += len(chunk)
         parser.Parse(b"", True)
     except expat.ExpatError as error:
         line = [Location(part=part, line=error.lineno)]
-        reason = expat.ErrorString(error.code)
         at = parser.ErrorByteIndex - seen
         if 0 <= at < len(chunk) and any(byte > 127 for byte in chunk[at : at + 4]):
             raise F009.unreadable("bytes that are not UTF-8", places=line, severity="error") from error
-        raise F003.unreadable(f"XML not well formed: {reason}", places=line) from error
-
-
-def _with_head(chunks: Iterable[bytes]) -> Iterator[bytes]:
-    """Return the same bytes, the first piece at least 200 long where there are so many."""
-    head: bytes | None = b""
-    for chunk in chunks:
-        if head is None:
-            yield chunk
-        elif len(head) + len(chunk) >= 200:
-            yield head + chunk
-            head = None
-        else:
-            head += chunk
-    if head:
-        yield head
-
-
-def _utf8_only(head: bytes, place: list[Location]) -> None:
-    if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:8]:
-        raise F009.unreadable("UTF-16 or UTF-32 instead of UTF-8", places=place, severity="error")
-    match = _ENCODING.match(head)
-    if match and match.group(1).lower() != b"utf-8":
-        named = match.group(1).decode("ascii", "replace")
-        raise F009.unreadable(f"encoding {named!r} instead of UTF-8", places=place, severity="error")
+        raise F003.unreadable(f"XML not well formed: {expat.ErrorString(error.code)}", places=line) from error
 
 
 def forbidden(name: str) -> str | None:
