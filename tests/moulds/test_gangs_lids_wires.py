@@ -84,7 +84,7 @@ def test_flat_lid_without_vents_traps_what_an_exact_integral_says() -> None:
     moulds = set_of("encapsulating", "moulds.pour=injected")
     step = moulds.plan.steps[1]
     sprue = step.channels[:1]
-    cup = moulds.cavities[1][0][1]
+    cup = moulds.cavities[1].reached
     from manifold3d import Manifold, OpType
 
     from unitcad.kernels.mesh import realise
@@ -106,7 +106,7 @@ def test_measured_pocket_between_vents_is_the_formula(count: int) -> None:
     """Without a tongue, whose dent would be the deeper one; polygons stand for circles within 5 um."""
     moulds = set_of("no-fpcb", "moulds.pour=injected", f"moulds.vents={count}", "output.tolerance_mm=0.001")
     step = moulds.plan.steps[0]
-    cavity = moulds.cavities[0][0][1]
+    cavity = moulds.cavities[0].reached
     expected = lid.pocket_depth(moulds.dimensions, 0, count)
     assert air.pockets(cavity, step.top)[0].depth == pytest.approx(
         expected, abs=5e-3 * math.sin(math.radians(5)) + 2e-4

@@ -58,7 +58,7 @@ def shown(visit: Visit) -> list[str]:
 def test_loads_from_a_file_and_asks_for_nothing(visit: Visit) -> None:
     assert visit.page.inner_text("h1") == "encapsulating"
     heads = visit.page.locator("section > h2").all_inner_texts()
-    assert heads == ["3D", "Section", "Attenuation estimate", "Laws and checks", "Procedure", "Parts", "Files", "Spec"]
+    assert heads == ["3D", "Section", "Attenuation estimate", "Mould checks and mesh checks", "Procedure", "Parts", "Files", "Spec"]
     assert visit.page.locator("img.drawing").first.evaluate("(image) => image.naturalWidth") > 200
 
 
@@ -166,7 +166,7 @@ def test_every_control_is_reached_and_worked_by_keys(visit: Visit) -> None:
     visit.page.locator('input[value="moulds"]').focus()
     visit.page.keyboard.press("ArrowLeft")
     assert "motor" in shown(visit)
-    visit.page.locator("summary", has_text="laws").focus()
+    visit.page.locator("summary", has_text="mould checks").focus()
     visit.page.keyboard.press("Enter")
     assert visit.page.locator("details[open] td", has_text="C100").count() > 0
 
@@ -331,7 +331,7 @@ def test_what_is_absent_says_what_to_ask_for(running: Any, tmp_path: Path) -> No
         ("estimate", "estimate"),
         ("procedure", "casting"),
         ("section", "unit"),
-        ("laws", "unit,moulds"),
+        ("checks", "unit,moulds"),
     ):
         assert f"--only {ask}" in seen.page.inner_text(f"#{where}")
     assert seen.errors == seen.console == []

@@ -28,7 +28,7 @@ __all__ = [
 @cache
 def mould_checks() -> dict[str, MouldCheck]:
     """Return the mould checks by their code, in the order of codes."""
-    modules = (import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__))
+    modules = (import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__))
     checks = [module.CHECK for module in modules if hasattr(module, "CHECK")]
     return {check.code: check for check in sorted(checks, key=lambda check: check.code)}
 

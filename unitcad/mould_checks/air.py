@@ -18,18 +18,16 @@ from scipy.sparse.csgraph import connected_components
 from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_most
+from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.dents import TILT_DEG, deepest
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.plan import Step
 from unitcad.shape.profile import GRID_PER_MM
 
 ATTITUDES = ((0.0, 0.0), (TILT_DEG, 0.0), (TILT_DEG, 90.0), (TILT_DEG, 180.0), (TILT_DEG, 270.0))
-"""(tilt, azimuth of the side that is raised) in degrees. Vents lie halfway between these azimuths: the worst case."""
+"""(tilt, azimuth of the side that is raised), degrees. Vents lie halfway between these azimuths: the worst case."""
 _SAME = 1e-6
 _AT_TOP = 1 / GRID_PER_MM
 """What snapping may take from the height of the opening, mm."""
-
-
 CREVICE = 1e-6
 """A pocket of a smaller share of the cavity is a crevice that rounding leaves between two pieces, as in C100."""
 
@@ -45,48 +43,38 @@ class Pocket:
 
 
 def findings(moulds: MouldSet) -> list[MouldFinding]:
-    """Look at every cavity of every pour."""
-    pours = zip(moulds.plan.steps, moulds.cavities, strict=True)
-    return [
-        finding
-        for layer, (step, cells) in enumerate(pours)
-        for finding in of_pour(step, [cell.reached for cell in cells], deepest(moulds.spec, layer))
-    ]
+    """Measure the deepest pocket of every cavity over the five attitudes."""
+    return [_of_cavity(cavity, deepest(moulds.spec, cavity.step.index - 1)) for cavity in moulds.cavities]
 
 
-def of_pour(step: Step, cells: list[Manifold], limit: float) -> list[MouldFinding]:
-    """Compare the deepest pocket of each cell over the five attitudes with `limit`, in mm."""
-    found = []
-    for i, cavity in enumerate(cells):
-        where = f"pour {step.index}" + (f" cell {i + 1}" if len(cells) > 1 else "")
-        depth, advice = 0.0, ""
-        for pocket in pockets(cavity, step.top):
-            volume = pocket_volume(cavity, step.top, pocket) if pocket.depth > limit else 0.0
-            if pocket.depth > limit and volume <= CREVICE * cavity.volume():
-                continue
-            depth = pocket.depth
-            if depth > limit:
-                where += f", tilted by {pocket.tilt:g} degrees towards {pocket.azimuth:g}"
-                advice = f"{volume:.3g} mm3 of air find no way to the rim or a vent"
-            break
-        found.append(at_most("C400", where, depth, limit, "mm", advice))
-    return found
+def _of_cavity(cavity: Cavity, limit: float) -> MouldFinding:
+    """Compare the depth of a cavity's deepest pocket with `limit`, mm."""
+    reached, top = cavity.reached, cavity.step.top
+    for pocket in pockets(reached, top):
+        if pocket.depth <= limit:
+            return at_most("C400", cavity.where, pocket.depth, limit, "mm")
+        volume = pocket_volume(reached, top, pocket)
+        if volume > CREVICE * reached.volume():
+            where = f"{cavity.where}, tilted by {pocket.tilt:g} degrees towards {pocket.azimuth:g}"
+            advice = f"{volume:.3g} mm3 of air find no way to the rim or a vent"
+            return at_most("C400", where, pocket.depth, limit, "mm", advice)
+    return at_most("C400", cavity.where, 0.0, limit, "mm")
 
 
 def pockets(cavity: Manifold, top: float) -> list[Pocket]:
-    """The pockets of a cavity that is open at z = `top` (mm), over `ATTITUDES`, the deepest first."""
+    """Return the pockets of a cavity that is open at z = `top` (mm), over `ATTITUDES`, the deepest first."""
     surface = _Surface.of(cavity)
     opening = surface.vertices[:, 2] >= top - _AT_TOP
-    found = [
+    kept = [
         Pocket(depth, tilt, azimuth, tuple(peak.tolist()))
         for tilt, azimuth in ATTITUDES
         for depth, peak in _pockets(surface, opening, upwards(tilt, azimuth))
     ]
-    return sorted(found, key=lambda pocket: -pocket.depth)
+    return sorted(kept, key=lambda pocket: -pocket.depth)
 
 
 def pocket_volume(cavity: Manifold, top: float, pocket: Pocket) -> float:
-    """Volume of the air that a pocket holds back, mm3."""
+    """Return the volume of the air that a pocket holds back, mm3."""
     up, peak = upwards(pocket.tilt, pocket.azimuth), np.asarray(pocket.peak)
     above = cavity.trim_by_plane(tuple(up), float(peak @ up) - pocket.depth + _SAME)
     total = 0.0
@@ -98,7 +86,7 @@ def pocket_volume(cavity: Manifold, top: float, pocket: Pocket) -> float:
 
 
 def upwards(tilt: float, azimuth: float) -> np.ndarray:
-    """The unit vector that is up when the mould's side at `azimuth` is raised by `tilt` (degrees)."""
+    """Return the unit vector that is up when the mould's side at `azimuth` is raised by `tilt` (degrees)."""
     t, a = math.radians(tilt), math.radians(azimuth)
     return np.array([math.sin(t) * math.cos(a), math.sin(t) * math.sin(a), math.cos(t)])
 
@@ -128,7 +116,7 @@ class _Surface:
 
 
 def _pockets(surface: _Surface, opening: np.ndarray, up: np.ndarray) -> list[tuple[float, np.ndarray]]:
-    """(depth, peak) of every ceiling peak that does not meet the opening."""
+    """Return (depth, peak) of every ceiling peak that does not meet the opening."""
     height = surface.vertices @ up
     first, second = surface.edges.T
     level = np.abs(height[first] - height[second]) <= _SAME
@@ -140,15 +128,13 @@ def _pockets(surface: _Surface, opening: np.ndarray, up: np.ndarray) -> list[tup
     # A sum of angle-weighted normals points out of the cavity: up at a ceiling, down at the top of an obstacle.
     facing = np.bincount(plateau, weights=surface.normals @ up, minlength=count)
     opens = np.bincount(plateau, weights=opening, minlength=count) > 0
-    found = []
-    for peak in np.nonzero(~rises & ~opens & (facing > 0))[0]:
-        vertex = int(np.nonzero(plateau == peak)[0][0])
-        found.append((_depth(surface.edges, height, opening, vertex), surface.vertices[vertex]))
-    return found
+    peaks = np.nonzero(~rises & ~opens & (facing > 0))[0]
+    vertices = [int(np.nonzero(plateau == peak)[0][0]) for peak in peaks]
+    return [(_depth(surface.edges, height, opening, vertex), surface.vertices[vertex]) for vertex in vertices]
 
 
 def _depth(edges: np.ndarray, height: np.ndarray, opening: np.ndarray, vertex: int) -> float:
-    """How far below a vertex the highest way from it to the opening leads, by bisection over the vertices' heights."""
+    """Return how far below a vertex the highest way to the opening leads, by bisection over the vertices' heights."""
     levels = np.unique(height[height <= height[vertex]])
     lowest = np.minimum(height[edges[:, 0]], height[edges[:, 1]])
     low, high = 0, len(levels) - 1
@@ -164,8 +150,8 @@ def _depth(edges: np.ndarray, height: np.ndarray, opening: np.ndarray, vertex: i
 
 def _components(edges: np.ndarray, count: int) -> tuple[int, np.ndarray]:
     graph = coo_matrix((np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    found, labels = connected_components(graph, directed=False)
-    return int(found), labels
+    number, labels = connected_components(graph, directed=False)
+    return int(number), labels
 
 
 CHECK = MouldCheck("C400", "air: every high region of a cavity meets the rim or a vent, level and tilted", findings)

@@ -41,7 +41,7 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
             faces[key] = _facing(solid, direction, upwards)
         return faces[key]
 
-    found = []
+    findings = []
     layers = {step.index: moulds.meshes((*step.layer, *step.earlier)) for step in moulds.plan.steps}
     for removal in removals(moulds.plan):
         staying = [(name, moulds.solids[name]) for name in removal.stays]
@@ -56,12 +56,12 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
         worst = max(areas, default=(0.0, ""))
         against = f" against {worst[1]}" if worst[0] > BLOCKED else ""
         where = f"pour {removal.step}: {removal.piece} out{against}"
-        found.append(at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", _advice(worst[1])))
-    return found
+        findings.append(at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", _advice(worst[1])))
+    return findings
 
 
 def blocked(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -> float:
-    """Area (mm2, seen along `direction`) of upward faces of `piece` that lie below downward faces of `stays`.
+    """Return the area, mm2, of upward faces of `piece` that lie below downward faces of `stays` along `direction`.
 
     `direction` is a signed axis. A face that several others lie above counts once for each of them. Where the two
     overlap at the start, the piece is cut out of what stays.
@@ -88,7 +88,7 @@ def _meeting(up: np.ndarray, down: np.ndarray) -> float:
 
 
 def _boxed(triangles: np.ndarray, frame: Frame, higher: float) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles in an order in which neighbours are near, and their boxes, raised by `higher`."""
+    """Return triangles in an order in which neighbours are near, and their boxes, raised by `higher`."""
     steps = frame.steps(triangles.reshape(-1, 3) + np.array([0.0, 0.0, higher]))
     corners = np.arange(len(triangles) * 3).reshape(-1, 3)
     order = morton_order(steps, corners[:, 0])
@@ -96,7 +96,7 @@ def _boxed(triangles: np.ndarray, frame: Frame, higher: float) -> tuple[np.ndarr
 
 
 def _in_the_way(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -> bool:
-    """Whether the boxes let the piece meet what stays at all."""
+    """Tell whether the boxes let the piece meet what stays at all."""
     p, q = piece.bounding_box(), stays.bounding_box()
     for axis, way in enumerate(direction):
         if way >= 0 and q[axis + 3] < p[axis] - LEVEL:
@@ -111,7 +111,7 @@ def _advice(name: str) -> str:
 
 
 def _facing(solid: Manifold, direction: tuple[int, int, int], upwards: bool) -> np.ndarray:
-    """Triangles (n, 3, 3) that face along the direction (or against it), in a frame where it is +z."""
+    """Return the triangles (n, 3, 3) that face along the direction (or against it), in a frame where it is +z."""
     vertices, faces = arrays(solid)
     axis = int(np.argmax(np.abs(direction)))
     sign = float(np.sign(direction[axis]))
@@ -123,13 +123,13 @@ def _facing(solid: Manifold, direction: tuple[int, int, int], upwards: bool) -> 
 
 
 def _overlap(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Whether the boxes of two triangles share area in plan: a common edge is none."""
+    """Tell whether the boxes of two triangles share area in plan: a common edge is none."""
     one, other = first[:, :, :2], second[:, :, :2]
     return ((one.min(1) < other.max(1)) & (other.min(1) < one.max(1))).all(1)
 
 
 def _area_below(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Area in plan of the part of each triangle of `first` on or above which its partner of `second` lies."""
+    """Return the area in plan of each triangle of `first` on or above which its partner of `second` lies."""
     polygon = first[:, :, :2]
     sense = np.sign(_cross(second[:, 1] - second[:, 0], second[:, 2] - second[:, 0]))
     for i in range(3):
@@ -143,7 +143,7 @@ def _area_below(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def _clip(polygon: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """The part of convex polygons (n, m, 2) where a function, linear on the plane and given at the corners, is >= 0.
+    """Return the part of convex polygons (n, m, 2) where a linear function, given at the corners, is >= 0.
 
     Corners that are no longer needed repeat another one, which adds no area; a polygon wholly outside shrinks to one
     point.
@@ -165,7 +165,7 @@ def _clip(polygon: np.ndarray, value: np.ndarray) -> np.ndarray:
 
 
 def _height(triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Height of each triangle's plane at its own points (n, m, 2)."""
+    """Return the height of each triangle's plane at its own points (n, m, 2)."""
     a, ab, ac = triangle[:, 0], triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
     doubled = _cross(ab, ac)
     slope_x = (ab[:, 2] * ac[:, 1] - ac[:, 2] * ab[:, 1]) / doubled

@@ -31,22 +31,22 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
     lengths, solids = moulds.spec.moulds, moulds.solids
     skirt, window = min(lengths.plinth_clearance_mm, lengths.seat_relief_mm), lengths.window_clearance_mm
     play = lengths.plinth_clearance_mm
-    found = []
+    findings = []
     for step in moulds.plan.steps:
         cup = solids[step.cup]
         gap = cup.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
-        found.append(at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm"))
+        findings.append(at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm"))
         if moulds.plan.by_complement:
             gap = _sideways(cup, solids["base"], window + 1)
             where = f"{step.cup} and what stands on the base"
-            found.append(at_least("C210", where, gap, window * chord - GRID, "mm", KNIFE))
+            findings.append(at_least("C210", where, gap, window * chord - GRID, "mm", KNIFE))
         for tongue in moulds.plan.standing(step, "tongue"):
             gap = cup.min_gap(solids[tongue.name], window + 1)
-            found.append(at_least("C210", f"{step.cup} window and {tongue.name}", gap, window - GRID, "mm"))
+            findings.append(at_least("C210", f"{step.cup} window and {tongue.name}", gap, window - GRID, "mm"))
         if step.lid:
             gap = solids[step.lid].trim_by_plane((0, 0, -1), play - step.rim).min_gap(cup, play + 1)
-            found.append(at_least("C210", f"{step.lid} skirt and {step.cup}", gap, play * chord - GRID, "mm"))
-    return found
+            findings.append(at_least("C210", f"{step.lid} skirt and {step.cup}", gap, play * chord - GRID, "mm"))
+    return findings
 
 
 def _sideways(cup: Manifold, base: Manifold, most: float) -> float:

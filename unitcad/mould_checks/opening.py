@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from manifold3d import Manifold
-
 from unitcad.kernels.sections import widest
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
+from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.plan import Step
 from unitcad.shape.profile import GRID_PER_MM
 
 LEAST_AREA = 2.0
@@ -29,21 +27,15 @@ _SNAPPED = 1 / GRID_PER_MM
 
 
 def findings(moulds: MouldSet) -> list[MouldFinding]:
-    """Look at every cavity of every pour."""
-    pours = zip(moulds.plan.steps, moulds.cavities, strict=True)
-    return [found for step, cells in pours for found in of_pour(step, [cell.reached for cell in cells])]
+    """Measure the opening of every cavity, and the narrowest of its vents under a lid."""
+    return [finding for cavity in moulds.cavities for finding in _of_cavity(cavity)]
 
 
-def of_pour(step: Step, cells: list[Manifold]) -> list[MouldFinding]:
-    """Return the size of the opening of each cell, and the narrowest of its vents under a lid."""
-    return [found for i, cavity in enumerate(cells) for found in _of_cell(step, cavity, i if len(cells) > 1 else None)]
-
-
-def _of_cell(step: Step, cavity: Manifold, cell: int | None) -> Iterator[MouldFinding]:
-    where = f"pour {step.index}" + ("" if cell is None else f" cell {cell + 1}")
+def _of_cavity(cavity: Cavity) -> Iterator[MouldFinding]:
+    step, where = cavity.step, cavity.where
     opening = "sprue" if step.lid else "opening at the rim"
-    top = max(cavity.bounding_box()[5], step.top - _SNAPPED)
-    regions = sorted((widest(part)[0], part.area()) for part in cavity.slice(top - _UNDER).decompose())
+    top = max(cavity.reached.bounding_box()[5], step.top - _SNAPPED)
+    regions = sorted((widest(part)[0], part.area()) for part in cavity.reached.slice(top - _UNDER).decompose())
     width, area = regions[-1] if regions else (0.0, 0.0)
     advice = f"at z = {step.top:.4g} mm there is no room to pour: give the layer a flat top, or turn it over"
     yield at_least("C410", f"{where}: {opening}, area", area, LEAST_AREA, "mm2", advice)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from itertools import combinations
 
-import manifold3d
 from manifold3d import Manifold
 
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_most
-from unitcad.moulds.cavities import boxes_meet
+from unitcad.moulds.cavities import boxes_meet, united
 from unitcad.moulds.mould_set import MouldSet
 
 OVERLAP = 1e-6
@@ -30,16 +29,16 @@ def of_unit(moulds: MouldSet) -> list[MouldFinding]:
 
 
 def _of_pours(moulds: MouldSet) -> list[MouldFinding]:
-    found: list[MouldFinding] = []
+    findings: list[MouldFinding] = []
     cast: list[tuple[str, Manifold]] = []
     shared: dict[tuple[str, str], float] = {}
     for step in moulds.plan.steps:
         cells = moulds.meshes(step.layer)
-        found += _overlaps(f"pour {step.index}", [(f"{step.name}.{i + 1}", c) for i, c in enumerate(cells)], shared)
-        cast.append((step.name, Manifold.batch_boolean(cells, manifold3d.OpType.Add)))
+        findings += _overlaps(f"pour {step.index}", [(f"{step.name}.{i + 1}", c) for i, c in enumerate(cells)], shared)
+        cast.append((step.name, united(cells)))
         standing = [(name, moulds.solids[name]) for name in step.tools] + cast
-        found += _overlaps(f"pour {step.index}", standing, shared)
-    return found
+        findings += _overlaps(f"pour {step.index}", standing, shared)
+    return findings
 
 
 def _overlaps(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, exactly
 from unitcad.moulds.mould_set import MouldSet
@@ -10,19 +12,23 @@ from unitcad.moulds.plan import Plan
 
 def findings(moulds: MouldSet) -> list[MouldFinding]:
     """Look at every body of unit and tooling; genus only where the drawing means one."""
-    genus, found = expected_genus(moulds.plan), []
-    for body in (*moulds.unit, *moulds.plan.tools):
-        solid = moulds.solids[body.name]
-        found.append(exactly("C000", f"{body.name} components", len(solid.decompose()), 1, ""))
-        found.append(MouldFinding("C000", f"{body.name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3"))
-        if body.name in genus:
-            found.append(exactly("C000", f"{body.name} genus", solid.genus(), genus[body.name], ""))
-    return found
+    return list(_of_solids(moulds))
+
+
+def _of_solids(moulds: MouldSet) -> Iterator[MouldFinding]:
+    genus = expected_genus(moulds.plan)
+    for name, solid in moulds.solids.items():
+        yield exactly("C000", f"{name} components", len(solid.decompose()), 1, "")
+        yield MouldFinding("C000", f"{name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3")
+        if name in genus:
+            yield exactly("C000", f"{name} genus", solid.genus(), genus[name], "")
 
 
 def expected_genus(plan: Plan) -> dict[str, int]:
-    """Return the through holes of each tool: a filament hole a core; a bore a cell and a closed window a tail in a cup;
-    a sprue and its vents in a lid. Of moulds by complement only the blade's is known.
+    """Return the number of through holes of each tool.
+
+    A base has a filament hole a core; a cup a bore a cell and a closed window a tail; a lid a sprue and its vents. Of
+    moulds by complement only the blade's is known.
     """
     if plan.by_complement:
         return {tool.name: 0 for tool in plan.of_kind("blade")}

@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
-import manifold3d
 from manifold3d import CrossSection, Manifold
 
 from unitcad import catalogue
@@ -18,6 +17,7 @@ from unitcad.designs.stretch import allowed_strain, tail_strain
 from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_most
+from unitcad.moulds.cavities import united
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import Spec
 
@@ -41,28 +41,28 @@ class Strain:
 
 def strains(moulds: MouldSet) -> list[Strain]:
     """Return the strains that the geometry asks for: each unit's peel off its core along +z, the tail's way out."""
-    found = []
+    needed = []
     pulled = peel(moulds)
     for i, (body, base) in enumerate(pulled):
         strain, z, room = peel_strain(body, base)
         where = "peel off the core" + (f", cell {i + 1}" if len(pulled) > 1 else "")
         if strain > 0:
             where += f", at z = {z:.3g} mm"
-        found.append(Strain(where, 100 * strain, z, room))
+        needed.append(Strain(where, 100 * strain, z, room))
     fpcb, slot = moulds.spec.fpcb, moulds.dimensions.exit
     if fpcb and slot:
-        found.append(Strain("tail through the slot", 100 * tail_strain(fpcb, slot)))
-    return found
+        needed.append(Strain("tail through the slot", 100 * tail_strain(fpcb, slot)))
+    return needed
 
 
-def strain_findings(spec: Spec, found: Iterable[Strain]) -> list[MouldFinding]:
+def strain_findings(spec: Spec, needed: Iterable[Strain]) -> list[MouldFinding]:
     """Compare strains with the margin of the spec's silicones. Values in percent."""
     limit = 100 * allowed_strain(spec, catalogue.materials(spec.materials))
-    return [at_most("C310", s.where, s.percent, limit, "%", _advice(s, limit)) for s in found]
+    return [at_most("C310", s.where, s.percent, limit, "%", _advice(s, limit)) for s in needed]
 
 
 def findings(moulds: MouldSet) -> list[MouldFinding]:
-    """Look at every strain of a set."""
+    """Compare every strain of a set with the margin of its silicones."""
     return strain_findings(moulds.spec, strains(moulds))
 
 
@@ -70,10 +70,7 @@ def peel(moulds: MouldSet) -> list[tuple[Manifold, Manifold]]:
     """Return for each cell what is pulled off at the end (all layers, bonded) and the base that stays."""
     last, cells = moulds.plan.steps[-1], len(moulds.plan.layout.cells)
     shapes = (*last.earlier, *last.layer)
-    return [
-        (Manifold.batch_boolean(moulds.meshes(shapes[i::cells]), manifold3d.OpType.Add), moulds.solids["base"])
-        for i in range(cells)
-    ]
+    return [(united(moulds.meshes(shapes[i::cells])), moulds.solids["base"]) for i in range(cells)]
 
 
 def _advice(strain: Strain, limit: float) -> str:
@@ -84,7 +81,7 @@ def _advice(strain: Strain, limit: float) -> str:
 
 
 def peel_strain(body: Manifold, base: Manifold) -> tuple[float, float, float]:
-    """(largest hoop strain of `body` pulled up off `base`, the height where, the perimeter of its hole there in mm).
+    """Return (largest hoop strain of `body` pulled up off `base`, height there in mm, perimeter of its hole there, mm).
 
     At each height the hole in the body must pass whatever the base carries above it, within the body's outline.
     """

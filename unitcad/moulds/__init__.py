@@ -1,1 +1,1 @@
-"""Casting moulds: the plan of pours, the tooling, the laws that they keep."""
+"""Casting moulds: the plan of pours, the tooling, the set that holds them."""

@@ -30,12 +30,12 @@ PRY_DEPTH, PRY_HALF_WIDTH, PRY_UNDER = 1.5, 4.0, 1.5
 
 
 def plate_top(spec: Spec) -> float:
-    """z of the plate's upper face."""
+    """Return z of the plate's upper face."""
     return -spec.moulds.plinth_height_mm
 
 
 def plate_bottom(spec: Spec) -> float:
-    """z of the plate's lower face."""
+    """Return z of the plate's lower face."""
     return plate_top(spec) - spec.moulds.plate_mm
 
 
@@ -57,24 +57,23 @@ def stand(spec: Spec, lay: Layout, standing: Sequence[Shape], tools: Sequence[Sh
 
 
 def plinth(spec: Spec, lay: Layout) -> Shape:
-    """The keyed square on the plate, 5 degrees a side, that every cup fits over; its top is the seat z = 0."""
-    height = spec.moulds.plinth_height_mm
-    return tapered(lay, 0.0, -height)
+    """Draw the keyed square on the plate that every cup fits over; its top is the seat z = 0."""
+    return tapered(lay, 0.0, plate_top(spec))
 
 
 def core(dims: Dimensions) -> Shape:
-    """The positive of a cavity, standing on the plinth (its foot sunk in it)."""
+    """Draw the positive of a cavity, standing on the plinth (its foot sunk in it)."""
     return cylinder(dims.cavity_radius, -BEYOND, dims.core_height)
 
 
 def notch(spec: Spec, dims: Dimensions, exit: Exit, side: int) -> Shape:
-    """What the ledge removes from a core: the tongue's seat and a window's clearance beside it, open upwards."""
+    """Draw what the ledge removes from a core: the tongue's seat and a window's clearance beside it, open upwards."""
     half = exit.width / 2 + spec.moulds.window_clearance_mm
     return strip(dims, side, dims.cavity_radius + BEYOND, half, exit.low, exit.high + BEYOND)
 
 
 def outline(size: tuple[float, float], key: float, grow: float = 0.0) -> Profile:
-    """A plate of half sizes `size` with its (+x, +y) corner cut by the leg `key`, then every side moved out by `grow`.
+    """Draw a plate of half sizes `size`, its (+x, +y) corner cut by the leg `key`, every side moved out by `grow`.
 
     A 45 degree cut moves out by as much, which lengthens its leg by (2 - sqrt 2) `grow`.
     """
@@ -83,7 +82,7 @@ def outline(size: tuple[float, float], key: float, grow: float = 0.0) -> Profile
 
 
 def tapered(lay: Layout, clearance: float, bottom: float) -> Shape:
-    """The plinth's taper from `bottom` up to the seat, grown by `clearance` on every side."""
+    """Draw the plinth's taper from `bottom` up to the seat, grown by `clearance` on every side."""
 
     def section(z: float) -> Profile:
         return outline(lay.plinth, lay.key, clearance - z * math.tan(math.radians(PLINTH_DRAFT_DEG)))
@@ -92,6 +91,6 @@ def tapered(lay: Layout, clearance: float, bottom: float) -> Shape:
 
 
 def _pry_slot(lay: Layout, top: float, side: int) -> Shape:
-    """A slot in the plate's edge that reaches under the skirt: a screwdriver lifts the cup there."""
+    """Draw a slot in the plate's edge that reaches under the skirt: a screwdriver lifts the cup there."""
     inner, outer = side * (lay.cup[0] - PRY_UNDER), side * (lay.plate[0] + BEYOND)
     return box(min(inner, outer), max(inner, outer), -PRY_HALF_WIDTH, PRY_HALF_WIDTH, top - PRY_DEPTH, top + BEYOND / 4)

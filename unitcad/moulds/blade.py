@@ -9,7 +9,7 @@ BLADE_THICKNESS, BLADE_EDGE = 3.0, 0.8
 
 
 def blade(lay: Layout, rim: float) -> Shape:
-    """The strike-off blade, edge down on the rim: a bar as long as the plate, bevelled to a flat edge."""
+    """Draw the strike-off blade, edge down on the rim: a bar as long as the plate, bevelled to a flat edge."""
     half, t, e, h = lay.plate[1], BLADE_THICKNESS, BLADE_EDGE, BLADE_HEIGHT
     section = polygon((0, 0), (e, 0), (t, 2 * (t - e)), (t, h), (0, h))
     # Drawn in (x, z) and stood up: x to x, y to z, extrusion to -y.

@@ -24,23 +24,23 @@ def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
 
 
 def cup_blank(spec: Spec, lay: Layout, rim: float) -> Shape:
-    """The block that a cup is cut from: the skirt ends above the plate, so that the seat bears."""
+    """Draw the block that a cup is cut from: the skirt ends above the plate, so that the seat bears."""
     return Extrude(outline(lay.cup, MARK), skirt_end(spec), rim)
 
 
 def skirt_end(spec: Spec) -> float:
-    """z of the skirt's lower edge."""
+    """Return z of the skirt's lower edge."""
     return plate_top(spec) + spec.moulds.seat_relief_mm
 
 
 def recess(spec: Spec, lay: Layout) -> Shape:
-    """The cup's recess: the plinth's taper, wider by the printer's clearance measured square to its sides."""
+    """Draw the cup's recess: the plinth's taper, wider by the printer's clearance measured square to its sides."""
     clearance = spec.moulds.plinth_clearance_mm / math.cos(math.radians(PLINTH_DRAFT_DEG))
     return tapered(lay, clearance, skirt_end(spec))
 
 
 def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
-    """The overflow groove round a rim, behind the land; it stops over a window that would leave too thin a wall."""
+    """Draw the overflow groove behind the land; it stops over a window where the wall would be too thin."""
     moulds, rim, radius = spec.moulds, dims.heights[layer], dims.radii[layer]
     inner = radius + moulds.land_mm
     outer = inner + moulds.groove_width_mm
@@ -59,12 +59,12 @@ def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
 
 
 def groove_depth_of(spec: Spec, rim: float) -> float:
-    """Depth of an overflow groove: the printer's, or half a low rim's height."""
+    """Return the depth of an overflow groove: the printer's, or half a low rim's height."""
     return min(spec.moulds.groove_depth_mm, rim / 2)
 
 
 def windows(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:
-    """The passages of the tongues through a cup's wall, from each cell outwards to the edge."""
+    """Draw the passages of the tongues through a cup's wall, from each cell outwards to the edge."""
     if not dims.exit:
         return []
     half, low, high = window_section(spec, dims.exit)
@@ -77,6 +77,6 @@ def windows(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:
 
 
 def window_section(spec: Spec, exit: Exit) -> tuple[float, float, float]:
-    """Half width, bottom and top of a window."""
+    """Return half width, bottom and top of a window, mm."""
     clearance = spec.moulds.window_clearance_mm
     return exit.width / 2 + clearance, exit.low - clearance, exit.high + clearance

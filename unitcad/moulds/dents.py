@@ -1,4 +1,4 @@
-"""Pockets of air that lengths alone tell of, before anything is meshed; law C400 measures them all."""
+"""Pockets of air that follow from lengths alone, before anything is meshed; mould check C400 measures them all."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ MESH_ROOM = 0.8
 
 
 def deepest(spec: Spec, layer: int) -> float:
-    """The depth of a dent that a layer (from 0) bears, mm."""
+    """Return the depth of a dent that a layer (from 0) bears, mm."""
     drawn = spec.layers[layer]
     return DENT * min(drawn.wall_mm, drawn.cap_mm if drawn.cap_mm else drawn.wall_mm)
 
 
 def under_tongue(dims: Dimensions, exit: Exit, layer: int) -> float:
-    """Depth of the air that stays under a tongue where it meets the bore, the mould tilted towards it, mm.
+    """Return the depth of the air that stays under a tongue where it meets the bore, the mould tilted towards it, mm.
 
     The tongue's flat underside is a ceiling; its highest point is on the bore at r, and the way out leads round to the
     tongue's edge, half a width h aside: lower by (r - sqrt(r^2 - h^2)) sin(tilt).
@@ -34,14 +34,14 @@ def under_tongue(dims: Dimensions, exit: Exit, layer: int) -> float:
 
 
 def widest_tongue(spec: Spec, dims: Dimensions, layer: int) -> float:
-    """The width up to which the air under a tongue gets out of a layer's pour, mm: `under_tongue` solved for it."""
+    """Return the width up to which air under a tongue gets out of a pour, mm: `under_tongue` solved for it."""
     bore = dims.radii[layer]
     drop = min(MESH_ROOM * deepest(spec, layer) / math.sin(math.radians(TILT_DEG)), bore)
     return 2 * math.sqrt(bore**2 - (bore - drop) ** 2)
 
 
 def check_tongue(spec: Spec, dims: Dimensions) -> None:
-    """Raises Refusal where a tongue is too wide for the air under it to get out."""
+    """Raise Refusal where a tongue is too wide for the air under it to get out."""
     widths = [widest_tongue(spec, dims, layer) for layer in range(len(spec.layers))]
     if not dims.exit or dims.exit.width <= min(widths):
         return
@@ -53,11 +53,11 @@ def check_tongue(spec: Spec, dims: Dimensions) -> None:
         f"{MESH_ROOM * deepest(spec, layer):.3f}"
     )
     if spec.wires:
-        each = _down((widest + WIRE_GAP) / spec.wires.count - WIRE_GAP)
+        each = _rounded_down((widest + WIRE_GAP) / spec.wires.count - WIRE_GAP)
         raise Refusal("wires.diameter_mm", spec.wires.diameter_mm, why, each if each > 0 else None)
     tail = spec.fpcb.tail_width_mm if spec.fpcb else 0.0
-    raise Refusal("fpcb.tail_width_mm", tail, why, _down(widest) if widest > 0.001 else None)
+    raise Refusal("fpcb.tail_width_mm", tail, why, _rounded_down(widest) if widest > 0.001 else None)
 
 
-def _down(length: float) -> float:
+def _rounded_down(length: float) -> float:
     return math.floor(1000 * length) / 1000

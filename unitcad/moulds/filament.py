@@ -25,7 +25,7 @@ _QUARTER = math.tan(math.pi / 8)
 
 
 def way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
-    """The hole through a core, flared below, and the groove under the plate (whose lower face is z = `bottom`)."""
+    """Draw the hole through a core, flared below, and the groove under the plate (whose lower face is z = `bottom`)."""
     radius, depth = spec.moulds.filament_hole_mm / 2, filament_groove(spec)
     roof = bottom + depth
     hole = Revolve(
@@ -43,7 +43,7 @@ def way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) ->
 
 
 def stub(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
-    """The stub itself: flush with the core's top, its bent end on the bench."""
+    """Draw the stub itself: flush with the core's top, its bent end on the bench."""
     radius = spec.moulds.filament_mm / 2
     elbow = bottom + radius
     ball = Revolve(Profile(((0, -radius, _QUARTER), (radius, 0, _QUARTER), (0, radius, 0.0))))
@@ -55,7 +55,7 @@ def stub(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -
 
 
 def annulus(spec: Spec, dims: Dimensions, cell: Cell) -> Shape:
-    """The ring between filament and hole: too narrow for silicone of these viscosities to matter, so a seal.
+    """Draw the ring between filament and hole: too narrow for silicone of these viscosities to matter, so a seal.
 
     It reaches into both walls, or faces that coincide could leave a way of no width along them.
     """
@@ -69,7 +69,7 @@ def _meets_edge(lay: Layout, cell: Cell) -> bool:
 
 
 def _length(spec: Spec, lay: Layout, cell: Cell) -> float:
-    """From the hole to beyond the plate's edge at -y, or, behind another cell, a pocket as long as the pitch allows."""
+    """Return the groove's length: to beyond the plate's edge at -y, or, behind another cell, what the pitch allows."""
     if _meets_edge(lay, cell):
         return cell.y + lay.plate[1] + BEYOND
     return lay.pitch - spec.moulds.filament_hole_mm / 2 - FLARE - 2 * spec.moulds.least_wall_mm

@@ -26,7 +26,7 @@ def base_label(spec: Spec, lay: Layout, label: str) -> list[Shape]:
 
 
 def corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, str]) -> list[Shape]:
-    """Three pairs of characters to engrave in a plate's corners, outside all bores; the fourth corner is the key's."""
+    """Draw three pairs of characters in a plate's corners, outside all bores; the fourth corner is the key's."""
     stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
     width, height = text_width("00", stroke), HEIGHT * stroke
     x, y = lay.cup[0] - TEXT_MARGIN, lay.cup[1] - TEXT_MARGIN
@@ -38,7 +38,7 @@ def corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, st
 
 
 def cell_numbers(spec: Spec, lay: Layout, rim: float) -> list[Shape]:
-    """The number of each of several cells, in the space that the grooves leave at its upper right."""
+    """Draw the number of each of several cells, in the space that the grooves leave at its upper right."""
     stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
     return [
         moved(

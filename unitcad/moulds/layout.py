@@ -43,14 +43,13 @@ class Layout:
     key: float
     pitch: float
     plinth: tuple[float, float]
-    plinth_foot: tuple[float, float]
     cup: tuple[float, float]
     plate: tuple[float, float]
     label_height: float
 
 
 def layout(spec: Spec, dims: Dimensions) -> Layout:
-    """The layout of a spec's moulds; "fill" is as many cavities as the bed takes.
+    """Return the layout of a spec's moulds; "fill" is as many cavities as the bed takes.
 
     Raises Refusal where a plate or a piece's height exceeds the bed, or a tail reaches no edge.
     """
@@ -64,26 +63,23 @@ def layout(spec: Spec, dims: Dimensions) -> Layout:
         if columns <= most:
             limit = f"cells are numbered up to {MOST_CELLS}"
         raise Refusal("moulds.cavities", [columns, rows], limit, list(_fill(spec, dims, min(columns, most), rows)))
-    found = _layout(spec, dims, columns, rows)
-    over = _excess(spec, found)
+    lay = _layout(spec, dims, columns, rows)
+    over = _excess(spec, lay)
     if max(over) > 1e-9:
-        raise _too_large(spec, dims, found, columns, rows, over)
+        raise _too_large(spec, dims, lay, columns, rows, over)
     tallest = spec.moulds.plinth_height_mm + spec.moulds.plate_mm + dims.heights[-1]
     if tallest > spec.moulds.bed_z_mm + 1e-9:
         raise _too_tall(spec, tallest)
-    return found
+    return lay
 
 
 def most_columns(dims: Dimensions) -> int:
-    """Columns of a gang: a tail, or the tongue for it, must reach an edge along x; without tails any number will do."""
+    """Return the most columns of a gang: a tail, or its tongue, must reach an edge along x."""
     return {0: MOST_CELLS, 1: 2, 2: 1}[len(dims.exits)]
 
 
 def _fill(spec: Spec, dims: Dimensions, most: int, most_rows: int) -> tuple[int, int]:
-    """As many columns and rows as the bed takes and as can be numbered, or one.
-
-    Found by trying: the pitch depends on the count.
-    """
+    """Return as many columns and rows as the bed takes and as can be numbered, by trial: the pitch depends on them."""
     columns = rows = 1
     while columns < most and _excess(spec, _layout(spec, dims, columns + 1, 1))[0] <= 1e-9:
         columns += 1
@@ -93,10 +89,10 @@ def _fill(spec: Spec, dims: Dimensions, most: int, most_rows: int) -> tuple[int,
     return columns, rows
 
 
-def _excess(spec: Spec, found: Layout) -> list[float]:
-    """By how much the plate exceeds the bed along x and y (mm)."""
+def _excess(spec: Spec, lay: Layout) -> list[float]:
+    """Return by how much the plate exceeds the bed along x and y (mm)."""
     bed = spec.moulds.bed_x_mm, spec.moulds.bed_y_mm
-    return [2 * size - room for size, room in zip(found.plate, bed, strict=True)]
+    return [2 * size - room for size, room in zip(lay.plate, bed, strict=True)]
 
 
 def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
@@ -130,16 +126,16 @@ def _layout(spec: Spec, dims: Dimensions, columns: int, rows: int) -> Layout:
         for i in range(columns)
     )
     key = min(KEY, KEY_SHARE * reach)
-    return Layout(cells, key, pitch, plinth, foot, cup, (cup[0] + margin, cup[1] + margin), label)
+    return Layout(cells, key, pitch, plinth, cup, (cup[0] + margin, cup[1] + margin), label)
 
 
 def _sides(dims: Dimensions, column: int, columns: int) -> tuple[int, ...]:
-    """Where a cell's tails leave: of two columns with one tail each, the left one's leaves to the left."""
+    """Return where a cell's tails leave: of two columns with one tail each, the left one's leaves to the left."""
     return (-1,) if dims.sides == (1,) and columns == 2 and column == 0 else dims.sides
 
 
 def _corner_for_label(radius: float, width: float, height: float) -> float:
-    """Least half side of a square about a cell whose corner holds a label outside `radius`."""
+    """Return the least half side of a square about a cell whose corner holds a label outside `radius`."""
     half = radius / math.sqrt(2)
     while math.hypot(max(half - TEXT_MARGIN - width, 0), max(half - TEXT_MARGIN - height, 0)) < radius:
         half += 1 / 64
@@ -147,7 +143,7 @@ def _corner_for_label(radius: float, width: float, height: float) -> float:
 
 
 def _too_tall(spec: Spec, tallest: float) -> Refusal:
-    """The refusal of a piece higher than the printer prints: of the largest length in it, or of a lowered bed_z_mm."""
+    """Refuse a piece higher than the printer prints: its largest length, or a lowered bed_z_mm."""
     lengths = {"motor.thickness_mm": spec.motor.thickness_mm, "moulds.plate_mm": spec.moulds.plate_mm}
     lengths |= {f"layers.{i}.cap_mm": layer.cap_mm for i, layer in enumerate(spec.layers)}
     lengths["moulds.plinth_height_mm"] = spec.moulds.plinth_height_mm
@@ -161,19 +157,19 @@ def _too_tall(spec: Spec, tallest: float) -> Refusal:
     return Refusal(field, lengths[field], limit, nearest if nearest > 0 else None)
 
 
-def _too_large(spec: Spec, dims: Dimensions, found: Layout, columns: int, rows: int, over: list[float]) -> Refusal:
-    """The refusal of a plate larger than the bed: fewer cavities if that helps, else a smaller unit or a larger bed."""
+def _too_large(spec: Spec, dims: Dimensions, lay: Layout, columns: int, rows: int, over: list[float]) -> Refusal:
+    """Refuse a plate larger than the bed; name fewer cavities if that helps, else a smaller unit or a larger bed."""
     fits = [
-        max(1, count - math.ceil(max(excess, 0) / found.pitch - 1e-9))
+        max(1, count - math.ceil(max(excess, 0) / lay.pitch - 1e-9))
         for count, excess in zip((columns, rows), over, strict=True)
     ]
     still = max(
-        2 * (size - (count - fit) / 2 * found.pitch) - room
+        2 * (size - (count - fit) / 2 * lay.pitch) - room
         for size, count, fit, room in zip(
-            found.plate, (columns, rows), fits, (spec.moulds.bed_x_mm, spec.moulds.bed_y_mm), strict=True
+            lay.plate, (columns, rows), fits, (spec.moulds.bed_x_mm, spec.moulds.bed_y_mm), strict=True
         )
     )
-    size = f"the plate of {2 * found.plate[0]:.1f} x {2 * found.plate[1]:.1f} mm exceeds the bed"
+    size = f"the plate of {2 * lay.plate[0]:.1f} x {2 * lay.plate[1]:.1f} mm exceeds the bed"
     by = f"by {max(over):.1f} mm"
     if still <= 1e-9:
         return Refusal("moulds.cavities", [columns, rows], f"{size} {by}", fits)
@@ -181,6 +177,6 @@ def _too_large(spec: Spec, dims: Dimensions, found: Layout, columns: int, rows: 
     if nearest < spec.diameter_mm - 2 * dims.air_ring:
         axis = over.index(max(over))
         field, bed = [("bed_x_mm", spec.moulds.bed_x_mm), ("bed_y_mm", spec.moulds.bed_y_mm)][axis]
-        needed = math.ceil(20 * found.plate[axis]) / 10
+        needed = math.ceil(20 * lay.plate[axis]) / 10
         return Refusal(f"moulds.{field}", bed, f"{size} {by} with one cavity", needed)
     return Refusal("diameter_mm", spec.diameter_mm, f"{size} {by} with one cavity", nearest)

@@ -25,7 +25,7 @@ THICKNESS, SKIRT, SKIRT_WALL, SKIRT_OFF_WINDOW = 3.0, 1.5, 1.6, 0.2
 VENT, LEAST_VENT = 1.0, 0.8
 """Diameter of a vent, mm, and what it may come down to over a narrow ring."""
 VENT_COUNTS = tuple(range(4, 65, 4))
-"""Multiples of four: the tilts of the air law then fall halfway between two vents, the worst case."""
+"""Multiples of four: the tilts of C400 then fall halfway between two vents, the worst case."""
 SPRUE_OFF_VENT = 0.1
 """Wall between sprue and vents at the lid's upper face, at least, mm."""
 GATE = 0.8
@@ -43,12 +43,12 @@ def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
 
 
 def lid_top(dims: Dimensions, layer: int) -> float:
-    """z of the lid's upper face, where sprue and vents are open."""
+    """Return z of the lid's upper face, where sprue and vents are open."""
     return dims.heights[layer] + THICKNESS
 
 
 def channels(spec: Spec, dims: Dimensions, lay: Layout, layer: int, beyond: float = 0.0) -> list[Shape]:
-    """Sprue and vents, cell by cell, as they fill with silicone; `beyond` (mm) makes them longer at both ends."""
+    """Draw sprue and vents, cell by cell, as they fill with silicone; `beyond` (mm) makes them longer at both ends."""
     rim, top, sprue = dims.heights[layer], lid_top(dims, layer), spec.moulds.sprue_mm / 2
     inner, outer = _ceiling(dims, layer)
     vent, count = vent_diameter(dims, layer) / 2, vents(spec, dims, layer)
@@ -70,7 +70,7 @@ def channels(spec: Spec, dims: Dimensions, lay: Layout, layer: int, beyond: floa
 
 
 def _check_sprue(spec: Spec, dims: Dimensions, layer: int, count: int) -> None:
-    """Raises Refusal for a sprue that runs into the vents."""
+    """Raise Refusal for a sprue that runs into the vents."""
     inner, outer = _ceiling(dims, layer)
     vent = vent_diameter(dims, layer) / 2
     middle, rim = (inner + outer) / 2 if inner else 0.0, outer - vent
@@ -82,13 +82,13 @@ def _check_sprue(spec: Spec, dims: Dimensions, layer: int, count: int) -> None:
 
 
 def vent_diameter(dims: Dimensions, layer: int) -> float:
-    """Of each vent, mm: 1, or what a narrow ring leaves."""
+    """Return the diameter of each vent, mm: 1, or what a narrow ring leaves."""
     inner, outer = _ceiling(dims, layer)
     return min(VENT, GATE * (outer - inner)) if inner else VENT
 
 
 def vents(spec: Spec, dims: Dimensions, layer: int) -> int:
-    """How many vents a cavity has: as asked for, or the least number that clears the air.
+    """Return how many vents a cavity has: as asked for, or the least number that clears the air.
 
     Raises Refusal for a number that can't clear, naming one that would, and for a ring too narrow for a vent.
     """
@@ -125,7 +125,7 @@ def vents(spec: Spec, dims: Dimensions, layer: int) -> int:
 
 
 def pocket_depth(dims: Dimensions, layer: int, count: int) -> float:
-    """Depth of the air that stays halfway between two of `count` vents when the lid is tilted towards there, mm.
+    """Return the depth of the air that stays halfway between two of `count` vents when the lid is tilted there, mm.
 
     The rim's highest point is at the outer radius r; a vent's at (r - v) cos(pi / n) + v, v being the vent's radius.
     """
@@ -134,7 +134,7 @@ def pocket_depth(dims: Dimensions, layer: int, count: int) -> float:
 
 
 def _ceiling(dims: Dimensions, layer: int) -> tuple[float, float]:
-    """Inner and outer radius of the flat top of a layer; the inner one is 0 for a cap."""
+    """Return inner and outer radius of the flat top of a layer; the inner one is 0 for a cap."""
     inside = (dims.cavity_radius, *dims.radii)[layer]
     is_ring = (dims.core_height, *dims.heights)[layer] >= dims.heights[layer]
     return (inside if is_ring else 0.0), dims.radii[layer]

@@ -119,8 +119,8 @@ class MouldSet:
         return {body.name: self.mesh(body) for body in (*self.unit, *self.plan.tools)}
 
     @cached_property
-    def cavities(self) -> list[list[Cavity]]:
-        """The cavities of each pour, one a cell."""
+    def cavities(self) -> tuple[Cavity, ...]:
+        """The cavities of all pours in their order, one a cell."""
         from unitcad.moulds.cavities import cavities
 
         return cavities(self.plan, self.solids, self.segments)

@@ -76,7 +76,7 @@ class Plan:
     by_complement: bool = False
 
     def tool(self, name: str) -> Body:
-        """The tool of that name. Raises KeyError."""
+        """Return the tool of that name. Raises KeyError."""
         return {tool.name: tool for tool in self.tools}[name]
 
     def of_kind(self, kind: Kind) -> tuple[Body, ...]:
@@ -151,30 +151,30 @@ def placed(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
 
 def _tools(spec: Spec, dims: Dimensions, lay: Layout, drawn: Complement | None) -> list[Body]:
     """Draw every tool without its label, in the order in which a person needs them."""
-    found = [Body("base", "tool", "base", drawn.base if drawn else base(spec, dims, lay), _BASE)]
+    tools = [Body("base", "tool", "base", drawn.base if drawn else base(spec, dims, lay), _BASE)]
     injected = spec.moulds.pour == "injected"
     for i in range(len(spec.layers)):
         shape, colour = drawn.cups[i] if drawn else cup(spec, dims, lay, i), _CUP2 if i % 2 else _CUP
-        found.append(Body(f"cup{i + 1}", "tool", "cup", shape, colour, step=i + 1, upside_down=True, removal=_UP))
+        tools.append(Body(f"cup{i + 1}", "tool", "cup", shape, colour, step=i + 1, upside_down=True, removal=_UP))
         if injected:
             shape = lid.lid(spec, dims, lay, i)
-            found.append(Body(f"lid{i + 1}", "tool", "lid", shape, _LID, step=i + 1, upside_down=True, removal=_UP))
+            tools.append(Body(f"lid{i + 1}", "tool", "lid", shape, _LID, step=i + 1, upside_down=True, removal=_UP))
     # A printed resin is too brittle for a strip this thin: it is cut from film or steel.
     brittle = printer_of(spec).technology.value == "sla"
     strips, made = tongues(dims, lay), "cut" if brittle else "printed"
-    found += [
+    tools += [
         Body(_numbered("tongue", i, strips), "tool", "tongue", shape, _TONGUE, made=made, removal=(side, 0, 0))
         for i, (side, shape) in enumerate(strips)
     ]
     if design_named(spec.design).suction and not drawn:
         stubs = [filament.stub(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells]
-        found += [
+        tools += [
             Body(_numbered("stub", i, stubs), "tool", "stub", stub, _STUB, made="cut", removal=_DOWN)
             for i, stub in enumerate(stubs)
         ]
     if not injected:
-        found.append(Body("blade", "tool", "blade", blade(lay, dims.heights[-1]), _BLADE, upside_down=True))
-    return found
+        tools.append(Body("blade", "tool", "blade", blade(lay, dims.heights[-1]), _BLADE, upside_down=True))
+    return tools
 
 
 def _engraved(tool: Body, spec: Spec, dims: Dimensions, lay: Layout, label: str) -> Body:

@@ -14,23 +14,23 @@ from unitcad.spec import Spec
 
 
 def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
-    """What silicone is kept from though no tool fills it: grease round a tongue, the annulus round a filament.
+    """Draw what silicone is kept from though no tool fills it: grease round a tongue, the annulus round a filament.
 
     A window's seal is what the window removes from the cup, less the tongue; never a solid built a second time.
     """
-    found: list[Shape] = []
+    seals: list[Shape] = []
     if dims.exit:
         around = [shape for _, shape in tongues(dims, lay)]
         walls = cut(
             cup_blank(spec, lay, dims.heights[layer]),
             [moved(cylinder(dims.radii[layer], -BEYOND, dims.heights[layer] + BEYOND), c.x, c.y) for c in lay.cells],
         )
-        found += [cut(Common((walls, window)), around) for window in windows(spec, dims, lay)]
-        found += [
+        seals += [cut(Common((walls, window)), around) for window in windows(spec, dims, lay)]
+        seals += [
             cut(Common((moved(core(dims), c.x, c.y), moved(notch(spec, dims, dims.exit, s), c.x, c.y))), around)
             for c in lay.cells
             for s in c.sides
         ]
     if design_named(spec.design).suction:
-        found += [filament.annulus(spec, dims, c) for c in lay.cells]
-    return found
+        seals += [filament.annulus(spec, dims, c) for c in lay.cells]
+    return seals

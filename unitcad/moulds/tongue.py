@@ -12,7 +12,7 @@ GRIP_LENGTH, GRIP_WIDTH, GRIP_GAP, GRIP_APART = 8.0, 10.0, 3.0, 0.5
 
 
 def tongue(dims: Dimensions, lay: Layout, exit: Exit) -> Shape:
-    """The strip that forms the slot, with a grip outside the cup; for a single cell on the axis, leaving along +x.
+    """Draw the strip that forms the slot, with a grip outside the cup; for a single cell on the axis, leaving along +x.
 
     Its tip is round and stops against the core's riser, its underside rests on the ledge.
     """

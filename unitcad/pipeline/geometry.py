@@ -154,10 +154,10 @@ def _steps(moulds: MouldSet, store: Store) -> list[dict[str, Any]]:
                 "index": step.index,
                 "layer": step.name,
                 "tools": list(step.tools),
-                "cavity_volume_mm3": float(f"{sum(cell.reached.volume() for cell in cells):.9g}"),
+                "cavity_volume_mm3": float(f"{sum(c.reached.volume() for c in moulds.cavities if c.step is step):.9g}"),
                 "layer_volume_mm3": float(f"{moulds.solids[step.name].volume():.9g}"),
             }
-            for step, cells in zip(moulds.plan.steps, moulds.cavities, strict=True)
+            for step in moulds.plan.steps
         ]
 
     return store.data(geometry_key(moulds, "steps"), measured)

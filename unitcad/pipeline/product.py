@@ -24,7 +24,7 @@ from unitcad.pipeline.versions import kernel_versions
 from unitcad.spec import Spec
 from unitcad.validation import warnings
 
-NO_MOULDS = "no moulds were asked for: of the mould checks only C200 looked at the unit"
+NO_MOULDS = "no moulds were asked for: only C200 ran, on the unit"
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ def _left_out(spec: Spec, asked: Sequence[str], only: Sequence[str], check: bool
     """Name what this variant does without, and why."""
     reasons: list[Reason] = []
     if not check or "moulds" not in only:
-        reasons.append(("laws", NO_MOULDS if check else folders.UNCHECKED))
+        reasons.append(("mould checks", NO_MOULDS if check else folders.UNCHECKED))
     if not check:
         reasons.append(("mesh checks", folders.UNCHECKED))
     reasons += _tooling_left_out(spec)

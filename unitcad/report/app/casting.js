@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const { el, number, section, table, framed, partName } = window.unitcad;
-  // What a person at the scale looks for first.
+  // The figures that are needed first, at the scale.
   const FIRST = [/^part A$/, /^part B$/, /^pot life/, /^cure/, /^rise of/];
 
   const quantity = (figure) => `${number(figure.value, 4)} ${figure.unit || ""}`.trim();
@@ -10,8 +10,8 @@
   function figures(list, summary) {
     if (!list || !list.length) return null;
     const rows = list.map((figure) => [figure.name, quantity(figure), figure.source]);
-    const found = table(["Figure", "Value", "Source"], rows, { label: summary });
-    return el("details", {}, el("summary", {}, summary), found);
+    const shown = table(["Figure", "Value", "Source"], rows, { label: summary });
+    return el("details", {}, el("summary", {}, summary), shown);
   }
 
   function cards(list) {

@@ -87,7 +87,7 @@
       const value = Number(at.input.value);
       at.output.textContent = `${value.toFixed(2)} mm`;
       at.input.disabled = axis.disabled = !cutOn.checked;
-      // A hair off the middle: a cut exactly in a face's plane shows false triangles.
+      // Slightly off the middle: a cut exactly in a face's plane shows false triangles.
       viewer.cut({ on: cutOn.checked, axis: axis.value, at: value + 1 / 1024 });
     }
 

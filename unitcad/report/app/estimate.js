@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const { el, number, section, table, facts, theme, curvePlot } = window.unitcad;
-  const NAMES = { paper: "Paper, as printed", consistent: "Paper's path, mended", fitted: "Fitted divider", crossings: "Crossings alone", null: "Null: two constants" };
+  const NAMES = { paper: "Paper, as printed", consistent: "Paper's path, corrected", fitted: "Fitted divider", crossings: "Interfaces alone", null: "Null: two constants" };
   const nameOf = (model) => NAMES[model] || model;
   const known = (value) => typeof value === "number" && Number.isFinite(value);
 
@@ -113,12 +113,12 @@
   }
 
   function errors(data) {
-    const judged = Object.entries(data.table_error || {}).filter(([, entry]) => entry && entry.levels);
-    if (!judged.length) return null;
+    const compared = Object.entries(data.table_error || {}).filter(([, entry]) => entry && entry.levels);
+    if (!compared.length) return null;
     const factor = (entry) => (entry ? entry.geometric_mean : "–");
     const out = (entry, key) => factor((entry.leave_one_unit_out || {})[key]);
     return [el("h3", {}, "Error against the measured table"),
-      table(["Model", "Nine levels", "left out", "worst", "Twelve ratios", "left out", "Directions"], judged.map(([model, entry]) => [
+      table(["Model", "Nine levels", "left out", "worst", "Twelve ratios", "left out", "Directions"], compared.map(([model, entry]) => [
         nameOf(model), factor(entry.levels), out(entry, "levels"), entry.levels.worst, factor(entry.ratios), out(entry, "ratios"),
         entry.directions ? `${entry.directions.right} of ${entry.directions.of}` : "–"]), { label: "Error against the measured table" }),
       el("p", { className: "note" }, `Factors; 1 is exact. ${(data.table_error.what || "")}`)];
@@ -127,7 +127,7 @@
   function assumptions(data) {
     const own = Object.entries(data.models || {}).map(([model, block]) => [el("h4", {}, nameOf(model)), el("p", {}, block.kind), el("ul", {}, (block.assumptions || []).map((text) => el("li", {}, text)))]);
     const layered = (data.layered && data.layered.assumptions) || [];
-    return el("details", {}, el("summary", {}, "What it assumes and leaves out"), el("ul", {}, (data.assumptions || []).map((text) => el("li", {}, text))),
+    return el("details", {}, el("summary", {}, "Assumptions and what is left out"), el("ul", {}, (data.assumptions || []).map((text) => el("li", {}, text))),
       own, layered.length > 0 && [el("h4", {}, "Layered skin"), el("ul", {}, layered.map((text) => el("li", {}, text)))]);
   }
 
@@ -137,7 +137,7 @@
     return section("estimate", "Attenuation estimate",
       el("p", {}, "An estimate, not a measurement: how much of the motor's amplitude reaches the skin at the unit's edge, by each model, and how it decays from there."),
       levels(data), ratios(data), el("h3", {}, "Outwards from the edge"), curves(data.layered), margins(data.models || {}), errors(data), assumptions(data),
-      el("details", {}, el("summary", {}, "All its numbers"), facts(data)));
+      el("details", {}, el("summary", {}, "All numbers"), facts(data)));
   }
 
   Object.assign(window.unitcad, { estimate });

@@ -1,4 +1,4 @@
-// Filters of a table's cells, as a person writes them: text to find, numbers to compare, `!` for all others.
+// Filters of a table's cells, text to find, numbers to compare, `!` for all others.
 (() => {
   "use strict";
   const { number } = window.unitcad;

@@ -6,7 +6,7 @@
   const page = document.getElementById("page");
   let leave = () => {};
 
-  // References into the pool, undone. The key is one that no data of ours has.
+  // References into the pool, undone. No data of unitcad has this key.
   function resolver(pool) {
     const known = new Map();
     const resolve = (node) => {
@@ -53,7 +53,7 @@
     return { node, ready };
   }
 
-  // What a damaged result says wrongly stays in its own section.
+  // An error in a damaged result stays in its own section.
   function guarded(id, title, make) {
     try {
       return make();
@@ -70,7 +70,7 @@
       view.node,
       guarded("section", "Section", () => U.parts.sectionDrawing(variant)),
       guarded("estimate", "Attenuation estimate", () => U.estimate(variant)),
-      guarded("laws", "Laws and checks", () => U.parts.laws(variant)),
+      guarded("checks", "Mould checks and mesh checks", () => U.parts.checks(variant)),
       guarded("procedure", "Procedure", () => U.procedure(variant)),
       guarded("parts", "Parts", () => U.parts.parts(variant)),
       guarded("files", "Files", () => U.parts.files(variant)),
@@ -120,7 +120,7 @@
     const chips = [el("span", { className: "chip" }, `${geometries} geometries`), failed > 0 && el("span", { className: "chip bad" }, `${failed} failed`)];
     const sections = [section("variants", "Variants", made.node), section("plot", "Two columns against each other", controls, plotHost)];
     if (data.damaged.length) sections.push(section("damaged", "Damaged", U.table(["Result", "Why"], data.damaged, { label: "Damaged results" })));
-    if (batch) sections.push(section("batch", "The batch", el("details", {}, el("summary", {}, "What the batch says of itself"), U.facts(batch))));
+    if (batch) sections.push(section("batch", "The batch", el("details", {}, el("summary", {}, "Properties of the batch"), U.facts(batch))));
     ready = true;
     const scrolled = made.node.querySelector(".scroll");
     let left = { page: 0, across: 0, down: 0, focus: null };

@@ -146,8 +146,8 @@
         let best = null;
         let least = 24;
         for (const p of drawn) {
-          const away = Math.hypot(u.valToPos(p.px, "x") - left, u.valToPos(p.py, "y") - top);
-          if (away < least) [best, least] = [p, away];
+          const distance = Math.hypot(u.valToPos(p.px, "x") - left, u.valToPos(p.py, "y") - top);
+          if (distance < least) [best, least] = [p, distance];
         }
         return best;
       };

@@ -20,13 +20,13 @@
   const link = (folder, path) => [folder, path].filter(Boolean).join("/").split("/").map(encodeURIComponent).join("/");
 
   function verdict(manifest) {
-    const laws = manifest.laws || [];
-    const held = laws.filter((law) => law.ok).length;
+    const checks = manifest.laws || [];
+    const failed = checks.filter((check) => !check.ok).length;
     const errors = manifest.check ? manifest.check.errors : 0;
-    if (!laws.length) return { state: "unknown", text: "laws not judged" };
-    if (held < laws.length) return { state: "bad", text: `${laws.length - held} of ${laws.length} laws broken` };
+    if (!checks.length) return { state: "unknown", text: "mould checks not run" };
+    if (failed) return { state: "bad", text: `${failed} of ${checks.length} mould checks failed` };
     if (errors) return { state: "bad", text: `${errors} errors in files` };
-    return { state: "good", text: `${held} laws hold` };
+    return { state: "good", text: `${checks.length} mould checks passed` };
   }
 
   function sectionDrawing(variant) {
@@ -36,24 +36,24 @@
       : absent("No section drawing here. Ask for it with", "unitcad build SPEC --only unit"));
   }
 
-  function laws(variant) {
+  function checks(variant) {
     const { manifest } = variant;
-    const found = manifest.laws || [];
-    const row = (law) => ({ className: law.ok ? undefined : "bad", cells: [law.code, law.where, law.value, law.limit, law.unit || "", law.ok ? "holds" : "broken"] });
-    const head = ["Law", "Where", "Value", "Limit", "Unit", ""];
-    const broken = found.filter((law) => !law.ok);
+    const all = manifest.laws || [];
+    const row = (check) => ({ className: check.ok ? undefined : "bad", cells: [check.code, check.where, check.value, check.limit, check.unit || "", check.ok ? "passed" : "failed"] });
+    const head = ["Check", "Where", "Value", "Limit", "Unit", ""];
+    const failed = all.filter((check) => !check.ok);
     const findings = (manifest.check && manifest.check.findings) || [];
     const content = [el("p", { className: `verdict ${verdict(manifest).state}` }, verdict(manifest).text)];
-    if (broken.length) content.push(table(head, broken.map(row), { caption: "Broken" }));
-    if (found.length) content.push(el("details", {}, el("summary", {}, `All ${found.length} laws`), table(head, found.map(row), { label: "All laws" })));
-    else content.push(absent("Laws were not judged. Ask for them with", "unitcad build SPEC --only unit,moulds"));
+    if (failed.length) content.push(table(head, failed.map(row), { caption: "Failed" }));
+    if (all.length) content.push(el("details", {}, el("summary", {}, `All ${all.length} mould checks`), table(head, all.map(row), { label: "All mould checks" })));
+    else content.push(absent("The mould checks were not run. Ask for them with", "unitcad build SPEC --only unit,moulds"));
     content.push(findings.length
-      ? table(["File", "Rule", "Severity", "Message"], findings.map((f) => ({ className: f.severity === "error" ? "bad" : undefined, cells: [f.path, f.code, f.severity, f.message] })), { caption: "Found in files" })
-      : el("p", {}, found.length ? "The rules for files found no fault." : ""));
+      ? table(["File", "Rule", "Severity", "Message"], findings.map((f) => ({ className: f.severity === "error" ? "bad" : undefined, cells: [f.path, f.code, f.severity, f.message] })), { caption: "Findings in files" })
+      : el("p", {}, all.length ? "The rules for files found no fault." : ""));
     const lines = (title, list) => list.length > 0 && [el("h3", {}, title), el("ul", {}, list.map((text) => el("li", {}, text)))];
     content.push(lines("Warnings", manifest.warnings || []));
     content.push(lines("Left out", (manifest.left_out || []).map((entry) => `${entry.what}: ${entry.why}`)));
-    return section("laws", "Laws and checks", content);
+    return section("checks", "Mould checks and mesh checks", content);
   }
 
   function parts(variant) {
@@ -83,5 +83,5 @@
       el("h3", {}, "Made by"), facts(variant.manifest.versions)));
   }
 
-  Object.assign(window.unitcad, { drawing, framed, absent, verdict, link, parts: { sectionDrawing, laws, parts, files, spec } });
+  Object.assign(window.unitcad, { drawing, framed, absent, verdict, link, parts: { sectionDrawing, checks, parts, files, spec } });
 })();

@@ -18,7 +18,7 @@
     return new Set(columns.filter((name, i) => rows.length > 1 && rows.every((row) => row[i + 1] === rows[0][i + 1])));
   }
 
-  // table: {columns, rows: [[folder, ...cells]]}; open(row); changed(rows) is told whenever other rows are shown.
+  // table: {columns, rows: [[folder, ...cells]]}; open(row); changed(rows) is called whenever other rows are shown.
   function createTable(table, { open, changed, nameColumn }) {
     const same = constants(table.columns, table.rows);
     const kinds = table.columns.map((name, i) => kindsOf(table.rows.map((row) => row[i + 1])));
