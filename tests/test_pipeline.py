@@ -38,7 +38,7 @@ def _mesh_only(name: str, *more: str):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_template_builds_with_all_laws_kept(name: str, tmp_path: Path) -> None:
+def test_every_template_builds_and_passes_all_checks(name: str, tmp_path: Path) -> None:
     built = build(_mesh_only(name), tmp_path)
     assert built.ok
     assert built.manifest["check"]["findings"] == []
@@ -178,7 +178,7 @@ def test_a_process_killed_between_the_two_renames_leaves_the_old_result_whole(tm
         ("no-fpcb", "tongue and slot"),
         ("embedded", "tongue and slot"),
         ("embedded", "filament stub and hole"),
-        ("embedded", "laws"),
+        ("embedded", "mould checks"),
         ("embedded", "boundary representation"),
     ],
 )

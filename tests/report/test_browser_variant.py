@@ -58,7 +58,16 @@ def shown(visit: Visit) -> list[str]:
 def test_loads_from_a_file_and_asks_for_nothing(visit: Visit) -> None:
     assert visit.page.inner_text("h1") == "encapsulating"
     heads = visit.page.locator("section > h2").all_inner_texts()
-    assert heads == ["3D", "Section", "Attenuation estimate", "Mould checks and mesh checks", "Procedure", "Parts", "Files", "Spec"]
+    assert heads == [
+        "3D",
+        "Section",
+        "Attenuation estimate",
+        "Mould checks and mesh checks",
+        "Procedure",
+        "Parts",
+        "Files",
+        "Spec",
+    ]
     assert visit.page.locator("img.drawing").first.evaluate("(image) => image.naturalWidth") > 200
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
@@ -24,7 +25,7 @@ class _Margin:
     findings: int = 0
     broken: int = 0
     share: float = -1.0
-    worst: dict[str, Any] = field(default_factory=dict)
+    worst: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0
 
 
@@ -40,7 +41,7 @@ def run(quick: bool, say: Say) -> Result:
             manifest = make(from_data(seeded_spec(seed)), ("unit", "moulds"), True, MemoryStore(), stages).manifest
         except Refusal:
             continue
-        seconds.append(stages.seconds["laws"])
+        seconds.append(stages.seconds["mould checks"])
         for finding in manifest["laws"]:
             margin = margins.setdefault(finding["code"], _Margin())
             margin.findings += 1
@@ -71,7 +72,7 @@ def run(quick: bool, say: Say) -> Result:
     )
 
 
-def _worst(finding: dict[str, Any]) -> tuple[float | None, float | None, str]:
+def _worst(finding: Mapping[str, Any]) -> tuple[float | None, float | None, str]:
     """Return value, limit and unit.
 
     A count that must be met exactly (C000's solids) has none: it is as wanted, or the check fails.
@@ -81,7 +82,7 @@ def _worst(finding: dict[str, Any]) -> tuple[float | None, float | None, str]:
     return finding["value"], finding["limit"], finding["unit"] or "number"
 
 
-def _share(finding: dict[str, Any]) -> float:
+def _share(finding: Mapping[str, Any]) -> float:
     """Return how much of its limit a finding uses; a broken one counts as infinite."""
     if not finding["ok"]:
         return float("inf")

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from unitcad import files
 from unitcad.batch.batch_records import Values
@@ -22,6 +21,7 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.build import build_into
 from unitcad.pipeline.json_text import json_bytes
+from unitcad.pipeline.manifest_records import Manifest, failed_codes
 from unitcad.pipeline.product import Product, make, possible_outputs
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import code_version
@@ -147,23 +147,21 @@ def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
     )
 
 
-def _outcome(job: Job, spec: Spec, folder: str, manifest: dict[str, Any], counts: Counter[str]) -> VariantOutcome:
-    holds = all(law["ok"] for law in manifest["laws"]) and manifest["check"]["errors"] == 0
-    codes = sorted({law["code"] for law in manifest["laws"] if not law["ok"]})
-    codes += sorted({finding["code"] for finding in manifest["check"]["findings"] if finding["severity"] == "error"})
+def _outcome(job: Job, spec: Spec, folder: str, manifest: Manifest, counts: Counter[str]) -> VariantOutcome:
+    codes = failed_codes(manifest)
     return VariantOutcome(
         job.index,
-        OK if holds else BROKEN,
+        BROKEN if codes else OK,
         folder,
         row(spec, manifest),
-        "" if holds else f"broken: {', '.join(codes)}",
+        f"broken: {', '.join(codes)}" if codes else "",
         manifest=digest(json_bytes(manifest)),
         built=counts["file built"] + counts["data built"],
         reused=counts["file reused"] + counts["data reused"],
     )
 
 
-def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> dict[str, Any] | None:
+def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> Manifest | None:
     """Return the manifest of a result that an interrupted run completed, if it is what is wanted now.
 
     Raises UnitcadError for a folder that holds something else.
@@ -185,7 +183,7 @@ def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> dict[str, A
             files.read_json(folder / "timings.json", links=False).get("code") == task.code
             and set(manifest["outputs"]) == set(possible_outputs(spec, task.only))
             and set(formats) == set(spec.output.formats)
-            and task.check != any(left["why"] == "--no-check" for left in manifest["left_out"])
+            and task.check != any(left["why"] == folders.UNCHECKED for left in manifest["left_out"])
         )
     except (UnitcadError, KeyError, TypeError, AttributeError):
         return None

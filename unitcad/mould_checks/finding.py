@@ -3,7 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TypedDict
+
+
+class FindingRecord(TypedDict):
+    """A finding as JSON data."""
+
+    code: str
+    where: str
+    ok: bool
+    value: float
+    limit: float
+    unit: str
+    advice: str
 
 
 @dataclass(frozen=True)
@@ -18,9 +30,9 @@ class MouldFinding:
     unit: str
     advice: str = ""
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> FindingRecord:
         """Return JSON-ready data; six significant digits, so that a summation's last bits do not show."""
-        return {**asdict(self), "value": float(f"{self.value:.6g}")}
+        return FindingRecord(**{**asdict(self), "value": float(f"{self.value:.6g}")})
 
 
 def exactly(code: str, where: str, value: float, wanted: float, unit: str) -> MouldFinding:

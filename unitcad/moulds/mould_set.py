@@ -76,14 +76,20 @@ class MouldSet:
         return self.design.dimensions(self.spec)
 
     @cached_property
+    def blank(self) -> MouldSet:
+        """The set of the same geometry with everything blank that the geometry does not read."""
+        spec = geometric(self.spec)
+        return self if spec == self.spec else MouldSet(spec, self.altered)
+
+    @cached_property
     def geometry(self) -> str:
         """What the geometry reads, as JSON: the spec without formats and without what is no shape."""
-        return to_json(with_formats(geometric(self.spec)))
+        return to_json(with_formats(self.spec)) if self.blank is self else self.blank.geometry
 
     @cached_property
     def unit(self) -> tuple[Body, ...]:
         """The bodies of the unit."""
-        return unit_bodies(self.spec)
+        return unit_bodies(self.spec) if self.blank is self else self.blank.unit
 
     @cached_property
     def plan(self) -> Plan:

@@ -9,15 +9,25 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any, Literal
 
 from unitcad.cache import Store, digest
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.pipeline import bodies as body_files
-from unitcad.pipeline.bodies import body_key, file_stem, groups, joint_key
+from unitcad.pipeline.bodies import (
+    body_key,
+    file_stem,
+    glb_content,
+    groups,
+    is_printed,
+    joint_key,
+    step_content,
+    stl_content,
+    threemf_content,
+)
 from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.versions import code_version, kernel_versions
+from unitcad.shape.body import Body
 from unitcad.spec import to_toml
 
 Output = Literal["unit", "moulds", "estimate", "casting"]
@@ -32,17 +42,17 @@ STAGES = ("meshes", "drawing", "step", "pictures")
 
 @dataclass(frozen=True)
 class Artifact:
-    """One file: its path in the variant's folder, the stage that makes it, the hash of what it reads, and how.
+    """One file: its path in the variant's folder, the format that asks for it, the stage that makes it, and how.
 
-    `form` is the format that asks for it, "" where its output alone does. `bodies` are the names of what it holds. A
-    variant's own file has no key. The key is worked out when it is called for: it hashes every shape in the file.
+    `form` is "" where the output alone asks for it. `key` gives the hash of what a shared file reads; it hashes every
+    shape in the file, so it is called only for files that are wanted. `bodies` are the names of what the file holds.
     """
 
     path: str
     form: str
     stage: str
-    key: Callable[[], str]
     make: Callable[[], bytes]
+    key: Callable[[], str] = str
     bodies: tuple[str, ...] = ()
 
 
@@ -56,64 +66,39 @@ def shared(moulds: MouldSet, only: Sequence[str], forms: Sequence[str]) -> list[
 def _of_bodies(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
     bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
     for group in groups(moulds, only):
-        every, printed = group.bodies, group.printed
+        every, together = group.bodies, group.together
+        names = tuple(body.name for body in every)
+        printed = [body for body in every if is_printed(body)]
         for body in printed:
-            yield Artifact(
-                path=f"{group.name}/{file_stem(body)}.stl",
-                form="stl",
-                stage="meshes",
-                key=lambda body=body: body_key(moulds, body, "stl"),
-                make=lambda body=body: body_files.stl_content(moulds, body),
-                bodies=(body.name,),
-            )
-        yield Artifact(
-            path=f"{group.together}.3mf",
-            form="3mf",
-            stage="meshes",
-            key=lambda every=every: joint_key(moulds, every, "3mf", *bed),
-            make=lambda printed=printed: body_files.threemf_content(moulds, printed),
-            bodies=tuple(body.name for body in printed),
-        )
-        yield Artifact(
-            path=f"{group.together}.glb",
-            form="glb",
-            stage="meshes",
-            key=lambda every=every: joint_key(moulds, every, "glb"),
-            make=lambda every=every: body_files.glb_content(moulds, every),
-            bodies=tuple(body.name for body in every),
-        )
-        yield Artifact(
-            path=f"{group.together}.step",
-            form="step",
-            stage="step",
-            key=lambda group=group: joint_key(moulds, group.bodies, "step", group.name, *_brep()),
-            make=lambda group=group: body_files.step_content(group.bodies, group.name),
-            bodies=tuple(body.name for body in every),
-        )
+            path, key = f"{group.name}/{file_stem(body)}.stl", partial(body_key, moulds, body, "stl")
+            yield Artifact(path, "stl", "meshes", partial(stl_content, moulds, body), key, (body.name,))
+        threemf, key = partial(threemf_content, moulds, printed), partial(joint_key, moulds, every, "3mf", *bed)
+        yield Artifact(f"{together}.3mf", "3mf", "meshes", threemf, key, tuple(body.name for body in printed))
+        glb, key = partial(glb_content, moulds, every), partial(joint_key, moulds, every, "glb")
+        yield Artifact(f"{together}.glb", "glb", "meshes", glb, key, names)
+        step, key = partial(step_content, every, group.name), partial(_step_key, moulds, every, group.name)
+        yield Artifact(f"{together}.step", "step", "step", step, key, names)
 
 
 def _drawings(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
     if "unit" in only:
         from unitcad.export import svg
 
+        key = partial(geometry_key, moulds, "section")
         yield Artifact(
-            path="section.svg",
-            form="",
-            stage="drawing",
-            key=lambda: geometry_key(moulds, "section"),
-            make=lambda: svg.unit_section(moulds.unit, moulds.dimensions, moulds.segments).encode(),
+            "section.svg",
+            "",
+            "drawing",
+            lambda: svg.unit_section(moulds.unit, moulds.dimensions, moulds.segments).encode(),
+            key,
         )
     if "casting" in only:
         from unitcad.casting.written import step_section
 
         for step in moulds.plan.steps:
-            yield Artifact(
-                path=f"step{step.index}-section.svg",
-                form="",
-                stage="drawing",
-                key=lambda step=step: geometry_key(moulds, f"section of pour {step.index}"),
-                make=lambda step=step: step_section(moulds, step).encode(),
-            )
+            key = partial(geometry_key, moulds, f"section of pour {step.index}")
+            drawing = partial(step_section, moulds, step)
+            yield Artifact(f"step{step.index}-section.svg", "", "drawing", lambda draw=drawing: draw().encode(), key)
 
 
 def _pictures(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
@@ -125,13 +110,8 @@ def _pictures(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
     drawn = cache(lambda: dict(zip(scenes, draw([scene() for scene in scenes.values()]), strict=True)))
     versions = sorted(kernel_versions(("png",)).items())
     for path in scenes:
-        yield Artifact(
-            path=path,
-            form="png",
-            stage="pictures",
-            key=lambda path=path: geometry_key(moulds, path, *versions),
-            make=lambda path=path: drawn()[path],
-        )
+        key = partial(geometry_key, moulds, path, *versions)
+        yield Artifact(path, "png", "pictures", lambda path=path: drawn()[path], key)
 
 
 def geometry_key(moulds: MouldSet, *more: object) -> str:
@@ -139,23 +119,20 @@ def geometry_key(moulds: MouldSet, *more: object) -> str:
     return digest(repr((moulds.geometry, more, code_version(), sorted(kernel_versions(()).items()))).encode())
 
 
-def _brep() -> tuple[object, ...]:
-    """What a STEP file depends on besides its bodies: its date and the kernels."""
-    return os.environ.get("SOURCE_DATE_EPOCH"), sorted(kernel_versions(("step",)).items())
+def _step_key(moulds: MouldSet, bodies: Sequence[Body], name: str) -> str:
+    """Return the key of a STEP file, which reads its date and the B-rep kernels too."""
+    kernels = sorted(kernel_versions(("step",)).items())
+    return joint_key(moulds, bodies, "step", name, os.environ.get("SOURCE_DATE_EPOCH"), kernels)
 
 
 def own(moulds: MouldSet, only: Sequence[str], layer_volumes_mm3: Sequence[float], store: Store) -> Iterator[Artifact]:
     """Yield the variant's own files but for the manifest, which lists them all. `layer_volumes_mm3`: of one unit."""
-    yield Artifact("spec.toml", "", "spec", _no_key, lambda: to_toml(moulds.spec).encode())
+    yield Artifact("spec.toml", "", "spec", lambda: to_toml(moulds.spec).encode())
     if "estimate" in only:
-        yield Artifact("estimate.json", "", "estimate", _no_key, lambda: json_bytes(estimated(moulds, store)))
+        yield Artifact("estimate.json", "", "estimate", lambda: json_bytes(estimated(moulds, store)))
     if "casting" in only:
         for path in CASTING:
-            yield Artifact(path, "", "casting", _no_key, lambda path=path: _casting(moulds, layer_volumes_mm3)[path])
-
-
-def _no_key() -> str:
-    return ""
+            yield Artifact(path, "", "casting", lambda path=path: _casting(moulds, layer_volumes_mm3)[path])
 
 
 def estimated(moulds: MouldSet, store: Store) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from unitcad.cache import digest
 from unitcad.errors import UnitcadError
@@ -16,6 +16,7 @@ from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.moulds import mould_set
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.manifest_records import PartRecord
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.shape import Shape, content_hash
 from unitcad.shape.body import Body
@@ -32,19 +33,14 @@ class Group:
     bodies: tuple[Body, ...]
     together: str
 
-    @property
-    def printed(self) -> tuple[Body, ...]:
-        """The bodies that have mesh files."""
-        return tuple(body for body in self.bodies if printed(body))
-
 
 def groups(moulds: MouldSet, only: Sequence[str]) -> list[Group]:
     """Return the groups of bodies that `only` asks for."""
-    found = [Group("unit", moulds.unit, "unit")] if "unit" in only else []
-    return [*found, Group("moulds", moulds.plan.tools, "moulds/moulds")] if "moulds" in only else found
+    unit = [Group("unit", moulds.unit, "unit")] if "unit" in only else []
+    return [*unit, Group("moulds", moulds.plan.tools, "moulds/moulds")] if "moulds" in only else unit
 
 
-def printed(body: Body) -> bool:
+def is_printed(body: Body) -> bool:
     """Tell whether a body has mesh files: what is cut from film or filament has none."""
     return body.role == "unit" or body.made == "printed"
 
@@ -104,18 +100,20 @@ def step_content(bodies: Sequence[Body], name: str) -> bytes:
         return path.read_bytes()
 
 
-def record(moulds: MouldSet, body: Body) -> dict[str, Any]:
-    """Return a body's entry in the manifest, without material and files."""
+def record(moulds: MouldSet, body: Body) -> PartRecord:
+    """Return a body's entry in the manifest, material and files left open."""
     solid = moulds.mesh(body)
-    return {
-        "name": body.name,
-        "role": body.role,
-        "step": body.step,
-        "made": body.made,
-        "volume_mm3": _round(solid.volume()),
-        "bbox_mm": [_round(v) for v in bounds(solid)],
-        "triangles": len(_ready(moulds, body)[1]) if printed(body) else int(solid.num_tri()),
-    }
+    return PartRecord(
+        name=body.name,
+        role=body.role,
+        step=body.step,
+        made=body.made,
+        material=None,
+        volume_mm3=_round(solid.volume()),
+        bbox_mm=[_round(v) for v in bounds(solid)],
+        triangles=len(_ready(moulds, body)[1]) if is_printed(body) else int(solid.num_tri()),
+        files={},
+    )
 
 
 def forget() -> None:
@@ -135,5 +133,5 @@ def _rounded(shape: Shape, segments: int, upside_down: bool) -> tuple[np.ndarray
 
 
 def _round(value: float) -> float:
-    """Twelve significant digits: what a summation's order leaves does not reach the file."""
+    """Round to twelve significant digits: what a summation's order leaves does not reach the file."""
     return float(f"{value:.12g}") + 0.0

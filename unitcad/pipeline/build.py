@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from unitcad import files
 from unitcad.cache import MemoryStore, MissingContent, Store
@@ -14,6 +13,7 @@ from unitcad.errors import UnitcadError
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import FORMATS, OUTPUTS
 from unitcad.pipeline.json_text import json_bytes
+from unitcad.pipeline.manifest_records import Manifest, failed_codes
 from unitcad.pipeline.product import checked_outputs, make
 from unitcad.pipeline.stages import Say, Stages
 from unitcad.pipeline.versions import code_version
@@ -25,15 +25,15 @@ TRIES = 5
 
 @dataclass(frozen=True)
 class Built:
-    """Where a variant went, its manifest, and whether every law and check held."""
+    """Where a variant went, and its manifest."""
 
     folder: Path
-    manifest: dict[str, Any]
+    manifest: Manifest
 
     @property
     def ok(self) -> bool:
-        """No law broken, no error found in a file."""
-        return all(law["ok"] for law in self.manifest["laws"]) and self.manifest["check"]["errors"] == 0
+        """Whether every mould check passed, and every mesh rule that makes an error."""
+        return not failed_codes(self.manifest)
 
 
 def build(
@@ -47,10 +47,9 @@ def build(
 ) -> Built:
     """Build a spec's variant into `out`/<slug>-<hash12>.
 
-    `only` is a choice of OUTPUTS; without `check` laws and mesh checks are left out. Formats and outputs that the
-    folder has from before are made again beside the new ones. What others have made already comes out of `store`.
-    Raises Refusal or UnitcadError before anything is written; a broken law or a bad file is no exception, see
-    `Built.ok`.
+    `only` is a choice of OUTPUTS; without `check` mould checks and mesh checks are left out. Formats and outputs that
+    the folder has from before are made again beside the new ones. What others have made already comes out of `store`.
+    Raises Refusal or UnitcadError before anything is written; a failed check is no exception, see `Built.ok`.
     """
     only = checked_outputs(only)
     if out.exists() and not out.is_dir():
@@ -103,7 +102,7 @@ def build_into(
                 product.place(fresh, store)
                 files.write_new(fresh / "timings.json", json_bytes(timings))
             return Built(folder, product.manifest)
-        except MissingContent:  # somebody clears the cache away while we work
+        except MissingContent:  # the cache is cleared meanwhile
             if not left:
                 raise
     raise AssertionError

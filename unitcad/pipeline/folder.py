@@ -12,13 +12,13 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from msgspec import structs
 
 from unitcad import cache, files
 from unitcad.cache import digest
 from unitcad.errors import UnitcadError
+from unitcad.pipeline.manifest_records import Manifest
 from unitcad.spec import Spec, read_toml, to_json, with_formats
 
 UNCHECKED = "--no-check"
@@ -28,18 +28,18 @@ PAGE = "report.html"
 
 
 def folder_name(spec: Spec) -> str:
-    """<slug>-<hash12>, at most 63 characters; the hash covers the effective spec without name and formats."""
+    """Return <slug>-<hash12>, at most 63 characters; the hash covers the effective spec without name and formats."""
     slug = re.sub(r"[^a-z0-9]+", "-", spec.name.lower()).strip("-")[:50].rstrip("-") or "unit"
     return f"{slug}-{spec_hash(spec)[:12]}"
 
 
 def spec_hash(spec: Spec) -> str:
-    """SHA-256 of the effective spec without name and formats."""
+    """Return the SHA-256 of the effective spec without name and formats."""
     return hashlib.sha256(to_json(structs.replace(with_formats(spec), name="")).encode()).hexdigest()
 
 
 def earlier_formats(folder: Path, spec: Spec, *, ours: bool = False) -> tuple[str, ...]:
-    """The formats that an existing result has, to be kept. `ours`: it is known to be one, perhaps damaged since.
+    """Return the formats that an existing result has. `ours`: it is known to be a result, perhaps damaged since.
 
     Raises UnitcadError for a folder that holds something else: no spec.toml of ours, or another spec.
     """
@@ -74,7 +74,7 @@ class Earlier:
 
 
 def earlier(folder: Path, spec: Spec) -> Earlier:
-    """What is in a folder already. Raises UnitcadError where that is something else than this spec's result."""
+    """Return what is in a folder already. Raises UnitcadError where that is no result of this spec."""
     formats = earlier_formats(folder, spec)
     try:
         manifest = files.read_json(folder / "manifest.json", links=False)
@@ -84,9 +84,11 @@ def earlier(folder: Path, spec: Spec) -> Earlier:
         return Earlier(formats)
 
 
-def whole(folder: Path, *, hashes: bool = False) -> dict[str, Any] | None:
-    """The manifest of a result whose files are all there with the sizes that it lists, with `hashes` also with their
-    content; else None. Links count as nothing.
+def whole(folder: Path, *, hashes: bool = False) -> Manifest | None:
+    """Return the manifest of a result that is whole, else None.
+
+    A result is whole when its files are there with the sizes, with `hashes` the contents, that the manifest lists. A
+    link counts as absent.
     """
     try:
         manifest = files.read_json(folder / "manifest.json", links=False)
@@ -129,13 +131,13 @@ def _sync(path: str) -> None:
 
 
 def held(folder: Path) -> contextlib.AbstractContextManager[None]:
-    """A lock on a result's folder, so that one process at a time changes it."""
+    """Hold a lock on a result's folder, so that one process at a time changes it."""
     return cache.held(folder.parent / f".{folder.name}.lock")
 
 
 @contextlib.contextmanager
 def replacing(folder: Path) -> Iterator[Path]:
-    """A fresh folder that takes `folder`'s place when the block ends well, and goes when it does not; held meanwhile.
+    """Yield a fresh folder that takes `folder`'s place when the block ends well; hold the place meanwhile.
 
     Files of the old result that the new one lacks are kept. An interruption at any point leaves the old result whole:
     at its place, or in a marked scratch folder from which the next run takes it back. Raises UnitcadError where a link

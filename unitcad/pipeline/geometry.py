@@ -1,8 +1,8 @@
 """What of a variant follows from its geometry alone: made once, whatever silicones it is cast in.
 
-Everything here sees a spec whose materials, names and casting are blank (`geometric`), so that nothing can read
-them unnoticed: what it makes serves every variant of that geometry. Each piece is kept in a store under a hash of
-what it reads: a body's file by its tree, a verdict on a file by its bytes, the whole by the spec.
+Everything here sees a mould set whose materials, names and casting are blank (`MouldSet.blank`), so that nothing can
+read them unnoticed: what it makes serves every variant of that geometry. Each piece is kept in a store under a hash of
+what it reads: a body's file by its tree, the findings of a file by its bytes, the whole by the spec.
 """
 
 from __future__ import annotations
@@ -15,26 +15,31 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from unitcad.cache import Store, digest
-from unitcad.moulds.mould_set import MouldSet, geometric
+from unitcad.mould_checks.finding import FindingRecord
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import artifacts
 from unitcad.pipeline.artifacts import GEOMETRIC, geometry_key
 from unitcad.pipeline.bodies import body_key, groups, record
+from unitcad.pipeline.manifest_records import BodyFile, MeshFindings, PartRecord, PourRecord
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import code_version, kernel_versions
-from unitcad.spec import Spec, printer_of, to_json
+from unitcad.spec import Spec, printer_of
 
 MESH_FORMATS = ("stl", "3mf")
 """The formats whose files the mesh rules look at."""
 
 
 class Geometry(TypedDict):
-    """What a geometry is made of, as JSON data: `files` is path -> SHA-256 of content in the store."""
+    """What a geometry is made of, as JSON data: `files` is path -> SHA-256 of content in the store.
+
+    The strains are compared with a limit by each variant, since it is that of its silicones.
+    """
 
     label: str | None
     air_ring_mm: float
-    parts: list[dict[str, Any]]
-    steps: list[dict[str, Any]]
-    laws: list[dict[str, Any]]
+    parts: list[PartRecord]
+    steps: list[PourRecord]
+    laws: list[FindingRecord]
     strains: list[dict[str, Any]]
     check: list[dict[str, Any]]
     files: dict[str, str]
@@ -42,25 +47,25 @@ class Geometry(TypedDict):
 
 def build_key(spec: Spec, only: Sequence[str], check: bool) -> str:
     """Return what `geometry` depends on; cheap, since no shape is drawn."""
-    return _build_key(geometric(spec), _geometric_outputs(only), check)
+    return _build_key(MouldSet(spec), _geometric_outputs(only), check)
 
 
-def geometry(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Geometry:
-    """Return parts, steps, mould findings, mesh findings and files of a spec's geometry."""
-    only, blank = _geometric_outputs(only), geometric(spec)
+def geometry(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Geometry:
+    """Return parts, steps, mould findings, mesh findings and files of a set's geometry."""
+    only = _geometric_outputs(only)
     return store.data(
-        _build_key(blank, only, check),
-        lambda: _made(MouldSet(blank), only, check, store, stages),
-        intact=lambda found: all(map(store.has, found["files"].values())),
+        _build_key(moulds, only, check),
+        lambda: _made(moulds.blank, only, check, store, stages),
+        intact=lambda there: all(map(store.has, there["files"].values())),
     )
 
 
-def pictures(spec: Spec, only: Sequence[str], store: Store) -> dict[str, str]:
-    """Return the shaded pictures of a spec's geometry: path -> SHA-256 of content in `store`.
+def pictures(moulds: MouldSet, only: Sequence[str], store: Store) -> dict[str, str]:
+    """Return the shaded pictures of a set's geometry: path -> SHA-256 of content in `store`.
 
     Raises NoPicture where this machine can't draw; that is not remembered, so another try may succeed.
     """
-    table = artifacts.shared(MouldSet(geometric(spec)), _geometric_outputs(only), ("png",))
+    table = artifacts.shared(moulds.blank, _geometric_outputs(only), ("png",))
     return {a.path: store.file(a.key(), a.make) for a in table if a.form == "png"}
 
 
@@ -74,37 +79,36 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, stag
     with stages("plan"):
         bodies = [body for group in groups(moulds, only) for body in group.bodies]
         label = moulds.plan.label if pours else None
+    parts: dict[str, PartRecord] = {}
     with stages("meshes"):
-        records = {
-            body.name: {
-                **store.data(body_key(moulds, body, "record"), lambda body=body: record(moulds, body)),
-                "files": {},
-            }
-            for body in bodies
-        }
+        for body in bodies:
+            part: PartRecord = store.data(body_key(moulds, body, "record"), lambda body=body: record(moulds, body))
+            parts[body.name] = {**part, "files": {}}
     files: dict[str, str] = {}
     for artifact in artifacts.shared(moulds, only, forms):
         with stages(artifact.stage):
             files[artifact.path] = store.file(artifact.key(), artifact.make)
         for name in artifact.bodies:
-            records[name]["files"][artifact.form] = {"path": artifact.path, "sha256": files[artifact.path]}
-    with stages("laws"):
-        laws, strained = _laws(moulds, only, store) if check else ([], [])
+            parts[name]["files"][artifact.form] = BodyFile(path=artifact.path, sha256=files[artifact.path])
+    with stages("mould checks"):
+        findings, strains = _mould_findings(moulds, only, store) if check else ([], [])
     with stages("check"):
-        findings = _mesh_findings(moulds, records, files, store) if check else []
+        mesh_findings = _mesh_findings(moulds, parts, store) if check else []
     return {
         "label": label,
         "air_ring_mm": round(moulds.dimensions.air_ring, 9),
-        "parts": list(records.values()),
-        "steps": _steps(moulds, store) if pours else [],
-        "laws": laws,
-        "strains": strained,
-        "check": findings,
+        "parts": list(parts.values()),
+        "steps": store.data(geometry_key(moulds, "steps"), lambda: _pours(moulds)) if pours else [],
+        "laws": findings,
+        "strains": strains,
+        "check": mesh_findings,
         "files": files,
     }
 
 
-def _laws(moulds: MouldSet, only: Sequence[str], store: Store) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+def _mould_findings(
+    moulds: MouldSet, only: Sequence[str], store: Store
+) -> tuple[list[FindingRecord], list[dict[str, Any]]]:
     """Return what the mould checks find that read no silicone, and the strains that a silicone's limit applies to.
 
     Without moulds only the unit's bodies are looked at: none may overlap another.
@@ -112,64 +116,70 @@ def _laws(moulds: MouldSet, only: Sequence[str], store: Store) -> tuple[list[dic
     from unitcad.mould_checks import check_geometry, check_unit, strains
 
     if "moulds" in only:
-        laws = store.data(geometry_key(moulds, "laws"), lambda: [law.as_dict() for law in check_geometry(moulds)])
-        return laws, store.data(geometry_key(moulds, "strains"), lambda: [asdict(s) for s in strains(moulds)])
+        findings = store.data(
+            geometry_key(moulds, "mould checks"), lambda: [f.as_dict() for f in check_geometry(moulds)]
+        )
+        return findings, store.data(geometry_key(moulds, "strains"), lambda: [asdict(s) for s in strains(moulds)])
     if "unit" in only:
         key = geometry_key(moulds, "overlaps in the unit")
-        return store.data(key, lambda: [law.as_dict() for law in check_unit(moulds)]), []
+        return store.data(key, lambda: [f.as_dict() for f in check_unit(moulds)]), []
     return [], []
 
 
-def _mesh_findings(
-    moulds: MouldSet, records: dict[str, dict[str, Any]], files: dict[str, str], store: Store
-) -> list[dict[str, Any]]:
-    """Return what the mesh rules find in every mesh file: tools against the printer."""
-    roles = {e["path"]: r["role"] for r in records.values() for form, e in r["files"].items() if form in MESH_FORMATS}
+def _mesh_findings(moulds: MouldSet, parts: dict[str, PartRecord], store: Store) -> list[dict[str, Any]]:
+    """Return what the mesh rules find in every mesh file."""
+    files = {
+        file["path"]: (file["sha256"], part["role"])
+        for part in parts.values()
+        for form, file in part["files"].items()
+        if form in MESH_FORMATS
+    }
     return [
         {"path": path, **finding}
-        for path, role in roles.items()
-        for finding in _findings_in(moulds, path, files[path], role, store)
+        for path, (sha256, role) in files.items()
+        for finding in _findings_in(moulds, path, sha256, role, store)
     ]
 
 
 def _findings_in(moulds: MouldSet, path: str, sha256: str, role: str, store: Store) -> list[dict[str, Any]]:
     from unitcad.check import Options, check_bytes
 
-    # A tool's STL is judged against the printer; its 3MF holds the same meshes.
+    # A tool's STL is checked against the printer; its 3MF holds the same meshes.
     printer = printer_of(moulds.spec) if role == "tool" and path.endswith(".stl") else None
 
-    def looked() -> list[dict[str, Any]]:
-        findings = check_bytes(store.content(sha256), Path(path).name, Options(printer=printer)).findings
-        return [finding.as_dict() for finding in findings if finding.severity != "info"]
+    def findings() -> list[dict[str, Any]]:
+        report = check_bytes(store.content(sha256), Path(path).name, Options(printer=printer))
+        return [finding.as_dict() for finding in report.findings if finding.severity != "info"]
 
-    return store.data(digest(f"{sha256} {printer!r} {code_version()}".encode()), looked)
-
-
-def _steps(moulds: MouldSet, store: Store) -> list[dict[str, Any]]:
-    """Return the pours: volume of the cavities as the tools leave them, and of one layer as the unit has it."""
-
-    def measured() -> list[dict[str, Any]]:
-        return [
-            {
-                "index": step.index,
-                "layer": step.name,
-                "tools": list(step.tools),
-                "cavity_volume_mm3": float(f"{sum(c.reached.volume() for c in moulds.cavities if c.step is step):.9g}"),
-                "layer_volume_mm3": float(f"{moulds.solids[step.name].volume():.9g}"),
-            }
-            for step in moulds.plan.steps
-        ]
-
-    return store.data(geometry_key(moulds, "steps"), measured)
+    return store.data(digest(f"{sha256} {printer!r} {code_version()}".encode()), findings)
 
 
-def _build_key(blank: Spec, *more: object) -> str:
-    epoch = os.environ.get("SOURCE_DATE_EPOCH") if "step" in blank.output.formats else None
-    versions = sorted(kernel_versions(blank.output.formats).items())
-    return digest(repr((to_json(blank), more, code_version(), versions, epoch)).encode())
+def _pours(moulds: MouldSet) -> list[PourRecord]:
+    return [
+        PourRecord(
+            index=step.index,
+            layer=step.name,
+            material="",
+            tools=list(step.tools),
+            cavity_volume_mm3=_rounded(sum(c.reached.volume() for c in moulds.cavities if c.step is step)),
+            layer_volume_mm3=_rounded(moulds.solids[step.name].volume()),
+        )
+        for step in moulds.plan.steps
+    ]
 
 
-def findings_count(findings: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return mesh findings with their number by severity."""
+def _rounded(volume: float) -> float:
+    return float(f"{volume:.9g}")
+
+
+def _build_key(moulds: MouldSet, *more: object) -> str:
+    formats = moulds.spec.output.formats
+    epoch = os.environ.get("SOURCE_DATE_EPOCH") if "step" in formats else None
+    versions = sorted(kernel_versions(formats).items())
+    return digest(repr((moulds.geometry, formats, more, code_version(), versions, epoch)).encode())
+
+
+def mesh_findings(findings: list[dict[str, Any]]) -> MeshFindings:
+    """Return the findings of mesh rules with their number by severity."""
     count = Counter(finding["severity"] for finding in findings)
-    return {"errors": count["error"], "warnings": count["warning"], "findings": list(findings)}
+    return {"errors": count["error"], "warnings": count["warning"], "findings": findings}

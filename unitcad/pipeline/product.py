@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,12 +13,14 @@ from unitcad.cache import Store, digest
 from unitcad.designs import design_named, no_estimate
 from unitcad.designs.design import Reason
 from unitcad.errors import Refusal, unknown_name
+from unitcad.mould_checks.finding import FindingRecord
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import artifacts
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import OUTPUTS
-from unitcad.pipeline.geometry import Geometry, findings_count, geometry, pictures
+from unitcad.pipeline.geometry import Geometry, geometry, mesh_findings, pictures
 from unitcad.pipeline.json_text import json_bytes
+from unitcad.pipeline.manifest_records import LeftOut, ListedFile, Manifest, PartRecord
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import kernel_versions
 from unitcad.spec import Spec
@@ -31,7 +33,7 @@ NO_MOULDS = "no moulds were asked for: only C200 ran, on the unit"
 class Product:
     """A variant's files by their paths: `own` as bytes, `shared` as the SHA-256 of content in a store."""
 
-    manifest: dict[str, Any]
+    manifest: Manifest
     own: dict[str, bytes]
     shared: dict[str, str]
 
@@ -48,44 +50,42 @@ class Product:
 def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
     """Return everything asked for of a spec, nothing written yet. Raises Refusal where the moulds can't be."""
     moulds, possible = MouldSet(spec), possible_outputs(spec, only)
-    shape = geometry(spec, possible, check, store, stages)
-    drawn, no_pictures = _pictures(spec, possible, store, stages)
+    shape = geometry(moulds, possible, check, store, stages)
+    drawn, no_pictures = _pictures(moulds, possible, store, stages)
     shared = {**shape["files"], **drawn}
     volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
     own: dict[str, bytes] = {}
     for artifact in artifacts.own(moulds, possible, volumes, store):
         with stages(artifact.stage):
             own[artifact.path] = artifact.make()
-    manifest: dict[str, Any] = {
-        "name": spec.name,
-        "design": spec.design,
-        "printer": spec.moulds.printer,
-        "hash": folders.folder_name(spec)[-12:],
-        "outputs": list(possible),
-        "label": shape["label"],
-        "warnings": warnings(spec),
-        "air_ring_mm": shape["air_ring_mm"],
-        "mesh": {
+    listed = {path: ListedFile(bytes=len(content), sha256=digest(content)) for path, content in own.items()}
+    listed |= {path: ListedFile(bytes=store.size(sha256), sha256=sha256) for path, sha256 in shared.items()}
+    manifest = Manifest(
+        name=spec.name,
+        design=spec.design,
+        printer=spec.moulds.printer,
+        hash=folders.spec_hash(spec)[:12],
+        outputs=list(possible),
+        label=shape["label"],
+        warnings=warnings(spec),
+        air_ring_mm=shape["air_ring_mm"],
+        mesh={
             "kernel": "manifold3d",
             "tolerance_mm": spec.output.tolerance_mm,
             "segments": moulds.segments,
             "note": "volume_mm3 and bbox_mm are the mesh's: its corners may stand out by the tolerance",
         },
-        "parts": [_part(spec, part) for part in shape["parts"]],
-        "steps": [_step(spec, step) for step in shape["steps"]],
-        "laws": _laws(spec, shape),
-        "estimate": _estimate(moulds, possible, store),
-        "check": findings_count(shape["check"]),
-        "pictures": list(drawn),
-        "casting": sorted(path for path in own if path in artifacts.CASTING) if "casting" in possible else None,
-        "left_out": [
-            {"what": what, "why": why} for what, why in [*no_pictures, *_left_out(spec, only, possible, check)]
-        ],
-        "versions": {"unitcad": __version__, **kernel_versions(spec.output.formats)},
-    }
-    listed = {path: {"bytes": len(content), "sha256": digest(content)} for path, content in own.items()}
-    listed |= {path: {"bytes": store.size(sha256), "sha256": sha256} for path, sha256 in shared.items()}
-    manifest["files"] = dict(sorted(listed.items()))
+        parts=[{**part, "material": _material(spec, part)} for part in shape["parts"]],
+        steps=[{**step, "material": spec.layers[step["index"] - 1].material} for step in shape["steps"]],
+        laws=_mould_findings(spec, shape),
+        estimate=_estimate(moulds, store) if "estimate" in possible else None,
+        check=mesh_findings(shape["check"]),
+        pictures=list(drawn),
+        casting=sorted(path for path in own if path in artifacts.CASTING) if "casting" in possible else None,
+        left_out=[LeftOut(what=what, why=why) for what, why in [*no_pictures, *_left_out(spec, only, possible, check)]],
+        versions={"unitcad": __version__, **kernel_versions(spec.output.formats)},
+        files=dict(sorted(listed.items())),
+    )
     return Product(manifest, {**own, "manifest.json": json_bytes(manifest)}, shared)
 
 
@@ -107,74 +107,56 @@ def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
     return possible
 
 
-def _pictures(spec: Spec, only: Sequence[str], store: Store, stages: Stages) -> tuple[dict[str, str], list[Reason]]:
+def _pictures(
+    moulds: MouldSet, only: Sequence[str], store: Store, stages: Stages
+) -> tuple[dict[str, str], list[Reason]]:
     """Return the shaded pictures; where this machine can't draw, none and the reason: the section drawing stays."""
-    if "png" not in spec.output.formats:
+    if "png" not in moulds.spec.output.formats:
         return {}, []
     from unitcad.export.picture import NoPicture
 
     try:
         with stages("pictures"):
-            return pictures(spec, only, store), []
+            return pictures(moulds, only, store), []
     except NoPicture as error:
         return {}, [("pictures", str(error))]
 
 
-def _laws(spec: Spec, shape: Geometry) -> list[dict[str, Any]]:
+def _mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
     """Return the geometry's mould findings, and its strains against this variant's silicones, by code."""
     if not shape["strains"]:
         return shape["laws"]
     from unitcad.mould_checks import Strain, strain_findings
 
     strained = strain_findings(spec, [Strain(**strain) for strain in shape["strains"]])
-    return sorted(shape["laws"] + [finding.as_dict() for finding in strained], key=lambda law: law["code"])
+    return sorted([*shape["laws"], *(each.as_dict() for each in strained)], key=lambda finding: finding["code"])
 
 
-def _estimate(moulds: MouldSet, only: Sequence[str], store: Store) -> dict[str, Any] | None:
-    if "estimate" not in only:
-        return None
+def _estimate(moulds: MouldSet, store: Store) -> dict[str, Any]:
     from unitcad.attenuation.edge.estimates import summary
 
     return summary(artifacts.estimated(moulds, store))
 
 
-def _part(spec: Spec, part: dict[str, Any]) -> dict[str, Any]:
-    """Return a part of the geometry with this variant's material, after what it is made by."""
-    step = part["step"] if part["made"] == "cast" else None
-    entry: dict[str, Any] = {}
-    for key, value in part.items():
-        entry[key] = value
-        if key == "made":
-            entry["material"] = spec.layers[step - 1].material if step else None
-    return entry
+def _material(spec: Spec, part: PartRecord) -> str | None:
+    return spec.layers[part["step"] - 1].material if part["made"] == "cast" and part["step"] else None
 
 
-def _step(spec: Spec, step: dict[str, Any]) -> dict[str, Any]:
-    material = spec.layers[step["index"] - 1].material
-    return {"index": step["index"], "layer": step["layer"], "material": material, **step}
-
-
-def _left_out(spec: Spec, asked: Sequence[str], only: Sequence[str], check: bool) -> list[Reason]:
+def _left_out(spec: Spec, asked: Sequence[str], only: Sequence[str], check: bool) -> Iterator[Reason]:
     """Name what this variant does without, and why."""
-    reasons: list[Reason] = []
     if not check or "moulds" not in only:
-        reasons.append(("mould checks", NO_MOULDS if check else folders.UNCHECKED))
+        yield "mould checks", NO_MOULDS if check else folders.UNCHECKED
     if not check:
-        reasons.append(("mesh checks", folders.UNCHECKED))
-    reasons += _tooling_left_out(spec)
-    reasons += [
-        (name, no_estimate() if name in asked else "not asked for (--only)") for name in OUTPUTS if name not in only
-    ]
-    if "step" not in spec.output.formats:
-        reasons.append(("boundary representation", "no STEP asked for"))
-    return reasons
-
-
-def _tooling_left_out(spec: Spec) -> list[Reason]:
+        yield "mesh checks", folders.UNCHECKED
     design = design_named(spec.design)
-    if not design.tooling:
-        return []
-    reasons: list[Reason] = [("second pour", "one layer: one pour")] if len(spec.layers) == 1 else []
-    if not spec.fpcb and not spec.wires:
-        reasons.append(("tongue and slot", "no FPCB"))
-    return reasons + design.left_out(spec)
+    if design.tooling:
+        if len(spec.layers) == 1:
+            yield "second pour", "one layer: one pour"
+        if not spec.fpcb and not spec.wires:
+            yield "tongue and slot", "no FPCB"
+        yield from design.left_out(spec)
+    for name in OUTPUTS:
+        if name not in only:
+            yield name, no_estimate() if name in asked else "not asked for (--only)"
+    if "step" not in spec.output.formats:
+        yield "boundary representation", "no STEP asked for"

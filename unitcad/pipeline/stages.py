@@ -1,4 +1,4 @@
-"""How long each stage of a build takes, told to whoever watches."""
+"""The time that each stage of a build takes, and the callback that shows it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Say = Callable[[str], None]
 
 @dataclass
 class Stages:
-    """`with stages("laws"): ...` tells `say`, once a stage, and adds to `seconds`."""
+    """`with stages("meshes"): ...` calls `say`, once a stage, and adds to `seconds`."""
 
     say: Say = lambda stage: None
     seconds: dict[str, float] = field(default_factory=dict)

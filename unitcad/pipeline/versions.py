@@ -18,7 +18,7 @@ PICTURE_KERNELS = ("vtk",)
 
 @cache
 def code_version() -> str:
-    """The version and twelve digits over the package's own files: a changed line makes nothing of before reusable."""
+    """Return the version and twelve digits over the package's own files, so that a changed line reuses nothing."""
     digest = hashlib.sha256()
     root = Path(str(files("unitcad")))
     named = {file.relative_to(root).as_posix(): file for file in root.rglob("*") if file.suffix in (".py", ".toml")}
@@ -28,13 +28,13 @@ def code_version() -> str:
 
 
 def kernel_versions(formats: Sequence[str]) -> dict[str, str]:
-    """The versions of what takes part in making `formats`; what is not installed is left out."""
+    """Return the versions of the kernels that make `formats`; what is not installed is left out."""
     names = (
         *MESH_KERNELS,
         *(BREP_KERNELS if "step" in formats else ()),
         *(PICTURE_KERNELS if "png" in formats else ()),
     )
-    return {name: found for name in names if (found := _version(name))}
+    return {name: installed for name in names if (installed := _version(name))}
 
 
 @cache
