@@ -76,7 +76,7 @@ def by_quad_vec(medium: LayeredMedium, lifted: bool) -> tuple[np.ndarray, float,
     """
     static = (1 - medium.layers[0].poisson_ratio) / medium.materials(OMEGA)[0].shear
     disc = UniformDisc(A)
-    known = static * disc.static(RADII)[0]
+    known = static * disc.static(RADII)[1]
     count = 0
 
     def remainder(k: np.ndarray) -> np.ndarray:

@@ -48,7 +48,7 @@ class Case:
     @property
     def known(self) -> np.ndarray:
         """What the static part gives, in closed form (m/Pa)."""
-        return self.static * DISC.static(RADII)[0]
+        return self.static * DISC.static(RADII)[1]
 
     def remainder(self, k: np.ndarray) -> np.ndarray:
         """Return what is left to integrate, without Bessel functions, m/Pa m; k (1/m) real or complex."""

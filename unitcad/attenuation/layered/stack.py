@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from unitcad.attenuation.layered import shear_horizontal
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.propagation import Plane, parameter, raised, underside
 from unitcad.attenuation.layered.rheology import Damping, LossFactor, complex_shear_modulus, compressibility, finite
@@ -129,6 +130,15 @@ class Stack:
             stiffness = abs(material.shear) * np.maximum(np.abs(k), abs(material.ks2) ** 0.5)
             c = parameter(below, u, t, stiffness)
         return u[:, 0]
+
+    def shear_transfer(self, k: w.Array, omega: float, depth: float) -> w.Array:
+        """Return u_theta at `depth` per surface traction of horizontally polarised shear (m/Pa), shape (n,)."""
+        *layers, base = self.materials(omega)
+        pieces = [
+            ([*layers, base][kind], h, above)
+            for kind, h, above in _cut([layer.thickness for layer in self.layers], depth)
+        ]
+        return shear_horizontal.compliance(base, pieces, k)
 
 
 def _material(body: Layer | HalfSpace, omega: float) -> w.Material:

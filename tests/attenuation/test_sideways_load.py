@@ -1,0 +1,167 @@
+"""A load in the plane of the surface: Cerruti's closed forms, reciprocity, and SH waves against mpmath."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy import special
+
+from unitcad.attenuation import HalfSpace, KelvinVoigt, Layer, LayeredMedium, LossFactor, Point, UniformDisc
+from unitcad.attenuation.layered.bessel import bessel_bound, bessels
+from unitcad.attenuation.layered.statics import disc_integrals
+
+NU, E = 0.3, 3e4
+MU = E / (2 * (1 + NU))
+BODY = LayeredMedium([], HalfSpace(1000, E, NU))
+FOREARM = LayeredMedium(
+    [
+        Layer(1.5e-3, 1100, 130e3, 0.49, LossFactor(0.14)),
+        Layer(4e-3, 950, 9e3, 0.495, KelvinVoigt(3.0)),
+        Layer(25e-3, 1050, 12e3, 0.495, KelvinVoigt(4.5)),
+    ],
+    HalfSpace(1900, 15e9, 0.3, LossFactor(0.01)),
+)
+
+
+def _cerruti(x, y, z):
+    """Displacement (x, y, z) under a newton in x at the origin of the surface (Johnson, Contact Mechanics, 3.75)."""
+    far, part = np.sqrt(x * x + y * y + z * z), 1 - 2 * NU
+    below = far + z
+    u_x = 1 / far + x**2 / far**3 + part * (1 / below - x**2 / (far * below**2))
+    u_y = x * y / far**3 - part * x * y / (far * below**2)
+    u_z = x * z / far**3 + part * x / (far * below)
+    return np.array([u_x, u_y, u_z]) / (4 * np.pi * MU)
+
+
+@pytest.mark.parametrize("z", [0.0, 5e-4, 2e-3, 1e-2])
+def test_a_point_force_is_cerrutis(z):
+    r = np.array([1e-3, 5e-3, 2e-2])
+    response = BODY.response(Point("tangential"), 0.0, r, z=z, rtol=1e-9)
+    ahead, beside = _cerruti(r, 0 * r, z), _cerruti(0 * r, r, z)
+    for value, exact in ((response.u_r, ahead[0]), (-response.u_theta, beside[0]), (response.u_z, ahead[2])):
+        assert np.max(np.abs(value - exact)) <= response.error
+    assert response.error < 1e-9 * np.max(np.abs(ahead))
+
+
+@pytest.mark.parametrize("z", [0.0, 1e-3])
+@pytest.mark.parametrize("r", [0.0, 2e-3, 5e-3, 3e-2])
+def test_a_disc_is_cerruti_summed_over_it(r, z):
+    a = 3.5e-3
+    response = BODY.response(UniformDisc(a, "tangential"), 0.0, [r], z=z, rtol=1e-10)
+    ahead, beside = (_disc_by_points(a, r * np.array(way), z) for way in ((1, 0), (0, 1)))
+    for value, exact in ((response.u_r, ahead[0]), (-response.u_theta, beside[0]), (response.u_z, ahead[2])):
+        assert abs(value[0] - exact) < 1e-9 * abs(ahead[0])
+
+
+def _disc_by_points(a, at, z):
+    """Sum over a disc of radius a under 1 Pa: about the point `at` if it lies inside, else about the disc's centre."""
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    turn = np.linspace(0, 2 * np.pi, 800, endpoint=False)
+    way = np.array([np.cos(turn), np.sin(turn)])
+    inside = at @ at < a * a
+    end = -at @ way + np.sqrt((at @ way) ** 2 + a * a - at @ at) if inside else np.full(turn.shape, a)
+    rho = end * (nodes[:, None] + 1) / 2
+    x, y = (-rho * one if inside else place - rho * one for one, place in zip(way, at, strict=True))
+    return np.einsum("cnt,n,t->c", _cerruti(x, y, z) * rho, weights, end / 2 * 2 * np.pi / turn.size)
+
+
+def test_disc_integrals_are_weber_and_schafheitlins():
+    for s in (1e-9, 1e-3, 0.3, 0.77, 0.78, 1 - 1e-9, 1.0, 1 + 1e-12, 1.29, 1.3, 40.0):
+        x = mp.mpf(s)
+        within = s <= 1
+        exact = x**2 / 8 * mp.hyp2f1(0.5, 1.5, 3, x**2) if within else mp.hyp2f1(1.5, -0.5, 2, x**-2) / (2 * x)
+        assert disc_integrals(s, "tangential")[1] == pytest.approx(float(exact), rel=4e-15)
+    assert disc_integrals(0.0, "tangential").tolist() == [1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("z", [0.0, 3e-3])
+@pytest.mark.parametrize("hertz", [0, 50, 125, 250])
+def test_a_sideways_force_and_a_normal_one_are_reciprocal(hertz, z):
+    """Betti: at the surface a force in x lifts the skin at r by what a force at r in z moves the origin in x."""
+    r = np.linspace(7e-3, 37e-3, 5)
+    sideways = FOREARM.response(Point("tangential"), 2 * np.pi * hertz, r, rtol=1e-8)
+    normal = FOREARM.response(Point(), 2 * np.pi * hertz, r, rtol=1e-8)
+    assert np.all(np.abs(sideways.u_z + normal.u_r) <= sideways.error_z + normal.error_r)
+    deep = FOREARM.response(Point("tangential"), 2 * np.pi * hertz, r, z=z, rtol=1e-4)
+    fine = FOREARM.response(Point("tangential"), 2 * np.pi * hertz, r, z=z, rtol=1e-9)
+    for name in ("r", "theta", "z"):
+        wrong = np.abs(getattr(deep, f"u_{name}") - getattr(fine, f"u_{name}"))
+        assert np.all(wrong <= getattr(deep, f"error_{name}") + getattr(fine, f"error_{name}"))
+
+
+def test_a_slow_load_is_the_static_one():
+    slow, static = (FOREARM.response(UniformDisc(3.5e-3, "tangential"), omega, [7e-3, 2e-2]) for omega in (1e-3, 0.0))
+    assert np.max(np.abs(slow.u_theta - static.u_theta)) < 1e-5 * np.max(np.abs(static.u_theta))
+
+
+def test_under_the_load_all_moves_one_way():
+    """On the axis u_x is the same in every direction: u_r = -u_theta, and nothing is lifted."""
+    response = FOREARM.response(UniformDisc(3.5e-3, "tangential"), 785.0, [0.0], rtol=1e-8)
+    assert abs(response.u_r[0] + response.u_theta[0]) <= response.error_r[0] + response.error_theta[0]
+    assert abs(response.u_z[0]) <= response.error_z[0]
+
+
+def test_an_axisymmetric_load_turns_nothing():
+    response = FOREARM.response(UniformDisc(3.5e-3), 785.0, [[7e-3], [2e-2]])
+    assert response.u_theta.shape == (2, 1)
+    assert np.all(response.u_theta == 0)
+    assert np.all(response.error_theta == 0)
+
+
+def _layers_in_mpmath(layers, base, k, omega):
+    """SH compliance at the surface and at the last interface by Thomson and Haskell's matrices, in 60 digits."""
+
+    def material(body):
+        mu = mp.mpf(body.youngs_modulus) / (2 * (1 + mp.mpf(body.poisson_ratio))) * mp.mpc(1, body.damping.tan_delta)
+        return mu, mp.sqrt(mp.mpf(k) ** 2 - mp.mpf(body.density) * mp.mpf(omega) ** 2 / mu)
+
+    mu, rate = material(base)
+    u, t = mp.mpc(1), mu * rate
+    for layer in reversed(layers):
+        mu, rate = material(layer)
+        cosh, sinh = mp.cosh(rate * layer.thickness), mp.sinh(rate * layer.thickness)
+        u, t = cosh * u + sinh / (mu * rate) * t, mu * rate * sinh * u + cosh * t
+    return u / t, 1 / t
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.data())
+def test_horizontal_shear_at_every_contrast(data):
+    """Thicknesses over 8 decades, moduli over 12, k h up to 2,000."""
+
+    def number(low, high):
+        return 10 ** data.draw(st.floats(np.log10(low), np.log10(high)))
+
+    layers = [
+        Layer(number(1e-7, 10), number(1, 2e4), number(1e-2, 1e10), 0.3, LossFactor(number(1e-3, 1)))
+        for _ in range(data.draw(st.integers(0, 4)))
+    ]
+    base = HalfSpace(number(1, 2e4), number(1e-2, 1e10), 0.3, LossFactor(number(1e-3, 1)))
+    k, omega = number(1e-2, 300), number(1, 1e4)
+    medium = LayeredMedium(layers, base)
+    phase = 1 + sum(_phase(layer, k, omega) for layer in layers)
+    assume(phase < 2000)
+    for depth, which in ((0.0, 0), (sum(layer.thickness for layer in layers), 1)):
+        ours = medium.shear_transfer(np.array([k], dtype=complex), omega, depth)[0]
+        with mp.workdps(60 + int(phase)):
+            exact = _layers_in_mpmath(layers, base, k, omega)[which]
+            wrong = abs(mp.mpc(complex(ours)) - exact)
+        assert wrong <= 4e-15 * phase / 1e-3 * abs(exact) + 1e-300
+
+
+def _phase(layer, k, omega):
+    mu = layer.youngs_modulus / 2.6
+    return abs(np.sqrt(complex(k * k - layer.density * omega**2 / (mu * (1 + 1j * layer.damping.tan_delta))))) * (
+        layer.thickness
+    )
+
+
+def test_bessel_functions_and_their_bounds():
+    x = np.concatenate([[0.0], np.geomspace(1e-9, 300, 20001), np.linspace(0.5, 12, 20001)])
+    for order, values in zip((0, 2, 1), bessels((0, 2, 1), x), strict=True):
+        exact = special.jv(order, x)
+        assert np.max(np.abs(values - exact)) < 2e-15
+        small = (x > 0) & (x < 1)
+        assert np.max(np.abs(values[small] / exact[small] - 1)) < 1e-14
+        assert np.all(np.abs(values) <= bessel_bound(order, x))
