@@ -31,8 +31,9 @@ def _off(medium: LayeredMedium, load: Load, omega: float, r: np.ndarray, z: floa
     for rtol in tolerances:
         found = medium.response(load, omega, r, z=z, rtol=rtol)
         assert np.max(exact.doubt) < max(1e-8 * np.max(np.abs(exact.u)), 0.25 * found.error)
-        wrong = np.abs(np.array([found.u_r, found.u_z]) - exact.u)
-        yield float(np.max((wrong - exact.doubt) / np.array([found.error_r, found.error_z])))
+        components = ("r", "theta", "z") if load.direction == "tangential" else ("r", "z")
+        wrong = np.abs(np.array([getattr(found, f"u_{name}") for name in components]) - exact.u)
+        yield float(np.max((wrong - exact.doubt) / np.array([getattr(found, f"error_{name}") for name in components])))
 
 
 def test_the_reference_gives_boussinesqs_disc_and_point():
@@ -49,14 +50,20 @@ def test_the_reference_gives_boussinesqs_disc_and_point():
 
 @pytest.mark.parametrize("z", [0.0, 2e-3, 31e-3])
 @pytest.mark.parametrize("k", [20.0, 300.0 + 15j, 2000.0])
-def test_its_kernel_is_the_compliance(k, z):
-    medium = LayeredMedium(FOREARM, BONE)
-    theirs = Kernel(medium, 785.0, z)(np.array([k]))[0]
-    for column in (0, 1):
+@pytest.mark.parametrize("base", [BONE, HalfSpace(1000, 0.0, 0.3)], ids=["bone", "free"])
+def test_its_kernel_is_the_compliance(k, z, base):
+    medium = LayeredMedium(FOREARM, base)
+    if not base.youngs_modulus:
+        z = min(z, 30.5e-3)
+    at = np.array([k], dtype=complex)
+    for column, direction in enumerate(("tangential", "normal")):
+        theirs = Kernel(medium, 785.0, z, Point(direction))(np.array([k]))[0]
         traction = np.zeros((2, 1), dtype=complex)
         traction[column] = 1.0
-        own = k * medium.transfer(traction, np.array([k], dtype=complex), 785.0, z)[:, 0]
-        assert np.max(np.abs(own - theirs[:, column])) < 1e-12 * np.max(np.abs(theirs)) + 1e-30
+        own = k * medium.transfer(traction, at, 785.0, z)[:, 0]
+        if column == 0:
+            own = np.insert(own, 1, k * medium.shear_transfer(at, 785.0, z))
+        assert np.max(np.abs(own - theirs)) < 1e-12 * np.max(np.abs(theirs)) + 1e-30
 
 
 @pytest.mark.parametrize(("medium", "hertz"), [(GEL, 250), (NEARLY_FLUID, 50)], ids=["gel", "nearly fluid"])
@@ -99,6 +106,14 @@ def test_a_backward_wave_without_any_damping_is_the_limit_of_a_small_one():
     assert found.error <= 1e-6 * np.max(np.abs(limit))
     wrong = np.abs(np.array([found.u_r, found.u_z]) - limit)
     assert np.max(wrong) < np.max(np.abs(2 * exact[0] - exact[1] - limit))
+
+
+@pytest.mark.parametrize(
+    ("medium", "z"), [(LayeredMedium(FOREARM, BONE), 0.0), (GEL, 3e-3)], ids=["forearm", "gel, at depth"]
+)
+def test_a_sideways_disc_on_the_forearm(medium, z):
+    load, r = UniformDisc(3.5e-3, "tangential"), np.array([0.0, 2e-3, 7e-3, 37e-3])
+    assert max(_off(medium, load, 785.0, r, z, (0.1, 1e-4, 1e-7, 1e-10))) <= 1
 
 
 @pytest.mark.parametrize("kind", CLASSES)

@@ -1,0 +1,194 @@
+"""k C(k) of a layered medium by the global matrix method in balls of 320 bits (python-flint).
+
+Nothing here is shared with `unitcad.attenuation` but the description of the medium. The amplitudes of the waves of all
+layers solve one linear system, so that neither growing exponentials nor P and S alike cost a digit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from unitcad.attenuation.layered.loads import Load
+from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
+from unitcad.errors import Missing
+
+BITS = 320
+
+
+class Kernel:
+    """k C(k) of a medium at omega (rad/s) and depth z (m), a value a row of the load, shape (n, rows).
+
+    Rows: (u_r, u_z) under an axisymmetric load; (u_r, u_theta of horizontal shear, u_z) under a sideways one.
+    """
+
+    def __init__(self, medium: LayeredMedium, omega: float, z: float, load: Load) -> None:
+        try:
+            import flint
+            import mpmath  # noqa: F401  for the static radial disc
+        except ImportError:
+            raise Missing("the reference needs python-flint and mpmath: pip install 'unitcad[test]'") from None
+        self.flint, self.omega, self.z, self.count = flint, omega, z, 0
+        self.sideways, self.column = load.direction == "tangential", 1 if load.direction == "normal" else 0
+        self.least_loss, self.slowest = math.inf, 0.0
+        flint.ctx.prec = BITS
+        self.bodies = []
+        bodies = [layer for layer in medium.layers if layer.thickness > 0]
+        mass = sum(layer.density * layer.thickness for layer in bodies)
+        for body in (*bodies, medium.half_space):
+            mu, eps, ks2 = self._material(body)
+            h = flint.arb(body.thickness) if isinstance(body, Layer) else None
+            self.bodies.append((mu, eps, ks2, h))
+            if body.youngs_modulus == 0.0:
+                continue
+            slow = abs(complex(ks2)) ** 0.5
+            if isinstance(body, Layer):  # and bending as a plate
+                bend = (12 * mass * omega**2 / (body.youngs_modulus * body.thickness**3)) ** 0.25
+                slow = max(slow, min(bend, 40 * slow))
+            self.slowest = max(self.slowest, slow)
+            self.least_loss = min(self.least_loss, complex(mu).imag / abs(complex(mu)))
+        mu, eps, _, _ = self.bodies[0]
+        self.static = self._static(complex(mu), float(eps)) if complex(mu) else np.zeros(3 if self.sideways else 2)
+
+    def _material(self, body: Layer | HalfSpace) -> tuple[Any, Any, Any]:
+        arb, acb = self.flint.arb, self.flint.acb
+        nu, omega, damping = arb(body.poisson_ratio), arb(self.omega), body.damping
+        mu = acb(arb(body.youngs_modulus) / (2 * (1 + nu)))
+        if isinstance(damping, LossFactor):
+            mu = mu * acb(1, damping.tan_delta)
+        elif isinstance(damping, KelvinVoigt):
+            mu = mu + acb(0, omega * arb(damping.viscosity))
+        elif isinstance(damping, FractionalKelvinVoigt) and self.omega > 0:
+            mu = mu * (1 + acb(0, omega * arb(damping.tau)) ** acb(arb(damping.n)))
+        ks2 = arb(body.density) * omega**2 / mu if body.youngs_modulus else acb(0)
+        return mu, (1 - 2 * nu) / (2 * (1 - nu)), ks2
+
+    def _static(self, mu: complex, eps: float) -> np.ndarray:
+        """Return the limit of k C(k) for large k: the top layer as a half-space (Boussinesq and Cerruti)."""
+        along = 1.0 / (2.0 * mu * (1.0 - eps))
+        across = -eps / (2.0 * mu * (1.0 - eps))
+        if self.sideways:
+            return np.array([along, 1.0 / mu, across])
+        return np.array([across, along] if self.column else [along, across])
+
+    def __call__(self, k: np.ndarray) -> np.ndarray:
+        self.count += k.size
+        return np.array([self._rows(complex(one)) for one in k])
+
+    def _rows(self, k: complex) -> np.ndarray:
+        u_r, u_z = self._one(k)[:, self.column]
+        return np.array([u_r, self._shear(k), u_z] if self.sideways else [u_r, u_z])
+
+    def _shear(self, k: complex) -> complex:
+        """Return k times u_theta at the depth per traction, by a wave down (1, mu g) and one up (1, -mu g) a layer."""
+        acb, mat = self.flint.acb, self.flint.acb_mat
+        at, last, scale = acb(k), len(self.bodies) - 1, abs(complex(self.bodies[0][0]))
+        free = complex(self.bodies[last][0]) == 0
+        size = 2 * last + (0 if free else 1)
+        rows, seen = [[acb(0)] * size for _ in range(size)], [acb(0)] * size
+
+        def place(interface: int, column: int, u: Any, t: Any) -> None:
+            underside = free and interface == last
+            if interface > 0 and not underside:
+                rows[2 * interface - 1][column] = u
+            rows[2 * interface - (1 if underside else 0)][column] = t
+
+        top, depth = self.flint.arb(0), self.flint.arb(self.z)
+        for i, (mu, _, ks2, h) in enumerate(self.bodies[: last if free else last + 1]):
+            inside = bool(depth >= top) and (h is None or bool(depth < top + h) or (free and i == last - 1))
+            rate = _root(at * at - ks2)
+            stiffness = mu / scale * rate
+            place(i, 2 * i, acb(1), stiffness)
+            if inside:
+                seen[2 * i] = (-rate * (depth - top)).exp()
+            if h is None:
+                continue
+            fall = (-rate * h).exp()
+            place(i + 1, 2 * i, -fall, -stiffness * fall)
+            place(i, 2 * i + 1, fall, -stiffness * fall)
+            place(i + 1, 2 * i + 1, acb(-1), stiffness)
+            if inside:
+                seen[2 * i + 1] = (-rate * (top + h - depth)).exp()
+            top = top + h
+        right = [[acb(1) / scale]] + [[acb(0)] for _ in range(size - 1)]
+        return complex(at * (mat([seen]) * mat(_even(rows, right)).solve(mat(right)))[0, 0])
+
+    def _one(self, k: complex) -> np.ndarray:
+        acb, mat = self.flint.acb, self.flint.acb_mat
+        at, last, scale = acb(k), len(self.bodies) - 1, abs(complex(self.bodies[0][0]))
+        free = complex(self.bodies[last][0]) == 0
+        size = 4 * last + (0 if free else 2)
+        rows = [[acb(0)] * size for _ in range(size)]
+        seen = [[acb(0)] * size for _ in range(2)]
+
+        def place(interface: int, column: int, state: list[Any]) -> None:
+            """Enter tractions at the surface and at a free underside, all four components at an interface."""
+            underside = free and interface == last
+            first = 4 * interface - (4 if underside else 2)
+            for c in range(2 if interface == 0 or underside else 0, 4):
+                rows[first + c][column] = state[c]
+
+        top, depth = self.flint.arb(0), self.flint.arb(self.z)
+        for i, (mu, eps, ks2, h) in enumerate(self.bodies[: last if free else last + 1]):
+            inside = bool(depth >= top) and (h is None or bool(depth < top + h) or (free and i == last - 1))
+            for j, (shape, rate) in enumerate(self._waves(mu / scale, eps, ks2, at)):
+                column = 4 * i + j
+                place(i, column, shape(acb(0)))
+                if inside:
+                    here, fall = shape(acb(depth - top)), (-rate * (depth - top)).exp()
+                    seen[0][column], seen[1][column] = here[0] * fall, here[1] * fall
+                if h is None:
+                    continue
+                fall, end = (-rate * h).exp(), shape(acb(h))
+                place(i + 1, column, [-value * fall for value in end])
+                # The wave that goes up from the bottom is the mirror image.
+                place(i, column + 2, [value * sign * fall for value, sign in zip(end, _MIRROR, strict=True)])
+                start = shape(acb(0))
+                place(i + 1, column + 2, [-value * sign for value, sign in zip(start, _MIRROR, strict=True)])
+                if inside:
+                    up = top + h - depth
+                    here, fall = shape(acb(up)), (-rate * up).exp()
+                    seen[0][column + 2], seen[1][column + 2] = here[0] * fall, -here[1] * fall
+            top = top + h if h is not None else top
+        right = [[acb(0), acb(0)] for _ in range(size)]
+        right[0][0] = right[1][1] = acb(1) / scale
+        solved = mat(seen) * mat(_even(rows, right)).solve(mat(right))
+        return np.array([[complex(at * solved[a, b]) for b in range(2)] for a in range(2)])
+
+    def _waves(self, mu: Any, eps: Any, ks2: Any, k: Any) -> list[tuple[Callable[[Any], list[Any]], Any]]:
+        """Return the two waves that go down: (u_r, u_z, t_r, t_z) at a depth less its exponential, and its rate."""
+        if self.omega == 0.0:
+            turn = -(1 + eps) / (1 - eps)
+
+            def linear(z: Any) -> list[Any]:
+                u, w = turn + k * z, k * z
+                shear = mu * (k - k * turn - k * k * z - k * w)
+                normal = -2 * mu * k * (1 - 2 * eps) / (1 - eps) + 2 * mu * (k - k * k * z)
+                return [u, w, -shear, -normal]
+
+            return [(lambda z: [k, k, 2 * mu * k * k, 2 * mu * k * k], k), (linear, k)]
+        gp, gs, q = _root(k * k - eps * ks2), _root(k * k - ks2), mu * (2 * k * k - ks2)
+        pressure, shear = [k, gp, 2 * mu * k * gp, q], [gs, k, q, 2 * mu * k * gs]
+        return [(lambda z: pressure, gp), (lambda z: shear, gs)]
+
+
+def _even(rows: list[list[Any]], right: list[list[Any]]) -> list[list[Any]]:
+    """Scale each equation, in place, so that its largest coefficient is 1; return the rows."""
+    for one, given in zip(rows, right, strict=True):
+        most = max(abs(complex(value)) for value in one)
+        one[:], given[:] = [value / most for value in one], [value / most for value in given]
+    return rows
+
+
+_MIRROR = (1, -1, -1, 1)
+
+
+def _root(squared: Any) -> Any:
+    """Return the root of a wave that decays downwards or, undamped, runs downwards."""
+    root = squared.sqrt()
+    value = complex(root)
+    return -root if value.real < 0 or (value.real == 0 and value.imag < 0) else root
