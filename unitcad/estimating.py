@@ -16,8 +16,6 @@ from unitcad.designs import design_named, no_estimate
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
 
-NO_MODULUS = "no small-strain modulus at the motor's frequency is known; the data sheet's 100 % modulus is static"
-
 
 def estimate_spec(
     spec: Spec,
@@ -91,12 +89,22 @@ def _youngs_modulus(material: Material, frequency: Quantity) -> Quantity:
         return _quantity(material.youngs_modulus_kpa, 1e3)
     mu0, tau, n = material.fractional_mu0_kpa, material.fractional_tau_us, material.fractional_n
     if not (mu0 and tau and n):
-        return Quantity(None, note=NO_MODULUS)
+        return Quantity(None, note=_no_modulus(material))
     static = float(mu0) * 1e3 * 2.0 * (1.0 + float(material.poisson_ratio))
     law = FractionalKelvinVoigt(float(tau) * 1e-6, float(n))
     dynamic = abs(law.complex_shear(static, 2.0 * math.pi * frequency.ends[1]))
-    note = f"{NO_MODULUS}; range from a fractional Kelvin-Voigt law, static to {frequency.ends[1]:g} Hz ({mu0.source})"
+    note = (
+        f"{_no_modulus(material)}; range from a fractional Kelvin-Voigt law, static to {frequency.ends[1]:g} Hz "
+        f"({mu0.source})"
+    )
     return Quantity(None, static, dynamic, note)
+
+
+def _no_modulus(material: Material) -> str:
+    return (
+        "no small-strain modulus at the motor's frequency is known; the data sheet's 100 % modulus is static "
+        f"({float(material.modulus_100pct_kpa):g} kPa)"
+    )
 
 
 def _tissue(layer: Tissue) -> TissueLayer:

@@ -8,9 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from unitcad.casting.figures import Mix
-from unitcad.catalogue import Material
+from unitcad.catalogue import Material, motors
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
+from unitcad.spec import Spec
 from unitcad.text import cell
 
 
@@ -65,7 +66,8 @@ def _pieces(moulds: MouldSet) -> Iterator[Item]:
 def _silicone(mixes: list[tuple[Material, Mix]]) -> Iterator[Item]:
     for material in dict.fromkeys(material for material, _ in mixes):
         own = [mix for other, mix in mixes if other == material]
-        note = f"{len(own)} pour{'' if len(own) == 1 else 's'}, mix ratio {float(material.mix_ratio):g} A to 1 B"
+        pours = f"{len(own)} pour{'' if len(own) == 1 else 's'}"
+        note = f"{pours}, mix ratio {float(material.mix_ratio):g} A to 1 B, Shore {material.shore.value}"
         yield Item(f"{material.name} part A", sum(m.part_a_g for m in own), "g", "bought", note)
         yield Item(f"{material.name} part B", sum(m.part_b_g for m in own), "g", "bought", note)
 
@@ -73,12 +75,20 @@ def _silicone(mixes: list[tuple[Material, Mix]]) -> Iterator[Item]:
 def _inside(moulds: MouldSet) -> Iterator[Item]:
     cells, spec = len(moulds.plan.layout.cells), moulds.spec
     size = f"{spec.motor.diameter_mm:g} x {spec.motor.thickness_mm:g} mm"
-    yield Item(spec.motor.part or "motor", cells, "piece", "bought", size)
+    yield Item(spec.motor.part or "motor", cells, "piece", "bought", ", ".join([size, *_ratings(spec)]))
     if fpcb := spec.fpcb:
         tail = f"tail {fpcb.tail_width_mm:g} wide to {fpcb.tail}, {fpcb.thickness_mm:g} thick"
         yield Item("flexible circuit", cells, "piece", "bought", f"pad {fpcb.pad_diameter_mm:g}, {tail}")
     if wires := spec.wires:
         yield Item("wire", cells * wires.count, "piece", "bought", f"{wires.diameter_mm:g} mm over the insulation")
+
+
+def _ratings(spec: Spec) -> Iterator[str]:
+    """Yield what the catalogue knows of the motor's rating."""
+    if spec.motor.part:
+        motor = motors(spec.motors)[spec.motor.part]
+        ratings = {"V": motor.voltage_v, "mA": motor.current_ma, "g": motor.acceleration_g}
+        yield from (f"{float(value):g} {unit}" for unit, value in ratings.items() if value)
 
 
 def _consumables(moulds: MouldSet) -> Iterator[Item]:

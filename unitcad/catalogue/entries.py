@@ -65,7 +65,6 @@ GrooveDepth = Annotated[float, Meta(ge=0.05, le=50, description="of the groove t
 FilamentHole = Annotated[float, Meta(ge=0.1, le=20, description="of the hole in the core that takes the filament")]
 EngravingDepth = Annotated[float, Meta(ge=0.01, le=10, description="of the lettering")]
 EngravingStroke = Annotated[float, Meta(ge=0.05, le=10, description="width of the lettering's strokes")]
-Draft = Annotated[float, Meta(ge=0, le=45, description="of walls along the direction of draw")]
 Overhang = Annotated[float, Meta(ge=0, le=90, description="most lean from the vertical without support")]
 Bridge = Annotated[float, Meta(ge=0, le=LONGEST_MM, description="longest bridge without support")]
 
@@ -149,7 +148,6 @@ class Printer(Struct, frozen=True, kw_only=True):
     filament_hole_mm: Value[FilamentHole]
     engraving_depth_mm: Value[EngravingDepth]
     engraving_stroke_mm: Value[EngravingStroke]
-    draft_deg: Value[Draft]
     overhang_deg: Value[Overhang]
     bridge_mm: Value[Bridge]
 

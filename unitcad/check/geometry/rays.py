@@ -45,7 +45,7 @@ def cast(topology: Topology, floors: tuple[float, float], least: float, tick: Ti
     double = np.sqrt(np.einsum("ij,ij->i", topology.areas, topology.areas))
     longest = np.sqrt(max_side_squared(corners))
     sound = double > 1e-3 * longest  # a height of a micrometre: below it a face has no direction worth following
-    points, owner = _spread_points(corners, longest, sound, upright)
+    points, owner = _spread_points(corners, longest, sound, upright or level)
     normal = side * topology.areas / np.maximum(double, 1e-300)[:, None]
     floor = (np.where(lying(topology), level, upright) * SLACK)[owner]
     return Rays(points, owner, floor, *_behind(corners, normal, sound, points, owner, np.maximum(floor, least), tick))
