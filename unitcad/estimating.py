@@ -12,7 +12,7 @@ from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_tabl
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.catalogue import Material, Tissue, Value, choose, materials, motors, tissue
-from unitcad.designs import design_named, no_estimate
+from unitcad.designs import design_of, no_estimate
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
 
@@ -40,7 +40,7 @@ def frequency_table_of_spec(
 
 def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
     """A spec's unit on its body, in SI. `frequency_hz` overrides the spec's and the motor's."""
-    passes = design_named(spec.design).passes
+    passes = design_of(spec).passes
     if passes is None:
         raise Refusal("design", spec.design, f"has no estimate: {no_estimate()}")
     known = motors(spec.motors)

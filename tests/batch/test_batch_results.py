@@ -245,7 +245,7 @@ def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path: P
         ("def unit(spec): return 5", "returns a int"),
         ("def unit(spec):\n    x = 1\n    return 1 / 0", r"line 3\): ZeroDivisionError"),
         ("def unit(spec) return", "line 1"),
-        ("def unti(spec): return 5", "has no such function; it has unti"),
+        ("def unti(spec): return 5", "has no such function or Design; it has unti"),
         ("from unitcad.shape import ring\ndef unit(spec): return {'Bad name': ring(1, 2, 0, 1)}", "is no name"),
         ("from unitcad.shape import ring\ndef unit(spec): return ring(2, 1, 0, 1)", "line 2"),
         ("import nonsense_there_is_not", "ModuleNotFoundError"),

@@ -86,7 +86,7 @@ def test_cup_base_layers_and_seals_fill_the_block(tmp_path: Path) -> None:
     moulds = moulds_of(tmp_path, lugs(), layers=2)
     spec, lay, drawn = moulds.spec, moulds.plan.layout, complement(moulds.spec, cast_layers(moulds.spec))
     depths = {1: 0.0, 2: spec.moulds.groove_depth_mm}  # the supports' holes leave cup 1 no room for a groove
-    inner = drawn.dims.radii[1] + spec.moulds.land_mm
+    inner = drawn.dimensions.radii[1] + spec.moulds.land_mm
     ring_area = math.pi * ((inner + spec.moulds.groove_width_mm) ** 2 - inner**2)
     for step in moulds.plan.steps:
 
@@ -94,7 +94,12 @@ def test_cup_base_layers_and_seals_fill_the_block(tmp_path: Path) -> None:
             solid = realise(shape, moulds.segments).trim_by_plane((0, 0, 1), 0.0)
             return solid.trim_by_plane((0, 0, -1), -top).volume()
 
-        parts = [drawn.cups[step.index - 1], drawn.base, *drawn.seals[step.index - 1], *step.layer, *step.earlier]
+        parts = [
+            *(t.shape for t in drawn.tools if t.name in ("base", step.cup)),
+            *drawn.seals[step.index - 1],
+            *step.layer,
+            *step.earlier,
+        ]
         block = volume(cup_blank(spec, lay, step.rim)) - depths[step.index] * ring_area
         assert sum(map(volume, parts)) == pytest.approx(block, rel=1e-4)
         assert volume(drawn.seals[step.index - 1][0]) > 1

@@ -60,7 +60,7 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
         f"Release agent, if any, only on the bore of cup {step.index}{core}. Put cup {step.index} on and push it "
         f"towards the cut corner{pushed}"
     )
-    if step.seals and moulds.plan.by_complement:
+    if step.seals and not moulds.plan.concentric:
         lines.append("Grease the flanks of what stands on the base beside the cavity thinly, and wipe off the rest.")
     if tongues:
         slot = "" if first else " and the slot that it left in the layer before"
@@ -131,9 +131,9 @@ def measurements(moulds: MouldSet, grams: Sequence[float], slot_height: float | 
     spec, dims = moulds.spec, moulds.plan.dimensions
     play = spec.moulds.plinth_clearance_mm
     width = (
-        f"Farthest corner from the motor's axis: {dims.outer_radius:.2f} mm."
-        if moulds.plan.by_complement
-        else f"Diameter at the skin: {2 * dims.outer_radius:.2f} mm, in two directions."
+        f"Diameter at the skin: {2 * dims.outer_radius:.2f} mm, in two directions."
+        if moulds.plan.concentric
+        else f"Farthest corner from the motor's axis: {dims.outer_radius:.2f} mm."
     )
     further = f", each further layer by {2 * play:g} mm unless both cups were pushed the same way"
     lines = [

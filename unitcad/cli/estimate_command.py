@@ -60,10 +60,10 @@ def estimate(
 
 def _warn_of_moulds(spec: Spec) -> None:
     """Warn that `build` would refuse the moulds of a unit that can be estimated."""
-    from unitcad.designs import design_named
+    from unitcad.designs import design_of
     from unitcad.moulds.plan import plan
 
-    if not design_named(spec.design).tooling:
+    if design_of(spec).passes is None:
         return
     try:
         plan(spec)

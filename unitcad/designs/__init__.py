@@ -10,16 +10,19 @@ from unitcad.designs import parts
 from unitcad.designs.custom import custom
 from unitcad.designs.design import Design
 from unitcad.designs.dimensions import Dimensions
+from unitcad.designs.tooling import Tooling
 from unitcad.errors import unknown_name
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
+from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import is_custom
 
 __all__ = [
     "Design",
     "Dimensions",
+    "Tooling",
     "default_design",
-    "design_named",
+    "design_of",
     "dimensions",
     "layer_colour",
     "no_estimate",
@@ -45,18 +48,18 @@ def shipped() -> dict[str, Design]:
     return {module.DESIGN.name: module.DESIGN for module in modules if hasattr(module, "DESIGN")}
 
 
-def design_named(name: str) -> Design:
-    """Return a design by its name in a spec. Raises Refusal for an unknown one."""
-    if is_custom(name):
-        return custom(name)
-    if name not in shipped():
-        raise unknown_name("design", name, shipped())
-    return shipped()[name]
+def design_of(spec: Spec | AskedSpec) -> Design:
+    """Return the design of a spec. Raises Refusal for an unknown one, UnitcadError for a custom one that fails."""
+    if is_custom(spec.design):
+        return custom(spec.design, spec.design_source or "")
+    if spec.design not in shipped():
+        raise unknown_name("design", spec.design, shipped())
+    return shipped()[spec.design]
 
 
 def dimensions(spec: Spec) -> Dimensions:
     """Return the lengths that follow from a spec, mm."""
-    return design_named(spec.design).dimensions(spec)
+    return design_of(spec).dimensions(spec)
 
 
 def no_estimate() -> str:
@@ -80,7 +83,7 @@ def unit_bodies(spec: Spec) -> tuple[Body, ...]:
 
     "layer1" ... are cast, whatever else a design names is printed; motor and circuit are added where it draws none.
     """
-    design = design_named(spec.design)
+    design = design_of(spec)
     dims = design.dimensions(spec)
     drawn = design.layers(spec, dims)
     names = [f"layer{i + 1}" for i in range(len(spec.layers))]

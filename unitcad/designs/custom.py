@@ -1,27 +1,74 @@
-"""A custom design: a function in a file that a spec names, from a spec to a shape tree or to several by name."""
+"""A custom design: a `Design`, or a function from a spec to its cast layers, in a file that a spec names."""
 
 from __future__ import annotations
 
 import re
 import types
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, get_args
 
 from unitcad.designs.design import Design
 from unitcad.designs.dimensions import Dimensions, concentric, wire_exit
-from unitcad.errors import UnitcadError
+from unitcad.designs.tooling import Tooling
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device
 from unitcad.shape import ProfileError, Shape
 from unitcad.spec import Spec
-from unitcad.spec.custom_code import expect_allowed, function_of
+from unitcad.spec.custom_code import is_allowed, name_in_file
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
 
 
-def custom(name: str) -> Design:
-    """Return the design of that name, "file.py:function": the spec's own text draws its layers."""
-    return Design(name=name, about="custom", layers=_layers, dimensions=_dimensions)
+def custom(name: str, source: str) -> Design:
+    """Return the design of that name, "file.py:NAME", in the text of its file.
+
+    Raises UnitcadError, with the line in the file, for a text that can't run and for a NAME that is nothing of the
+    kind. Code that is not allowed to run is not run: such a design has defaults, and refuses to draw its layers.
+    """
+    if is_allowed(name, source):
+        return _design(name, source)
+
+    def refuse(spec: Spec, dims: Dimensions) -> dict[str, Shape]:
+        raise UnitcadError(f"design {name}: this command runs its code only with --allow-code; read it first")
+
+    return Design(name=name, about="custom", layers=refuse, dimensions=_dimensions)
+
+
+@lru_cache(maxsize=16)
+def _design(name: str, source: str) -> Design:
+    """Return what the text holds under the name, each of its functions with errors that name the line."""
+    held = _held(name, source)
+    if isinstance(held, Design):
+        design = replace(held, name=name)
+    elif callable(held):
+
+        def layers(spec: Spec, dims: Dimensions) -> Mapping[str, Shape]:
+            made: Any = held(spec)
+            return {"layer1": made} if isinstance(made, get_args(Shape)) else made
+
+        design = Design(name=name, about="custom", layers=layers, dimensions=_dimensions)
+    else:
+        raise UnitcadError(f"design {name}: is a {type(held).__name__}, not a function or a Design")
+    _check_values(design)
+    functions = {field: getattr(design, field) for field in _EXPECTED if callable(getattr(design, field))}
+    return replace(design, **{field: _checked(name, field, function) for field, function in functions.items()})
+
+
+def _held(name: str, source: str) -> Any:
+    """Run the text and return what it has under the name."""
+    module = types.ModuleType("unitcad_custom_design")
+    try:
+        exec(compile(source, name.rpartition(":")[0], "exec"), module.__dict__)
+    except (Exception, SystemExit) as error:
+        raise _failed(name, error) from None
+    known, wanted = vars(module), name_in_file(name)
+    if wanted in known:
+        return known[wanted]
+    own = [key for key, value in known.items() if isinstance(value, types.FunctionType | Design)]
+    there = ", ".join(sorted(own)) or "none"
+    raise UnitcadError(f"design {name}: the file has no such function or Design; it has {there}")
 
 
 def _dimensions(spec: Spec) -> Dimensions:
@@ -29,47 +76,85 @@ def _dimensions(spec: Spec) -> Dimensions:
     return concentric(spec, height, wire_exit(spec, height))
 
 
-def _layers(spec: Spec, dims: Dimensions) -> dict[str, Shape]:
-    """Return what the spec's function draws, by name: a single tree is "layer1".
+def _check_values(design: Design) -> None:
+    """Raise UnitcadError for a field of a Design that holds what it can't."""
+    ways = ("concentric", "complement")
+    if not callable(design.tooling) and design.tooling not in ways:
+        raise UnitcadError(f"design {design.name}: tooling is {design.tooling!r}, not a function or one of {ways}")
+    if design.opens not in ("above", "below"):
+        raise UnitcadError(f"design {design.name}: opens is {design.opens!r}, not 'above' or 'below'")
 
-    Raises UnitcadError, with the line in the file, where the function raises or returns anything else, and where its
-    code is not allowed to run.
+
+def _checked(name: str, field: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a design's function with its errors as one sentence and its result looked at.
+
+    A Refusal is the design's own word on a value of the spec and passes as it is.
     """
-    source = spec.design_source or ""
-    expect_allowed(spec.design, source)
-    function = _function(spec.design, source)
-    try:
-        made = function(spec)
-    except (Exception, SystemExit) as error:
-        raise _failed(spec.design, error) from None
-    if isinstance(made, get_args(Shape)):
-        made = {"layer1": made}
+
+    def call(*given: Any) -> Any:
+        try:
+            made = function(*given)
+            fault = _EXPECTED[field](made)
+        except Refusal:
+            raise
+        except (Exception, SystemExit) as error:
+            raise _failed(name, error) from None
+        if field == "dimensions" and not fault:
+            fault = _wrong_count(made, given[0])
+        if fault:
+            raise UnitcadError(f"design {name}: {fault}")
+        return dict(made) if field == "layers" else made
+
+    return call
+
+
+def _wrong_shapes(made: Any) -> str:
     if not isinstance(made, Mapping) or not made:
-        raise UnitcadError(f"design {spec.design}: returns a {type(made).__name__}, not a shape tree or shapes by name")
+        return f"returns a {type(made).__name__}, not a shape tree or shapes by name"
     for name, shape in made.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise UnitcadError(f"design {spec.design}: {name!r} is no name for a body (a letter, then a-z 0-9 -)")
+            return f"{name!r} is no name for a body (a letter, then a-z 0-9 -)"
         if names_device(name):
-            raise UnitcadError(f"design {spec.design}: {name!r} is no name for a body: on Windows it is a device")
+            return f"{name!r} is no name for a body: on Windows it is a device"
         if not isinstance(shape, get_args(Shape)):
-            raise UnitcadError(f"design {spec.design}: {name} is a {type(shape).__name__}, not a shape tree")
-    return dict(made)
+            return f"{name} is a {type(shape).__name__}, not a shape tree"
+    return ""
 
 
-@lru_cache(maxsize=16)
-def _function(design: str, source: str) -> Any:
-    module = types.ModuleType("unitcad_custom_design")
-    try:
-        exec(compile(source, design.rpartition(":")[0], "exec"), module.__dict__)
-    except (Exception, SystemExit) as error:
-        raise _failed(design, error) from None
-    function = module.__dict__.get(function_of(design))
-    if not callable(function):
-        names = [name for name, value in vars(module).items() if isinstance(value, types.FunctionType)]
-        raise UnitcadError(
-            f"design {design}: the file has no such function; it has {', '.join(sorted(names)) or 'none'}"
-        )
-    return function
+def _wrong_count(dims: Dimensions, spec: Spec) -> str:
+    wanted = len(spec.layers)
+    if (len(dims.radii), len(dims.heights)) == (wanted, wanted):
+        return ""
+    return f"dimensions has {len(dims.radii)} radii and {len(dims.heights)} heights, not {wanted} each"
+
+
+def _wrong_texts(field: str, many: int = 0) -> Callable[[Any], str]:
+    """Return what finds fault with a list of sentences, or of `many` texts together."""
+
+    def fault(made: Any) -> str:
+        items = made if isinstance(made, list | tuple) else [None]
+        flat = [text for item in items for text in (item if many and isinstance(item, list | tuple) else [item])]
+        whole = all(isinstance(text, str) for text in flat) and len(flat) == len(items) * max(many, 1)
+        return "" if whole else f"{field} does not return a list of {'pairs of texts' if many else 'sentences'}"
+
+    return fault
+
+
+def _wrong_kind(field: str, kind: type | types.UnionType, word: str) -> Callable[[Any], str]:
+    return lambda made: "" if isinstance(made, kind) else f"{field} returns a {type(made).__name__}, not {word}"
+
+
+_EXPECTED: dict[str, Callable[[Any], str]] = {
+    "layers": _wrong_shapes,
+    "dimensions": _wrong_kind("dimensions", Dimensions, "Dimensions"),
+    "limits": lambda made: "",
+    "advice": _wrong_texts("advice"),
+    "pad_radius": _wrong_kind("pad_radius", int | float, "a number"),
+    "tooling": _wrong_kind("tooling", Tooling, "a Tooling"),
+    "assembly": _wrong_texts("assembly"),
+    "left_out": _wrong_texts("left_out", many=2),
+}
+"""What is wrong with what each function of a Design returned, "" for nothing."""
 
 
 def _failed(design: str, error: BaseException) -> UnitcadError:

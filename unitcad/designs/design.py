@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from unitcad.designs.dimensions import Dimensions
+from unitcad.designs.tooling import Tooling
 from unitcad.shape import Shape
 from unitcad.spec import Spec
 from unitcad.spec.asked import AskedSpec
@@ -35,7 +36,7 @@ def _inside_cavity(asked: AskedSpec, inner_radius: float) -> float:
 class Design:
     """A kind of unit, all of it in one file.
 
-    name         what `design` in a spec says
+    name         what `design` in a spec says; a custom design is named by its file
     about        one line for `unitcad list designs`
     layers       the cast layers from the inside out, by name ("layer1" ...); other names are printed bodies
     dimensions   radii, heights, pad and exit that follow from a spec
@@ -43,7 +44,8 @@ class Design:
     advice       what is unwise and not refused, a sentence each
     pad_radius   default radius of the circuit's pad (mm), from the asked spec and the cavity's radius
     wire_sides   sides of a wire that need clearance in its exit: 2 in a slot, 1 in a notch
-    tooling      "concentric": base, cups, tongues and blade drawn from the dimensions; None: no moulds
+    tooling      "concentric": base, cups, tongues and blade drawn from the dimensions; "complement": what is left round
+                 the cast layers; or a function from a spec and the cast layers' shapes to a Tooling
     suction      whether a unit closed at the top holds to its core, so that a filament must let air in
     opens        where motor and circuit go in: "above" or "below" (the skin)
     caps         whether a layer has a cap over the one inside it, or is an open ring
@@ -61,7 +63,7 @@ class Design:
     advice: Callable[[Spec, Dimensions], list[str]] = _nothing
     pad_radius: Callable[[AskedSpec, float], float] = _inside_cavity
     wire_sides: int = 1
-    tooling: Literal["concentric"] | None = None
+    tooling: Literal["concentric", "complement"] | Callable[[Spec, Sequence[Shape]], Tooling] = "complement"
     suction: bool = False
     opens: Literal["above", "below"] = "below"
     caps: bool = False

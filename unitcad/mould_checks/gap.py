@@ -36,7 +36,7 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
         cup = solids[step.cup]
         gap = cup.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
         findings.append(at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm"))
-        if moulds.plan.by_complement:
+        if not moulds.plan.concentric:
             gap = _sideways(cup, solids["base"], window + 1)
             where = f"{step.cup} and what stands on the base"
             findings.append(at_least("C210", where, gap, window * chord - GRID, "mm", KNIFE))

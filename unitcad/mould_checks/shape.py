@@ -30,7 +30,7 @@ def expected_genus(plan: Plan) -> dict[str, int]:
     A base has a filament hole a core; a cup a bore a cell and a closed window a tail; a lid a sprue and its vents. Of
     moulds by complement only the blade's is known.
     """
-    if plan.by_complement:
+    if not plan.concentric:
         return {tool.name: 0 for tool in plan.of_kind("blade")}
     genus = {tool.name: 0 for tool in plan.tools}
     genus["base"] = len(plan.of_kind("stub"))

@@ -18,11 +18,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from unitcad.designs import Dimensions, design_named
+from unitcad.designs import Dimensions, design_of
 from unitcad.designs.dimensions import Exit
 from unitcad.designs.parts import BEYOND, strip
+from unitcad.designs.tooling import Layout
 from unitcad.moulds import filament
-from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, Layout
+from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, union
 from unitcad.spec import Spec
 
@@ -42,7 +43,7 @@ def plate_bottom(spec: Spec) -> float:
 def base(spec: Spec, dims: Dimensions, lay: Layout) -> Shape:
     """Draw plate, keyed plinth and cores in one piece, with pry slots, filament holes and grooves, and ledges."""
     tools: list[Shape] = []
-    if design_named(spec.design).suction:
+    if design_of(spec).suction:
         tools += [filament.way(spec, dims, lay, c, plate_bottom(spec)) for c in lay.cells]
     if dims.exit:
         tools += [moved(notch(spec, dims, dims.exit, s), c.x, c.y) for c in lay.cells for s in c.sides]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from unitcad.moulds.layout import BLADE_HEIGHT, Layout
+from unitcad.designs.tooling import Layout
+from unitcad.moulds.layout import BLADE_HEIGHT
 from unitcad.shape import Extrude, Shape, moved, polygon, turned
 
 BLADE_THICKNESS, BLADE_EDGE = 3.0, 0.8

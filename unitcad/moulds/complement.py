@@ -15,21 +15,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from manifold3d import Manifold, OpType
 
 from unitcad.designs import dimensions
-from unitcad.designs.dimensions import Dimensions
 from unitcad.designs.parts import BEYOND
+from unitcad.designs.tooling import Tooling
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import area_true, arrays, bounds, realise, segment_count
 from unitcad.kernels.sections import widest
 from unitcad.moulds.base import stand
+from unitcad.moulds.blade import blade
 from unitcad.moulds.cup import cup_blank, groove, recess, skirt_end
-from unitcad.moulds.layout import Layout, layout
+from unitcad.moulds.layout import layout
+from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece
 from unitcad.shape import Below, Common, Component, Cut, Shape, box, cut, moved, union
 from unitcad.shape.profile import GRID_PER_MM
 from unitcad.spec import Spec
@@ -40,18 +42,7 @@ LEVEL = 1 / GRID_PER_MM
 """Heights nearer than this are one, mm."""
 
 
-@dataclass(frozen=True)
-class Complement:
-    """Blank tools (without labels) as assembled, a cup and its seals a pour; `dims` hold the cast shapes' extent."""
-
-    dims: Dimensions
-    layout: Layout
-    base: Shape
-    cups: tuple[Shape, ...]
-    seals: tuple[tuple[Shape, ...], ...]
-
-
-def complement(spec: Spec, cast: Sequence[Shape]) -> Complement:
+def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     """Return the moulds of the layers `cast`, in the order of their pours, drawn about the unit's axis.
 
     Raises Refusal, with the pour and the place, for layers that leave a piece of mould that nothing holds.
@@ -96,7 +87,12 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Complement:
         cups.append(cup)
         rest = Cut(blank, (recess(spec, lay), *bores))
         sealed.append((Cut(Common((union(holes), rest)), tuple(in_cells(standing))),) if holes else ())
-    return Complement(dims, lay, base, tuple(cups), tuple(sealed))
+    tools = (
+        base_piece(base),
+        *(cup_piece(i + 1, cup) for i, cup in enumerate(cups)),
+        blade_piece(blade(lay, dims.heights[-1])),
+    )
+    return Tooling(dims, lay, tools, seals=tuple(sealed))
 
 
 def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tuple[float, ...], tuple[float, ...]]:

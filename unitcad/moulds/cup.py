@@ -7,8 +7,9 @@ import math
 from unitcad.designs import Dimensions
 from unitcad.designs.dimensions import Exit
 from unitcad.designs.parts import BEYOND
+from unitcad.designs.tooling import Cell, Layout
 from unitcad.moulds.base import outline, plate_top, tapered
-from unitcad.moulds.layout import MARK, PLINTH_DRAFT_DEG, Cell, Layout
+from unitcad.moulds.layout import MARK, PLINTH_DRAFT_DEG
 from unitcad.shape import Extrude, Shape, box, cut, cylinder, moved, ring
 from unitcad.spec import Spec
 

@@ -11,7 +11,7 @@ import math
 from unitcad.designs import Dimensions
 from unitcad.designs.limits import filament_groove
 from unitcad.designs.parts import BEYOND
-from unitcad.moulds.layout import Cell, Layout
+from unitcad.designs.tooling import Cell, Layout
 from unitcad.shape import Profile, Revolve, Shape, box, cylinder, moved, polygon, ring, turned, union
 from unitcad.spec import Spec
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from unitcad.designs.parts import BEYOND
+from unitcad.designs.tooling import Layout
 from unitcad.moulds.base import plate_top
-from unitcad.moulds.layout import TEXT_MARGIN, Layout
+from unitcad.moulds.layout import TEXT_MARGIN
 from unitcad.shape import Cut, Shape, cut, moved
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
 from unitcad.spec import Spec

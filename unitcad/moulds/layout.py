@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from unitcad.catalogue import printers
 from unitcad.designs import Dimensions
+from unitcad.designs.tooling import Cell, Layout
 from unitcad.errors import Refusal
 from unitcad.shape.lettering import HEIGHT, text_width
 from unitcad.spec import Spec
@@ -23,29 +23,6 @@ MARK = 3.5
 TEXT_MARGIN, TEXT_GAP = 1.0, 0.3
 MOST_CELLS = 255
 """Cells are numbered by two hexadecimal digits."""
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One cavity: its centre, the sides (+1, -1 along x) where its tails leave, and its number among several ("")."""
-
-    x: float
-    y: float
-    sides: tuple[int, ...]
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Cells and half sizes along x and y (mm): `plinth` at z = 0, `cup` and `plate` outside; `key` is a leg."""
-
-    cells: tuple[Cell, ...]
-    key: float
-    pitch: float
-    plinth: tuple[float, float]
-    cup: tuple[float, float]
-    plate: tuple[float, float]
-    label_height: float
 
 
 def layout(spec: Spec, dims: Dimensions) -> Layout:

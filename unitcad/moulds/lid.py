@@ -14,10 +14,11 @@ import math
 
 from unitcad.designs import Dimensions
 from unitcad.designs.parts import BEYOND
+from unitcad.designs.tooling import Layout
 from unitcad.errors import Refusal
 from unitcad.moulds.base import outline
 from unitcad.moulds.dents import MESH_ROOM, TILT_DEG, deepest
-from unitcad.moulds.layout import MARK, Layout
+from unitcad.moulds.layout import MARK
 from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, moved, polygon
 from unitcad.spec import Spec
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from msgspec import structs
 
-from unitcad.designs import Design, Dimensions, design_named, unit_bodies
+from unitcad.designs import Design, Dimensions, design_of, unit_bodies
 from unitcad.moulds.plan import Plan, plan
 from unitcad.shape import Shape
 from unitcad.shape.body import Body
@@ -68,7 +68,7 @@ class MouldSet:
     @cached_property
     def design(self) -> Design:
         """The design of the unit."""
-        return design_named(self.spec.design)
+        return design_of(self.spec)
 
     @cached_property
     def dimensions(self) -> Dimensions:

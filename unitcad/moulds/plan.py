@@ -4,28 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
-from unitcad.designs import Dimensions, design_named, dimensions, unit_bodies
-from unitcad.errors import Refusal
-from unitcad.moulds import dents, filament, lid
-from unitcad.moulds.base import base, plate_bottom
-from unitcad.moulds.blade import blade
-from unitcad.moulds.cup import cup
+from unitcad.designs import Dimensions, design_of, unit_bodies
+from unitcad.designs.tooling import Cell, Layout, Tooling
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.moulds import lid
+from unitcad.moulds.concentric import concentric
 from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved
-from unitcad.moulds.layout import Cell, Layout, layout
-from unitcad.moulds.seals import seals
-from unitcad.moulds.tongue import tongues
 from unitcad.shape import Shape, Union, content_hash, moved, turned
 from unitcad.shape.body import Body, Kind
-from unitcad.spec import Spec, printer_of
-
-if TYPE_CHECKING:
-    from unitcad.moulds.complement import Complement
-
-_BASE, _CUP, _CUP2, _TONGUE = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.73, 0.83, 0.93), (0.90, 0.30, 0.30)
-_UP, _DOWN = (0, 0, 1), (0, 0, -1)
-_BLADE, _STUB, _LID = (0.87, 0.87, 0.55), (0.22, 0.22, 0.22), (0.80, 0.72, 0.90)
+from unitcad.spec import Spec
 
 
 @dataclass(frozen=True)
@@ -65,7 +53,7 @@ class Step:
 class Plan:
     """All tools as assembled, the pours in their order, and the four characters that their labels end in.
 
-    `dimensions` are those that the tools were drawn to; `by_complement`: from the cast shapes and not from lengths.
+    `dimensions` are those that the tools were drawn to; `concentric`: they tell every hole and gap in the tools.
     """
 
     tools: tuple[Body, ...]
@@ -73,7 +61,7 @@ class Plan:
     layout: Layout
     label: str
     dimensions: Dimensions
-    by_complement: bool = False
+    concentric: bool = True
 
     def tool(self, name: str) -> Body:
         """Return the tool of that name. Raises KeyError."""
@@ -89,46 +77,61 @@ class Plan:
 
 
 def plan(spec: Spec) -> Plan:
-    """Return the plan of a spec: the design's own tooling, or moulds by complement of its cast layers.
+    """Return the plan of a spec: the tooling that its design asks for, labelled, and the pours.
 
     Raises Refusal where the moulds can't be: beyond the bed, a tail that reaches no edge, a lid whose vents or a tongue
     whose width can't clear the air, a piece that nothing holds.
     """
     layers = cast_layers(spec)
-    made = None
-    if design_named(spec.design).tooling is None:
-        from unitcad.moulds.complement import complement  # it meshes: the other designs' plans load no kernel
-
-        made = complement(spec, layers)
-    dims = made.dims if made else dimensions(spec)
-    lay = made.layout if made else layout(spec, dims)
-    if not made:
-        dents.check_tongue(spec, dims)
-    blank = _tools(spec, dims, lay, made)
+    made = _tooling(spec, layers)
+    dims, lay = made.dimensions, made.layout
     # Material variants share pieces: the label is of geometry alone, drawn before there is a label on it.
-    label = content_hash(Union((*(tool.shape for tool in blank), *layers)))[:4].upper()
-    tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in blank)
+    label = content_hash(Union((*(tool.shape for tool in made.tools), *layers)))[:4].upper()
+    tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in made.tools)
     cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
-    around = [tool.name for tool in tools if tool.kind in ("tongue", "stub")]
-    injected = spec.moulds.pour == "injected"
     tails = sum(len(cell.sides) for cell in lay.cells) if dims.exit else 0
     steps = tuple(
         Step(
             index=i + 1,
             name=f"layer{i + 1}",
             material=layer.material,
-            tools=("base", f"cup{i + 1}", *([f"lid{i + 1}"] if injected else []), *around),
+            tools=tuple(tool.name for tool in tools if tool.kind != "blade" and tool.step in (None, i + 1)),
             layer=cast[i],
             earlier=tuple(shape for earlier in cast[:i] for shape in earlier),
-            seals=made.seals[i] if made else tuple(seals(spec, dims, lay, i)),
+            seals=made.seals[i],
             rim=dims.heights[i],
-            top=lid.lid_top(dims, i) if injected else dims.heights[i],
-            channels=tuple(lid.channels(spec, dims, lay, i)) if injected else (),
+            top=lid.lid_top(dims, i) if made.channels else dims.heights[i],
+            channels=made.channels[i] if made.channels else (),
             windows=tails if dims.exit and dims.exit.high < dims.heights[i] else 0,
         )
         for i, layer in enumerate(spec.layers)
     )
-    return Plan(tools, steps, lay, label, dims, by_complement=made is not None)
+    return Plan(tools, steps, lay, label, dims, made.concentric)
+
+
+def _tooling(spec: Spec, cast: Sequence[Shape]) -> Tooling:
+    """Return the tooling of the cast layers, by the way that the design names or by a function of its own.
+
+    Raises UnitcadError where a function's tooling lacks a piece, and Refusal for a pour that the tooling can't take.
+    """
+    way = design_of(spec).tooling
+    if way == "concentric":
+        return concentric(spec, cast)
+    if way == "complement":
+        from unitcad.moulds.complement import complement  # it meshes: the other designs' plans load no kernel
+
+        return complement(spec, cast)
+    made = way(spec, cast)
+    names, injected = [tool.name for tool in made.tools], spec.moulds.pour == "injected"
+    needed = ["base", *(f"{kind}{i + 1}" for i in range(len(cast)) for kind in ("cup", "lid")[: 1 + injected])]
+    wrong = [f"has no {name}" for name in needed if name not in names]
+    wrong += [f"has {name} twice" for name in sorted({name for name in names if names.count(name) > 1})]
+    for field in ("seals", *(["channels"] if made.channels or injected else [])):
+        count = len(getattr(made, field))
+        wrong += [f"has {field} of {count} pours, not of {len(cast)}"] if count != len(cast) else []
+    if wrong:
+        raise UnitcadError(f"design {spec.design}: its tooling {wrong[0]}")
+    return made
 
 
 def cast_layers(spec: Spec) -> tuple[Shape, ...]:
@@ -149,34 +152,6 @@ def placed(shape: Shape, dims: Dimensions, cell: Cell) -> Shape:
     return moved(turned(shape, "z", 2 if cell.sides == (-1,) and dims.sides == (1,) else 0), cell.x, cell.y)
 
 
-def _tools(spec: Spec, dims: Dimensions, lay: Layout, drawn: Complement | None) -> list[Body]:
-    """Draw every tool without its label, in the order in which a person needs them."""
-    tools = [Body("base", "tool", "base", drawn.base if drawn else base(spec, dims, lay), _BASE)]
-    injected = spec.moulds.pour == "injected"
-    for i in range(len(spec.layers)):
-        shape, colour = drawn.cups[i] if drawn else cup(spec, dims, lay, i), _CUP2 if i % 2 else _CUP
-        tools.append(Body(f"cup{i + 1}", "tool", "cup", shape, colour, step=i + 1, upside_down=True, removal=_UP))
-        if injected:
-            shape = lid.lid(spec, dims, lay, i)
-            tools.append(Body(f"lid{i + 1}", "tool", "lid", shape, _LID, step=i + 1, upside_down=True, removal=_UP))
-    # A printed resin is too brittle for a strip this thin: it is cut from film or steel.
-    brittle = printer_of(spec).technology.value == "sla"
-    strips, made = tongues(dims, lay), "cut" if brittle else "printed"
-    tools += [
-        Body(_numbered("tongue", i, strips), "tool", "tongue", shape, _TONGUE, made=made, removal=(side, 0, 0))
-        for i, (side, shape) in enumerate(strips)
-    ]
-    if design_named(spec.design).suction and not drawn:
-        stubs = [filament.stub(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells]
-        tools += [
-            Body(_numbered("stub", i, stubs), "tool", "stub", stub, _STUB, made="cut", removal=_DOWN)
-            for i, stub in enumerate(stubs)
-        ]
-    if not injected:
-        tools.append(Body("blade", "tool", "blade", blade(lay, dims.heights[-1]), _BLADE, upside_down=True))
-    return tools
-
-
 def _engraved(tool: Body, spec: Spec, dims: Dimensions, lay: Layout, label: str) -> Body:
     """Return the tool with the set's label, and a cup with the numbers of its cells."""
     corners = label[:2], label[2:]
@@ -190,7 +165,3 @@ def _engraved(tool: Body, spec: Spec, dims: Dimensions, lay: Layout, label: str)
     else:
         return tool
     return replace(tool, shape=engraved(tool.shape, letters))
-
-
-def _numbered(name: str, index: int, among: Sequence[object]) -> str:
-    return name if len(among) == 1 else f"{name}{index + 1}"

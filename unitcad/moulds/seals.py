@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from unitcad.designs import Dimensions, design_named
+from unitcad.designs import Dimensions, design_of
 from unitcad.designs.parts import BEYOND
+from unitcad.designs.tooling import Layout
 from unitcad.moulds import filament
 from unitcad.moulds.base import core, notch
 from unitcad.moulds.cup import cup_blank, windows
-from unitcad.moulds.layout import Layout
 from unitcad.moulds.tongue import tongues
 from unitcad.shape import Common, Shape, cut, cylinder, moved
 from unitcad.spec import Spec
@@ -31,6 +31,6 @@ def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
             for c in lay.cells
             for s in c.sides
         ]
-    if design_named(spec.design).suction:
+    if design_of(spec).suction:
         seals += [filament.annulus(spec, dims, c) for c in lay.cells]
     return seals

@@ -5,7 +5,7 @@ from __future__ import annotations
 from unitcad.designs import Dimensions
 from unitcad.designs.dimensions import Exit
 from unitcad.designs.parts import strip
-from unitcad.moulds.layout import Layout
+from unitcad.designs.tooling import Layout
 from unitcad.shape import Shape, box, moved, turned, union
 
 GRIP_LENGTH, GRIP_WIDTH, GRIP_GAP, GRIP_APART = 8.0, 10.0, 3.0, 0.5

@@ -10,7 +10,7 @@ from typing import Any
 
 from unitcad import __version__, files
 from unitcad.cache import Store, digest
-from unitcad.designs import design_named, no_estimate
+from unitcad.designs import design_of, no_estimate
 from unitcad.designs.design import Reason
 from unitcad.errors import Refusal, unknown_name
 from unitcad.mould_checks.finding import FindingRecord
@@ -101,7 +101,7 @@ def checked_outputs(only: Sequence[str]) -> tuple[str, ...]:
 
 def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
     """Return what of `only` there can be: not every design has an estimate. Raises Refusal where nothing is left."""
-    possible = tuple(name for name in only if name != "estimate" or design_named(spec.design).passes)
+    possible = tuple(name for name in only if name != "estimate" or design_of(spec).passes)
     if not possible:
         raise Refusal("--only", ",".join(only), f"{spec.design} has no estimate: {no_estimate()}", "unit")
     return possible
@@ -148,13 +148,13 @@ def _left_out(spec: Spec, asked: Sequence[str], only: Sequence[str], check: bool
         yield "mould checks", NO_MOULDS if check else folders.UNCHECKED
     if not check:
         yield "mesh checks", folders.UNCHECKED
-    design = design_named(spec.design)
-    if design.tooling:
+    design = design_of(spec)
+    if design.tooling == "concentric":
         if len(spec.layers) == 1:
             yield "second pour", "one layer: one pour"
         if not spec.fpcb and not spec.wires:
             yield "tongue and slot", "no FPCB"
-        yield from design.left_out(spec)
+    yield from design.left_out(spec)
     for name in OUTPUTS:
         if name not in only:
             yield name, no_estimate() if name in asked else "not asked for (--only)"

@@ -1,6 +1,7 @@
-"""A custom design: `design = "path/to/file.py:function"`. Its text becomes part of the effective spec.
+"""A custom design: `design = "path/to/file.py:NAME"`, a function or a Design in that file.
 
-So a result's spec.toml stands alone, the result's hash covers the code, and a worker elsewhere needs no file.
+The file's text becomes part of the effective spec. So a result's spec.toml stands alone, the result's hash covers the
+code, and a worker elsewhere needs no file.
 """
 
 from __future__ import annotations
@@ -14,17 +15,17 @@ from typing import Any
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import read_text
 
-_FORM = re.compile(r"(?P<file>.+\.py):(?P<function>[A-Za-z_][A-Za-z0-9_]*)", re.DOTALL)
+_FORM = re.compile(r"(?P<file>.+\.py):(?P<name>[A-Za-z_][A-Za-z0-9_]*)", re.DOTALL)
 LARGEST = 1_000_000
 
 
 def is_custom(design: object) -> bool:
-    """Tell whether a spec's `design` means a function in a file."""
+    """Tell whether a spec's `design` means something in a file."""
     return isinstance(design, str) and _FORM.fullmatch(design) is not None
 
 
-def function_of(design: str) -> str:
-    """Return the function's name in "file.py:function"."""
+def name_in_file(design: str) -> str:
+    """Return NAME of "file.py:NAME"."""
     return design.rpartition(":")[2]
 
 
@@ -37,13 +38,13 @@ def with_source(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     design = data.get("design")
     if not is_custom(design) or data.get("design_source") is not None:
         return data
-    file, _, function = str(design).rpartition(":")
+    file, _, name = str(design).rpartition(":")
     path = folder / file
     try:
         source = read_text(path, largest=LARGEST)
     except UnitcadError as error:
         raise Refusal("design", str(design), str(error)) from None
-    named = f"{path.name}:{function}"
+    named = f"{path.name}:{name}"
     allow({_digest(named, source)})
     return {**data, "design": named, "design_source": source}
 
@@ -69,10 +70,9 @@ def allow_nothing() -> None:
     _allowed.clear()
 
 
-def expect_allowed(design: str, source: str) -> None:
-    """Raise UnitcadError unless this process may run a design's code."""
-    if ANY not in _allowed and _digest(design, source) not in _allowed:
-        raise UnitcadError(f"design {design}: this command runs its code only with --allow-code; read it first")
+def is_allowed(design: str, source: str) -> bool:
+    """Tell whether this process may run a design's code."""
+    return ANY in _allowed or _digest(design, source) in _allowed
 
 
 def _digest(design: str, source: str) -> str:

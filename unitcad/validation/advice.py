@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from unitcad import catalogue
-from unitcad.designs import design_named
+from unitcad.designs import design_of
 from unitcad.designs.limits import EPS
 from unitcad.spec import Spec
 
@@ -44,5 +44,5 @@ def _play(spec: Spec) -> list[str]:
 
 
 def _design(spec: Spec) -> list[str]:
-    design = design_named(spec.design)
+    design = design_of(spec)
     return design.advice(spec, design.dimensions(spec))

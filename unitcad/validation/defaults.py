@@ -6,7 +6,7 @@ from msgspec import structs
 
 from unitcad import catalogue
 from unitcad.catalogue import Motor as CatalogueMotor
-from unitcad.designs import Design, design_named
+from unitcad.designs import Design, design_of
 from unitcad.designs.limits import least_slot
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
@@ -21,7 +21,7 @@ _PRINTER_LENGTHS = tuple(f for f in Moulds.__struct_fields__ if f in catalogue.P
 
 def effective(asked: AskedSpec) -> Spec:
     """Return the effective spec. Raises Refusal for the first value that can't be."""
-    design = design_named(asked.design)
+    design = design_of(asked)
     if is_custom(asked.design):
         if asked.design_source is None:
             raise Refusal("design_source", None, f"is required with design = {asked.design!r}")

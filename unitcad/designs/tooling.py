@@ -1,0 +1,53 @@
+"""What a design's moulds are made of: blank tools and the cells they stand in (mm, as assembled, seat at z = 0)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from unitcad.designs.dimensions import Dimensions
+from unitcad.shape import Shape
+from unitcad.shape.body import Body
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cavity: its centre, the sides (+1, -1 along x) where its tails leave, and its number among several ("")."""
+
+    x: float
+    y: float
+    sides: tuple[int, ...]
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Cells and half sizes along x and y (mm): `plinth` at z = 0, `cup` and `plate` outside; `key` is a leg."""
+
+    cells: tuple[Cell, ...]
+    key: float
+    pitch: float
+    plinth: tuple[float, float]
+    cup: tuple[float, float]
+    plate: tuple[float, float]
+    label_height: float
+
+
+@dataclass(frozen=True)
+class Tooling:
+    """The tools of all pours, without labels, and what keeps silicone in beside them.
+
+    dimensions   the lengths that the tools are drawn to; `heights` are the rims of the pours
+    layout       cells and plates; the labels go into the plates' corners
+    tools        in the order in which a person needs them: "base", and "cup1", "cup2" ... with their pour as `step`;
+                 what has no `step` stands in every pour, but for a blade
+    seals        for each pour, what silicone is kept from though no tool fills it
+    channels     for each pour under a lid, the silicone in sprue and vents, as many a cell; () where all pours are open
+    concentric   whether the tools are those of rings: then the dimensions tell every hole and gap in them
+    """
+
+    dimensions: Dimensions
+    layout: Layout
+    tools: tuple[Body, ...]
+    seals: tuple[tuple[Shape, ...], ...]
+    channels: tuple[tuple[Shape, ...], ...] = ()
+    concentric: bool = False

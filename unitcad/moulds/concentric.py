@@ -1,0 +1,48 @@
+"""The tooling of concentric layers, drawn from their lengths: base, cups, lids, tongues, filament stubs and blade."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from unitcad.designs import design_of
+from unitcad.designs.tooling import Tooling
+from unitcad.moulds import dents, filament, lid
+from unitcad.moulds.base import base, plate_bottom
+from unitcad.moulds.blade import blade
+from unitcad.moulds.cup import cup
+from unitcad.moulds.layout import layout
+from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, lid_piece, stub_pieces, tongue_pieces
+from unitcad.moulds.seals import seals
+from unitcad.moulds.tongue import tongues
+from unitcad.shape import Shape
+from unitcad.spec import Spec, printer_of
+
+
+def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
+    """Return the tooling of a spec's rings or cups; the shapes `cast` are not looked at, so that C100 can compare.
+
+    Raises Refusal beyond the bed, for a tail that reaches no edge, and for a tongue or vents that can't clear the air.
+    """
+    design = design_of(spec)
+    dims = design.dimensions(spec)
+    lay, pours = layout(spec, dims), range(len(cast))
+    dents.check_tongue(spec, dims)
+    injected = spec.moulds.pour == "injected"
+    tools = [base_piece(base(spec, dims, lay))]
+    for i in pours:
+        tools.append(cup_piece(i + 1, cup(spec, dims, lay, i)))
+        if injected:
+            tools.append(lid_piece(i + 1, lid.lid(spec, dims, lay, i)))
+    tools += tongue_pieces(tongues(dims, lay), brittle=printer_of(spec).technology.value == "sla")
+    if design.suction:
+        tools += stub_pieces([filament.stub(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells])
+    if not injected:
+        tools.append(blade_piece(blade(lay, dims.heights[-1])))
+    return Tooling(
+        dims,
+        lay,
+        tuple(tools),
+        seals=tuple(tuple(seals(spec, dims, lay, i)) for i in pours),
+        channels=tuple(tuple(lid.channels(spec, dims, lay, i)) for i in pours) if injected else (),
+        concentric=True,
+    )

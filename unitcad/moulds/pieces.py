@@ -1,0 +1,57 @@
+"""A shape as a piece of tooling: its name, colour, attitude on the printer, and the way that it is taken away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from unitcad.shape import Shape
+from unitcad.shape.body import Body
+
+_BASE, _CUP, _CUP2, _TONGUE = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.73, 0.83, 0.93), (0.90, 0.30, 0.30)
+_BLADE, _STUB, _LID = (0.87, 0.87, 0.55), (0.22, 0.22, 0.22), (0.80, 0.72, 0.90)
+_UP, _DOWN = (0, 0, 1), (0, 0, -1)
+
+
+def base_piece(shape: Shape) -> Body:
+    """Return the base, which stays for all pours."""
+    return Body("base", "tool", "base", shape, _BASE)
+
+
+def cup_piece(pour: int, shape: Shape) -> Body:
+    """Return the cup of a pour (from 1), printed upside down and lifted off upwards."""
+    colour = _CUP if pour % 2 else _CUP2
+    return Body(f"cup{pour}", "tool", "cup", shape, colour, step=pour, upside_down=True, removal=_UP)
+
+
+def lid_piece(pour: int, shape: Shape) -> Body:
+    """Return the lid of a pour (from 1), printed upside down and lifted off upwards."""
+    return Body(f"lid{pour}", "tool", "lid", shape, _LID, step=pour, upside_down=True, removal=_UP)
+
+
+def tongue_pieces(strips: Sequence[tuple[int, Shape]], brittle: bool) -> list[Body]:
+    """Return tongues, each pulled out to its side (+1, -1 along x).
+
+    A printed resin is too `brittle` for a strip this thin: it is cut from film or steel.
+    """
+    made = "cut" if brittle else "printed"
+    return [
+        Body(_numbered("tongue", i, strips), "tool", "tongue", shape, _TONGUE, made=made, removal=(side, 0, 0))
+        for i, (side, shape) in enumerate(strips)
+    ]
+
+
+def stub_pieces(stubs: Sequence[Shape]) -> list[Body]:
+    """Return filament stubs, pulled out downwards."""
+    return [
+        Body(_numbered("stub", i, stubs), "tool", "stub", stub, _STUB, made="cut", removal=_DOWN)
+        for i, stub in enumerate(stubs)
+    ]
+
+
+def blade_piece(shape: Shape) -> Body:
+    """Return the blade, printed upside down; it stands in no pour."""
+    return Body("blade", "tool", "blade", shape, _BLADE, upside_down=True)
+
+
+def _numbered(name: str, index: int, among: Sequence[object]) -> str:
+    return name if len(among) == 1 else f"{name}{index + 1}"
