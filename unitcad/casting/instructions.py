@@ -50,7 +50,9 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
             "soon as it is firm and no longer tacky is the usual practice (assumed), and silicone bonds to cured "
             "silicone of its kind."
         )
-    core = " and on the core, sparingly" if first else ""
+    if moulds.design.laid_in == step.index:
+        lines += assembly(moulds)
+    core = f" and on the {_holds(moulds)}, sparingly" if first else ""
     pushed = (
         ": the play is then on one side."
         if first
@@ -103,7 +105,8 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
     if step.lid:
         lines.append("Lift the lid: sprue and vents tear off at the layer. Trim them flush with a blade.")
     lines.append(
-        f"Lift cup {step.index} straight up, a screwdriver in each pry slot. Layer {step.index} stays on the core."
+        f"Lift cup {step.index} straight up, a screwdriver in each pry slot. Layer {step.index} stays on the "
+        f"{_holds(moulds)}."
     )
     return tuple(lines)
 
@@ -118,7 +121,7 @@ def release(moulds: MouldSet, inner: Material) -> tuple[str, ...]:
             f"{tear:.1f} N on its end tear {inner.name} (computed: tensile strength, {inner.tensile_mpa.status}, x its "
             "area)."
         )
-    lines.append("Peel the unit off the core straight up, all round first. Trim the flash.")
+    lines.append(f"Peel the unit off the {_holds(moulds)} straight up, all round first. Trim the flash.")
     return tuple(lines)
 
 
@@ -152,6 +155,16 @@ def measurements(moulds: MouldSet, grams: Sequence[float], slot_height: float | 
     low = "" if spec.moulds.pour == "injected" else " or a low strike"
     lines.append(f"Weigh one unit, trimmed, without motor and circuit: {weights} g. Less means air{low}.")
     return tuple(lines)
+
+
+def assembly(moulds: MouldSet) -> tuple[str, ...]:
+    """Describe how motor and circuit go into the body, or into the mould, in the design's words."""
+    return tuple(moulds.design.assembly(moulds.spec, moulds.plan.dimensions))
+
+
+def _holds(moulds: MouldSet) -> str:
+    """Return what the silicone is cast on: "core"; moulds by complement need not have one."""
+    return "core" if moulds.plan.concentric else "base"
 
 
 def _each(moulds: MouldSet) -> str:

@@ -9,7 +9,7 @@ from unitcad import catalogue
 from unitcad.casting import figures as fig
 from unitcad.casting.bill import Item, bill
 from unitcad.casting.figures import Figure, Mix, sourced
-from unitcad.casting.instructions import measurements, pour_steps, preparation, release
+from unitcad.casting.instructions import assembly, measurements, pour_steps, preparation, release
 from unitcad.casting.layer_grid import OffGrid, off_grid
 from unitcad.catalogue import Material
 from unitcad.moulds.mould_set import MouldSet
@@ -82,7 +82,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
         off_grid=edges,
         pours=tuple(pours),
         release=release(moulds, mixes[0][0]),
-        assembly=tuple(moulds.design.assembly(spec, plan.dimensions)),
+        assembly=() if moulds.design.laid_in else assembly(moulds),
         measure=measurements(moulds, grams, _printed_slot_height(moulds, edges)),
         walls=tuple(_walls(spec)),
         bill=bill(moulds, mixes),

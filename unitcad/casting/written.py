@@ -54,7 +54,8 @@ def to_markdown(procedure: Procedure) -> str:
         lines += [f"## Pour {pour.index}: {spaced(pour.layer)}, {markdown(pour.material)}", ""]
         lines += [f"![pour {pour.index}]({pour.drawing})", "", *_figures(pour.figures), "", *steps(pour.steps), ""]
     lines += ["## Out of the mould", "", *steps(procedure.release), ""]
-    lines += ["## Motor in", "", *steps(procedure.assembly), ""]
+    if procedure.assembly:
+        lines += ["## Motor in", "", *steps(procedure.assembly), ""]
     lines += ["## Measure on the first part", "", *(f"- {markdown(text)}" for text in procedure.measure), ""]
     lines += ["The cups' play on the plinth is the largest error of all:", "", *_figures(procedure.walls), ""]
     needed = [(markdown(i.item), f"{i.quantity:.4g} {i.unit}", i.made, markdown(i.note)) for i in procedure.bill]
@@ -70,6 +71,7 @@ def step_section(moulds: MouldSet, step: Step) -> str:
     layers = [(i // cells, shape) for i, shape in enumerate(step.earlier)]
     layers += [(step.index - 1, shape) for shape in step.layer]
     bodies += [Body(f"layer{i + 1}", "unit", "layer", shape, layer_colour(i), made="cast") for i, shape in layers]
+    bodies += step.inserts
     regions = svg.cut(bodies, moulds.segments, y=plan.layout.cells[0].y)
     labels = {region.name: spaced(region.name) for region in regions}
     return svg.section(_merged(regions), title=f"Pour {step.index}: {spaced(step.name)}", labels=labels, ground="seat")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 
@@ -11,7 +12,7 @@ from unitcad.designs.custom import custom
 from unitcad.designs.design import Design
 from unitcad.designs.dimensions import Dimensions
 from unitcad.designs.tooling import Tooling
-from unitcad.errors import unknown_name
+from unitcad.errors import UnitcadError, unknown_name
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
 from unitcad.spec.asked import AskedSpec
@@ -24,6 +25,7 @@ __all__ = [
     "default_design",
     "design_of",
     "dimensions",
+    "inserts",
     "layer_colour",
     "no_estimate",
     "shipped",
@@ -81,18 +83,34 @@ def layer_colour(index: int) -> tuple[float, float, float]:
 def unit_bodies(spec: Spec) -> tuple[Body, ...]:
     """Return the bodies of the unit as assembled on the skin z = 0: layers inside out, motor, circuit or wires.
 
-    "layer1" ... are cast, whatever else a design names is printed; motor and circuit are added where it draws none.
+    "layer1" ... are cast. Motor ("motor"), circuit ("fpcb") and wires ("wire1" ...) are bought, and added where the
+    design draws none. Whatever else it names is printed.
     """
     design = design_of(spec)
     dims = design.dimensions(spec)
     drawn = design.layers(spec, dims)
     names = [f"layer{i + 1}" for i in range(len(spec.layers))]
+    inside = {body.name: body for body in _inside(spec, dims)}
     bodies = []
     for i, (name, shape) in enumerate(drawn.items()):
+        if name in inside:
+            bodies.append(replace(inside[name], shape=shape))
+            continue
         step = names.index(name) + 1 if name in names else None
         kind, made = ("layer", "cast") if step else ("printed", "printed")
         bodies.append(Body(name, "unit", kind, shape, layer_colour(i), made=made, step=step))
-    return (*bodies, *(body for body in _inside(spec, dims) if body.name not in drawn))
+    return (*bodies, *(body for body in inside.values() if body.name not in drawn))
+
+
+def inserts(spec: Spec) -> tuple[Body, ...]:
+    """Return the bodies that are laid into the mould before the pour `Design.laid_in`, to stay; () where it is None.
+
+    Raises UnitcadError where the spec has fewer pours.
+    """
+    laid_in, pours = design_of(spec).laid_in or 0, len(spec.layers)
+    if laid_in > pours:
+        raise UnitcadError(f"design {spec.design}: laid_in is {laid_in}, and there are {pours} pours")
+    return tuple(body for body in unit_bodies(spec) if body.made != "cast") if laid_in else ()
 
 
 def _inside(spec: Spec, dims: Dimensions) -> tuple[Body, ...]:

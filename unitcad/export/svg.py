@@ -158,7 +158,7 @@ def _unit_measures(dims: Dimensions) -> list[Measure]:
         found.append(
             Measure(f"slot {show(high - low)} × {show(dims.exit.width)}", low, high, "right", 0, dims.outer_radius)
         )
-    return found
+    return [measure for measure in found if measure.end > measure.start]
 
 
 class _Page:

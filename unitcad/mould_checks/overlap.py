@@ -16,7 +16,7 @@ OVERLAP = 1e-6
 
 
 def findings(moulds: MouldSet) -> list[MouldFinding]:
-    """Look at the unit, then at each assembled pour: tools, cured layers and the one being cast.
+    """Look at the unit, then at each assembled pour: tools, cured layers, what is laid in, and the one being cast.
 
     The cells of a layer are compared with each other, then count as one solid.
     """
@@ -36,7 +36,8 @@ def _of_pours(moulds: MouldSet) -> list[MouldFinding]:
         cells = moulds.meshes(step.layer)
         findings += _overlaps(f"pour {step.index}", [(f"{step.name}.{i + 1}", c) for i, c in enumerate(cells)], shared)
         cast.append((step.name, united(cells)))
-        standing = [(name, moulds.solids[name]) for name in step.tools] + cast
+        laid = [(body.name, moulds.mesh(body)) for body in step.inserts]
+        standing = [(name, moulds.solids[name]) for name in step.tools] + cast + laid
         findings += _overlaps(f"pour {step.index}", standing, shared)
     return findings
 

@@ -62,7 +62,8 @@ def _reached(
     tools = [solids[name] for name in step.tools]
     x0, y0, z0, x1, y1, _ = Manifold.compose(tools).bounding_box()
     block = realise(box(x0 - 5, x1 + 5, y0 - 5, y1 + 5, z0 - 5, step.top), segments)
-    filled = [*tools, cured, *(realise(shape, segments) for shape in step.seals)]
+    laid = [body.shape for body in step.inserts]
+    filled = [*tools, cured, *(realise(shape, segments) for shape in (*laid, *step.seals))]
     if one_by_one:
         for piece in filled:
             block = block - piece

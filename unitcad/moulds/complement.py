@@ -14,14 +14,14 @@ Balance (C100) holds by construction here and proves nothing: draw, strain, air,
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from manifold3d import Manifold, OpType
 
-from unitcad.designs import dimensions
+from unitcad.designs import design_of, dimensions, inserts
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Tooling
 from unitcad.errors import Refusal
@@ -45,15 +45,25 @@ LEVEL = 1 / GRID_PER_MM
 def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     """Return the moulds of the layers `cast`, in the order of their pours, drawn about the unit's axis.
 
-    Raises Refusal, with the pour and the place, for layers that leave a piece of mould that nothing holds.
+    Where what the design lays into the mould leads out of the silicone, the base carries it, and the cup has a slot
+    for it, open downwards. Raises Refusal, with the pour and the place, for layers that leave a piece of mould that
+    nothing holds.
     """
     if spec.moulds.pour == "injected":
         raise Refusal("moulds.pour", "injected", "moulds by complement have no lids; they are poured open", "open")
-    given = dimensions(spec)
+    given, clearance = dimensions(spec), spec.moulds.window_clearance_mm
     segments = segment_count(given.outer_radius, spec.output.tolerance_mm)
+    laid, laid_in = [body.shape for body in inserts(spec)], design_of(spec).laid_in or 0
     solids = [realise(shape, segments) for shape in cast]
     rims, radii = _extent(spec, solids, segments)
-    standing, tops = _standing(spec, cast, solids, rims, max(radii), segments)
+
+    def there(layer: int) -> Sequence[Shape]:
+        return laid if layer + 1 >= laid_in else ()
+
+    standing, tops = _standing(spec, cast, there, solids, rims, max(radii), segments)
+    if laid:
+        seat = max(radii) + spec.moulds.land_mm + spec.moulds.groove_width_mm
+        standing = [Common((piece, box(-seat, seat, -seat, seat, -BEYOND, tops))) for piece in standing]
     dims = replace(given, radii=radii, heights=rims, core_height=tops, exit=None, sides=())
     lay = layout(spec, dims)
 
@@ -65,11 +75,12 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     cups, sealed = [], []
     for i, rim in enumerate(rims):
         blank, under = cup_blank(spec, lay, rim), Below(union(cast[: i + 1]), -BEYOND)
+        slots = [_grown(Below(shape, skirt_end(spec) - BEYOND), clearance) for shape in there(i)]
         wall = Manifold.batch_boolean(
-            [realise(shape, segments) for shape in (blank, under, recess(spec, lay), *standing)], OpType.Subtract
+            [realise(shape, segments) for shape in (blank, under, recess(spec, lay), *standing, *slots)],
+            OpType.Subtract,
         )
-        clearance = spec.moulds.window_clearance_mm
-        slid = [
+        slid = slots + [
             _slid(spec, piece, solid, wall, rim, segments)
             for piece, solid in zip(standing, solid_of, strict=True)
             if wall.min_gap(solid, 2 * clearance) < clearance
@@ -85,8 +96,9 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
             for lost in _pieces(Manifold.compose(pieces) - realise(cup, segments) - realise(base, segments)):
                 raise _refused(spec, i, f"the base goes all round a piece of the cup, {_place(lost)}")
         cups.append(cup)
-        rest = Cut(blank, (recess(spec, lay), *bores))
-        sealed.append((Cut(Common((union(holes), rest)), tuple(in_cells(standing))),) if holes else ())
+        # Down into the plinth too: where only faces touch, a way of no width could be left.
+        rest = Cut(blank, tuple(bores))
+        sealed.append((Cut(Common((union(holes), rest)), tuple(in_cells([*standing, *there(i)]))),) if holes else ())
     tools = (
         base_piece(base),
         *(cup_piece(i + 1, cup) for i, cup in enumerate(cups)),
@@ -114,13 +126,20 @@ def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tupl
 
 
 def _standing(
-    spec: Spec, cast: Sequence[Shape], solids: Sequence[Manifold], rims: Sequence[float], radius: float, segments: int
+    spec: Spec,
+    cast: Sequence[Shape],
+    there: Callable[[int], Sequence[Shape]],
+    solids: Sequence[Manifold],
+    rims: Sequence[float],
+    radius: float,
+    segments: int,
 ) -> tuple[list[Shape], float]:
     """Return the pieces that stand on the base in every pour, sunk into it, and the height of the tallest.
 
     Raises Refusal for a piece that would hang in the air, and for one that a later layer takes the place of.
     """
-    under = Cut(Below(union(cast), 0.0), tuple(cast))
+    filled = (*cast, *there(len(cast) - 1))
+    under = Cut(Below(union(filled), 0.0), filled)
     held = _pieces(realise(under, segments))
     for piece in held:
         if not _stands(piece):
@@ -128,7 +147,9 @@ def _standing(
     found: list[Shape] = [Component(under, _inside(piece)) for piece in held]
     edge = radius + BEYOND
     for i, rim in reversed(list(enumerate(rims))):
-        beneath = Below(union(cast[: i + 1]), -BEYOND)
+        if any(bounds(realise(shape, segments))[5] > rim + LEVEL for shape in there(i)):
+            raise _refused(spec, i, f"what is laid in stands out of the rim at z = {rim:.4g} mm")
+        beneath = Below(union((*cast[: i + 1], *there(i))), -BEYOND)
         beside = Cut(box(-edge, edge, -edge, edge, -BEYOND, rim), (beneath,))
         for piece in _pieces(realise(beside, segments)):
             if bounds(piece)[3] > edge - LEVEL:
@@ -178,10 +199,10 @@ def _slid(spec: Spec, piece: Shape, solid: Manifold, wall: Manifold, rim: float,
     clearance = spec.moulds.window_clearance_mm
     top = bounds(solid)[5]
     if rim - spec.moulds.least_wall_mm < top < rim:
-        column = _grown(Below(moved(piece, z=rim), -BEYOND), clearance)
+        column = _grown(Below(moved(piece, z=rim), -2 * BEYOND), clearance)
         if len(_pieces(wall - realise(column, segments))) <= len(_pieces(wall)):
             return column
-    return _grown(piece, clearance)
+    return _grown(Below(piece, -2 * BEYOND), clearance)
 
 
 def _grown(piece: Shape, clearance: float) -> Shape:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from unitcad.designs import Dimensions, design_of, unit_bodies
+from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
 from unitcad.designs.tooling import Cell, Layout, Tooling
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.moulds import lid
 from unitcad.moulds.concentric import concentric
 from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved
-from unitcad.shape import Shape, Union, content_hash, moved, turned
+from unitcad.shape import Shape, Union, content_hash, moved, turned, union
 from unitcad.shape.body import Body, Kind
 from unitcad.spec import Spec
 
@@ -22,6 +22,7 @@ class Step:
 
     `layer` is the cast layer in the frame of the tools, one solid a cell; `earlier` the cured ones; `seals` what
     silicone is kept from though no tool fills it; `channels` the silicone in sprue and vents, as many a cell.
+    `inserts` are motor and circuit where they are laid in before this pour, or lie there already: of all cells.
     `rim` is z of the plane that the blade runs on, `top` where the silicone is open: the rim or the lid's upper face.
     `windows` counts the cup's passages for tongues that are closed all round.
     """
@@ -37,6 +38,7 @@ class Step:
     top: float
     channels: tuple[Shape, ...] = ()
     windows: int = 0
+    inserts: tuple[Body, ...] = ()
 
     @property
     def cup(self) -> str:
@@ -89,6 +91,8 @@ def plan(spec: Spec) -> Plan:
     label = content_hash(Union((*(tool.shape for tool in made.tools), *layers)))[:4].upper()
     tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in made.tools)
     cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
+    laid_in, laid = design_of(spec).laid_in or 0, inserts(spec)
+    laid = tuple(replace(b, shape=union(placed(b.shape, dims, cell) for cell in lay.cells)) for b in laid)
     tails = sum(len(cell.sides) for cell in lay.cells) if dims.exit else 0
     steps = tuple(
         Step(
@@ -103,6 +107,7 @@ def plan(spec: Spec) -> Plan:
             top=lid.lid_top(dims, i) if made.channels else dims.heights[i],
             channels=made.channels[i] if made.channels else (),
             windows=tails if dims.exit and dims.exit.high < dims.heights[i] else 0,
+            inserts=laid if i + 1 >= laid_in else (),
         )
         for i, layer in enumerate(spec.layers)
     )

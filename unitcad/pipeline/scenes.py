@@ -37,10 +37,15 @@ class Moment:
 def moments(moulds: MouldSet) -> tuple[Moment, ...]:
     """Return casting from the bare base to the unit, in the person's order."""
     plan, found = moulds.plan, []
+    cast_in: tuple[str, ...] = ()
     base = tuple(tool.name for kind in ("base", "stub") for tool in plan.of_kind(kind))
     found.append(Moment("Base, filament flush with the core" if len(base) > 1 else "Base", base))
     for step in plan.steps:
         cured = tuple(f"layer{i}" for i in range(1, step.index))
+        laid = tuple(body.name for body in step.inserts)
+        if laid and not cast_in:
+            found.append(Moment(f"Pour {step.index}: motor and circuit laid in", (*base, *cured, *laid)))
+        cured, cast_in = (*cured, *laid), laid
         cup, tongues = step.cup, tuple(tool.name for tool in plan.standing(step, "tongue"))
         found.append(Moment(f"Pour {step.index}: cup {step.index} on", (*base, *cured, cup)))
         if tongues:
@@ -51,7 +56,7 @@ def moments(moulds: MouldSet) -> tuple[Moment, ...]:
             found.append(Moment(f"Pour {step.index}: cured, tongue out first", (*full, cup)))
         found.append(Moment(f"Pour {step.index}: cup up, layer {step.index} stays", full))
     unit = tuple(body.name for body in moulds.unit)
-    found.append(Moment("The unit: peeled off, motor and circuit in", unit))
+    found.append(Moment("The unit: peeled off" + ("" if cast_in else ", motor and circuit in"), unit))
     return tuple(found)
 
 
@@ -64,6 +69,11 @@ def taken_apart(moulds: MouldSet) -> dict[str, Offset]:
     top = _top(moulds, "base")
     cup_levels = []
     for step in plan.steps:
+        laid = [body.name for body in step.inserts if body.name not in offsets]
+        if laid:
+            lift = top + GAP - min(_extent(moulds, name)[0] for name in laid)
+            offsets |= {name: (0.0, 0.0, lift) for name in laid}
+            top = lift + max(_extent(moulds, name)[1] for name in laid)
         for name in (step.cup, step.name):
             low, high = _extent(moulds, name)
             lift = top + GAP - low
@@ -91,6 +101,9 @@ def unit_apart(moulds: MouldSet) -> dict[str, Offset]:
     others = [name for name in solids if name not in layers and name not in rest]
     inside_out = [*rest, *others, *layers]
     order = [*reversed(layers), *rest, *others] if moulds.design.opens == "above" else inside_out
+    if moulds.design.laid_in:
+        below = moulds.design.laid_in - 1
+        order = [*layers[:below], *rest, *others, *layers[below:]]
     offsets: dict[str, Offset] = {}
     top = 0.0
     for name in order:
@@ -101,11 +114,11 @@ def unit_apart(moulds: MouldSet) -> dict[str, Offset]:
 
 
 def _solids(moulds: MouldSet, name: str) -> list[Manifold]:
-    """The solids of a tool, or of a cast layer in the frame of the tools (one a cell)."""
+    """The solids of a tool, of what is laid in, or of a cast layer in the frame of the tools (one a cell)."""
     for step in moulds.plan.steps:
         if step.name == name:
             return [realise(shape, moulds.segments) for shape in step.layer]
-    return [moulds.mesh(moulds.plan.tool(name))]
+    return [moulds.mesh(body) for body in (*moulds.plan.steps[-1].inserts, *moulds.plan.tools) if body.name == name]
 
 
 def _extent(moulds: MouldSet, name: str) -> tuple[float, float]:
@@ -143,7 +156,7 @@ def step_in_section(moulds: MouldSet, index: int) -> Scene:
     step = moulds.plan.steps[index - 1]
     colours = _colours(moulds)
     y = min(cell.y for cell in moulds.plan.layout.cells)
-    names = (*(n for n in step.tools), *(f"layer{i}" for i in range(1, index + 1)))
+    names = (*step.tools, *(f"layer{i}" for i in range(1, index + 1)), *(body.name for body in step.inserts))
     parts = [_drawn(_far_half(solid, y), colours[name]) for name in names for solid in _solids(moulds, name)]
     return Scene(tuple(p for p in parts if p), (0.18, -1.0, 0.48), (1200, 640))
 
