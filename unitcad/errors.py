@@ -77,6 +77,8 @@ def unknown_key(field: str, value: object, known: Iterable[str], lists: str = ""
 
 def misfit(error: Exception) -> str:
     """Say where data differs from what this program writes, from msgspec's error about it."""
+    # msgspec gives the place in its sentence alone. For what a person types `unitcad.spec.convert` walks the types
+    # instead; here the data is this program's own, and a sentence that reads otherwise only loses its detail.
     what, _, place = str(error).partition(" - at `$")
     if (byte := re.search(r"byte (\d+)", what)) or not re.match("Expected|Object|Invalid", what):
         return f"it is not JSON{f' (byte {byte[1]})' if byte else ''}"

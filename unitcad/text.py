@@ -52,7 +52,10 @@ def toml_key(key: str) -> str:
 
 
 def toml(value: Any) -> str:
-    """Write a value as TOML has it, in one line: tables and lists inline; what TOML lacks as its text."""
+    """Write a value as TOML has it, in one line: tables and lists inline; what TOML lacks as its text.
+
+    tomli-w writes whole files, and lists over several lines.
+    """
     if isinstance(value, dict):
         return f"{{ {', '.join(f'{toml_key(str(k))} = {toml(v)}' for k, v in value.items())} }}" if value else "{}"
     if isinstance(value, list | tuple):

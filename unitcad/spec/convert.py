@@ -12,29 +12,24 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from unitcad.errors import Refusal, unknown_key, unknown_name
-from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, named_in, table_in
+from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, named_in, notes, table_in
 from unitcad.text import invisible, printable, without_invisible
 
 T = TypeVar("T")
-_NAMES = {
-    "float": "a number",
-    "int": "a whole number",
-    "str": "a text",
-    "bool": "true or false",
-    "array": "a list",
-    "object": "a table",
-    "null": "nothing",
+_NAMES: dict[type, str] = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+    list: "a list",
+    dict: "a table",
 }
-_BOUND = re.compile(r"Expected `(?P<kind>\w+)`(?P<length> of length)? (?P<sign>[<>]=) (?P<limit>\S+)")
-_LENGTH = re.compile(r"Expected `array` of length (?P<length>\d+)")
-_KIND = re.compile(r"Expected `(?P<kinds>[^`]+)`")
-_STEP = re.compile(r"\.([^.\[]+)|\[(\d+|\.\.\.)\]")
+"""Kinds of plain data in words, in the order in which a refusal lists them."""
 _HALF_PAIR = re.compile(r"[\ud800-\udfff]")
 """What stands for a byte that is not UTF-8."""
 _MOST_KEYS = 5
 """Keys of a table that a refusal names."""
 _LARGEST_INT = 2**63 - 1
-_SIGNS = {">=": "at least", "<=": "at most"}
 SOURCE = "design_source"
 """The field whose text has lines."""
 DEEPEST = 20
@@ -50,11 +45,8 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
     check_plain(data, field)
     try:
         return msgspec.convert(data, kind)
-    except msgspec.ValidationError as error:
-        if str(error).startswith("Object contains unknown"):
-            raise next(_unknown(data, kind, field)) from None
-        before, _, last = str(error).rpartition(" - at `$")
-        raise _refusal(before or last, last.removesuffix("`") if before else "", data, kind, field) from None
+    except msgspec.ValidationError:
+        raise next(_refusals(data, kind, field)) from None
 
 
 def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
@@ -89,57 +81,83 @@ def _below(field: str, key: object) -> str:
     return f"{field}.{key}" if field else str(key)
 
 
-def _unknown(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
-    """Keys that their tables do not have: found here, since a key in a message may look like anything."""
-    table = table_in(kind)
+def _refusals(node: Any, kind: Any, field: str) -> Iterator[Refusal]:
+    """Yield what is wrong with `node` as a `kind`, in the order of the data.
+
+    msgspec says only by a sentence where and why it refused, so place and limit are looked up in the types again.
+    """
+    if _fits(node, kind):
+        return
+    table, named, entry = table_in(kind), named_in(kind), entry_in(kind)
     if isinstance(node, Mapping) and table:
         fields = fields_of(table)
         for key, below in node.items():
-            place = _below(field, key)
             if key in fields:
-                yield from _unknown(below, fields[key].type, place)
+                yield from _refusals(below, fields[key].type, _below(field, key))
             else:
-                yield unknown_key(place, below, fields, "`unitcad schema`")
-    elif isinstance(node, Mapping):
-        for key, below in node.items():
-            yield from _unknown(below, named_in(kind), _below(field, key))
-    elif isinstance(node, list):
-        for i, below in enumerate(node):
-            yield from _unknown(below, entry_in(kind, i), _below(field, i))
+                yield unknown_key(_below(field, key), below, fields, "`unitcad schema`")
+        missing = (name for name, entry in fields.items() if entry.required and name not in node)
+        yield from (Refusal(_below(field, name), None, "is required") for name in missing)
+        return
+    inside: Iterator[tuple[object, Any, Any]] = iter(())
+    if isinstance(node, Mapping) and named:
+        inside = ((key, below, named) for key, below in node.items())
+    elif isinstance(node, list | tuple) and entry:
+        inside = ((i, below, entry_in(kind, i)) for i, below in enumerate(node) if entry_in(kind, i))
+    for key, below, of in inside:
+        yield from _refusals(below, of, _below(field, key))
+    yield _refusal(node, kind, field)
 
 
-def _refusal(what: str, path: str, data: Any, kind: Any, above: str) -> Refusal:
-    """What msgspec says is wrong at `path` of `data`, in our words."""
-    steps, value, kind = _followed(path, data, kind)
-    field = ".".join([above, *steps] if above else steps)
-    table = table_in(kind)
-    if what.startswith("Object ") and table:
-        fields = fields_of(table)
-        missing = next(name for name, entry in fields.items() if entry.required and name not in value)
-        return Refusal(_below(field, missing), None, "is required")
-    if what.startswith("Invalid enum value"):
-        return unknown_name(field, value, _words(kind))
-    if bound := _BOUND.match(what):
-        limit = float(bound["limit"])
-        limit = int(limit) if bound["kind"] != "float" else limit
-        if bound["length"]:
-            of = "characters" if bound["kind"] == "str" else "entries"
-            empty = bound["sign"] == ">="
-            return Refusal(field, value, _needs(kind) if empty else f"must have at most {limit} {of}")
-        return Refusal(field, value, f"must be {_SIGNS[bound['sign']]} {limit:g}", limit)
-    if length := _LENGTH.match(what):
-        return Refusal(field, value, f"must have {length['length']} entries")
-    if kinds := _KIND.match(what):
-        names = [_name(name, kind) for name in kinds["kinds"].split(" | ") if name != "null"]
+def _refusal(value: Any, kind: Any, field: str) -> Refusal:
+    """Return why a value itself can't be a `kind`: its type, its word, its size or its length."""
+    table, known, words = table_in(kind), _plain_kinds(kind), _words(kind)
+    given = next((plain for plain in (bool, float, str, dict) if isinstance(value, plain)), type(value))
+    if isinstance(value, str) and words:
+        return unknown_name(field, value, words)
+    if not (given in known or (given is int and float in known)):
+        names = [_name(plain, table) for plain in _NAMES if plain in known]
         return Refusal(field, value, f"takes {', or '.join(names) if table else ' or '.join(names)}")
-    return Refusal(field, value, what.lower())
+    if isinstance(value, int | float):
+        return next(_out_of_range(value, kind, field))
+    tuples = [typing.get_args(k) for k in alternatives(kind) if typing.get_origin(k) is tuple]
+    fixed = [len(entries) for entries in tuples if Ellipsis not in entries]
+    most = [note.max_length for note in notes(kind) if note.max_length is not None]
+    if not value and not fixed:
+        return Refusal(field, value, _needs(kind))
+    if most:
+        return Refusal(field, value, f"must have at most {most[0]} {'characters' if given is str else 'entries'}")
+    return Refusal(field, value, f"must have {fixed[0]} entries")
 
 
-def _name(plain: str, kind: Any) -> str:
-    """A kind of plain data in words, with a table's keys: those it requires, else the first ones."""
-    table = table_in(kind)
-    if plain != "object" or not table:
-        return _NAMES.get(plain, plain)
+def _out_of_range(value: float, kind: Any, field: str) -> Iterator[Refusal]:
+    for note in notes(kind):
+        for limit, words, broken in ((note.ge, "at least", float.__lt__), (note.le, "at most", float.__gt__)):
+            if limit is not None and broken(float(value), float(limit)):
+                nearest = limit if float not in _plain_kinds(kind) else float(limit)
+                yield Refusal(field, value, f"must be {words} {limit:g}", nearest)
+
+
+def _plain_kinds(kind: Any) -> set[type]:
+    """Return the kinds of plain data that a `kind` is made from."""
+    found: set[type] = set()
+    for one in alternatives(kind):
+        of = typing.get_origin(one) or one
+        if of is Literal:
+            found |= {type(word) for word in typing.get_args(one)}
+        elif of in (list, tuple):
+            found.add(list)
+        elif of is dict or table_in(one):
+            found.add(dict)
+        elif of in _NAMES:
+            found.add(of)
+    return found
+
+
+def _name(plain: type, table: type[msgspec.Struct] | None) -> str:
+    """Name a kind of plain data, with a table's keys: those it requires, else the first ones."""
+    if plain is not dict or not table:
+        return _NAMES[plain]
     fields = fields_of(table)
     required = [name for name, entry in fields.items() if entry.required]
     optional = [name for name in fields if name not in required][:_MOST_KEYS]
@@ -154,24 +172,6 @@ def _needs(kind: Any) -> str:
     words = f"one or more of {', '.join(_words(entry))}" if entry and _words(entry) else ""
     needed = meaning(kind) or words or ("one entry or more" if entry else "one character or more")
     return f"must not be empty: needs {needed}"
-
-
-def _followed(path: str, node: Any, kind: Any) -> tuple[list[str], Any, Any]:
-    """The steps of a path, what lies there and what should. msgspec names no key of a free table: it is found again."""
-    steps: list[str] = []
-    for name, index in _STEP.findall(path):
-        table = table_in(kind)
-        if index == "...":
-            kind = named_in(kind)
-            step = next(key for key, below in node.items() if not _fits(below, kind))
-        elif index:
-            step, kind = index, entry_in(kind, int(index))
-        else:
-            assert table is not None
-            step, kind = name, fields_of(table)[name].type
-        steps.append(step)
-        node = node[int(step)] if isinstance(node, list | tuple) else node[step]
-    return steps, node, kind
 
 
 def _fits(value: Any, kind: Any) -> bool:
