@@ -12,7 +12,7 @@ from batching import bytes_of, environment, ring_sweep, unitcad
 from test_batch_dask import Cluster
 
 from unitcad.batch.cluster import Certificates
-from unitcad.batch.executors import open_executor
+from unitcad.batch.executors import Workers
 from unitcad.errors import UnitcadError
 
 pytest.importorskip("distributed")
@@ -112,7 +112,7 @@ def test_who_is_not_of_the_authority_is_not_talked_to(encrypted, tmp_path: Path)
 )
 def test_certificates_that_can_not_be_used(address: str | None, files: list[str], said: str, tmp_path: Path) -> None:
     (tmp_path / "text").write_text("no certificate\n")
-    opened = open_executor(None, address, None, Certificates(*(tmp_path / file for file in files)))
+    opened = Workers(None, address, Certificates(*(tmp_path / file for file in files))).executor()
     with pytest.raises(UnitcadError) as error, opened:
         pass
     assert said.format(tmp_path) in str(error.value)

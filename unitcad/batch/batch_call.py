@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from unitcad import notebook
+from unitcad.batch.batch_records import Summary
 from unitcad.batch.estimate_table import write_estimates
-from unitcad.batch.executors import open_executor
-from unitcad.batch.run import BatchOptions, Summary, run, trim
+from unitcad.batch.executors import Workers
+from unitcad.batch.run import BatchOptions, Watch, run
 from unitcad.batch.sweep import Sweep, load_sweep
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.spec.asked import Format
@@ -58,6 +59,20 @@ _MOST_ROWS = 20
 """Variants that a notebook's cell lists."""
 
 
+def make(
+    sweep: Sweep, folder: Path, options: BatchOptions, workers: Workers, watch: Watch = lambda summary, outcome: None
+) -> Summary:
+    """Make a sweep's variants in `folder`: estimates alone as one table in this process, all else by `workers`.
+
+    Raises Refusal or UnitcadError where nothing can be run.
+    """
+    if options.only == ("estimate",):
+        return write_estimates(sweep, folder, options)
+    with workers.executor(options.timeout) as (executor, number):
+        remote = workers.scheduler is not None
+        return run(sweep, folder, options, executor, workers=number, remote=remote, watch=watch)
+
+
 def batch(
     sweep: str | os.PathLike[str] | Sweep,
     out: str | os.PathLike[str] | None = None,
@@ -89,12 +104,7 @@ def batch(
     folder = Path("out") / wanted.slug if out is None else Path(out)
     where = None if cache is None else Path(cache)
     options = BatchOptions(tuple(only), check, keep_going, timeout, limit, where)
-    if options.only == ("estimate",):
-        summary = write_estimates(wanted, folder, options)
-    else:
-        with open_executor(jobs, timeout=timeout) as (executor, workers):
-            summary = run(wanted, folder, options, executor, workers=workers)
-        trim(options)
+    summary = make(wanted, folder, options, Workers(jobs))
     if report:
         from unitcad.report import write_report
 

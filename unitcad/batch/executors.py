@@ -1,9 +1,8 @@
 """Where variants are made, as `concurrent.futures.Executor`: in this process, in worker processes, on a Dask cluster.
 
 ProcessPoolExecutor fails all running tasks when one worker dies. Here only the dead worker's task fails, and the worker
-is replaced. docs/scale.md compares this pool with Pebble's.
-They are started by `python -c`, so neither fork after a kernel has run threads (it hangs) nor a guard in the caller's
-main module is needed.
+is replaced. docs/scale.md compares this pool with Pebble's. Workers are started by `python -c`: a fork after a kernel
+has run threads hangs, and the caller's main module needs no guard.
 """
 
 from __future__ import annotations
@@ -19,11 +18,11 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from dataclasses import dataclass
 from importlib.resources import files
 from typing import IO, Any
 
 from unitcad.batch.cluster import FROM_DASK, Certificates, check_certificates, dask_executor
-from unitcad.batch.frames import receive, send
 from unitcad.errors import Refusal
 
 _START = "import sys; sys.path[:] = {path!r}; from unitcad.batch.worker import serve; serve({preload!r})"
@@ -110,10 +109,10 @@ class ProcessExecutor(Executor):
             if child.poll() is not None and not self._closing:
                 child, log = self._start(slot)
             try:
-                assert child.stdin is not None
-                assert child.stdout is not None
-                send(child.stdin, message)
-                ok, result = pickle.loads(receive(child.stdout))
+                tasks, answers = _pipes(child)
+                pickle.dump(message, tasks)
+                tasks.flush()
+                ok, result = pickle.loads(pickle.load(answers))
             except (OSError, EOFError, pickle.UnpicklingError):
                 future.set_exception(WorkerDied(_cause_of_end(child, log)))
                 continue
@@ -136,51 +135,50 @@ class ProcessExecutor(Executor):
         return child, log
 
 
-@contextlib.contextmanager
-def open_executor(
-    jobs: int | None,
-    scheduler: str | None = None,
-    timeout: float | None = None,
-    certificates: Certificates = FROM_DASK,
-) -> Iterator[tuple[Executor, int]]:
-    """Open an executor; yield it and how many tasks it runs at once.
+@dataclass(frozen=True)
+class Workers:
+    """Where tasks run: on the Dask cluster of `scheduler`, else in `jobs` processes.
 
-    It is Dask's with a `scheduler`, else `jobs` worker processes (one a core by default), with 0 this process. The end
-    of the block ends the workers that were started for it.
-
-    Raises Refusal or UnitcadError for a combination that can't be, or a scheduler that does not answer.
+    None is a process for each core, 0 this process.
     """
-    check_certificates(certificates, scheduler)
-    if scheduler is not None:
-        if jobs is not None:
-            raise Refusal("--jobs", jobs, "the scheduler knows its workers; leave it out with --scheduler")
-        executor, workers = dask_executor(scheduler, certificates)
-        try:
-            yield executor, workers
-        finally:
-            executor.shutdown(wait=False)  # which takes back what is still with the scheduler
-        return
-    if jobs == 0:
-        if timeout is not None:
-            raise Refusal("--timeout", timeout, "only a worker process can be ended in time; with -j from 1 on")
-        yield SerialExecutor(), 1
-        return
-    workers = jobs or _cores()
-    processes = ProcessExecutor(workers)
-    try:
-        yield processes, workers
-    finally:
-        processes.kill()
+
+    jobs: int | None = None
+    scheduler: str | None = None
+    certificates: Certificates = FROM_DASK
+
+    @contextlib.contextmanager
+    def executor(self, timeout: float | None = None) -> Iterator[tuple[Executor, int]]:
+        """Yield an executor and how many tasks it runs at once; the end of the block ends what was started for it.
+
+        Raises Refusal or UnitcadError for a combination that can't be, or a scheduler that does not answer.
+        """
+        check_certificates(self.certificates, self.scheduler)
+        if self.scheduler is not None:
+            if self.jobs is not None:
+                raise Refusal("--jobs", self.jobs, "the scheduler knows its workers; leave it out with --scheduler")
+            cluster, threads = dask_executor(self.scheduler, self.certificates)
+            try:
+                yield cluster, threads
+            finally:
+                cluster.shutdown(wait=False)  # which takes back what is still with the scheduler
+        elif self.jobs == 0:
+            if timeout is not None:
+                raise Refusal("--timeout", timeout, "only a worker process can be ended in time; with -j from 1 on")
+            yield SerialExecutor(), 1
+        else:
+            processes = ProcessExecutor(self.jobs or _cores())
+            try:
+                yield processes, self.jobs or _cores()
+            finally:
+                processes.kill()
 
 
 def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _cause_of_end(child: subprocess.Popen[bytes], log: IO[bytes]) -> str:
-    """Say how a worker ended, in words that are the same in every run."""
+    """Return how a worker ended, in words that are the same in every run."""
     with contextlib.suppress(subprocess.TimeoutExpired):
         child.wait(10)
     code = child.returncode
@@ -192,10 +190,15 @@ def _cause_of_end(child: subprocess.Popen[bytes], log: IO[bytes]) -> str:
     return f"the worker ended (exit code {code})"
 
 
+def _pipes(child: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes]]:
+    assert child.stdin
+    assert child.stdout
+    return child.stdin, child.stdout
+
+
 def _end(child: subprocess.Popen[bytes], log: IO[bytes]) -> None:
-    if child.stdin:
-        with contextlib.suppress(OSError):
-            child.stdin.close()  # the worker reads the end and goes
+    with contextlib.suppress(OSError):
+        _pipes(child)[0].close()  # the worker reads the end and goes
     try:
         child.wait(10)
     except subprocess.TimeoutExpired:
@@ -206,7 +209,6 @@ def _end(child: subprocess.Popen[bytes], log: IO[bytes]) -> None:
 
 
 def _close(child: subprocess.Popen[bytes]) -> None:
-    for pipe in (child.stdin, child.stdout):
-        if pipe:
-            with contextlib.suppress(OSError):
-                pipe.close()
+    for pipe in _pipes(child):
+        with contextlib.suppress(OSError):
+            pipe.close()

@@ -17,7 +17,6 @@ from pathlib import Path
 from unitcad import __version__
 from unitcad.batch import task as tasks
 from unitcad.batch.batch_records import BatchHead, Failure, JournalEntry, Summary
-from unitcad.batch.executors import ProcessExecutor
 from unitcad.batch.journal import JOURNAL, Journal
 from unitcad.batch.remote import Receiver
 from unitcad.batch.results import columns_of, write_results, write_timings
@@ -42,8 +41,10 @@ COLLECT_EVERY = 500
 
 @dataclass(frozen=True)
 class BatchOptions:
-    """Options of a run: `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end;
-    `verify` compares the hashes of finished variants, not only their sizes.
+    """Options of a run.
+
+    `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end; `verify` compares the hashes
+    of finished variants, not only their sizes.
     """
 
     only: Sequence[str] = OUTPUTS
@@ -63,27 +64,24 @@ MOST_FAILURES_TOLD = 20
 def run(
     sweep: Sweep,
     out: Path,
-    options: BatchOptions = BatchOptions(),
-    executor: Executor | None = None,
+    options: BatchOptions,
+    executor: Executor,
     *,
-    workers: int = 2,
+    workers: int,
     remote: bool = False,
     watch: Watch = lambda summary, outcome: None,
 ) -> Summary:
     """Make every variant of `sweep` in `out`, with `variants.csv`, `batch.json`, `timings.json`.
 
-    `executor`, of that many `workers`, is the caller's to shut down; without one, processes are started. With
-    `remote` its workers don't share this disk: results come back as messages. What an earlier run in `out` finished is
-    not made again. Raises UnitcadError where nothing can be run; whatever happens to a variant is in the summary.
+    `executor`, of that many `workers`, is the caller's to shut down. With `remote` its workers don't share this disk:
+    results come back as messages. What an earlier run in `out` finished is not made again. Raises UnitcadError where
+    nothing can be run; whatever happens to a variant is in the summary.
     """
     only = checked_outputs(options.only)
     count = counted(sweep, options.limit)
     head = batch_head(sweep, only, options)
     store = DiskStore(options.cache or default_root())
     journal = Journal(out, head)
-    own = None
-    if executor is None:
-        executor = own = ProcessExecutor(workers)
     batch = _Batch(sweep, out, only, options, executor, workers, remote, watch, journal, store, Summary(count))
     if journal.damaged:
         batch.summary.warnings.append(
@@ -106,13 +104,11 @@ def run(
     finally:
         journal.close()
         store.close()
-        if own:
-            own.kill()
-            trim(options)
+        _trim(options)
     return summary
 
 
-def trim(options: BatchOptions) -> None:
+def _trim(options: BatchOptions) -> None:
     """Reduce the cache to its limit. A cache that was deleted meanwhile is no error."""
     with contextlib.suppress(UnitcadError, OSError):
         collect(options.cache or default_root(), int(options.cache_mb * 1e6))
@@ -280,7 +276,7 @@ class _Batch:
         self.made.add(_short(key))
         self.summary.geometries = len(self.made)
         if len(self.made) % COLLECT_EVERY == 0:
-            trim(self.options)
+            _trim(self.options)
 
     def _lost(self, task: Task, error: BaseException) -> None:
         """Handle a task whose worker ended: each of its variants is tried alone, to see which one ended it."""

@@ -1,4 +1,7 @@
-"""A worker process: reads tasks from standard input, answers on standard output, ends when its parent does."""
+"""A worker process: reads tasks from standard input, answers on standard output, ends when its parent does.
+
+A message is the pickle of bytes, and these of a task or an answer: one that can't be unpickled is read whole.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,6 @@ import signal
 import threading
 from typing import IO
 
-from unitcad.batch.frames import receive, send
 from unitcad.children import end_with_parent
 
 
@@ -39,7 +41,8 @@ def serve(preload: tuple[str, ...]) -> None:
         except Exception:
             packed = pickle.dumps((False, RuntimeError(f"{type(answer[1]).__name__}: {answer[1]}")))
         try:
-            send(answers, packed)
+            pickle.dump(packed, answers)
+            answers.flush()
         except OSError:
             os._exit(0)
 
@@ -48,6 +51,6 @@ def _read(tasks: IO[bytes], coming: queue.SimpleQueue[bytes]) -> None:
     """Pass on every message; end this process when the parent has ended, whatever it is doing."""
     while True:
         try:
-            coming.put(receive(tasks))
-        except EOFError:
+            coming.put(pickle.load(tasks))
+        except (EOFError, pickle.UnpicklingError):
             os._exit(0)

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from unitcad.cli.options import AsJson
+
 
 def accuracy(
     suites: Annotated[list[str] | None, typer.Argument(metavar="SUITE", help="Which suites; else all.")] = None,
@@ -24,7 +26,7 @@ def accuracy(
         Path | None,
         typer.Option("-o", "--out", help="Where accuracy.md and accuracy.json go: docs; nowhere if quick."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Compute the tables of error against run time. Exit 1 when an error exceeds its promise.
 

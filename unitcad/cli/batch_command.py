@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from unitcad.cli.code import AllowCode, allow_code
+from unitcad.cli.options import AllowCode, AsJson, Formats, NoCheck, Only, Page, Sets, allow_code, outputs, overrides
 from unitcad.cli.output import warn
 
 if TYPE_CHECKING:
@@ -55,58 +55,43 @@ def batch(
     cache_limit: Annotated[
         float, typer.Option(metavar="MB", min=0, max=1e12, help="What the cache keeps at the end.")
     ] = 4096,
-    sets: Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="For every variant.")] = None,
-    formats: Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb; else the specs'.")] = None,
-    only: Annotated[
-        str | None, typer.Option(help="unit,moulds,estimate,casting; else all. estimate alone makes a table only.")
-    ] = None,
-    page: Annotated[
-        bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")
-    ] = False,
-    no_check: Annotated[
-        bool, typer.Option("--no-check", help="Leave out the mould checks and the mesh checks.")
-    ] = False,
+    sets: Sets = None,
+    formats: Formats = None,
+    only: Only = None,
+    page: Page = False,
+    no_check: NoCheck = False,
     code: AllowCode = False,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    as_json: AsJson = False,
     json_lines: Annotated[bool, typer.Option("--json-lines", help="One JSON object a line as variants end.")] = False,
 ) -> None:
     """Make every variant of a sweep, each distinct part once. The last line printed is the folder."""
     from msgspec import to_builtins
 
-    from unitcad.batch import BatchOptions, load_sweep, run
+    from unitcad.batch import BatchOptions, load_sweep
+    from unitcad.batch.batch_call import make
     from unitcad.batch.cluster import Certificates
-    from unitcad.batch.estimate_table import write_estimates
-    from unitcad.batch.executors import open_executor
+    from unitcad.batch.executors import Workers
     from unitcad.batch.preview import preview
-    from unitcad.batch.run import trim
     from unitcad.cli.batch_progress import watching
-    from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json
     from unitcad.errors import Refusal
-    from unitcad.pipeline.artifacts import OUTPUTS
     from unitcad.pipeline.folder import PAGE
 
-    chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
-    wanted = load_sweep(sweep).overridden([*(sets or []), *chosen_formats(formats)])
+    chosen = outputs(only)
+    wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
     options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify)
     if dry_run:
         size = preview(wanted, options)
         print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)
         return
+    if chosen == ("estimate",) and scheduler is not None:
+        raise Refusal("--scheduler", scheduler, "estimates alone are computed in this process: leave it out")
     folder = out or Path("out") / wanted.slug
+    workers = Workers(jobs, scheduler, Certificates(tls_ca_file, tls_cert, tls_key))
     try:
-        if chosen == ("estimate",):
-            if scheduler is not None:
-                raise Refusal("--scheduler", scheduler, "estimates alone are computed in this process: leave it out")
-            summary = write_estimates(wanted, folder, options)
-        else:
-            certificates = Certificates(tls_ca_file, tls_cert, tls_key)
-            opened = open_executor(jobs, scheduler, timeout, certificates)
-            with opened as (executor, workers), watching(json_lines) as watch:
-                remote = scheduler is not None
-                summary = run(wanted, folder, options, executor, workers=workers, remote=remote, watch=watch)
-            trim(options)
+        with watching(json_lines) as watch:
+            summary = make(wanted, folder, options, workers, watch)
     except KeyboardInterrupt:
         typer.echo(f"interrupted: finished variants stay in {folder}; the same command resumes", err=True)
         sys.exit(130)

@@ -4,49 +4,42 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from unitcad.cli.code import AllowCode, allow_code
+from unitcad.cli.options import AllowCode, AsJson, Formats, NoCheck, Only, Page, Sets, allow_code, outputs, overrides
 from unitcad.cli.output import warn
 
-Specs = Annotated[list[str], typer.Argument(metavar="SPEC", help="A spec file, or the name of a template.")]
-Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the spec.")]
+if TYPE_CHECKING:
+    from unitcad.pipeline.manifest_records import Manifest
 
 
 def build(
-    specs: Specs,
+    specs: Annotated[list[str], typer.Argument(metavar="SPEC", help="A spec file, or the name of a template.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Where the result's folder goes.")] = Path("out"),
     sets: Sets = None,
-    formats: Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb; else the spec's.")] = None,
-    only: Annotated[str | None, typer.Option(help="unit,moulds,estimate,casting; else all.")] = None,
-    page: Annotated[
-        bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")
-    ] = False,
-    no_check: Annotated[
-        bool, typer.Option("--no-check", help="Leave out the mould checks and the mesh checks.")
-    ] = False,
+    formats: Formats = None,
+    only: Only = None,
+    page: Page = False,
+    no_check: NoCheck = False,
     no_slice: Annotated[
         bool, typer.Option("--no-slice", help="Leave out PrusaSlicer's print time and filament (slicer.json).")
     ] = False,
     code: AllowCode = False,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Make a unit and its casting moulds. The last line printed is the folder."""
-    from unitcad.cli.formats import chosen_formats
     from unitcad.cli.output import print_json, progress
-    from unitcad.pipeline.artifacts import OUTPUTS
     from unitcad.pipeline.build import build as run
     from unitcad.pipeline.folder import PAGE, held
     from unitcad.pipeline.slicing import slice_tools
     from unitcad.validation import load
 
-    overrides = [*(sets or []), *chosen_formats(formats)]
-    chosen = OUTPUTS if only is None else tuple(name.strip() for name in only.split(",") if name.strip())
+    changes, chosen = overrides(sets, formats), outputs(only)
     allow_code(code)
     # Every spec is validated before the first one is built.
-    wanted = [load(spec, overrides) for spec in specs]
+    wanted = [load(spec, changes) for spec in specs]
     results, printing = [], []
     sliced = only is None and not no_slice
     for spec in wanted:
@@ -71,8 +64,8 @@ def build(
         sys.exit(1)
 
 
-def _print_result(manifest: dict) -> None:
-    """Print what a person should know of a result: warnings, broken mould checks, bad files."""
+def _print_result(manifest: Manifest) -> None:
+    """Print warnings, failed mould checks, and findings in files."""
     for warning in manifest["warnings"]:
         warn(f"warning: {warning}")
     for entry in manifest["left_out"]:
@@ -86,5 +79,7 @@ def _print_result(manifest: dict) -> None:
     for finding in manifest["check"]["findings"]:
         typer.echo(f"{finding['path']}: {finding['code']} {finding['message']}", err=True)
     if checks:
-        held = sum(check["ok"] for check in checks)
-        typer.echo(f"{manifest['name']}: {len(manifest['parts'])} bodies, {held} of {len(checks)} mould checks hold")
+        passed = sum(check["ok"] for check in checks)
+        typer.echo(
+            f"{manifest['name']}: {len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed"
+        )

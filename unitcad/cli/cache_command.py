@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
+from unitcad.cli.options import AsJson
+
 cache = typer.Typer(help="The cache of distinct parts.", no_args_is_help=True)
 Where = Annotated[Path | None, typer.Option("--cache", help="The cache's folder; else the user's.")]
-Json = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
 
 
 @cache.command("ls")
-def ls(where: Where = None, as_json: Json = False) -> None:
+def ls(where: Where = None, as_json: AsJson = False) -> None:
     """Print what the cache holds. The last line printed is its folder."""
     from unitcad.cache import default_root, usage
 
@@ -26,7 +27,7 @@ def ls(where: Where = None, as_json: Json = False) -> None:
 def gc(
     where: Where = None,
     limit: Annotated[float, typer.Option(metavar="MB", min=0, max=1e12, help="What may stay; 0 empties it.")] = 4096,
-    as_json: Json = False,
+    as_json: AsJson = False,
 ) -> None:
     """Remove what was used longest ago, down to a size. Results keep their files: they are links."""
     from unitcad.cache import collect, default_root

@@ -7,13 +7,15 @@ from typing import Annotated
 
 import typer
 
+from unitcad.cli.options import AsJson
+
 
 def coupon(
     printer: Annotated[
         str, typer.Argument(metavar="PRINTER", help="A printer of the catalogue (unitcad list printers).")
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Where the coupon's folder goes.")] = Path("out"),
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write a fit coupon to print first, and how to read it. The last line printed is the folder."""
     from unitcad import catalogue

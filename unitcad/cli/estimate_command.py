@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from unitcad.cli.options import AsJson, Sets
 from unitcad.cli.output import print_json, warn
 from unitcad.errors import Refusal, unknown_name
 
@@ -24,10 +25,8 @@ def estimate(
     frequency: Annotated[
         str, typer.Option(metavar="HZ|FROM:TO:STEP", help="one frequency, or a table over frequencies")
     ] = "",
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="override a value of the spec")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on standard output")] = False,
+    sets: Sets = None,
+    as_json: AsJson = False,
 ) -> None:
     """Estimate the vibration at the unit's edge.
 
@@ -42,7 +41,7 @@ def estimate(
         raise unknown_name("--model", model, (*MODELS, "all"))
     models = None if not model else MODELS if model == "all" else (model,)
     hertz = frequencies(frequency) if frequency else []
-    loaded = [load(name, set_ or []) for name in specs]
+    loaded = [load(name, sets or []) for name in specs]
     for spec in loaded:
         _warn_of_moulds(spec)
     if ":" in frequency:

@@ -8,13 +8,15 @@ from typing import Annotated
 
 import typer
 
+from unitcad.cli.options import AsJson
+
 
 def init(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Of the variant and of the file, NAME.toml.")],
     template: Annotated[
         str | None, typer.Option(help="What to start from: see `unitcad list templates`; else the default design's.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write a commented spec to start from. The last line printed is the file."""
     from unitcad.cli.output import print_json

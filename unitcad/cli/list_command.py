@@ -6,12 +6,14 @@ from typing import Annotated, Any
 
 import typer
 
+from unitcad.cli.options import AsJson
+
 KINDS = ("templates", "designs", "materials", "motors", "printers", "rules")
 
 
 def list_(
     kind: Annotated[str, typer.Argument(help=f"{', '.join(KINDS)}; none: these.", metavar="[KIND]")] = "",
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """List what is shipped, each value with its source and status."""
     from unitcad.cli.output import print_json

@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.code import AllowCode, allow_code
+from unitcad.cli.options import AllowCode, AsJson, allow_code
 
 
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A variant's folder, or one that holds variants.")],
     code: AllowCode = False,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write one offline page for what a folder holds. The last line printed is the page."""
     from unitcad.cli.output import print_json, progress, warn

@@ -1,0 +1,53 @@
+"""Options that several commands share, and what they mean."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
+Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the spec.")]
+Formats = Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb; else the spec's.")]
+Only = Annotated[
+    str | None, typer.Option(help="unit,moulds,estimate,casting; else all. In a batch estimate alone makes a table.")
+]
+Page = Annotated[bool, typer.Option("--report", help="Write report.html, one offline page, into the folder.")]
+NoCheck = Annotated[bool, typer.Option("--no-check", help="Leave out the mould checks and the mesh checks.")]
+AllowCode = Annotated[
+    bool, typer.Option("--allow-code", help="Run Python code that came with a spec (design_source), not from a file.")
+]
+
+
+def overrides(sets: list[str] | None, formats: str | None) -> list[str]:
+    """Return what --set and --formats override in a spec. Raises Refusal for an unknown format."""
+    from unitcad.errors import unknown_name
+    from unitcad.pipeline.artifacts import FORMATS
+
+    names = listed(formats)
+    for name in names or ():
+        if name not in FORMATS:
+            raise unknown_name("--formats", name, FORMATS)
+    return [*(sets or ()), *([] if formats is None else [f"output.formats={names}"])]
+
+
+def outputs(only: str | None) -> tuple[str, ...]:
+    """Return what --only asks for; all without it."""
+    from unitcad.pipeline.artifacts import OUTPUTS
+
+    return OUTPUTS if only is None else tuple(name for name in listed(only) if name)
+
+
+def listed(text: str | None) -> list[str]:
+    """Return the parts of a comma-separated list."""
+    return [] if text is None else [part.strip() for part in text.split(",")]
+
+
+def allow_code(wanted: bool, nothing_else: bool = False) -> None:
+    """Let this process run the code inside a spec; with `nothing_else`, no design's code at all."""
+    from unitcad.spec import custom_code
+
+    if wanted:
+        custom_code.allow({custom_code.ANY})
+    elif nothing_else:
+        custom_code.allow_nothing()
