@@ -112,7 +112,7 @@ def test_the_slider_goes_through_the_casting(visit: Visit) -> None:
     tools = [tool.name for tool in Variant.of("encapsulating").plan.tools]
     assert sorted(shown(visit)) == sorted([*tools, "layer1", "layer2"])
     pictures = [canvas(visit)]
-    expected = moments(Variant.of("encapsulating"))
+    expected = list(moments(Variant.of("encapsulating")))
     for i, moment in enumerate(expected, start=1):
         visit.page.fill('input[name="step"]', str(i))
         assert shown(visit) == list(moment.parts)

@@ -20,7 +20,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import artifacts
 from unitcad.pipeline.artifacts import GEOMETRIC, geometry_key
 from unitcad.pipeline.bodies import body_key, groups, record
-from unitcad.pipeline.manifest_records import BodyFile, MeshFindings, PartRecord, PourRecord
+from unitcad.pipeline.manifest_records import BodyFile, MeshFinding, MeshFindings, PartRecord, PourRecord
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.spec import Spec, printer_of
@@ -41,7 +41,7 @@ class Geometry(TypedDict):
     steps: list[PourRecord]
     laws: list[FindingRecord]
     strains: list[dict[str, Any]]
-    check: list[dict[str, Any]]
+    check: list[MeshFinding]
     files: dict[str, str]
 
 
@@ -126,7 +126,7 @@ def _mould_findings(
     return [], []
 
 
-def _mesh_findings(moulds: MouldSet, parts: dict[str, PartRecord], store: Store) -> list[dict[str, Any]]:
+def _mesh_findings(moulds: MouldSet, parts: dict[str, PartRecord], store: Store) -> list[MeshFinding]:
     """Return what the mesh rules find in every mesh file."""
     files = {
         file["path"]: (file["sha256"], part["role"])
@@ -135,7 +135,7 @@ def _mesh_findings(moulds: MouldSet, parts: dict[str, PartRecord], store: Store)
         if form in MESH_FORMATS
     }
     return [
-        {"path": path, **finding}
+        MeshFinding(path=path, **finding)
         for path, (sha256, role) in files.items()
         for finding in _findings_in(moulds, path, sha256, role, store)
     ]
@@ -179,7 +179,7 @@ def _build_key(moulds: MouldSet, *more: object) -> str:
     return digest(repr((moulds.geometry, formats, more, code_version(), versions, epoch)).encode())
 
 
-def mesh_findings(findings: list[dict[str, Any]]) -> MeshFindings:
+def mesh_findings(findings: list[MeshFinding]) -> MeshFindings:
     """Return the findings of mesh rules with their number by severity."""
     count = Counter(finding["severity"] for finding in findings)
     return {"errors": count["error"], "warnings": count["warning"], "findings": findings}

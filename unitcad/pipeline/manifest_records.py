@@ -39,12 +39,36 @@ class PourRecord(TypedDict):
     layer_volume_mm3: float
 
 
+class MeshFinding(TypedDict):
+    """A finding of a mesh rule in the file `path`; it has the other keys of a finding of `unitcad check` too."""
+
+    path: str
+    code: str
+    severity: str
+    message: str
+
+
 class MeshFindings(TypedDict):
-    """The findings of the mesh rules, but for information; each names its file by `path`."""
+    """The findings of the mesh rules, but for information."""
 
     errors: int
     warnings: int
-    findings: list[dict[str, Any]]
+    findings: list[MeshFinding]
+
+
+class ModelLevel(TypedDict):
+    """A model's level at the edge, None where it gives no number, and its mean error against the measured levels."""
+
+    edge: float | None
+    table_error: float | None
+
+
+class EstimateSummary(TypedDict):
+    """The estimate in short; `measured` is the paper's level of this unit, None where there is none."""
+
+    models: dict[str, ModelLevel]
+    measured: float | None
+    frequency_hz: float | None
 
 
 class LeftOut(TypedDict):
@@ -76,7 +100,7 @@ class Manifest(TypedDict):
     parts: list[PartRecord]
     steps: list[PourRecord]
     laws: list[FindingRecord]
-    estimate: dict[str, Any] | None
+    estimate: EstimateSummary | None
     check: MeshFindings
     pictures: list[str]
     casting: list[str] | None

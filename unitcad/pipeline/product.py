@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from unitcad import __version__, files
 from unitcad.cache import Store, digest
@@ -20,7 +19,7 @@ from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.geometry import Geometry, geometry, mesh_findings, pictures
 from unitcad.pipeline.json_text import json_bytes
-from unitcad.pipeline.manifest_records import LeftOut, ListedFile, Manifest, PartRecord
+from unitcad.pipeline.manifest_records import EstimateSummary, LeftOut, ListedFile, Manifest, PartRecord
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import kernel_versions
 from unitcad.spec import Spec
@@ -132,10 +131,10 @@ def _mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
     return sorted([*shape["laws"], *(each.as_dict() for each in strained)], key=lambda finding: finding["code"])
 
 
-def _estimate(moulds: MouldSet, store: Store) -> dict[str, Any]:
+def _estimate(moulds: MouldSet, store: Store) -> EstimateSummary:
     from unitcad.attenuation.edge.estimates import summary
 
-    return summary(artifacts.estimated(moulds, store))
+    return EstimateSummary(**summary(artifacts.estimated(moulds, store)))
 
 
 def _material(spec: Spec, part: PartRecord) -> str | None:

@@ -1,8 +1,8 @@
-"""What is shown of a variant: which parts stand together, where they go when taken apart, where they are cut."""
+"""The scenes of a variant: which parts stand together, where they go when taken apart, where they are cut."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unitcad.export.picture import Drawn, Scene
-from unitcad.kernels.mesh import arrays, bounds, realise
+from unitcad.kernels.mesh import arrays, bounds
 from unitcad.text import spaced
 
 if TYPE_CHECKING:
@@ -28,106 +28,98 @@ Offset = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Moment:
-    """One moment of casting: what a person sees on the bench. `parts` are names of tools and of cured layers."""
+    """One moment of casting, as on the bench; `parts` are names of tools and of cured layers."""
 
     title: str
     parts: tuple[str, ...]
 
 
-def moments(moulds: MouldSet) -> tuple[Moment, ...]:
-    """Return casting from the bare base to the unit, in the person's order."""
-    plan, found = moulds.plan, []
-    cast_in: tuple[str, ...] = ()
+def moments(moulds: MouldSet) -> Iterator[Moment]:
+    """Yield casting from the bare base to the unit, in the person's order."""
+    plan = moulds.plan
     base = tuple(tool.name for kind in ("base", "stub") for tool in plan.of_kind(kind))
-    found.append(Moment("Base, filament flush with the core" if len(base) > 1 else "Base", base))
+    yield Moment("Base, filament flush with the core" if len(base) > 1 else "Base", base)
+    inserts: tuple[str, ...] = ()
     for step in plan.steps:
-        cured = tuple(f"layer{i}" for i in range(1, step.index))
-        laid = tuple(body.name for body in step.inserts)
-        if laid and not cast_in:
-            found.append(Moment(f"Pour {step.index}: motor and circuit laid in", (*base, *cured, *laid)))
-        cured, cast_in = (*cured, *laid), laid
-        cup, tongues = step.cup, tuple(tool.name for tool in plan.standing(step, "tongue"))
-        found.append(Moment(f"Pour {step.index}: cup {step.index} on", (*base, *cured, cup)))
+        pour, cup = f"Pour {step.index}", step.cup
+        before, inserts = inserts, tuple(body.name for body in step.inserts)
+        cured = (*base, *(f"layer{i}" for i in range(1, step.index)), *inserts)
+        tongues = tuple(tool.name for tool in plan.standing(step, "tongue"))
+        if inserts and not before:
+            yield Moment(f"{pour}: motor and circuit laid in", cured)
+        yield Moment(f"{pour}: cup {step.index} on", (*cured, cup))
         if tongues:
-            found.append(Moment(f"Pour {step.index}: tongue in, to the ledge", (*base, *cured, cup, *tongues)))
-        full = (*base, *cured, step.name)
-        found.append(Moment(f"Pour {step.index}: layer {step.index} poured, struck off", (*full, cup, *tongues)))
+            yield Moment(f"{pour}: tongue in, to the ledge", (*cured, cup, *tongues))
+        yield Moment(f"{pour}: layer {step.index} poured, struck off", (*cured, step.name, cup, *tongues))
         if tongues:
-            found.append(Moment(f"Pour {step.index}: cured, tongue out first", (*full, cup)))
-        found.append(Moment(f"Pour {step.index}: cup up, layer {step.index} stays", full))
+            yield Moment(f"{pour}: cured, tongue out first", (*cured, step.name, cup))
+        yield Moment(f"{pour}: cup up, layer {step.index} stays", (*cured, step.name))
     unit = tuple(body.name for body in moulds.unit)
-    found.append(Moment("The unit: peeled off" + ("" if cast_in else ", motor and circuit in"), unit))
-    return tuple(found)
+    yield Moment("The unit: peeled off" + ("" if inserts else ", motor and circuit in"), unit)
 
 
 def taken_apart(moulds: MouldSet) -> dict[str, Offset]:
-    """How far each tool and each cast layer moves (mm) when the set is shown exploded: up the axis in casting order,
-    a tongue out of its window, a filament stub down.
+    """Return how far each tool and each cast layer moves (mm) when the set is shown exploded.
+
+    Up the axis in casting order; a tongue out of its window, a filament stub down.
     """
     plan = moulds.plan
+    bottom, top = _extent(moulds, ["base"])
     offsets: dict[str, Offset] = {"base": (0.0, 0.0, 0.0)}
-    top = _top(moulds, "base")
-    cup_levels = []
+
+    def lift(*names: str) -> None:
+        nonlocal top
+        low, high = _extent(moulds, names)
+        offsets.update((name, (0.0, 0.0, top + GAP - low)) for name in names)
+        top += GAP + high - low
+
     for step in plan.steps:
-        laid = [body.name for body in step.inserts if body.name not in offsets]
-        if laid:
-            lift = top + GAP - min(_extent(moulds, name)[0] for name in laid)
-            offsets |= {name: (0.0, 0.0, lift) for name in laid}
-            top = lift + max(_extent(moulds, name)[1] for name in laid)
-        for name in (step.cup, step.name):
-            low, high = _extent(moulds, name)
-            lift = top + GAP - low
-            offsets[name] = (0.0, 0.0, lift)
-            top = high + lift
-            if name == step.cup:
-                cup_levels.append(lift)
+        inserts = [body.name for body in step.inserts if body.name not in offsets]
+        if inserts:
+            lift(*inserts)
+        lift(step.cup)
+        lift(step.name)
     for tool in plan.tools:
         if tool.kind == "tongue" and tool.removal:
-            offsets[tool.name] = (tool.removal[0] * ASIDE, 0.0, cup_levels[0])
+            offsets[tool.name] = (tool.removal[0] * ASIDE, 0.0, offsets[plan.steps[0].cup][2])
         elif tool.kind == "stub":
-            _, high = _extent(moulds, tool.name)
-            offsets[tool.name] = (0.0, 0.0, _extent(moulds, "base")[0] - GAP - high)
+            offsets[tool.name] = (0.0, 0.0, bottom - GAP - _extent(moulds, [tool.name])[1])
         elif tool.name not in offsets:
-            offsets[tool.name] = (0.0, 0.0, top + GAP - _extent(moulds, tool.name)[0])
-            top += GAP + _extent(moulds, tool.name)[1] - _extent(moulds, tool.name)[0]
+            lift(tool.name)
     return offsets
 
 
 def unit_apart(moulds: MouldSet) -> dict[str, Offset]:
-    """The same for the unit's bodies: what goes in first stays below."""
-    solids = {body.name: moulds.mesh(body) for body in moulds.unit}
-    layers = [body.name for body in sorted(moulds.unit, key=lambda body: body.step or 0) if body.kind == "layer"]
-    rest = [body.name for kind in ("motor", "circuit") for body in moulds.unit if body.kind == kind]
-    others = [name for name in solids if name not in layers and name not in rest]
-    inside_out = [*rest, *others, *layers]
-    order = [*reversed(layers), *rest, *others] if moulds.design.opens == "above" else inside_out
-    if moulds.design.laid_in:
-        below = moulds.design.laid_in - 1
-        order = [*layers[:below], *rest, *others, *layers[below:]]
+    """Return the same for the unit's bodies: what goes in first stays below."""
+    layers = [body for body in sorted(moulds.unit, key=lambda body: body.step or 0) if body.kind == "layer"]
+    inside = [body for kind in ("motor", "circuit") for body in moulds.unit if body.kind == kind]
+    inside += [body for body in moulds.unit if body not in layers and body not in inside]
+    below = moulds.design.laid_in - 1 if moulds.design.laid_in else 0
+    order = [*layers[:below], *inside, *layers[below:]]
+    if moulds.design.opens == "above" and not moulds.design.laid_in:
+        order = [*reversed(layers), *inside]
     offsets: dict[str, Offset] = {}
     top = 0.0
-    for name in order:
-        _, _, low, _, _, high = bounds(solids[name])
-        offsets[name] = (0.0, 0.0, max(0.0, top - low))
-        top = high + offsets[name][2] + GAP / 2
+    for body in order:
+        _, _, low, _, _, high = bounds(moulds.mesh(body))
+        lift = max(0.0, top - low)
+        offsets[body.name] = (0.0, 0.0, lift)
+        top = high + lift + GAP / 2
     return offsets
 
 
 def _solids(moulds: MouldSet, name: str) -> list[Manifold]:
-    """The solids of a tool, of what is laid in, or of a cast layer in the frame of the tools (one a cell)."""
+    """Return the solids of a tool, of what is laid in, or of a cast layer in the frame of the tools (one a cell)."""
     for step in moulds.plan.steps:
         if step.name == name:
-            return [realise(shape, moulds.segments) for shape in step.layer]
+            return moulds.meshes(step.layer)
     return [moulds.mesh(body) for body in (*moulds.plan.steps[-1].inserts, *moulds.plan.tools) if body.name == name]
 
 
-def _extent(moulds: MouldSet, name: str) -> tuple[float, float]:
-    boxes = [bounds(solid) for solid in _solids(moulds, name)]
+def _extent(moulds: MouldSet, names: Iterable[str]) -> tuple[float, float]:
+    """Return the least and the largest z of tools or cast layers, mm."""
+    boxes = [bounds(solid) for name in names for solid in _solids(moulds, name)]
     return min(b[2] for b in boxes), max(b[5] for b in boxes)
-
-
-def _top(moulds: MouldSet, name: str) -> float:
-    return _extent(moulds, name)[1]
 
 
 def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict[str, Callable[[], Scene]]:
@@ -146,13 +138,13 @@ def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict
 
 
 def unit_cut_open(moulds: MouldSet) -> Scene:
-    """The unit, its nearer half taken away, seen from a little below: the skin's side is the open one."""
+    """Show the unit without its nearer half, seen from a little below: the skin's side is the open one."""
     parts = [_drawn(_far_half(moulds.mesh(body)), body.colour) for body in moulds.unit]
     return Scene(tuple(p for p in parts if p), (0.45, -1.0, -0.38), (1200, 640))
 
 
 def step_in_section(moulds: MouldSet, index: int) -> Scene:
-    """Pour `index` as it stands when struck off, cut through the first row of cells."""
+    """Show pour `index` as it stands when struck off, cut through the first row of cells."""
     step = moulds.plan.steps[index - 1]
     colours = _colours(moulds)
     y = min(cell.y for cell in moulds.plan.layout.cells)
@@ -162,7 +154,7 @@ def step_in_section(moulds: MouldSet, index: int) -> Scene:
 
 
 def exploded(moulds: MouldSet) -> Scene:
-    """The whole set taken apart, with names."""
+    """Show the whole set taken apart, with names."""
     colours, offsets = _colours(moulds), taken_apart(moulds)
     groups = [[tool.name for tool in moulds.plan.of_kind(kind)] for kind in ("tongue", "stub")]
     numbered = [name for group in groups if len(group) > 1 for name in group]
@@ -180,7 +172,7 @@ def _colours(moulds: MouldSet) -> Mapping[str, tuple[float, float, float]]:
 
 
 def _far_half(solid: Manifold, y: float = 0.0) -> Manifold:
-    """What lies beyond the plane y. A hair off it: a section exactly in a parting plane shows false triangles."""
+    """Return what lies beyond the plane y, slightly off it: a section in a parting plane shows false triangles."""
     return solid.trim_by_plane((0, 1, 0), y + 1 / 512)
 
 

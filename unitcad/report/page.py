@@ -70,7 +70,7 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
     if read_results.is_variant(folder):
         record, spec = read_results.read_variant(folder, folder)
         records, specs, table, batch = [record], [spec], None, None
-        title = str(record.manifest.get("name") or folder.resolve().name)
+        title = record.manifest["name"] or folder.resolve().name
     else:
         records, specs, batch = [], [], None
         folders = read_results.variant_folders(folder)

@@ -16,7 +16,8 @@ from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.files import TEMPORARY
 from unitcad.pipeline.folder import PAGE
-from unitcad.report.records import BatchFile, Manifest, ResultsTable, VariantRecord, expect
+from unitcad.pipeline.manifest_records import Manifest
+from unitcad.report.records import BatchFile, ResultsTable, VariantRecord, expect
 from unitcad.report.viewer_models import model_key, spec_in
 from unitcad.spec import Spec, to_data
 
@@ -169,18 +170,19 @@ def read_batch(folder: Path) -> dict[str, Any] | None:
 def _row(record: VariantRecord) -> dict[str, Any]:
     """Return a variant's columns in the table of a folder without batch.json."""
     manifest, spec = record.manifest, record.spec or {}
-    row: dict[str, Any] = {"name": manifest.get("name"), "design": manifest.get("design")}
-    row["diameter_mm"] = spec.get("diameter_mm")
+    row: dict[str, Any] = {
+        "name": manifest["name"],
+        "design": manifest["design"],
+        "diameter_mm": spec.get("diameter_mm"),
+    }
     for i, layer in enumerate(spec.get("layers", [])):
         row |= {f"layers.{i}.{key}": value for key, value in layer.items()}
-    for part in manifest.get("parts", []):
-        if part.get("made") == "cast":
-            row[f"{part['name']}_mm3"] = part.get("volume_mm3")
-    for model, level in ((manifest.get("estimate") or {}).get("models") or {}).items():
-        row[f"edge_{model}"] = level.get("edge")
-    checks = manifest.get("laws", [])
+    row |= {f"{part['name']}_mm3": part["volume_mm3"] for part in manifest["parts"] if part["made"] == "cast"}
+    for model, level in (manifest["estimate"] or {"models": {}})["models"].items():
+        row[f"edge_{model}"] = level["edge"]
+    checks = manifest["laws"]
     row["laws"] = ("hold" if all(check["ok"] for check in checks) else "broken") if checks else None
-    row["warnings"] = len(manifest.get("warnings", []))
+    row["warnings"] = len(manifest["warnings"])
     return row
 
 

@@ -9,80 +9,11 @@ import msgspec
 from msgspec import UNSET, Struct, UnsetType, structs
 
 from unitcad.errors import UnitcadError, misfit
+from unitcad.pipeline.manifest_records import Manifest
 from unitcad.report.pool import REFERENCE
 
 DEEPEST = 40
 """Nesting of lists and tables that a result's file may have."""
-
-
-class ListedCheck(Struct):
-    """A mould check, passed or broken."""
-
-    code: str
-    ok: bool
-    where: str = ""
-
-
-class ListedFinding(Struct):
-    """A finding in a file."""
-
-    code: str
-    severity: str
-    path: str = ""
-    message: str = ""
-
-
-class Checked(Struct):
-    """Result of the mesh check."""
-
-    errors: int
-    findings: list[ListedFinding] = []
-
-
-class ListedPart(Struct):
-    """A body."""
-
-    name: str
-    role: str = ""
-    made: str | None = None
-    material: str | None = None
-    volume_mm3: float | None = None
-    bbox_mm: list[float] = []
-
-
-class LeftOut(Struct):
-    """An output that a build left out."""
-
-    what: str
-    why: str
-
-
-class Level(Struct):
-    """A model's level at the edge."""
-
-    edge: float | None = None
-
-
-class Levels(Struct):
-    """The estimate's summary."""
-
-    models: dict[str, Level] = {}
-
-
-class Manifest(Struct):
-    """manifest.json."""
-
-    name: str = ""
-    design: str = ""
-    hash: str = ""
-    label: str | None = None
-    laws: list[ListedCheck] = []
-    check: Checked | None = None
-    parts: list[ListedPart] = []
-    warnings: list[str] = []
-    left_out: list[LeftOut] = []
-    estimate: Levels | None = None
-    versions: dict[str, str] = {}
 
 
 class ListedVariant(Struct):
@@ -106,7 +37,7 @@ class VariantRecord(Struct, kw_only=True):
     """
 
     folder: str
-    manifest: dict[str, Any]
+    manifest: Manifest
     estimate: dict[str, Any] | None
     casting: dict[str, Any] | None
     slicer: dict[str, Any] | None
@@ -130,9 +61,7 @@ class ResultsTable(Struct, frozen=True):
 
 
 def expect(data: Any, kind: Any, path: Path) -> None:
-    """Raise UnitcadError, naming the file and the place, for data that is not of a kind, is nested too deep, or has a
-    key that the page keeps for itself.
-    """
+    """Raise UnitcadError, naming file and place, for data of another kind, too deep, or with the page's own key."""
     level = [data]
     for _ in range(DEEPEST):
         tables = [node for node in level if isinstance(node, dict)]

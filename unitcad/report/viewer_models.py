@@ -7,7 +7,6 @@ import gzip
 from pathlib import Path
 from typing import Any
 
-from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.artifacts import GEOMETRIC
 from unitcad.pipeline.bodies import glb_content
@@ -50,13 +49,5 @@ def cells(moulds: MouldSet) -> list[list[float]]:
     return [[cell.x, cell.y, 2 if one_sided and cell.sides == (-1,) else 0] for cell in moulds.plan.layout.cells]
 
 
-def unpacked(text: str) -> bytes:
-    """Return the bytes of a file within the page."""
-    return gzip.decompress(base64.b64decode(text))
-
-
 def _packed(content: bytes) -> str:
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
-
-
-__all__ = ["UnitcadError", "cells", "model", "model_key", "spec_in", "unpacked"]
