@@ -71,14 +71,16 @@ def check(
 
     Reads STL, 3MF, OBJ, PLY, OFF and GLB, and STEP where an extra with a B-rep kernel is installed.
     """
-    from unitcad.check import detail, many_files
+    from unitcad.check import Options, detail, many_files
     from unitcad.check.output import as_text
     from unitcad.check.output.render import FORMATS, render
-    from unitcad.check.rules import registry
+    from unitcad.check.rules.registry import check_prefixes
+    from unitcad.check.rules.registry import explain as explanation
+    from unitcad.check.units import unit_named
     from unitcad.cli import check_settings
 
     if explain is not None:
-        typer.echo(registry.explain(explain))
+        typer.echo(explanation(explain))
         return
     output_format = "json" if as_json else output_format
     if output_format not in FORMATS:
@@ -95,25 +97,30 @@ def check(
         from unitcad.check import baseline as baselines
 
         known = baselines.read(base) if base.exists() or not write_baseline else baselines.EMPTY
-    options = replace(
-        _filters(configuration, select, ignore, extend_select),
-        unit=_unit("--unit", unit) if unit is not None else _unit(configuration.name("unit"), settings.unit),
-        printer=_printer("--printer", printer)
-        if printer
-        else _printer(configuration.name("printer"), settings.printer),
+    selected = check_prefixes(*configuration.chosen("select", _split(select)))
+    extra = check_prefixes("--extend-select", _split(extend_select) or [])
+    options = Options(
+        select=selected + extra if selected else (),
+        ignore=check_prefixes(*configuration.chosen("ignore", _split(ignore))),
+        unit=unit_named(*configuration.chosen("unit", unit)),
+        printer=_printer(*configuration.chosen("printer", printer)),
         shells=shells,
         strict_3mf=bool(settings.strict_3mf if strict_3mf is None else strict_3mf),
-        limits=_limits(configuration, max_faces, timeout),
+        limits=_limits(max_faces or settings.max_faces, *configuration.chosen("timeout", timeout)),
         locations=detail.MOST if all_locations or base is not None or show is not None else detail.SHOWN,
         draw=show is not None,
     )
     if not files and manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
-    per_file = _per_file(configuration, options)
-    check_all = partial(
-        many_files.check_files, jobs=jobs, memory_mb=memory or settings.memory or 8000, then=_drawn(show)
-    )
-    reports = _run(files or [], per_file, manifest, options.printer is not None, check_all)
+    for pattern, codes in settings.per_file_ignores.items():
+        check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
+    draw = None
+    if show is not None:
+        from unitcad.export import finding_pictures
+
+        draw = partial(finding_pictures.write, Path(show))
+    check_all = partial(many_files.check_files, jobs=jobs, memory_mb=memory or settings.memory or 8000, then=draw)
+    reports = _reports(files or [], configuration, options, manifest, check_all)
     shown = detail.MOST if all_locations else detail.SHOWN
     if base is not None:
         known = baselines.write(base, known, reports) if write_baseline else known
@@ -141,91 +148,45 @@ def _write(text: str, *, plain: bool) -> None:
     raw.flush()
 
 
-def _run(
+def _reports(
     names: list[str],
-    options: Callable[[str], Options],
+    configuration: Configuration,
+    options: Options,
     manifest: str | None,
-    printer_named: bool,
     check_all: Callable[[list[tuple[str, Options]]], Iterator[FileReport]],
 ) -> list[FileReport]:
+    """Return the reports of all files, compared with a manifest if there is one."""
     from unitcad.check import many_files
+
+    def of_path(path: str) -> Options:
+        """Return the options of a file: without what the settings ignore for it."""
+        return replace(options, unwanted=tuple(code.strip().upper() for code in configuration.ignored(path)))
 
     paths, reports = many_files.expand(names)
     if manifest is None:
-        work = [(path, options(path)) for path in paths]
-        return reports + list(check_all(work))
+        return reports + list(check_all([(path, of_path(path)) for path in paths]))
     from unitcad.check import manifest as listing
 
     listed = listing.read(manifest)
-    work = listing.work(listed, paths, options, printer_named)
-    compared = [listing.compare(listed, report, options(report.path)) for report in check_all(work)]
-    return reports + compared + listing.unchecked(listed, [path for path, _ in work], options)
-
-
-def _drawn(show: str | None) -> Callable[[FileReport], FileReport] | None:
-    """Return the function that draws a report's findings into the folder `show`."""
-    if show is None:
-        return None
-    from unitcad.export import finding_pictures
-
-    return partial(finding_pictures.write, Path(show))
-
-
-def _filters(
-    configuration: Configuration, select: list[str] | None, ignore: list[str] | None, extend_select: list[str] | None
-) -> Options:
-    """Return the wanted codes: those of the command line, else those of the settings."""
-    from unitcad.check import Options
-    from unitcad.check.rules.registry import check_prefixes
-
-    settings = configuration.settings
-    wanted = check_prefixes("--select", _split(select))
-    if select is None and settings.select:
-        wanted = check_prefixes(configuration.name("select"), settings.select)
-    unwanted = check_prefixes("--ignore", _split(ignore))
-    if ignore is None and settings.ignore:
-        unwanted = check_prefixes(configuration.name("ignore"), settings.ignore)
-    extra = check_prefixes("--extend-select", _split(extend_select))
-    return Options(select=wanted + extra if wanted else (), ignore=unwanted)
-
-
-def _per_file(configuration: Configuration, options: Options) -> Callable[[str], Options]:
-    """Return the options of a path: `options` without what the settings ignore for it."""
-    from unitcad.check.rules.registry import check_prefixes
-
-    for pattern, codes in configuration.settings.per_file_ignores.items():
-        check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
-
-    def chosen(path: str) -> Options:
-        return replace(options, unwanted=tuple(code.strip().upper() for code in configuration.ignored(path)))
-
-    return chosen
-
-
-def _unit(field: str, unit: str | None) -> str | None:
-    from unitcad.check.units import unit_named
-
-    return unit_named(field, unit)
+    work = listing.work(listed, paths, of_path, options.printer is not None)
+    compared = [listing.compare(listed, report, of_path(report.path)) for report in check_all(work)]
+    return reports + compared + listing.unchecked(listed, [path for path, _ in work], of_path)
 
 
 def _printer(field: str, name: str | None) -> Printer | None:
-    if name is None:
-        return None
     from unitcad import catalogue
 
-    return catalogue.choose(field, name, catalogue.printers())
+    return catalogue.choose(field, name, catalogue.printers()) if name else None
 
 
-def _limits(configuration: Configuration, max_faces: int | None, timeout: float | None) -> Limits:
+def _limits(max_faces: int | None, field: str, seconds: float | None) -> Limits:
     from unitcad.check import Limits
 
-    field = "--timeout" if timeout is not None else configuration.name("timeout")
-    settings, default = configuration.settings, Limits()
-    seconds = timeout or settings.timeout or default.seconds
-    if not seconds < 1e7:
+    default = Limits()
+    if seconds is not None and not seconds < 1e7:
         raise Refusal(field, seconds, "must be a number of seconds below 1e7", default.seconds)
-    return replace(default, max_faces=max_faces or settings.max_faces or default.max_faces, seconds=seconds)
+    return replace(default, max_faces=max_faces or default.max_faces, seconds=seconds or default.seconds)
 
 
-def _split(values: list[str] | None) -> list[str]:
-    return [part for value in values or [] for part in value.split(",") if part.strip()]
+def _split(values: list[str] | None) -> list[str] | None:
+    return values and [part for value in values for part in value.split(",") if part.strip()]

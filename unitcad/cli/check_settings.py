@@ -21,10 +21,10 @@ NAMES = ("unitcad.toml", "pyproject.toml")
 
 
 class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename="kebab"):
-    """Keys that a file may set; None where it does not. They have the options' names."""
+    """Keys that a file may set, None or empty where it does not. They have the options' names."""
 
-    select: list[str] | None = None
-    ignore: list[str] | None = None
+    select: list[str] = []
+    ignore: list[str] = []
     per_file_ignores: dict[str, list[str]] = {}
     fail_on: Literal["error", "warning"] | None = None
     printer: str | None = None
@@ -46,6 +46,10 @@ class Configuration(Struct, frozen=True, kw_only=True):
     def name(self, key: str) -> str:
         """Name a key in an error: file, table and key."""
         return f"{self.shown}: {self.table}.{key}"
+
+    def chosen(self, key: str, given: Any) -> tuple[str, Any]:
+        """Return an option's name and the value `given` to it; without one, the name and the value of its setting."""
+        return (f"--{key}", given) if given is not None else (self.name(key), getattr(self.settings, key))
 
     @property
     def shown(self) -> str | None:
