@@ -22,7 +22,7 @@ from unitcad.batch import task as tasks
 from unitcad.batch.batch_records import Failure, JournalEntry, Summary
 from unitcad.batch.journal import Journal
 from unitcad.batch.results import FIRST, write_results, write_timings
-from unitcad.batch.run import MOST_FAILURES_TOLD, BatchOptions, batch_head, counted
+from unitcad.batch.run import MOST_FAILURES, BatchOptions, batch_head, counted
 from unitcad.batch.sweep import Sweep
 from unitcad.batch.task import OK
 from unitcad.errors import UnitcadError
@@ -241,4 +241,4 @@ def _count(summary: Summary, blocks: list[EstimateBlock]) -> None:
         if isinstance(entry, UnitcadError)
     ]
     summary.failed, summary.ok = len(failed), summary.done - len(failed)
-    summary.failures = [Failure(each.index, each.status, each.reason) for each in failed[:MOST_FAILURES_TOLD]]
+    summary.failures = [Failure(each.index, each.status, each.reason) for each in failed[:MOST_FAILURES]]

@@ -1,4 +1,4 @@
-"""Running a sweep: variants grouped by geometry, given to an executor, noted one by one, resumed after an interruption.
+"""Running a sweep: variants in groups of one geometry, given to an executor, recorded one by one, resumed later.
 
 The first task of a geometry makes its files; the others of that geometry wait for it and then cost a few milliseconds
 each. So no geometry is made twice, and at most WINDOW variants are held in memory, however many there are.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Executor, Future, wait
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -58,7 +58,7 @@ class BatchOptions:
 
 
 Watch = Callable[[Summary, VariantOutcome | None], None]
-MOST_FAILURES_TOLD = 20
+MOST_FAILURES = 20
 
 
 def run(
@@ -77,26 +77,26 @@ def run(
     results come back as messages. What an earlier run in `out` finished is not made again. Raises UnitcadError where
     nothing can be run; whatever happens to a variant is in the summary.
     """
-    only = checked_outputs(options.only)
-    count = counted(sweep, options.limit)
-    head = batch_head(sweep, only, options)
+    head = batch_head(sweep, checked_outputs(options.only), options)
+    summary = Summary(counted(sweep, options.limit))
     store = DiskStore(options.cache or default_root())
     journal = Journal(out, head)
-    batch = _Batch(sweep, out, only, options, executor, workers, remote, watch, journal, store, Summary(count))
+    receiver = Receiver(out, store) if remote else None
+    batch = _Batch(sweep, out, options, executor, 2 * workers, watch, journal, store, receiver, summary)
     if journal.damaged:
-        batch.summary.warnings.append(
+        summary.warnings.append(
             f"{out / JOURNAL}: damaged in {journal.damaged} lines; their variants were checked again"
         )
     start = time.perf_counter()
     try:
         clear_leftovers(out)
-        summary = batch.all()
+        batch.all()
         write_results(out, columns_of(sweep, journal), journal.entries, head)
         summary.seconds = round(time.perf_counter() - start, 3)
         write_timings(out, summary, workers)
         watch(summary, None)
     except OSError as error:
-        raise _no_room(tasks.failure(0, error), out, batch.summary) from error
+        raise _no_room(tasks.failure(0, error), out, summary) from error
     except KeyboardInterrupt:
         for future in batch.running:
             future.cancel()
@@ -146,27 +146,25 @@ class _Group:
 
 
 class _Batch:
-    """One run of one sweep."""
+    """One run of one sweep; at most `room` tasks are submitted at a time."""
 
     def __init__(
-        self, sweep: Sweep, out: Path, only: tuple[str, ...], options: BatchOptions, executor: Executor, workers: int,
-        remote: bool, watch: Watch, journal: Journal, store: DiskStore, summary: Summary,
+        self, sweep: Sweep, out: Path, options: BatchOptions, executor: Executor, room: int,
+        watch: Watch, journal: Journal, store: DiskStore, receiver: Receiver | None, summary: Summary,
     ) -> None:  # fmt: skip
-        self.sweep, self.out, self.only, self.options, self.executor = sweep, out, only, options, executor
-        self.watch, self.journal, self.store, self.summary = watch, journal, store, summary
-        self.receiver = Receiver(out, store) if remote else None
-        self.room = 2 * workers
-        self.coming = iter(range(summary.variants))
-        self.failed_before: deque[int] = deque()
+        self.sweep, self.out, self.options, self.executor, self.room = sweep, out, options, executor, room
+        self.watch, self.journal, self.store, self.receiver, self.summary = watch, journal, store, receiver, summary
+        self.only = checked_outputs(options.only)
+        self.coming = self._to_make()
         self.groups: dict[str, _Group] = {}
         self.waiting = 0
         self.again: deque[tuple[str, Job]] = deque()
-        self.tried: dict[int, int] = {}
+        self.tried: set[int] = set()
         self.made: set[int] = set()
         self.seen: dict[int, int] = {}
         self.running: dict[Future[list[VariantOutcome]], Task] = {}
 
-    def all(self) -> Summary:
+    def all(self) -> None:
         while not self.summary.stopped:
             self._fill()
             self._submit()
@@ -175,38 +173,44 @@ class _Batch:
             self._collect()
         while self.running:  # tasks that were begun are finished and kept
             self._collect()
-        return self.summary
 
-    def _fill(self) -> None:
-        """Bring variants into the window; note at once those that are done or refused."""
-        while self.waiting < WINDOW and not self.summary.stopped:
-            index, again = next(self.coming, None), True
-            if index is None:
-                if not self.failed_before:
-                    return
-                index, again = self.failed_before.popleft(), False
+    def _to_make(self) -> Iterator[tuple[int, JournalEntry | None]]:
+        """Yield the variants that are not finished, with what the journal has of them.
+
+        What failed before comes last: a batch that stops at a failure has made all others by then.
+        """
+        failed: list[int] = []
+        for index in range(self.summary.variants):
             entry = self.journal.entry(index)
             if entry is not None and self._stands(entry):
                 self._finished(VariantOutcome(index, entry.status), fresh=False)
-                continue
-            if entry is not None and entry.status == tasks.FAILED and again:
-                # What failed before comes last: a batch that stops at a failure has made all others by then.
-                self.failed_before.append(index)
-                continue
+            elif entry is not None and entry.status == tasks.FAILED:
+                failed.append(index)
+            else:
+                yield index, entry
+        for index in failed:
+            yield index, self.journal.entry(index)
+
+    def _fill(self) -> None:
+        """Bring variants into the window; note at once those that are refused, or equal to another one."""
+        while self.waiting < WINDOW and not self.summary.stopped:
+            index, entry = next(self.coming, (None, None))
+            if index is None:
+                return
             try:
                 spec = self.sweep.spec(index)
             except UnitcadError as error:
                 self._finished(VariantOutcome(index, tasks.REFUSED, reason=tasks.failure(index, error).reason))
                 continue
-            identity = int(folder_name(spec)[-12:], 16)
-            first = self.seen.setdefault(identity, index)
+            first = self.seen.setdefault(int(folder_name(spec)[-12:], 16), index)
             if first != index:
                 self.journal.add(JournalEntry(index=index, same_as=first, values=self.sweep.values(index)[1]))
                 self._finished(VariantOutcome(index, tasks.OK), fresh=False)
                 continue
             key = build_key(spec, self.only, self.options.check)
-            damaged = entry.manifest if entry else ""
-            self.groups.setdefault(key, _Group()).jobs.append(Job(index, to_json(spec), damaged))
+            self.groups.setdefault(key, _Group()).jobs.append(
+                Job(index, to_json(spec), entry.manifest if entry else "")
+            )
             self.waiting += 1
 
     def _stands(self, entry: JournalEntry) -> bool:
@@ -295,12 +299,12 @@ class _Batch:
         if outcome.status == tasks.NO_SPACE:
             self.summary.stopped = self.summary.stopped or outcome.reason
             return
-        if outcome.status == tasks.FAILED and self.tried.setdefault(outcome.index, 0) == 0:
-            self.tried[outcome.index] = 1
+        if outcome.status == tasks.FAILED and outcome.index not in self.tried:
+            self.tried.add(outcome.index)
             self.summary.retried += 1
             self.again.append((key, job))
             return
-        self.tried.pop(outcome.index, None)
+        self.tried.discard(outcome.index)
         if self.receiver and outcome.product:
             outcome = self.receiver.place(outcome, key)
         self._finished(outcome)
@@ -326,7 +330,7 @@ class _Batch:
             summary.ok += 1
         else:
             summary.failed += 1
-            if len(summary.failures) < MOST_FAILURES_TOLD:
+            if len(summary.failures) < MOST_FAILURES:
                 entry = self.journal.entry(outcome.index)
                 if entry is not None:
                     summary.failures.append(Failure(entry.index, entry.status, entry.reason, entry.folder))

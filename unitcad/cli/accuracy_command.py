@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.options import AsJson
+from unitcad.cli.shared_options import AsJson
 
 
 def accuracy(

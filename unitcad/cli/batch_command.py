@@ -8,8 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from unitcad.cli.options import AllowCode, AsJson, Formats, NoCheck, Only, Page, Sets, allow_code, outputs, overrides
 from unitcad.cli.output import warn
+from unitcad.cli.shared_options import (
+    AllowCode,
+    AsJson,
+    Formats,
+    NoCheck,
+    Only,
+    Page,
+    Sets,
+    allow_code,
+    outputs,
+    overrides,
+)
 
 if TYPE_CHECKING:
     from unitcad.batch import Summary

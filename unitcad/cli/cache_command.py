@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.options import AsJson
+from unitcad.cli.shared_options import AsJson
 
 cache = typer.Typer(help="The cache of distinct parts.", no_args_is_help=True)
 Where = Annotated[Path | None, typer.Option("--cache", help="The cache's folder; else the user's.")]

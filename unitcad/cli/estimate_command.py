@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from unitcad.cli.options import AsJson, Sets
 from unitcad.cli.output import print_json, warn
+from unitcad.cli.shared_options import AsJson, Sets
 from unitcad.errors import Refusal, unknown_name
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from unitcad.cli.options import AsJson
+from unitcad.cli.shared_options import AsJson
 
 KINDS = ("templates", "designs", "materials", "motors", "printers", "rules")
 

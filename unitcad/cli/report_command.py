@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.options import AllowCode, AsJson, allow_code
+from unitcad.cli.shared_options import AllowCode, AsJson, allow_code
 
 
 def report(
