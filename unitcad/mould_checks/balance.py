@@ -5,26 +5,20 @@ It compares what was drawn as a unit with what was drawn as tools, and knows of 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_most
 from unitcad.moulds.cavities import BALANCE
 from unitcad.moulds.mould_set import MouldSet
 
 
-def findings(moulds: MouldSet) -> list[MouldFinding]:
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Compare what silicone can reach with the layer, in every cavity."""
-    return [
+    for _, where, drawn, reached in moulds.cavities:
         # What one has and the other lacks, both ways.
-        at_most(
-            "C100",
-            cavity.where,
-            abs(cavity.reached.volume() + cavity.drawn.volume() - 2 * (cavity.reached ^ cavity.drawn).volume())
-            / cavity.drawn.volume(),
-            BALANCE,
-            "share of the layer",
-        )
-        for cavity in moulds.cavities
-    ]
+        differ = abs(reached.volume() + drawn.volume() - 2 * (reached ^ drawn).volume())
+        yield at_most("C100", where, differ / drawn.volume(), BALANCE, "share of the layer")
 
 
 CHECK = MouldCheck(

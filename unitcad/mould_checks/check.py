@@ -1,8 +1,8 @@
-"""What a mould check is."""
+"""The record of a mould check."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from unitcad.mould_checks.finding import MouldFinding
@@ -11,9 +11,9 @@ from unitcad.moulds.mould_set import MouldSet
 
 @dataclass(frozen=True)
 class MouldCheck:
-    """A code, what it demands in one line, and the function that looks. `reads_silicone`: its limit is a material's."""
+    """A code, what it demands in one line, and its function. `reads_silicone`: its limit is a material's."""
 
     code: str
     demands: str
-    findings: Callable[[MouldSet], list[MouldFinding]]
+    findings: Callable[[MouldSet], Iterable[MouldFinding]]
     reads_silicone: bool = False

@@ -8,6 +8,9 @@ is sampled.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cache
+
 import numpy as np
 from manifold3d import Manifold
 
@@ -27,21 +30,13 @@ LEVEL = 1e-9
 _BLOCK = 100_000  # pairs of triangles clipped together
 
 
-def findings(moulds: MouldSet) -> list[MouldFinding]:
-    """Return the area of every removed piece that runs into what stays.
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
+    """Yield the area of every removed piece that runs into what stays.
 
     Where pieces overlap, the piece is cut out of what stays first: silicone has taken the tool's real shape.
     """
     overlapping = any(not finding.ok for finding in overlap.findings(moulds))
-    faces: dict[tuple[int, tuple[int, int, int], bool], np.ndarray] = {}
-
-    def facing(solid: Manifold, direction: tuple[int, int, int], upwards: bool) -> np.ndarray:
-        key = id(solid), direction, upwards
-        if key not in faces:
-            faces[key] = _facing(solid, direction, upwards)
-        return faces[key]
-
-    findings = []
+    facing = cache(_facing)
     layers = {step.index: moulds.meshes((*step.layer, *step.earlier)) for step in moulds.plan.steps}
     laid = {step.index: [(body.name, moulds.mesh(body)) for body in step.inserts] for step in moulds.plan.steps}
     for removal in removals(moulds.plan):
@@ -54,11 +49,10 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
                 areas.append((blocked(piece, solid, way), name))
             elif _in_the_way(piece, solid, way):
                 areas.append((_meeting(facing(piece, way, True), facing(solid, way, False)), name))
-        worst = max(areas, default=(0.0, ""))
-        against = f" against {worst[1]}" if worst[0] > BLOCKED else ""
-        where = f"pour {removal.step}: {removal.piece} out{against}"
-        findings.append(at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", _advice(worst[1])))
-    return findings
+        largest, name = max(areas, default=(0.0, ""))
+        where = f"pour {removal.step}: {removal.piece} out" + (f" against {name}" if largest > BLOCKED else "")
+        advice = f"something of the piece lies under {name}: the two are drawn with an undercut"
+        yield at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", advice)
 
 
 def blocked(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -> float:
@@ -105,10 +99,6 @@ def _in_the_way(piece: Manifold, stays: Manifold, direction: tuple[int, int, int
         if way <= 0 and q[axis] > p[axis + 3] + LEVEL:
             return False
     return True
-
-
-def _advice(name: str) -> str:
-    return f"something of the piece lies under {name}: the two are drawn with an undercut"
 
 
 def _facing(solid: Manifold, direction: tuple[int, int, int], upwards: bool) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What a mould check states about one place."""
+"""The result of a mould check at one place."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ In moulds by complement the gap to what stands on the base is that of sections: 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from itertools import pairwise
 
 from manifold3d import Manifold
@@ -25,28 +26,26 @@ GRID = 2 / GRID_PER_MM
 """What snapping two faces to the grid may take from the clearance between them, mm."""
 
 
-def findings(moulds: MouldSet) -> list[MouldFinding]:
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure every pair of sliding faces of every pour."""
     chord = math.cos(math.pi / moulds.segments)
     lengths, solids = moulds.spec.moulds, moulds.solids
     skirt, window = min(lengths.plinth_clearance_mm, lengths.seat_relief_mm), lengths.window_clearance_mm
     play = lengths.plinth_clearance_mm
-    findings = []
     for step in moulds.plan.steps:
         cup = solids[step.cup]
         gap = cup.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
-        findings.append(at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm"))
+        yield at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm")
         if not moulds.plan.concentric:
             gap = _sideways(cup, solids["base"], window + 1)
             where = f"{step.cup} and what stands on the base"
-            findings.append(at_least("C210", where, gap, window * chord - GRID, "mm", KNIFE))
+            yield at_least("C210", where, gap, window * chord - GRID, "mm", KNIFE)
         for tongue in moulds.plan.standing(step, "tongue"):
             gap = cup.min_gap(solids[tongue.name], window + 1)
-            findings.append(at_least("C210", f"{step.cup} window and {tongue.name}", gap, window - GRID, "mm"))
+            yield at_least("C210", f"{step.cup} window and {tongue.name}", gap, window - GRID, "mm")
         if step.lid:
             gap = solids[step.lid].trim_by_plane((0, 0, -1), play - step.rim).min_gap(cup, play + 1)
-            findings.append(at_least("C210", f"{step.lid} skirt and {step.cup}", gap, play * chord - GRID, "mm"))
-    return findings
+            yield at_least("C210", f"{step.lid} skirt and {step.cup}", gap, play * chord - GRID, "mm")
 
 
 def _sideways(cup: Manifold, base: Manifold, most: float) -> float:

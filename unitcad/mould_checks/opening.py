@@ -26,9 +26,10 @@ _SNAPPED = 1 / GRID_PER_MM
 """What snapping to the grid may take from the height of that plane, mm."""
 
 
-def findings(moulds: MouldSet) -> list[MouldFinding]:
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure the opening of every cavity, and the narrowest of its vents under a lid."""
-    return [finding for cavity in moulds.cavities for finding in _of_cavity(cavity)]
+    for cavity in moulds.cavities:
+        yield from _of_cavity(cavity)
 
 
 def _of_cavity(cavity: Cavity) -> Iterator[MouldFinding]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 
 from manifold3d import Manifold
@@ -28,18 +29,16 @@ def of_unit(moulds: MouldSet) -> list[MouldFinding]:
     return _overlaps("unit", [(body.name, moulds.mesh(body)) for body in moulds.unit], {})
 
 
-def _of_pours(moulds: MouldSet) -> list[MouldFinding]:
-    findings: list[MouldFinding] = []
+def _of_pours(moulds: MouldSet) -> Iterator[MouldFinding]:
     cast: list[tuple[str, Manifold]] = []
     shared: dict[tuple[str, str], float] = {}
     for step in moulds.plan.steps:
         cells = moulds.meshes(step.layer)
-        findings += _overlaps(f"pour {step.index}", [(f"{step.name}.{i + 1}", c) for i, c in enumerate(cells)], shared)
+        yield from _overlaps(f"pour {step.index}", [(f"{step.name}.{i + 1}", c) for i, c in enumerate(cells)], shared)
         cast.append((step.name, united(cells)))
         laid = [(body.name, moulds.mesh(body)) for body in step.inserts]
         standing = [(name, moulds.solids[name]) for name in step.tools] + cast + laid
-        findings += _overlaps(f"pour {step.index}", standing, shared)
-    return findings
+        yield from _overlaps(f"pour {step.index}", standing, shared)
 
 
 def _overlaps(

@@ -10,12 +10,8 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Plan
 
 
-def findings(moulds: MouldSet) -> list[MouldFinding]:
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Look at every body of unit and tooling; genus only where the drawing means one."""
-    return list(_of_solids(moulds))
-
-
-def _of_solids(moulds: MouldSet) -> Iterator[MouldFinding]:
     genus = expected_genus(moulds.plan)
     for name, solid in moulds.solids.items():
         yield exactly("C000", f"{name} components", len(solid.decompose()), 1, "")
