@@ -6,14 +6,11 @@ has a corner, a side or its whole. Comparisons of coordinates only, hence exact.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints
-
-_TRIES = 3  # pairs of faces tried one by one for each pair of shells before all are
 
 
 def by_boxes(a: Floats, b: Floats) -> tuple[Bools, Bools]:
@@ -34,28 +31,10 @@ def by_boxes(a: Floats, b: Floats) -> tuple[Bools, Bools]:
     return apart, flush
 
 
-def parts_apart(a: Floats, b: Floats) -> Bools:
-    """Return whether the boxes of those parts are apart that pairs of triangles have in a plane where their boxes
-    touch.
-    """
-    (low_a, high_a), (low_b, high_b) = _box(a), _box(b)
-    apart = np.zeros(a.shape[2], bool)
-    for axis in range(3):
-        for plane, other in ((high_a[axis], low_b[axis]), (low_a[axis], high_b[axis])):
-            rows = np.flatnonzero((plane == other) & ~apart)
-            if len(rows):
-                one, two = (corners.take(rows, axis=2) for corners in (a, b))
-                (low, high), (low_two, high_two) = (_box(part, part[:, axis] != plane[rows]) for part in (one, two))
-                apart[rows] = ((low > high_two) | (low_two > high)).any(axis=0)
-    return apart
-
-
-def _box(corners: Floats, out: Bools | None = None) -> tuple[Floats, Floats]:
-    """Return low and high corner (axis, n) of the corners' box, without those that are `out`."""
-    low = high = corners
-    if out is not None:
-        low, high = np.where(out[:, None], np.inf, corners), np.where(out[:, None], -np.inf, corners)
-    return np.minimum(np.minimum(low[0], low[1]), low[2]), np.maximum(np.maximum(high[0], high[1]), high[2])
+def _box(corners: Floats) -> tuple[Floats, Floats]:
+    """Return low and high corner (axis, n) of the corners' box."""
+    a, b, c = corners
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 @dataclass
@@ -75,11 +54,6 @@ class Contacts:
         """Return which keys are still asked for."""
         return np.ones(len(keys), bool) if self.every else ~self._knows(keys)
 
-    def fresh(self, keys: Ints) -> Ints:
-        """Return rows of the first of each key that is not known."""
-        rows = np.unique(keys, return_index=True)[1]
-        return rows[~self._knows(keys[rows])]
-
     def _knows(self, keys: Ints) -> Bools:
         """Return which keys are known, by bisection: `numpy.isin` hashes all that are known at each call."""
         if not len(self.known):
@@ -88,26 +62,9 @@ class Contacts:
 
     def add(self, keys: Ints, pairs: Ints) -> None:
         """Note pairs of faces that meet, one for each pair of shells that is not known."""
-        rows = self.fresh(keys)
+        rows = np.unique(keys, return_index=True)[1]
+        rows = rows[~self._knows(keys[rows])]
         if len(rows):
             self.known = np.sort(np.concatenate([self.known, keys[rows]]), kind="stable")  # merges
         if len(rows) or self.every:
             self.pairs.append(pairs if self.every else pairs[rows])
-
-    def look(self, keys: Ints, pairs: Ints, meet: Callable[[Ints], Bools]) -> None:
-        """Note which of many pairs meet, with few calls of `meet` (rows to whether they do): most shells meet often."""
-        for _ in range(0 if self.every else _TRIES):
-            rows = self.fresh(keys)
-            if not len(rows):
-                return
-            met = rows[meet(rows)]
-            self.add(keys[met], pairs[met])
-            left = ~self._knows(keys)
-            left[rows] = False
-            keys, pairs, meet = keys[left], pairs[left], _of(np.flatnonzero(left), meet)
-        met = np.flatnonzero(meet(np.arange(len(keys))))
-        self.add(keys[met], pairs[met])
-
-
-def _of(which: Ints, meet: Callable[[Ints], Bools]) -> Callable[[Ints], Bools]:
-    return lambda rows: meet(which[rows])

@@ -50,26 +50,14 @@ def edges_of(faces: Ints, n_vertices: int) -> Edges:
     start, end = half_edges(faces)
     order, low, high = _sorted_edges(np.minimum(start, end), np.maximum(start, end), n_vertices)
     n = len(order)
-    closed = False
-    if n % 2 == 0 and n and _in_pairs(low, high):
-        closed = not (start[order[0::2]] == start[order[1::2]]).any()
-        first = np.arange(0, n, 2, dtype=np.int32)
-        size = np.full(n // 2, 2, np.int32)
-    else:
-        fresh = np.empty(n, bool)
-        fresh[:1] = True
-        np.not_equal(low[1:], low[:-1], out=fresh[1:])
-        fresh[1:] |= high[1:] != high[:-1]
-        first = np.flatnonzero(fresh).astype(np.int32)
-        size = np.diff(np.append(first, n)).astype(np.int32)
-    return Edges(order, first, size, low[first], high[first], closed)
-
-
-def _in_pairs(low: Ints, high: Ints) -> bool:
-    """Return whether sorted edges come in twos, no more and no fewer."""
-    if not ((low[0::2] == low[1::2]).all() and (high[0::2] == high[1::2]).all()):
-        return False
-    return bool(((low[1:-1:2] != low[2::2]) | (high[1:-1:2] != high[2::2])).all())
+    fresh = np.empty(n, bool)
+    fresh[:1] = True
+    np.not_equal(low[1:], low[:-1], out=fresh[1:])
+    fresh[1:] |= high[1:] != high[:-1]
+    first = np.flatnonzero(fresh).astype(np.int32)
+    size = np.diff(np.append(first, np.int32(n)))
+    closed = n > 0 and bool((size == 2).all()) and not (start[order[0::2]] == start[order[1::2]]).any()
+    return Edges(order, first, size, low[first], high[first], bool(closed))
 
 
 def _sorted_edges(low: Ints, high: Ints, n_vertices: int) -> tuple[Ints, Ints, Ints]:

@@ -206,14 +206,9 @@ def _contacts(faces: Faces, i: Ints, j: Ints, sharing: Bools, found: Crossings) 
     found.contact.add(keys[sharing], pair[sharing])
     asked = np.flatnonzero(~sharing)
     asked = asked[found.contact.open(keys[asked])]
-    a, b = (faces.planes.corners(faces.planes.vertices(f[asked])) for f in (i, j))
-    near = np.flatnonzero(~contact.parts_apart(a, b))
-    asked = asked[near]
-
-    def meet(rows: Ints) -> Bools:
-        return triangles.meet(*(corners[:, :, near[rows]].transpose(2, 0, 1) for corners in (a, b))).touches
-
-    found.contact.look(keys[asked], pair[asked], meet)
+    a, b = (faces.vertices[faces.corners[:, f[asked]].T] for f in (i, j))
+    asked = asked[triangles.meet(a, b).touches]
+    found.contact.add(keys[asked], pair[asked])
 
 
 def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, found: Crossings) -> None:
