@@ -22,10 +22,10 @@ _WIDE = 64.0  # float32 steps: a face lower than that may be thin by rounding
 
 
 def kinds(topology: Topology, shells: Ints, opposite: Bools) -> tuple[Bools, Bools]:
-    """Return, of pairs of faces that cover each other in one plane, which double a shell, which have nothing between
-    them (G009). `shells` (n, 2) are theirs; `opposite`: they look opposite ways.
+    """Return which pairs that cover each other in one plane double a shell (G008), and which leave no room (G009).
 
-    The others belong to two shells side by side, or to one within the other, of which G003 and G002 tell.
+    `shells` (n, 2) are theirs; `opposite`: they look opposite ways. The others belong to two shells side by side, or to
+    one within the other, which G003 and G002 report.
     """
     volume, closed = topology.volumes[shells], topology.closed[shells].all(axis=1)
     apart = shells[:, 0] != shells[:, 1]
@@ -34,9 +34,7 @@ def kinds(topology: Topology, shells: Ints, opposite: Bools) -> tuple[Bools, Boo
 
 
 def run_alike(a: Ints, b: Ints) -> Bools:
-    """Return which pairs of faces (n, 3) run along a common edge in the same direction: they lie on the same side of
-    it.
-    """
+    """Return which pairs of faces (n, 3) run along a common edge in one direction: they lie on one side of it."""
     ends = [np.roll(face, -1, axis=1) for face in (a, b)]
     same = (a[:, :, None] == b[:, None, :]) & (ends[0][:, :, None] == ends[1][:, None, :])
     return np.asarray(same.any(axis=(1, 2)))

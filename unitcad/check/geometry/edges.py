@@ -32,9 +32,7 @@ class Edges:
 
 
 def scipy_pays(n: int) -> bool:
-    """Return whether scipy's compiled code pays for `n` rows: to load it takes longer than to check a small mesh
-    without.
-    """
+    """Return whether scipy pays for `n` rows: to load it takes longer than to check a small mesh without it."""
     return n > _SMALL or "scipy.sparse" in sys.modules
 
 
@@ -112,8 +110,9 @@ def pinched_closed(faces: Ints, across: Ints, n_vertices: int) -> Ints:
 
 
 def pinched_open(faces: Ints, edges: Edges, n_vertices: int) -> Ints:
-    """Return the same for any mesh: fans are joined across edges of two faces; vertices of edges with more are left
-    out.
+    """Return such vertices of any mesh, without those of edges that have more than two faces.
+
+    Fans are joined across edges of two faces.
     """
     start, _ = half_edges(faces)
     n = len(start)
@@ -152,11 +151,11 @@ def balanced(faces: Ints, edges: Edges) -> Bools:
 
 
 def around(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[Ints, Ints, Bools, Ints]:
-    """Return the half-edges of the edges `many` by angle; of each the place of its edge in `many`, whether the solid
-    ends at its face, and its turn: the rank of that angle, the same for faces in one plane.
+    """Return the half-edges of the edges `many` by edge and angle, and what is known of each.
 
-    By angle about the edge, the solid begins at faces that run from its high vertex to its low one and ends at the
-    others. Half-edges are in the order of edge and turn.
+    That is the place of its edge in `many`, whether the solid ends at its face, and its turn: the rank of its angle,
+    the same for faces in one plane. By angle about the edge, the solid begins at faces that run from its high vertex to
+    its low one and ends at the others.
     """
     size = edges.size[many]
     group = np.repeat(np.arange(len(many)), size)

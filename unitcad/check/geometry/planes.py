@@ -51,8 +51,9 @@ class Planes:
         return found
 
     def one_side(self, i: Ints, others: Ints, shared: Ints) -> Bools:
-        """Return whether the vertices `others` (corner, n) of faces are on one side of the plane of each face i, but
-        for 0 to 3 that are `shared`.
+        """Return whether the vertices `others` (corner, n) of faces are on one side of the plane of each face i.
+
+        0 to 3 of them are `shared`, and left out.
         """
         x, y, z = (row.take(i, mode="clip") for row in self.normal)
         offset, error = self.offset.take(i, mode="clip"), self.error.take(i, mode="clip")
@@ -70,8 +71,7 @@ class Planes:
         return ((above == 0) | (below == 0)) & (above + below >= 3 - shared) & (shared < 3)
 
     def seen_apart(self, i: Ints, a: Floats, b: Floats, shared: Ints) -> Bools:
-        """Return whether a side of a or b has them on both sides of its line, seen along the axis that face i
-        faces most.
+        """Return whether a side of a or b has them on both sides of its line, as seen along the axis that i faces most.
 
         `a` are the corners of i, `b` those of the other face.
         """
@@ -97,9 +97,7 @@ class Planes:
 
 
 def planes_of(columns: Floats, ids: Ints, normal: Floats) -> Planes:
-    """Return the planes of faces (3, m) by the coordinates of vertices (3, n) and twice the area vectors (3, m), as
-    `area_vectors` makes them.
-    """
+    """Return the planes of faces from vertices (3, n), their ids (3, m) and their `area_vectors` (3, m)."""
     low, high = columns.min(axis=1), columns.max(axis=1)
     offset, longest = np.zeros((2, ids.shape[1]))
     for start in range(0, ids.shape[1], _FACES):

@@ -37,10 +37,9 @@ def orient2d(a: Floats, b: Floats, c: Floats) -> Ints:
 
 
 def sides(a: Floats, b: Floats) -> Ints:
-    """Return the side of the plane of each triangle `a` (corner, axis, n) that each corner of `b` lies on, int8
-    (corner, n).
+    """Return the side of the plane of each triangle `a` that each corner of `b` lies on: int8 (corner, n).
 
-    Positive where `a` is seen anticlockwise; zero for all corners where `a` has no area.
+    Both are (corner, axis, n). Positive where `a` is seen anticlockwise; zero for all corners where `a` has no area.
     """
     one, two = a[1] - a[0], a[2] - a[0]
     normal, size = np.empty_like(one), np.empty_like(one)

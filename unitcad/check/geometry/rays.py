@@ -21,12 +21,11 @@ _FINEST = 6  # a face has at most _FINEST (_FINEST + 1) / 2 points
 
 @dataclass(frozen=True)
 class Rays:
-    """Points inside the faces, the face of each, and how much material lies behind it, mm (inf beyond reach); for gaps
-    how much air before it.
+    """Points inside the faces, the face of each, and how much material (for gaps, air) lies behind it, mm.
 
-    `thickness`: up to the first face that is nearly parallel, within the wall's floor; `behind`: up to the first face
-    that looks the other way at all, within the larger of that floor and the least feature; `across`: the face that
-    `thickness` ends at, -1 where there is none.
+    `thickness` goes up to the first face that is nearly parallel, within the wall's floor. `behind` goes up to the
+    first face that looks the other way at all, within the larger of that floor and the least feature. Both are inf
+    beyond. `across` is the face that `thickness` ends at, -1 where there is none.
     """
 
     points: Floats

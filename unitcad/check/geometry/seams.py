@@ -20,9 +20,10 @@ _CROWD = 30  # pairs within reach a vertex: more means points that lie everywher
 
 @dataclass(frozen=True)
 class Seams:
-    """Faces with vertices joined: `stored` those in one place, `joined` also those within reach; `whole` are the faces
-    that keep three vertices in `stored`. `reach`: how near to a vertex another one counts as the same, mm (0 where the
-    vertex is on no open edge).
+    """Faces with vertices joined: in `stored` those in one place, in `joined` also those within reach.
+
+    `whole` are the faces that keep three vertices in `stored`. `reach`: how near to a vertex another one counts as the
+    same, mm; 0 where the vertex is on no open edge.
     """
 
     stored: Ints
@@ -130,8 +131,7 @@ def _joined(place: Ints, stored: Ints, points: Ints, pairs: Ints) -> Ints:
 
 
 def t_junctions(vertices: Floats, low: Ints, high: Ints, reach: Floats) -> Bools:
-    """Return which open edges (low, high) have another vertex of the open border on them, within the `reach` of their
-    vertex.
+    """Return which open edges (low, high) have another vertex of the open border on them, within its `reach`.
 
     Where a long open edge meets a chain of short ones, the first short one starts at an end of the long one and lies
     along it; so only open edges that share a vertex are compared.

@@ -22,8 +22,11 @@ _BLOCK = 1 << 12  # pairs whose corners stay in the processor's cache
 
 @dataclass(frozen=True)
 class Meeting:
-    """For each pair of triangles: `crosses` (each passes through the other), `touches` (they have a point in common),
-    `overlaps` (coplanar, with area in common). `side_a` (n, 3): the sides of a's corners off b's plane; `side_b` so.
+    """How the triangles of each pair meet.
+
+    `crosses`: each passes through the other; `touches`: they have a point in common; `overlaps`: they are coplanar with
+    area in common. `side_a` (n, 3) are the sides of b's plane on which a's corners lie; `side_b` is the same the other
+    way.
     """
 
     crosses: Bools
@@ -34,9 +37,7 @@ class Meeting:
 
 
 def _table() -> tuple[Ints, Bools]:
-    """Tabulate by three signs (index 9 p + 3 q + r + 13) which corner stands alone, and whether the other is
-    flipped.
-    """
+    """Tabulate by three signs (index 9p + 3q + r + 13) which corner stands alone, and whether the other is flipped."""
     alone, flip = np.zeros(27, np.int8), np.zeros(27, bool)
     for index in range(27):
         p, q, r = index // 9 - 1, index // 3 % 3 - 1, index % 3 - 1
@@ -132,8 +133,9 @@ def coplanar(a: Floats, b: Floats) -> tuple[Bools, Bools]:
 
 
 def _off_sides(corners: Floats, points: Floats) -> Ints:
-    """Return for triangles (n, 3, 2) and points (n, k, 2) 1 where a point is inward of a side, -1 outward:
-    (side, k, n).
+    """Return 1 where a point is inward of a side, -1 where it is outward: (side, k, n).
+
+    Triangles are (n, 3, 2), points (n, k, 2).
     """
     n, count = len(corners), points.shape[1]
     whole = [corners[:, k] for k in range(3)]

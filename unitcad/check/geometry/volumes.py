@@ -20,10 +20,10 @@ def closed(faces: Ints, edges: Edges, shells: Ints, n: int) -> Bools:
 
 
 def signed(vertices: Floats, faces: Ints, areas: Floats, shells: Ints, n: int) -> Floats:
-    """Return the volume of each of `n` shells, mm3: below zero where its faces look inwards, anything where it is not
-    closed.
+    """Return the volume of each of `n` shells, mm3: below zero where its faces look inwards.
 
-    Tetrahedra stand on the middle of all vertices, so that a part far from the origin loses no digits.
+    It means nothing where the shell is not closed. Tetrahedra stand on the middle of all vertices, so that a part far
+    from the origin loses no digits.
     """
     corner = faces[:, 0]
     tetra = np.zeros(len(faces))
@@ -38,11 +38,11 @@ def signed(vertices: Floats, faces: Ints, areas: Floats, shells: Ints, n: int) -
 
 
 def side_by_side(one: Floats, other: Floats) -> Bools:
-    """Return whether closed shells of these volumes, which meet in faces that look opposite ways, have material on both
-    sides.
+    """Return whether two closed shells that meet in faces which look opposite ways have material on both sides.
 
-    Two solids have; a cavity and the wall's outer face have not: the wall is without thickness there. What stands in a
-    cavity has less volume than the cavity, whose volume is below zero. 0 stands for a shell that is not closed.
+    Arguments are their volumes, 0 for a shell that is not closed. Two solids have; a cavity and the wall's outer face
+    have not: the wall is without thickness there. What stands in a cavity has less volume than the cavity, whose volume
+    is below zero.
     """
     return np.asarray((one * other > 0) | ((one * other < 0) & (one + other < -1e-9 * np.abs(one))))
 

@@ -29,9 +29,7 @@ def github(reports: Sequence[FileReport]) -> str:
 
 
 def _data(text: str) -> str:
-    """Return text of a workflow command: line breaks as the runner decodes them, other control characters shown, not
-    sent.
-    """
+    """Return text of a workflow command: line breaks as the runner decodes them, other control characters shown."""
     lines = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
     return printable(lines)
 

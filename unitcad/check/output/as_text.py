@@ -64,8 +64,9 @@ def summary(reports: Sequence[FileReport]) -> str:
 
 
 def statistics(reports: Sequence[FileReport]) -> str:
-    """Return how many files each rule hit and how often, most files first. A finding that counts bytes is one
-    occurrence.
+    """Return how many files each rule hit and how often, most files first.
+
+    A finding that counts bytes is one occurrence.
     """
     files: Counter[str] = Counter()
     times: Counter[str] = Counter()

@@ -20,8 +20,9 @@ def render(
     config: str | None = None,
     baseline: str | None = None,
 ) -> str:
-    """Return all reports in one of FORMATS, ending in a newline; JSON names the files of settings and of known
-    findings.
+    """Return all reports in one of FORMATS, ending in a newline.
+
+    JSON names `config` and `baseline`, the files of settings and of known findings.
     """
     written = _written(reports, format_, fail_on, config, baseline)
     return _SURROGATE.sub(partial(_escaped, format_ in ("json", "sarif")), written)
@@ -56,9 +57,7 @@ _SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def _escaped(quoted: bool, match: re.Match[str]) -> str:
-    """Return what UTF-8 cannot hold, such as a byte of a file's name that is no text, as \xe4; quoted for JSON's
-    strings.
-    """
+    """Return what UTF-8 cannot hold, such as a byte of a file's name, as \\xe4; `quoted` for JSON's strings."""
     code = ord(match.group())
     text = f"\\x{code - 0xDC00:02x}" if 0xDC80 <= code <= 0xDCFF else f"\\u{code:04x}"
     return text.replace("\\", "\\\\") if quoted else text

@@ -123,8 +123,9 @@ def _in_triangles(
 
 
 def _cut(points: Floats, deadline: Deadline) -> tuple[Ints, Floats]:
-    """Return triangles (k, n - 2, 3) of polygons (k, n, 3) as places in them; how far each is bent, mm, 0 where it is
-    flat.
+    """Return triangles (k, n - 2, 3) of polygons (k, n, 3) as places in them, and how far each is bent.
+
+    That is in mm, 0 where it is flat.
     """
     n = points.shape[1]
     with np.errstate(all="ignore"):

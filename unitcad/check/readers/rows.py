@@ -68,9 +68,7 @@ def plain(raw: bytes, findings: list[Finding]) -> bytes:
 
 
 def blocks(raw: bytes, at: int, deadline: Deadline, line: int = 1) -> Iterator[tuple[Ints, int]]:
-    """Yield whole lines of the text from `at` on as bytes (n,), each block ending in a newline, with their
-    first line.
-    """
+    """Yield whole lines from `at` on as bytes (n,), each ending in a newline, with the number of its first line."""
     while at < len(raw):
         deadline.tick()
         cut = raw.find(b"\n", min(at + BLOCK, len(raw)))
@@ -102,8 +100,7 @@ def words(block: Ints) -> tuple[Ints, Ints]:
 
 
 def rows_of(block: Ints, line: int, *, integers: bool = False, which: Ints | None = None) -> Rows:
-    """Return the numbers of a block that begins on `line`, a row for each line that has any, or for each of the lines
-    `which`.
+    """Return the numbers of a block that begins on `line`: a row for each line that has any, or for the lines `which`.
 
     Raises `Unreadable` (F004) for a word that is no number.
     """
@@ -155,8 +152,9 @@ def columns(table: Rows, which: slice, most: int) -> Floats:
 
 
 def lengths(counts: Floats, room: Ints, lines: Ints, what: str = "face") -> Ints:
-    """Return the lengths of lists whose rows have `room` numbers for them. Raises `Unreadable` (F003) where one is
-    longer.
+    """Return the lengths of lists whose rows have `room` numbers for them.
+
+    Raises `Unreadable` (F003) where one is longer.
     """
     bad = np.flatnonzero(~((counts >= 0) & (counts <= room) & (counts == np.floor(counts))))
     if len(bad):

@@ -80,8 +80,9 @@ def check_print(part: Inspection, printer: Printer) -> Iterator[Finding]:
 
 
 def _border(topology: Topology, beyond: Ints, bed: float) -> tuple[Floats, Floats]:
-    """Return border edges in plan (n, 2, 2), and whether each is held: it lies on the bed, or the face beyond
-    goes down.
+    """Return border edges in plan (n, 2, 2), and whether each is held.
+
+    It is where it lies on the bed, or where the face beyond goes down.
     """
     faces, vertices = topology.mesh.faces, topology.mesh.vertices
     face, side = beyond // 3, beyond % 3

@@ -98,9 +98,7 @@ def _patches(topology: Topology, rays: Rays, upright: float) -> list[tuple[float
 
 
 def _reach(cloud: Floats, lying: bool) -> float:
-    """Measure how far a thin patch reaches across its longest direction, mm: its height, or its lesser extent
-    in plan.
-    """
+    """Measure how far a thin patch reaches across its longest direction, mm: its height, or lesser extent in plan."""
     if not lying:
         return float(np.ptp(cloud[:, 2]))
     plan = cloud[:, :2] - cloud[:, :2].mean(axis=0)

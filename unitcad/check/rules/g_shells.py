@@ -120,9 +120,7 @@ def expected(there: int | None, wanted: int | None, word: str = "shell") -> Iter
 
 
 def specks(low: Floats, high: Floats, asked: Bools) -> list[Finding]:
-    """Apply G010 to the bodies `asked` of those with these boxes, (n, 3) mm, where one of them is as large as
-    a part.
-    """
+    """Apply G010 to the bodies `asked` of those with these boxes, (n, 3) mm, where one of them is large."""
     side = (high - low).max(axis=1, initial=0)
     tiny = np.flatnonzero(asked & (side < SPECK))
     if not len(tiny) or side.max() < BODY:

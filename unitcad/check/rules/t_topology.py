@@ -199,8 +199,9 @@ def _exactly_flat(corners: Floats) -> Bools:
 
 
 def _stored_normals(mesh: Mesh, normals: Floats, kept: Ints, areas: Floats) -> Iterator[Finding]:
-    """Apply T013; a stored normal of zeros is none, and a face lower than a thousandth of its length has no
-    direction.
+    """Apply T013.
+
+    A stored normal of zeros is none, and a face lower than a thousandth of its length has no direction.
     """
     stored = normals[kept]
     lengths = np.sqrt(np.einsum("ij,ij->i", stored, stored, dtype=np.float64))
