@@ -193,10 +193,10 @@ def test_a_manifest_holds_the_files_that_are_not_judged(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("{}", "it lacks 'parts'"),
-        ('{"parts": [{"name": "a"}]}', "it lacks 'files'"),
-        ("[]", "an entry has a wrong type"),
-        ('{"parts": [3]}', "an entry has a wrong type"),
+        ("{}", "its top level lacks the key 'parts'"),
+        ('{"parts": [{"name": "a"}]}', "parts[0] lacks the key 'role'"),
+        ("[]", "its top level has a value of the wrong kind"),
+        ('{"parts": [3]}', "parts[0] has a value of the wrong kind"),
     ],
 )
 def test_a_bad_manifest_is_one_sentence(folder: Path, content: str, said: str) -> None:

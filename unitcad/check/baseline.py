@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from unitcad import files
-from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, Location
+from unitcad.check.findings import SEVERITIES, Facts, FileReport, Finding, Location, Point, rounded
 from unitcad.check.rules.registry import rules
 from unitcad.errors import UnitcadError, misfit
 from unitcad.geometry.arrays import Bools, Floats
@@ -35,7 +35,7 @@ class Entry(msgspec.Struct, frozen=True, omit_defaults=True, forbid_unknown_fiel
     code: str
     severity: str
     count: int
-    places: list[tuple[float, float, float]] = []
+    places: list[Point] = []
     names: list[str] = []
 
 
@@ -94,14 +94,9 @@ def _may_be(finding: Finding) -> bool:
 
 
 def _entry(finding: Finding) -> Entry:
-    places = sorted({_rounded(place.centre) for place in finding.locations if place.centre is not None})
+    places = sorted({rounded(place.centre) for place in finding.locations if place.centre is not None})
     names = sorted({_name(place) for place in finding.locations if place.centre is None})
     return Entry(finding.code, finding.severity, finding.count, places, names)
-
-
-def _rounded(point: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = (float(f"{value:.9g}") + 0.0 for value in point)
-    return x, y, z
 
 
 def _name(place: Location) -> str:

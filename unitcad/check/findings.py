@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from unitcad.check.detail import detail
@@ -19,6 +20,11 @@ _MOST_CODES = 5
 
 
 Point = tuple[float, float, float]
+
+
+def rounded(xyz: Point) -> Point:
+    """Return coordinates to nine digits, never -0."""
+    return point(float(f"{value:.9g}") + 0.0 for value in xyz)
 
 
 def point(values: Iterable[SupportsFloat]) -> Point:
@@ -63,7 +69,7 @@ class Location:
         if self.face is not None:
             known |= {"face": self.face, "faces": list(self.faces)}
         if self.xyz is not None:
-            known["xyz"] = [float(f"{v:.9g}") + 0.0 for v in self.xyz]
+            known["xyz"] = list(rounded(self.xyz))
         if self.line is not None:
             known["line"] = self.line
         return known
@@ -124,15 +130,9 @@ class Facts:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it JSON-ready; bbox_mm is [[x, y, z] low, [x, y, z] high]."""
-        return {
-            "triangles": self.triangles,
-            "vertices": self.vertices,
-            "shells": self.shells,
-            "volume_mm3": self.volume_mm3,
-            "area_mm2": self.area_mm2,
-            "bbox_mm": None if self.bbox_mm is None else [list(self.bbox_mm[0]), list(self.bbox_mm[1])],
-            "watertight": self.watertight,
-        }
+        import msgspec
+
+        return msgspec.to_builtins(self)
 
 
 @dataclass(frozen=True, repr=False)
@@ -220,30 +220,25 @@ def counted(n: int, one: str, many: str = "") -> str:
 
 
 def merge(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Merge to one finding a rule, worst first: counts added, two messages and the first places kept, worst
-    severity.
+    """Merge to one finding a rule, the worst first.
+
+    Counts are added, the first two messages and the first places are kept, the worst severity counts.
     """
-    by_code: dict[str, Finding] = {}
-    merged: set[str] = set()
-    for new in findings:
-        old = by_code.get(new.code)
-        if old is None:
-            by_code[new.code] = replace(new, locations=new.locations[: detail().locations])
-            continue
-        merged.add(new.code)
-        worst = max(old.severity, new.severity, key=SEVERITIES.index)
-        message = old.message
-        if new.message != message and "; and " not in message:
-            message = f"{message}; and {new.message}"
-        by_code[new.code] = Finding(
-            new.code,
-            worst,
-            message,
-            old.count + new.count,
-            (old.locations + new.locations)[: detail().locations],
-            old.ends or new.ends,
-        )
-    for code in merged:
-        finding = by_code[code]
-        by_code[code] = replace(finding, message=f"{finding.message} ({finding.count} in all)")
-    return tuple(sorted(by_code.values(), key=lambda finding: (-SEVERITIES.index(finding.severity), finding.code)))
+    by_code: dict[str, list[Finding]] = {}
+    for finding in findings:
+        by_code.setdefault(finding.code, []).append(finding)
+    merged = [_together(alike) for alike in by_code.values()]
+    return tuple(sorted(merged, key=lambda finding: (-SEVERITIES.index(finding.severity), finding.code)))
+
+
+def _together(alike: list[Finding]) -> Finding:
+    count = sum(finding.count for finding in alike)
+    message = "; and ".join(list(dict.fromkeys(finding.message for finding in alike))[:2])
+    return Finding(
+        alike[0].code,
+        max((finding.severity for finding in alike), key=SEVERITIES.index),
+        f"{message} ({count} in all)" if len(alike) > 1 else message,
+        count,
+        tuple(islice(chain.from_iterable(finding.locations for finding in alike), detail().locations)),
+        any(finding.ends for finding in alike),
+    )

@@ -6,13 +6,14 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
-from typing import Any
+
+import msgspec
 
 from unitcad import catalogue, files
 from unitcad.check.findings import FileReport, counted, merge
 from unitcad.check.options import Options
 from unitcad.check.rules.m_manifest import M004, M005, ListedFile, check_listed
-from unitcad.errors import UnitcadError
+from unitcad.errors import UnitcadError, misfit
 
 _MESHES = ("stl", "3mf")
 Choice = Callable[[str], Options]
@@ -31,39 +32,47 @@ class Listing:
     outside: tuple[str, ...] = ()
 
 
+class _File(msgspec.Struct):
+    path: str
+    sha256: str | None = None
+
+
+class _Part(msgspec.Struct):
+    name: str
+    role: str
+    files: dict[str, _File]
+    volume_mm3: float | None = None
+    solids: int = 1
+
+
+class _Manifest(msgspec.Struct):
+    """What is read of a build's manifest."""
+
+    parts: list[_Part]
+    printer: object = None
+
+
 def read(where: str) -> Listing:
     """Read a manifest (its path or its folder). Raises `UnitcadError` if it is none."""
     path = Path(where)
     path = path / "manifest.json" if path.is_dir() else path
     try:
-        return _listing(path, files.read_json(path))
+        manifest = msgspec.convert(files.read_json(path), _Manifest)
     except UnitcadError as error:
         raise UnitcadError(f"--manifest {where}: cannot be read: {error}") from error
-    except KeyError as error:
-        raise UnitcadError(f"--manifest {where}: not a manifest of `unitcad build`: it lacks {error}") from error
-    except (TypeError, ValueError, AttributeError) as error:
-        raise UnitcadError(
-            f"--manifest {where}: not a manifest of `unitcad build`: an entry has a wrong type"
-        ) from error
-
-
-def _listing(manifest: Path, data: Any) -> Listing:
-    files: dict[str, ListedFile] = {}
+    except msgspec.ValidationError as error:
+        raise UnitcadError(f"--manifest {where}: not a manifest of `unitcad build`: {misfit(error)}") from error
+    listed: dict[str, ListedFile] = {}
     outside: list[str] = []
-    for part in data["parts"]:
-        for entry in part["files"].values():
-            if leads_outside(manifest.parent, entry["path"]):
-                outside.append(entry["path"])
+    for part in manifest.parts:
+        for file in part.files.values():
+            if leads_outside(path.parent, file.path):
+                outside.append(file.path)
                 continue
-            path = os.path.abspath(manifest.parent / entry["path"])
-            sha256, volume, solids = entry.get("sha256"), part.get("volume_mm3"), part.get("solids", 1)
-            if not (isinstance(sha256, str | None) and isinstance(volume, int | float | None) and type(solids) is int):
-                raise TypeError
-            new = ListedFile((part["name"],), part["role"] == "tool", sha256, volume, solids)
-            old = files.get(path)
-            files[path] = new if old is None else _together(old, new)
-    printer = data.get("printer")
-    return Listing(manifest, files, printer if isinstance(printer, str) else None, tuple(outside))
+            place = os.path.abspath(path.parent / file.path)
+            new = ListedFile((part.name,), part.role == "tool", file.sha256, part.volume_mm3, part.solids)
+            listed[place] = _together(listed[place], new) if place in listed else new
+    return Listing(path, listed, manifest.printer if isinstance(manifest.printer, str) else None, tuple(outside))
 
 
 def leads_outside(folder: Path, listed: str) -> bool:
@@ -126,9 +135,7 @@ def unchecked(listing: Listing, checked: Sequence[str], options: Choice) -> list
     reports = [compare(listing, FileReport(path), options(path)) for path in left]
     name = files.seen_from(listing.path)
     if listing.outside and options(name).wants("M005"):
-        shown = ", ".join(repr(path[:80]) for path in listing.outside[:3]) + (
-            ", ..." if len(listing.outside) > 3 else ""
-        )
+        shown = ", ".join([*(repr(path[:80]) for path in listing.outside[:3]), *["..."][: len(listing.outside) > 3]])
         text = f"{counted(len(listing.outside), 'path')} outside the manifest's folder: {shown}"
         reports.append(FileReport(name, (M005.finding(text, len(listing.outside)),)))
     return [report for report in reports if report.findings]

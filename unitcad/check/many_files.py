@@ -20,7 +20,7 @@ from unitcad.check.findings import FileReport
 from unitcad.check.one_file import check_file
 from unitcad.check.options import Options
 from unitcad.check.readers import read_step
-from unitcad.check.readers.sniff import SUFFIXES
+from unitcad.check.readers.sniff import kind_of
 from unitcad.check.rules.f_file import F012
 from unitcad.check.rules.f_limits import F011, OutOfTime, Unreadable
 
@@ -33,7 +33,7 @@ Then = Callable[[FileReport], FileReport]
 def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
     """Return files for names that may be folders or globs, without repeats; a report for each name that gives none.
 
-    So for a folder's STEP files where none can be read: a warning, since nobody named them.
+    A folder's STEP files that cannot be read here give a warning each, since they were not named.
     """
     files: list[str] = []
     empty: list[FileReport] = []
@@ -43,9 +43,12 @@ def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
             inside = _inside(_walked(path))
             if not inside:
                 empty.append(FileReport(name, (F012.finding("no mesh file in this folder"),)))
-            able, unable = _readable(inside)
-            files += able
-            empty += unable
+            for file in inside:
+                if kind_of(file) == "step" and not read_step.installed():
+                    warning = F012.finding(f"{read_step.NEEDS}; not checked", severity="warning")
+                    empty.append(FileReport(file, (warning,)))
+                else:
+                    files.append(file)
         elif not path.exists() and glob.has_magic(name):
             inside = _inside(p for p in glob.glob(name, recursive=True) if os.path.isfile(p))
             if not inside:
@@ -62,17 +65,8 @@ def _walked(folder: Path) -> Iterator[str]:
         below[:] = [name for name in below if not name.startswith(".")]
         for name in names:
             path = Path(here, name)
-            if path.suffix.lower() in SUFFIXES and path.is_file():
+            if kind_of(name) and path.is_file():
                 yield str(path)
-
-
-def _readable(paths: list[str]) -> tuple[list[str], list[FileReport]]:
-    """Return files of a folder that can be checked here, and for those that only an extra reads a report with a
-    warning.
-    """
-    step = [] if read_step.installed() else [path for path in paths if Path(path).suffix.lower() in (".step", ".stp")]
-    warning = F012.finding(f"{read_step.NEEDS}; not checked", severity="warning")
-    return [path for path in paths if path not in step], [FileReport(path, (warning,)) for path in step]
 
 
 def _inside(paths: Iterable[str]) -> list[str]:
@@ -146,22 +140,16 @@ def _in_processes(
                 yield future.result()
                 done += 1
         except BrokenProcessPool:
-            # A worker died (killed for its memory, or a crash in native code). Which file it was is found by
-            # checking the first unfinished one alone.
-            yield _alone(*left[done], memory_mb, then)
+            if len(left) == 1:
+                why = "the process that checked it died (memory, or a fault in native code)"
+                yield _stopped(left[0][0], why)
+            else:  # which file it was is found by checking the first unfinished one alone
+                yield from _in_processes(left[done : done + 1], 1, memory_mb, then)
             done += 1
         finally:
             # Workers with nothing left to do are waited for, or their pipes close under the interpreter's own exit.
             pool.shutdown(wait=done == len(futures), cancel_futures=True)
         left = left[done:]
-
-
-def _alone(path: str, options: Options, memory_mb: int | None, then: Then | None) -> FileReport:
-    with children.safe_path(), ProcessPoolExecutor(1, get_context("spawn"), _limit_memory, (memory_mb,)) as pool:
-        try:
-            return pool.submit(guarded, path, options, then).result()
-        except BrokenProcessPool:
-            return _stopped(path, "the process that checked it died (memory, or a fault in native code)")
 
 
 def _limit_memory(memory_mb: int | None) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from unitcad.check.detail import detail
-from unitcad.check.findings import Finding, Location, counted
+from unitcad.check.findings import Finding, Location, counted, point
 from unitcad.check.geometry.coverings import folded_edges, kinds, through_edges
 from unitcad.check.geometry.edges import edges_of
 from unitcad.check.geometry.self_crossing import Crossings, Faces, facing, joined
@@ -129,11 +129,11 @@ def _places(
     grid = 4 * max(float32_step(faces.vertices), 1e-300)
     listed = max(_LISTED, detail().locations)
     chosen = np.arange(0, len(pairs), max(1, len(pairs) // listed))[:listed]
-    corners = faces.vertices[faces.corners[:, pairs[chosen]].transpose(1, 2, 0)].tolist()
+    corners = faces.vertices[faces.corners[:, pairs[chosen]].transpose(1, 2, 0)]
     names = np.sort(faces.original[pairs[chosen]], axis=1).tolist()
     for at, (a, b), (one, other) in zip(chosen.tolist(), corners, names, strict=True):
-        x, y, z = common_point(a, b) or (sum(values) / 3 for values in zip(*a, strict=True))
-        xyz = x + 0.0, y + 0.0, z + 0.0  # no -0
+        common = common_point(a, b)
+        xyz = point((a.mean(axis=0) if common is None else common) + 0.0)  # no -0
         near = tuple(round(v / grid) for v in xyz)
         if near in by_place:
             continue
