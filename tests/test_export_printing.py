@@ -89,8 +89,8 @@ def test_ready_mesh_does_not_depend_on_the_order_of_faces():
 def test_stl_bytes_are_the_format(tmp_path):
     vertices, faces = printing.print_ready(*arrays(realise(cup().shape, 96)))
     path = tmp_path / "cup2.stl"
-    stl.write(path, vertices, faces, "cup2")
-    data = path.read_bytes()
+    data = stl.content(vertices, faces, "cup2")
+    path.write_bytes(data)
     assert len(data) == 84 + 50 * len(faces)
     assert data[:80].decode("ascii").rstrip() == "unitcad, mm: cup2"
     assert int.from_bytes(data[80:84], "little") == len(faces)

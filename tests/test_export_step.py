@@ -15,6 +15,8 @@ from unitcad.validation import templates
 
 occt = pytest.importorskip("unitcad.kernels.occt", exc_type=UnitcadError)
 step = pytest.importorskip("unitcad.export.step", exc_type=UnitcadError)
+import step_reader  # noqa: E402  it needs OCP
+
 BODIES = all_bodies()
 
 
@@ -26,10 +28,10 @@ def written(tmp_path_factory) -> Path:
 
 
 def test_read_back_equals_written(written):
-    found = step.read(written)
+    bodies_read = step_reader.read(written)
     solids = occt.solids(body.shape for body in BODIES)
-    assert [body.name for body in found] == [body.name for body in BODIES]
-    for back, body, solid in zip(found, BODIES, solids, strict=True):
+    assert [body.name for body in bodies_read] == [body.name for body in BODIES]
+    for back, body, solid in zip(bodies_read, BODIES, solids, strict=True):
         true = occt.measure(solid)
         assert back.colour == pytest.approx(body.colour, abs=1e-6)
         assert back.measures.solids == true.solids == 1
@@ -45,9 +47,9 @@ def test_every_template_comes_back_as_written(template, tmp_path, monkeypatch):
     variant = Variant.of(template)
     bodies = (*variant.unit, *variant.plan.tools)
     step.write(tmp_path / "all.step", bodies, "all")
-    found = step.read(tmp_path / "all.step")
-    assert [(b.name, b.colour) for b in found] == [(b.name, pytest.approx(b.colour, abs=1e-6)) for b in bodies]
-    for back, solid in zip(found, made, strict=True):
+    bodies_read = step_reader.read(tmp_path / "all.step")
+    assert [(b.name, b.colour) for b in bodies_read] == [(b.name, pytest.approx(b.colour, abs=1e-6)) for b in bodies]
+    for back, solid in zip(bodies_read, made, strict=True):
         true = occt.measure(solid)
         assert back.measures.solids == true.solids == 1
         assert back.measures.volume == pytest.approx(true.volume, rel=1e-9)
@@ -55,18 +57,18 @@ def test_every_template_comes_back_as_written(template, tmp_path, monkeypatch):
 
 
 def test_a_fault_shows_when_read_back(tmp_path):
-    """A tool left out of the cut is a part in ten thousand of the volume, and seen."""
+    """A tool left out of the cut is a part in ten thousand of the volume, and shows."""
     body = cup()
     assert isinstance(body.shape, Cut)
     step.write(
         tmp_path / "a.step", [Body("cup2", "tool", "cup", Cut(body.shape.body, body.shape.tools[:-1]), (0, 0, 0))], "a"
     )
-    back = step.read(tmp_path / "a.step")[0]
+    back = step_reader.read(tmp_path / "a.step")[0]
     assert back.measures.volume != pytest.approx(occt.measure(occt.solids([body.shape])[0]).volume, rel=1e-4)
 
 
 def test_other_readers_find_names_and_volumes(written):
-    """What build123d makes of the file: its own reader's labels, colours and solids."""
+    """build123d's own reader returns the labels, colours and solids."""
     build123d = pytest.importorskip("build123d", exc_type=Exception)
     whole = build123d.import_step(str(written))
     assert [child.label for child in whole.children] == [body.name for body in BODIES]
@@ -117,9 +119,9 @@ def test_bodies_of_one_shape_keep_their_own_names_colours_and_places(tmp_path):
         Body("tongue3", "tool", "tongue", shape, (0, 0, 1)),
     ]
     step.write(tmp_path / "pair.step", pair, "pair")
-    found = step.read(tmp_path / "pair.step")
-    assert [(body.name, body.colour) for body in found] == [(body.name, body.colour) for body in pair]
-    assert found[1].measures.box[2] - found[0].measures.box[2] == pytest.approx(5, abs=1e-9)
+    bodies_read = step_reader.read(tmp_path / "pair.step")
+    assert [(body.name, body.colour) for body in bodies_read] == [(body.name, body.colour) for body in pair]
+    assert bodies_read[1].measures.box[2] - bodies_read[0].measures.box[2] == pytest.approx(5, abs=1e-9)
 
 
 def test_a_body_that_occt_gets_wrong_is_not_written():
@@ -131,10 +133,4 @@ def test_a_body_that_occt_gets_wrong_is_not_written():
 
 def test_names_are_escaped(tmp_path):
     step.write(tmp_path / "a.step", [Body("o'ne", "tool", "coupon", tube().shape, (0, 0, 0))], "it's; a")
-    assert step.read(tmp_path / "a.step")[0].name == "o'ne"
-
-
-def test_an_unreadable_file_is_refused(tmp_path):
-    (tmp_path / "a.step").write_text("<html>")
-    with pytest.raises(UnitcadError, match="could not read"):
-        step.read(tmp_path / "a.step")
+    assert step_reader.read(tmp_path / "a.step")[0].name == "o'ne"

@@ -72,7 +72,7 @@ def assert_breps_agree(shape, share=1e-9):
 
 def assert_mesh_within_bound(shape, segments, reference):
     solid = mesh.realise(shape, segments)
-    allowed = bounds.box_bound(shape, segments)
+    allowed = 2 * bounds.deviation(shape, segments)
     assert len(solid.decompose()) == reference.solids
     assert abs(solid.volume() - reference.volume) <= bounds.volume_bound(shape, segments) + 1e-9 * reference.volume
     for side, (found, true) in enumerate(zip(solid.bounding_box(), reference.box, strict=True)):

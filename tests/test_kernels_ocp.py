@@ -1,4 +1,4 @@
-"""A missing or broken OCP: one message, and it tells how to mend it."""
+"""A missing or broken OCP: one message, and it tells how to fix it."""
 
 import subprocess
 import sys

@@ -1,7 +1,7 @@
 """Programs that end when this process ends, however it ends.
 
-A program is started by a keeper: a small process that holds one end of a pipe. The system closes our end when we end,
-by SIGKILL too; the keeper then ends the program and its process group. Nothing here depends on a handler of ours.
+A program is started by a keeper: a small process that holds one end of a pipe. The system closes the other end when
+this process ends, by SIGKILL too; the keeper then ends the program and its process group. No signal handler is needed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 
 GRACE_S = 2.0
-"""How long a program that was asked to end may take until it is killed."""
+"""Seconds from the request that a program end until it is killed."""
 
 
 def run(
@@ -45,7 +45,7 @@ def started(
         raise FileNotFoundError(command[0])
     reading, lifeline = os.pipe()
     try:
-        # Its own session: what a terminal sends to our group is ours to handle.
+        # Its own session: a signal from a terminal reaches this process alone.
         keeper = subprocess.Popen(
             [sys.executable, "-I", "-S", __file__, program, *command[1:]],
             stdin=reading, stdout=subprocess.PIPE, stderr=stderr, env=env, start_new_session=True,
@@ -72,7 +72,7 @@ def started(
 def safe_path() -> Iterator[None]:
     """Keep Python processes that are started in this block from importing anything from the folder they start in.
 
-    For `multiprocessing`, whose commands are its own; a command of ours has -P.
+    For `multiprocessing`, which makes its own commands; commands made here have -P.
     """
     before = os.environ.get("PYTHONSAFEPATH")
     os.environ["PYTHONSAFEPATH"] = "1"
@@ -103,7 +103,7 @@ def _write(pipe, content: bytes) -> None:
 def _keep(command: list[str]) -> int:
     """Run a program, as its keeper, until it ends or the pipe does; return its exit code, as a shell counts it."""
     lifeline = sys.stdin.buffer
-    # The whole content first: nothing that the program does can keep us from reading the pipe's end.
+    # The whole content first: then the program can't delay the reading of the pipe's end.
     size = int.from_bytes(lifeline.read(8), "little")
     content = lifeline.read(size)
     if len(content) < size:

@@ -1,4 +1,4 @@
-"""The errors that a person may meet: one clear sentence each; the command line prints it, exits with `exit_code`."""
+"""Errors for users: one clear sentence each, which the command line prints before it exits with `exit_code`."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class UnitcadError(Exception):
 
 
 class Missing(UnitcadError):
-    """Something that this machine or installation lacks: a library of an extra, a folder that only a clone has."""
+    """A lack of this machine or installation: a library of an extra, a folder that only a clone has."""
 
 
 class Refusal(UnitcadError):
-    """A value that can't be: which field, its value, the limit it breaks and the nearest accepted value.
+    """A value that is refused: its field, the value, the limit that it breaks and the nearest accepted value.
 
     `nearest` is a value that may be typed in `field`'s place and that meets this limit (it may then meet another one).
     `value` is None for a field that is missing.

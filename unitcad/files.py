@@ -1,8 +1,8 @@
-"""The one place that reads files which others may have put there, and that writes files whole.
+"""Reading of files that others may have written, and writing of whole files.
 
-Reading refuses what is not a regular file, before it is opened, and what is larger than it may be. Writing goes to a
-fresh file in a scratch folder of an unpredictable name, then renames: no link that lies at the target or at a
-temporary name is written through, and the target is the old file or the new one, never half of it.
+Reading refuses what is not a regular file, before it is opened, and what is larger than allowed. Writing goes to a
+fresh file in a scratch folder of an unpredictable name, then renames: nothing is written through a link at the target
+or at a temporary name, and the target is the old file or the new one, never half of it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LARGEST_TABLE = 256_000_000
 TEMPORARY = ".tmp-"
 MARK, LOCK = "unitcad-scratch", "unitcad-lock"
 """The files in every scratch folder: the mark holds FORMAT, the folder's token, a name; the lock is held while its
-maker lives. They are two, since Windows lets nobody read a locked file.
+maker lives. They are two files, since nobody can read a locked file on Windows.
 """
 FORMAT = "unitcad scratch 1"
 _TOKEN = re.compile(re.escape(TEMPORARY) + "[0-9a-f]{16}")
@@ -104,7 +104,7 @@ def regular(links: bool = True) -> Callable[[str, int], int]:
 
 
 def write(path: Path, content: bytes, *, sync: bool = False) -> None:
-    """Put a file of `content` in place of what is at `path`, with `sync` on the disk at the end. Raises OSError."""
+    """Write a file in place of what is at `path`; with `sync` it is on the disk at the end. Raises OSError."""
     with writing(path, sync=sync) as file:
         file.write(content)
 
@@ -127,8 +127,9 @@ def writing(path: Path, *, sync: bool = False) -> Iterator[IO[bytes]]:
 
 
 def write_new(path: Path, content: bytes, *, sync: bool = False) -> None:
-    """Make a file that is not there yet; none is left where that fails. Raises FileExistsError, also for a link, or
-    OSError.
+    """Make a file that is not there yet; none is left where that fails.
+
+    Raises FileExistsError, also for a link, or OSError.
     """
     with open(path, "xb") as file:
         try:
@@ -172,7 +173,7 @@ def sync_folder(folder: Path) -> None:
 def scratch(parent: Path, name: str = "") -> Iterator[Path]:
     """Make a folder in `parent` with an unpredictable name and our mark inside, removed with the block.
 
-    `name` is what in `parent` the work is for: what a killed process leaves is handed out with it by `leftovers`.
+    `name` is what in `parent` the work is for; `leftovers` yields it with the folder of a killed process.
     """
     from filelock import FileLock
 
@@ -181,7 +182,7 @@ def scratch(parent: Path, name: str = "") -> Iterator[Path]:
     try:
         folder.mkdir(0o700)
     except OSError as error:
-        error.filename = str(parent)  # the name that the person knows
+        error.filename = str(parent)  # the name that the user knows
         raise
     lock = FileLock(folder / LOCK, thread_local=False)
     try:
@@ -207,8 +208,8 @@ def _remove_scratch(folder: Path) -> None:
 def leftovers(parent: Path) -> Iterator[tuple[Path, str]]:
     """Yield the scratch folders in `parent` whose process is gone, each with its name, locked meanwhile.
 
-    Only real folders with our mark and their own token inside are given out, and those that hold our empty lock and
-    nothing else: their process ended before it wrote the mark, or after it had removed it.
+    Only real folders with our mark and their own token inside are yielded, and those that hold an empty lock alone:
+    their process ended before it wrote the mark, or after it had removed it.
     """
     from filelock import FileLock
 
@@ -242,11 +243,11 @@ def _marked(folder: Path) -> str | None:
     return name if form == FORMAT and folder.name == f"{TEMPORARY}{token}" and plain and not rest else None
 
 
-def _expect_regular(path: str, found: os.stat_result) -> None:
-    if stat.S_ISREG(found.st_mode):
+def _expect_regular(path: str, status: os.stat_result) -> None:
+    if stat.S_ISREG(status.st_mode):
         return
     kinds = {stat.S_IFLNK: "a link", stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
-    raise UnitcadError(f"{path}: is {kinds.get(stat.S_IFMT(found.st_mode), 'a device')}, not a regular file")
+    raise UnitcadError(f"{path}: is {kinds.get(stat.S_IFMT(status.st_mode), 'a device')}, not a regular file")
 
 
 def _sync(file: IO[bytes]) -> None:

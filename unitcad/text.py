@@ -1,4 +1,4 @@
-"""Text that somebody else may have chosen, made safe for where it goes: a terminal, Markdown, a spreadsheet."""
+"""Text from others, made safe for a terminal, Markdown or a spreadsheet; values as TOML."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _MARKUP = re.compile(r"[\\`*_\[\]|~]")
 
 def invisible(text: str) -> str | None:
     """Return the first character of a text that no name needs and that deceives, such as a control character."""
-    found = _INVISIBLE.search(text)
-    return found[0] if found else None
+    match = _INVISIBLE.search(text)
+    return match[0] if match else None
 
 
 def without_invisible(text: str) -> str:
@@ -30,7 +30,7 @@ def without_invisible(text: str) -> str:
 
 def printable(text: str) -> str:
     """Return a text for a terminal, in one line: such characters as Python writes them in a string."""
-    return _INVISIBLE.sub(lambda found: ascii(found[0])[1:-1], text)
+    return _INVISIBLE.sub(lambda match: ascii(match[0])[1:-1], text)
 
 
 def markdown(text: str) -> str:

@@ -19,18 +19,16 @@ def test_each_librarys_own_mesh_and_the_exact_volume_of_a_revolved_body():
     assert isinstance(shape, Revolve)
     dims = variant.dimensions
     exact = np.pi * dims.motor_radius**2 * dims.motor_height
-    ways = tessellation._ways(shape, dims.outer_radius, 0.1)
-    off = {
-        way: mesh_volume(made.vertices, made.faces)[0] / exact - 1 for way, made in ((w, m()) for w, m in ways.items())
-    }
+    methods = tessellation._methods(shape, dims.outer_radius, 0.1)
+    off = {name: mesh_volume(*method())[0] / exact - 1 for name, method in methods.items()}
     assert abs(off["manifold3d, area-true"]) < 1e-12
     assert -0.1 < off["manifold3d, plain"] < -1e-3
     for library in ("build123d", "CadQuery"):
         assert -2e-3 < off[library] < -1e-5
 
 
-def row(way, tolerance, triangles, error, distance, seconds):
-    return tessellation._Row(way, tolerance, triangles, error, distance, timing([seconds]))
+def row(method, tolerance, triangles, error, distance, seconds):
+    return tessellation._Row(method, tolerance, triangles, error, distance, timing([seconds]))
 
 
 ROWS = [

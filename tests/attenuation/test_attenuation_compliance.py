@@ -7,9 +7,9 @@ import layered_mp
 import mpmath as mp
 import numpy as np
 import pytest
-import thomson_haskell
 from scipy import optimize
 
+from unitcad.accuracy import thomson_haskell
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.errors import Refusal

@@ -20,7 +20,7 @@ from unitcad.validation import load, templates
 
 pytestmark = [
     pytest.mark.slicer,
-    pytest.mark.skipif(not slicer.installed(), reason="PrusaSlicer is not installed"),
+    pytest.mark.skipif(slicer.program() is None, reason="PrusaSlicer is not installed"),
 ]
 SETS = [(name,) for name in sorted(templates())] + [
     ("encapsulating", "moulds.cavities=[2,3]"),

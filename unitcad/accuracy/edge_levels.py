@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
 
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, frontier
+from unitcad.accuracy.result import Cell, Plot, Promise, Result, Say, Table, stars
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.accuracy.unexplained import NineLevels, unexplained
 from unitcad.accuracy.unit_fem import edge_level, pressed_skin
@@ -28,13 +30,22 @@ _DRAWN, _BARE = "finite elements, as drawn", "finite elements, without the circu
 _RADII = np.array([0, 2, 5, 7, 10, 15, 20, 30]) * 1e-3
 
 
+@dataclass(frozen=True)
+class _Model:
+    """A model's comparison with the measured levels, its time, and how many constants were fitted to them."""
+
+    judged: Judgement
+    time: Timing
+    constants: str
+
+
 def run(quick: bool, say: Say) -> Result:
     """Compare closed forms, null model and finite elements with the measured levels and ratios.
 
     Bare skin and mesh convergence come with them.
     """
     table = measured_table()
-    found: dict[str, tuple[Judgement, Timing, str]] = {}
+    models: dict[str, _Model] = {}
     calls: dict[str, Callable[[], object]] = {
         name: lambda name=name: edge_levels(table.units(4), name) for name in ("paper", "consistent", "fitted")
     }
@@ -43,34 +54,22 @@ def run(quick: bool, say: Say) -> Result:
     constants = {"paper": "1", "consistent": "1", "fitted": "2"}
     for name, judged in judgements().items():
         if name in constants:
-            found[name] = (judged, times[name], constants[name])
+            models[name] = _Model(judged, times[name], constants[name])
         elif name == "null":
-            found["null: soft inside or not"] = (judged, times["null"], "2")
+            models["null: soft inside or not"] = _Model(judged, times["null"], "2")
         else:
-            found[f"{name} (k_t once or twice)"] = (judged, times["paper"], "1")
+            models[f"{name} (k_t once or twice)"] = _Model(judged, times["paper"], "1")
     solved: dict[str, NineLevels] = {}
     for pad, name in ((True, _DRAWN), (False, _BARE)):
         say(name)
         solved[name], seconds = finite_element_levels(1.0 if quick else 2.0, pad)
-        found[name] = (judge(_given(solved[name].in_order(table)), False), timing(seconds), "0")
+        models[name] = _Model(judge(_given(solved[name].in_order(table)), False), timing(seconds), "0")
     closed = {name: NineLevels(_by_name(table, name, two_levels)) for name in (*constants, "crossings", "null")}
-    rows = tuple(_row(name, *entry) for name, entry in found.items())
-    marks = frontier([(entry[1].median, entry[0].left_out.geometric_mean) for entry in found.values()])
-    columns = (
-        "model",
-        "constants",
-        "levels",
-        "left out",
-        "ratios",
-        "left out",
-        "directions",
-        "time a level",
-        "frontier",
-    )
-    judged_table = Table(
+    marks = stars([(model.time.median, model.judged.left_out.geometric_mean) for model in models.values()])
+    comparison = Table(
         "Against nine levels and twelve ratios to controls: geometric-mean factor error (1 is exact)",
-        columns,
-        tuple((*row, "*" if mark else "") for row, mark in zip(rows, marks, strict=True)),
+        ("model", "constants", "levels", "left out", "ratios", "left out", "directions", "time a level", "frontier"),
+        tuple((*_row(name, model), mark) for (name, model), mark in zip(models.items(), marks, strict=True)),
         f"The divider's constants, fitted when this runs: kappa {fit_divider(table, np.ones(9, bool))[0]:.4g}, s "
         f"{fit_divider(table, np.ones(9, bool))[1]:.4g} (stored: {STORED_FIT['kappa']:.4g}, {STORED_FIT['s']:.4g}). "
         "Left out: each unit by constants fitted without it. Directions: of twelve ratios, how many lie on the right "
@@ -81,7 +80,7 @@ def run(quick: bool, say: Say) -> Result:
         "Error against the measured levels, each unit left out, against time",
         "seconds a level",
         "geometric-mean factor error less 1",
-        {name: ((entry[1].median, entry[0].left_out.geometric_mean - 1),) for name, entry in found.items()},
+        {name: ((model.time.median, model.judged.left_out.geometric_mean - 1),) for name, model in models.items()},
         frontier=True,
     )
     say("mesh convergence")
@@ -107,13 +106,13 @@ def run(quick: bool, say: Say) -> Result:
         suite="models",
         title="Models of the edge level",
         text=unexplained(table, solved, closed, judgements()["paper"]),
-        tables=(judged_table, _units_table(table, closed, solved), meshes, bare),
+        tables=(comparison, _units_table(table, closed, solved), meshes, bare),
         plots=(plot,),
         promises=(
             Promise("bare skin: layered solver from the finest mesh, over the mesh's own error", worst, 1.0),
             Promise("unit: last halving of the mesh changes a level by, relative", shrink, 0.01),
             Promise(
-                "fitted, left out: factor error of the levels", judgements()["fitted"].left_out.geometric_mean, 1.35
+                "fitted, left out: factor error of the levels", models["fitted"].judged.left_out.geometric_mean, 1.35
             ),
         ),
         measured=machine("numpy", "scipy", "scikit-fem"),
@@ -140,8 +139,6 @@ def finite_element_levels(fineness: float, pad: bool) -> tuple[NineLevels, list[
 
     A control has a level in both shapes, since the paper does not say which one was measured.
     """
-    import time
-
     seconds: list[float] = []
     levels: dict[str, dict[str, float]] = {}
     for name in measured_table().names:
@@ -155,8 +152,8 @@ def finite_element_levels(fineness: float, pad: bool) -> tuple[NineLevels, list[
 
 def _by_name(table: Measured, model: str, two_levels: Callable[[Measured], np.ndarray]) -> dict[str, dict[str, float]]:
     """Return the levels of a model that knows no shape."""
-    found = two_levels(table) if model == "null" else [edge_levels(table.units(i), model) for i in range(9)]
-    return {name: {"": float(level)} for name, level in zip(table.names, found, strict=True)}
+    levels = two_levels(table) if model == "null" else [edge_levels(table.units(i), model) for i in range(9)]
+    return {name: {"": float(level)} for name, level in zip(table.names, levels, strict=True)}
 
 
 def _measured(table: Measured, unit: str) -> float:
@@ -190,16 +187,15 @@ def bare_skin(finenesses: Sequence[float], repeats: int) -> tuple[Table, float]:
     medium = body(variant.tissue)
     exact = medium.response(UniformDisc(disc), omega, _RADII, rtol=1e-9).u_z
     scale = np.max(np.abs(exact))
-    calls = {n: lambda n=n: pressed_skin(medium, omega, disc, n) for n in finenesses}
-    surfaces = [call() for call in calls.values()]
-    times = [interleaved({"": call}, repeats, warm=False)[""] for call in calls.values()]
+    calls = {n: partial(pressed_skin, medium, omega, disc, n) for n in finenesses}
+    times = {n: interleaved({n: call}, repeats, warm=False)[n] for n, call in calls.items()}
     # The finite elements count z upwards.
-    values = [-surface.at(_RADII) for surface in surfaces]
+    values = [-time.value.at(_RADII) for time in times.values()]
     rows = []
-    for i, (n, surface, time) in enumerate(zip(finenesses, surfaces, times, strict=True)):
+    for i, (n, solved) in enumerate(times.items()):
         from_solver = float(np.max(np.abs(values[i] - exact)) / scale)
         own = float(np.max(np.abs(values[i] - values[i - 1])) / scale) if i else None
-        rows.append((f"{n:g}", surface.unknowns, from_solver, own, str(time)))
+        rows.append((f"{n:g}", solved.value.unknowns, from_solver, own, str(solved)))
     solver = interleaved({"": lambda: medium.response(UniformDisc(disc), omega, _RADII, rtol=1e-6)}, 5)[""]
     own_error = float(np.max(np.abs(values[-1] - values[-2])) / scale)
     table = Table(
@@ -220,20 +216,20 @@ def _given(levels: Sequence[float]) -> Fit:
     return fit
 
 
-def _row(name: str, judged: Judgement, time: Timing, constants: str) -> tuple:
-    ratios = judged.left_out_ratios
+def _row(name: str, model: _Model) -> tuple[Cell, ...]:
+    judged, ratios = model.judged, model.judged.left_out_ratios
     return (
         name,
-        constants,
+        model.constants,
         judged.levels.geometric_mean,
         judged.left_out.geometric_mean,
         judged.ratios.geometric_mean,
         ratios.geometric_mean if ratios else None,
         f"{judged.directions} of {judged.ratios.count}",
-        str(time),
+        str(model.time),
     )
 
 
 def _converging(name: str, spec: Spec, finenesses: Sequence[float]) -> tuple:
-    found = [edge_level(spec, n) for n in finenesses]
-    return (name, *(level for level, _ in found), found[-1][1])
+    solved = [edge_level(spec, n) for n in finenesses]
+    return (name, *(level for level, _ in solved), solved[-1][1])

@@ -7,7 +7,7 @@ import json
 import multiprocessing
 import os
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -162,15 +162,10 @@ def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:
 def _sweeps(values: int | None) -> Iterator[Job]:
     """Yield each extreme on a template, to the limit and past it."""
 
-    def some(of: Iterable[Any]) -> list[Any]:
-        chosen = list(of)
-        if values is None:
-            return chosen
-        return [chosen[round(len(chosen) * (i + 1) / values) - 1] for i in range(values)]
-
-    def each(name: str, base: str, change: Callable[[Any], list[str]], of: Iterable[Any]) -> Iterator[Job]:
-        for value in some(of):
-            yield name, override(read(base), change(value))
+    def each(name: str, base: str, change: Callable[[Any], list[str]], *of: Any) -> Iterator[Job]:
+        count = len(of) if values is None else values
+        for i in range(count):
+            yield name, override(read(base), change(of[round(len(of) * (i + 1) / count) - 1]))
 
     def layers(count: int, wall: float, cap: bool) -> str:
         one = f'{{ material = "ecoflex-00-30", wall_mm = {wall}' + (f", cap_mm = {max(wall, 1.2)} }}" if cap else " }")
@@ -179,61 +174,31 @@ def _sweeps(values: int | None) -> Iterator[Job]:
     def room(*walls: float) -> str:
         return f"diameter_mm={2 * (4.5 + sum(walls)):.3f}"
 
-    for base, cap in ((name, design.caps) for name, design in shipped().items()):
-        yield from each(
-            f"{base}: walls 0.4 to 12 mm",
-            base,
-            lambda w, cap=cap: [layers(2, w, cap), room(w, w)],
-            (0.4, 0.5, 0.7, 1, 3, 6, 10, 12),
-        )
-        yield from each(
-            f"{base}: diameter 8 to 250 mm",
-            base,
-            lambda d: [f"diameter_mm={d}"],
-            (8, 10, 12.2, 14, 30, 80, 150, 200, 250),
-        )
-        yield from each(
-            f"{base}: 1 to 16 layers",
-            base,
-            lambda n, cap=cap: [layers(n, 1.0, cap), room(*[1.0] * n)],
-            (1, 2, 5, 9, 12, 15, 16),
-        )
-        yield from each(
-            f"{base}: tolerance 0.0004 to 0.25 mm",
-            base,
-            lambda t: [f"output.tolerance_mm={t}"],
-            (0.25, 0.2, 0.1, 0.03, 0.003, 0.001, 0.0005, 0.0004),
-        )
-        yield from each(
-            f"{base}: plinth clearance 0.001 to 3 mm",
-            base,
-            lambda c: [f"moulds.plinth_clearance_mm={c}"],
-            (0.001, 0.01, 0.05, 0.5, 1.0, 3.0),
-        )
-    yield from each(
-        "tail 0.3 to 7 mm, one side and both",
-        default_template(),
-        lambda t: [f"fpcb.tail_width_mm={t[0]}", f"fpcb.tail={t[1]}"],
-        [(w, s) for w in (0.3, 0.5, 2.0, 5.0, 6.0, 6.29, 6.3, 7.0) for s in ("one", "both")],
-    )
-    yield from each(
-        "window clearance 0.001 to 0.6 mm",
-        default_template(),
-        lambda c: [f"moulds.window_clearance_mm={c}"],
-        (0.001, 0.01, 0.05, 0.2, 0.24, 0.3, 0.6),
-    )
-    yield from each(
-        "caps at the floor and below",
-        default_template(),
-        lambda c: [f"layers.0.cap_mm={c}", f"layers.1.cap_mm={c}"],
-        (0.49, 0.5, 0.8, 1.09, 1.094, 1.095, 1.1, 1.25),
-    )
-    yield from each(
-        "second cap at the floor and below",
-        default_template(),
-        lambda c: [f"layers.1.cap_mm={c}"],
-        (0.4, 0.5, 0.51, 0.6, 0.8),
-    )
+    # fmt: off
+    for base, design in shipped().items():
+        cap = design.caps
+        yield from each(f"{base}: walls 0.4 to 12 mm", base,
+                        lambda w, cap=cap: [layers(2, w, cap), room(w, w)], 0.4, 0.5, 0.7, 1, 3, 6, 10, 12)
+        yield from each(f"{base}: diameter 8 to 250 mm", base,
+                        lambda d: [f"diameter_mm={d}"], 8, 10, 12.2, 14, 30, 80, 150, 200, 250)
+        yield from each(f"{base}: 1 to 16 layers", base,
+                        lambda n, cap=cap: [layers(n, 1.0, cap), room(*[1.0] * n)], 1, 2, 5, 9, 12, 15, 16)
+        yield from each(f"{base}: tolerance 0.0004 to 0.25 mm", base,
+                        lambda t: [f"output.tolerance_mm={t}"], 0.25, 0.2, 0.1, 0.03, 0.003, 0.001, 0.0005, 0.0004)
+        yield from each(f"{base}: plinth clearance 0.001 to 3 mm", base,
+                        lambda c: [f"moulds.plinth_clearance_mm={c}"], 0.001, 0.01, 0.05, 0.5, 1.0, 3.0)
+    base = default_template()
+    yield from each("tail 0.3 to 7 mm, one side and both", base,
+                    lambda t: [f"fpcb.tail_width_mm={t[0]}", f"fpcb.tail={t[1]}"],
+                    *((w, s) for w in (0.3, 0.5, 2.0, 5.0, 6.0, 6.29, 6.3, 7.0) for s in ("one", "both")))
+    yield from each("window clearance 0.001 to 0.6 mm", base,
+                    lambda c: [f"moulds.window_clearance_mm={c}"], 0.001, 0.01, 0.05, 0.2, 0.24, 0.3, 0.6)
+    yield from each("caps at the floor and below", base,
+                    lambda c: [f"layers.0.cap_mm={c}", f"layers.1.cap_mm={c}"],
+                    0.49, 0.5, 0.8, 1.09, 1.094, 1.095, 1.1, 1.25)
+    yield from each("second cap at the floor and below", base,
+                    lambda c: [f"layers.1.cap_mm={c}"], 0.4, 0.5, 0.51, 0.6, 0.8)
+    # fmt: on
 
 
 def _outcome_table(groups: dict[str, list[Outcome]]) -> Table:

@@ -1,17 +1,18 @@
-"""The Hankel integral: error against time at five tolerances, and the peers of `hankel_peers` beside it."""
+"""The Hankel integral: error against time at five tolerances, beside the other methods of `hankel_peers`."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy import special
 
 from unitcad.accuracy import hankel_peers as peers
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, fastest, frontier
-from unitcad.accuracy.timing import interleaved, machine
+from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, fastest, stars
+from unitcad.accuracy.timing import Timing, interleaved, machine
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
@@ -24,7 +25,7 @@ DISC = UniformDisc(3.5e-3)
 RADII = np.array([0.5, 1, 2, 3, 4, 5, 7, 9, 12, 15, 20, 25, 30]) * 1e-3
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 _END = 3e5
-"""Where the reference's path ends, 1/m: beyond it nothing of the remainder is left (checked by doubling it)."""
+"""Where the reference's path ends, 1/m: beyond it the remainder is nothing (checked by doubling the end)."""
 _FINEST = {"undamped": 1e-9}
 """The finest rtol that a case is promised to reach."""
 _LEVELS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)
@@ -47,7 +48,7 @@ class Case:
 
     @property
     def known(self) -> np.ndarray:
-        """What the static part gives, in closed form (m/Pa)."""
+        """The static part's displacement, in closed form (m/Pa)."""
         return self.static * DISC.static(RADII)[1]
 
     def remainder(self, k: np.ndarray) -> np.ndarray:
@@ -58,23 +59,22 @@ class Case:
 
 @dataclass(frozen=True)
 class _Row:
-    way: str
+    method: str
     setting: str
     error: float
     estimate: float | None
-    seconds: float
-    shown: str
+    time: Timing
 
 
 TEXT = (
     "u_z of the four-layer forearm at 125 Hz under the motor's disc (radius 3.5 mm) at 13 radii from 0.5 to 30 mm; the "
     "same without damping; the same with nu = 0.4999999 and tan delta 0.01. The error is the largest over the radii, "
     "over the largest |u_z|, against a brute-force path: another contour and many more nodes, as each table says. It "
-    "judges the integration alone: the reference shares the compliance and the static part in closed form with unitcad "
-    "(the stability suite judges the compliance against 60 digits, and the static part against exact answers). All "
-    "ways get the same remainder after the static half-space is taken out, so none of them fights the disc's slow "
+    "measures the integration alone: the reference shares the compliance and the static part in closed form with "
+    "unitcad (the stability suite compares the compliance with 60 digits, and the static part with exact answers). All "
+    "methods get the same remainder after the static half-space is taken out, so none of them has the disc's slow "
     "tail; unitcad's time covers u_r as well, its bound on the error, and the choice of path.\n\n"
-    "The others are set up so. *quad_vec*: scipy's, one wavenumber a call, the real axis and a path lifted to "
+    "The settings of the others. *quad_vec*: scipy's, one wavenumber a call, the real axis and a path lifted to "
     f"{peers.HEIGHT:g}i /m up to {peers.POLES:g} /m, at most {peers.INTERVALS} intervals a leg, cut at {peers.END:g} "
     "/m (some 3e-9 are lost there, which a smaller tolerance does not bring back); in full runs the lifted path is "
     "timed three times, the real axis, which takes most of a minute where nothing is damped, only once, and in quick "
@@ -109,40 +109,40 @@ def run(quick: bool, say: Say) -> Result:
         doubt = float(np.max(np.abs(other - reference)) / np.max(np.abs(reference)))
         rows = _rows(case, reference, quick)
         counts = [case.medium.response(DISC, case.omega, RADII, rtol=rtol).wavenumbers for rtol in TOLERANCES]
-        ends[case.name] = [(f"{row.way}, {row.setting}: {row.shown}", row.seconds, row.error) for row in rows]
-        # A way that is off by as much as the answer is no choice at any time.
-        marks = frontier([(row.seconds, row.error if row.error < 1 else math.inf) for row in rows])
+        ends[case.name] = [(f"{row.method}, {row.setting}: {row.time}", row.time.median, row.error) for row in rows]
+        # A method that is off by as much as the answer is no choice at any time.
+        marks = stars([(row.time.median, row.error if row.error < 1 else math.inf) for row in rows])
         tables.append(
             Table(
                 case.name,
-                ("way", "setting", "error", "its own estimate", "time", "frontier"),
+                ("method", "setting", "error", "its own estimate", "time", "frontier"),
                 tuple(
-                    (r.way, r.setting, r.error, r.estimate, r.shown, "*" if mark else "")
+                    (r.method, r.setting, r.error, r.estimate, str(r.time), mark)
                     for r, mark in zip(rows, marks, strict=True)
                 ),
                 f"The reference has {_NODES:,} nodes, unitcad {min(counts):,} to {max(counts):,}. The reference's "
                 f"doubt, what a second such path differs by, is {doubt:.1e}.",
             )
         )
-        ways = dict.fromkeys(row.way for row in rows)
+        names = dict.fromkeys(row.method for row in rows)
         plots.append(
             Plot(
                 f"{case.name}: error against time",
                 "seconds for 13 radii",
                 "error over the largest |u_z|",
-                {w: tuple((r.seconds, max(r.error, 1e-17)) for r in rows if r.way == w) for w in ways},
+                {n: tuple((r.time.median, max(r.error, 1e-17)) for r in rows if r.method == n) for n in names},
             )
         )
-        own = [row for row in rows if row.way == "unitcad"]
+        own = [row for row in rows if row.method == "unitcad"]
         for row, rtol in zip(own, TOLERANCES, strict=True):
             # Without any damping the response is a limit: the finest tolerance is not reached; the estimate says so.
             if rtol >= _FINEST.get(case.name, 0.0):
                 promises.append(Promise(f"{case.name}: error over rtol {rtol:g}", row.error / max(rtol, 2e-13), 1.0))
-            # The reference itself is good to about 1e-13: below that an estimate can't be judged.
+            # The reference itself is good to about 1e-13: below that an estimate can't be checked.
             ratio = row.error / max(row.estimate or 0.0, 2e-13)
             promises.append(Promise(f"{case.name}: error over its estimate at rtol {rtol:g}", ratio, 1.0))
     picks = tuple((level, *(fastest(points, level) for points in ends.values())) for level in _LEVELS)
-    tables.append(Table("What to pick: the fastest way to an error", ("error", *ends), picks))
+    tables.append(Table("What to pick: the fastest method for an error", ("error", *ends), picks))
     return Result(
         suite="hankel",
         title="The Hankel integral: error against time",
@@ -187,60 +187,52 @@ def second_path(case: Case) -> np.ndarray:
     return brute_force(case, end=6e5, poles=9000.0, height=25.0)
 
 
+_LIFTED, _LEVEL = "quad_vec, lifted path", "quad_vec, real axis"
+Solved = tuple[np.ndarray, float | None]
+"""u_z (m/Pa) at `RADII`, and the method's own estimate of its error."""
+
+
 def _rows(case: Case, reference: np.ndarray, quick: bool) -> list[_Row]:
-    ways = _ways(case, quick)
+    methods = _methods(case, quick)
     scale = np.max(np.abs(reference))
-    values: dict[str, Found] = {}
-
-    def kept(name: str, call: Callable[[], Found]) -> Callable[[], None]:
-        return lambda: values.update({name: call()})
-
-    calls = {" ".join(key): kept(" ".join(key), call) for key, call in ways.items()}
-    lifted = {name: call for name, call in calls.items() if name.startswith(_LIFTED)}
-    level = {name: call for name, call in calls.items() if name.startswith(_LEVEL)}
-    slow = lifted.keys() | level.keys()
-    times = interleaved({name: call for name, call in calls.items() if name not in slow}, 1 if quick else 7)
-    times |= interleaved(lifted, 1 if quick else 3, warm=False)
-    times |= interleaved(level, 1, warm=False)
-    found = []
-    for way, setting in ways:
-        value, estimate = values[f"{way} {setting}"]
-        time = times[f"{way} {setting}"]
+    times: dict[tuple[str, str], Timing] = {}
+    slow = {_LIFTED: 1 if quick else 3, _LEVEL: 1}
+    times |= interleaved({key: call for key, call in methods.items() if key[0] not in slow}, 1 if quick else 7)
+    for name, repeats in slow.items():
+        times |= interleaved({key: call for key, call in methods.items() if key[0] == name}, repeats, warm=False)
+    rows = []
+    for method, setting in methods:
+        time = times[method, setting]
+        value, estimate = time.value
         error = float(np.max(np.abs(value - reference)) / scale)
         relative = None if estimate is None else estimate / scale
-        found.append(_Row(way, setting, error, relative, time.median, str(time)))
-    return found
+        rows.append(_Row(method, setting, error, relative, time))
+    return rows
 
 
-Found = tuple[np.ndarray, float | None]
-
-
-def _ways(case: Case, quick: bool) -> dict[tuple[str, str], Callable[[], Found]]:
+def _methods(case: Case, quick: bool) -> dict[tuple[str, str], Callable[[], Solved]]:
     f, known = case.remainder, case.known
-    found: dict[tuple[str, str], Callable[[], Found]] = {
-        ("unitcad", f"rtol {rtol:g}"): lambda rtol=rtol: _own(case, rtol) for rtol in TOLERANCES
+    methods: dict[tuple[str, str], Callable[[], Solved]] = {
+        ("unitcad", f"rtol {rtol:g}"): partial(_by_unitcad, case, rtol) for rtol in TOLERANCES
     }
-    for way in (_LIFTED, _LEVEL):
+    for name in (_LIFTED, _LEVEL):
         for rtol in (1e-3,) if quick else (1e-3, 1e-6, 1e-9):
-            found[way, f"tolerance {rtol:g}"] = lambda way=way, rtol=rtol: _adaptive(case, rtol, way == _LIFTED)
+            methods[name, f"tolerance {rtol:g}"] = partial(_adaptive, case, rtol, name == _LIFTED)
     for name in peers.FILTERS:
-        found["digital filter", name] = lambda name=name: (known + peers.filtered(f, RADII, name), None)
+        methods["digital filter", name] = lambda name=name: (known + peers.filtered(f, RADII, name), None)
     for n in (256, 1024, 4096, 16384):
-        found["FFTLog", f"{n} points"] = lambda n=n: (known + peers.logarithmic(f, RADII, n), None)
+        methods["FFTLog", f"{n} points"] = lambda n=n: (known + peers.logarithmic(f, RADII, n), None)
     for n in (300, 3000, 30000) if quick else (300, 3000, 30000, 300000):
-        found["uniform k", f"{n} points"] = lambda n=n: (known + peers.uniform(f, RADII, n), None)
-    return found
+        methods["uniform k", f"{n} points"] = lambda n=n: (known + peers.uniform(f, RADII, n), None)
+    return methods
 
 
-_LIFTED, _LEVEL = "quad_vec, lifted path", "quad_vec, real axis"
+def _by_unitcad(case: Case, rtol: float) -> Solved:
+    response = case.medium.response(DISC, case.omega, RADII, rtol=rtol)
+    return response.u_z, response.error
 
 
-def _own(case: Case, rtol: float) -> Found:
-    found = case.medium.response(DISC, case.omega, RADII, rtol=rtol)
-    return found.u_z, found.error
-
-
-def _adaptive(case: Case, rtol: float, lifted: bool) -> Found:
+def _adaptive(case: Case, rtol: float, lifted: bool) -> Solved:
     scale = float(np.max(np.abs(case.known)))
     value, error = peers.adaptive(case.remainder, RADII, rtol * scale, lifted)
     return case.known + value, error

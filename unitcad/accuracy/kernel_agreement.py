@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator
+from itertools import count, islice
 
 import numpy as np
 
@@ -36,20 +38,20 @@ def run(quick: bool, say: Say) -> Result:
         parts: list[Body] = [*variant.unit, *variant.plan.tools]
         shapes = [body.shape for body in parts]
         bodies += len(parts)
-        found: dict[str, list[Measures]] = {}
+        measured: dict[str, list[Measures]] = {}
         for kernel, make in makers().items():
             solids, taken = timed(lambda make=make, shapes=shapes: make(shapes))
             seconds.setdefault(kernel, []).append(taken)
-            found[kernel] = [of_brep(solid) for solid in solids]
+            measured[kernel] = [of_brep(solid) for solid in solids]
         mesh.forget()
         meshes, taken = timed(lambda shapes=shapes, n=variant.segments: [mesh.realise(s, n) for s in shapes])
         seconds.setdefault("manifold3d", []).append(taken)
-        found["manifold3d"] = [of_mesh(solid) for solid in meshes]
+        measured["manifold3d"] = [of_mesh(solid) for solid in meshes]
         for kernel in worst:
-            for exact, other in zip(found["OCCT"], found[kernel], strict=True):
+            for exact, other in zip(measured["OCCT"], measured[kernel], strict=True):
                 for quantity, value in _differences(exact, other).items():
                     worst[kernel][quantity] = max(worst[kernel][quantity], value)
-        for shape, exact, other in zip(shapes, found["OCCT"], found["manifold3d"], strict=True):
+        for shape, exact, other in zip(shapes, measured["OCCT"], measured["manifold3d"], strict=True):
             off = abs(other.volume - exact.volume)
             volume = max(volume, off / (bounds.volume_bound(shape, variant.segments) + 1e-9 * exact.volume))
             far = float(np.max(np.abs(np.subtract(other.box, exact.box))))
@@ -70,8 +72,7 @@ def run(quick: bool, say: Say) -> Result:
         text=(
             f"Every body of {len(chosen)} templates and {random} random specs ({bodies} bodies) from one tree. "
             "build123d and CadQuery share OCCT, so they agree to rounding; manifold3d shares no code with it, and "
-            "differs "
-            "by what its polygons leave out: at most the bound of `unitcad.kernels.bounds`, written down there."
+            "differs by what its polygons leave out: at most the bound of `unitcad.kernels.bounds`."
         ),
         tables=(
             Table(
@@ -94,17 +95,15 @@ def run(quick: bool, say: Say) -> Result:
 def _variants(chosen: tuple[str, ...], random: int) -> Iterator[tuple[str, Variant]]:
     for name in chosen:
         yield name, Variant.of(name)
-    seed = found = 0
-    while found < random:
-        try:
+    yield from islice(_random_variants(), random)
+
+
+def _random_variants() -> Iterator[tuple[str, Variant]]:
+    for seed in count():
+        with contextlib.suppress(Refusal):
             variant = Variant(from_data(seeded_spec(seed)))
             _ = variant.plan
-        except Refusal:
-            variant = None
-        seed += 1
-        if variant:
-            found += 1
-            yield f"random {seed - 1}", variant
+            yield f"random {seed}", variant
 
 
 def _differences(exact: Measures, other: Measures) -> dict[str, float]:

@@ -1,11 +1,12 @@
-"""What the demand-driven pipeline leaves out per template and request, and the time that it saves."""
+"""What a build leaves out per template and request, and the time that it saves."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
-from unitcad.accuracy.result import Result, Say, Table
+from unitcad.accuracy.result import Cell, Result, Say, Table
 from unitcad.accuracy.timing import interleaved, machine
 from unitcad.cache import MemoryStore
 from unitcad.pipeline import bodies
@@ -23,36 +24,34 @@ REQUESTS: dict[str, tuple[Sequence[str], Sequence[str], bool]] = {
     "unit only": (("unit",), ("stl",), True),
     "estimate only": (("estimate",), ("stl",), True),
 }
-"""Outputs, formats, checks. Shaded pictures are left aside: their time is another process'."""
+"""Outputs, formats, checks. Without shaded pictures, which another process draws."""
 
 
 def run(quick: bool, say: Say) -> Result:
     """Build every template and request, from an empty store each time."""
     chosen = (default_template(),) if quick else tuple(templates())
-    rows: list[tuple[Any, ...]] = []
+    rows: list[tuple[Cell, ...]] = []
     for name in chosen:
         say(name)
-        manifests: dict[str, dict[str, Any]] = {}
-
-        def build(request: str, name: str = name, manifests: dict[str, Any] = manifests) -> None:
-            only, formats, check = REQUESTS[request]
-            bodies.forget()
-            spec = load(name, [f"output.formats={list(formats)}"])
-            manifests[request] = make(spec, only, check, MemoryStore(), Stages()).manifest
-
-        times = interleaved({request: lambda r=request: build(r) for request in REQUESTS}, 1 if quick else 3)
+        times = interleaved({request: partial(_manifest, name, request) for request in REQUESTS}, 1 if quick else 3)
         whole = times["everything"].median
         for request, time in times.items():
-            left = "; ".join(f"{entry['what']} ({entry['why']})" for entry in manifests[request]["left_out"])
+            left = "; ".join(f"{entry['what']} ({entry['why']})" for entry in time.value["left_out"])
             rows.append((name, request, str(time), time.median / whole, left or "nothing"))
     return Result(
         suite="left-out",
         title="What is left out",
         text=(
             "A build computes what the outputs that were asked for need, and its manifest says what it left out and "
-            "why. "
-            "Here every request starts from an empty store in a warm process; the share is of the time for everything."
+            "why. Here every request starts from an empty store in a warm process; the share is of the time for "
+            "everything."
         ),
         tables=(Table("By template and request", ("template", "asked for", "time", "share", "left out"), tuple(rows)),),
         measured=machine("manifold3d", "cadquery-ocp"),
     )
+
+
+def _manifest(template: str, request: str) -> dict[str, Any]:
+    only, formats, check = REQUESTS[request]
+    bodies.forget()
+    return make(load(template, [f"output.formats={list(formats)}"]), only, check, MemoryStore(), Stages()).manifest

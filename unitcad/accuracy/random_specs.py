@@ -20,7 +20,7 @@ _STEP = 1000
 
 
 class Choose(Protocol):
-    """Who decides: a seed or hypothesis."""
+    """A source of choices: a seed or hypothesis."""
 
     def whole(self, low: int, high: int, /) -> int:
         """Return a whole number, both ends included."""
@@ -33,11 +33,10 @@ class Choose(Protocol):
 
 @dataclass(frozen=True)
 class Ranges:
-    """From where each field is drawn: (least, largest), mm where a length.
+    """The range of each field: (least, largest), mm where a length.
 
-    `tail_share` is half the tail's width over the core's radius, drawn instead of the width where it is given; `edges`
-    is the share of lengths that lie on an end of their range, `singles` that of specs with one cavity whatever the
-    range says.
+    `tail_share` is half the tail's width over the core's radius, drawn instead of the width where it is given. `edges`
+    is the share of lengths that lie on an end of their range, `singles` that of specs with one cavity.
     """
 
     diameter_mm: tuple[float, float]
@@ -77,7 +76,7 @@ DOCUMENTED = Ranges(
     tolerance_mm=(0.002, 0.1),
     cavities=(1, 2),
 )
-"""What docs/spec.md says is tried out: at least 60 % of what is drawn here builds."""
+"""The ranges that docs/spec.md calls tried: at least 60 % of the specs drawn here build."""
 
 EXTREME = Ranges(
     diameter_mm=(10.0, 200.0),
@@ -97,13 +96,13 @@ EXTREME = Ranges(
     edges=0.2,
     singles=0.5,
 )
-"""To the limits and past them: most of it is refused, and nothing else may happen."""
+"""To the limits and past them: most of it is refused."""
 
 RANGES = {"documented": DOCUMENTED, "extreme": EXTREME}
 
 
 class Seeded:
-    """Chooses by a seed: the same seed, the same spec, on every machine."""
+    """Choices by a seed: the same seed, the same spec, on every machine."""
 
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)

@@ -1,6 +1,6 @@
 """Speed as ratios in one run: the default template's set against plain CadQuery, plain build123d and bare manifold3d.
 
-The scripts lie in benchmarks/, beside those of the other rooms, which are run too; so this suite needs a clone.
+The scripts lie in benchmarks/, beside other benchmarks, which are run too; so this suite needs a clone.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +32,7 @@ SCRIPTS = {
 OURS, CADQUERY, BUILD123D, BARE = SCRIPTS
 FULL = "unitcad build, the whole command"
 OTHERS = (("bench_check.py",), ("bench_attenuation.py",), ("bench_batch.py", "--rounds", "1", "--sizes", "100,1000"))
-"""Scripts of benchmarks/ with their options; batches take long, so they run once."""
+"""Other scripts of benchmarks/ with their options; batches take long, so they run once."""
 
 
 def run(quick: bool, say: Say) -> Result:
@@ -49,52 +51,42 @@ def run(quick: bool, say: Say) -> Result:
             _call(folder / script, lengths, out / name, "stl")
             errors[name] = _volume_error(out / name)
         tables = [_volume_table(errors)]
-        say("cold, STL")
-        cold = interleaved(
-            {
-                **{
-                    name: lambda s=script, n=name: _call(folder / s, lengths, out / n, "stl")
-                    for name, script in SCRIPTS.items()
-                },
-                FULL: lambda: _build(out / "build", "stl"),
-            },
-            rounds,
-        )
-        tables.append(_time_table(f"The {default_template()} set, parameters to STL, cold processes", cold, CADQUERY))
-        say("cold, STL and STEP")
-        with_step = interleaved(
-            {
-                **{
-                    name: lambda s=script, n=name: _call(folder / s, lengths, out / n, "both")
-                    for name, script in SCRIPTS.items()
-                    if name != BARE
-                },
-                FULL: lambda: _build(out / "build-step", "step,stl"),
-            },
-            rounds,
-        )
-        tables.append(_time_table("The same with STEP, cold processes", with_step, CADQUERY))
-        say("warm")
-        warmed = {}
-        for formats, title in (("stl", "STL"), ("both", "STL and STEP")):
-            names = [name for name in SCRIPTS if name != BARE or formats == "stl"]
-            times = {name: _warm(folder / SCRIPTS[name], lengths, out / name, formats, warm) for name in names}
-            warmed[formats] = times
-            tables.append(
-                _time_table(f"The same, {title}, warm: the library is loaded, geometry made anew", times, CADQUERY)
-            )
-        tables.append(_aims(cold, with_step, warmed["both"]))
+
+        def scripts(formats: str) -> list[str]:
+            return [name for name in SCRIPTS if name != BARE or formats == "stl"]  # manifold3d has no B-rep for STEP
+
+        def cold(formats: str) -> dict[str, Timing]:
+            say(f"cold, {formats}")
+            calls: dict[str, Callable[[], object]] = {
+                name: partial(_call, folder / SCRIPTS[name], lengths, out / name, formats) for name in scripts(formats)
+            }
+            calls[FULL] = partial(_build, out / f"build-{formats}", "stl" if formats == "stl" else "step,stl")
+            return interleaved(calls, rounds)
+
+        def warmed(formats: str) -> dict[str, Timing]:
+            say(f"warm, {formats}")
+            return {n: _warm(folder / SCRIPTS[n], lengths, out / n, formats, warm) for n in scripts(formats)}
+
+        cold_stl, cold_step, warm_stl, warm_step = cold("stl"), cold("both"), warmed("stl"), warmed("both")
+    warm_title = "The same, {}, warm: the library is loaded, geometry made anew"
+    tables += [
+        _time_table(f"The {default_template()} set, parameters to STL, cold processes", cold_stl, CADQUERY),
+        _time_table("The same with STEP, cold processes", cold_step, CADQUERY),
+        _time_table(warm_title.format("STL"), warm_stl, CADQUERY),
+        _time_table(warm_title.format("STL and STEP"), warm_step, CADQUERY),
+        _aims(cold_stl, cold_step, warm_step),
+    ]
     failed: list[str] = []
     for command in () if quick else OTHERS:
         script = " ".join(command)
         say(script)
         try:
             tables.append(_printed(command))
-        except UnitcadError as error:  # what the others measured is not lost
+        except UnitcadError as error:  # keep what the others measured
             say(str(error))
             failed.append(script)
             tables.append(Table(f"python benchmarks/{script}", ("failed",), ((str(error),),)))
-    worst = {name: max(map(abs, found.values())) for name, found in errors.items()}
+    worst = {name: max(map(abs, of_part.values())) for name, of_part in errors.items()}
     share = {name: worst[name] / worst[OURS] for name in SCRIPTS if name != OURS}
     return Result(
         suite="speed",
@@ -103,14 +95,14 @@ def run(quick: bool, say: Say) -> Result:
             f"Ten bodies of the {default_template()} template with its moulds: two layers, motor, circuit, base, "
             "two cups, tongue, filament stub and blade. The plain scripts draw the same parts as a user would, from "
             "the same lengths, with one boolean after the other; the angle of their STL is chosen so that the largest "
-            "volume error is near that of unitcad's meshes, which the promises hold. Cold: a new process each. "
-            "Warm times come from one process a script, so they are not interleaved. The benchmarks of checks, "
-            "estimates and batches stand below as they print themselves."
+            "volume error is near that of unitcad's meshes, which the promises hold. Cold: a new process each, taken "
+            "in turn. Warm times come from one process a script, so they are not interleaved. The benchmarks of "
+            "checks, estimates and batches stand below as they print them."
         ),
         tables=tuple(tables),
         promises=(
             Promise("benchmarks that failed", len(failed), 0),
-            Promise("largest relative volume error of a part by any way", max(worst.values()), 1e-4),
+            Promise("largest relative volume error of a part by any method", max(worst.values()), 1e-4),
             *(
                 Promise(f"{name}: largest volume error over unitcad's, or the other way round", max(s, 1 / s), 2.5)
                 for name, s in share.items()
@@ -150,12 +142,12 @@ def _volume_error(folder: Path) -> dict[str, float]:
 
     variant = Variant.of(default_template())
     bodies = (*variant.unit, *variant.plan.tools)
-    found = {}
+    errors = {}
     for body, solid in zip(bodies, occt.solids([body.shape for body in bodies]), strict=True):
         corners = _read_stl(folder / f"{body.name}.stl")
         volume = mesh_volume(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))[0]
-        found[body.name] = volume / occt.measure(solid).volume - 1
-    return found
+        errors[body.name] = volume / occt.measure(solid).volume - 1
+    return errors
 
 
 def _read_stl(file: Path) -> np.ndarray:
@@ -181,7 +173,7 @@ def _volume_table(errors: dict[str, dict[str, float]]) -> Table:
 
 def _time_table(title: str, times: dict[str, Timing], base: str) -> Table:
     rows = tuple((name, str(time), times[base].median / time.median) for name, time in times.items())
-    return Table(title, ("way", "time", f"times faster than {base}"), rows)
+    return Table(title, ("method", "time", f"times faster than {base}"), rows)
 
 
 def _aims(cold: dict[str, Timing], step: dict[str, Timing], step_warm: dict[str, Timing]) -> Table:
@@ -206,7 +198,6 @@ def _aims(cold: dict[str, Timing], step: dict[str, Timing], step_warm: dict[str,
 
 def _printed(command: tuple[str, ...]) -> Table:
     """Return what another benchmark prints, unchanged."""
-    lines = [
-        line.rstrip() for line in _call(ROOT / "benchmarks" / command[0], *command[1:]).splitlines() if line.strip()
-    ]
-    return Table(f"python benchmarks/{' '.join(command)}", (), tuple((line,) for line in lines))
+    printed = _call(ROOT / "benchmarks" / command[0], *command[1:])
+    lines = tuple((line.rstrip(),) for line in printed.splitlines() if line.strip())
+    return Table(f"python benchmarks/{' '.join(command)}", (), lines)

@@ -1,4 +1,4 @@
-"""Meshes against the B-rep: volume error and distance over time and triangles, for three ways of making them."""
+"""Meshes against the B-rep: volume error and distance over time and triangles, by four methods."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.accuracy.measures import makers, mesh_volume
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, frontier, shown
+from unitcad.accuracy.measures import mesh_volume
+from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, shown, stars
 from unitcad.accuracy.timing import Timing, interleaved, machine
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline import Variant
@@ -19,7 +19,7 @@ from unitcad.validation import default_template, load
 
 TOLERANCES = (0.1, 0.03, 0.01, 0.003, 0.001)
 ANGLE = 0.1
-"""Of OCCT's tessellation, radians: the default of `tessellate` in both libraries."""
+"""The angle of OCCT's tessellation, radians: the default of `tessellate` in both libraries."""
 DEFAULT = OutputTable().tolerance_mm
 """unitcad's tolerance where a spec names none, mm."""
 REVOLVED = "motor"
@@ -28,15 +28,13 @@ BODIES = (REVOLVED, "layer2", "base", "cup2")
 _SAMPLES = 400
 
 
-@dataclass(frozen=True)
-class _Mesh:
-    vertices: np.ndarray
-    faces: np.ndarray
+Mesh = tuple[np.ndarray, np.ndarray]
+"""Vertices (n, 3) in mm and faces (m, 3)."""
 
 
 @dataclass(frozen=True)
 class _Row:
-    way: str
+    method: str
     tolerance: float
     triangles: int
     volume_error: float
@@ -49,27 +47,24 @@ def run(quick: bool, say: Say) -> Result:
     tolerances = (0.1, DEFAULT, 0.003) if quick else TOLERANCES
     variant = Variant.of(default_template())
     parts = {body.name: body.shape for body in (*variant.unit, *variant.plan.tools)}
-    tables, plots, promises, found = [], [], [], {}
+    tables, plots, promises, by_body = [], [], [], {}
     for name in BODIES[:2] if quick else BODIES:
         say(name)
         shape, radius = parts[name], variant.dimensions.outer_radius
-        rows = found[name] = _rows(shape, radius, tolerances, repeats=2 if quick else 5)
+        rows = by_body[name] = _rows(shape, radius, tolerances, repeats=2 if quick else 5)
         tables.append(_table(name, rows))
         plots += _plots(name, rows)
-        for row in (row for row in rows if row.way == _TRUE):
+        for row in (row for row in rows if row.method == _TRUE):
             bound = bounds.deviation(shape, mesh.segment_count(radius, row.tolerance)) + 1e-6
-            where = f"{name} at {row.tolerance:g}: distance over"
-            promises.append(
-                Promise(
-                    f"{where} the bound that its segments imply (1: attained, by construction)",
-                    row.distance / bound,
-                    1.0,
-                )
-            )
-            promises.append(Promise(f"{where} 1.5 times the tolerance", row.distance / row.tolerance / 1.5, 1.0))
+            what = f"{name} at {row.tolerance:g}:"
+            over = f"{what} distance over the bound that its segments imply (1: attained, by construction)"
+            promises.append(Promise(over, row.distance / bound, 1.0))
+            over = f"{what} distance over 1.5 times the tolerance"
+            promises.append(Promise(over, row.distance / row.tolerance / 1.5, 1.0))
             if name == REVOLVED:
-                what = f"{name} at {row.tolerance:g}: volume error of a body that is revolved alone"
-                promises.append(Promise(what, row.volume_error, 1e-12))
+                promises.append(
+                    Promise(f"{what} volume error of a body that is revolved alone", row.volume_error, 1e-12)
+                )
     return Result(
         suite="tessellation",
         title="Tessellation: error against time and triangles",
@@ -79,9 +74,9 @@ def run(quick: bool, say: Say) -> Result:
             "to rounding at any tolerance; the other bodies have extruded parts as well (a layer has the slot of its "
             "tail), and where these meet a revolved face a little volume is off. build123d and CadQuery each "
             f"tessellate their own solid by their own `tessellate`, at its default angle of {ANGLE} rad. Both call "
-            f"OCCT's mesher{_same_triangles(found)}. Distance is one-sided: the farthest that any of {_SAMPLES} "
+            f"OCCT's mesher{_same_triangles(by_body)}. Distance is one-sided: the farthest that any of {_SAMPLES} "
             "sampled vertices, edge middles and face centres of the mesh lies from the B-rep's surface. "
-            f"{_default(found, tolerances)}"
+            f"{_default(by_body, tolerances)}"
         ),
         tables=tuple(tables),
         plots=tuple(plots),
@@ -92,14 +87,14 @@ def run(quick: bool, say: Say) -> Result:
 
 def _table(name: str, rows: list[_Row]) -> Table:
     marks = [
-        ["*" if mark else "" for mark in frontier([(cost(row), error(row)) for row in rows])]
+        stars([(cost(row), error(row)) for row in rows])
         for cost in (lambda row: row.time.median, lambda row: float(row.triangles))
         for error in (lambda row: row.volume_error, lambda row: row.distance)
     ]
     return Table(
         f"{name} of the {default_template()} template",
         (
-            "way",
+            "method",
             "tolerance, mm",
             "triangles",
             "volume error",
@@ -111,8 +106,8 @@ def _table(name: str, rows: list[_Row]) -> Table:
             "triangles: distance",
         ),
         tuple(
-            (r.way, r.tolerance, r.triangles, r.volume_error, r.distance, str(r.time), *stars)
-            for r, *stars in zip(rows, *marks, strict=True)
+            (r.method, r.tolerance, r.triangles, r.volume_error, r.distance, str(r.time), *on)
+            for r, *on in zip(rows, *marks, strict=True)
         ),
         "Stars, a column for each frontier: no other row is lower in both.",
     )
@@ -120,8 +115,8 @@ def _table(name: str, rows: list[_Row]) -> Table:
 
 def _plots(name: str, rows: list[_Row]) -> list[Plot]:
     def series(x: Callable[[_Row], float], y: Callable[[_Row], float]) -> dict[str, tuple[tuple[float, float], ...]]:
-        ways = dict.fromkeys(row.way for row in rows)
-        return {way: tuple((x(row), y(row)) for row in rows if row.way == way) for way in ways}
+        methods = dict.fromkeys(row.method for row in rows)
+        return {name: tuple((x(row), y(row)) for row in rows if row.method == name) for name in methods}
 
     return [
         Plot(
@@ -142,29 +137,29 @@ def _plots(name: str, rows: list[_Row]) -> list[Plot]:
     ]
 
 
-def _same_triangles(found: dict[str, list[_Row]]) -> str:
+def _same_triangles(by_body: dict[str, list[_Row]]) -> str:
     """Say at which tolerances OCCT's meshes of a body have the same number of triangles."""
-    said = []
-    for name, rows in found.items():
+    groups = []
+    for name, rows in by_body.items():
         counts: dict[int, list[float]] = {}
         for row in rows:
-            if row.way == "CadQuery":
+            if row.method == "CadQuery":
                 counts.setdefault(row.triangles, []).append(row.tolerance)
         alike = [", ".join(f"{t:g}" for t in sorted(some, reverse=True)) for some in counts.values() if len(some) > 1]
         if alike:
-            said.append(f"{name} at {' and at '.join(alike)} mm")
-    if not said:
+            groups.append(f"{name} at {' and at '.join(alike)} mm")
+    if not groups:
         return ""
-    return f", and on bodies this small that angle decides: as many triangles for {'; '.join(said)}"
+    return f", and on bodies this small that angle decides: as many triangles for {'; '.join(groups)}"
 
 
-def _default(found: dict[str, list[_Row]], tolerances: tuple[float, ...]) -> str:
+def _default(by_body: dict[str, list[_Row]], tolerances: tuple[float, ...]) -> str:
     """Say what unitcad's default costs and gives, against the next finer tolerance."""
-    said = []
+    costs = []
     finer = max(t for t in tolerances if t < DEFAULT)
-    for name, rows in found.items():
-        here, there = (next(r for r in rows if r.way == _TRUE and r.tolerance == t) for t in (DEFAULT, finer))
-        said.append(
+    for name, rows in by_body.items():
+        here, there = (next(r for r in rows if r.method == _TRUE and r.tolerance == t) for t in (DEFAULT, finer))
+        costs.append(
             f"{name} {shown(here.volume_error)} of volume, {shown(here.distance)} mm, {here.triangles} triangles, "
             f"{here.time} (at {finer:g} mm: {shown(there.volume_error)}, {shown(there.distance)} mm, "
             f"{there.triangles}, {there.time})"
@@ -172,7 +167,7 @@ def _default(found: dict[str, list[_Row]], tolerances: tuple[float, ...]) -> str
     play = load(default_template()).moulds.plinth_clearance_mm
     return (
         f"The default of {DEFAULT:g} mm is 1/{play / DEFAULT:.0f} of the play between printed faces ({play:g} mm): "
-        f"{'; '.join(said)}."
+        f"{'; '.join(costs)}."
     )
 
 
@@ -180,42 +175,39 @@ _TRUE, _PLAIN = "manifold3d, area-true", "manifold3d, plain"
 
 
 def _rows(shape: Shape, radius: float, tolerances: tuple[float, ...], repeats: int) -> list[_Row]:
-    brep = makers()["OCCT"]([shape])[0]
-    true_volume = _volume(brep)
-    found = []
+    from unitcad.kernels import occt
+
+    (brep,) = occt.solids([shape])
+    true_volume = occt.measure(brep).volume
+    rows = []
     for tolerance in tolerances:
-        ways = _ways(shape, radius, tolerance)
-        times = interleaved(ways, repeats)
-        for way, make in ways.items():
-            made = make()
-            volume = mesh_volume(made.vertices, made.faces)[0]
-            found.append(
-                _Row(
-                    way,
-                    tolerance,
-                    len(made.faces),
-                    abs(volume / true_volume - 1),
-                    _distance(made, brep),
-                    times[way],
-                )
-            )
-    return sorted(found, key=lambda row: row.way)
+        for method, time in interleaved(_methods(shape, radius, tolerance), repeats).items():
+            vertices, faces = time.value
+            error = abs(mesh_volume(vertices, faces)[0] / true_volume - 1)
+            rows.append(_Row(method, tolerance, len(faces), error, _distance(vertices, faces, brep), time))
+    return sorted(rows, key=lambda row: row.method)
 
 
-def _ways(shape: Shape, radius: float, tolerance: float) -> dict[str, Callable[[], _Mesh]]:
-    def area_true() -> _Mesh:
+def _methods(shape: Shape, radius: float, tolerance: float) -> dict[str, Callable[[], Mesh]]:
+    from unitcad.kernels import build123d, cadquery
+
+    def by_manifold(segments: int, swell: float | None = None) -> Mesh:
         mesh.forget()
-        return _Mesh(*mesh.arrays(mesh.realise(shape, mesh.segment_count(radius, tolerance))))
+        return mesh.arrays(mesh.realise(shape, segments, swell))
 
-    def plain() -> _Mesh:
-        mesh.forget()
-        return _Mesh(*mesh.arrays(mesh.realise(shape, _inscribed_count(radius, tolerance), swell=1.0)))
+    def by_build123d() -> Mesh:
+        points, faces = build123d.solid(shape).tessellate(tolerance, ANGLE)
+        return np.array([tuple(point) for point in points]), np.array(faces)
+
+    def by_cadquery() -> Mesh:
+        points, faces = cadquery.solid(shape).tessellate(tolerance, ANGLE)
+        return np.array([point.toTuple() for point in points]), np.array(faces)
 
     return {
-        _TRUE: area_true,
-        _PLAIN: plain,
-        "build123d": lambda: _by_build123d(shape, tolerance),
-        "CadQuery": lambda: _by_cadquery(shape, tolerance),
+        _TRUE: lambda: by_manifold(mesh.segment_count(radius, tolerance)),
+        _PLAIN: lambda: by_manifold(_inscribed_count(radius, tolerance), swell=1.0),
+        "build123d": by_build123d,
+        "CadQuery": by_cadquery,
     }
 
 
@@ -227,27 +219,7 @@ def _inscribed_count(radius: float, tolerance: float) -> int:
     return n
 
 
-def _by_build123d(shape: Shape, tolerance: float) -> _Mesh:
-    from unitcad.kernels import build123d
-
-    points, faces = build123d.solid(shape).tessellate(tolerance, ANGLE)
-    return _Mesh(np.array([tuple(point) for point in points]), np.array(faces))
-
-
-def _by_cadquery(shape: Shape, tolerance: float) -> _Mesh:
-    from unitcad.kernels import cadquery
-
-    points, faces = cadquery.solid(shape).tessellate(tolerance, ANGLE)
-    return _Mesh(np.array([point.toTuple() for point in points]), np.array(faces))
-
-
-def _volume(brep: Any) -> float:
-    from unitcad.kernels import occt
-
-    return occt.measure(brep).volume
-
-
-def _distance(made: _Mesh, brep: Any) -> float:
+def _distance(vertices: np.ndarray, faces: np.ndarray, brep: Any) -> float:
     """Return the farthest of the sampled points from the B-rep's faces, mm."""
     from OCP.BRep import BRep_Builder
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeVertex
@@ -264,10 +236,8 @@ def _distance(made: _Mesh, brep: Any) -> float:
     while explorer.More():
         builder.Add(skin, explorer.Current())
         explorer.Next()
-    corners = made.vertices[made.faces]
-    points = np.concatenate(
-        [made.vertices, (corners + np.roll(corners, 1, axis=1)).reshape(-1, 3) / 2, corners.mean(1)]
-    )
+    corners = vertices[faces]
+    points = np.concatenate([vertices, (corners + np.roll(corners, 1, axis=1)).reshape(-1, 3) / 2, corners.mean(1)])
     sampled = points[np.random.default_rng(0).permutation(len(points))[:_SAMPLES]]
     extrema = BRepExtrema_DistShapeShape()
     extrema.LoadS1(skin)

@@ -12,42 +12,46 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+K = TypeVar("K")
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds: median, and the lower and upper quartile (all one number for a single run)."""
+    """Seconds: median, lower and upper quartile (all one number for a single run); `value`: what the last run gave."""
 
     median: float
     low: float
     high: float
+    value: Any = None
 
     def __str__(self) -> str:
         spread = f" ({_seconds(self.low)} to {_seconds(self.high)})" if self.high > self.low else ""
         return _seconds(self.median) + spread
 
 
-def interleaved(calls: Mapping[str, Callable[[], Any]], repeats: int, warm: bool = True) -> dict[str, Timing]:
+def interleaved(calls: Mapping[K, Callable[[], Any]], repeats: int, warm: bool = True) -> dict[K, Timing]:
     """Time every call `repeats` times, in turn; a first round warms up and does not count."""
-    seconds: dict[str, list[float]] = {name: [] for name in calls}
-    for round_ in range(repeats + (1 if warm else 0)):
+    seconds: dict[K, list[float]] = {name: [] for name in calls}
+    values: dict[K, Any] = {}
+    for round_ in range(repeats + warm):
         for name, call in calls.items():
             gc.collect()
             start = time.perf_counter()
-            call()
+            values[name] = call()
             taken = time.perf_counter() - start
             if round_ or not warm:
                 seconds[name].append(taken)
-    return {name: timing(values) for name, values in seconds.items()}
+    return {name: timing(seconds[name], values[name]) for name in calls}
 
 
-def timing(seconds: list[float]) -> Timing:
+def timing(seconds: list[float], value: Any = None) -> Timing:
     """Return the median and quartiles of some runs."""
     if len(seconds) < 2:
-        return Timing(seconds[0], seconds[0], seconds[0])
+        return Timing(seconds[0], seconds[0], seconds[0], value)
     low, middle, high = statistics.quantiles(seconds, n=4, method="inclusive")
-    return Timing(middle, low, high)
+    return Timing(middle, low, high, value)
 
 
 def machine(*packages: str) -> dict[str, str | int]:

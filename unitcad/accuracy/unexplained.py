@@ -1,4 +1,4 @@
-"""What neither models nor finite elements explain of the measured levels: the page's paragraph, from the levels."""
+"""The page's paragraph on what neither models nor finite elements explain of the measured levels."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class NineLevels:
 
     def range(self, names: tuple[str, ...]) -> tuple[float, float]:
         """Return the least and largest of single solutions, no means."""
-        found = [level for name in names for level in self.levels[name].values()]
-        return min(found), max(found)
+        levels = [level for name in names for level in self.levels[name].values()]
+        return min(levels), max(levels)
 
     def shown(self, name: str) -> str:
         """Return the level as text, and a control's by shape."""
@@ -82,12 +82,12 @@ def _orders(table: Table, models: Mapping[str, NineLevels]) -> str:
     controls = sorted((name for name in table.names if name.startswith(CONTROL)), key=measured.__getitem__)
     same = [name for name, m in models.items() if _rising([m.of(control) for control in controls])]
     order = " < ".join(control.split(" ")[1] for control in controls)
-    found = [f"The measured order of the controls, {order}, is given by {_named(same)}."]
+    sentences = [f"The measured order of the controls, {order}, is given by {_named(same)}."]
     for design in measurements().designs:
         low, high = sorted((f"{design} E10/D30", f"{design} E10/D10"), key=measured.__getitem__)
         above = [name for name, m in models.items() if _rising([m.of(low), m.of(high)])]
-        found.append(f"{high} above {low.split(' ')[1]}, as was measured, is given by {_named(above)}.")
-    return " ".join(found)
+        sentences.append(f"{high} above {low.split(' ')[1]}, as was measured, is given by {_named(above)}.")
+    return " ".join(sentences)
 
 
 def _rising(levels: list[float]) -> bool:

@@ -44,7 +44,7 @@ def pressed_skin(medium: LayeredMedium, omega: float, disc: float, fineness: flo
 def unit_blocks(spec: Spec, omega: float, pad: bool) -> list[Block]:
     """Return the blocks of layers, pad and motor (m, z upwards from the skin)."""
     dims = dimensions(spec)
-    found = []
+    blocks = []
     inner, below = dims.cavity_radius, dims.core_height
     walls = zip(estimate_input(spec).layers, spec.layers, dims.radii, dims.heights, strict=True)
     for silicone, layer, radius, top in walls:
@@ -59,23 +59,25 @@ def unit_blocks(spec: Spec, omega: float, pad: bool) -> list[Block]:
             ),
             omega,
         )
-        found.append(Block(inner * _MM, radius * _MM, 0.0, top * _MM, solid))
+        blocks.append(Block(inner * _MM, radius * _MM, 0.0, top * _MM, solid))
         if layer.cap_mm is not None:
-            found.append(Block(0.0, inner * _MM, below * _MM, top * _MM, solid))
+            blocks.append(Block(0.0, inner * _MM, below * _MM, top * _MM, solid))
         inner, below = radius, top
     if pad and dims.pad:
-        found.append(Block(0.0, dims.pad.radius * _MM, dims.pad.low * _MM, dims.pad.high * _MM, _solid(CIRCUIT, omega)))
-    found.append(Block(0.0, dims.motor_radius * _MM, 0.0, dims.motor_height * _MM, None))
-    return found
+        blocks.append(
+            Block(0.0, dims.pad.radius * _MM, dims.pad.low * _MM, dims.pad.high * _MM, _solid(CIRCUIT, omega))
+        )
+    blocks.append(Block(0.0, dims.motor_radius * _MM, 0.0, dims.motor_height * _MM, None))
+    return blocks
 
 
 def medium_blocks(medium: LayeredMedium, omega: float) -> list[Block]:
     """Return the layers of a medium from the skin down, out to `RADIUS`; its half-space becomes the floor."""
-    found, top = [], 0.0
+    blocks, top = [], 0.0
     for layer in medium.layers:
-        found.append(Block(0.0, RADIUS, top - layer.thickness, top, _solid(layer, omega)))
+        blocks.append(Block(0.0, RADIUS, top - layer.thickness, top, _solid(layer, omega)))
         top -= layer.thickness
-    return found
+    return blocks
 
 
 def _solid(material: Layer | HalfSpace, omega: float) -> Solid:

@@ -1,13 +1,13 @@
 """Content kept under a key, so that each distinct piece of work is done once.
 
-A key is a hash of all that the work reads. Under it lies either data (JSON) or the SHA-256 of a file's content; equal
-contents are kept once. `MemoryStore` keeps them for one build, `DiskStore` for everybody who shares a folder:
+A key is a hash of all that the work reads. It names either data (JSON) or the SHA-256 of a file's content; equal
+contents are kept once. `MemoryStore` keeps them for one build, `DiskStore` for all who share a folder:
 
-    <root>/unitcad-cache          marks the folder as ours
+    <root>/unitcad-cache          marks the folder as a cache of unitcad
     <root>/data/ab/<key>          checksum, newline, JSON
     <root>/files/ab/<key>         checksum, newline, JSON {"sha256", "size"}
     <root>/content/ab/<sha256>    the bytes, read-only, since results are hard links to them
-    <root>/unitcad-cache.lock     held while a store comes in, and while one process collects alone
+    <root>/unitcad-cache.lock     held while a store opens, and while one process collects alone
     <root>/locks/<key>            held by the process that makes the entry
     <root>/locks/open-<id>        held by each that has the cache open
     <root>/tmp/                   what is being written

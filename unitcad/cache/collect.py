@@ -1,4 +1,4 @@
-"""What a cache on disk holds, and removing what was used longest ago."""
+"""Usage of a cache on disk, and removal of what was used longest ago."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from unitcad.errors import UnitcadError
 
 DEFAULT_LIMIT_MB = 4096
 GRACE_S = 600.0
-"""While somebody else has the cache open, what was used within this time is not collected."""
+"""While another process has the cache open, what was used within this time is not collected."""
 
 
 @dataclass(frozen=True)
 class Usage:
-    """What a cache holds; `bytes` of contents and entries together."""
+    """The size of a cache; `bytes` of contents and entries together."""
 
     entries: int
     contents: int
@@ -110,14 +110,14 @@ def _contents_of(entry: Path) -> list[str]:
 
 def _scan(root: Path, kind: str) -> list[tuple[Path, int, float]]:
     """List files of a kind: path, size, time of last use; one whose time is yet to come counts as the oldest."""
-    found, latest = [], time.time() + GRACE_S
+    entries, latest = [], time.time() + GRACE_S
     for folder, _, names in os.walk(root / kind):
         for name in names:
             path = Path(folder) / name
             with contextlib.suppress(OSError):
                 stat = path.lstat()
-                found.append((path, stat.st_size, stat.st_mtime if stat.st_mtime <= latest else 0.0))
-    return found
+                entries.append((path, stat.st_size, stat.st_mtime if stat.st_mtime <= latest else 0.0))
+    return entries
 
 
 def _expect(root: Path) -> None:

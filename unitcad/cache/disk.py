@@ -26,13 +26,13 @@ from unitcad.files import regular, write_new
 
 MARK = "unitcad-cache"
 GATE = "unitcad-cache.lock"
-"""Held while a store comes in, and while one process collects alone."""
+"""The lock held while a store opens, and while one process collects alone."""
 FOLDERS = ("data", "files", "content", "locks", "tmp")
 _POLL_S = 0.01
 
 
 class DiskStore:
-    """A store in a folder, shared by any number of processes and threads.
+    """A store in a folder.
 
     Entries are written under a temporary name and renamed. Each process verifies a content's checksum on first use and
     watches its size and time of change afterwards; whatever does not match is removed and made again. An entry that
@@ -51,11 +51,11 @@ class DiskStore:
         taken = lock(self.root / "locks" / f"open-{uuid.uuid4().hex}")
         with contextlib.suppress(OSError), lock(self.root / GATE):
             taken.acquire()
-        self._let_go = weakref.finalize(self, let_go, taken)
+        self._release = weakref.finalize(self, release, taken)
 
     def close(self) -> None:
-        """Let go of the folder: others may collect everything."""
-        self._let_go()
+        """Release the folder: others may then collect everything."""
+        self._release()
 
     def __reduce__(self) -> tuple[type[DiskStore], tuple[Path]]:
         return DiskStore, (self.root,)
@@ -83,7 +83,7 @@ class DiskStore:
                 return True
         except OSError:
             return False
-        except UnitcadError:  # a link, a pipe, a folder: nothing of ours
+        except UnitcadError:  # a link, a pipe or a folder
             pass
         self._verified.pop(sha256, None)
         remove(self._content_path(sha256))
@@ -105,7 +105,7 @@ class DiskStore:
     def size(self, sha256: str) -> int:
         if sha256 in self._held:
             return len(self._held[sha256])
-        # What was verified before is not looked at again here: who places it does, and content has one size.
+        # What was verified before is not checked again here: `place` checks it, and content has one size.
         if sha256 not in self._verified and not self.has(sha256):
             raise self._missing(sha256)
         return self._verified[sha256][1]
@@ -141,7 +141,7 @@ class DiskStore:
             full = error.errno == errno.EMLINK
         write_new(target, self.content(sha256), sync=True)
         if full:
-            # As many links as the file system allows: a fresh file takes the entry's place and the next ones.
+            # The file has as many links as the file system allows: a fresh one takes its place.
             with contextlib.suppress(OSError):
                 self._write(Path(name), target.read_bytes(), shared=True)
                 self._verified[sha256] = _signature(name)
@@ -157,11 +157,11 @@ class DiskStore:
 
     def _entry(self, kind: str, key: str, make: Make, intact: Intact) -> Any:
         path = self._path(kind, key)
-        found = self._read(kind, key, intact)
-        if found is None:
+        data = self._read(kind, key, intact)
+        if data is None:
             with held(self.root / "locks" / key):
-                found = self._read(kind, key, intact)  # somebody may have made it while we waited
-                if found is None:
+                data = self._read(kind, key, intact)  # another process may have made it meanwhile
+                if data is None:
                     made = make()
                     payload = json.dumps(made, ensure_ascii=False, allow_nan=False).encode()
                     with contextlib.suppress(OSError):
@@ -170,7 +170,7 @@ class DiskStore:
                     return json.loads(payload)
         self.counts[f"{kind} reused"] += 1
         self._touch(path)
-        return found
+        return data
 
     def _read(self, kind: str, key: str, intact: Intact) -> Any:
         """Return an entry's data, or None; an entry that is damaged or was written for another key is removed."""
@@ -200,7 +200,7 @@ class DiskStore:
         """Write a file whole; what results share is read-only, and on the disk when this ends. Raises OSError."""
         try:
             self._put(path, content, shared)
-        except (FileNotFoundError, NotADirectoryError):  # somebody has cleared the cache away
+        except (FileNotFoundError, NotADirectoryError):  # the cache was removed meanwhile
             with contextlib.suppress(UnitcadError):
                 _claim(self.root)
             self._put(path, content, shared)
@@ -276,11 +276,11 @@ def _signature(path: str) -> tuple[int, int, int]:
 
 
 def _claim(root: Path) -> None:
-    """Make the folder ours, or refuse one that holds something else."""
+    """Make a folder a cache, or refuse one that holds something else."""
     try:
         root.mkdir(parents=True, exist_ok=True)
         if not (root / MARK).exists():
-            # Whoever claims the folder at the same time as we do writes the mark first.
+            # A process that claims the folder at the same time writes the mark first.
             others = {path.name for path in root.iterdir()} - {MARK, GATE}
             if others not in (set(), set(FOLDERS)) and not (root / MARK).exists():
                 raise UnitcadError(f"{root}: is not a cache of unitcad, and not empty; choose another with --cache")
@@ -300,18 +300,18 @@ def lock(path: Path) -> FileLock:
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Hold a lock by one thread of one process at a time; a process that dies lets go of it, and no file stays.
+    """Hold a lock by one thread of one process at a time; a process that dies releases it, and no file stays.
 
-    Where there can be no lock (read-only, no space, no folder) the block runs without: better twice than not at all.
+    Where there can be no lock (read-only, no space, no folder) the block runs without: work may then be done twice.
     """
     taken = lock(path)
-    if path.parent.is_dir():  # else the lock would make it, and a cache that was cleared away look like somebody else's
+    if path.parent.is_dir():  # else the lock would make it, and a removed cache would look like another program's
         with contextlib.suppress(OSError):
             taken.acquire()
     try:
         yield
     finally:
-        let_go(taken)
+        release(taken)
 
 
 def free(path: Path) -> bool:
@@ -321,13 +321,13 @@ def free(path: Path) -> bool:
         taken.acquire(blocking=False)
     except OSError:
         return False
-    let_go(taken)
+    release(taken)
     return True
 
 
-def let_go(taken: FileLock) -> None:
+def release(taken: FileLock) -> None:
     """Release a lock and remove its file: whoever waits on it makes a new one."""
     if taken.is_locked:
-        with contextlib.suppress(OSError):  # Windows: an open file stays until the lock itself removes it
+        with contextlib.suppress(OSError):  # Windows: an open file stays until the lock removes it
             os.unlink(taken.lock_file)
         taken.release()

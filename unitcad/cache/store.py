@@ -1,4 +1,4 @@
-"""What a build needs of a cache, and the store that lives as long as one build."""
+"""The interface of a cache, and the store that lasts one build."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ Intact = Callable[[Any], bool]
 
 
 class MissingContent(UnitcadError):
-    """Content that was there is gone: collected, or damaged. Made again by whoever asks again."""
+    """Content that was collected or is damaged. The next request makes it again."""
 
     exit_code = 1
 
 
 class Store(Protocol):
-    """What a build needs of a cache."""
+    """A cache as a build uses it."""
 
     counts: Counter[str]
     """"built" and "reused" entries, by kind ("data", "file")."""
@@ -55,9 +55,7 @@ class Store(Protocol):
 
 @dataclass(frozen=True)
 class Bundle:
-    """What a store holds, to be handed to another one: data and the SHA-256 of files by key, their bytes by SHA-256,
-    no content.
-    """
+    """A store's entries without content, for another store: data and the SHA-256 of files by key, sizes by SHA-256."""
 
     data: dict[str, Any] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
@@ -65,8 +63,9 @@ class Bundle:
 
 
 class MemoryStore:
-    """A store that lives as long as one build. What a bundle `known` to it names as a file is somebody else's to keep:
-    it counts as there, but can't be placed from here.
+    """A store that lasts one build.
+
+    A file of the bundle `known` counts as there, but another store keeps it: it can't be placed from here.
     """
 
     def __init__(self, known: Bundle | None = None) -> None:
@@ -81,16 +80,16 @@ class MemoryStore:
         return Bundle(dict(self._data), dict(self._files), {sha: self.size(sha) for sha in self._files.values()})
 
     def data(self, key: str, make: Make, intact: Intact = lambda data: True) -> Any:
-        there = key in self._data and intact(self._data[key])
-        self.counts["data reused" if there else "data built"] += 1
-        if not there:
+        known = key in self._data and intact(self._data[key])
+        self.counts["data reused" if known else "data built"] += 1
+        if not known:
             self._data[key] = make()
         return self._data[key]
 
     def file(self, key: str, make: Callable[[], bytes]) -> str:
-        there = key in self._files
-        self.counts["file reused" if there else "file built"] += 1
-        if not there:
+        known = key in self._files
+        self.counts["file reused" if known else "file built"] += 1
+        if not known:
             content = make()
             self._files[key] = digest(content)
             self.contents[self._files[key]] = content

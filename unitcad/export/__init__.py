@@ -1,1 +1,1 @@
-"""Files from bodies: STL and 3MF for the printer, STEP for CAD, SVG for the eye. Same input, same bytes."""
+"""Files from bodies: STL and 3MF for printers, STEP for CAD, SVG, PNG and GLB to look at. Same input, same bytes."""

@@ -1,4 +1,4 @@
-"""The marks of a technical drawing in SVG: dimension lines, leaders, text clear of other text. In px, y downwards."""
+"""Parts of a technical drawing in SVG: dimension lines, leaders, text clear of other text. In px, y downwards."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 TEXT_PX = 12.0
 CHARACTER_PX = 0.62 * TEXT_PX
-"""Width that a character is given room for: no common sans-serif is wider on average."""
+"""The room for a character: no common sans-serif is wider on average."""
 ARROW_PX = 7.0
 
 Point = tuple[float, float]
@@ -32,7 +32,7 @@ def text_width(text: str) -> float:
 def spread(wanted: Sequence[float], sizes: Sequence[float], gap: float = 4.0) -> list[float]:
     """Return middles of items of `sizes` in a row, `gap` apart or more, in the order of `wanted` and close to it.
 
-    Items that would overlap are joined into a run about the mean of their wishes (pool adjacent violators).
+    Items that would overlap are joined into a run about the mean of their wanted middles (pool adjacent violators).
     """
     order = sorted(range(len(wanted)), key=lambda i: (wanted[i], i))
     before = [0.0]
@@ -45,10 +45,10 @@ def spread(wanted: Sequence[float], sizes: Sequence[float], gap: float = 4.0) ->
             mean, count = runs.pop()
             runs[-1] = [(runs[-1][0] * runs[-1][1] + mean * count) / (runs[-1][1] + count), runs[-1][1] + count]
     starts = [mean for mean, count in runs for _ in range(int(count))]
-    found = [0.0] * len(wanted)
+    middles = [0.0] * len(wanted)
     for i, start, offset in zip(order, starts, before, strict=True):
-        found[i] = start + offset
-    return found
+        middles[i] = start + offset
+    return middles
 
 
 def line(start: Point, end: Point, kind: str) -> str:

@@ -1,4 +1,6 @@
-"""Pictures of what a check found, for `unitcad check --show`: for each file with findings a folder that holds
+"""Pictures of a check's findings, for `unitcad check --show`.
+
+For each file with findings a folder that holds
 
 - a picture a finding (SVG with two shaded views): the whole part with the place marked, and the place from near;
 - findings.3mf: its meshes, faces that a finding concerns in the colour of the worst severity.
@@ -10,6 +12,7 @@ import base64
 import hashlib
 import os
 import re
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,10 +33,10 @@ PART = (0.74, 0.79, 0.85)
 SECOND = (0.55, 0.12, 0.75)
 """The other face of a pair."""
 SIZE = (560, 440)
-"""Of one view, px."""
+"""The size of one view, px."""
 _SHARPER = 2
 _MARGIN = 14.0
-_WORDS = 118  # characters a line
+_TITLE, _LINE = 118, 165  # characters
 _DIRECTIONS = [
     (1.0, -1.4, 0.9), (-1.2, -1.3, 0.9), (1.2, 1.3, 0.9), (-1.2, 1.3, 0.9), (1.0, -1.4, -0.9), (-1.2, -1.3, -0.9),
     (1.2, 1.3, -0.9), (-1.2, 1.3, -0.9), (0.1, -1.0, 0.15), (1.0, 0.1, 0.15), (-0.1, 1.0, 0.15), (-1.0, -0.1, 0.15),
@@ -61,9 +64,9 @@ def write(folder: Path, report: FileReport) -> FileReport:
     if report.findings and any(scenes):
         own = folder / folder_name(report.path)
         own.mkdir(parents=True, exist_ok=True)
-        for found in report.findings:
-            if picture := draw(report, found, scenes):
-                files.write(own / f"{found.code}.svg", picture.encode())
+        for finding in report.findings:
+            if picture := draw(report, finding, scenes):
+                files.write(own / f"{finding.code}.svg", picture.encode())
         files.write(own / "findings.3mf", coloured(report))
     return FileReport(report.path, report.findings, report.facts, report.seconds)
 
@@ -84,11 +87,11 @@ def coloured(report: FileReport) -> bytes:
         if not len(mesh.faces) or not (np.abs(mesh.vertices) <= LARGEST).all():
             continue
         paint = np.zeros(len(mesh.faces), int)
-        for found in report.findings:
-            for place in found.locations:
+        for finding in report.findings:
+            for place in finding.locations:
                 if place.mesh == number and place.region is not None:
                     which = np.asarray(place.region, int)
-                    paint[which] = np.maximum(paint[which], 1 + SEVERITIES.index(found.severity))
+                    paint[which] = np.maximum(paint[which], 1 + SEVERITIES.index(finding.severity))
         a, b, c = mesh.faces.T
         sound = (a != b) & (b != c) & (c != a)  # 3MF has no triangle with a vertex twice
         palette = (PART, *(COLOURS[severity] for severity in SEVERITIES))
@@ -97,27 +100,26 @@ def coloured(report: FileReport) -> bytes:
     return threemf.content(parts)
 
 
-def draw(report: FileReport, found: Finding, scenes: Sequence[Scene | None]) -> str | None:
+def draw(report: FileReport, finding: Finding, scenes: Sequence[Scene | None]) -> str | None:
     """Draw a finding as SVG; None where nothing of it can be drawn."""
-    places = [place for place in found.locations if place.mesh is not None and scenes[place.mesh]]
+    places = [place for place in finding.locations if place.mesh is not None and scenes[place.mesh]]
     number = places[0].mesh if places else next(i for i, scene in enumerate(scenes) if scene)
     assert number is not None
     scene = scenes[number]
     assert scene is not None
     here = [place for place in places if place.mesh == number]
-    title = f"{Path(report.path).name}: {found.code} {rules()[found.code].title} ({found.severity})"
+    colour = COLOURS[finding.severity]
+    title = f"{Path(report.path).name}: {finding.code} {rules()[finding.code].title} ({finding.severity})"
     if not here:
-        views = [_View(scene, Marks(), _DIRECTIONS[0], None, COLOURS[found.severity])]
-        return _page(title, found, views, None)
-    marks = marks_of(found.code, report.meshes[number], here)
+        return _page(title, finding, [_View(scene, Marks(), _DIRECTIONS[0], None, colour)], None)
+    marks = marks_of(finding.code, report.meshes[number], here)
     middle, reach = _near(scene, marks)
     towards, cut = _direction(scene, marks, middle, reach)
-    colour = COLOURS[found.severity]
     views = [
         _View(scene, marks, towards, None, colour, (middle, reach)),
         _View(scene, marks, towards, (middle, reach), colour, None, cut),
     ]
-    return _page(title, found, views, here[0])
+    return _page(title, finding, views, here[0])
 
 
 def _scene(mesh: Mesh) -> Scene | None:
@@ -190,7 +192,7 @@ def _shown(points: np.ndarray, seen: raster.Seen, view: raster.Camera, deep: flo
 
 
 class _View:
-    """One of the two views: its pixels, and what is drawn over them."""
+    """One of the two views: its pixels, and the marks drawn over them."""
 
     def __init__(
         self,
@@ -282,8 +284,8 @@ class _View:
         end, y = SIZE[0] - 16.0, SIZE[1] - 16.0
         start = end - length * self.view.scale
         bar = f"M{drawing.number(start)} {y - 4}v8M{drawing.number(start)} {y}H{end}M{end} {y - 4}v8"
-        said = drawing.text(f"{length:g} mm", ((start + end) / 2, y - 14))
-        return ['<g class="scale">', f'<path class="halo" d="{bar}"/>', f'<path class="bar" d="{bar}"/>', said, "</g>"]
+        label = drawing.text(f"{length:g} mm", ((start + end) / 2, y - 14))
+        return ['<g class="scale">', f'<path class="halo" d="{bar}"/>', f'<path class="bar" d="{bar}"/>', label, "</g>"]
 
     def _axes(self) -> list[str]:
         """Draw the three axes, which show a view from below."""
@@ -311,9 +313,9 @@ _STYLE = (
 )
 
 
-def _page(title: str, found: Finding, views: Sequence[_View], place: Location | None) -> str:
+def _page(title: str, finding: Finding, views: Sequence[_View], place: Location | None) -> str:
     """Draw title and message, the views side by side, and below them what each shows."""
-    lines = [*_wrapped(found.message), *_wrapped(f"Fix: {rules()[found.code].fix}")]
+    lines = [*_wrapped(finding.message), *_wrapped(f"Fix: {rules()[finding.code].fix}")]
     top = 2 * _MARGIN + 20 + 17 * len(lines)
     width = _MARGIN + len(views) * (SIZE[0] + _MARGIN)
     height = top + SIZE[1] + 46
@@ -325,7 +327,7 @@ def _page(title: str, found: Finding, views: Sequence[_View], place: Location | 
     for i, view in enumerate(views):
         left = _MARGIN + i * (SIZE[0] + _MARGIN)
         marks += view.svg(left, top)
-        marks.append(drawing.text(_caption(view, found, place), (left, top + SIZE[1] + 16), "start"))
+        marks.append(drawing.text(_caption(view, finding, place), (left, top + SIZE[1] + 16), "start"))
     size = f'width="{drawing.number(width)}" height="{drawing.number(height)}"'
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" {size} '
@@ -336,25 +338,19 @@ def _page(title: str, found: Finding, views: Sequence[_View], place: Location | 
     return "\n".join([head, *marks, "</svg>", ""])
 
 
-def _caption(view: _View, found: Finding, place: Location | None) -> str:
+def _caption(view: _View, finding: Finding, place: Location | None) -> str:
     if place is None:
         return f"the whole part, {' x '.join(f'{side:.6g}' for side in view.sides)} mm"
     if view.near is None:
-        many = f"; {len(found.locations)} of {found.count} places are marked" if found.count > 1 else ""
+        many = f"; {len(finding.locations)} of {finding.count} places are marked" if finding.count > 1 else ""
         return f"the whole part{many}; the ring is the view on the right"
     cut = ", cut open in front of it" if np.isfinite(view.cut) else ""
     return printable(f"near{cut}: {place}")[:100]
 
 
 def _wrapped(text: str) -> list[str]:
-    """Return lines of at most _WORDS characters."""
-    lines = [""]
-    for word in printable(text).split(" "):
-        if lines[-1] and len(lines[-1]) + 1 + len(word) > _WORDS * 1.4:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()[: int(_WORDS * 1.4)]
-    return lines
+    return textwrap.wrap(printable(text), _LINE, break_on_hyphens=False)
 
 
 def _fitting(text: str) -> str:
-    return text if len(text) <= _WORDS else text[: _WORDS - 1] + "…"
+    return text if len(text) <= _TITLE else text[: _TITLE - 1] + "…"

@@ -17,15 +17,16 @@ import numpy as np
 from unitcad.export.printing import single_precision
 
 CREASE_DEG = 20.0
-"""Where two faces meet at more than this, their shading does not run together."""
+"""Faces that meet at more than this angle are not shaded as one surface."""
 _FLOAT, _UINT16, _UINT32, _ARRAY, _ELEMENTS = 5126, 5123, 5125, 34962, 34963
 _HALF = math.sqrt(0.5)
 
 
 @dataclass(frozen=True)
 class GlbPart:
-    """A named closed mesh: colour as three sRGB numbers 0 to 1, vertices (n, 3) in mm, faces (m, 3), and what
-    programs may read of it (`extras`, plain values).
+    """A named closed mesh: colour as three sRGB numbers 0 to 1, vertices (n, 3) in mm, faces (m, 3).
+
+    `extras`: plain values that programs may read.
     """
 
     name: str

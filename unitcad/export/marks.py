@@ -1,4 +1,4 @@
-"""What of a mesh a finding's places mark: faces, sides, lines on which faces cross, points."""
+"""The parts of a mesh that a finding's places mark: faces, sides, lines on which faces cross, points."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ _NONE = np.empty(0, np.int64)
 
 @dataclass(frozen=True)
 class Marks:
-    """`faces`: those of the first place, the first and the second one of a pair apart; `others`: those of other places.
+    """The marks of a finding on one mesh.
 
+    `faces`: those of the first place, the first and the second one of a pair apart; `others`: those of other places.
     `segments` (n, 2, 3) and `points` (n, 3) are drawn over everything; `boxes`: low and high corner of each place, the
     first one first; `point` its middle. `at_point`: that point is what must be seen, as opposed to the faces.
     `across`: the unit vector through a thin wall.
@@ -93,8 +94,8 @@ def _lines(code: str, corners: np.ndarray, centre: np.ndarray) -> list[np.ndarra
     """
     if code in _EDGES and len(corners):
         sides = np.stack([corners[0], np.roll(corners[0], -1, axis=0)], axis=1)
-        away = np.linalg.norm(sides.mean(axis=1) - centre, axis=1)
-        return [sides[int(away.argmin())]]
+        distance = np.linalg.norm(sides.mean(axis=1) - centre, axis=1)
+        return [sides[int(distance.argmin())]]
     if code == "G001" and len(corners) == 2:
         line = common_line(corners[0], corners[1])
         return [] if line is None else [line]

@@ -1,7 +1,7 @@
 """Shaded pictures by VTK (CadQuery brings it), drawn in a child process.
 
 VTK without libEGL and without a display ends its process with a segmentation fault. So it is never loaded here: a child
-draws, a second one under a virtual display (Xvfb) if the first fell and Xvfb is installed, else there is a message.
+draws; if it crashes and Xvfb is installed, a second one draws under a virtual display; else there is a message.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from unitcad import children
 from unitcad.errors import UnitcadError
 
 SECONDS = 300
-"""After which a child that draws is given up."""
+"""The time after which a child that draws is ended."""
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A closed mesh in a picture: vertices (n, 3) in mm, faces (m, 3), colour of three numbers 0 to 1; `label` is
-    written beside it.
+    """A closed mesh in a picture: vertices (n, 3) in mm, faces (m, 3), colour of three numbers 0 to 1.
+
+    `label` is written beside it.
     """
 
     colour: tuple[float, float, float]
@@ -39,7 +40,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Scene:
-    """A picture: what is in it, the direction from it to the eye, and its size in pixels. +z is up."""
+    """A picture: its parts, the direction from them to the eye, and its size in pixels. +z is up."""
 
     parts: tuple[Drawn, ...]
     towards_eye: tuple[float, float, float]
@@ -47,7 +48,7 @@ class Scene:
 
 
 class NoPicture(UnitcadError):
-    """This machine can't draw: VTK is missing, or there is neither EGL nor Xvfb."""
+    """A machine that can't draw: VTK is missing, or there is neither EGL nor Xvfb."""
 
 
 def draw(scenes: Sequence[Scene]) -> list[bytes]:

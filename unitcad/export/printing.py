@@ -1,4 +1,4 @@
-"""What a printer's file needs: a body as it lies on the bed, in the single precision that STL and slicers have."""
+"""A body for a printer's file: as it lies on the bed, in the single precision that STL and slicers have."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def single_precision(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarra
     step = resolution(vertices)
     for power in range(1, ROUNDS + 1):
         mesh = solid.simplify(step * 4**power).to_mesh64()
-        found = _rounded(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.int64))
-        if len(found[1]) and _closed(found[1]) and _thinnest(*found) > step:
-            return found
+        rounded = _rounded(np.asarray(mesh.vert_properties[:, :3]), np.asarray(mesh.tri_verts, dtype=np.int64))
+        if len(rounded[1]) and _closed(rounded[1]) and _thinnest(*rounded) > step:
+            return rounded
     raise UnitcadError(f"the mesh can't be rounded to single precision: it is thinner than {step:.3g} mm somewhere")
 
 

@@ -1,6 +1,6 @@
 """Shaded pictures of triangle meshes by numpy alone: parallel projection, a depth buffer, PNG. No display, no GPU.
 
-Whatever a mesh is, it is drawn as it is: open, turned inside out or passing through itself.
+Any mesh is drawn unchanged: open, turned inside out or passing through itself.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 BACKGROUND = (1.0, 1.0, 1.0)
 INSIDE = (0.62, 0.50, 0.40)
-"""Faces seen from behind: the inside of a part, through a hole or a cut."""
+"""The colour of faces seen from behind: the inside of a part, through a hole or a cut."""
 CUT = (0.93, 0.87, 0.76)
 LINE = (0.10, 0.10, 0.12)
 _FRAGMENTS = 200_000  # a block's, which stay in the processor's cache
@@ -24,8 +24,10 @@ _PIXELS = 50_000
 
 @dataclass(frozen=True)
 class Camera:
-    """A parallel view: unit vectors to the right, up and towards the eye (3,), the point in the middle (3,) mm, pixels
-    a mm, and the picture's size (width, height) in pixels.
+    """A parallel view.
+
+    Unit vectors to the right, up and towards the eye (3,), the point in the middle (3,) mm, pixels a mm, and the
+    picture's size (width, height) in pixels.
     """
 
     right: np.ndarray
@@ -67,7 +69,7 @@ def camera(
 
 @dataclass(frozen=True)
 class Seen:
-    """What a picture's pixels show: the index of a face (height, width), -1 for none, and its depth in mm."""
+    """The faces that a picture's pixels show: an index (height, width), -1 for none, and its depth in mm."""
 
     face: np.ndarray
     depth: np.ndarray
@@ -171,7 +173,7 @@ def shade(
     tint = np.where(behind[:, None], back, own) * np.where(behind & cut, 1.0, bright)[:, None]
     wide = np.where((behind & cut)[:, None], 0.0, lines[which[none:]])
     tint = np.concatenate([np.array([BACKGROUND] * none).reshape(-1, 3), tint])
-    away = np.concatenate([np.zeros((none, 3, 3)), _side_lines(view.project(corners).reshape(-1, 3, 3))])
+    side_lines = np.concatenate([np.zeros((none, 3, 3)), _side_lines(view.project(corners).reshape(-1, 3, 3))])
     wide = np.concatenate([np.zeros((none, 3)), wide])
     hatched = np.concatenate([np.zeros(none, bool), behind & cut])
     picture = np.empty((height * width, 3))
@@ -180,13 +182,13 @@ def shade(
         pixel = np.arange(begin, min(begin + _PIXELS, height * width))
         at = index[pixel]
         row, column = np.divmod(pixel, width)
-        found = tint[at]
+        colour = tint[at]
         stripe = hatched[at] & ((row + column) % 16 < 3)
-        found[stripe] *= 0.72
-        form = away[at]
-        distance = form[:, :, 0] * (column + 0.5)[:, None] + form[:, :, 1] * (row + 0.5)[:, None] + form[:, :, 2]
+        colour[stripe] *= 0.72
+        a, b, c = np.moveaxis(side_lines[at], 2, 0)
+        distance = a * (column + 0.5)[:, None] + b * (row + 0.5)[:, None] + c
         near = np.clip(wide[at] - np.abs(distance), 0, 1).max(axis=1)[:, None]
-        picture[pixel] = found + near * (np.array(LINE) - found)
+        picture[pixel] = colour + near * (np.array(LINE) - colour)
     return picture.reshape(height, width, 3)
 
 

@@ -1,4 +1,4 @@
-"""PrusaSlicer, headless, where it is installed: whether it takes a file without a repair, print time and filament."""
+"""PrusaSlicer, headless, where it is installed: whether it reads a file without repair, print time and filament."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from unitcad.errors import UnitcadError
 
 Say = Callable[[str], None]
 PROGRAMS = ("prusa-slicer", "prusa-slicer-console", "PrusaSlicer")
-"""What it is called on Linux, Windows and macOS, where it is on the path."""
+"""Its names on Linux, Windows and macOS, where it is on the path."""
 PLACES = {
     "darwin": (
         "/Applications/PrusaSlicer.app/Contents/MacOS/PrusaSlicer",
@@ -29,7 +29,7 @@ PLACES = {
     ),
     "win32": (r"C:\Program Files\Prusa3D\PrusaSlicer\prusa-slicer-console.exe",),
 }
-"""Where its installers put it without naming it on the path, by `sys.platform`."""
+"""Where its installers put it without adding it to the path, by `sys.platform`."""
 NOZZLES_MM = {"fdm-0.25": 0.25}
 TIMEOUT_S = 300
 FILAMENT_MM = 1.75
@@ -38,7 +38,7 @@ _REPAIRS = re.compile(r"^(?:degenerate_facets|edges_fixed|facets_removed|facets_
 
 @dataclass(frozen=True)
 class Sliced:
-    """One file as the slicer took it. `repaired`: it was not manifold, or something had to be mended."""
+    """One file as the slicer read it. `repaired`: it was not manifold, or something had to be repaired."""
 
     file: str
     repaired: bool
@@ -49,12 +49,7 @@ class Sliced:
 
 def program() -> str | None:
     """Return PrusaSlicer's command: on the path, or where its installer puts it; None where there is none."""
-    return next((found for name in (*PROGRAMS, *PLACES.get(sys.platform, ())) if (found := shutil.which(name))), None)
-
-
-def installed() -> bool:
-    """Tell whether PrusaSlicer is on this machine."""
-    return program() is not None
+    return next((path for name in (*PROGRAMS, *PLACES.get(sys.platform, ())) if (path := shutil.which(name))), None)
 
 
 def needs_repair(path: Path) -> bool:
@@ -62,10 +57,10 @@ def needs_repair(path: Path) -> bool:
 
     Raises UnitcadError where the slicer is missing or does not read the file.
     """
-    said = _run("--info", str(path))
-    if "manifold" not in said:
-        raise UnitcadError(f"{path}: PrusaSlicer does not read it: {said.strip()[-200:]}")
-    return "manifold = yes" not in said or bool(_REPAIRS.search(said))
+    output = _run("--info", str(path))
+    if "manifold" not in output:
+        raise UnitcadError(f"{path}: PrusaSlicer does not read it: {output.strip()[-200:]}")
+    return "manifold = yes" not in output or bool(_REPAIRS.search(output))
 
 
 def slice_file(path: Path, printer: Printer) -> Sliced:
@@ -73,7 +68,7 @@ def slice_file(path: Path, printer: Printer) -> Sliced:
     with tempfile.TemporaryDirectory(prefix="unitcad-slice-") as scratch:
         code = Path(scratch) / "out.gcode"
         layer, nozzle = float(printer.layer_mm), NOZZLES_MM.get(printer.name, 0.4)
-        said = _run(
+        output = _run(
             "--export-gcode",
             *("--output", str(code)),
             *("--nozzle-diameter", f"{nozzle:g}"),
@@ -83,14 +78,14 @@ def slice_file(path: Path, printer: Printer) -> Sliced:
             str(path),
         )
         if not code.is_file():
-            raise UnitcadError(f"{path}: PrusaSlicer wrote nothing: {said.strip()[-200:]}")
+            raise UnitcadError(f"{path}: PrusaSlicer wrote nothing: {output.strip()[-200:]}")
         text = code.read_text("utf-8", "replace")
     return Sliced(
         path.name,
         needs_repair(path),
-        _seconds(_found(text, "estimated printing time (normal mode)")),
-        float(_found(text, "filament used [mm]")),
-        float(_found(text, "filament used [cm3]")),
+        _seconds(_value(text, "estimated printing time (normal mode)")),
+        float(_value(text, "filament used [mm]")),
+        float(_value(text, "filament used [cm3]")),
     )
 
 
@@ -101,7 +96,7 @@ def report(
 
     Two at a time. Pieces of an `earlier` report with the same content, printer and slicer are taken from it.
     """
-    if not installed() or printer.technology.value != "fdm":
+    if program() is None or printer.technology.value != "fdm":
         return None
     head = {"slicer": _version(), "printer": printer.name, "layer_mm": float(printer.layer_mm)}
     known = {}
@@ -128,8 +123,8 @@ def report(
 
 def _version() -> str:
     """Return the slicer's own name and version."""
-    found = re.search(r"^(PrusaSlicer-\S+)", _run("--help"), re.M)
-    return found.group(1) if found else "PrusaSlicer"
+    name = re.search(r"^(PrusaSlicer-\S+)", _run("--help"), re.M)
+    return name.group(1) if name else "PrusaSlicer"
 
 
 def _run(*arguments: str) -> str:
@@ -137,14 +132,14 @@ def _run(*arguments: str) -> str:
     if command is None:
         raise UnitcadError("PrusaSlicer is not installed")
     try:
-        # It ends at once where the person's locale is not installed; this one always is.
+        # It ends at once where the user's locale is not installed; this one always is.
         done = children.run([command, *arguments], timeout=TIMEOUT_S, env={**os.environ, "LC_ALL": "C"})
     except subprocess.TimeoutExpired:
         raise UnitcadError(f"PrusaSlicer took more than {TIMEOUT_S} s") from None
     return (done.stdout + done.stderr).decode("utf-8", "replace")
 
 
-def _found(text: str, name: str) -> str:
+def _value(text: str, name: str) -> str:
     match = re.search(rf"^; {re.escape(name)} = (.+)$", text, re.M)
     if not match:
         raise UnitcadError(f"PrusaSlicer's G-code does not say: {name}")

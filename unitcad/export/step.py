@@ -1,8 +1,8 @@
 """STEP AP242: an assembly of named, coloured bodies, exact surfaces, the same bytes for the same bodies.
 
 Written through OCCT's document (XCAF) directly, so that either B-rep extra will do. What OCCT writes differently each
-time is put right in the text: the time stamp, a counter of the process, the last bits of coordinates, and the styles,
-which it orders by address and whose colours it rounds to single precision: those are written here.
+time is replaced in the text: the time stamp, a counter of the process and the last bits of coordinates. The styles are
+written here, since OCCT orders them by address and rounds colours to single precision.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -28,16 +27,15 @@ with loading("OCP"):
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.Interface import Interface_Static
     from OCP.Message import Message, Message_Gravity
-    from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
-    from OCP.STEPCAFControl import STEPCAFControl_Controller, STEPCAFControl_Reader, STEPCAFControl_Writer
+    from OCP.STEPCAFControl import STEPCAFControl_Controller, STEPCAFControl_Writer
     from OCP.STEPControl import STEPControl_StepModelType
     from OCP.TCollection import TCollection_ExtendedString
     from OCP.TDataStd import TDataStd_Name
-    from OCP.TDF import TDF_Label, TDF_LabelSequence
+    from OCP.TDF import TDF_Label
     from OCP.TDocStd import TDocStd_Document
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS_Shape
-    from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
 _SETTINGS = {"write.step.schema": 5, "write.surfacecurve.mode": 0}
 """AP242; and no curves in the parameters of surfaces: OCCT's differ by 1e-16 from run to run, and readers need none."""
@@ -50,16 +48,7 @@ _STYLE = (
     "SURFACE_STYLE_USAGE(.BOTH.,{})",
     "PRESENTATION_STYLE_ASSIGNMENT(({}))",
 )
-"""What stands between a colour and the item that it is given to, each about the one before."""
-
-
-@dataclass(frozen=True)
-class StepBody:
-    """A body as read back: name, colour (or None), and its measures as assembled (mm, mm3)."""
-
-    name: str
-    colour: tuple[float, float, float] | None
-    measures: occt.Measures
+"""The entities between a colour and the item that it styles, each about the one before."""
 
 
 def write(path: Path, bodies: Sequence[Body], name: str) -> None:
@@ -89,39 +78,19 @@ def content(bodies: Sequence[Body], name: str) -> bytes:
     return _with_styles(text, [body.colour for body in bodies]).encode("ascii")
 
 
-def read(path: Path) -> list[StepBody]:
-    """Return the bodies of a STEP assembly in the order of the file. Raises UnitcadError where OCCT can't read it."""
-    document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
-    with _quiet():
-        reader = STEPCAFControl_Reader()
-        reader.SetColorMode(True)
-        reader.SetNameMode(True)
-        if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone or not reader.Transfer(document):
-            raise UnitcadError(f"{path}: OCCT could not read it as STEP")
-    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
-    roots, found = TDF_LabelSequence(), []
-    shapes.GetFreeShapes(roots)
-    for root in _labels(roots):
-        parts = TDF_LabelSequence()
-        XCAFDoc_ShapeTool.GetComponents_s(root, parts)
-        found += [_read_body(part, colours) for part in (_labels(parts) or [root])]
-    return found
-
-
 def _document(bodies: Sequence[Body], solids: Sequence[TopoDS_Shape], name: str) -> TDocStd_Document:
     document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     shapes.SetAutoNaming_s(False)
     assembly = shapes.NewShape()
     _name(assembly, name)
-    there: list[TopoDS_Shape] = []
+    earlier: list[TopoDS_Shape] = []
     for body, solid in zip(bodies, solids, strict=True):
         place, solid = solid.Location(), solid.Located(TopLoc_Location())
-        if any(solid.IsPartner(other) for other in there):
+        if any(solid.IsPartner(other) for other in earlier):
             # Two bodies of one shape would share a label, so also a name.
             solid = BRepBuilderAPI_Copy(solid).Shape()
-        there.append(solid)
+        earlier.append(solid)
         part = shapes.AddShape(solid, False)
         _name(part, body.name)
         _name(shapes.AddComponent(assembly, part, place), body.name)
@@ -131,25 +100,6 @@ def _document(bodies: Sequence[Body], solids: Sequence[TopoDS_Shape], name: str)
 
 def _name(label: TDF_Label, name: str) -> None:
     TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
-
-
-def _labels(sequence: TDF_LabelSequence) -> list[TDF_Label]:
-    return [sequence.Value(i) for i in range(1, sequence.Length() + 1)]
-
-
-def _read_body(label: TDF_Label, colours: XCAFDoc_ColorTool) -> StepBody:
-    part = TDF_Label()
-    if not XCAFDoc_ShapeTool.GetReferredShape_s(label, part):
-        part = label
-    found, colour = Quantity_Color(), None
-    for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
-        if XCAFDoc_ColorTool.GetColor_s(part, kind, found):
-            values = found.Values(Quantity_TypeOfColor.Quantity_TOC_sRGB)
-            colour = (round(values[0], 6), round(values[1], 6), round(values[2], 6))
-            break
-    attribute = TDataStd_Name()
-    name = attribute.Get().ToExtString() if part.FindAttribute(TDataStd_Name.GetID_s(), attribute) else ""
-    return StepBody(name, colour, occt.measure(XCAFDoc_ShapeTool.GetShape_s(label)))
 
 
 def _with_header(text: str, name: str) -> str:
@@ -170,7 +120,7 @@ def _settled(text: str) -> str:
     takes to print; and it counts occurrences on from the file before.
     """
     text = re.sub(r"\n +", "", text)
-    text = re.sub(r"-0\.(?=[,)])|-?\d+\.\d*E-\d+|-?\d+\.\d{11,}", lambda found: _real(float(found[0])), text)
+    text = re.sub(r"-0\.(?=[,)])|-?\d+\.\d*E-\d+|-?\d+\.\d{11,}", lambda real: _real(float(real[0])), text)
     number = itertools.count(1)
     return re.sub(r"(?<=NEXT_ASSEMBLY_USAGE_OCCURRENCE\(')\d+", lambda _: str(next(number)), text)
 

@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
-
-from unitcad import files
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def write(path: Path, vertices: np.ndarray, faces: np.ndarray, name: str) -> None:
-    """Write a mesh (vertices (n, 3) in mm, faces (m, 3)); `print_ready` makes one that survives the rounding.
-
-    The header names the part. It never starts with "solid", by which some readers take a file for the ASCII kind.
-    """
-    files.write(path, content(vertices, faces, name))
-
-
 def content(vertices: np.ndarray, faces: np.ndarray, name: str) -> bytes:
-    """Return the bytes of the file."""
+    """Return the bytes of a file with a mesh: vertices (n, 3) in mm, faces (m, 3).
+
+    `export.printing.print_ready` makes a mesh that survives the rounding. The header names the part. It never starts
+    with "solid", by which some readers take a file for the ASCII kind.
+    """
     corners = np.asarray(vertices, dtype=np.float32)[faces]
     edges = corners[:, 1:].astype(np.float64) - corners[:, :1]
     normals = np.cross(edges[:, 0], edges[:, 1])

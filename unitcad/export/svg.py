@@ -1,4 +1,4 @@
-"""A section drawing in SVG: what a plane of constant y cuts through bodies, coloured, named, with dimensions in mm."""
+"""A section drawing in SVG: bodies cut by a plane of constant y, coloured, named, with dimensions in mm."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from unitcad.kernels.mesh import realise
 from unitcad.shape.body import Body
 
 HAIR_MM = 1 / 3000
-"""The cut lies this far off its plane, and so in no plane of the length grid: a face in the plane
-itself, shared by two bodies, could be drawn for both or for neither."""
+"""The cut lies this far off its plane, and so in no plane of the length grid: a face in the plane itself, shared by two
+bodies, could be drawn for both or for neither."""
 TAIL_MM = 2.5
-"""Of a tail, this much is drawn."""
+"""The length of a tail that is drawn."""
 WIDTH_PX = 520.0
 ROW_PX, COLUMN_PX = 26.0, 54.0
 _UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0]])
@@ -39,7 +39,7 @@ _STYLE = (
 
 @dataclass(frozen=True)
 class Region:
-    """What the plane cuts of one body: closed loops in (x, z), mm, holes among them by the even-odd rule."""
+    """The section of one body: closed loops in (x, z), mm, holes among them by the even-odd rule."""
 
     name: str
     colour: tuple[float, float, float]
@@ -72,15 +72,15 @@ class Note:
 def cut(bodies: Sequence[Body], segments: int, y: float = 0.0, reach: float = math.inf) -> list[Region]:
     """Return what the plane at `y` (mm) cuts of `bodies`, up to |x| = `reach`; what it misses is left out."""
     window = CrossSection.square((2 * reach, 2e4), True) if math.isfinite(reach) else None
-    found = []
+    regions = []
     for body in bodies:
         flat: CrossSection = realise(body.shape, segments).transform(_UPRIGHT).slice(HAIR_MM - y)
         if window is not None:
             flat = flat ^ window
         loops = tuple(tuple((float(px), float(pz)) for px, pz in loop) for loop in flat.to_polygons())
         if loops:
-            found.append(Region(body.name, body.colour, loops))
-    return found
+            regions.append(Region(body.name, body.colour, loops))
+    return regions
 
 
 def section(
@@ -140,7 +140,7 @@ def _unit_measures(dims: Dimensions) -> list[Measure]:
         walls.append(Measure(show(high - low), -high, -low, "below", 0, 0))
     if dims.air_ring > 0:
         walls.append(Measure(show(dims.air_ring), -dims.cavity_radius, -dims.motor_radius, "below", 0, 0))
-    found = [
+    measures = [
         *walls,
         Measure(f"Ø{show(2 * dims.motor_radius)}", -dims.motor_radius, dims.motor_radius, "below", 0, 0),
         Measure(f"R{show(dims.cavity_radius)}", 0, dims.cavity_radius, "below", 1, 0),
@@ -150,19 +150,19 @@ def _unit_measures(dims: Dimensions) -> list[Measure]:
     reach = -dims.outer_radius
     inside = [level for level in levels if level != dims.motor_height or level == dims.core_height]
     for low, high in pairwise(inside):
-        found.append(Measure(show(high - low), low, high, "left", 0, reach))
+        measures.append(Measure(show(high - low), low, high, "left", 0, reach))
     if len(inside) > 2:
-        found.append(Measure(show(levels[-1]), 0, levels[-1], "left", 1, reach))
+        measures.append(Measure(show(levels[-1]), 0, levels[-1], "left", 1, reach))
     if dims.exit:
         low, high = dims.exit.low, dims.exit.high
-        found.append(
+        measures.append(
             Measure(f"slot {show(high - low)} × {show(dims.exit.width)}", low, high, "right", 0, dims.outer_radius)
         )
-    return [measure for measure in found if measure.end > measure.start]
+    return [measure for measure in measures if measure.end > measure.start]
 
 
 class _Page:
-    """The sheet: from mm in the plane to px, and what is drawn round the regions."""
+    """The sheet: from mm in the plane to px, and the drawing round the regions."""
 
     def __init__(self, regions: Sequence[Region], measures: Sequence[Measure]) -> None:
         points = np.array([p for region in regions for loop in region.loops for p in loop])
@@ -194,13 +194,13 @@ class _Page:
         """Draw the dimension lines of one side, their extension lines and their texts."""
         marks = []
         for row in sorted({measure.row for measure in measures}):
-            there = [measure for measure in measures if measure.row == row]
-            ends = [self._ends(measure) for measure in there]
-            for measure, (start, end) in zip(there, ends, strict=True):
-                feet = [self._foot(measure, value) for value in (measure.start, measure.end)]
+            in_row = [measure for measure in measures if measure.row == row]
+            ends = [self._ends(measure) for measure in in_row]
+            for measure, (start, end) in zip(in_row, ends, strict=True):
+                feet = [self.at(self._point(measure, value)) for value in (measure.start, measure.end)]
                 marks += [drawing.line(foot, tip, "extension") for foot, tip in zip(feet, (start, end), strict=True)]
                 marks += drawing.dimension(start, end)
-            marks += self._texts(there, ends)
+            marks += self._texts(in_row, ends)
         return marks
 
     def labels(self, notes: Sequence[Note]) -> list[str]:
@@ -235,42 +235,41 @@ class _Page:
     def _point(measure: Measure, value: float) -> Point:
         return (value, measure.reach) if measure.side == "below" else (measure.reach, value)
 
-    def _foot(self, measure: Measure, value: float) -> Point:
-        return self.at(self._point(measure, value))
-
     @staticmethod
     def _texts(measures: Sequence[Measure], ends: Sequence[tuple[Point, Point]]) -> list[str]:
         """Draw the texts of one row: under a horizontal dimension line, beside a vertical one."""
         if measures[0].side == "below":
             middles = [(start[0] + end[0]) / 2 for start, end in ends]
-            found = drawing.spread(middles, [drawing.text_width(m.text) for m in measures])
+            places = drawing.spread(middles, [drawing.text_width(m.text) for m in measures])
             level = ends[0][0][1] + drawing.TEXT_PX * 0.8
-            return [drawing.text(m.text, (x, level)) for m, x in zip(measures, found, strict=True)]
+            return [drawing.text(m.text, (x, level)) for m, x in zip(measures, places, strict=True)]
         middles = [(start[1] + end[1]) / 2 for start, end in ends]
-        found = drawing.spread(middles, [drawing.TEXT_PX] * len(measures), 2.0)
-        away, anchor = (-6.0, "end") if measures[0].side == "left" else (6.0, "start")
-        return [drawing.text(m.text, (ends[0][0][0] + away, y), anchor) for m, y in zip(measures, found, strict=True)]
+        places = drawing.spread(middles, [drawing.TEXT_PX] * len(measures), 2.0)
+        beside, anchor = (-6.0, "end") if measures[0].side == "left" else (6.0, "start")
+        return [
+            drawing.text(m.text, (ends[0][0][0] + beside, y), anchor) for m, y in zip(measures, places, strict=True)
+        ]
 
 
 def _anchors(regions: Sequence[Region], widths: Sequence[float]) -> list[Point]:
     """Return a point in each region for its leader: well inside, and below where a label of its width has room."""
     ends = [point[0] for region in regions for loop in region.loops for point in loop]
     low, span = min(ends, default=0.0), max(ends, default=0.0) - min(ends, default=0.0)
-    room, total, found = 0.0, sum(widths) or 1.0, []
+    room, total, anchors = 0.0, sum(widths) or 1.0, []
     for region, width in zip(regions, widths, strict=True):
-        wish = low + span * (room + width / 2) / total
+        wanted = low + span * (room + width / 2) / total
         room += width
         starts = np.array([point for loop in region.loops for point in loop])
         stops = np.array([point for loop in region.loops for point in (*loop[1:], loop[0])])
         best, least = region.loops[0][0], math.inf
         for x in np.linspace(low, low + span, 241)[1:-1]:
             for z in _middles(starts, stops, x):
-                # As much room as a dot needs counts; beyond that, nearness to the wish does.
+                # Room counts up to what a dot needs; beyond that, nearness to the wanted place does.
                 clear = min(_distance(starts, stops, np.array([x, z])), 0.02 * span)
-                if abs(x - wish) - 20 * clear < least:
-                    best, least = (float(x), float(z)), abs(x - wish) - 20 * clear
-        found.append(best)
-    return found
+                if abs(x - wanted) - 20 * clear < least:
+                    best, least = (float(x), float(z)), abs(x - wanted) - 20 * clear
+        anchors.append(best)
+    return anchors
 
 
 def _middles(starts: np.ndarray, stops: np.ndarray, x: float) -> np.ndarray:

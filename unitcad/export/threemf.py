@@ -9,12 +9,9 @@ import io
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-
-from unitcad import files
 
 GAP_MM = 5.0
 
@@ -46,13 +43,11 @@ class MeshPart:
     paint: np.ndarray | None = None
 
 
-def write(path: Path, parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220.0)) -> None:
-    """Write `parts` in their order, in rows along x within the bed's width, GAP_MM apart."""
-    files.write(path, content(parts, bed_mm))
-
-
 def content(parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220.0)) -> bytes:
-    """Return the bytes of the package: fixed dates, order and compression."""
+    """Return the bytes of a package with `parts` in their order, in rows along x within the bed's width, GAP_MM apart.
+
+    Dates, order and compression are fixed.
+    """
     entries = {
         "[Content_Types].xml": _CONTENT_TYPES,
         "_rels/.rels": _RELATIONSHIPS,

@@ -1,4 +1,4 @@
-"""Arrays of numbers and points: their types, and what numpy does slowly.
+"""Arrays of numbers and points: their types, and faster versions of some numpy functions.
 
 numpy's own generic types make every sum and mask a union that a type checker cannot follow.
 """
@@ -33,17 +33,16 @@ def sorted_with_order(key: NDArray[np.unsignedinteger], bits: int) -> tuple[NDAr
 
 
 def extent(points: Floats) -> tuple[Floats, Floats]:
-    """Return low and high corner of the box round (n, 3) points, column by column (five times faster than along an
-    axis).
+    """Return low and high corner of the box round (n, 3) points.
+
+    By columns, which is five times faster than along an axis.
     """
     columns = [points[:, axis] for axis in range(3)]
     return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
 
 
 def extents(points: Floats, label: Ints, n: int) -> tuple[Floats, Floats]:
-    """Return low and high corners (n, 3) of the boxes round the points of each label; of a label without any inf and
-    -inf.
-    """
+    """Return low and high corners (n, 3) of the boxes round each label's points; inf and -inf where it has none."""
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     np.minimum.at(low, label, points)
     np.maximum.at(high, label, points)
@@ -52,8 +51,8 @@ def extents(points: Floats, label: Ints, n: int) -> tuple[Floats, Floats]:
 
 def cross(a: Floats, b: Floats) -> Floats:
     """Return the row-wise cross product of (n, 3) arrays; several times faster than numpy.cross on long arrays."""
-    found = np.empty_like(a)
+    product = np.empty_like(a)
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3
-        np.subtract(a[:, i] * b[:, j], a[:, j] * b[:, i], out=found[:, axis])
-    return found
+        np.subtract(a[:, i] * b[:, j], a[:, j] * b[:, i], out=product[:, axis])
+    return product

@@ -1,4 +1,4 @@
-"""Pairs of boxes that meet, found by a tree of boxes that is walked level by level, all nodes of it at once.
+"""Pairs of boxes that meet, by a tree of boxes whose levels are walked one after the other, all nodes at once.
 
 Boxes are put in Morton order; every four neighbours share a box, every four of those the next. A walk down keeps the
 pairs of nodes that meet. Coordinates are 16-bit steps of a common frame: rounding keeps their order, so no pair is
@@ -26,25 +26,18 @@ _BITS = 14  # of each axis in a Morton key
 
 @dataclass(frozen=True)
 class Frame:
-    """Where steps are counted from, and steps per mm of each axis."""
+    """The origin of steps, and steps per mm of each axis."""
 
     origin: Floats
     scale: Floats
 
     def steps(self, points: Floats) -> list[Ints]:
-        """Return the three coordinates of (n, 3) points in steps, 1 to 65,534; order is kept, what lies outside is
-        clipped.
-        """
-        found = []
-        for axis in range(3):
-            value = (points[:, axis] - self.origin[axis]) * self.scale[axis]
-            found.append(np.clip(value, 0, _TOP - 1).astype(np.uint16) + np.uint16(1))
-        return found
+        """Return the coordinates of (n, 3) points in steps, 1 to 65,534, clipped to the frame; order is kept."""
+        values = ((points[:, axis] - self.origin[axis]) * self.scale[axis] for axis in range(3))
+        return [np.clip(value, 0, _TOP - 1).astype(np.uint16) + np.uint16(1) for value in values]
 
     def even(self, steps: list[Ints]) -> list[Ints]:
-        """Return the same in steps of about one length, by powers of two: cells of a space-filling curve are near
-        cubes.
-        """
+        """Return steps of about one length, by powers of two, so that a space-filling curve's cells are near cubes."""
         shift = np.round(np.log2(self.scale / self.scale.min())).clip(0, 15).astype(np.uint16)
         return [step >> bits for step, bits in zip(steps, shift, strict=True)]
 
@@ -56,8 +49,9 @@ def frame_of(points: Floats) -> Frame:
 
 
 def morton_order(steps: list[Ints], corner: Ints | None = None) -> Ints:
-    """Return the order of points along a space-filling curve; with `corner`, of what has `corner[i]` as its first
-    point.
+    """Return the order of points along a space-filling curve.
+
+    With `corner`: of faces, by `corner[i]`, the first point of each.
     """
     key = np.zeros(len(steps[0]), np.uint64)
     for axis in range(3):
@@ -66,9 +60,7 @@ def morton_order(steps: list[Ints], corner: Ints | None = None) -> Ints:
 
 
 def box_order(boxes: Ints, frame: Frame) -> Ints:
-    """Return the order of boxes in a frame by their middles, along a space-filling curve with cells that are near
-    cubes.
-    """
+    """Return the order of boxes by their middles, along a space-filling curve whose cells are near cubes."""
     middle = [boxes[:, axis] // 2 + (np.uint16(65_535) - boxes[:, axis + 3]) // 2 for axis in range(3)]
     return morton_order(frame.even(middle))
 
@@ -81,9 +73,7 @@ def _spread(value: np.ndarray) -> np.ndarray:
 
 
 def boxes_of(steps: list[Ints], *corners: Ints) -> Ints:
-    """Return boxes round the points named by each row of the corner columns: low corner, 65,535 less high corner; (m,
-    6).
-    """
+    """Return boxes (m, 6) round the points of each row of corners: low corner, 65,535 less high corner."""
     boxes = np.empty((len(corners[0]), 6), np.uint16)
     for axis in range(3):
         low = high = steps[axis][corners[0]]
@@ -134,7 +124,7 @@ def slabs_of(steps: list[Ints], *corners: Ints) -> Slabs:
 
 
 def meeting_pairs(boxes: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints, Ints]]:
-    """Return blocks of pairs i, j of different rows of `boxes` whose boxes meet, each pair once.
+    """Yield blocks of pairs i, j of different rows of `boxes` whose boxes meet, each pair once.
 
     Rows near each other should be near in space.
     """
@@ -144,7 +134,7 @@ def meeting_pairs(boxes: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints
 
 
 def meeting_between(boxes: Ints, others: Ints, tick: Tick = lambda: None) -> Iterator[tuple[Ints, Ints]]:
-    """Return the same between the rows of two sets in one frame: row of `boxes`, row of `others`."""
+    """Yield the same between the rows of two sets in one frame: row of `boxes`, row of `others`."""
     here, there = _levels(boxes, len(others)), _levels(others, len(boxes))
     top = np.indices((len(here[-1]), len(there[-1]))).reshape(2, -1)
     yield from _descend(here, there, top[0], top[1], tick, own=False)
@@ -156,12 +146,12 @@ def box_pairs(low: Floats, high: Floats, tick: Tick) -> Ints:
     corners = np.concatenate([low, high])
     steps = frame_of(corners).steps(corners)
     order = morton_order(steps, np.arange(n))
-    found = [np.empty((0, 2), np.int64)]
+    blocks = [np.empty((0, 2), np.int64)]
     for i, j in meeting_pairs(boxes_of(steps, order, order + n), tick):
         pair = np.sort(np.stack([order[i], order[j]], axis=1), axis=1).astype(np.int64)
         one, other = pair.T
-        found.append(pair[((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)])
-    pairs = np.concatenate(found)
+        blocks.append(pair[((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)])
+    pairs = np.concatenate(blocks)
     return pairs[np.lexsort(pairs.T[::-1])]
 
 
@@ -225,7 +215,7 @@ def _walk(
     skip: Callable[[Ints, Ints], Bools] | None,
     tick: Tick,
 ) -> Iterator[tuple[Ints, Ints]]:
-    """Return children of the node pairs whose boxes meet.
+    """Yield children of the node pairs whose boxes meet.
 
     Of a node with itself the pairs of children (p, q) for which `skip(p, q)` are left out.
     """
@@ -251,8 +241,8 @@ def _walk(
             meet[p, :, : len(i)] = hit
         if skip is not None and len(own := np.flatnonzero(i == j)):
             meet.reshape(_FAN * _FAN, -1)[np.ix_(left_out, own)] = False
-        found = np.flatnonzero(meet)
-        which, pair = found >> _STEP_BITS, found & (_STEP - 1)
+        hits = np.flatnonzero(meet)
+        which, pair = hits >> _STEP_BITS, hits & (_STEP - 1)
         i, j = (i * _FAN).take(pair), (j * _FAN).take(pair)
         i += which >> 2
         j += which & 3

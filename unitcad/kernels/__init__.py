@@ -1,1 +1,1 @@
-"""Realisations of one tree: manifold3d for meshes; OCCT, build123d and CadQuery for boundary representations."""
+"""Kernels: shape trees to meshes by manifold3d, to boundary representations by OCCT, build123d and CadQuery."""

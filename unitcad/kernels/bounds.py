@@ -1,4 +1,4 @@
-"""How far a mesh may lie from its shape: what the number of segments implies, for tests and reports.
+"""Bounds of a mesh's distance from its shape, from the number of segments; for tests and reports.
 
 With n segments a turn, a = sqrt(x / sin x), x = 2 pi / n (see `mesh.area_true`):
 
@@ -10,8 +10,8 @@ Volume: |V_mesh - V| <= sum over the leaves of d S, S the area of the leaf's cur
 boolean, since what two sums, differences or intersections disagree on lies where their operands disagree.
 Under `Below` a leaf's curved faces also bound what lies under them: their area counts by how much taller it becomes,
 for leaves that are moved but not turned.
-Box: each face of the box moves by at most max d where a leaf's own face is what reaches out farthest, and by d / sin(w)
-where it is an edge at which two faces meet at an angle w: 2 max d for any w of 30 degrees or more.
+Box: a face of the box moves by at most max d where a leaf's own face reaches out farthest, and by d / sin(w) where an
+edge does at which two faces meet at an angle w: 2 max d for any w of 30 degrees or more.
 `segment_count(r, t)` makes r (a - 1) <= t, and so d <= 1.5 t for every extruded R <= r.
 """
 
@@ -28,11 +28,6 @@ from unitcad.shape.profile import arc_centre, sides
 def deviation(shape: Shape, segments: int) -> float:
     """Return the farthest (mm) that any leaf's mesh of `segments` a turn lies from the leaf's surface."""
     return max(_deviation(leaf, segments) for leaf, _ in _leaves(shape))
-
-
-def box_bound(shape: Shape, segments: int) -> float:
-    """Return how far (mm) a face of the mesh's box may lie off, its faces meeting at 30 degrees or more."""
-    return 2 * deviation(shape, segments)
 
 
 def volume_bound(shape: Shape, segments: int) -> float:

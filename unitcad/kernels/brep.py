@@ -1,7 +1,7 @@
-"""Shape to boundary representation, in the terms of whichever library is handed in. No library is loaded here.
+"""Shape to boundary representation, by any library that is passed in. No library is loaded here.
 
-Exact where the mesh is not: arcs are arcs, and every volume is OCCT's to about 1e-12. One boolean a node with all its
-tools in one list, which OCCT's general fuse does several times faster than one after the other.
+The result is exact: arcs are arcs, and every volume is OCCT's to about 1e-12. A node is one boolean with all its tools
+in one list, which OCCT's general fuse does several times faster than one after the other.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Point = tuple[float, float, float]
 
 
 class Library(Protocol):
-    """What a B-rep library has to offer; a module with these functions is one. Lengths in mm."""
+    """The functions of a B-rep library; a module with these functions is one. Lengths in mm."""
 
     def line(self, start: Point, end: Point, /) -> Any: ...
     def arc(self, start: Point, middle: Point, end: Point, /) -> Any: ...
@@ -49,7 +49,7 @@ def _solid(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
 def _built(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
     match shape:
         case Revolve(profile):
-            return library.revolve(library.face(_upright(profile, library), []))
+            return library.revolve(library.face(_wire(profile, lambda r, z: (r, 0.0, z), library), []))
         case Extrude(profile, z0, z1, holes, None):
             face = library.face(_level(profile, z0, library), [_level(hole, z0, library) for hole in holes])
             return library.extrude(face, z1 - z0)
@@ -72,10 +72,6 @@ def _built(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
         case Place(inner, turn, move):
             return library.place(_solid(inner, library, known), turn, move)
     raise TypeError(f"not a shape: {shape!r}")
-
-
-def _upright(profile: Profile, library: Library) -> Any:
-    return _wire(profile, lambda r, z: (r, 0.0, z), library)
 
 
 def _level(profile: Profile, z: float, library: Library) -> Any:

@@ -1,4 +1,4 @@
-"""Shape to build123d, in its own terms: what `Variant.to_build123d()` hands over."""
+"""Shape to build123d by its own operations, for `Variant.to_build123d()`."""
 
 from __future__ import annotations
 
@@ -87,5 +87,5 @@ def place(shape: B3dShape, turn: Turn, move: brep.Point) -> B3dShape:
 def _solids(shapes: Sequence[Shape]) -> list[B3dShape]:
     # Cleaned once at the end instead of after each boolean.
     with SkipClean():
-        found = brep.realise(shapes, sys.modules[__name__])  # type: ignore[arg-type]
-    return [shape.clean() for shape in found]
+        made = brep.realise(shapes, sys.modules[__name__])  # type: ignore[arg-type]
+    return [shape.clean() for shape in made]

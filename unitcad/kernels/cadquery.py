@@ -1,4 +1,4 @@
-"""Shape to CadQuery, in its own terms: what `Variant.to_cadquery()` hands over."""
+"""Shape to CadQuery by its own operations, for `Variant.to_cadquery()`."""
 
 from __future__ import annotations
 
@@ -82,5 +82,5 @@ def place(shape: cq.Shape, turn: Turn, move: brep.Point) -> cq.Shape:
 
 
 def _solids(shapes: Sequence[Shape]) -> list[cq.Shape]:
-    found = [shape.clean() for shape in brep.realise(shapes, sys.modules[__name__])]  # type: ignore[arg-type]
-    return [shape.Solids()[0] if len(shape.Solids()) == 1 else shape for shape in found]
+    made = [shape.clean() for shape in brep.realise(shapes, sys.modules[__name__])]  # type: ignore[arg-type]
+    return [shape.Solids()[0] if len(shape.Solids()) == 1 else shape for shape in made]

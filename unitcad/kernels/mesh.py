@@ -76,7 +76,7 @@ def _realise(shape: Shape, segments: int, swell: float) -> Manifold:
 
 
 def forget() -> None:
-    """Drop every mesh that is kept for the next call: what a measurement of times needs."""
+    """Drop every mesh that is kept for the next call, before a measurement of times."""
     _realise.cache_clear()
 
 
@@ -100,7 +100,7 @@ def bounds(solid: Manifold) -> tuple[float, ...]:
 
 
 _PROBE = 1e-4
-"""Edge of the cube that finds which piece holds a point, mm."""
+"""Edge of the cube that tells which piece holds a point, mm."""
 _SAME_LINE = 1e-9
 """Distance in plan up to which two vertices lie on one vertical line, mm."""
 

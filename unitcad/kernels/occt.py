@@ -1,4 +1,4 @@
-"""Shape to boundary representation with OCCT directly: what STEP is written from.
+"""Shape to boundary representation with OCCT directly, for STEP files.
 
 Either extra brings OCP, and OCP alone loads in a third of the time that build123d takes, half of cadquery's.
 """
@@ -6,6 +6,7 @@ Either extra brings OCP, and OCP alone loads in a third of the time that build12
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -38,7 +39,7 @@ with loading("OCP"):
 
 @dataclass(frozen=True)
 class Measures:
-    """What can be compared between kernels: solid count, volume (mm3), box (x0, y0, z0, x1, y1, z1 in mm)."""
+    """Measures that kernels can be compared by: solid count, volume (mm3), box (x0, y0, z0, x1, y1, z1 in mm)."""
 
     solids: int
     volume: float
@@ -47,7 +48,7 @@ class Measures:
 
 def solids(shapes: Iterable[Shape]) -> list[TopoDS_Shape]:
     """Return the bodies of `shapes`, faces that continue each other merged."""
-    return [_unified(solid) for solid in brep.realise(shapes, _library())]
+    return [_unified(solid) for solid in brep.realise(shapes, sys.modules[__name__])]  # type: ignore[arg-type]
 
 
 def confirm(shape: Shape, solid: TopoDS_Shape, segments: int = 96) -> None:
@@ -150,15 +151,15 @@ def _faces_up(each: TopoDS_Face) -> bool:
     """Tell whether a face looks upwards. Raises UnitcadError for one that turns from up to down: it has no prism."""
     surface, point, normal = BRepGProp_Face(each), gp_Pnt(), gp_Vec()
     u0, u1, v0, v1 = surface.Bounds()
-    found = set()
+    signs = set()
     for u in (0.02, 0.35, 0.65, 0.98):
         for v in (0.02, 0.35, 0.65, 0.98):
             surface.Normal(u0 + u * (u1 - u0), v0 + v * (v1 - v0), point, normal)
             if abs(normal.Z()) > 1e-6 * normal.Magnitude():
-                found.add(normal.Z() > 0)
-    if len(found) > 1:
+                signs.add(normal.Z() > 0)
+    if len(signs) > 1:
         raise UnitcadError("OCCT: a curved face that turns from up to down bounds a mould; part it where it turns")
-    return found == {True}
+    return signs == {True}
 
 
 def place(solid: TopoDS_Shape, turn: Turn, move: brep.Point) -> TopoDS_Shape:
@@ -166,12 +167,6 @@ def place(solid: TopoDS_Shape, turn: Turn, move: brep.Point) -> TopoDS_Shape:
     transform = gp_Trsf()
     transform.SetTransformation(gp_Ax3(gp_Pnt(*move), gp_Dir(*z_axis), gp_Dir(*x_axis)))
     return solid.Moved(TopLoc_Location(transform.Inverted()))
-
-
-def _library() -> brep.Library:
-    import sys
-
-    return sys.modules[__name__]  # type: ignore[return-value]
 
 
 def _boolean(
@@ -187,23 +182,23 @@ def _boolean(
 
 
 def _list(shapes: Sequence[TopoDS_Shape]) -> TopTools_ListOfShape:
-    found = TopTools_ListOfShape()
+    collected = TopTools_ListOfShape()
     for shape in shapes:
-        found.Append(shape)
-    return found
+        collected.Append(shape)
+    return collected
 
 
 def _unified(solid: TopoDS_Shape) -> TopoDS_Shape:
     upgrade = ShapeUpgrade_UnifySameDomain(solid, True, True, True)
     upgrade.AllowInternalEdges(False)
     upgrade.Build()
-    found = _solids_in(upgrade.Shape())
-    return found[0] if len(found) == 1 else upgrade.Shape()
+    solids = _solids_in(upgrade.Shape())
+    return solids[0] if len(solids) == 1 else upgrade.Shape()
 
 
 def _solids_in(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
-    explorer, found = TopExp_Explorer(shape, TopAbs_SOLID), []
+    explorer, solids = TopExp_Explorer(shape, TopAbs_SOLID), []
     while explorer.More():
-        found.append(explorer.Current())
+        solids.append(explorer.Current())
         explorer.Next()
-    return found
+    return solids

@@ -1,15 +1,15 @@
-"""The door to OCP, the Python binding of OCCT: whatever is wrong with it becomes one error that tells how to mend it.
+"""Loading of OCP, the Python binding of OCCT: a failure becomes one error that tells how to fix it.
 
-Two wheels fill the same folder OCP: cadquery-ocp (with VTK, what cadquery wants) and cadquery-ocp-novtk (what build123d
-wants). The one unpacked last wins; removing either breaks both; both of the one version below, installed in one go,
+Two wheels fill the same folder OCP: cadquery-ocp (with VTK, for cadquery) and cadquery-ocp-novtk (for build123d). The
+one unpacked last overwrites the other, and removing either breaks both. Both of the version below, installed together,
 serve both libraries.
 """
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 from collections.abc import Iterator
-from contextlib import contextmanager
 
 from unitcad.errors import Missing
 
@@ -17,9 +17,9 @@ WHEEL_VERSION = "7.9.3.1.1"
 WHEELS = ("cadquery-ocp", "cadquery-ocp-novtk")
 
 
-@contextmanager
+@contextlib.contextmanager
 def loading(library: str) -> Iterator[None]:
-    """Round the imports of `library` (OCP, build123d or cadquery): raises UnitcadError where they fail."""
+    """Run the imports of `library` (OCP, build123d or cadquery). Raises Missing where they fail."""
     try:
         yield
     except (ImportError, AttributeError) as error:
@@ -28,13 +28,11 @@ def loading(library: str) -> Iterator[None]:
 
 def installed_wheels() -> dict[str, str]:
     """Return the version by name of every installed wheel that fills the folder OCP."""
-    found = {}
+    versions = {}
     for name in WHEELS:
-        try:
-            found[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    return found
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            versions[name] = importlib.metadata.version(name)
+    return versions
 
 
 def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
@@ -50,8 +48,8 @@ def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
     if library == "cadquery" and "cadquery-ocp" not in wanted:
         wanted = ["cadquery-ocp", *wanted]
     # cadquery needs the wheel with VTK, which serves build123d as well: it is unpacked last.
-    mend = "; ".join(f"pip install --force-reinstall --no-deps {name}=={WHEEL_VERSION}" for name in reversed(wanted))
+    fix = "; ".join(f"pip install --force-reinstall --no-deps {name}=={WHEEL_VERSION}" for name in reversed(wanted))
     return (
         f"{library} does not load ({type(error).__name__}: {error}). The folder OCP is broken or of another version:"
-        f" found {have}. Mend it with: {mend}"
+        f" found {have}. Fix it with: {fix}"
     )

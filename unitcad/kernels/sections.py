@@ -1,11 +1,11 @@
-"""Plane sections of meshes: how wide they are."""
+"""The width of plane sections of meshes."""
 
 from __future__ import annotations
 
 from manifold3d import CrossSection, JoinType
 
 FINENESS = 1e-3
-"""To what the widest circle's diameter is found, mm."""
+"""Accuracy of the widest circle's diameter, mm."""
 
 
 def widest(section: CrossSection) -> tuple[float, tuple[float, float]]:
@@ -19,11 +19,11 @@ def widest(section: CrossSection) -> tuple[float, tuple[float, float]]:
     low, high, kept = 0.0, min(x1 - x0, y1 - y0) / 2, section
     while high - low > FINENESS / 4:
         middle = (low + high) / 2
-        left = section.offset(-middle, JoinType.Miter)
-        if left.is_empty():
+        inner = section.offset(-middle, JoinType.Miter)
+        if inner.is_empty():
             high = middle
         else:
-            low, kept = middle, left
-    # Any corner of what is left lies so deep; its mean would not, were it a ring.
+            low, kept = middle, inner
+    # Any corner of the last offset lies that deep; the mean of its corners would not, were it a ring.
     corner = min(tuple(map(float, point)) for loop in kept.to_polygons() for point in loop)
     return 2 * low, (corner[0], corner[1])

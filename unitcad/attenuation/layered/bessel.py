@@ -1,4 +1,4 @@
-"""Bessel functions of the Hankel transforms, and the moment of J1 that a radial disc has for its transform."""
+"""Bessel functions of the Hankel transforms, and the moment of J1 that is a radial disc's transform."""
 
 from __future__ import annotations
 

@@ -17,10 +17,10 @@ class LayeredMedium(Stack):
     >>> from unitcad.attenuation import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
     >>> skin = Layer(thickness=1.5e-3, density=1100, youngs_modulus=130e3, poisson_ratio=0.49, damping=LossFactor(0.14))
     >>> medium = LayeredMedium([skin], HalfSpace(density=1050, youngs_modulus=12e3, poisson_ratio=0.495))
-    >>> found = medium.response(UniformDisc(3.5e-3), omega=785.0, r=[7e-3, 20e-3], rtol=1e-6)
-    >>> found.u_z.shape
+    >>> response = medium.response(UniformDisc(3.5e-3), omega=785.0, r=[7e-3, 20e-3], rtol=1e-6)
+    >>> response.u_z.shape
     (2,)
-    >>> bool(found.error < 1e-6 * abs(found.u_z).max())
+    >>> bool(response.error < 1e-6 * abs(response.u_z).max())
     True
     """
 

@@ -1,4 +1,4 @@
-"""Carrying a stack's state through one layer, upwards, at many wavenumbers.
+"""Propagation of a stack's state through one layer, upwards, at many wavenumbers.
 
 A plane is a pair of (2, 2, n) blocks (U, T): all states u = U c, t = T c that the stack below can carry. In its chart U
 or T is the identity, so the plane's own equation is T u = U t.
@@ -25,8 +25,8 @@ def underside(material: w.Material, k: w.Array) -> Plane:
     """Return the plane at the top of a half-space (or of nothing, if its modulus is 0)."""
     if material.shear == 0:
         return Plane(_identity(k.size), np.zeros((2, 2, k.size), dtype=np.complex128))
-    found = w.waves(material, k)
-    return charted(Plane(found.displacement, found.traction))
+    waves = w.waves(material, k)
+    return charted(Plane(waves.displacement, waves.traction))
 
 
 def raised(material: w.Material, h: float, k: w.Array, below: Plane, with_bottom: bool = False) -> Plane:
@@ -34,22 +34,22 @@ def raised(material: w.Material, h: float, k: w.Array, below: Plane, with_bottom
     below = Plane(below.u, below.t, (below.u, below.t) if with_bottom else None)
     if h == 0.0:
         return below
-    way = route(material, h, k)
-    ways = np.unique(way)
-    if ways.size == 1:
-        return _WAYS[int(ways[0])](material, h, k, below)
+    method = route(material, h, k)
+    methods = np.unique(method)
+    if methods.size == 1:
+        return _METHODS[int(methods[0])](material, h, k, below)
     out = Plane(
         np.empty_like(below.u),
         np.empty_like(below.t),
         (np.empty_like(below.u), np.empty_like(below.t)) if with_bottom else None,
     )
-    for one in ways:
-        part = way == one
+    for one in methods:
+        part = method == one
         bottom = (below.u[..., part], below.t[..., part])
-        found = _WAYS[int(one)](material, h, k[part], Plane(*bottom, bottom if with_bottom else None))
-        out.u[..., part], out.t[..., part] = found.u, found.t
-        if out.bottom and found.bottom:
-            out.bottom[0][..., part], out.bottom[1][..., part] = found.bottom
+        top = _METHODS[int(one)](material, h, k[part], Plane(*bottom, bottom if with_bottom else None))
+        out.u[..., part], out.t[..., part] = top.u, top.t
+        if out.bottom and top.bottom:
+            out.bottom[0][..., part], out.bottom[1][..., part] = top.bottom
     return out
 
 
@@ -57,7 +57,7 @@ def route(material: w.Material, h: float, k: w.Array) -> np.ndarray:
     """Choose a layer's method for each wavenumber: 0 thin (series), 1 grazing (squared series), 2 thick (reflection).
 
     Grazing: one of the two waves hardly changes over the layer (next to its branch point, or k h small where k_s h is
-    not), so that its way down and its way up look alike and reflection would lose digits.
+    not), so that the waves down and up are alike and reflection would lose digits.
     """
     thin = np.maximum(np.abs(k), abs(material.ks2) ** 0.5) * h < w.THIN
     gp, gs = w.rates(material, k)
@@ -87,12 +87,12 @@ def _thick(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
 
     The amplitudes are a down at the top and R E a up at the bottom, with R from the plane's equation T u = U t.
     """
-    found = w.waves(material, k)
-    d, tr = found.displacement, found.traction
+    waves = w.waves(material, k)
+    d, tr = waves.displacement, waves.traction
     jd, jt = w.mirrored(d), -w.mirrored(tr)
     system = w.product(below.t, jd) - w.product(below.u, jt)
     given = w.product(below.u, tr) - w.product(below.t, d)
-    e = w.decay(material, found, h)
+    e = w.decay(material, waves, h)
     reflected = w.product(w.adjugate(system), w.product(given, e)) / w.determinant(system)
     back = w.product(e, reflected)
     bottom = None
@@ -104,7 +104,7 @@ def _thick(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
     return charted(Plane(d + w.product(jd, back), tr + w.product(jt, back), bottom))
 
 
-_WAYS = (_thin, _grazing, _thick)
+_METHODS = (_thin, _grazing, _thick)
 
 
 def charted(raw: Plane) -> Plane:

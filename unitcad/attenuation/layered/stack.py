@@ -4,7 +4,7 @@ The state below an interface is the plane of all (u, t) that the stack can carry
 blocks (U, T), u = U c, t = T c, one of which is the identity: the impedance T U^-1 or the compliance U T^-1, whichever
 is better conditioned, so that neither a clamped nor a free resonance of the lower layers costs digits. It is carried
 upwards through a thick layer by reflection, R -> E R E, with decaying exponentials only, and through a thin one by the
-series of exp(-A h) - 1. The Thomson-Haskell propagator, which multiplies growing exponentials, loses everything where
+series of exp(-A h) - 1. The Thomson-Haskell propagator, which multiplies growing exponentials, loses all digits where
 k h is large or omega small.
 
 Time factor e^{+i omega t}; z into the body; u_z with J0(kr), u_r with J1(kr), both k dk; SI throughout.
@@ -43,7 +43,7 @@ class Layer:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """What lies under all layers; units as `Layer`. A Young's modulus of 0: nothing does (a free underside)."""
+    """The body under all layers; units as `Layer`. A Young's modulus of 0 means a free underside."""
 
     density: float
     youngs_modulus: float
@@ -81,7 +81,7 @@ class Stack:
         if not (np.all(np.isfinite(k)) and np.all(k.real > 0)):
             raise Refusal("k", "array", "wavenumbers must be finite, with a positive real part")
         top = self.planes(k.ravel(), omega)[0]
-        with np.errstate(divide="ignore", invalid="ignore"):  # infinite at an undamped mode, and meant so
+        with np.errstate(divide="ignore", invalid="ignore"):  # infinite at an undamped mode
             block = w.product(top.u, w.adjugate(top.t)) / w.determinant(top.t)
         return np.moveaxis(block, -1, 0).reshape(*k.shape, 2, 2)
 
@@ -91,9 +91,9 @@ class Stack:
 
     def with_loss(self, tan_delta: float) -> Stack:
         """Return the same stack with that loss factor in every body."""
-        law = LossFactor(tan_delta)
-        layers = [replace(layer, damping=law) for layer in self.layers]
-        return Stack(layers, replace(self.half_space, damping=law))
+        loss = LossFactor(tan_delta)
+        layers = [replace(layer, damping=loss) for layer in self.layers]
+        return Stack(layers, replace(self.half_space, damping=loss))
 
     def materials(self, omega: float) -> tuple[w.Material, ...]:
         """Return the layers' and the half-space's complex moduli at omega. Raises `Refusal` for a static free body."""

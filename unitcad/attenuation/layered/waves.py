@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 Array = Any  # a complex numpy array
-THIN = 0.4  # below max(|k|, |k_s|) h of this a layer goes by series: its stiffness blocks, like 1/h, lose digits
+THIN = 0.4  # below this max(|k|, |k_s|) h a layer is propagated by series: its stiffness blocks, like 1/h, lose digits
 _TERM = 1e-18
 
 
@@ -84,10 +84,10 @@ def waves(material: Material, k: Array) -> Waves:
     return Waves(gp, gs, displacement, traction)
 
 
-def decay(material: Material, found: Waves, h: float) -> Array:
+def decay(material: Material, solved: Waves, h: float) -> Array:
     """Return E(h): amplitudes of (P, Q) a depth h lower, upper triangular; only decaying exponentials are formed."""
-    ep, es = np.exp(-found.gp * h), np.exp(-found.gs * h)
-    sum_ = found.gp + found.gs
+    ep, es = np.exp(-solved.gp * h), np.exp(-solved.gs * h)
+    sum_ = solved.gp + solved.gs
     phase = material.ks2 * (1.0 - material.eps) * h / sum_  # (g_p - g_s) h
     turned = phase.real > 0
     towards = np.where(turned, -phase, phase)
