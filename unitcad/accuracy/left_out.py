@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 from unitcad.accuracy.result import Cell, Result, Say, Table
 from unitcad.accuracy.timing import interleaved, machine
 from unitcad.cache import MemoryStore
 from unitcad.pipeline import bodies
 from unitcad.pipeline.artifacts import OUTPUTS
+from unitcad.pipeline.manifest_records import Manifest
 from unitcad.pipeline.product import make
 from unitcad.pipeline.stages import Stages
 from unitcad.validation import default_template, load, templates
@@ -51,7 +51,7 @@ def run(quick: bool, say: Say) -> Result:
     )
 
 
-def _manifest(template: str, request: str) -> dict[str, Any]:
+def _manifest(template: str, request: str) -> Manifest:
     only, formats, check = REQUESTS[request]
     bodies.forget()
     return make(load(template, [f"output.formats={list(formats)}"]), only, check, MemoryStore(), Stages()).manifest

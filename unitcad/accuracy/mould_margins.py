@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import count
-from typing import Any
 
 from unitcad.accuracy.random_specs import seeded_spec
 from unitcad.accuracy.result import Promise, Result, Say, Table
@@ -13,6 +12,7 @@ from unitcad.accuracy.timing import machine, timing
 from unitcad.cache import MemoryStore
 from unitcad.errors import Refusal
 from unitcad.mould_checks import mould_checks
+from unitcad.pipeline.manifest_records import FindingRecord
 from unitcad.pipeline.product import make
 from unitcad.pipeline.stages import Stages
 from unitcad.validation import from_data
@@ -77,7 +77,7 @@ def _worst(finding: Mapping[str, Any]) -> tuple[float | None, float | None, str]
 
     A count that must be met exactly (C000's solids) has none: it is as wanted, or the check fails.
     """
-    if finding["ok"] and finding["code"] == "C000":
+    if finding is None or (finding["ok"] and finding["code"] == "C000"):
         return None, None, ""
     return finding["value"], finding["limit"], finding["unit"] or "number"
 
