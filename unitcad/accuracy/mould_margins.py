@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import count
 
@@ -25,7 +24,7 @@ class _Margin:
     findings: int = 0
     broken: int = 0
     share: float = -1.0
-    worst: Mapping[str, Any] = field(default_factory=dict)
+    worst: FindingRecord | None = None
     seed: int = 0
 
 
@@ -72,7 +71,7 @@ def run(quick: bool, say: Say) -> Result:
     )
 
 
-def _worst(finding: Mapping[str, Any]) -> tuple[float | None, float | None, str]:
+def _worst(finding: FindingRecord | None) -> tuple[float | None, float | None, str]:
     """Return value, limit and unit.
 
     A count that must be met exactly (C000's solids) has none: it is as wanted, or the check fails.
@@ -82,7 +81,7 @@ def _worst(finding: Mapping[str, Any]) -> tuple[float | None, float | None, str]
     return finding["value"], finding["limit"], finding["unit"] or "number"
 
 
-def _share(finding: Mapping[str, Any]) -> float:
+def _share(finding: FindingRecord) -> float:
     """Return how much of its limit a finding uses; a broken one counts as infinite."""
     if not finding["ok"]:
         return float("inf")
