@@ -218,7 +218,8 @@ def _static(kernel: Kernel, load: Load, r: np.ndarray) -> np.ndarray:
 def _static_orders(load: Load, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Integrate q(k) J_n(kr) dk for n = 0, 1 and 2 (0 for a radial load, which does not need it)."""
     if isinstance(load, Point):
-        return (1.0 / (2 * np.pi * r),) * 3
+        integral = 1.0 / (2 * np.pi * r)
+        return integral, integral, integral
     a, s = load.radius, r / load.radius
     if load.direction == "radial":
         return np.where(s < 1, a * (1.0 - s), 0.0), a * np.array([_radial(float(one)) for one in s]), 0.0 * s
