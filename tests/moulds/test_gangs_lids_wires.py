@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from faulty_sets import broken, of_spec, set_of
 
-from unitcad.accuracy.outcomes import door, put_in
+from unitcad.accuracy.outcomes import put_in, refusal_of
 from unitcad.accuracy.random_specs import DOCUMENTED, Seeded, random_spec
 from unitcad.errors import Refusal
 from unitcad.mould_checks import air, check_moulds
@@ -180,7 +180,7 @@ def test_random_specs_keep_the_laws_or_are_refused(seed: int) -> None:
         data.pop("fpcb", None)
         data["wires"] = {"diameter_mm": choose.whole(20, 80) / 100, "count": choose.whole(1, 3)}
     seen = set()
-    while (refusal := door(data)) is not None:
+    while (refusal := refusal_of(data)) is not None:
         assert (refusal.field, refusal.limit) not in seen
         seen.add((refusal.field, refusal.limit))
         if refusal.nearest is None:
