@@ -44,9 +44,9 @@ class BatchResult:
         return json.loads((self.folder / "batch.json").read_text("utf-8"))["variants"]
 
     def __repr__(self) -> str:
-        found = self.summary
-        stopped = f", stopped: {notebook.shortened(found.stopped, 60)}" if found.stopped else ""
-        return f"BatchResult({found.ok} of {found.variants} made, {found.failed} failed{stopped}; {self.folder.name})"
+        s = self.summary
+        stopped = f", stopped: {notebook.shortened(s.stopped, 60)}" if s.stopped else ""
+        return f"BatchResult({s.ok} of {s.variants} made, {s.failed} failed{stopped}; {self.folder.name})"
 
     def _repr_html_(self) -> str:
         rows, shown = self.rows, self.rows[:_MOST_ROWS]

@@ -1,4 +1,4 @@
-"""What a batch notes and hands out: an entry of its journal, what it is, how it ended, what it would make."""
+"""Records of a batch: its identity, an entry of its journal, its summary, its preview."""
 
 from __future__ import annotations
 

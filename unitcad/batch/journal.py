@@ -1,4 +1,4 @@
-"""The batch's own record of what is done: one line a variant, appended as it ends, so that a kill loses nothing.
+"""The record of finished variants: one line a variant, appended as it ends, so that a kill loses nothing.
 
 <out>/batch.lock      held while a batch runs: a second one in the same folder is refused
 <out>/journal.jsonl   a head that says which batch this is, then a line a finished variant; the last one counts
@@ -28,7 +28,7 @@ from unitcad.pipeline.versions import code_version
 JOURNAL, LOCK, TABLE = "journal.jsonl", "batch.lock", "batch.json"
 NOT_THERE = -1
 FORMAT = 2
-"""Version of the lines. A journal of version 1, which had no checksums, is begun anew."""
+"""Version of the lines. A journal of version 1, which had no checksums, is replaced."""
 LONGEST = 1 << 26
 """Bytes of a line, at most; a longer one is damaged."""
 

@@ -1,4 +1,4 @@
-"""Dotted paths into a spec: which there are, and the closest to one that isn't."""
+"""Dotted paths into a spec: those that exist, and the closest to one that does not."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, tab
 
 
 def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
-    """Refuse a path that no spec has, or that names a list entry which `base` (a spec's data) lacks; `where`
-    is the table of the sweep file that has it.
+    """Refuse a path that no spec has, or that names a list entry which `base` (a spec's data) lacks.
 
-    "layers.0.wall_mm", "estimate.frequency_hz" and whole tables ("fpcb", "layers") are paths.
+    `where` is the table of the sweep file that has it. "layers.0.wall_mm", "estimate.frequency_hz" and whole tables
+    ("fpcb", "layers") are paths.
     """
     kind: Any = AskedSpec
     node: Any = base

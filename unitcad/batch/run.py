@@ -138,7 +138,7 @@ def counted(sweep: Sweep, limit: int | None) -> int:
 
 
 @dataclass
-class _Group:
+class _GeometryJobs:
     """Waiting variants of one geometry."""
 
     jobs: deque[Job] = field(default_factory=deque)
@@ -156,7 +156,7 @@ class _Batch:
         self.watch, self.journal, self.store, self.receiver, self.summary = watch, journal, store, receiver, summary
         self.only = checked_outputs(options.only)
         self.coming = self._to_make()
-        self.groups: dict[str, _Group] = {}
+        self.groups: dict[str, _GeometryJobs] = {}
         self.waiting = 0
         self.again: deque[tuple[str, Job]] = deque()
         self.tried: set[int] = set()
@@ -208,7 +208,7 @@ class _Batch:
                 self._finished(VariantOutcome(index, tasks.OK), fresh=False)
                 continue
             key = build_key(spec, self.only, self.options.check)
-            self.groups.setdefault(key, _Group()).jobs.append(
+            self.groups.setdefault(key, _GeometryJobs()).jobs.append(
                 Job(index, to_json(spec), entry.manifest if entry else "")
             )
             self.waiting += 1

@@ -1,4 +1,4 @@
-"""A fit coupon: what a person prints first, to learn the clearances that the printer needs.
+"""A fit coupon: printed first, it shows the clearances that the printer needs.
 
 Five stations at 0.5 to 1.5 times the catalogue's value. At each: a recess for the plug (the plinth's fit), a window for
 the tongue, a hole for the filament, a wall, and the station's own number, engraved.

@@ -63,7 +63,7 @@ def _of_cavity(cavity: Cavity, limit: float) -> MouldFinding:
 
 def pockets(cavity: Manifold, top: float) -> list[Pocket]:
     """Return the pockets of a cavity that is open at z = `top` (mm), over `ATTITUDES`, the deepest first."""
-    surface = _Surface.of(cavity)
+    surface = _Boundary.of(cavity)
     opening = surface.vertices[:, 2] >= top - _AT_TOP
     kept = [
         Pocket(depth, tilt, azimuth, tuple(peak.tolist()))
@@ -92,7 +92,7 @@ def upwards(tilt: float, azimuth: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class _Surface:
+class _Boundary:
     """A cavity's boundary: vertices (n, 3), edges (m, 2), outward normals at the vertices weighted by angle (n, 3)."""
 
     vertices: np.ndarray
@@ -100,7 +100,7 @@ class _Surface:
     normals: np.ndarray
 
     @classmethod
-    def of(cls, solid: Manifold) -> _Surface:
+    def of(cls, solid: Manifold) -> _Boundary:
         vertices, faces = arrays(solid)
         edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
         corners = vertices[faces]
@@ -115,7 +115,7 @@ class _Surface:
         return cls(vertices, edges, normals)
 
 
-def _pockets(surface: _Surface, opening: np.ndarray, up: np.ndarray) -> list[tuple[float, np.ndarray]]:
+def _pockets(surface: _Boundary, opening: np.ndarray, up: np.ndarray) -> list[tuple[float, np.ndarray]]:
     """Return (depth, peak) of every ceiling peak that does not meet the opening."""
     height = surface.vertices @ up
     first, second = surface.edges.T

@@ -1,4 +1,4 @@
-"""C300: every piece comes out, in the person's order, without passing through anything that stays.
+"""C300: every piece comes out, in the order of the procedure, without passing through anything that stays.
 
 A piece that moves along +z meets what stays if, and only if, somewhere an upward face of the piece lies below (or
 against) a downward face of what stays, on one vertical line. So the test is exact for any polyhedron: project the faces

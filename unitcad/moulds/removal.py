@@ -1,4 +1,4 @@
-"""The order in which a person takes the pieces away, and which way each goes."""
+"""The order in which pieces are removed, and the direction of each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from unitcad.moulds.plan import Plan
 
 @dataclass(frozen=True)
 class Removal:
-    """One movement of the person's hands after pour `step`: which piece goes which way, past which tools that stay.
+    """One removal after pour `step`: the piece, its direction, and the tools that stay.
 
     The layers that are there stay too. The unit is peeled off the core last; that is C310's.
     """

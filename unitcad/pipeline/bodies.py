@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Group:
+class BodyGroup:
     """Bodies that share a 3MF, a GLB and a STEP file (`together`), and the folder of their own files."""
 
     name: str  # unit | moulds
@@ -34,10 +34,10 @@ class Group:
     together: str
 
 
-def groups(moulds: MouldSet, only: Sequence[str]) -> list[Group]:
+def groups(moulds: MouldSet, only: Sequence[str]) -> list[BodyGroup]:
     """Return the groups of bodies that `only` asks for."""
-    unit = [Group("unit", moulds.unit, "unit")] if "unit" in only else []
-    return [*unit, Group("moulds", moulds.plan.tools, "moulds/moulds")] if "moulds" in only else unit
+    unit = [BodyGroup("unit", moulds.unit, "unit")] if "unit" in only else []
+    return [*unit, BodyGroup("moulds", moulds.plan.tools, "moulds/moulds")] if "moulds" in only else unit
 
 
 def is_printed(body: Body) -> bool:

@@ -95,8 +95,8 @@ def whole(folder: Path, *, hashes: bool = False) -> Manifest | None:
         if any((folder / parent).is_symlink() for parent in {Path(path).parent for path in manifest["files"]}):
             return None
         for path, listed in manifest["files"].items():
-            found = (folder / path).lstat()
-            if not stat.S_ISREG(found.st_mode) or found.st_size != listed["bytes"]:
+            status = (folder / path).lstat()
+            if not stat.S_ISREG(status.st_mode) or status.st_size != listed["bytes"]:
                 return None
             if hashes and digest((folder / path).read_bytes()) != listed["sha256"]:
                 return None
@@ -170,8 +170,8 @@ def clear_leftovers(out: Path) -> None:
         shutil.rmtree(scratch, ignore_errors=True)
     for path in out.glob(".*.lock"):
         with contextlib.suppress(OSError):  # it has been released meanwhile
-            found = path.lstat()
-            if LOCK.fullmatch(path.name) and stat.S_ISREG(found.st_mode) and not found.st_size:
+            status = path.lstat()
+            if LOCK.fullmatch(path.name) and stat.S_ISREG(status.st_mode) and not status.st_size:
                 cache.free(path)
 
 

@@ -78,7 +78,7 @@ class LeftOut(TypedDict):
     why: str
 
 
-class ListedFile(TypedDict):
+class FileRecord(TypedDict):
     """A file of the folder."""
 
     bytes: int
@@ -106,7 +106,7 @@ class Manifest(TypedDict):
     casting: list[str] | None
     left_out: list[LeftOut]
     versions: dict[str, str]
-    files: dict[str, ListedFile]
+    files: dict[str, FileRecord]
 
 
 def failed_codes(manifest: Manifest) -> list[str]:

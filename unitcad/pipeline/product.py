@@ -19,7 +19,7 @@ from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.geometry import Geometry, geometry, mesh_findings, pictures
 from unitcad.pipeline.json_text import json_bytes
-from unitcad.pipeline.manifest_records import EstimateSummary, LeftOut, ListedFile, Manifest, PartRecord
+from unitcad.pipeline.manifest_records import EstimateSummary, FileRecord, LeftOut, Manifest, PartRecord
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import kernel_versions
 from unitcad.spec import Spec
@@ -57,8 +57,8 @@ def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Sta
     for artifact in artifacts.own(moulds, possible, volumes, store):
         with stages(artifact.stage):
             own[artifact.path] = artifact.make()
-    listed = {path: ListedFile(bytes=len(content), sha256=digest(content)) for path, content in own.items()}
-    listed |= {path: ListedFile(bytes=store.size(sha256), sha256=sha256) for path, sha256 in shared.items()}
+    listed = {path: FileRecord(bytes=len(content), sha256=digest(content)) for path, content in own.items()}
+    listed |= {path: FileRecord(bytes=store.size(sha256), sha256=sha256) for path, sha256 in shared.items()}
     manifest = Manifest(
         name=spec.name,
         design=spec.design,

@@ -35,7 +35,7 @@ class Moment:
 
 
 def moments(moulds: MouldSet) -> Iterator[Moment]:
-    """Yield casting from the bare base to the unit, in the person's order."""
+    """Yield casting from the bare base to the unit, in the order of the procedure."""
     plan = moulds.plan
     base = tuple(tool.name for kind in ("base", "stub") for tool in plan.of_kind(kind))
     yield Moment("Base, filament flush with the core" if len(base) > 1 else "Base", base)

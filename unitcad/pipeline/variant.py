@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Variant(MouldSet):
-    """A spec's unit, moulds and meshes, each worked out when first asked for. Lengths in mm, as assembled, z = 0 at
-    the skin. Raises UnitcadError for a `spec` that is none.
+    """A spec's unit, moulds and meshes, each worked out when first asked for.
+
+    Lengths in mm, as assembled, z = 0 at the skin. Raises UnitcadError for a `spec` that is none.
     """
 
     def __post_init__(self) -> None:
@@ -102,7 +103,7 @@ class Variant(MouldSet):
 
     def _body(self, name: str) -> Body:
         """Return the unit's body of that name, else the tool's: the moulds are drawn for a tool alone."""
-        found = next((body for body in self.unit if body.name == name), None) or self.bodies.get(name)
-        if found is None:
+        of_unit = {body.name: body for body in self.unit}
+        if name not in of_unit and name not in self.bodies:
             raise unknown_name("body", name, self.bodies)
-        return found
+        return of_unit.get(name) or self.bodies[name]

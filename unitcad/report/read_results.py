@@ -1,6 +1,6 @@
 """Reading a result folder. What is absent stays absent; the page names the option that makes it.
 
-A folder may be damaged, or made by somebody who means harm: nothing outside it is read, no link is followed, no special
+A folder may be damaged, or made to do harm: nothing outside it is read, no link is followed, no special
 file opened, and no code of a spec run. What can't be read is named with its reason, and the rest is shown.
 """
 
