@@ -14,9 +14,9 @@ from unitcad.designs.dimensions import Dimensions, concentric, wire_exit
 from unitcad.designs.tooling import Tooling
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import names_device
-from unitcad.shape import ProfileError, Shape
+from unitcad.shape import ProfileError, Shape, cut
 from unitcad.spec import Spec
-from unitcad.spec.custom_code import is_allowed, name_in_file
+from unitcad.spec.custom_code import is_allowed, is_body_file, name_in_file
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,31}")
 
@@ -27,6 +27,8 @@ def custom(name: str, source: str) -> Design:
     Raises UnitcadError, with the line in the file, for a text that can't run and for a NAME that is nothing of the
     kind. Code that is not allowed to run is not run: such a design has defaults, and refuses to draw its layers.
     """
+    if is_body_file(name):
+        return Design(name, "bodies of a file", layers=lambda *_: _of_file(name, source), dimensions=_dimensions)
     if is_allowed(name, source):
         return _design(name, source)
 
@@ -69,6 +71,16 @@ def _held(name: str, source: str) -> Any:
     own = [key for key, value in known.items() if isinstance(value, types.FunctionType | Design)]
     there = ", ".join(sorted(own)) or "none"
     raise UnitcadError(f"design {name}: the file has no such function or Design; it has {there}")
+
+
+@lru_cache(maxsize=16)
+def _of_file(name: str, source: str) -> Mapping[str, Shape]:
+    """Return the bodies of a file; where layers share space, the earlier one has it."""
+    from unitcad.spec.body_file import bodies_in  # numpy: the plan of a shipped design does without
+
+    held = bodies_in(name, source)
+    cast = [key for key in (f"layer{i + 1}" for i in range(len(held))) if key in held]
+    return held | {key: cut(held[key], [held[other] for other in cast[:i]]) for i, key in enumerate(cast)}
 
 
 def _dimensions(spec: Spec) -> Dimensions:

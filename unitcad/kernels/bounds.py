@@ -21,13 +21,13 @@ import math
 from collections.abc import Iterator
 
 from unitcad.kernels.mesh import area_true
-from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Profile, Revolve, Shape, Union
+from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Profile, Revolve, Shape, Union
 from unitcad.shape.profile import arc_centre, sides
 
 
 def deviation(shape: Shape, segments: int) -> float:
     """Return the farthest (mm) that any leaf's mesh of `segments` a turn lies from the leaf's surface."""
-    return max(_deviation(leaf, segments) for leaf, _ in _leaves(shape))
+    return max((_deviation(leaf, segments) for leaf, _ in _leaves(shape)), default=0.0)
 
 
 def volume_bound(shape: Shape, segments: int) -> float:
@@ -40,6 +40,8 @@ def _leaves(shape: Shape, times: float = 1.0) -> Iterator[tuple[Revolve | Extrud
     match shape:
         case Revolve() | Extrude():
             yield shape, times
+        case Polyhedron():
+            return  # flat faces: the mesh is the shape
         case Union(parts) | Common(parts):
             for part in parts:
                 yield from _leaves(part, times)

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
-from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Revolve, Shape, Union
+from unitcad.kernels.mesh import corners_and_faces
+from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
 from unitcad.shape.profile import Profile, arc_middle, sides
 from unitcad.shape.tree import Turn
 
@@ -26,6 +27,7 @@ class Library(Protocol):
     def revolve(self, face: Any, /) -> Any: ...
     def extrude(self, face: Any, height: float, /) -> Any: ...
     def loft(self, below: Any, above: Any, /) -> Any: ...
+    def polyhedron(self, corners: Sequence[Point], faces: Sequence[Sequence[int]], /) -> Any: ...
     def fuse(self, parts: Sequence[Any], /) -> Any: ...
     def cut(self, body: Any, tools: Sequence[Any], /) -> Any: ...
     def common(self, one: Any, other: Any, /) -> Any: ...
@@ -55,6 +57,9 @@ def _built(shape: Shape, library: Library, known: dict[Shape, Any]) -> Any:
             return library.extrude(face, z1 - z0)
         case Extrude(profile, z0, z1, _, Profile() as top):
             return library.loft(_level(profile, z0, library), _level(top, z1, library))
+        case Polyhedron():
+            corners, faces = corners_and_faces(shape)
+            return library.polyhedron(corners.tolist(), faces.tolist())
         case Union(parts):
             return library.fuse([_solid(part, library, known) for part in parts])
         case Cut(body, tools):

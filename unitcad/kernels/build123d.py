@@ -59,6 +59,10 @@ def loft(below: b3d.Wire, above: b3d.Wire) -> b3d.Solid:
     return b3d.Solid.make_loft([below, above], ruled=True)
 
 
+def polyhedron(corners: Sequence[brep.Point], faces: Sequence[Sequence[int]]) -> B3dShape:
+    return B3dShape.cast(occt.polyhedron(corners, faces))
+
+
 def fuse(parts: Sequence[B3dShape]) -> B3dShape:
     return parts[0].fuse(*parts[1:])
 

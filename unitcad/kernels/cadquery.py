@@ -56,6 +56,10 @@ def loft(below: cq.Wire, above: cq.Wire) -> cq.Solid:
     return cq.Solid.makeLoft([below, above], True)
 
 
+def polyhedron(corners: Sequence[brep.Point], faces: Sequence[Sequence[int]]) -> cq.Shape:
+    return cq.Shape.cast(occt.polyhedron(corners, faces))
+
+
 def fuse(parts: Sequence[cq.Shape]) -> cq.Shape:
     return parts[0].fuse(*parts[1:])
 

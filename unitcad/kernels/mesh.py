@@ -13,8 +13,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Revolve, Shape, Union
-from unitcad.shape.profile import Profile, points
+from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
+from unitcad.shape.profile import GRID_PER_MM, Profile, points
 
 FINEST, COARSEST = 4096, 24
 
@@ -57,6 +57,8 @@ def _realise(shape: Shape, segments: int, swell: float) -> Manifold:
             return Manifold.extrude(CrossSection(loops), z1 - z0).translate((0, 0, z0))
         case Extrude(profile, z0, z1, _, Profile() as top):
             return _taper(points(profile, segments), points(top, segments), z0, z1)
+        case Polyhedron():
+            return Manifold(manifold3d.Mesh64(*corners_and_faces(shape)))
         case Union(parts):
             return Manifold.batch_boolean([_realise(part, segments, swell) for part in parts], manifold3d.OpType.Add)
         case Cut(body, tools):
@@ -73,6 +75,12 @@ def _realise(shape: Shape, segments: int, swell: float) -> Manifold:
         case Place(inner, turn, move):
             return _realise(inner, segments, swell).transform(np.column_stack([turn, move]))
     raise TypeError(f"not a shape: {shape!r}")
+
+
+def corners_and_faces(shape: Polyhedron) -> tuple[np.ndarray, np.ndarray]:
+    """Return (corners (n, 3) in mm, double; faces (m, 3))."""
+    corners = np.frombuffer(shape.vertices, "<i4").reshape(-1, 3) / GRID_PER_MM
+    return corners, np.frombuffer(shape.faces, "<i4").reshape(-1, 3).astype(np.uint64)
 
 
 def forget() -> None:

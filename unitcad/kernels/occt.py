@@ -21,20 +21,32 @@ with loading("OCP"):
     from OCP.Bnd import Bnd_Box
     from OCP.BRepAlgoAPI import BRepAlgoAPI_BooleanOperation, BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
     from OCP.BRepBndLib import BRepBndLib
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
+    from OCP.BRepBuilderAPI import (
+        BRepBuilderAPI_MakeEdge,
+        BRepBuilderAPI_MakeFace,
+        BRepBuilderAPI_MakePolygon,
+        BRepBuilderAPI_MakeSolid,
+        BRepBuilderAPI_MakeWire,
+        BRepBuilderAPI_Sewing,
+    )
     from OCP.BRepClass3d import BRepClass3d_SolidClassifier
     from OCP.BRepGProp import BRepGProp, BRepGProp_Face
+    from OCP.BRepLib import BRepLib
     from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
     from OCP.GC import GC_MakeArcOfCircle
     from OCP.gp import gp_Ax1, gp_Ax3, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
     from OCP.GProp import GProp_GProps
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
-    from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_SOLID
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_SHELL, TopAbs_SOLID
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Wire
     from OCP.TopTools import TopTools_ListOfShape
+
+
+_SEWN = 1e-6
+"""Distance up to which edges of neighbouring triangles are one, mm."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +124,23 @@ def loft(below: TopoDS_Wire, above: TopoDS_Wire) -> TopoDS_Shape:
     builder.AddWire(below)
     builder.AddWire(above)
     return builder.Shape()
+
+
+def polyhedron(corners: Sequence[brep.Point], faces: Sequence[Sequence[int]]) -> TopoDS_Shape:
+    """Return the solid of triangles: their edges sewn together, faces in one plane made one."""
+    sewing = BRepBuilderAPI_Sewing(_SEWN)
+    for face in faces:
+        a, b, c = (gp_Pnt(*corners[i]) for i in face)
+        outline = BRepBuilderAPI_MakePolygon(a, b, c, True)
+        sewing.Add(BRepBuilderAPI_MakeFace(outline.Wire(), True).Face())
+    sewing.Perform()
+    builder, explorer = BRepBuilderAPI_MakeSolid(), TopExp_Explorer(sewing.SewedShape(), TopAbs_SHELL)
+    while explorer.More():
+        builder.Add(TopoDS.Shell(explorer.Current()))
+        explorer.Next()
+    solid = builder.Solid()
+    BRepLib.OrientClosedSolid_s(solid)
+    return _unified(solid)
 
 
 def fuse(parts: Sequence[TopoDS_Shape]) -> TopoDS_Shape:

@@ -51,6 +51,17 @@ class Extrude:
 
 
 @dataclass(frozen=True)
+class Polyhedron:
+    """A closed mesh with its faces outwards: corners and faces, three little-endian int32 each, as bytes.
+
+    Coordinates count in 1/1024 mm, the grid of all solids; faces are indices of corners.
+    """
+
+    vertices: bytes
+    faces: bytes
+
+
+@dataclass(frozen=True)
 class Union:
     """All of `parts` together."""
 
@@ -108,7 +119,7 @@ class Place:
         object.__setattr__(self, "move", (mm(x), mm(y), mm(z)))
 
 
-Shape = Revolve | Extrude | Union | Cut | Common | Component | Below | Place
+Shape = Revolve | Extrude | Polyhedron | Union | Cut | Common | Component | Below | Place
 
 
 def cylinder(radius: float, z0: float, z1: float) -> Revolve:
@@ -192,7 +203,7 @@ def _feed(node: object, digest: hashlib._Hash) -> None:
     match node:
         case float():
             digest.update(float.hex(node + 0.0).encode() + b";")
-        case int() | str() | None:
+        case int() | str() | bytes() | None:
             digest.update(repr(node).encode() + b";")
         case tuple():
             digest.update(b"(%d" % len(node))

@@ -157,5 +157,5 @@ class AskedSpec(Table, frozen=True, kw_only=True):
         dict[str, bool | int | float | str], Meta(description="further values that a custom design reads")
     ] = {}
     design_source: Annotated[
-        str | None, Meta(description="the text of a custom design's file; filled in when the spec is read")
+        str | None, Meta(description="the text of a custom design's file, or its bodies; filled in when it is read")
     ] = None

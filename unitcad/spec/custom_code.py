@@ -1,4 +1,4 @@
-"""A custom design: `design = "path/to/file.py:NAME"`, a function or a Design in that file.
+"""A custom design: `design = "path/to/file.py:NAME"`, a function or a Design in that file, or a file of bodies.
 
 The file's text becomes part of the effective spec. So a result's spec.toml stands alone, the result's hash covers the
 code, and a worker elsewhere needs no file.
@@ -17,11 +17,17 @@ from unitcad.files import read_text
 
 _FORM = re.compile(r"(?P<file>.+\.py):(?P<name>[A-Za-z_][A-Za-z0-9_]*)", re.DOTALL)
 LARGEST = 1_000_000
+BODIES = (".step", ".stp", ".stl", ".3mf")
+
+
+def is_body_file(design: object) -> bool:
+    """Tell whether a spec's `design` means a file of bodies."""
+    return isinstance(design, str) and bool(Path(design).stem) and design.lower().endswith(BODIES)
 
 
 def is_custom(design: object) -> bool:
-    """Tell whether a spec's `design` means something in a file."""
-    return isinstance(design, str) and _FORM.fullmatch(design) is not None
+    """Tell whether a spec's `design` means a file, or something in one."""
+    return is_body_file(design) or (isinstance(design, str) and _FORM.fullmatch(design) is not None)
 
 
 def name_in_file(design: str) -> str:
@@ -38,6 +44,11 @@ def with_source(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     design = data.get("design")
     if not is_custom(design) or data.get("design_source") is not None:
         return data
+    if is_body_file(design):
+        from unitcad.spec.body_file import body_text  # numpy and the mesh rules: most specs do without
+
+        path = folder / str(design)
+        return {**data, "design": path.name, "design_source": body_text(str(design), path)}
     file, _, name = str(design).rpartition(":")
     path = folder / file
     try:

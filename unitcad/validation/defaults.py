@@ -11,7 +11,7 @@ from unitcad.designs.limits import least_slot
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
 from unitcad.spec.asked import AskedSpec
-from unitcad.spec.custom_code import is_custom
+from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.spec.effective import Circuit, Estimate, Layer, Motor, Moulds
 
 UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
@@ -25,6 +25,8 @@ def effective(asked: AskedSpec) -> Spec:
     if is_custom(asked.design):
         if asked.design_source is None:
             raise Refusal("design_source", None, f"is required with design = {asked.design!r}")
+        if is_body_file(asked.design) and asked.parameters:
+            raise Refusal("parameters", "...", f"nothing reads them: {asked.design} is a file of bodies")
     else:
         for field in ("parameters", "design_source"):
             if getattr(asked, field):

@@ -1,0 +1,121 @@
+"""The solids of a STEP file as meshes, with their names, where a B-rep extra is installed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from unitcad import children
+from unitcad.errors import UnitcadError
+
+_CHILD = (
+    "import sys; from unitcad.check.readers.step_bodies import write_bodies;"
+    " write_bodies(sys.argv[1], sys.argv[2], float(sys.argv[3]))"
+)
+_ANGLE = 0.35
+"""Largest angle between neighbouring facets of a curved face, radians."""
+
+
+def step_bodies(path: Path, tolerance: float, seconds: float) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Return the name, vertices (n, 3) in mm and faces (m, 3) of every solid, in the order of the file.
+
+    No facet lies farther than `tolerance` (mm) from its surface. Vertices of neighbouring B-rep faces are not joined.
+    Raises UnitcadError where OCCT fails, or takes longer than `seconds`: it runs in a process of its own.
+    """
+    with TemporaryDirectory() as folder:
+        out = Path(folder, "bodies.npz")
+        try:
+            done = children.run(
+                [sys.executable, "-P", "-c", _CHILD, str(path), str(out), repr(tolerance)], timeout=seconds
+            )
+        except subprocess.TimeoutExpired:
+            raise UnitcadError(f"OCCT needs more than {seconds:g} s for it") from None
+        if done.returncode or not out.exists():
+            last = done.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
+            raise UnitcadError(f"OCCT can't turn it into a mesh: {last[:200] or f'exit code {done.returncode}'}")
+        with np.load(out) as held:
+            names = [str(name) for name in held["names"]]
+            return [(name, held[f"vertices{i}"], held[f"faces{i}"]) for i, name in enumerate(names)]
+
+
+def write_bodies(path: str, out: str, tolerance: float) -> None:
+    """Write what `step_bodies` returns as an npz file."""
+    from OCP.STEPCAFControl import STEPCAFControl_Reader
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDF import TDF_LabelSequence
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    document, reader = TDocStd_Document(TCollection_ExtendedString("XmlXCAF")), STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    reader.ReadFile(path)
+    reader.Transfer(document)
+    roots = TDF_LabelSequence()
+    XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
+    held: dict[str, Any] = {}
+    names = []
+    for root in range(1, roots.Length() + 1):
+        for name, solid in _solids(roots.Value(root), "", TopLoc_Location()):
+            held[f"vertices{len(names)}"], held[f"faces{len(names)}"] = _triangles(solid, tolerance)
+            names.append(name)
+    np.savez(out, names=np.array(names, dtype=str), **held)
+
+
+def _solids(label: Any, called: str, place: Any) -> list[tuple[str, Any]]:
+    """Return the solids under a label with the name of the part that holds each."""
+    from OCP.TDataStd import TDataStd_Name
+    from OCP.TDF import TDF_Label, TDF_LabelSequence
+    from OCP.TopAbs import TopAbs_SOLID
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool
+
+    name = TDataStd_Name()
+    if label.FindAttribute(TDataStd_Name.GetID_s(), name):
+        called = name.Get().ToExtString()
+    if XCAFDoc_ShapeTool.IsReference_s(label):
+        referred = TDF_Label()
+        XCAFDoc_ShapeTool.GetReferredShape_s(label, referred)
+        return _solids(referred, called, place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label)))
+    if XCAFDoc_ShapeTool.IsAssembly_s(label):
+        parts = TDF_LabelSequence()
+        XCAFDoc_ShapeTool.GetComponents_s(label, parts)
+        return [found for i in range(1, parts.Length() + 1) for found in _solids(parts.Value(i), called, place)]
+    explorer, solids = TopExp_Explorer(XCAFDoc_ShapeTool.GetShape_s(label).Moved(place), TopAbs_SOLID), []
+    while explorer.More():
+        solids.append((called, explorer.Current()))
+        explorer.Next()
+    return solids
+
+
+def _triangles(solid: Any, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS
+
+    BRepMesh_IncrementalMesh(solid, tolerance, False, _ANGLE, False)
+    vertices: list[tuple[float, float, float]] = []
+    faces: list[tuple[int, int, int]] = []
+    explorer = TopExp_Explorer(solid, TopAbs_FACE)
+    while explorer.More():
+        face, place = TopoDS.Face(explorer.Current()), TopLoc_Location()
+        explorer.Next()
+        mesh, first = BRep_Tool.Triangulation_s(face, place), len(vertices) - 1
+        if mesh is None:
+            continue
+        for i in range(1, mesh.NbNodes() + 1):
+            point = mesh.Node(i).Transformed(place.Transformation())
+            vertices.append((point.X(), point.Y(), point.Z()))
+        for i in range(1, mesh.NbTriangles() + 1):
+            a, b, c = mesh.Triangle(i).Get()
+            a, b, c = (a, c, b) if face.Orientation() == TopAbs_REVERSED else (a, b, c)
+            faces.append((first + a, first + b, first + c))
+    return np.array(vertices).reshape(-1, 3), np.array(faces, dtype=np.int64).reshape(-1, 3)
