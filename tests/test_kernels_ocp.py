@@ -11,7 +11,9 @@ from unitcad.kernels import ocp
 
 def test_nothing_installed():
     error = ModuleNotFoundError("No module named 'OCP'", name="OCP")
-    assert ocp.advice("OCP", error, {}) == "OCP is not installed: pip install 'unitcad[build123d]'"
+    assert ocp.advice("OCP", error, {}) == (
+        "OCP is not installed: pip install 'unitcad[build123d]', or build without STEP: --formats stl,3mf"
+    )
     error = ModuleNotFoundError("No module named 'cadquery'", name="cadquery")
     assert ocp.advice("cadquery", error, {"cadquery-ocp-novtk": "7.9.3.1.1"}).endswith("'unitcad[cadquery]'")
 

@@ -15,8 +15,7 @@ from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.accuracy.unexplained import NineLevels, unexplained
 from unitcad.accuracy.unit_fem import edge_level, pressed_skin
 from unitcad.attenuation.edge.fitted_models import STORED_FIT, edge_levels, fit_divider, judgements, null
-from unitcad.attenuation.edge.measured_levels import CONTROL, Fit, Judgement, judge, measured_table
-from unitcad.attenuation.edge.measured_levels import Table as Measured
+from unitcad.attenuation.edge.measured_levels import CONTROL, Fit, Judgement, MeasuredTable, judge, measured_table
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.catalogue import measurements
@@ -150,19 +149,21 @@ def finite_element_levels(fineness: float, pad: bool) -> tuple[NineLevels, list[
     return NineLevels(levels), seconds
 
 
-def _by_name(table: Measured, model: str, two_levels: Callable[[Measured], np.ndarray]) -> dict[str, dict[str, float]]:
+def _by_name(
+    table: MeasuredTable, model: str, two_levels: Callable[[MeasuredTable], np.ndarray]
+) -> dict[str, dict[str, float]]:
     """Return the levels of a model that knows no shape."""
     levels = two_levels(table) if model == "null" else [edge_levels(table.units(i), model) for i in range(9)]
     return {name: {"": float(level)} for name, level in zip(table.names, levels, strict=True)}
 
 
-def _measured(table: Measured, unit: str) -> float:
+def _measured(table: MeasuredTable, unit: str) -> float:
     """Return the measured level of a unit of the page, whose controls have a shape."""
     name = unit if unit in table.names else f"{CONTROL} {unit.split(' ')[1]}"
     return float(table.levels[table.names.index(name)])
 
 
-def _units_table(table: Measured, closed: dict[str, NineLevels], solved: dict[str, NineLevels]) -> Table:
+def _units_table(table: MeasuredTable, closed: dict[str, NineLevels], solved: dict[str, NineLevels]) -> Table:
     rows: list[tuple] = []
     for i, name in enumerate(table.names):
         models = [level for model in ("paper", "fitted") for level in closed[model].levels[name].values()]
@@ -210,7 +211,7 @@ def bare_skin(finenesses: Sequence[float], repeats: int) -> tuple[Table, float]:
 
 
 def _given(levels: Sequence[float]) -> Fit:
-    def fit(table: Measured, chosen: np.ndarray) -> Callable[[Measured], np.ndarray]:
+    def fit(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
         return lambda other: np.array(levels)
 
     return fit

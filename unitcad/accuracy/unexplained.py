@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.attenuation.edge.closed_form import wave_speed
-from unitcad.attenuation.edge.measured_levels import CONTROL, Judgement, Table
+from unitcad.attenuation.edge.measured_levels import CONTROL, Judgement, MeasuredTable
 from unitcad.catalogue import measurements
 
 
@@ -24,7 +24,7 @@ class NineLevels:
         """Return one level a unit: the geometric mean over its shapes."""
         return math.exp(sum(map(math.log, self.levels[name].values())) / len(self.levels[name]))
 
-    def in_order(self, table: Table) -> tuple[float, ...]:
+    def in_order(self, table: MeasuredTable) -> tuple[float, ...]:
         """Return the level of every unit, in the table's order."""
         return tuple(self.of(name) for name in table.names)
 
@@ -41,7 +41,7 @@ class NineLevels:
 
 
 def unexplained(
-    table: Table, solved: Mapping[str, NineLevels], closed: Mapping[str, NineLevels], paper: Judgement
+    table: MeasuredTable, solved: Mapping[str, NineLevels], closed: Mapping[str, NineLevels], paper: Judgement
 ) -> str:
     """Write the paragraph.
 
@@ -76,7 +76,7 @@ def unexplained(
     )
 
 
-def _orders(table: Table, models: Mapping[str, NineLevels]) -> str:
+def _orders(table: MeasuredTable, models: Mapping[str, NineLevels]) -> str:
     """Say which models give the measured order of the controls, and that of E10/D30 and E10/D10."""
     measured = dict(zip(table.names, table.levels.tolist(), strict=True))
     controls = sorted((name for name in table.names if name.startswith(CONTROL)), key=measured.__getitem__)
@@ -98,7 +98,7 @@ def _named(names: list[str]) -> str:
     return "; ".join(names) or "nothing here"
 
 
-def _thinness(table: Table) -> str:
+def _thinness(table: MeasuredTable) -> str:
     """Return the layers of the layered units over their shear wavelength, thickest and thinnest."""
     shares = []
     for i, layers in enumerate(table.layers):

@@ -60,7 +60,7 @@ def unit_blocks(spec: Spec, omega: float, pad: bool) -> list[Block]:
             omega,
         )
         blocks.append(Block(inner * _MM, radius * _MM, 0.0, top * _MM, solid))
-        if layer.cap_mm is not None:
+        if layer.cap_mm:
             blocks.append(Block(0.0, inner * _MM, below * _MM, top * _MM, solid))
         inner, below = radius, top
     if pad and dims.pad:

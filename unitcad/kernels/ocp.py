@@ -40,7 +40,8 @@ def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
     missing = isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] == library
     extra = "cadquery" if library == "cadquery" else "build123d"
     if missing and (not wheels or library != "OCP"):
-        return f"{library} is not installed: pip install 'unitcad[{extra}]'"
+        without = ", or build without STEP: --formats stl,3mf" if library == "OCP" else ""
+        return f"{library} is not installed: pip install 'unitcad[{extra}]'{without}"
     if ".so" in str(error) and "cannot open shared object" in str(error):
         return f"{library} lacks a library of the system: {error}. On Debian: apt-get install libgl1"
     have = ", ".join(f"{name} {version}" for name, version in sorted(wheels.items())) or "no wheel of it"

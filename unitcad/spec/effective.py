@@ -36,7 +36,7 @@ _MOST_LAYERS = 3
 """Layers that a spec's summary lists."""
 
 
-class Motor(Table, frozen=True, kw_only=True):
+class MotorSize(Table, frozen=True, kw_only=True):
     """The motor's size; `part` names its catalogue entry, or None. With `fill` Layer 1 reaches it."""
 
     part: str | None
@@ -56,7 +56,7 @@ class Circuit(Table, frozen=True, kw_only=True):
     tail_end_width_mm: float
 
 
-class Layer(Table, frozen=True, kw_only=True):
+class CastLayer(Table, frozen=True, kw_only=True):
     """One silicone layer: its wall, and its cap where the design gives it one (0: an open ring)."""
 
     material: str
@@ -135,10 +135,10 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
     name: str
     design: str
     diameter_mm: float
-    motor: Motor
+    motor: MotorSize
     fpcb: Circuit | None
     wires: Wires | None
-    layers: tuple[Layer, ...]
+    layers: tuple[CastLayer, ...]
     moulds: Moulds
     casting: Casting
     estimate: Estimate
@@ -158,8 +158,8 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
             name: str,
             design: str,
             diameter_mm: float,
-            layers: Sequence[LayerTable | Layer | _Keys],
-            motor: MotorTable | Motor | _Keys = ...,
+            layers: Sequence[LayerTable | CastLayer | _Keys],
+            motor: MotorTable | MotorSize | _Keys = ...,
             fpcb: FpcbTable | Circuit | _Keys | None = None,
             wires: WiresTable | _Keys | None = None,
             moulds: MouldsTable | Moulds | _Keys = ...,

@@ -5,14 +5,13 @@ from __future__ import annotations
 from msgspec import structs
 
 from unitcad import catalogue
-from unitcad.catalogue import Motor as CatalogueMotor
 from unitcad.designs import Design, design_of
 from unitcad.designs.limits import least_slot
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import is_body_file, is_custom
-from unitcad.spec.effective import Circuit, Estimate, Layer, Motor, Moulds
+from unitcad.spec.effective import CastLayer, Circuit, Estimate, MotorSize, Moulds
 
 UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
 """What is assumed of a motor whose entry does not say: the paper's motor."""
@@ -54,7 +53,8 @@ def _with_defaults(asked: AskedSpec, design: Design) -> Spec:
         fpcb=fpcb,
         wires=asked.wires,
         layers=tuple(
-            Layer(material=layer.material, wall_mm=layer.wall_mm, cap_mm=layer.cap_mm or 0.0) for layer in asked.layers
+            CastLayer(material=layer.material, wall_mm=layer.wall_mm, cap_mm=layer.cap_mm or 0.0)
+            for layer in asked.layers
         ),
         moulds=moulds,
         casting=asked.casting,
@@ -69,7 +69,7 @@ def _with_defaults(asked: AskedSpec, design: Design) -> Spec:
     )
 
 
-def _motor(asked: AskedSpec) -> tuple[CatalogueMotor | None, Motor]:
+def _motor(asked: AskedSpec) -> tuple[catalogue.Motor | None, MotorSize]:
     """Return the motor's catalogue entry and its size; a size given beside a part overrides the entry's."""
     given, part = asked.motor, None
     sizes = {"diameter_mm": given.diameter_mm, "thickness_mm": given.thickness_mm}
@@ -80,7 +80,7 @@ def _motor(asked: AskedSpec) -> tuple[CatalogueMotor | None, Motor]:
         if size is None:
             raise Refusal(f"motor.{field}", None, "is required where no part is named")
     found = {field: size for field, size in sizes.items() if size is not None}
-    return part, Motor(part=given.part, fill=given.fill, **found)
+    return part, MotorSize(part=given.part, fill=given.fill, **found)
 
 
 def _moulds(asked: AskedSpec, design: Design) -> Moulds:
@@ -94,7 +94,7 @@ def _moulds(asked: AskedSpec, design: Design) -> Moulds:
     return Moulds(**{**given, **lengths})
 
 
-def _circuit(asked: AskedSpec, design: Design, motor: Motor) -> Circuit | None:
+def _circuit(asked: AskedSpec, design: Design, motor: MotorSize) -> Circuit | None:
     """Return the circuit with its pad, which the design sizes, and its tail's end, as wide as the tail."""
     fpcb = asked.fpcb
     if fpcb is None:
@@ -109,7 +109,7 @@ def _circuit(asked: AskedSpec, design: Design, motor: Motor) -> Circuit | None:
     return Circuit(**{**structs.asdict(fpcb), "pad_diameter_mm": pad, "tail_end_width_mm": end})
 
 
-def _estimate(asked: AskedSpec, part: CatalogueMotor | None) -> Estimate:
+def _estimate(asked: AskedSpec, part: catalogue.Motor | None) -> Estimate:
     """Return what the estimate reads: the motor's frequency and amplitude where the spec gives none."""
     unknown = dict(UNKNOWN_MOTOR)
     if part and part.rpm:

@@ -14,7 +14,7 @@ from msgspec import Struct
 from unitcad.catalogue import Printer
 from unitcad.errors import Refusal
 from unitcad.spec import Spec, to_data
-from unitcad.spec.effective import Layer, Moulds
+from unitcad.spec.effective import CastLayer, Moulds
 
 
 class HasSpec(Protocol):
@@ -46,7 +46,7 @@ def plain(node: object, field: str = "") -> Any:
     """
     if isinstance(node, Struct):
         named = {name: getattr(node, name) for name in node.__struct_fields__}
-        if isinstance(node, Layer) and not node.cap_mm:  # an open ring, whose cap a file leaves out
+        if isinstance(node, CastLayer) and not node.cap_mm:  # an open ring, whose cap a file leaves out
             del named["cap_mm"]
         return plain({key: value for key, value in named.items() if value is not None}, field)
     if isinstance(node, Mapping):

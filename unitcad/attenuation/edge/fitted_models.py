@@ -14,7 +14,7 @@ import numpy as np
 
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.measured_levels import Fit, Judgement, Predict, Table, judge, measured_table
+from unitcad.attenuation.edge.measured_levels import Fit, Judgement, MeasuredTable, Predict, judge, measured_table
 
 MODELS = ("paper", "consistent", "fitted")
 STORED_FIT = {"kappa": 0.282048, "s": 0.659429, "left_out_levels": 1.3345, "left_out_ratios": 1.3299}
@@ -25,7 +25,7 @@ Made by `fit_divider(measured_table(), everyone)`, least squares of the log, and
 """
 
 
-def scale_of(path: Predict, table: Table, chosen: np.ndarray) -> float:
+def scale_of(path: Predict, table: MeasuredTable, chosen: np.ndarray) -> float:
     """The one constant s of level = s path: geometric mean of measured / path over the chosen units."""
     return float(np.exp(np.mean(np.log(table.levels / table.evaluate(path))[chosen])))
 
@@ -33,14 +33,14 @@ def scale_of(path: Predict, table: Table, chosen: np.ndarray) -> float:
 def one_constant(path: Predict) -> Fit:
     """level = s path."""
 
-    def fit(table: Table, chosen: np.ndarray) -> Callable[[Table], np.ndarray]:
+    def fit(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
         s = scale_of(path, table, chosen)
         return lambda other: s * other.evaluate(path)
 
     return fit
 
 
-def fit_divider(table: Table, chosen: np.ndarray) -> tuple[float, float]:
+def fit_divider(table: MeasuredTable, chosen: np.ndarray) -> tuple[float, float]:
     """(kappa, s) of level = s / (1 + kappa n E_outer/E_inner): least squares of the log, golden section."""
     logs, contrast = np.log(table.levels[chosen]), table.contrast[chosen]
 
@@ -67,13 +67,13 @@ def fit_divider(table: Table, chosen: np.ndarray) -> tuple[float, float]:
     return float(np.exp(best)), float(np.exp(np.mean(parts(best))))
 
 
-def two_constants(table: Table, chosen: np.ndarray) -> Callable[[Table], np.ndarray]:
+def two_constants(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
     """The divider fitted to the chosen units."""
     kappa, s = fit_divider(table, chosen)
     return lambda other: s / (1.0 + kappa * other.contrast)
 
 
-def null(table: Table, chosen: np.ndarray) -> Callable[[Table], np.ndarray]:
+def null(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
     """Two constants: one level where the inner layer is the softer one, one for all others."""
     logs = np.log(table.levels)
     soft = table.soft_inside

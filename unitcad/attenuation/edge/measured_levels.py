@@ -19,12 +19,12 @@ _OMEGA = 2 * np.pi * 125.0  # rad/s, the middle of the 100 to 150 Hz of section 
 
 Predict = Callable[[Units], Any]
 """Levels of units of one number of layers, shape (...)."""
-Fit = Callable[["Table", np.ndarray], "Callable[[Table], np.ndarray]"]
+Fit = Callable[["MeasuredTable", np.ndarray], "Callable[[MeasuredTable], np.ndarray]"]
 """From a table and a mask of the units to use, a function that gives the levels of a table's units."""
 
 
 @dataclass(frozen=True)
-class Table:
+class MeasuredTable:
     """The measured units, controls first: names, design (`CONTROL`: one layer), layers inside out, level."""
 
     names: tuple[str, ...]
@@ -40,13 +40,8 @@ class Table:
 
     @property
     def soft_inside(self) -> np.ndarray:
-        known = materials()
-        return np.array(
-            [
-                float(known[layers[0]].youngs_modulus_kpa or 0) < float(known[layers[-1]].youngs_modulus_kpa or 0)
-                for layers in self.layers
-            ]
-        )
+        """Whether the innermost layer of a unit is softer than the outermost, a truth value each."""
+        return self.evaluate(lambda units: units.youngs_modulus[..., -1] - units.youngs_modulus[..., 0]) > 0
 
     def evaluate(self, predict: Predict) -> np.ndarray:
         """`predict` of every unit, at the nominal values of the catalogue."""
@@ -77,7 +72,7 @@ def _units(design: str, layers: tuple[str, ...]) -> Units:
 
 
 @cache
-def measured_table() -> Table:
+def measured_table() -> MeasuredTable:
     """The nine levels of the catalogue's measurements, as the results section prints them."""
     data = measurements()
     names, designs, layers, levels = [], [], [], []
@@ -87,7 +82,7 @@ def measured_table() -> Table:
             designs.append(design)
             layers.append(data.layers(unit))
             levels.append(level)
-    return Table(tuple(names), tuple(designs), tuple(layers), np.array(levels))
+    return MeasuredTable(tuple(names), tuple(designs), tuple(layers), np.array(levels))
 
 
 @dataclass(frozen=True)
@@ -114,7 +109,7 @@ class Judgement:
     left_out_ratios: Score | None
 
 
-def judge(fit: Fit, fitted_ratios: bool, table: Table | None = None) -> Judgement:
+def judge(fit: Fit, fitted_ratios: bool, table: MeasuredTable | None = None) -> Judgement:
     """Fit to all units and to all but one, and compare. `fitted_ratios`: a fitted constant enters the ratios too."""
     table = table or measured_table()
     everyone = np.ones(len(table.names), dtype=bool)
