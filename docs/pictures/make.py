@@ -51,10 +51,15 @@ def main() -> None:
 def pictures() -> dict[str, bytes]:
     """Units cut open, two sets taken apart, and the second pour of one."""
     variants = {name: Variant.of(name) for name in ("encapsulating", "embedded")}
-    lugs = Variant.of(str(HERE.parents[1] / "templates" / "custom" / "strap-lugs.toml"))
+    custom = HERE.parents[1] / "templates" / "custom"
+    dome, film, lugs = (Variant.of(str(custom / f"{name}.toml")) for name in ("dome", "film-closed", "strap-lugs"))
     scenes = {f"{name}-unit.png": unit_cut_open(variant) for name, variant in variants.items()}
     scenes["encapsulating-moulds.png"] = exploded(variants["encapsulating"])
     scenes["strap-lugs-moulds.png"] = exploded(lugs)
+    scenes["strap-lugs-pour2.png"] = step_in_section(lugs, 2)
+    scenes["film-closed-moulds.png"] = exploded(film)
+    scenes["film-closed-pour2.png"] = step_in_section(film, 2)
+    scenes["dome-unit.png"] = unit_cut_open(dome)
     scenes["encapsulating-pour2.png"] = step_in_section(variants["encapsulating"], 2)
     return {name: small(image) for name, image in zip(scenes, draw(list(scenes.values())), strict=True)}
 

@@ -11,13 +11,14 @@ from faulty_sets import broken, of_spec, set_of
 
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
-from unitcad.mould_checks import check_moulds, mould_checks
+from unitcad.mould_checks import check_moulds, mould_checks, opening
+from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.complement import complement
 from unitcad.moulds.cup import cup_blank
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import cast_layers
 from unitcad.pipeline.build import Built, build
-from unitcad.shape import Shape, union
+from unitcad.shape import Revolve, Shape, polygon, union
 from unitcad.validation import load, templates
 
 SPEC = """
@@ -119,20 +120,56 @@ def test_a_support_with_a_knife_edge_has_no_clearance(tmp_path: Path) -> None:
     assert broken(moulds_of(tmp_path, lugs(half=7.25), layers=2)) == {"C210"}
 
 
+DOME = (
+    "def unit(spec):\n    return Revolve(Profile(((3.5, 0, 0), (7, 0, 0.15), FLAT(0, 4, 0), (0, 2, 0), (3.5, 2, 0))))\n"
+)
+
+
 def test_a_dome_has_no_opening_to_pour_into(tmp_path: Path) -> None:
-    arc = "Profile(((3.5, 0, 0), (7, 0, 0.15), (FLAT, 4, 0), (0, 4, 0), (0, 2, 0), (3.5, 2, 0)))"
-    dome = f"def unit(spec):\n    return Revolve({arc})\n"
-    pointed = dome.replace("(FLAT, 4, 0), ", "")
-    found = [f for f in check_moulds(moulds_of(tmp_path, pointed)) if not f.ok]
-    assert [finding.code for finding in found] == ["C410", "C410"]
-    assert found[0].where == "pour 1: opening at the rim, area"
-    assert found[0].value < 0.01
+    with pytest.raises(
+        Refusal, match="pour 1 can't be cast: the layer's top, at x = 0, y = 0, z = 4 mm, leaves an"
+    ) as bad:
+        moulds_of(tmp_path, DOME.replace("FLAT", ""))
+    sentence = str(bad.value)
+    assert (
+        "to pour silicone takes 2 mm2 and a circle of 0.4 mm: give it a flat top, such as a disc of 1.6 mm" in sentence
+    )
+    assert sentence.endswith("--only unit makes the unit alone")
+    for flat, fits in ((0.79, False), (0.8, True), (1.0, True)):
+        code = DOME.replace("FLAT", f"({flat}, 4, 0), ")
+        if not fits:
+            with pytest.raises(Refusal, match=f"an opening of {math.pi * flat**2:.2g} mm2"):
+                moulds_of(tmp_path, code)
+            continue
+        area = next(f for f in check_moulds(moulds_of(tmp_path, code)) if f.code == "C410")
+        assert area.ok
+        assert area.value == pytest.approx(math.pi * flat**2, rel=2e-3)
+
+
+def test_a_layer_below_its_rim_has_no_opening(tmp_path: Path) -> None:
+    code = "def unit(spec):\n    return {'layer1': ring(4, 5, 0, 3), 'layer2': ring(5, 7, 0, 2)}\n"
+    with pytest.raises(
+        Refusal, match=r"pour 2 can.t be cast: the layer.s top, at .*, z = 2 mm, leaves an opening of 0 mm2"
+    ):
+        moulds_of(tmp_path, code, layers=2)
+
+
+def test_c410_measures_the_opening() -> None:
+    """A cavity that ends in a point, as a design's own tooling might leave it."""
+    moulds = set_of("single-embedded")
+    (cavity,) = moulds.cavities
+    cone = realise(Revolve(polygon((0, 0), (7, 0), (0, 2))), 96)
+    found = [f for f in opening.CHECK.findings(_with_cavity(moulds, cavity._replace(reached=cone))) if not f.ok]
+    assert [finding.where for finding in found] == [
+        "pour 1: opening at the rim, area",
+        "pour 1: opening at the rim, width",
+    ]
     assert "no room to pour" in found[0].advice
-    (tmp_path / "flat").mkdir()
-    flat = check_moulds(moulds_of(tmp_path / "flat", dome.replace("FLAT", "2.0")))
-    area = next(f for f in flat if f.code == "C410")
-    assert area.ok
-    assert area.value == pytest.approx(math.pi * 4, rel=2e-3)
+
+
+def _with_cavity(moulds: MouldSet, cavity: Cavity) -> MouldSet:
+    moulds.__dict__["cavities"] = [cavity]
+    return moulds
 
 
 @pytest.mark.parametrize(
@@ -182,7 +219,8 @@ def test_a_build_writes_moulds_and_casting(tmp_path: Path) -> None:
 def test_the_worked_examples_become_what_the_page_says() -> None:
     folder = templates()["embedded"].parent / "custom"
     assert broken(of_spec(load(folder / "strap-lugs.toml"))) == set()
-    assert broken(of_spec(load(folder / "dome.toml"))) == {"C410"}
+    with pytest.raises(Refusal, match="pour 1 can't be cast: the layer's top"):
+        of_spec(load(folder / "dome.toml"))
     assert broken(of_spec(load(folder / "dome.toml", ["parameters.flat_mm=1.6"]))) == set()
     assert broken(of_spec(load(folder / "film-closed.toml"))) == set()
     assert not {file.stem for file in folder.glob("*.toml")} & set(templates())

@@ -32,12 +32,15 @@ from unitcad.moulds.blade import blade
 from unitcad.moulds.cup import cup_blank, groove, recess, skirt_end
 from unitcad.moulds.layout import layout
 from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece
+from unitcad.moulds.pour_opening import LEAST_AREA, LEAST_WIDTH, regions
 from unitcad.shape import Below, Common, Component, Cut, Shape, box, cut, moved, union
 from unitcad.shape.profile import GRID_PER_MM
 from unitcad.spec import Spec
 
 SLIVER = 1e-3
 """Volume up to which a piece is what rounding leaves between two faces, mm3."""
+FLAT = math.ceil(10 * math.sqrt(4 * LEAST_AREA / math.pi)) / 10
+"""Diameter of a disc that is large enough to pour through, mm."""
 LEVEL = 1 / GRID_PER_MM
 """Heights nearer than this are one, mm."""
 
@@ -61,6 +64,8 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         return laid if layer + 1 >= laid_in else ()
 
     standing, tops = _standing(spec, cast, there, solids, rims, max(radii), segments)
+    for i, (solid, rim) in enumerate(zip(solids, rims, strict=True)):
+        _check_opening(spec, i, solid, rim)
     if laid:
         seat = max(radii) + spec.moulds.land_mm + spec.moulds.groove_width_mm
         standing = [Common((piece, box(-seat, seat, -seat, seat, -BEYOND, tops))) for piece in standing]
@@ -123,6 +128,19 @@ def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tupl
         rims.append(max([math.floor(high * GRID_PER_MM + 1e-6) / GRID_PER_MM, *rims]))
         radii.append(max([math.ceil(radius * GRID_PER_MM - 0.01) / GRID_PER_MM, *radii]))
     return tuple(rims), tuple(radii)
+
+
+def _check_opening(spec: Spec, layer: int, solid: Manifold, rim: float) -> None:
+    """Raise Refusal where a layer meets its rim in less than what silicone can be poured through."""
+    width, area = max(regions(solid, rim), default=(0.0, 0.0))
+    if area >= LEAST_AREA and width >= LEAST_WIDTH:
+        return
+    corners = arrays(solid)[0]
+    x, y, z = corners[corners[:, 2].argmax()]
+    opening = f"an opening of {area:.2g} mm2 in the rim that takes a circle of {width:.2g} mm"
+    least = f"to pour silicone takes {LEAST_AREA:g} mm2 and a circle of {LEAST_WIDTH:g} mm"
+    why = f"the layer's top, at x = {x:.3g}, y = {y:.3g}, z = {z:.3g} mm, leaves {opening}; {least}: "
+    raise _refused(spec, layer, f"{why}give it a flat top, such as a disc of {FLAT:g} mm, or turn it over")
 
 
 def _standing(
