@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import count, islice
+from typing import Any
 
 import numpy as np
 
-from unitcad.accuracy.measures import Measures, makers, of_brep, of_mesh, timed
+from unitcad.accuracy.measures import mesh_volume
 from unitcad.accuracy.random_specs import seeded_spec
 from unitcad.accuracy.result import Promise, Result, Say, Table
-from unitcad.accuracy.timing import machine, timing
+from unitcad.accuracy.timing import interleaved, machine, timing
 from unitcad.designs import shipped
 from unitcad.errors import Refusal
-from unitcad.kernels import bounds, mesh
+from unitcad.kernels import bounds, build123d, cadquery, mesh, occt
+from unitcad.kernels.occt import Measures
 from unitcad.pipeline import Variant
-from unitcad.shape.body import Body
+from unitcad.shape import Shape
 from unitcad.validation import from_data, templates
 
 _QUANTITIES: tuple[str, ...] = ("solids", "volume", "area", "box", "centre")
@@ -35,18 +37,13 @@ def run(quick: bool, say: Say) -> Result:
     seconds: dict[str, list[float]] = {}
     for name, variant in _variants(chosen, random):
         say(name)
-        parts: list[Body] = [*variant.unit, *variant.plan.tools]
-        shapes = [body.shape for body in parts]
-        bodies += len(parts)
+        shapes = [body.shape for body in (*variant.unit, *variant.plan.tools)]
+        bodies += len(shapes)
         measured: dict[str, list[Measures]] = {}
-        for kernel, make in makers().items():
-            solids, taken = timed(lambda make=make, shapes=shapes: make(shapes))
-            seconds.setdefault(kernel, []).append(taken)
-            measured[kernel] = [of_brep(solid) for solid in solids]
         mesh.forget()
-        meshes, taken = timed(lambda shapes=shapes, n=variant.segments: [mesh.realise(s, n) for s in shapes])
-        seconds.setdefault("manifold3d", []).append(taken)
-        measured["manifold3d"] = [of_mesh(solid) for solid in meshes]
+        for kernel, time in interleaved(_makers(shapes, variant.segments), 1, warm=False).items():
+            seconds.setdefault(kernel, []).append(time.median)
+            measured[kernel] = [(_of_mesh if kernel == "manifold3d" else occt.measure)(solid) for solid in time.value]
         for kernel in worst:
             for exact, other in zip(measured["OCCT"], measured[kernel], strict=True):
                 for quantity, value in _differences(exact, other).items():
@@ -104,6 +101,21 @@ def _random_variants() -> Iterator[tuple[str, Variant]]:
             variant = Variant(from_data(seeded_spec(seed)))
             _ = variant.plan
             yield f"random {seed}", variant
+
+
+def _makers(shapes: Sequence[Shape], segments: int) -> dict[str, Callable[[], list[Any]]]:
+    """Return the kernels by name, each from trees to OCCT bodies or manifold3d solids."""
+    return {
+        "OCCT": lambda: occt.solids(shapes),
+        "build123d": lambda: [build123d.solid(shape).wrapped for shape in shapes],
+        "CadQuery": lambda: [cadquery.solid(shape).wrapped for shape in shapes],
+        "manifold3d": lambda: [mesh.realise(shape, segments) for shape in shapes],
+    }
+
+
+def _of_mesh(solid: Any) -> Measures:
+    volume, centre = mesh_volume(*mesh.arrays(solid))
+    return Measures(len(solid.decompose()), volume, solid.surface_area(), mesh.bounds(solid), tuple(centre))
 
 
 def _differences(exact: Measures, other: Measures) -> dict[str, float]:

@@ -13,8 +13,6 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from unitcad.accuracy.measures import mesh_volume
 from unitcad.accuracy.result import Promise, Result, Say, Table
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
@@ -138,26 +136,18 @@ def _warm(script: Path, lengths: Path, out: Path, formats: str, runs: int) -> Ti
 
 def _volume_error(folder: Path) -> dict[str, float]:
     """Return the relative volume error of every STL in a folder against OCCT's volume of the same tree."""
+    import trimesh
+
     from unitcad.kernels import occt
 
     variant = Variant.of(default_template())
     bodies = (*variant.unit, *variant.plan.tools)
     errors = {}
     for body, solid in zip(bodies, occt.solids([body.shape for body in bodies]), strict=True):
-        corners = _read_stl(folder / f"{body.name}.stl")
-        volume = mesh_volume(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))[0]
+        mesh = trimesh.load_mesh(folder / f"{body.name}.stl", process=False)
+        volume = mesh_volume(mesh.vertices, mesh.faces)[0]
         errors[body.name] = volume / occt.measure(solid).volume - 1
     return errors
-
-
-def _read_stl(file: Path) -> np.ndarray:
-    """Return the corners (n, 3, 3) in mm of a binary or ASCII STL."""
-    raw = file.read_bytes()
-    if raw[:5] == b"solid" and b"facet" in raw[:400]:
-        numbers = [line.split()[1:] for line in raw.decode().splitlines() if line.strip().startswith("vertex")]
-        return np.array(numbers, dtype=float).reshape(-1, 3, 3)
-    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")])
-    return np.frombuffer(raw, record, offset=84)["corners"].astype(float)
 
 
 def _volume_table(errors: dict[str, dict[str, float]]) -> Table:

@@ -51,11 +51,13 @@ _SEWN = 1e-6
 
 @dataclass(frozen=True)
 class Measures:
-    """Measures that kernels can be compared by: solid count, volume (mm3), box (x0, y0, z0, x1, y1, z1 in mm)."""
+    """Measures that kernels can be compared by, in mm, mm2 and mm3; the box as (x0, y0, z0, x1, y1, z1)."""
 
     solids: int
     volume: float
+    area: float
     box: tuple[float, ...]
+    centre: tuple[float, ...]
 
 
 def solids(shapes: Iterable[Shape]) -> list[TopoDS_Shape]:
@@ -81,12 +83,20 @@ def confirm(shape: Shape, solid: TopoDS_Shape, segments: int = 96) -> None:
 
 
 def measure(solid: TopoDS_Shape) -> Measures:
-    """Return count, volume and box of a body; the box is that of the surfaces themselves, to about 1e-7 mm."""
-    properties, box = GProp_GProps(), Bnd_Box()
-    BRepGProp.VolumeProperties_s(solid, properties, 1e-12)
+    """Return the measures of a body; the box is that of the surfaces themselves, to about 1e-7 mm."""
+    inside, surface = GProp_GProps(), GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid, inside, 1e-12)
+    BRepGProp.SurfaceProperties_s(solid, surface, 1e-12)
+    centre = inside.CentreOfMass()
+    place = (centre.X(), centre.Y(), centre.Z())
+    return Measures(len(_solids_in(solid)), inside.Mass(), surface.Mass(), _box(solid), place)
+
+
+def _box(solid: TopoDS_Shape) -> tuple[float, ...]:
+    box = Bnd_Box()
     BRepBndLib.AddOptimal_s(solid, box, False, False)
     box.SetGap(0.0)
-    return Measures(len(_solids_in(solid)), properties.Mass(), tuple(box.Get()))
+    return tuple(box.Get())
 
 
 def line(start: brep.Point, end: brep.Point) -> TopoDS_Edge:
@@ -164,7 +174,7 @@ def component(solid: TopoDS_Shape, at: brep.Point) -> TopoDS_Shape:
 
 def below(solid: TopoDS_Shape, bottom: float) -> TopoDS_Shape:
     """Return the prisms under the upward faces, fused: exact where each such face is seen whole from above."""
-    x0, y0, _, x1, y1, high = measure(solid).box
+    x0, y0, _, x1, y1, high = _box(solid)
     prisms = []
     explorer = TopExp_Explorer(solid, TopAbs_FACE)
     while explorer.More():
