@@ -60,7 +60,7 @@ def test_its_toml_is_taken_by_a_spec(name: str) -> None:
     spec = from_data({**read("encapsulating"), **tomllib.loads(block)})
     assert spec.moulds.plinth_clearance_mm == float(printer.plinth_clearance_mm)
     for fit in coupon.fits(printer):
-        own = tomllib.loads(coupon.toml(printer, fit, 3))
+        own = tomllib.loads(fit.toml(3))
         data = {**read("no-fpcb"), "moulds": {"printer": "mine"}, "printers": {"mine": {"like": name, **own}}}
         assert getattr(from_data(data).moulds, fit.key) == fit.values_mm[3]
 

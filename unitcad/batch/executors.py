@@ -52,8 +52,7 @@ class ProcessExecutor(Executor):
     Tasks and results are pickled; functions go by name, as with `multiprocessing`.
     """
 
-    def __init__(self, workers: int, preload: tuple[str, ...] = WARM) -> None:
-        self._preload = preload
+    def __init__(self, workers: int) -> None:
         self._tasks: queue.SimpleQueue[tuple[Future[Any], Any] | None] = queue.SimpleQueue()
         self._children: dict[int, subprocess.Popen[bytes]] = {}
         self._closing = False
@@ -125,7 +124,7 @@ class ProcessExecutor(Executor):
     def _start(self, slot: int) -> tuple[subprocess.Popen[bytes], IO[bytes]]:
         log = tempfile.TemporaryFile()  # noqa: SIM115  (closed when the worker has ended)
         path = [*filter(None, sys.path), str(files("unitcad").joinpath(os.pardir))]  # not the working directory
-        code = _START.format(path=path, preload=self._preload)
+        code = _START.format(path=path, preload=WARM)
         child = subprocess.Popen(
             [sys.executable, "-P", "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log
         )

@@ -45,6 +45,10 @@ class Fit:
     choose: str
     values_mm: tuple[float, ...]
 
+    def toml(self, station: int) -> str:
+        """Return the line of TOML for a station (from 0), to stand under [printers.NAME] with like = the printer."""
+        return f"{self.key} = {self.values_mm[station]:g}"
+
 
 def fits(printer: Printer) -> tuple[Fit, ...]:
     """Return what the coupon settles, with the five values of each."""
@@ -60,11 +64,6 @@ def fits(printer: Printer) -> tuple[Fit, ...]:
         fit("wall", "least_wall_mm", "thinnest that stands closed and stiff"),
         fit("number", "engraving_stroke_mm", "narrowest that reads"),
     )
-
-
-def toml(printer: Printer, fit: Fit, station: int) -> str:
-    """Return the line of TOML for a station (from 0), to stand under [printers.NAME] with like = the printer."""
-    return f"{fit.key} = {fit.values_mm[station]:g}"
 
 
 def bodies(printer: Printer) -> tuple[Body, ...]:
@@ -101,14 +100,14 @@ def to_markdown(printer: Printer) -> str:
         "",
         "[printers.mine]",
         f'like = "{printer.name}"',
-        *(toml(printer, fit, 2) for fit in fits(printer)),
+        *(fit.toml(2) for fit in fits(printer)),
         "```",
         "",
         "| feature | choose the | 1 | 2 | 3 | 4 | 5 |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for fit in fits(printer):
-        cells = " | ".join(f"`{toml(printer, fit, i)}`" for i in range(len(SHARES)))
+        cells = " | ".join(f"`{fit.toml(i)}`" for i in range(len(SHARES)))
         lines.append(f"| {fit.feature} | {fit.choose} | {cells} |")
     layer, made = float(printer.layer_mm), window_heights_as_printed(printer)
     drawn = [high - low for low, high in _windows(printer)]
