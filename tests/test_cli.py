@@ -30,13 +30,13 @@ def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess
 
 @pytest.mark.parametrize("kind", ["templates", "designs", "materials", "motors", "printers", "rules"])
 def test_list_names_what_is_shipped(kind: str) -> None:
-    told = _run("list", kind)
-    assert told.returncode == 0
+    done = _run("list", kind)
+    assert done.returncode == 0
     data = json.loads(_run("list", kind, "--json").stdout)
     assert list(data) == [kind]
     assert kind in _run("list").stdout.split()
     for name in data[kind]:
-        assert name in told.stdout
+        assert name in done.stdout
     if kind in ("materials", "motors", "printers"):
         for entry in data[kind].values():
             assert all(value["status"] and value["source"] for value in entry.values())
@@ -118,11 +118,11 @@ def test_a_wrong_command_line_is_one_plain_line_and_json_where_asked(words: str)
 
 
 def _commands() -> dict[str, Any]:
-    found = get_command(app).commands  # pyright: ignore
+    commands = get_command(app).commands  # pyright: ignore
     return {
         "": get_command(app),
-        **found,
-        **{f"cache {name}": below for name, below in found["cache"].commands.items()},
+        **commands,
+        **{f"cache {name}": below for name, below in commands["cache"].commands.items()},
     }
 
 

@@ -23,12 +23,12 @@ class Terminal(io.StringIO):
 
 
 def _terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    found = Terminal()
-    monkeypatch.setattr("sys.stderr", found)
-    monkeypatch.setattr("sys.stdout", found)
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setattr("sys.stdout", terminal)
     for name, value in {"COLUMNS": "400", "TERM": "xterm", "NO_COLOR": "1"}.items():
         monkeypatch.setenv(name, value)
-    return found
+    return terminal
 
 
 @pytest.mark.parametrize("name", HOSTILE)

@@ -198,8 +198,8 @@ def test_materials_share_geometry() -> None:
 
 def test_json_is_one_object_and_the_last_line_is_the_folder(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "unitcad", "build", "single-embedded", "--formats", "stl", "--only", "unit"]
-    told = subprocess.run([*command, "-o", str(tmp_path)], capture_output=True, text=True, check=True)
-    assert Path(told.stdout.splitlines()[-1]).is_dir()
+    done = subprocess.run([*command, "-o", str(tmp_path)], capture_output=True, text=True, check=True)
+    assert Path(done.stdout.splitlines()[-1]).is_dir()
     data = json.loads(
         subprocess.run([*command, "-o", str(tmp_path), "--json"], capture_output=True, text=True, check=True).stdout
     )

@@ -1,4 +1,4 @@
-"""What the batch tests share: small sweeps, and a design whose function crashes, hangs or fails where it is told to."""
+"""What the batch tests share: small sweeps, and a design whose function crashes, hangs or fails on request."""
 
 from __future__ import annotations
 

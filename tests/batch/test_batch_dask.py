@@ -45,8 +45,8 @@ class Cluster:
     def _read(self, child: subprocess.Popen[str], pattern: str) -> str:
         assert child.stderr is not None
         for line in child.stderr:
-            if found := re.search(pattern, line):
-                return found[1]
+            if match := re.search(pattern, line):
+                return match[1]
         raise AssertionError("dask did not start")
 
     def close(self) -> None:
@@ -58,9 +58,9 @@ class Cluster:
 @pytest.fixture
 def cluster(tmp_path: Path) -> Iterator[Cluster]:
     (tmp_path / "cluster").mkdir()
-    found = Cluster(tmp_path / "cluster")
-    yield found
-    found.close()
+    cluster = Cluster(tmp_path / "cluster")
+    yield cluster
+    cluster.close()
 
 
 def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(cluster: Cluster, tmp_path: Path) -> None:
@@ -77,9 +77,9 @@ def test_a_cluster_that_loses_a_worker_makes_the_same_bytes(cluster: Cluster, tm
     while len(list(out.glob("ring-*"))) < 6 and time.monotonic() < end:
         time.sleep(0.02)
     cluster.workers[0].kill()
-    told, errors = child.communicate(timeout=90)
+    output, errors = child.communicate(timeout=90)
     assert child.returncode == 0, errors
-    summary = json.loads(told)
+    summary = json.loads(output)
     assert summary["ok"] == 25
     assert summary["failed"] == 0
     assert "Traceback" not in errors
@@ -134,9 +134,9 @@ def test_a_scheduler_that_does_not_answer_is_told_within_ten_seconds(listening: 
             "except UnitcadError as error: print(error, file=sys.stderr)\n"
             "print(time.monotonic() - start)\n"
         )
-        told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
-        assert float(told.stdout) < 10
-        assert "no answer" in told.stderr
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+        assert float(done.stdout) < 10
+        assert "no answer" in done.stderr
         done = unitcad("batch", sweep, "-o", tmp_path / "out", "--scheduler", address)
         assert done.returncode == 2
         assert f"--scheduler {address}: no answer" in done.stderr
@@ -153,9 +153,9 @@ def test_an_address_that_is_none(address: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "said", [b"SSH-2.0-OpenSSH_9.6p1\r\n" + b"x" * 40, b"HTTP/1.1 400 Bad Request\r\n\r\n" + b"a" * 99, b"\xff" * 64]
+    "sent", [b"SSH-2.0-OpenSSH_9.6p1\r\n" + b"x" * 40, b"HTTP/1.1 400 Bad Request\r\n\r\n" + b"a" * 99, b"\xff" * 64]
 )
-def test_an_answer_that_is_no_schedulers(said: bytes) -> None:
+def test_an_answer_that_is_no_schedulers(sent: bytes) -> None:
     from unitcad.batch.cluster import dask_executor
     from unitcad.errors import UnitcadError
 
@@ -166,7 +166,7 @@ def test_an_answer_that_is_no_schedulers(said: bytes) -> None:
 
         def answer() -> None:
             kept.append(other.accept()[0])
-            kept[0].sendall(said)
+            kept[0].sendall(sent)
 
         threading.Thread(target=answer, daemon=True).start()
         with pytest.raises(UnitcadError, match="not a Dask scheduler"):

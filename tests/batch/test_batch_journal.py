@@ -1,4 +1,4 @@
-"""The journal: torn lines, other versions, what is taken up and what is made again."""
+"""The journal: torn lines, other versions, what is resumed and what is made again."""
 
 from __future__ import annotations
 

@@ -87,9 +87,9 @@ def test_the_table_has_a_row_a_variant_with_what_was_swept_and_what_came_out(tmp
         assert float(row["layer1_volume_mm3"]) == pytest.approx(volume, rel=1e-8)
         assert float(row["layer1_mass_g"]) == pytest.approx(volume * density / 1000, rel=1e-5)
         assert (tmp_path / "o" / row["folder"] / "manifest.json").is_file()
-    told = json.loads((tmp_path / "o" / "batch.json").read_text())
-    assert told["columns"] == list(table[0])
-    assert [row["layer1_mass_g"] for row in told["variants"]] == [float(row["layer1_mass_g"]) for row in table]
+    listed = json.loads((tmp_path / "o" / "batch.json").read_text())
+    assert listed["columns"] == list(table[0])
+    assert [row["layer1_mass_g"] for row in listed["variants"]] == [float(row["layer1_mass_g"]) for row in table]
 
 
 def test_laws_and_checks_are_in_the_table(tmp_path: Path) -> None:
@@ -149,10 +149,10 @@ def test_folders_that_are_not_ours(tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter").write_text("keep")
     (tmp_path / "file").write_text("keep")
-    for out, said in (("mine", "no batch's result"), ("file", "is a file")):
+    for out, message in (("mine", "no batch's result"), ("file", "is a file")):
         done = unitcad("batch", sweep, "-o", tmp_path / out)
         assert done.returncode == 2
-        assert said in done.stderr
+        assert message in done.stderr
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["letter"]
     assert unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0).returncode == 0
     other = unitcad("batch", "paper", "-o", tmp_path / "o")
@@ -201,11 +201,11 @@ def test_cache_ls_and_gc(tmp_path: Path, own_cache: Path) -> None:
     sweep = ring_sweep(tmp_path / "s", heights=[2.0])
     unitcad("batch", sweep, "-o", tmp_path / "o", "-j", 0)
     before = bytes_of(tmp_path / "o")
-    told = json.loads(unitcad("cache", "ls", "--json").stdout)
-    assert told["cache"] == str(own_cache)
-    assert told["bytes"] > 0
+    listed = json.loads(unitcad("cache", "ls", "--json").stdout)
+    assert listed["cache"] == str(own_cache)
+    assert listed["bytes"] > 0
     gone = json.loads(unitcad("cache", "gc", "--limit", 0, "--json").stdout)
-    assert gone["bytes"] == told["bytes"]
+    assert gone["bytes"] == listed["bytes"]
     assert json.loads(unitcad("cache", "ls", "--json").stdout)["bytes"] == 0
     assert bytes_of(tmp_path / "o") == before
     assert unitcad("cache", "ls", "--cache", tmp_path).returncode == 2
@@ -240,7 +240,7 @@ def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path: P
 
 
 @pytest.mark.parametrize(
-    ("code", "said"),
+    ("code", "message"),
     [
         ("def unit(spec): return 5", "returns a int"),
         ("def unit(spec):\n    x = 1\n    return 1 / 0", r"line 3\): ZeroDivisionError"),
@@ -254,11 +254,11 @@ def test_the_design_in_the_docs_builds_and_is_complete_in_its_folder(tmp_path: P
         ("def unit(spec): assert False", r"line 1\): AssertionError without a message"),
     ],
 )
-def test_a_design_that_does_not_work_says_where(code: str, said: str, tmp_path: Path) -> None:
+def test_a_design_that_does_not_work_says_where(code: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "d.py").write_text(code)
     layers = [{"material": "ecoflex-00-10", "wall_mm": 1.25}]
     data = {"name": "x", "design": f"{tmp_path / 'd.py'}:unit", "diameter_mm": 14.0, "layers": layers}
-    with pytest.raises(UnitcadError, match=said):
+    with pytest.raises(UnitcadError, match=message):
         build(from_data(data, tmp_path), tmp_path / "out", only=("unit",), check=False)
 
 

@@ -68,9 +68,9 @@ def test_a_killed_worker_costs_its_variant_one_more_try(tmp_path: Path) -> None:
     child = _start("batch", sweep, "-o", out, "-j", 2, "--json")
     _wait_for(lambda: len(_results(out)) >= 2)
     psutil.Process(child.pid).children()[0].kill()
-    told, errors = child.communicate(timeout=240)
+    output, errors = child.communicate(timeout=240)
     assert child.returncode == 0, errors
-    summary = json.loads(told)
+    summary = json.loads(output)
     assert summary["ok"] == 7
     assert summary["failed"] == 0
     assert summary["retried"] <= 1

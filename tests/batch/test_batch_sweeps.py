@@ -179,18 +179,18 @@ def test_dry_run_counts_and_makes_nothing(tmp_path: Path) -> None:
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=5)
     done = unitcad("batch", sweep, "-o", tmp_path / "out", "--dry-run", "--json", "--allow-code")
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
+    preview = json.loads(done.stdout)
     # Three rings and one motor.
-    assert (told["variants"], told["geometries"], told["parts"], told["exact"]) == (15, 3, 4, True)
+    assert (preview["variants"], preview["geometries"], preview["parts"], preview["exact"]) == (15, 3, 4, True)
     assert not (tmp_path / "out").exists()
     made = unitcad("batch", sweep, "-o", tmp_path / "out", "-j", 0)
     assert made.returncode == 0, made.stderr
     files = [f for f in (tmp_path / "out").rglob("*") if f.is_file() and f.parent != tmp_path / "out"]
-    assert told["files"] == len(files)
+    assert preview["files"] == len(files)
     linked = sum(f.stat().st_size for f in files)
-    assert told["linked_mb"] == pytest.approx(linked / 1e6, rel=0.2)
+    assert preview["linked_mb"] == pytest.approx(linked / 1e6, rel=0.2)
     stored = sum({f.stat().st_ino: f.stat().st_size for f in files}.values())
-    assert told["stored_mb"] == pytest.approx(stored / 1e6, rel=0.2)
+    assert preview["stored_mb"] == pytest.approx(stored / 1e6, rel=0.2)
 
 
 def test_dry_run_tells_what_can_not_be() -> None:
@@ -201,7 +201,7 @@ def test_dry_run_tells_what_can_not_be() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["papr"], "closest: paper"),
         (["paper", "--limit", "0"], "--limit"),
@@ -213,9 +213,9 @@ def test_dry_run_tells_what_can_not_be() -> None:
         (["no/such.toml"], "no such file"),
     ],
 )
-def test_asked_wrongly(words: list[str], said: str, tmp_path: Path) -> None:
+def test_asked_wrongly(words: list[str], message: str, tmp_path: Path) -> None:
     done = unitcad("batch", *words, cwd=tmp_path)
     assert done.returncode == 2, done.stdout
-    assert said in done.stderr
+    assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.glob("out*"))

@@ -78,7 +78,7 @@ def test_the_table_is_what_single_estimates_give(name: str, tmp_path: Path, monk
         assert estimate_table._free_axes(sweep) == [1, 2]
 
 
-def test_what_the_door_refuses_is_refused_here(tmp_path: Path) -> None:
+def test_what_validation_refuses_is_refused_here(tmp_path: Path) -> None:
     axes = {"layers.0.wall_mm": [1.0, 2.0, 3.0], "layers.0.material": ["ecoflex-00-10", "nonsense", "dragon-skin-30"]}
     sweep = from_file({"base": "embedded", "sweep": axes}, Path(), "test")
     rows = _rows(sweep, tmp_path / "o")
@@ -107,7 +107,7 @@ def test_the_command_writes_the_same_table_each_time_and_no_folders(tmp_path: Pa
     assert unitcad("batch", "thickness", "--only", "estimate", "-o", tmp_path / "a").returncode == 2
 
 
-def test_a_hundred_thousand_variants_pass_the_door_a_handful_of_times() -> None:
+def test_a_hundred_thousand_variants_are_validated_a_handful_of_times() -> None:
     axes = {"layers.0.material": SILICONES, "estimate.frequency_hz": {"start": 50.0, "stop": 250.0, "num": 20_000}}
     sweep = from_file({"base": "encapsulating", "sweep": axes}, Path(), "test")
     blocks = list(estimate_table.evaluate(sweep, sweep.count))

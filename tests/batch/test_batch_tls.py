@@ -101,7 +101,7 @@ def test_who_is_not_of_the_authority_is_not_talked_to(encrypted, tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("address", "files", "said"),
+    ("address", "files", "message"),
     [
         ("tls://127.0.0.1:9", [], "needs --tls-ca-file, --tls-cert and --tls-key"),
         ("tls://127.0.0.1:9", ["none.pem"], "--tls-ca-file = '{}/none.pem': there is no such file"),
@@ -110,9 +110,9 @@ def test_who_is_not_of_the_authority_is_not_talked_to(encrypted, tmp_path: Path)
         (None, ["text"], "--tls-ca-file = '{}/text': needs a --scheduler at tls://"),
     ],
 )
-def test_certificates_that_can_not_be_used(address: str | None, files: list[str], said: str, tmp_path: Path) -> None:
+def test_certificates_that_can_not_be_used(address: str | None, files: list[str], message: str, tmp_path: Path) -> None:
     (tmp_path / "text").write_text("no certificate\n")
     opened = Workers(None, address, Certificates(*(tmp_path / file for file in files))).executor()
     with pytest.raises(UnitcadError) as error, opened:
         pass
-    assert said.format(tmp_path) in str(error.value)
+    assert message.format(tmp_path) in str(error.value)

@@ -66,10 +66,10 @@ def test_a_scale_of_a_hundredth_of_a_gram_is_3_to_12_percent_wrong() -> None:
 
 def test_mix_covers_waste_and_least_batch() -> None:
     spec = set_of("encapsulating", "casting.waste=0.25", "casting.minimum_mix_g=0.1").spec
-    found = figures.mix(spec, materials()["ecoflex-00-30"], 1000.0)
-    assert found.mix_g == pytest.approx(1.07 * 1.25)
-    assert found.part_a_g + found.part_b_g == pytest.approx(found.mix_g)
-    assert found.mix_error_pct == pytest.approx(100 * 0.005 / found.part_a_g)
+    mix = figures.mix(spec, materials()["ecoflex-00-30"], 1000.0)
+    assert mix.mix_g == pytest.approx(1.07 * 1.25)
+    assert mix.part_a_g + mix.part_b_g == pytest.approx(mix.mix_g)
+    assert mix.mix_error_pct == pytest.approx(100 * 0.005 / mix.part_a_g)
 
 
 def test_play_moves_walls() -> None:
@@ -94,8 +94,8 @@ def test_cure_follows_the_room() -> None:
 
 @pytest.mark.parametrize("name", sorted(templates()))
 def test_every_figure_has_a_source(name: str) -> None:
-    found = procedure(name)
-    for figure in (*found.walls, *(f for pour in found.pours for f in pour.figures)):
+    casting = procedure(name)
+    for figure in (*casting.walls, *(f for pour in casting.pours for f in pour.figures)):
         known = (
             "datasheet: ",
             "paper: ",
@@ -108,8 +108,8 @@ def test_every_figure_has_a_source(name: str) -> None:
         )
         assert figure.source.startswith(known), figure
         assert math.isfinite(figure.value)
-    assert json.loads(written.to_json(found))["label"] == found.label
-    text = written.to_markdown(found)
+    assert json.loads(written.to_json(casting))["label"] == casting.label
+    text = written.to_markdown(casting)
     assert text.isascii()
     tongue = name not in ("embedded", "single-embedded", "no-fpcb")
     assert ("tongue out FIRST" in text) == tongue
@@ -125,12 +125,12 @@ def test_numbers_run_through_the_whole_text() -> None:
 
 def test_order_of_the_hands() -> None:
     """Tongue first, then the cup; the filament before the peel."""
-    found = procedure("encapsulating")
-    for pour in found.pours:
+    casting = procedure("encapsulating")
+    for pour in casting.pours:
         words = " ".join(pour.steps)
         assert words.index("tongue out FIRST") < words.index("Lift cup")
-    assert "filament" in found.release[0]
-    assert "Peel" in found.release[1]
+    assert "filament" in casting.release[0]
+    assert "Peel" in casting.release[1]
 
 
 def test_resin_and_lid_have_their_own_words() -> None:
@@ -141,22 +141,22 @@ def test_resin_and_lid_have_their_own_words() -> None:
 
 
 def test_bill_counts_pieces() -> None:
-    found = procedure("encapsulating", "moulds.cavities=[2,2]")
-    lines = {item.item: item for item in found.bill}
+    casting = procedure("encapsulating", "moulds.cavities=[2,2]")
+    lines = {item.item: item for item in casting.bill}
     assert lines["tongue"].quantity == lines["filament stub"].quantity == lines["LCM0720A3463F"].quantity == 4
     assert lines["cup1"].quantity == 1
     assert "upside down" in lines["cup1"].made
-    csv = written.files(found)["bom.csv"].splitlines()
-    assert len(csv) == len(found.bill) + 1
+    csv = written.files(casting)["bom.csv"].splitlines()
+    assert len(csv) == len(casting.bill) + 1
 
 
 def test_edges_off_the_layer_grid() -> None:
     moulds = set_of("encapsulating")
-    found = {(e.piece, e.edge): e for e in off_grid(moulds)}
+    edges = {(e.piece, e.edge): e for e in off_grid(moulds)}
     # As printed, upside down, the window's edges lie 3.36 - 1.705 and 3.36 - 2.405 above the bed.
-    assert found["cup1", "window's lower edge"].height_mm == pytest.approx(1.655)
-    assert found["cup1", "window's upper edge"].nearest_mm == pytest.approx(1.0)
-    assert ("base", "seat") not in found
+    assert edges["cup1", "window's lower edge"].height_mm == pytest.approx(1.655)
+    assert edges["cup1", "window's upper edge"].nearest_mm == pytest.approx(1.0)
+    assert ("base", "seat") not in edges
     assert off_grid(set_of("encapsulating", "moulds.layer_mm=0.005")) == []
 
 

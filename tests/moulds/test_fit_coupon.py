@@ -70,12 +70,12 @@ def test_command_writes_a_folder(tmp_path: Path) -> None:
 
     result = CliRunner().invoke(app, ["coupon", "fdm-0.4", "-o", str(tmp_path), "--json"])
     assert result.exit_code == 0, result.output
-    said = json.loads(result.stdout)
-    names = {file.name for file in Path(said["folder"]).iterdir()}
+    output = json.loads(result.stdout)
+    names = {file.name for file in Path(output["folder"]).iterdir()}
     assert names == {"coupon-plate.stl", "coupon-plug.stl", "coupon-tongue.stl", "coupon.3mf", "coupon.md"}
-    first = {file.name: file.read_bytes() for file in Path(said["folder"]).iterdir()}
+    first = {file.name: file.read_bytes() for file in Path(output["folder"]).iterdir()}
     CliRunner().invoke(app, ["coupon", "fdm-0.4", "-o", str(tmp_path)])
-    assert first == {file.name: file.read_bytes() for file in Path(said["folder"]).iterdir()}
+    assert first == {file.name: file.read_bytes() for file in Path(output["folder"]).iterdir()}
 
 
 def test_resin_coupon_prints_no_tongue(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Gangs, lids and wires: what fits, what is refused and with which words, and that what is accepted keeps the laws."""
+"""Gangs, lids and wires: what fits, what is refused and why, and that what is accepted passes the mould checks."""
 
 from __future__ import annotations
 

@@ -28,10 +28,10 @@ def read(path: Path) -> list[float]:
         '  Printf("volume %.15g", m);\n'
         "EndFor\n"
     )
-    said = subprocess.run(
+    done = subprocess.run(
         ["gmsh", str(script), "-", "-nopopup"], capture_output=True, text=True, timeout=120, check=True, cwd=path.parent
     )
-    return [float(number) for number in re.findall(r"^volume (\S+)$", said.stdout + said.stderr, re.M)]
+    return [float(number) for number in re.findall(r"^volume (\S+)$", done.stdout + done.stderr, re.M)]
 
 
 @pytest.mark.parametrize("name", ["encapsulating", "embedded"])

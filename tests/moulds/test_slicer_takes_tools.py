@@ -72,14 +72,14 @@ def test_a_broken_mesh_needs_one(tmp_path: Path) -> None:
 def test_print_time_and_filament(tmp_path: Path) -> None:
     """Filament by volume lies between the walls alone and the solid piece."""
     (tongue,) = (file for file in written(tmp_path, "encapsulating") if file.name == "tongue.stl")
-    found = slicer.report([tongue], printers()["fdm-0.4"])
-    assert found is not None
-    assert found["pieces"][0]["repaired"] is False
-    assert 10 < found["print_s"] < 3600
+    report = slicer.report([tongue], printers()["fdm-0.4"])
+    assert report is not None
+    assert report["pieces"][0]["repaired"] is False
+    assert 10 < report["print_s"] < 3600
     moulds = set_of("encapsulating")
     solid = realise(moulds.plan.tool("tongue").shape, moulds.segments).volume() / 1000
     # A skirt round the piece comes on top.
-    assert 0.5 * solid < found["filament_cm3"] < 5 * solid
+    assert 0.5 * solid < report["filament_cm3"] < 5 * solid
     assert slicer.report([tongue], printers()["sla"]) is None
 
 
@@ -91,9 +91,9 @@ def test_durations() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
 def test_every_tool_slices(source: tuple[str, ...], tmp_path: Path) -> None:
-    found = slicer.report(written(tmp_path, *source), printers()["fdm-0.4"])
-    assert found is not None
-    assert all(piece["print_s"] > 0 and not piece["repaired"] for piece in found["pieces"])
+    report = slicer.report(written(tmp_path, *source), printers()["fdm-0.4"])
+    assert report is not None
+    assert all(piece["print_s"] > 0 and not piece["repaired"] for piece in report["pieces"])
 
 
 def test_coupon_needs_no_repair(tmp_path: Path) -> None:
@@ -109,8 +109,8 @@ def test_build_writes_print_times_once_a_piece(tmp_path: Path) -> None:
     built = build(spec, tmp_path, only=("moulds",), check=False)
     sliced: list[str] = []
     assert slice_tools(built.folder, built.manifest, spec, sliced.append).startswith("prints in 0 h ")
-    found = json.loads((built.folder / "slicer.json").read_text())
-    assert {piece["file"] for piece in found["pieces"]} == {"base.stl", "step1-cup.stl", "blade.stl"}
+    report = json.loads((built.folder / "slicer.json").read_text())
+    assert {piece["file"] for piece in report["pieces"]} == {"base.stl", "step1-cup.stl", "blade.stl"}
     assert len(sliced) == 3
     slice_tools(built.folder, built.manifest, spec, sliced.append)
     assert len(sliced) == 3

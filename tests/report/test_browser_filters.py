@@ -14,7 +14,7 @@ NUMBERS = [1, 1.1, 1.2, 1.25, 2, -3, 0.0517123456, None]
 
 
 @pytest.mark.parametrize(
-    ("text", "found"),
+    ("text", "kept"),
     [
         ("1.0", [1]),
         ("1", [1]),
@@ -37,15 +37,15 @@ NUMBERS = [1, 1.1, 1.2, 1.25, 2, -3, 0.0517123456, None]
         ("!> 1", [1, -3, 0.0517123456, None]),
     ],
 )
-def test_numbers_are_filtered_as_numbers(table_of_both: Visit, text: str, found: list[float | None]) -> None:
+def test_numbers_are_filtered_as_numbers(table_of_both: Visit, text: str, kept: list[float | None]) -> None:
     table_of_both.page.fill('input[name="filter-value"]', text)
-    assert column(table_of_both, "name") == [f"v{NUMBERS.index(value)}" for value in found]
+    assert column(table_of_both, "name") == [f"v{NUMBERS.index(value)}" for value in kept]
     assert table_of_both.page.get_attribute('input[name="filter-value"]', "aria-invalid") == "false"
     assert table_of_both.page.inner_text(".fault") == ""
 
 
 @pytest.mark.parametrize(
-    ("field", "text", "found"),
+    ("field", "text", "kept"),
     [
         ("mixed", "1.0", 2),  # the number 1 and the text "1.0 soft"
         ("mixed", "> 0", 1),
@@ -58,9 +58,9 @@ def test_numbers_are_filtered_as_numbers(table_of_both: Visit, text: str, found:
         ("word", "", 8),
     ],
 )
-def test_texts_are_filtered_as_texts(table_of_both: Visit, field: str, text: str, found: int) -> None:
+def test_texts_are_filtered_as_texts(table_of_both: Visit, field: str, text: str, kept: int) -> None:
     table_of_both.page.fill(f'input[name="filter-{field}"]', text)
-    assert len(column(table_of_both, "name")) == found
+    assert len(column(table_of_both, "name")) == kept
     assert table_of_both.page.inner_text(".fault") == ""
 
 

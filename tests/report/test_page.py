@@ -140,8 +140,8 @@ def test_a_batch_is_listed_as_it_lists_itself(built: Path, tmp_path: Path) -> No
         {"index": 1, "status": "failed", "folder": "", "name": "bad"},
         {"index": 2, "status": "ok", "folder": "gone", "name": "gone"},
     ]
-    said = {"name": "sweep", "columns": ["index", "status", "folder", "name", "edge", "flag", "none"]}
-    (tmp_path / "batch.json").write_text(json.dumps({**said, "variants": variants}), "utf-8")
+    batch = {"name": "sweep", "columns": ["index", "status", "folder", "name", "edge", "flag", "none"]}
+    (tmp_path / "batch.json").write_text(json.dumps({**batch, "variants": variants}), "utf-8")
     data = data_of(write_report(tmp_path).read_text("utf-8"))
     assert data["title"] == "sweep: 3 variants"
     assert data["table"]["columns"] == ["name", "index", "status", "edge", "flag", "none"]
@@ -156,8 +156,8 @@ def test_a_batch_is_listed_as_it_lists_itself(built: Path, tmp_path: Path) -> No
 def test_what_was_swept_and_the_levels_come_first(sweep: Path) -> None:
     columns = ["index", "status", "reason", "folder", "motor", "moulds.land_mm", "name", "design", "diameter_mm",
                "layer1_volume_mm3", "layer1_mass_g", "laws", "edge_paper", "edge_fitted"]  # fmt: skip
-    said = {"name": "s", "columns": columns, "variants": [dict.fromkeys(columns)]}
-    assert read_results.results_table(said, [], {}).columns == [
+    batch = {"name": "s", "columns": columns, "variants": [dict.fromkeys(columns)]}
+    assert read_results.results_table(batch, [], {}).columns == [
         "name", "motor", "moulds.land_mm", "design", "diameter_mm", "edge_paper", "edge_fitted",
         "index", "status", "reason", "layer1_volume_mm3", "layer1_mass_g", "laws",
     ]  # fmt: skip

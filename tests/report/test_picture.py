@@ -124,9 +124,9 @@ def test_every_picture_of_the_encapsulating_unit() -> None:
     tongue = variant.plan.tool("tongue").colour
     for name, image in images.items():
         assert len(image) < 250_000, name
-        found = pixels(image)
-        assert like(found, blue).sum() > 1000 or name == "moulds/exploded.png", name
-        assert (found == 255).all(axis=2).mean() > 0.2, name
+        shades = pixels(image)
+        assert like(shades, blue).sum() > 1000 or name == "moulds/exploded.png", name
+        assert (shades == 255).all(axis=2).mean() > 0.2, name
     # Layer 2 is there in the second pour and not in the first; the tongue in both.
     assert like(pixels(images["moulds/step1.png"]), green).sum() == 0
     assert like(pixels(images["moulds/step2.png"]), green).sum() > 1000
