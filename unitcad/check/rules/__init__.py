@@ -1,4 +1,4 @@
-"""The rules, a family or a part of one in each file that begins with the family's letter: texts beside the code.
+"""The rules: each file has the text of a rule, or of a few, beside the code. Its name begins with the family's letter.
 
 A file is found by its name; nothing else lists it. Its `Rule` constants are the rules. Two functions are called where a
 file has them, and yield findings:
