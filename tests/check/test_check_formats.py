@@ -12,6 +12,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from make_checks import markdown
 from shapes import box, stl, text_stl
 
 from unitcad.check import FileReport, Options, check_file, check_mesh
@@ -23,7 +24,7 @@ from unitcad.check.one_mesh import check_surface, in_file
 from unitcad.check.output import as_text
 from unitcad.check.output.render import FORMATS, render
 from unitcad.check.rules.f_limits import Deadline
-from unitcad.check.rules.registry import FAMILIES, check_prefixes, explain, markdown, rules
+from unitcad.check.rules.registry import FAMILIES, check_prefixes, explain, rules
 from unitcad.errors import Refusal
 
 HERE = Path(__file__).parent

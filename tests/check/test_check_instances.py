@@ -75,6 +75,17 @@ def test_a_huge_expansion_is_said_in_few_digits(judge: Judge) -> None:
     assert said == "more than 1e117 faces in more than 1e116 instances, more than --max-faces 10000000"
 
 
+def test_depth_is_counted_over_what_was_visited_before(judge: Judge) -> None:
+    chain = "".join(
+        f'<object id="{i}"><components><component objectid="{i - 1}"/></components></object>' for i in range(2, 82)
+    )
+    for items, code in ((("41", "60"), None), (("41", "81"), "P009"), (("81",), "P009")):
+        built = "".join(f'<item objectid="{item}"/>' for item in items)
+        content = package(model_xml(f'<object id="1">{mesh_xml()}</object>{chain}', f"<build>{built}</build>"))
+        report = judge(content, "a.3mf", cross=False)
+        assert [found.code for found in report.findings] == ([code] if code else []), items
+
+
 def test_a_printers_rules_are_applied_once_to_instances_that_differ_by_their_place_on_the_bed(
     judge: Judge, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,7 +36,7 @@ class CheckResult:
     def verdict(self) -> str:
         """The worst verdict of a file: "error", "warning" or "pass"."""
         verdicts = {report.verdict for report in self.reports}
-        return next((found for found in ("error", "warning") if found in verdicts), "pass")
+        return next((severity for severity in ("error", "warning") if severity in verdicts), "pass")
 
     @property
     def ok(self) -> bool:
@@ -52,8 +52,8 @@ class CheckResult:
         files, codes = len(self.reports), Counter(finding.code for finding in self.findings)
         listed = ", ".join(f"{code} x {count}" for code, count in sorted(codes.items())[:_MOST_CODES])
         more = f" and {len(codes) - _MOST_CODES} more codes" if len(codes) > _MOST_CODES else ""
-        found = f"; {listed}{more}" if codes else ""
-        return f"CheckResult({files} {'file' if files == 1 else 'files'}: {self.verdict}{found})"
+        counted = f"; {listed}{more}" if codes else ""
+        return f"CheckResult({files} {'file' if files == 1 else 'files'}: {self.verdict}{counted})"
 
     def _repr_html_(self) -> str:
         from unitcad import notebook
@@ -62,7 +62,7 @@ class CheckResult:
         for report in self.reports:
             if not report.findings:
                 rows.append((report.path, report.verdict, "", ""))
-            rows += [(report.path, found.severity, found.code, found.message) for found in report.findings]
+            rows += [(report.path, finding.severity, finding.code, finding.message) for finding in report.findings]
         return notebook.table(("file", "verdict", "code", "finding"), rows)
 
 

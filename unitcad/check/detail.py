@@ -19,7 +19,7 @@ MOST = 10_000
 
 @dataclass(frozen=True)
 class Detail:
-    """`locations` a finding; `meshes`: where meshes with a finding are collected, None where nobody draws them."""
+    """`locations` a finding; `meshes`: where meshes with a finding are collected, None where they are not drawn."""
 
     locations: int = SHOWN
     meshes: list[Mesh] | None = None

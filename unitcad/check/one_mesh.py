@@ -36,8 +36,8 @@ def check_surface(mesh: Mesh, deadline: Deadline, *, cross: bool = True) -> Chec
     """Apply the rules that need no printer; `cross=False` leaves out what compares faces with each other."""
     facts = Facts(triangles=len(mesh.faces), vertices=len(mesh.vertices))
     mesh = replace(mesh, vertices=representable(mesh.vertices))
-    if found := not_finite(mesh):
-        return CheckedMesh(in_file(found, mesh), facts)
+    if broken := not_finite(mesh):
+        return CheckedMesh(in_file(broken, mesh), facts)
     if not len(mesh.faces):
         return CheckedMesh(ending([F001.finding("the mesh has no face")]), facts)
     low, high = extent(mesh.vertices)
@@ -82,7 +82,7 @@ def in_file(findings: Iterable[Finding], mesh: Mesh) -> tuple[Finding, ...]:
 
 
 def _drawn(place: Location, mesh: Mesh) -> Location:
-    """Return the location with the middle of its triangles and, where somebody draws, the number of their mesh."""
+    """Return the location with the middle of its triangles and, where findings are drawn, the number of their mesh."""
     if place.mesh is not None or (place.centre is not None and place.region is None):
         return place
     whole, meshes = place.region is not None, detail().meshes

@@ -145,7 +145,7 @@ def _check_object(instance: Instance, options: Options, deadline: Deadline) -> C
 
 
 def _filled(findings: Iterable[Finding]) -> Iterator[Finding]:
-    """Return the findings, of rules that 3MF answers by its fill rule as warnings."""
+    """Return the findings, as warnings those that 3MF settles by its fill rule."""
     for item in findings:
         if item.code in _FILLED:
             yield replace(item, severity="warning", message=f"{item.message} (3MF's fill rule says what is solid)")

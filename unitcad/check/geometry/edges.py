@@ -79,12 +79,12 @@ def _sorted_edges(low: Ints, high: Ints, n_vertices: int) -> tuple[Ints, Ints, I
 
 def opposite(edges: Edges, n_half: int) -> Ints:
     """Return for each half-edge the one across its edge; itself where an edge has other than two faces."""
-    found = np.arange(n_half, dtype=np.int32)
+    across = np.arange(n_half, dtype=np.int32)
     pairs = edges.first[edges.size == 2]
     one, other = edges.order[pairs], edges.order[pairs + 1]
-    found[one] = other
-    found[other] = one
-    return found
+    across[one] = other
+    across[other] = one
+    return across
 
 
 def pinched_closed(faces: Ints, across: Ints, n_vertices: int) -> Ints:

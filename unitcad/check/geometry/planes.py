@@ -44,11 +44,11 @@ class Planes:
 
     def corners(self, ids: Ints) -> Floats:
         """Return the corners of faces by their vertices: (corner, axis, n)."""
-        found = np.empty((3, 3, ids.shape[1]))
+        corners = np.empty((3, 3, ids.shape[1]))
         for k, at in enumerate(ids):
             for axis, column in enumerate(self.columns):
-                column.take(at, mode="clip", out=found[k, axis])
-        return found
+                column.take(at, mode="clip", out=corners[k, axis])
+        return corners
 
     def one_side(self, i: Ints, others: Ints, shared: Ints) -> Bools:
         """Return whether the vertices `others` (corner, n) of faces are on one side of the plane of each face i.

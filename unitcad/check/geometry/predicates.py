@@ -104,8 +104,8 @@ def _exact(points: Floats, size: Floats) -> Ints:
         ~(same.all(axis=0).any(axis=0) | same[:-1].all(axis=1).any(axis=0))
     )  # else two lines are zero
     points, size = points.take(left, axis=2), size[left]
-    known, found = _modular(points, 2 * (_BOUND[points.shape[1]] * size + _TINY))
-    sign[left[known]] = found
+    known, signs = _modular(points, 2 * (_BOUND[points.shape[1]] * size + _TINY))
+    sign[left[known]] = signs
     if known.all():
         return sign
     left, points, size = left[~known], points.compress(~known, axis=2), size[~known]
@@ -114,8 +114,8 @@ def _exact(points: Floats, size: Floats) -> Ints:
     sign[left] = np.sign(value.high)
     unsure = np.flatnonzero(np.abs(value.high) <= bound)
     left, points, bound = left[unsure], points.take(unsure, axis=2), bound[unsure]
-    known, found = _modular(points, 2 * bound)
-    sign[left[known]] = found
+    known, signs = _modular(points, 2 * bound)
+    sign[left[known]] = signs
     if not known.all():
         whole = integers(points.compress(~known, axis=2))
         sign[left[~known]] = np.sign(_determinant(whole[:-1] - whole[-1])).astype(np.int8)

@@ -12,7 +12,7 @@ from unitcad.geometry.boxes import boxes_of, frame_of, meeting_between, morton_o
 from unitcad.geometry.ticks import Tick
 
 PARALLEL = float(np.cos(np.radians(12.0)))  # two sides of a wall
-AWAY = 0.3  # two sides of a whisker, which may have three
+OPPOSED = 0.3  # two sides of a whisker, which may have three
 LEVEL = float(np.cos(np.radians(45.0)))  # normals steeper than this belong to a flat piece's wall
 SLACK = 0.995  # of the floor: a wall drawn at the floor passes after rounding and tessellation
 _SAMPLES = 40_000
@@ -89,8 +89,8 @@ def _behind(
     for i, j in meeting_between(rays, faces, tick):
         ray, face = order[i], by_place[j]
         facing = np.einsum("ij,ij->i", normal[owner[ray]], normal[face])
-        away = facing < -AWAY
-        ray, face, facing = ray[away], face[away], facing[away]
+        opposed = facing < -OPPOSED
+        ray, face, facing = ray[opposed], face[opposed], facing[opposed]
         distance = _hit(points[ray], -normal[owner[ray]], corners[face], normal[face])
         np.minimum.at(behind, ray, distance)
         parallel = facing < -PARALLEL

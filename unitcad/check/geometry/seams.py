@@ -99,7 +99,7 @@ def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
     """
     from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
-    found = [np.empty((0, 2), np.int64)]
+    near = [np.empty((0, 2), np.int64)]
     level = np.ceil(np.log2(np.maximum(reach, 1e-300)) / 2)
     for size in np.unique(level):
         some = np.flatnonzero(level >= size)
@@ -108,8 +108,8 @@ def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
         if len(some) < 2 or tree.count_neighbors(tree, within) > _CROWD * len(some):
             continue
         pairs = some[tree.query_pairs(within, output_type="ndarray")]
-        found.append(pairs[level[pairs].min(axis=1, initial=np.inf) == size])
-    pairs = np.concatenate(found)
+        near.append(pairs[level[pairs].min(axis=1, initial=np.inf) == size])
+    pairs = np.concatenate(near)
     distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
     fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
     return pairs[fits], distance[fits]

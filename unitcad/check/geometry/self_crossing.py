@@ -91,7 +91,7 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
     faces = _prepared(topology, order, normal)
     boxes, slabs = boxes.take(order, axis=0), slabs_of(steps, *faces.corners)
     del normal, steps
-    found = Crossings(faces, Contacts(topology.n_shells, every=every))
+    crossings = Crossings(faces, Contacts(topology.n_shells, every=every))
     waiting: list[tuple[Ints, Ints]] = []
     count = 0
     try:
@@ -100,15 +100,15 @@ def crossings_of(topology: Topology, tick: Tick, *, every: bool = False) -> Cros
             waiting.append((i, j))
             count += len(i)
             if count > _BLOCK:
-                _decide(faces, waiting, found)
+                _decide(faces, waiting, crossings)
                 waiting, count = [], 0
                 tick()
-        _decide(faces, waiting, found)
+        _decide(faces, waiting, crossings)
     except Interrupted as stop:
-        found.contact.pairs.clear()  # shells that touch there may cross elsewhere
-        found.stopped = stop
-    _leaning(faces, found)
-    return found
+        crossings.contact.pairs.clear()  # shells that touch there may cross elsewhere
+        crossings.stopped = stop
+    _leaning(faces, crossings)
+    return crossings
 
 
 def _prepared(topology: Topology, order: Ints, normal: Floats) -> Faces:
@@ -131,12 +131,12 @@ def _prepared(topology: Topology, order: Ints, normal: Floats) -> Faces:
 
 def _surrounded(topology: Topology) -> Bools:
     """Return vertices all of whose edges have two faces, wound alike."""
-    edges, found = topology.edges, np.ones(len(topology.mesh.vertices), bool)
+    edges, whole = topology.edges, np.ones(len(topology.mesh.vertices), bool)
     if not edges.closed:
         wrong = (edges.size != 2) | ~balanced(topology.mesh.faces, edges)
-        found[edges.low[wrong]] = False
-        found[edges.high[wrong]] = False
-    return found
+        whole[edges.low[wrong]] = False
+        whole[edges.high[wrong]] = False
+    return whole
 
 
 def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
@@ -153,9 +153,9 @@ def _strangers(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     return i[keep], j[keep]
 
 
-def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], found: Crossings) -> None:
-    """Give answers for pairs of faces that are near each other: planes and boxes first, then exact signs."""
-    if not waiting or found.kept > _FEW:
+def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], crossings: Crossings) -> None:
+    """Decide pairs of faces that are near each other: planes and boxes first, then exact signs."""
+    if not waiting or crossings.kept > _FEW:
         return
     i = np.concatenate([pair[0] for pair in waiting])
     j = np.concatenate([pair[1] for pair in waiting])
@@ -166,13 +166,13 @@ def _decide(faces: Faces, waiting: list[tuple[Ints, Ints]], found: Crossings) ->
     if faces.several:
         some = np.flatnonzero(np.where(shared > 0, state != _OPEN, state == _FLUSH))
         some = some[faces.shell[i[some]] != faces.shell[j[some]]]
-        _contacts(faces, i[some], j[some], shared[some] > 0, found)
+        _contacts(faces, i[some], j[some], shared[some] > 0, crossings)
     left = np.flatnonzero(state == _OPEN)
-    _decide_exactly(faces, i[left], j[left], shared[left], found)
+    _decide_exactly(faces, i[left], j[left], shared[left], crossings)
 
 
 def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
-    """Return what planes and boxes say of pairs, and how many corners the faces of each share."""
+    """Return the state of pairs by planes and boxes, and how many corners the faces of each share."""
     planes = faces.planes
     ids_a, ids_b = (planes.vertices(f) for f in (i, j))
     shared = np.zeros(len(i), np.int8)
@@ -200,19 +200,19 @@ def _sieved(faces: Faces, i: Ints, j: Ints) -> tuple[Ints, Ints]:
     return state, shared
 
 
-def _contacts(faces: Faces, i: Ints, j: Ints, sharing: Bools, found: Crossings) -> None:
+def _contacts(faces: Faces, i: Ints, j: Ints, sharing: Bools, crossings: Crossings) -> None:
     """Note the shells that meet, of pairs of faces that can do no more than touch; those `sharing` a corner do."""
-    keys, pair = found.contact.keys(faces.shell[i], faces.shell[j]), np.stack([i, j], axis=1)
-    found.contact.add(keys[sharing], pair[sharing])
+    keys, pair = crossings.contact.keys(faces.shell[i], faces.shell[j]), np.stack([i, j], axis=1)
+    crossings.contact.add(keys[sharing], pair[sharing])
     asked = np.flatnonzero(~sharing)
-    asked = asked[found.contact.open(keys[asked])]
+    asked = asked[crossings.contact.open(keys[asked])]
     a, b = (faces.vertices[faces.corners[:, f[asked]].T] for f in (i, j))
     asked = asked[triangles.meet(a, b).touches]
-    found.contact.add(keys[asked], pair[asked])
+    crossings.contact.add(keys[asked], pair[asked])
 
 
-def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, found: Crossings) -> None:
-    """Give answers by exact signs; `shared` corners (n,)."""
+def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, crossings: Crossings) -> None:
+    """Decide pairs of faces by exact signs; `shared` (n,) counts their common corners."""
     if not len(i):
         return
     pair, overlaps, meets = np.stack([i, j], axis=1), shared == 3, shared > 0
@@ -222,14 +222,14 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, found: Crossin
     overlaps[some] = meeting.overlaps
     wide = np.flatnonzero(overlaps)
     wide = wide[~_same_corners(faces, i[wide], j[wide])]
-    found.covering.append(pair[wide[coverings.wide(a[wide], b[wide])]])
+    crossings.covering.append(pair[wide[coverings.wide(a[wide], b[wide])]])
     if faces.several:
         meets[some] |= meeting.touches | meeting.crosses
         meets &= faces.shell[i] != faces.shell[j]
-        found.contact.add(found.contact.keys(faces.shell[i[meets]], faces.shell[j[meets]]), pair[meets])
+        crossings.contact.add(crossings.contact.keys(faces.shell[i[meets]], faces.shell[j[meets]]), pair[meets])
     crossing = some[meeting.crosses & (shared[some] < 2)]
-    found.crossing.append(pair[crossing])
-    found.kept += len(crossing) + len(wide)
+    crossings.crossing.append(pair[crossing])
+    crossings.kept += len(crossing) + len(wide)
     in_b, in_a = (
         np.flatnonzero(((side == 0).sum(axis=1) == 2) & (shared[some] < 2)) for side in (meeting.side_a, meeting.side_b)
     )
@@ -238,7 +238,7 @@ def _decide_exactly(faces: Faces, i: Ints, j: Ints, shared: Ints, found: Crossin
         in_a, in_b = some[in_a], some[in_b]
         face, holder = np.concatenate([i[in_b], j[in_a]]), np.concatenate([j[in_b], i[in_a]])
         one, other = np.concatenate([a[in_b], b[in_a]]), np.concatenate([b[in_b], a[in_a]])
-        found.leaning.append(_edges_inside(faces, face, holder, one, other, sides))
+        crossings.leaning.append(_edges_inside(faces, face, holder, one, other, sides))
 
 
 def facing(faces: Faces, i: Ints, j: Ints) -> Floats:
@@ -268,17 +268,17 @@ def _edges_inside(faces: Faces, face: Ints, holder: Ints, one: Floats, other: Fl
     return np.column_stack([holder, ends, sides[kept, free[kept]], face]).astype(np.int64)
 
 
-def _leaning(faces: Faces, found: Crossings) -> None:
+def _leaning(faces: Faces, crossings: Crossings) -> None:
     """Return edges that lie in a face with their two faces on both sides of it: crossings through an edge."""
-    if not found.leaning:
+    if not crossings.leaning:
         return
-    rows = np.concatenate(found.leaning)
+    rows = np.concatenate(crossings.leaning)
     if not len(rows):
         return
     rows = rows[np.lexsort(rows.T[[3, 2, 1, 0]])]
     same = (rows[1:, :3] == rows[:-1, :3]).all(axis=1) & (rows[1:, 3] != rows[:-1, 3])
     through = np.flatnonzero(same)
-    found.crossing.append(rows[through][:, [4, 0]].astype(np.int32))
+    crossings.crossing.append(rows[through][:, [4, 0]].astype(np.int32))
 
 
 def joined(blocks: list[Ints]) -> Ints:

@@ -20,8 +20,8 @@ def height_fields(columns: Floats, corners: Ints, areas: Floats, surrounded: Boo
 
     `corners` (3, m) are the vertices of the faces, `areas` (3, m) twice their area vectors.
     """
-    found = _along_axes(columns, corners, areas) & surrounded
-    return found | _along_means(columns, corners, areas, surrounded & ~found)
+    axial = _along_axes(columns, corners, areas) & surrounded
+    return axial | _along_means(columns, corners, areas, surrounded & ~axial)
 
 
 def _along_axes(columns: Floats, corners: Ints, areas: Floats) -> Bools:

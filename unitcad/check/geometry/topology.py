@@ -219,8 +219,8 @@ def _facing(faces: Ints, areas: Floats, shells: Ints, volume: Floats) -> Ints:
 
 def max_side_squared(corners: Floats) -> Floats:
     """Return the squared length of each triangle's longest side; corners (n, 3, 3)."""
-    found = np.zeros(len(corners))
+    longest = np.zeros(len(corners))
     for k in range(3):
         side = corners[:, k] - corners[:, k - 1]
-        np.maximum(found, np.einsum("ij,ij->i", side, side), out=found)
-    return found
+        np.maximum(longest, np.einsum("ij,ij->i", side, side), out=longest)
+    return longest

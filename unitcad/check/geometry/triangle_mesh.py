@@ -133,8 +133,8 @@ def area_vectors(vertices: Floats, faces: Ints) -> Floats:
         origin = column.take(corners[0])
         first.append(column.take(corners[1]) - origin)
         second.append(column.take(corners[2]) - origin)
-    found = np.empty((len(faces), 3))
+    areas = np.empty((len(faces), 3))
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3
-        np.subtract(first[i] * second[j], first[j] * second[i], out=found[:, axis])
-    return found
+        np.subtract(first[i] * second[j], first[j] * second[i], out=areas[:, axis])
+    return areas

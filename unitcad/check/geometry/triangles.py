@@ -39,16 +39,16 @@ def _table() -> tuple[Ints, Bools]:
     for index in range(27):
         p, q, r = index // 9 - 1, index // 3 % 3 - 1, index % 3 - 1
         if p > 0:
-            found = (2, True) if q > 0 else (1, True) if r > 0 else (0, False)
+            turn = (2, True) if q > 0 else (1, True) if r > 0 else (0, False)
         elif p < 0:
-            found = (2, False) if q < 0 else (1, False) if r < 0 else (0, True)
+            turn = (2, False) if q < 0 else (1, False) if r < 0 else (0, True)
         elif q < 0:
-            found = (1, True) if r >= 0 else (0, False)
+            turn = (1, True) if r >= 0 else (0, False)
         elif q > 0:
-            found = (0, True) if r > 0 else (1, False)
+            turn = (0, True) if r > 0 else (1, False)
         else:
-            found = (2, r < 0)
-        alone[index], flip[index] = found
+            turn = (2, r < 0)
+        alone[index], flip[index] = turn
     return alone, flip
 
 

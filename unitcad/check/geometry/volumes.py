@@ -12,11 +12,11 @@ _BLOCK = 500_000
 
 def closed(faces: Ints, edges: Edges, shells: Ints, n: int) -> Bools:
     """Return whether each of `n` shells has an inside: at all its edges as many faces run one way as the other."""
-    found = np.ones(n, bool)
+    inside = np.ones(n, bool)
     if not edges.closed:
         wrong = np.repeat(~balanced(faces, edges), edges.size)
-        found[shells[edges.order[wrong] // 3]] = False
-    return found
+        inside[shells[edges.order[wrong] // 3]] = False
+    return inside
 
 
 def signed(vertices: Floats, faces: Ints, areas: Floats, shells: Ints, n: int) -> Floats:

@@ -53,7 +53,7 @@ def check_step(path: Path, data: memoryview, options: Options) -> tuple[list[Fin
 def _from_child(path: Path, seconds: float) -> dict[str, Any]:
     """Return what `measure` finds, in a process of its own: OCCT dies of some malformed files, and it prints."""
     with TemporaryDirectory() as folder:
-        out = Path(folder, "found.json")
+        out = Path(folder, "measured.json")
         try:
             done = children.run([sys.executable, "-P", "-c", _CHILD, str(path), str(out)], timeout=seconds)
         except subprocess.TimeoutExpired as error:

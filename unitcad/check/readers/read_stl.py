@@ -144,7 +144,7 @@ def _walk(raw: bytes, state: _Text, limits: Limits, deadline: Deadline) -> None:
         deadline.tick()
         line_end = raw.find(b"\n", at)
         line_end = end if line_end < 0 else line_end
-        word = raw[at : at + 8].split(None, 1)[0].lower() if raw[at : at + 8].strip() else b""
+        word = raw[at : at + 8].split(None, 1)[0].lower()
         if word.startswith(b"solid"):
             if inside:
                 state.nested += 1
@@ -174,8 +174,7 @@ def _walk(raw: bytes, state: _Text, limits: Limits, deadline: Deadline) -> None:
 
 
 def _skip_blank(raw: bytes, at: int) -> int:
-    match = _BLANK.match(raw, at)
-    return match.end() if match else at
+    return at + len(_BLANK.match(raw, at)[0])  # type: ignore[index]
 
 
 _BLANK = re.compile(rb"[\s\x00]*")
@@ -204,21 +203,18 @@ def _facets(raw: bytes, at: int, state: _Text, limits: Limits, deadline: Deadlin
 
 
 def _take(block: bytes, tokens: list[bytes], state: _Text, limits: Limits) -> None:
-    blocks = len(tokens) // _TOKENS
-    if state.facets + blocks > limits.max_faces:
+    if state.facets + len(tokens) // _TOKENS > limits.max_faces:
         raise F011.unreadable(f"more faces than --max-faces {limits.max_faces}")
-    columns = []
-    plain = block.isascii() and b"_" not in block  # numpy takes 1_0 for ten, as Python does
-    for column in _NUMBERS:
-        texts = tokens[column::_TOKENS]
-        try:
-            columns.append(np.array(texts).astype(np.float64) if plain else _slow_numbers(texts, state))
-        except ValueError:
-            columns.append(_slow_numbers(texts, state))
-    numbers = np.stack(columns, axis=1)
+    columns = [tokens[column::_TOKENS] for column in _NUMBERS]
+    try:
+        if not block.isascii() or b"_" in block:  # numpy takes 1_0 for ten, as Python does
+            raise ValueError
+        numbers = np.array(columns).astype(np.float64).T
+    except ValueError:
+        numbers = np.array([_slow_numbers(column, state) for column in columns]).T
     state.normals.append(numbers[:, :3])
     state.corners.append(numbers[:, 3:].reshape(-1, 3, 3))
-    state.facets += blocks
+    state.facets += len(numbers)
 
 
 def _slow_numbers(texts: list[bytes], state: _Text) -> Floats:
@@ -246,10 +242,15 @@ def _explain(raw: bytes, at: int, cut: int, state: _Text, limits: Limits) -> Non
         wanted = (b"vertex",) if place == _LOOP_END and vertices < 3 else _GRAMMAR[place]
         if place in (_VERTEX, _LOOP_END) and word in (b"vertex", b"endloop"):
             place = _VERTEX if word == b"vertex" else _LOOP_END
-        elif word != wanted[0] if wanted else word in _KEYWORDS or not _is_number(word):
-            if match.end() == len(raw) and (_begins(word, wanted)):
+        elif (
+            word != wanted[0]
+            if wanted
+            else word in _KEYWORDS or not (NUMBER.fullmatch(word) or _NAN_SPELLINGS.match(word))
+        ):
+            fixed = wanted or word in _KEYWORDS
+            if match.end() == len(raw) and (not fixed or any(whole.startswith(word) for whole in wanted)):
                 break  # the text was cut within the word
-            if wanted or word in _KEYWORDS:
+            if fixed:
                 shown, expected = word[:30].decode("utf-8", "replace"), b" or ".join(wanted).decode() or "a number"
                 state.findings.append(_at(F003, f"{shown!r} where {expected} belongs", raw, here))
                 return
@@ -280,15 +281,6 @@ _GRAMMAR: tuple[tuple[bytes, ...], ...] = (
 _VERTEX, _LOOP_END = 7, 11  # places in it
 _KEYWORDS = {words[0] for words in _GRAMMAR if words}
 _WORD = re.compile(rb"\S+")
-
-
-def _begins(word: bytes, wanted: tuple[bytes, ...]) -> bool:
-    """Return whether the last word of a text may be the beginning of what belongs there."""
-    return any(whole.startswith(word) for whole in wanted) or not (wanted or word in _KEYWORDS)
-
-
-def _is_number(word: bytes) -> bool:
-    return bool(NUMBER.fullmatch(word) or _NAN_SPELLINGS.match(word))
 
 
 def _at(rule: Rule, message: str, raw: bytes, place: int) -> Finding:

@@ -45,7 +45,7 @@ _TEXT_MARKS = (b"<!doctype html", b"<html", b"<head", b"<body")
 
 
 def foreign(head: bytes) -> str | None:
-    """Name a format that is certainly not STL, OBJ, PLY or OFF; None where the bytes do not tell."""
+    """Name a format that is certainly not STL, OBJ, PLY or OFF; None where the bytes show none."""
     for magic, name in _MAGIC:
         if head.startswith(magic):
             return name

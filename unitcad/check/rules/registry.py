@@ -1,4 +1,4 @@
-"""All rules, found in the files of this folder: for the command line's --explain, docs/checks.md and SARIF's list."""
+"""All rules, found in the files of this folder: for --explain, docs/checks.md and SARIF's list."""
 
 from __future__ import annotations
 
@@ -54,27 +54,6 @@ def explain(codes: str) -> str:
         for rule in rules().values()
         if rule.code.startswith(chosen)
     )
-
-
-def markdown() -> str:
-    """Write docs/checks.md: every rule by family."""
-    lines = [
-        "# Rules of `unitcad check`",
-        "",
-        "Made from the files of `unitcad/check/rules/` by `python docs/make_checks.py`; a test compares the two.",
-        "Severity: an error fails a run, a warning does with `--fail-on warning`, an info never does.",
-        "How to run it in CI: [checks-in-ci.md](checks-in-ci.md).",
-        "",
-    ]
-    head = ["| code | severity | rule | cause | example | fix |", "| --- | --- | --- | --- | --- | --- |"]
-    for letter, family in FAMILIES.items():
-        lines += [f"## {family}", "", *head]
-        for rule in rules().values():
-            if rule.code.startswith(letter):
-                cells = (rule.code, rule.severity, rule.title, rule.cause, rule.example, rule.fix)
-                lines.append(f"| {' | '.join(cells)} |")
-        lines.append("")
-    return "\n".join(lines)
 
 
 def check_prefixes(option: str, prefixes: Sequence[str]) -> tuple[str, ...]:

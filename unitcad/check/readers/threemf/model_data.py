@@ -15,14 +15,13 @@ _NOTED = 200  # findings kept of one part
 
 @dataclass
 class Resource:
-    """A resource by id: its element's name, how many members it has, its attributes, its rank and line in the file."""
+    """A resource by id: its element's name, its rank in the file, its attributes, its members' attributes, its line."""
 
     kind: str
     id: int
     rank: int
     attributes: dict[str, str]
     members: list[dict[str, str]] = field(default_factory=list)
-    count: int = 0
     line: int | None = None
 
 
@@ -77,16 +76,16 @@ class Model:
     strict: bool = False
     where: Callable[[], Location] = Location
 
-    def say(self, rule: Rule, message: str, severity: str | None = None, line: int | None = None) -> None:
+    def add(self, rule: Rule, message: str, severity: str | None = None, line: int | None = None) -> None:
         """Add a finding about this part, placed by `where`, or at `line`."""
         if len(self.findings) < _NOTED:
             place = replace(self.where(), part=self.part)
             place = place if line is None else replace(place, line=line)
             self.findings.append(rule.finding(message, 1, [place], severity))
 
-    def say_lenient(self, rule: Rule, message: str) -> None:
+    def add_lenient(self, rule: Rule, message: str) -> None:
         """Add a finding that real programs' files have: a warning unless the model is checked strictly."""
-        self.say(rule, message, None if self.strict else "warning")
+        self.add(rule, message, None if self.strict else "warning")
 
     def objects(self) -> dict[int, Object]:
         """Return the object resources by id."""

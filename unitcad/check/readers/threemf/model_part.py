@@ -97,7 +97,7 @@ class _Reader:
                 self.model.foreign.add(int(attributes["id"]))
             for attribute in attributes:
                 if why := forbidden(attribute):
-                    self.model.say(P017, f"{why} in <{local}>")
+                    self.model.add(P017, f"{why} in <{local}>")
             self.skip = 1
             return
         good = self._attributes(local, rules, attributes)
@@ -114,8 +114,8 @@ class _Reader:
         if done is _LEAF or done.rules is None:
             return
         for child, least, _most in done.rules.children:
-            if done.counts.get(child, 0) < least and not (child == "triangles" and self._lattice()):
-                self.model.say(P017, f"<{done.name}> lacks <{child}>")
+            if done.counts.get(child, 0) < least:
+                self.model.add(P017, f"<{done.name}> lacks <{child}>")
         if done.space == elements.CORE and done.name == "vertices":
             self._flush_vertices()
         elif done.space == elements.CORE and done.name == "triangles":
@@ -127,14 +127,11 @@ class _Reader:
         if self.stack[-1].name == "resources":
             self.resource = None
 
-    def _lattice(self) -> bool:
-        return isinstance(self.resource, Object) and self.resource.lattice is not None
-
     def _child(self, space: str, local: str, rules: elements.ElementSchema | None) -> None:
         """Check that this child may stand here, and in this order."""
         parent = self.stack[-1]
         if parent is _LEAF:
-            self.model.say(P017, f"<{local}> inside <vertex>")
+            self.model.add(P017, f"<{local}> inside <vertex>")
             return
         if not parent.name:
             if (space, local) != (elements.CORE, "model"):
@@ -143,9 +140,9 @@ class _Reader:
             return
         if space != parent.space:
             if not space:
-                self.model.say(P017, f"<{local}> without a namespace")
+                self.model.add(P017, f"<{local}> without a namespace")
             elif space == elements.CORE:
-                self.model.say(P017, f"<{local}> inside <{parent.name}>")
+                self.model.add(P017, f"<{local}> inside <{parent.name}>")
             return
         assert parent.rules is not None
         for place, (name, _, most) in enumerate(parent.rules.children):
@@ -153,37 +150,37 @@ class _Reader:
                 continue
             parent.counts[name] = parent.counts.get(name, 0) + 1
             if parent.counts[name] == most + 1:
-                self.model.say(P017, f"<{parent.name}> has <{local}> more than once")
+                self.model.add(P017, f"<{parent.name}> has <{local}> more than once")
             if parent.rules.ordered and place < parent.last:
-                self.model.say(P017, f"<{local}> is out of order in <{parent.name}>")
+                self.model.add(P017, f"<{local}> is out of order in <{parent.name}>")
             parent.last = max(parent.last, place)
             return
         if space in (elements.CORE, elements.MATERIAL, elements.SLICE, elements.BEAM) and not (
             rules is not None and parent.name == "resources"
         ):
-            self.model.say(P017, f"<{local}> inside <{parent.name}>")
+            self.model.add(P017, f"<{local}> inside <{parent.name}>")
 
     def _attributes(self, local: str, rules: elements.ElementSchema, attributes: dict[str, str]) -> bool:
         """Check them; return whether all required ones are there and well typed."""
         good = True
         for name in rules.required:
             if name not in attributes:
-                self.model.say(P017, f"<{local}> lacks {name}")
+                self.model.add(P017, f"<{local}> lacks {name}")
                 good = False
         for name, value in attributes.items():
             test = rules.required.get(name) or rules.optional.get(name)
             if test is not None:
                 if not test(value):
-                    self.model.say(P017, f'{name}="{value[:40]}" of <{local}> is not of its type')
+                    self.model.add(P017, f'{name}="{value[:40]}" of <{local}> is not of its type')
                     good = good and name not in rules.required
             elif why := forbidden(name):
-                self.model.say(P017, f"{why} in <{local}>")
+                self.model.add(P017, f"{why} in <{local}>")
             elif name.startswith("http://www.w3.org/XML/1998/namespace ") and local != "model":
-                self.model.say(P017, f"attribute xml:lang in <{local}>")
+                self.model.add(P017, f"attribute xml:lang in <{local}>")
             elif " " not in name:
-                self.model.say_lenient(P017, f"unknown attribute {name!r} of <{local}>")
+                self.model.add_lenient(P017, f"unknown attribute {name!r} of <{local}>")
             elif not rules.open_ and " " in name:
-                self.model.say(P017, f"attribute {name.split()[-1]!r} of <{local}>, which takes none of others")
+                self.model.add(P017, f"attribute {name.split()[-1]!r} of <{local}>, which takes none of others")
         return good
 
     def _take(self, space: str, local: str, attributes: dict[str, str]) -> None:
@@ -199,14 +196,13 @@ class _Reader:
         elif space == elements.BEAM or space == elements.BALLS:
             self._take_lattice(local, attributes)
         elif self.resource is not None and not isinstance(self.resource, Object):
-            self.resource.count += 1
             self.resource.members.append({"": local, **attributes})
             if len(self.resource.members) > self.limits.max_faces:
                 raise F011.unreadable("more properties than --max-faces")
 
     def _once(self, id_: int) -> None:
         if id_ in self.model.resources or id_ in self.model.foreign:
-            self.model.say(P018, f"id {id_} twice")
+            self.model.add(P018, f"id {id_} twice")
 
     def _resource(self, resource: Resource) -> None:
         self._once(resource.id)
@@ -217,25 +213,25 @@ class _Reader:
     def _take_model(self, attributes: dict[str, str]) -> None:
         self.model.unit = attributes.get("unit", "millimeter")
         if self.model.unit not in elements.UNITS:
-            self.model.say(P010, f"unit {self.model.unit[:40]!r}")
+            self.model.add(P010, f"unit {self.model.unit[:40]!r}")
         self.model.required = attributes.get("requiredextensions", "").split()
         for prefix in self.model.required:
             uri = self.model.namespaces.get(prefix)
             if uri is None:
-                self.model.say(P016, f"required extension {prefix!r} has no namespace")
+                self.model.add(P016, f"required extension {prefix!r} has no namespace")
             elif uri not in elements.KNOWN:
-                self.model.say(P016, f"required extension {uri!r} is not known")
+                self.model.add(P016, f"required extension {uri!r} is not known")
 
     def _take_metadata(self, attributes: dict[str, str]) -> None:
         name = attributes["name"]
         prefix, colon, _ = name.partition(":")
         if not name.strip() or name.lower() in _PLACEHOLDERS:
-            self.model.say(P017, f"metadata without a name ({name!r})")
+            self.model.add(P017, f"metadata without a name ({name!r})")
         elif colon and prefix not in self.model.namespaces:
-            self.model.say(P017, f"metadata name {name!r} has no namespace")
+            self.model.add(P017, f"metadata name {name!r} has no namespace")
         if self.stack[-2].name == "model":
             if name in self.names:
-                self.model.say_lenient(P017, f"metadata {name!r} twice")
+                self.model.add_lenient(P017, f"metadata {name!r} twice")
             self.names.add(name)
 
     def _take_object(self, attributes: dict[str, str]) -> None:
@@ -272,7 +268,7 @@ class _Reader:
             raise F011.unreadable(f"more items and components than the limit of {self.limits.max_instances} instances")
         uuid = attributes.get(f"{elements.PRODUCTION} UUID")
         if uuid is not None and not elements.uuid(uuid):
-            self.model.say(P017, f"UUID {uuid[:40]!r} is none")
+            self.model.add(P017, f"UUID {uuid[:40]!r} is none")
         path = attributes.get(f"{elements.PRODUCTION} path", "")
         matrix = self._matrix(attributes.get("transform"))
         return Use(
@@ -288,20 +284,20 @@ class _Reader:
         if len(parts) == 12 and all(elements.number(part) for part in parts):
             matrix = np.array([float(part) for part in parts]).reshape(4, 3)
             if not (np.abs(matrix) <= LARGEST).all():
-                self.model.say(P013, f'transform="{text[:60]}" is not twelve float32 numbers')
+                self.model.add(P013, f'transform="{text[:60]}" is not twelve float32 numbers')
                 return identity
             if (linear := tuple(parts[:9])) not in self.regular:  # most items of a build differ by their shift only
                 det = float(np.linalg.det(matrix[:3]))
                 scale = float(np.prod(np.linalg.norm(matrix[:3], axis=1)))
                 if not math.isfinite(det) or abs(det) <= 1e-12 * scale:
-                    self.model.say(P013, "a transform has determinant zero")
+                    self.model.add(P013, "a transform has determinant zero")
                 elif det < 0:
-                    self.model.say(P015, "a transform mirrors")
+                    self.model.add(P015, "a transform mirrors")
                 else:
                     self.regular.add(linear)
             return matrix
         rule = P013 if len(parts) == 12 and any(part.lower() in _NAMES for part in parts) else P017
-        self.model.say(rule, f'transform="{text[:60]}" is not twelve numbers')
+        self.model.add(rule, f'transform="{text[:60]}" is not twelve numbers')
         return identity
 
     def _take_lattice(self, local: str, attributes: dict[str, str]) -> None:
@@ -330,7 +326,7 @@ class _Reader:
             values = np.array([self._number(text, self.lines[i // 3]) for i, text in enumerate(self.numbers)])
         bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
         if len(bad):
-            self.model.say(V001, "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
+            self.model.add(V001, "a vertex is not a finite float32 number", line=self.lines[bad[0] // 3])
             values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
         self.vertices.append(values.reshape(-1, 3))
         self.numbers, self.lines = [], []
@@ -343,7 +339,7 @@ class _Reader:
             return float(text)
         if text.lower() in _NAMES:
             return math.nan
-        self.model.say(F004, not_a_number(text).message, line=line)
+        self.model.add(F004, not_a_number(text).message, line=line)
         return 0.0
 
     def _flush_triangles(self) -> None:
@@ -359,9 +355,9 @@ class _Reader:
 
     def _close_object(self, resource: Object) -> None:
         if resource.mesh is None and not resource.components and not resource.other_shape:
-            self.model.say(P017, f"object {resource.id} has neither mesh nor components")
+            self.model.add(P017, f"object {resource.id} has neither mesh nor components")
         if resource.mesh is not None and resource.components:
-            self.model.say(P017, f"object {resource.id} has a mesh and components")
+            self.model.add(P017, f"object {resource.id} has a mesh and components")
 
 
 # Extensions whose elements take the place of an object's mesh.

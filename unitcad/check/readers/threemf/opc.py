@@ -62,14 +62,14 @@ class Package:
     spent: int = 0
     strict: bool = False
 
-    def say(self, rule: Rule, message: str, part: str | None = None, severity: str | None = None) -> None:
+    def add(self, rule: Rule, message: str, part: str | None = None, severity: str | None = None) -> None:
         """Add a finding about a part."""
         places = [Location(part=self.shown(part))] if part else ()
         self.findings.append(rule.finding(message, places=places, severity=severity))
 
-    def say_lenient(self, rule: Rule, message: str, part: str | None = None) -> None:
+    def add_lenient(self, rule: Rule, message: str, part: str | None = None) -> None:
         """Add a finding that real programs' files have: a warning unless the package is checked strictly."""
-        self.say(rule, message, part, None if self.strict else "warning")
+        self.add(rule, message, part, None if self.strict else "warning")
 
     def chunks(self, name: str) -> Iterator[bytes]:
         """Return a part's bytes, inflated piece by piece within the limits. Raises `Unreadable`."""
@@ -116,7 +116,7 @@ class Package:
         if root is None:
             return []
         if root.name != f"{_PACKAGE}relationships Relationships":
-            self.say(P002, "the root is not Relationships", rels)
+            self.add(P002, "the root is not Relationships", rels)
             return []
         return list(self._read_relations(root, folder, rels))
 
@@ -139,20 +139,20 @@ class Package:
             attributes = child.attributes
             kind, target, id_ = (attributes.get(key, "") for key in ("Type", "Target", "Id"))
             if child.name != f"{_PACKAGE}relationships Relationship" or not (kind and target and id_):
-                self.say(P002, "a relationship needs Id, Type and Target", rels)
+                self.add(P002, "a relationship needs Id, Type and Target", rels)
                 continue
             if id_ in ids:
-                self.say(P002, f"relationship Id {id_!r} twice", rels)
+                self.add(P002, f"relationship Id {id_!r} twice", rels)
             ids.add(id_)
             if attributes.get("TargetMode", "Internal") != "Internal" or _SCHEME.match(target) or target[:2] == "//":
-                self.say(P007, f"target {target!r}", rels)
+                self.add(P007, f"target {target!r}", rels)
                 continue
             path = target if target.startswith("/") else posixpath.join("/", folder, target)
             part = posixpath.normpath(unquote(path)).lstrip("/").lower()
             if kind in KNOWN and part not in self.parts:
                 rule = P003 if kind == START and rels == "_rels/.rels" else P002
-                say = self.say_lenient if kind == THUMBNAIL else self.say
-                say(rule, f"target {target!r} is not in the package", rels)
+                add = self.add_lenient if kind == THUMBNAIL else self.add
+                add(rule, f"target {target!r} is not in the package", rels)
                 continue
             yield Relation(kind, part, target)
 
@@ -172,12 +172,12 @@ def open_package(data: memoryview, limits: Limits, deadline: Deadline, *, strict
     bombs = []
     for info in entries:
         if why := _unsafe(info.filename):
-            package.say(P005, f"{info.filename!r} {why}", info.filename)
+            package.add(P005, f"{info.filename!r} {why}", info.filename)
         if info.is_dir():
             continue
         key = unquote(info.filename).lower().lstrip("/")
         if key in package.parts:
-            package.say(P004, f"{info.filename!r} is there twice", info.filename)
+            package.add(P004, f"{info.filename!r} is there twice", info.filename)
             continue
         package.parts[key] = info
         if info.file_size > _FREE and info.file_size > limits.ratio * max(info.compress_size, 1):
@@ -219,33 +219,33 @@ def _unsafe(name: str) -> str | None:
 def _content_types(package: Package) -> None:
     key = CONTENT_TYPES.lower()
     if key not in package.parts:
-        package.say(P001, f"{CONTENT_TYPES} is missing")
+        package.add(P001, f"{CONTENT_TYPES} is missing")
         return
     root = package.xml(key, P001)
     if root is None:
         return
     space = f"{_PACKAGE}content-types "
     if root.name != f"{space}Types":
-        package.say(P001, "the root is not Types", CONTENT_TYPES)
+        package.add(P001, "the root is not Types", CONTENT_TYPES)
         return
     for child in root.children:
         kind = child.attributes.get("ContentType", "")
         if not _MEDIA.match(kind):
-            package.say(P001, f"content type {kind!r} is none", CONTENT_TYPES)
+            package.add(P001, f"content type {kind!r} is none", CONTENT_TYPES)
         if child.name == f"{space}Default":
             name, table = child.attributes.get("Extension", "").lower(), package.defaults
         elif child.name == f"{space}Override":
             name, table = unquote(child.attributes.get("PartName", "")).lower(), package.overrides
             if not name.startswith("/"):
-                package.say(P001, f"part name {name!r} does not begin with a slash", CONTENT_TYPES)
+                package.add(P001, f"part name {name!r} does not begin with a slash", CONTENT_TYPES)
             name = name.lstrip("/")
         else:
-            package.say(P001, f"unknown element {child.name.split()[-1]!r}", CONTENT_TYPES)
+            package.add(P001, f"unknown element {child.name.split()[-1]!r}", CONTENT_TYPES)
             continue
         if not name:
-            package.say(P001, "an entry without Extension or PartName", CONTENT_TYPES)
+            package.add(P001, "an entry without Extension or PartName", CONTENT_TYPES)
         elif name in table:
-            package.say(P001, f"{name!r} has a type twice", CONTENT_TYPES)
+            package.add(P001, f"{name!r} has a type twice", CONTENT_TYPES)
         table[name] = kind
     if "_rels/.rels" in package.parts and package.content_type("_rels/.rels") not in (RELS_TYPE, None):
-        package.say(P001, "the extension rels has another type than relationships", CONTENT_TYPES)
+        package.add(P001, "the extension rels has another type than relationships", CONTENT_TYPES)

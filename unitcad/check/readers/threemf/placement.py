@@ -54,7 +54,7 @@ class Instance:
 
 def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list[Finding]) -> list[Instance]:
     """Return the meshes of the build with their transforms; faces are counted before anything is expanded."""
-    counts: dict[Key, tuple[int, int]] = {}
+    sizes: dict[Key, tuple[int, int, int]] = {}
     objects = {
         (part, id_): model_object for part, model in models.items() for id_, model_object in model.objects().items()
     }
@@ -62,27 +62,25 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
     def key_of(part: str, use: Use) -> Key:
         return (use.path.lower().lstrip("/") if use.path else part, use.object)
 
-    def size(key: Key, trail: tuple[Key, ...]) -> tuple[int, int]:
-        """Return faces and nodes under an object; depth and recursion are bounded here."""
-        if key in counts:
-            return counts[key]
-        model_object = objects.get(key)
-        if model_object is None:
-            return 0, 0
+    def size(key: Key, trail: tuple[Key, ...]) -> tuple[int, int, int]:
+        """Return faces, nodes and levels of an object and what is below it, within the limit of depth."""
+        if key not in objects:
+            return 0, 0, 0
         if key in trail:
             raise P012.unreadable(f"object {key[1]} contains itself")
-        if len(trail) >= limits.max_depth:
+        if key not in sizes and len(trail) < limits.max_depth:
+            mesh, components = objects[key].mesh, objects[key].components
+            below = [(0 if mesh is None else len(mesh.rows), 1, 0)]
+            below += [size(key_of(key[0], use), (*trail, key)) for use in components]
+            faces, nodes, levels = zip(*below, strict=True)
+            sizes[key] = sum(faces), sum(nodes), 1 + max(levels)
+        if key not in sizes or len(trail) + sizes[key][2] > limits.max_depth:
             raise P009.unreadable(f"components nest deeper than {limits.max_depth}")
-        faces, nodes = (0 if model_object.mesh is None else len(model_object.mesh.rows)), 1
-        for use in model_object.components:
-            more, below = size(key_of(key[0], use), (*trail, key))
-            faces, nodes = faces + more, nodes + below
-        counts[key] = faces, nodes
-        return counts[key]
+        return sizes[key]
 
     total = nodes = 0
     for item in root.items:
-        faces, below = size(key_of(root.part, item), ())
+        faces, below, _ = size(key_of(root.part, item), ())
         total, nodes = total + faces, nodes + below
     if total > limits.max_faces:
         text = f"{_large(total)} faces in {_large(nodes)} instances, more than --max-faces {limits.max_faces}"
@@ -91,9 +89,9 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
         raise F011.unreadable(f"{_large(nodes)} instances, more than the limit of {limits.max_instances}")
     instances: list[Instance] = []
 
-    def place(key: Key, matrix: Floats, depth: int) -> None:
+    def place(key: Key, matrix: Floats) -> None:
         model_object = objects.get(key)
-        if model_object is None or depth > limits.max_depth:
+        if model_object is None:
             return
         if model_object.type == "other" and not model_object.components:
             findings.append(P012.finding(f"the build uses object {key[1]} of type other"))
@@ -101,13 +99,13 @@ def expand(models: dict[str, Model], root: Model, limits: Limits, findings: list
             unit_mm = UNITS_MM.get(models[key[0]].unit, 1.0)
             instances.append(Instance(key, model_object, model_object.mesh, matrix, unit_mm))
         for use in model_object.components:
-            place(key_of(key[0], use), _times(use.matrix, matrix), depth + 1)
+            place(key_of(key[0], use), _times(use.matrix, matrix))
 
     for item in root.items:
         key = key_of(root.part, item)
         if item.path and key not in objects and key[0] in models:
             findings.append(P012.finding(f"a build item names object {key[1]} of {item.path}, which is not there"))
-        place(key, item.matrix, 0)
+        place(key, item.matrix)
     return instances
 
 

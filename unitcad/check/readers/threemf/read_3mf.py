@@ -49,12 +49,12 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
     """Return the start part's model first, then those that it reaches by path, each with its relationships checked."""
     relations = package.relations("")
     if "_rels/.rels" not in package.parts:
-        package.say(P002, "_rels/.rels is missing")
+        package.add(P002, "_rels/.rels is missing")
     starts = [relation for relation in relations if relation.kind == opc.START]
     _singletons(package, relations, "the package", (opc.THUMBNAIL, opc.PROPERTIES))
     if len(starts) != 1:
         if not any(item.code in ("P003", "F003", "P007") for item in package.findings):
-            package.say(P003, counted(len(starts), "start part"))
+            package.add(P003, counted(len(starts), "start part"))
         if not starts:
             return {}
     models: dict[str, Model] = {}
@@ -64,7 +64,7 @@ def _models(package: Package, limits: Limits) -> dict[str, Model]:
         if part in models:
             continue
         if package.content_type(part) != opc.MODEL_TYPE:
-            package.say(P001, f"{package.shown(part)} has type {package.content_type(part)!r}, not the model's", part)
+            package.add(P001, f"{package.shown(part)} has type {package.content_type(part)!r}, not the model's", part)
         try:
             model = read_model(package.chunks(part), part, limits, faces, strict=package.strict)
         except OutOfTime:
@@ -97,14 +97,14 @@ def _singletons(package: Package, relations: list[Relation], who: str, kinds: tu
         of = [relation for relation in relations if relation.kind == kind]
         name = kind.rsplit("/", 1)[-1]
         if len(of) > 1:
-            package.say(P020, f"{len(of)} parts of type {name} for {who}")
+            package.add(P020, f"{len(of)} parts of type {name} for {who}")
         for relation in of:
             content_type = package.content_type(relation.target)
             if kind == opc.THUMBNAIL:
                 _image(package, relation.target, P020)
             elif kind == opc.TICKET and content_type != _TICKET_TYPE:
                 text = f"{package.shown(relation.target)} has type {content_type!r}, not a print ticket's"
-                package.say(P020, text, relation.target)
+                package.add(P020, text, relation.target)
             elif kind == opc.PROPERTIES:
                 package.xml(relation.target, F003)
 
@@ -112,12 +112,12 @@ def _singletons(package: Package, relations: list[Relation], who: str, kinds: tu
 def _image(package: Package, part: str, rule: Rule) -> None:
     content_type = package.content_type(part)
     if content_type is None:
-        package.say(P001, f"{package.shown(part)} has no content type", part)
+        package.add(P001, f"{package.shown(part)} has no content type", part)
         return
     if content_type not in _IMAGES and not (
         rule is P019 and content_type == "application/vnd.ms-package.3dmanufacturing-3dmodeltexture"
     ):
-        package.say(rule, f"{package.shown(part)} has type {content_type!r}, not PNG's or JPEG's", part)
+        package.add(rule, f"{package.shown(part)} has type {content_type!r}, not PNG's or JPEG's", part)
         return
     try:
         kind, why = image_kind(package.chunks(part))
@@ -127,9 +127,9 @@ def _image(package: Package, part: str, rule: Rule) -> None:
         package.findings += stop.findings
         return
     if why:
-        package.say(rule, f"{package.shown(part)}: {why}", part)
+        package.add(rule, f"{package.shown(part)}: {why}", part)
     elif content_type in _IMAGES and kind != _IMAGES[content_type]:
-        package.say(rule, f"{package.shown(part)} is {kind or 'no image'}, its type says {content_type}", part)
+        package.add(rule, f"{package.shown(part)} is {kind or 'no image'}, its type says {content_type}", part)
 
 
 def _paths(package: Package, model: Model, related: list[Relation], *, is_root: bool) -> None:
@@ -142,17 +142,17 @@ def _paths(package: Package, model: Model, related: list[Relation], *, is_root: 
             continue
         part = path.lower().lstrip("/")
         if part not in package.parts:
-            rule, say = (P019, package.say) if resource.kind == "texture2d" else (P002, package.say_lenient)
-            say(rule, f"{path} of {resource.kind} {resource.id} is not in the package", model.part)
+            rule, add = (P019, package.add) if resource.kind == "texture2d" else (P002, package.add_lenient)
+            add(rule, f"{path} of {resource.kind} {resource.id} is not in the package", model.part)
         elif part not in (by_kind[opc.TEXTURE] if resource.kind == "texture2d" else images):
-            say = package.say if resource.kind == "texture2d" else package.say_lenient
-            say(P002, f"{path} of {resource.kind} {resource.id} has no relationship", model.part)
+            add = package.add if resource.kind == "texture2d" else package.add_lenient
+            add(P002, f"{path} of {resource.kind} {resource.id} has no relationship", model.part)
         else:
             _image(package, part, P019 if resource.kind == "texture2d" else P020)
     for part, written in sorted(_reached(model).items()):
         if part not in package.parts:
-            package.say(P012, f"{written} is not in the package", model.part)
+            package.add(P012, f"{written} is not in the package", model.part)
         elif part not in by_kind[opc.START]:
-            package.say(P002, f"{written} has no relationship of the model type", model.part)
+            package.add(P002, f"{written} has no relationship of the model type", model.part)
         elif not is_root and any(use.path for resource in model.objects().values() for use in resource.components):
-            package.say(P012, "a part other than the root one refers to objects by path", model.part)
+            package.add(P012, "a part other than the root one refers to objects by path", model.part)
