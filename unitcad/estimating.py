@@ -23,7 +23,7 @@ def estimate_spec(
     frequency_hz: float | None = None,
     layered: Layered = layered_block,
 ) -> dict[str, Any]:
-    """The estimate of a spec as JSON-ready data (`attenuation.edge.estimates`); the same spec gives the same data.
+    """Return the estimate of a spec as JSON-ready data (`attenuation.edge.estimates`); same spec, same data.
 
     Raises `Refusal` where no frequency is known, for an unknown material or tissue, and for values no body has.
     """
@@ -33,13 +33,13 @@ def estimate_spec(
 def frequency_table_of_spec(
     spec: Spec, frequencies_hz: Sequence[float], models: Sequence[str] | None = None
 ) -> dict[str, Any]:
-    """A table over frequencies (Hz): edge level by model, and the layered decay; raises as `estimate_spec`."""
+    """Return a table over frequencies (Hz): edge level by model, and the layered decay; raises as `estimate_spec`."""
     variant = estimate_input(spec, frequencies_hz[0])
     return frequency_table(variant, frequencies_hz, tuple(models or spec.estimate.models))
 
 
 def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:
-    """A spec's unit on its body, in SI. `frequency_hz` overrides the spec's and the motor's."""
+    """Return a spec's unit on its body, in SI. `frequency_hz` overrides the spec's and the motor's."""
     passes = design_of(spec).passes
     if passes is None:
         raise Refusal("design", spec.design, f"has no estimate: {no_estimate()}")
@@ -84,7 +84,7 @@ def _silicone(material: Material, wall: float, frequency: Quantity) -> SiliconeL
 
 
 def _youngs_modulus(material: Material, frequency: Quantity) -> Quantity:
-    """The catalogue's small-strain modulus in Pa; else a range of a fractional law, static to dynamic; else none."""
+    """Return the catalogue's small-strain modulus in Pa, or a fractional law's range, static to dynamic, or none."""
     if material.youngs_modulus_kpa:
         return _quantity(material.youngs_modulus_kpa, 1e3)
     mu0, tau, n = material.fractional_mu0_kpa, material.fractional_tau_us, material.fractional_n

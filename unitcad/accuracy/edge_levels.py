@@ -205,7 +205,7 @@ def bare_skin(finenesses: Sequence[float], repeats: int) -> tuple[Table, float]:
         tuple(rows),
         f"Largest over 0 to 30 mm, over the largest |u_z|. Times of {f'{repeats} runs' if repeats > 1 else 'one run'} "
         f"each; the layered solver takes {solver} at rtol 1e-6, 5 runs. The change to the mesh before bounds the finer "
-        f"mesh's own error; the solver is {rows[-1][2] / own_error:.2g} of it away.",
+        f"mesh's own error; the solver differs by {rows[-1][2] / own_error:.2g} of it.",
     )
     return table, rows[-1][2] / own_error
 

@@ -26,7 +26,7 @@ _SPREAD_RTOL = 1e-3
 
 
 def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
-    """The estimate's `layered`: |u_z| and |u_r| over |u_z| at the edge, at the surface and at `DEPTHS_MM`, with spread.
+    """Return the estimate's `layered`: |u_z| and |u_r| over |u_z| at the edge, at 0 mm and `DEPTHS_MM`, with spread.
 
     The spread takes each kind of input (moduli, damping, thicknesses, frequency) by itself to its low and high end.
     """

@@ -91,7 +91,7 @@ class EstimateInput:
 
 
 def body(tissue: tuple[TissueLayer, ...], end: dict[str, int] | None = None) -> LayeredMedium:
-    """The body as a layered medium; `end` takes "moduli", "damping" or "thicknesses" to their low (0), high (1) end."""
+    """Return the body as a layered medium; `end` sets "moduli", "damping" or "thicknesses" to low (0) or high (1)."""
     end = end or {}
 
     def of(kind: str, quantity: Quantity) -> float:

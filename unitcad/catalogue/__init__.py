@@ -79,7 +79,7 @@ def printers(own: Mapping[str, PrinterEntry] | None = None) -> dict[str, Printer
 
 
 def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] | None = None) -> tuple[Tissue, ...]:
-    """The layers of a body, skin first, the last one a half-space.
+    """Return the layers of a body, skin first, the last one a half-space.
 
     Raises `Refusal` for an unknown name and for a body of the spec that can't be.
     """
@@ -143,7 +143,7 @@ def _plain(table: Any) -> dict[str, Any]:
 
 
 def _sourced(kind: type[Struct], table: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a table, each as a table that says where it comes from."""
+    """Return the values of a table, each as a table that says where it comes from."""
     default = {key: table[key] for key in ("status", "source") if key in table}
     return {
         key: {**default, **(raw if isinstance(raw, dict) else {"value": raw})}
@@ -153,7 +153,7 @@ def _sourced(kind: type[Struct], table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _entry(kind: type[Struct], name: str, table: Mapping[str, Any], path: str) -> Any:
-    """An entry from its table. Raises `Refusal` for values left out, or that lie outside their own range."""
+    """Return an entry from its table. Raises `Refusal` for values left out, or that lie outside their own range."""
     missing = [key for key in required_of(kind) if key not in ("name", *table)]
     if missing:
         others = f" with {', '.join(missing[1:])}" if missing[1:] else ""

@@ -167,13 +167,13 @@ class Tissue(Struct, frozen=True, kw_only=True):
 
 @cache
 def required_of(entry: type[Struct]) -> tuple[str, ...]:
-    """The keys that an entry can't do without; worked out once, as the next."""
+    """Return the keys that an entry can't do without; worked out once, as the next."""
     return tuple(field.name for field in msgspec.structs.fields(entry) if field.required)
 
 
 @cache
 def kinds_of(entry: type[Struct]) -> tuple[tuple[str, Any], ...]:
-    """The keys of an entry and the kind of value that each takes; worked out once, since types are slow to read."""
+    """Return the keys of an entry and the kind of each one's value; worked out once, since types are slow to read."""
     return tuple(
         (field.name, typing.get_args(kind)[0])
         for field in msgspec.structs.fields(entry)
@@ -183,7 +183,7 @@ def kinds_of(entry: type[Struct]) -> tuple[tuple[str, Any], ...]:
 
 
 def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:
-    """What a spec may give of an entry: a value, or a value with where it comes from; the rest is as in `like`."""
+    """Return what a spec may give of an entry: a value, or a value with its source; the rest is as in `like`."""
     said = "where values stand without it"
     fields: list[tuple[str, Any, Any]] = [
         *([("like", Annotated[str | None, Meta(description="the shipped entry to start from")], None)] if like else []),

@@ -32,5 +32,5 @@ def widest_tail_end(fpcb: Circuit, slot: Exit, strain: float) -> float:
 
 
 def _round(slot: Exit) -> float:
-    """The slot's perimeter, mm."""
+    """Return the slot's perimeter, mm."""
     return 2 * (slot.width + slot.height)

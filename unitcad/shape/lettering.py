@@ -63,7 +63,7 @@ def text_width(text: str, stroke: float) -> float:
 
 @lru_cache
 def outlines(character: str, stroke: float) -> tuple[Profile, tuple[Profile, ...]]:
-    """The outer outline and the islands of a character: the border of its cells, walked with the ink on the left."""
+    """Return a character's outer outline and islands: the border of its cells, walked with the ink on the left."""
     ink = {
         (x, y)
         for bar in _GLYPHS[character]
@@ -96,7 +96,7 @@ def outlines(character: str, stroke: float) -> tuple[Profile, tuple[Profile, ...
 
 
 def _corners(loop: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """A loop of unit steps without the points in the middle of a straight run."""
+    """Return a loop of unit steps without the points in the middle of a straight run."""
     return [
         p
         for before, p, after in zip([loop[-1], *loop[:-1]], loop, [*loop[1:], loop[0]], strict=True)

@@ -92,17 +92,17 @@ class Profile:
 
 
 def polygon(*corners: tuple[float, float]) -> Profile:
-    """A profile of straight sides through `corners` (mm), counter-clockwise."""
+    """Return a profile of straight sides through `corners` (mm), counter-clockwise."""
     return Profile(tuple((x, y, 0.0) for x, y in corners))
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> Profile:
-    """The upright rectangle between two opposite corners (mm)."""
+    """Return the upright rectangle between two opposite corners (mm)."""
     return polygon((x0, y0), (x1, y0), (x1, y1), (x0, y1))
 
 
 def rounded_rectangle(half_x: float, half_y: float, radius: float, key: float = 0.0) -> Profile:
-    """A rectangle about the origin with three or four round corners (mm); a `key` > 0 cuts the corner at (+x, +y)
+    """Return a rectangle about the origin with three or four round corners (mm); a `key` > 0 cuts the one at (+x, +y)
     straight at 45 degrees by that length, so that what fits round it goes on one way only.
     """
     a, b, r, quarter = half_x, half_y, radius, math.tan(math.pi / 8)
@@ -121,7 +121,7 @@ def rounded_rectangle(half_x: float, half_y: float, radius: float, key: float = 
 
 
 def points(profile: Profile, segments: int) -> np.ndarray:
-    """The profile as a polygon, (n, 2) in mm: an arc gets its share of `segments` a turn, at least one side."""
+    """Return the profile as a polygon, (n, 2) in mm: an arc gets its share of `segments` a turn, at least one side."""
     found: list[tuple[float, float]] = []
     for (x0, y0, bulge), (x1, y1, _) in sides(profile.vertices):
         found.append((x0, y0))
@@ -141,7 +141,7 @@ def points(profile: Profile, segments: int) -> np.ndarray:
 
 
 def arc_middle(start: Vertex, end: Vertex) -> tuple[float, float]:
-    """The point halfway along the arc from `start` to `end` (mm)."""
+    """Return the point halfway along the arc from `start` to `end` (mm)."""
     (x0, y0, bulge), (x1, y1, _) = start, end
     return (x0 + x1) / 2 + bulge * (y1 - y0) / 2, (y0 + y1) / 2 - bulge * (x1 - x0) / 2
 

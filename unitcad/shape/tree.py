@@ -123,22 +123,22 @@ Shape = Revolve | Extrude | Polyhedron | Union | Cut | Common | Component | Belo
 
 
 def cylinder(radius: float, z0: float, z1: float) -> Revolve:
-    """A cylinder about the z axis (mm)."""
+    """Return a cylinder about the z axis (mm)."""
     return Revolve(rectangle(0, z0, radius, z1))
 
 
 def ring(inner: float, outer: float, z0: float, z1: float) -> Revolve:
-    """A tube about the z axis between two radii (mm)."""
+    """Return a tube about the z axis between two radii (mm)."""
     return Revolve(rectangle(inner, z0, outer, z1))
 
 
 def box(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> Extrude:
-    """An upright box (mm)."""
+    """Return an upright box (mm)."""
     return Extrude(rectangle(x0, y0, x1, y1), z0, z1)
 
 
 def union(parts: Iterable[Shape]) -> Shape:
-    """The union of one or more shapes; one is returned as it is."""
+    """Return the union of one or more shapes; one is returned unchanged."""
     parts = tuple(parts)
     return parts[0] if len(parts) == 1 else Union(parts)
 

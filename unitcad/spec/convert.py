@@ -37,7 +37,7 @@ DEEPEST = 20
 
 
 def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
-    """`data`, the table at `field`, as a `kind`, types strict. Raises Refusal for the first value that can't be one.
+    """Return `data`, the table at `field`, as a `kind`, types strict. Raises Refusal for the first unfit value.
 
     A number that is infinite, huge or none is refused wherever it stands, and so is what nests too deeply. A kind's
     numbers have limits that they may reach (ge, le), so that a limit is what a refusal can offer.
@@ -167,7 +167,7 @@ def _name(plain: type, table: type[msgspec.Struct] | None) -> str:
 
 
 def _needs(kind: Any) -> str:
-    """What an empty text, list or table must hold."""
+    """Say what an empty text, list or table must hold."""
     entry = named_in(kind) or entry_in(kind)
     words = f"one or more of {', '.join(_words(entry))}" if entry and _words(entry) else ""
     needed = meaning(kind) or words or ("one entry or more" if entry else "one character or more")

@@ -21,7 +21,7 @@ def fields_of(table: type[msgspec.Struct]) -> Fields:
 
 
 def alternatives(kind: Any) -> tuple[Any, ...]:
-    """The members of a union, annotations taken off."""
+    """Return the members of a union, without annotations."""
     if typing.get_origin(kind) is Annotated:
         return alternatives(typing.get_args(kind)[0])
     if typing.get_origin(kind) in _UNIONS:
@@ -30,7 +30,7 @@ def alternatives(kind: Any) -> tuple[Any, ...]:
 
 
 def table_in(kind: Any) -> type[msgspec.Struct] | None:
-    """The table among the alternatives of `kind`."""
+    """Return the table among the alternatives of `kind`."""
     return next((k for k in alternatives(kind) if _is_table(typing.get_origin(k) or k)), None)
 
 
@@ -39,12 +39,12 @@ def _is_table(kind: Any) -> bool:
 
 
 def named_in(kind: Any) -> Any:
-    """The kind of what lies under any name in a free table that `kind` allows; None where it allows none."""
+    """Return the kind of any name's value in a free table that `kind` allows; None where it allows none."""
     return next((typing.get_args(k)[1] for k in alternatives(kind) if typing.get_origin(k) is dict), None)
 
 
 def entry_in(kind: Any, index: int = 0) -> Any:
-    """The kind of entry `index` of a list that `kind` allows; None where it allows no list so long."""
+    """Return the kind of entry `index` of a list that `kind` allows; None where it allows no list so long."""
     for found in alternatives(kind):
         if typing.get_origin(found) in (tuple, list):
             entries = typing.get_args(found)
@@ -55,14 +55,14 @@ def entry_in(kind: Any, index: int = 0) -> Any:
 
 
 def index_in(step: str, count: int) -> int | None:
-    """A path's step as an index of a list of `count` entries; None where it is none."""
+    """Return a path's step as an index of a list of `count` entries; None where it is none."""
     if not (step.isascii() and step.isdigit()) or len(step) > len(str(count)):
         return None
     return int(step) if int(step) < count else None
 
 
 def notes(kind: Any) -> Iterator[msgspec.Meta]:
-    """What a kind and the members of its unions are annotated with."""
+    """Return the annotations of a kind and of the members of its unions."""
     if typing.get_origin(kind) is Annotated:
         yield from kind.__metadata__
         yield from notes(typing.get_args(kind)[0])
@@ -72,5 +72,5 @@ def notes(kind: Any) -> Iterator[msgspec.Meta]:
 
 
 def meaning(kind: Any) -> str:
-    """The description that a kind is annotated with, or nothing."""
+    """Return the description that a kind is annotated with, or nothing."""
     return next((note.description for note in notes(kind) if note.description), "")

@@ -40,7 +40,7 @@ def starter(name: str, template: str | None = None) -> str:
 
 
 def _further_keys(section: str, there: dict[str, Any]) -> str:
-    """The keys that a table of the template leaves out, commented out."""
+    """Return the keys that a table of the template leaves out, commented out."""
     header = re.match(r"\[(\w+)\]", section)
     field = fields_of(AskedSpec).get(header[1]) if header else None
     table = table_in(field.type) if field else None

@@ -93,7 +93,7 @@ def impedances(units: Units, wave: Wave) -> Any:
 
 
 def with_air(layered: Any, wave: Wave) -> Any:
-    """The layers' impedances and, after the last one, air's."""
+    """Return the layers' impedances and, after the last one, air's."""
     layered = np.asarray(layered)
     return np.concatenate([layered, np.full((*layered.shape[:-1], 1), AIR_IMPEDANCE[wave])], axis=-1)
 
@@ -120,7 +120,7 @@ def paper_path(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus"
 
 
 def consistent_path(units: Units, wave: Wave = "s") -> Any:
-    """The path with complex moduli: |product of 2 Z1/(Z1 + Z2)|, Z = sqrt(rho M*), exp(Im(omega sqrt(rho/M*)) d)."""
+    """Return the path by complex moduli: product of |2 Z1/(Z1+Z2)|, Z = sqrt(rho M*), exp(Im(omega sqrt(rho/M*)) d)."""
     shear = units.youngs_modulus / (2.0 * (1.0 + units.poisson_ratio)) * (1.0 + 1j * units.tan_delta)
     with _quiet():
         factor = 2.0 * (1.0 - units.poisson_ratio) / (1.0 - 2.0 * units.poisson_ratio) if wave == "p" else 1.0

@@ -58,7 +58,7 @@ def estimate(
 
 
 def summary(estimated: dict[str, Any]) -> dict[str, Any]:
-    """What a table or a manifest says of an estimate: edge level and its geometric-mean error by model, measured."""
+    """Return an estimate for a table or a manifest: edge level and its geometric-mean error by model, measured."""
     models = {
         name: {
             "edge": block["edge_level"].get("value"),
@@ -96,7 +96,7 @@ def frequency_table(
 
 
 def variant_block(variant: EstimateInput) -> dict[str, Any]:
-    """The inputs as they were used, in the units of the spec."""
+    """Return the inputs as they were used, in the units of the spec."""
     return {
         "name": variant.name,
         "design": variant.design,
@@ -127,7 +127,7 @@ def table_error() -> dict[str, Any]:
 
 
 def judgement_block(found: Judgement) -> dict[str, Any]:
-    """A judgement as data."""
+    """Return a judgement as data."""
     return {
         "levels": asdict(found.levels),
         "ratios": asdict(found.ratios),
@@ -148,7 +148,7 @@ def _quantity(quantity: Quantity, factor: float) -> dict[str, Any]:
 
 
 def rounded(data: Any) -> Any:
-    """`data` with its floats to nine significant digits, so that the last bits of a platform do not show."""
+    """Return `data` with its floats to nine significant digits, so that the last bits of a platform do not show."""
     if isinstance(data, float):
         return float(f"{data:.{SIGNIFICANT_DIGITS}g}")
     if isinstance(data, dict):

@@ -26,7 +26,7 @@ Made by `fit_divider(measured_table(), everyone)`, least squares of the log, and
 
 
 def scale_of(path: Predict, table: MeasuredTable, chosen: np.ndarray) -> float:
-    """The one constant s of level = s path: geometric mean of measured / path over the chosen units."""
+    """Return the one constant s of level = s path: geometric mean of measured / path over the chosen units."""
     return float(np.exp(np.mean(np.log(table.levels / table.evaluate(path))[chosen])))
 
 
@@ -68,7 +68,7 @@ def fit_divider(table: MeasuredTable, chosen: np.ndarray) -> tuple[float, float]
 
 
 def two_constants(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
-    """The divider fitted to the chosen units."""
+    """Return the divider fitted to the chosen units."""
     kappa, s = fit_divider(table, chosen)
     return lambda other: s / (1.0 + kappa * other.contrast)
 
@@ -107,7 +107,7 @@ def judgements() -> dict[str, Judgement]:
 
 @cache
 def scales() -> dict[str, float]:
-    """The constant s of every model, from all nine levels; the divider's is stored."""
+    """Return the constant s of every model, from all nine levels; the divider's is stored."""
     table = measured_table()
     everyone = np.ones(len(table.names), dtype=bool)
     found = {name: scale_of(path, table, everyone) for name, path in paths().items() if name != "fitted"}

@@ -46,12 +46,12 @@ ASSUMPTIONS = {
 
 
 def nominal(variant: EstimateInput) -> Units:
-    """The variant's middle values as closed-form input."""
+    """Return the variant's middle values as closed-form input."""
     return _units(variant, np.array([[q.middle for _, q in _inputs(variant)]]), [0])
 
 
 def corners(variant: EstimateInput) -> Units:
-    """The variant with its inputs at the ends of their ranges: all corners, or one input at a time if there are many.
+    """Yield the variant with inputs at the ends of their ranges: all corners, or one input at a time if there are many.
 
     Layers of one material move together.
     """
@@ -161,7 +161,7 @@ def model_block(variant: EstimateInput, model: str) -> dict[str, Any]:
 
 
 def _controls(variant: EstimateInput) -> list[int]:
-    """A layer's index for each distinct material, if the unit has more than one layer."""
+    """Return a layer's index for each distinct material, if the unit has more than one layer."""
     if len(variant.layers) == 1:
         return []
     names = [layer.material for layer in variant.layers]
@@ -269,7 +269,7 @@ def _number(value: Any) -> float | None:
 
 
 def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
-    """What the paper measured for this unit's design and materials, in both prints; None if it measured none."""
+    """Return the paper's measurement of this unit's design and materials, in both prints; None if there is none."""
     table, layers = measured_table(), tuple(layer.material for layer in variant.layers)
     design = CONTROL if len(layers) == 1 else variant.design
     found = [i for i in range(len(table.names)) if table.designs[i] == design and table.layers[i] == layers]
@@ -296,7 +296,7 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
 
 
 def printed_besides(design: str, layers: tuple[str, ...]) -> dict[str, Any] | None:
-    """The second print of a level, a ratio to an unnamed control, and directions stated without a figure."""
+    """Return the second print of a level, a ratio to an unnamed control, and directions stated without a figure."""
     data = measurements()
     short = {full: name for name, full in data.names.items()}
     if design not in data.designs or any(layer not in short for layer in layers):

@@ -53,7 +53,7 @@ class MeasuredTable:
         return self.evaluate(lambda u: u.passes * u.youngs_modulus[..., -1] / u.youngs_modulus[..., 0])
 
     def units(self, index: int) -> Units:
-        """The closed forms' input for one unit of the table."""
+        """Return the closed forms' input for one unit of the table."""
         return _units(self.designs[index], self.layers[index])
 
 
@@ -73,7 +73,7 @@ def _units(design: str, layers: tuple[str, ...]) -> Units:
 
 @cache
 def measured_table() -> MeasuredTable:
-    """The nine levels of the catalogue's measurements, as the results section prints them."""
+    """Return the nine levels of the catalogue's measurements, as the results section prints them."""
     data = measurements()
     names, designs, layers, levels = [], [], [], []
     for design, measured in {CONTROL: data.controls, **{name: d.levels for name, d in data.designs.items()}}.items():
