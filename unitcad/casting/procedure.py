@@ -68,7 +68,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
                 silicone.name,
                 _figures(moulds, step, silicone, mix, volume),
                 verdict,
-                pour_steps(moulds, step, silicone, mix, verdict),
+                tuple(pour_steps(moulds, step, silicone, mix, verdict)),
                 f"step{step.index}-section.svg",
             )
         )
@@ -78,12 +78,12 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
         name=spec.name,
         label=plan.label,
         cells=len(plan.layout.cells),
-        preparation=preparation(moulds),
+        preparation=tuple(preparation(moulds)),
         off_grid=edges,
         pours=tuple(pours),
-        release=release(moulds, mixes[0][0]),
+        release=tuple(release(moulds, mixes[0][0])),
         assembly=() if moulds.design.laid_in else assembly(moulds),
-        measure=measurements(moulds, grams, _printed_slot_height(moulds, edges)),
+        measure=tuple(measurements(moulds, grams, _printed_slot_height(moulds, edges))),
         walls=tuple(_walls(spec)),
         bill=bill(moulds, mixes),
     )
