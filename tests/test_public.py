@@ -10,6 +10,7 @@ import pickle
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -239,7 +240,7 @@ def test_meshes_are_handed_out_in_both_libraries() -> None:
         variant.mesh("layer3")
     with pytest.raises(Refusal, match="library = 'open3d': not known"):
         variant.mesh("layer1", "open3d")  # type: ignore[call-overload]
-    with pytest.raises(UnitcadError, match="Variant takes a Spec, not a str"):
+    with pytest.raises(UnitcadError, match="Variant takes a Spec, not str"):
         unitcad.Variant("encapsulating")  # type: ignore[arg-type]
 
 
@@ -337,6 +338,35 @@ def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
     with pytest.raises(Refusal, match=r"output\.formats\.0 = 'stp': not known"):
         unitcad.build("encapsulating", tmp_path, formats=["stp"])  # type: ignore[list-item]
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: unitcad.load(3), r"^int is no spec: name a template or a file, or give a dict"),  # type: ignore[arg-type]
+        (lambda: unitcad.load("encapsulating", set=3), "^set takes a dict by path or texts"),  # type: ignore[arg-type]
+        (lambda: unitcad.load("encapsulating", set=[3]), "^set takes .*, not int$"),  # type: ignore[list-item]
+        (lambda: unitcad.Spec("encapsulating"), "^Spec takes its keys by name"),  # type: ignore[call-arg]
+    ],
+)
+def test_arguments_of_another_type_are_refused_in_one_sentence(call: Callable[[], object], words: str) -> None:
+    with pytest.raises(UnitcadError, match=words):
+        call()
+
+
+def test_a_single_text_is_a_list_of_one(tmp_path: Path) -> None:
+    built = unitcad.build("encapsulating", tmp_path, formats="stl", only="unit", check=False)
+    assert list(built.volumes) == ["layer1", "layer2", "motor", "fpcb"]
+    assert list(unitcad.estimate("encapsulating", models="paper").edge) == ["paper"]
+
+
+def test_tab_completion_offers_the_public_names_alone() -> None:
+    assert [name for name in dir(unitcad) if not name.startswith("__")] == unitcad.__all__
+
+
+def test_a_repr_shows_what_was_given() -> None:
+    assert repr(unitcad.Material(like="ecoflex-00-30")) == "MaterialEntry(like='ecoflex-00-30')"
+    assert repr(unitcad.Motor(part="x")) == "MotorTable(part='x')"
 
 
 def test_a_table_of_a_spec_is_data() -> None:

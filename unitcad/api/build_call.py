@@ -17,6 +17,7 @@ from unitcad.pipeline.folder import PAGE, held
 from unitcad.spec import Spec
 from unitcad.spec.asked import Format
 from unitcad.validation import Changes, Source, load
+from unitcad.validation.tables import listed
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,8 +65,8 @@ def build(
     out: str | os.PathLike[str] = "out",
     *,
     set: Changes = (),
-    formats: Sequence[Format] | None = None,
-    only: Sequence[str] = OUTPUTS,
+    formats: Sequence[Format] | Format | None = None,
+    only: Sequence[str] | str = OUTPUTS,
     check: bool = True,
     report: bool = False,
     progress: Callable[[str], None] | None = None,
@@ -80,8 +81,8 @@ def build(
     """
     spec = load(source, set)
     if formats is not None:
-        spec = load(spec, {"output.formats": list(formats)})
-    built = build_spec(spec, Path(out), only=only, check=check, say=progress or _silent)
+        spec = load(spec, {"output.formats": listed(formats)})
+    built = build_spec(spec, Path(out), only=listed(only), check=check, say=progress or _silent)
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
         from unitcad.report import write_report
 

@@ -12,6 +12,7 @@ from unitcad.attenuation.edge.estimates import summary
 from unitcad.estimating import estimate_spec
 from unitcad.spec.asked import Model
 from unitcad.validation import Changes, Source, load
+from unitcad.validation.tables import listed
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,7 +60,7 @@ def estimate(
     source: Source,
     *,
     set: Changes = (),
-    models: Sequence[Model] | None = None,
+    models: Sequence[Model] | Model | None = None,
     frequency_hz: float | None = None,
 ) -> EdgeEstimate:
     """Estimate the vibration at a unit's edge, and on the skin beyond it.
@@ -69,6 +70,6 @@ def estimate(
     that no model describes.
     """
     spec = load(source, set)
-    chosen = {"estimate.models": models and list(models), "estimate.frequency_hz": frequency_hz}
+    chosen = {"estimate.models": models and listed(models), "estimate.frequency_hz": frequency_hz}
     wanted = {path: value for path, value in chosen.items() if value is not None}
     return EdgeEstimate(estimate_spec(load(spec, wanted)))

@@ -3,10 +3,11 @@
 numpy and scipy only; SI inside. Knows nothing of CAD, nor of the spec. The names below are loaded on first use.
 """
 
+# pyright: strict
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
@@ -38,7 +39,7 @@ _PLACES = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Load a public name. Raises `AttributeError` for any other."""
     for place, names in _PLACES.items():
         if name in names:

@@ -20,7 +20,7 @@ from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.spec.asked import Format
 from unitcad.text import toml
 from unitcad.validation import Changes
-from unitcad.validation.tables import changes_of
+from unitcad.validation.tables import changes_of, listed
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,8 +78,8 @@ def batch(
     out: str | os.PathLike[str] | None = None,
     *,
     set: Changes = (),
-    formats: Sequence[Format] | None = None,
-    only: Sequence[str] = OUTPUTS,
+    formats: Sequence[Format] | Format | None = None,
+    only: Sequence[str] | str = OUTPUTS,
     check: bool = True,
     jobs: int | None = None,
     limit: int | None = None,
@@ -100,10 +100,10 @@ def batch(
     overrides = [
         change if isinstance(change, str) else "=".join((change[0], toml(change[1]))) for change in changes_of(set)
     ]
-    wanted = chosen.overridden([*overrides, *([] if formats is None else [f"output.formats={list(formats)}"])])
+    wanted = chosen.overridden([*overrides, *([] if formats is None else [f"output.formats={listed(formats)}"])])
     folder = Path("out") / wanted.slug if out is None else Path(out)
     where = None if cache is None else Path(cache)
-    options = BatchOptions(tuple(only), check, keep_going, timeout, limit, where)
+    options = BatchOptions(tuple(listed(only)), check, keep_going, timeout, limit, where)
     summary = make(wanted, folder, options, Workers(jobs))
     if report:
         from unitcad.report import write_report

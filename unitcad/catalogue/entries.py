@@ -74,7 +74,7 @@ TissueModulus = Annotated[float, Meta(ge=0.001, le=1e9, description="at small st
 TissueViscosity = Annotated[float, Meta(ge=0, le=1e6, description="of shear; it goes before the loss factor")]
 
 
-class Value(Struct, Generic[T], frozen=True, omit_defaults=True, forbid_unknown_fields=True):
+class Value(Struct, Generic[T], frozen=True, omit_defaults=True, repr_omit_defaults=True, forbid_unknown_fields=True):
     """A number or a word with where it comes from; `low` and `high` bound it where a range is known."""
 
     value: T
@@ -199,6 +199,7 @@ def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:
         frozen=True,
         kw_only=True,
         omit_defaults=True,
+        repr_omit_defaults=True,
         forbid_unknown_fields=True,
     )
 

@@ -28,7 +28,7 @@ class Variant(MouldSet):
     def __post_init__(self) -> None:
         if not isinstance(self.spec, Spec):  # pyright: ignore[reportUnnecessaryIsInstance]
             given = type(self.spec).__name__
-            raise UnitcadError(f"Variant takes a Spec, not a {given}; Variant.of takes a template's name or a file")
+            raise UnitcadError(f"Variant takes a Spec, not {given}; Variant.of takes a template's name or a file")
 
     @classmethod
     def of(cls, source: Source, *overrides: str) -> Variant:

@@ -29,7 +29,7 @@ _TISSUE = "one layer or more by name, skin first, each a table with density_kg_m
 Model = Literal["paper", "consistent", "fitted"]
 
 
-class Table(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_unknown_fields=True):
     """A table of the spec: frozen, unknown keys refused."""
 
 

@@ -14,6 +14,7 @@ from msgspec import Struct, structs
 
 from unitcad import notebook
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
+from unitcad.errors import UnitcadError
 from unitcad.spec.asked import (
     AskedSpec,
     CastingTable,
@@ -115,7 +116,9 @@ else:
     class _Validated(type(Struct)):
         """Makes a call of the class take what a TOML file may hold, and check it like one."""
 
-        def __call__(cls, /, **keys: Any) -> Spec:
+        def __call__(cls, /, *values: object, **keys: Any) -> Spec:
+            if values:
+                raise UnitcadError("Spec takes its keys by name, as in Spec(name=..., design=...); `load` reads a file")
             # Validation knows the designs and lies above this room: it is loaded when a spec is asked for.
             return import_module("unitcad.validation").from_tables(keys)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.designs import default_design
-from unitcad.errors import Refusal, UnknownKey, unknown_name
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, unknown_name
 from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
@@ -50,7 +50,10 @@ def load(source: Source, set: Changes = ()) -> Spec:
     elif isinstance(source, Mapping):
         data = plain(source)
     else:
-        spec = source if isinstance(source, Spec) else source.spec
+        spec = source if isinstance(source, Spec) else getattr(source, "spec", None)
+        if not isinstance(spec, Spec):
+            given = type(source).__name__
+            raise UnitcadError(f"{given} is no spec: name a template or a file, or give a dict, a Spec or a Variant")
         if not changes:
             return spec
         data = asked_of(spec, from_data)

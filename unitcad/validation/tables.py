@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from numbers import Integral, Real
 from typing import Any, Protocol, cast
 
 from msgspec import Struct
 
 from unitcad.catalogue import Printer
-from unitcad.errors import Refusal
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import Spec, to_data
 from unitcad.spec.effective import CastLayer, Moulds
 
@@ -37,6 +37,11 @@ _DERIVED = {
     "estimate": ("frequency_hz", "amplitude_um"),
 }
 """What validation works out from other values where a spec leaves it out."""
+
+
+def listed(given: Sequence[str]) -> list[str]:
+    """Return the entries of a list; a single text is a list of one."""
+    return [given] if isinstance(given, str) else list(given)
 
 
 def plain(node: object, field: str = "") -> Any:
@@ -85,9 +90,16 @@ def asked_of(spec: Spec, settle: Callable[[dict[str, Any]], Spec]) -> dict[str, 
 
 
 def changes_of(changes: Changes) -> Iterator[str | tuple[str, Any]]:
-    """Yield each change: a text "path=value", or a path and its plain value."""
+    """Yield each change: a text "path=value", or a path and its plain value. Raises UnitcadError for anything else."""
     if isinstance(changes, Mapping):
         table = cast("Mapping[str, object]", changes)
         yield from ((path, plain(value, path)) for path, value in table.items())
+    elif isinstance(changes, str):
+        yield changes
     else:
-        yield from [changes] if isinstance(changes, str) else changes
+        given = cast("object", changes)
+        entries = list(cast("Iterable[object]", given)) if isinstance(given, Iterable) else [given]
+        wrong = [entry for entry in entries if not isinstance(entry, str)]
+        if wrong:
+            raise UnitcadError(f'set takes a dict by path or texts "path=value", not {type(wrong[0]).__name__}')
+        yield from cast("list[str]", entries)
