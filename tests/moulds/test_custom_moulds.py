@@ -215,6 +215,9 @@ def test_a_build_writes_moulds_and_casting(tmp_path: Path) -> None:
     assert {"casting.md", "moulds/base.stl", "moulds/step2-cup.stl"} <= set(done.manifest["files"])
     reasons = {left["what"]: left["why"] for left in done.manifest["left_out"]}
     assert reasons["estimate"].startswith("the models describe")
+    first, second = (done.folder / "casting.md").read_text("utf-8").split("## Pour 2")
+    assert "draw the blade past it" in first  # the lugs' supports are as high in pour 1 as in pour 2
+    assert "draw the blade past it" not in second
 
 
 def test_the_worked_examples_become_what_the_page_says() -> None:

@@ -13,7 +13,8 @@ from unitcad.accuracy.random_specs import DOCUMENTED, Seeded, random_spec
 from unitcad.errors import Refusal
 from unitcad.mould_checks import air, check_moulds
 from unitcad.moulds import lid
-from unitcad.validation import from_data, read
+from unitcad.moulds.plan import plan
+from unitcad.validation import from_data, load, read
 
 WIRES = {"diameter_mm": 0.3, "count": 2}
 
@@ -218,3 +219,14 @@ def test_nearest_value_leads_out(overrides: list[str], field: str, nearest: obje
         set_of("encapsulating", *overrides[:-1], put_in)
     except Refusal as further:
         assert further.field != field
+
+
+@pytest.mark.parametrize("wall", [0.6, 0.713, 0.8])
+def test_the_widest_tail_that_a_tongue_s_air_allows_is_offered(wall: float) -> None:
+    change = {"layers.0.wall_mm": wall, "layers.0.cap_mm": 1.1, "fpcb.tail_width_mm": 5.5}
+    with pytest.raises(Refusal, match="mm of air under the tongue") as refused:
+        plan(load("encapsulating", change))
+    offered = refused.value.nearest
+    plan(load("encapsulating", change | {"fpcb.tail_width_mm": offered}))
+    with pytest.raises(Refusal, match="under the tongue"):
+        plan(load("encapsulating", change | {"fpcb.tail_width_mm": round(offered + 0.001, 3)}))

@@ -94,6 +94,8 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
             "Wait for the bubbles, prick what you see. Strike off along the rim with the blade held upright; what it "
             "takes goes into the groove."
         )
+        if not moulds.plan.concentric and moulds.plan.dimensions.core_height > step.rim:
+            yield "What stands on the base beside the cavity is higher than this rim: draw the blade past it."
         again = " The window weeps a little." if tongues else ""
         yield f"Top up and strike again after {STRIKE_AGAIN_MIN} min (assumed).{again}"
     yield "Let it cure, level, for the time above. Touch the overflow, not the layer, to see whether it is done."

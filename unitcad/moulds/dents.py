@@ -6,6 +6,7 @@ import math
 
 from unitcad.designs import Dimensions
 from unitcad.designs.dimensions import WIRE_GAP, Exit
+from unitcad.designs.limits import EPS, down
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
 
@@ -43,7 +44,7 @@ def widest_tongue(spec: Spec, dims: Dimensions, layer: int) -> float:
 def check_tongue(spec: Spec, dims: Dimensions) -> None:
     """Raise Refusal where a tongue is too wide for the air under it to get out."""
     widths = [widest_tongue(spec, dims, layer) for layer in range(len(spec.layers))]
-    if not dims.exit or dims.exit.width <= min(widths):
+    if not dims.exit or dims.exit.width <= min(widths) + EPS:
         return
     layer = widths.index(min(widths))
     widest = widths[layer] - spec.moulds.slot_width_clearance_mm
@@ -53,11 +54,7 @@ def check_tongue(spec: Spec, dims: Dimensions) -> None:
         f"{MESH_ROOM * deepest(spec, layer):.3f}"
     )
     if spec.wires:
-        each = _rounded_down((widest + WIRE_GAP) / spec.wires.count - WIRE_GAP)
+        each = down((widest + WIRE_GAP) / spec.wires.count - WIRE_GAP)
         raise Refusal("wires.diameter_mm", spec.wires.diameter_mm, why, each if each > 0 else None)
     tail = spec.fpcb.tail_width_mm if spec.fpcb else 0.0
-    raise Refusal("fpcb.tail_width_mm", tail, why, _rounded_down(widest) if widest > 0.001 else None)
-
-
-def _rounded_down(length: float) -> float:
-    return math.floor(1000 * length) / 1000
+    raise Refusal("fpcb.tail_width_mm", tail, why, down(widest) if widest > 0.001 else None)
