@@ -130,9 +130,7 @@ class Facts:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it JSON-ready; bbox_mm is [[x, y, z] low, [x, y, z] high]."""
-        import msgspec
-
-        return msgspec.to_builtins(self)
+        return vars(self) | {"bbox_mm": self.bbox_mm and [list(corner) for corner in self.bbox_mm]}
 
 
 @dataclass(frozen=True, repr=False)
