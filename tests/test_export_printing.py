@@ -13,7 +13,7 @@ from unitcad.kernels.mesh import arrays, realise
 BODIES = {body.name: body for body in all_bodies()}
 
 
-def judged(vertices: np.ndarray, faces: np.ndarray) -> tuple[bool, float, float]:
+def measured(vertices: np.ndarray, faces: np.ndarray) -> tuple[bool, float, float]:
     """By trimesh, another library: watertight volume, signed volume (mm3), least altitude of a face (mm)."""
     mesh = trimesh.Trimesh(vertices.astype(float), faces, process=False)
     sides = np.linalg.norm(np.diff(mesh.triangles[:, (0, 1, 2, 0)], axis=1), axis=2)
@@ -24,7 +24,7 @@ def judged(vertices: np.ndarray, faces: np.ndarray) -> tuple[bool, float, float]
 def test_ready_mesh_is_closed_and_keeps_its_volume(name):
     solid = realise(BODIES[name].shape, 96)
     vertices, faces = printing.print_ready(*arrays(solid), BODIES[name].upside_down)
-    sound, volume, altitude = judged(vertices, faces)
+    sound, volume, altitude = measured(vertices, faces)
     step = printing.resolution(vertices)
     assert vertices.dtype == np.float32
     assert sound
@@ -57,7 +57,7 @@ def test_slivers_of_booleans_survive_the_rounding(x, y, angle, gap):
     drum = manifold3d.Manifold.cylinder(20, 4 + gap, 4, 64).translate((x + gap, y, -5))
     solid = (block + other) - drum
     vertices, faces = printing.print_ready(*arrays(solid))
-    sound, volume, altitude = judged(vertices, faces)
+    sound, volume, altitude = measured(vertices, faces)
     assert sound
     assert altitude > printing.resolution(vertices)
     assert volume == pytest.approx(solid.volume(), abs=64 * printing.resolution(vertices) * solid.surface_area())
@@ -70,7 +70,7 @@ def test_plain_rounding_is_what_this_guards_against():
     vertices, faces = arrays(solid)
     rounded = trimesh.Trimesh(vertices.astype(np.float32).astype(float), faces, process=False)
     assert (rounded.area_faces < 1e-9).any()
-    assert judged(*printing.print_ready(vertices, faces))[0]
+    assert measured(*printing.print_ready(vertices, faces))[0]
 
 
 def test_a_body_thinner_than_single_precision_is_refused():

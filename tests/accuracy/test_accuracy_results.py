@@ -105,11 +105,6 @@ def test_timing_is_interleaved_and_shows_its_spread():
     assert shown(1.23456e-7) == "1.2e-07"
 
 
-def test_unknown_suite_names_the_known():
-    with pytest.raises(Refusal, match="stability"):
-        runner.chosen(["stabilty"])
-
-
 def test_the_command_fails_on_a_broken_promise_alone(tmp_path: Path, monkeypatch, capsys):
     monkeypatch.setattr(runner, "run", lambda *_: RESULT)
     with pytest.raises(SystemExit) as stopped:
