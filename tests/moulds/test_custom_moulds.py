@@ -220,14 +220,32 @@ def test_a_build_writes_moulds_and_casting(tmp_path: Path) -> None:
     assert "draw the blade past it" not in second
 
 
-def test_the_worked_examples_become_what_the_page_says() -> None:
-    folder = templates()["embedded"].parent / "custom"
-    assert broken(of_spec(load(folder / "strap-lugs.toml"))) == set()
-    with pytest.raises(Refusal, match="pour 1 can't be cast: the layer's top"):
-        of_spec(load(folder / "dome.toml"))
-    assert broken(of_spec(load(folder / "dome.toml", ["parameters.flat_mm=1.6"]))) == set()
-    assert broken(of_spec(load(folder / "film-closed.toml"))) == set()
-    assert not {file.stem for file in folder.glob("*.toml")} & set(templates())
+CUSTOM = templates()["embedded"].parent / "custom"
+FLAT_TOP = {"parameters.flat_mm": 1.6}
+
+
+@pytest.mark.parametrize(("name", "change"), [("strap-lugs", {}), ("film-closed", {}), ("dome", FLAT_TOP)])
+def test_the_worked_examples_are_built_whole(name: str, change: dict[str, object], tmp_path: Path) -> None:
+    spec = load(CUSTOM / f"{name}.toml", change | {"output.formats": ["stl", "svg"]})
+    done = build(spec, tmp_path)
+    assert done.ok
+    assert [law for law in done.manifest["laws"] if not law["ok"]] == []
+    assert done.manifest["check"]["errors"] == 0
+    pours = [f"moulds/step{i + 1}-cup.stl" for i in range(len(spec.layers))]
+    assert {"casting.md", "bom.csv", "moulds/base.stl", "step1-section.svg", *pours} <= set(done.manifest["files"])
+
+
+def test_the_dome_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
+    with pytest.raises(Refusal, match=r"pour 1 can't be cast: the layer's top, at x = 0, y = 0, z = 4 mm"):
+        build(load(CUSTOM / "dome.toml"), tmp_path / "out")
+    assert not list(tmp_path.rglob("*.*"))
+    assert build(load(CUSTOM / "dome.toml"), tmp_path / "out", only=("unit",)).ok
+
+
+def test_every_worked_example_has_its_test() -> None:
+    names = {file.stem for file in CUSTOM.glob("*.toml")}
+    assert names == {"strap-lugs", "film-closed", "dome"}
+    assert not names & set(templates())
 
 
 def test_an_opening_off_the_grid_is_seen() -> None:
