@@ -14,8 +14,8 @@ from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Plot
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.fitted_models import STORED_FIT, edge_levels, judgements, one_constant, scales
-from unitcad.attenuation.edge.measured_levels import judge, measured_table
+from unitcad.attenuation.edge.fitted_models import STORED_FIT, assessments, edge_levels, one_constant, scales
+from unitcad.attenuation.edge.measured_levels import assess, measured_table
 from unitcad.estimating import estimate_spec
 from unitcad.validation import load
 
@@ -36,7 +36,7 @@ def table_of_models() -> str:
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, title in TITLES.items():
-        found = judgements()[name]
+        found = assessments()[name]
         without = f"{found.left_out_ratios.geometric_mean:.2f}" if found.left_out_ratios else "no constant in it"
         rows.append(
             f"| {title} | {found.levels.geometric_mean:.2f} | {found.left_out.geometric_mean:.2f} "
@@ -55,7 +55,7 @@ def table_of_readings() -> str:
     for reading in cf.READINGS:
         for wave in ("s", "p"):
             path = one_constant(lambda u, wave=wave, reading=reading: cf.paper_path(u, wave, reading))
-            found = judge(path, fitted_ratios=False)
+            found = assess(path, fitted_ratios=False)
             rows.append(
                 f"| {reading} | {wave.upper()} | {found.levels.geometric_mean:.2f} "
                 f"| {found.left_out.geometric_mean:.2f} | {found.ratios.geometric_mean:.2f}"

@@ -121,7 +121,8 @@ def test_strict_typing_is_asked_for() -> None:
         file = PACKAGE / (module.replace(".", "/") + ".py")
         if module.startswith("api") or module.endswith("_call"):
             assert "\n# pyright: strict\n" in file.read_text("utf-8"), file
-    assert "\n# pyright: strict\n" in (PACKAGE / "__init__.py").read_text("utf-8")
+    for room in (".", "attenuation"):
+        assert "\n# pyright: strict\n" in (PACKAGE / room / "__init__.py").read_text("utf-8")
     assert (
         "tests/typed_use.py"
         in tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text("utf-8"))["tool"]["pyright"]["include"]

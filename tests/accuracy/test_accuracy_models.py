@@ -9,7 +9,7 @@ import pytest
 from unitcad.accuracy.plot import LEGEND_LETTERS, svg
 from unitcad.accuracy.result import Plot
 from unitcad.accuracy.unexplained import NineLevels, unexplained
-from unitcad.attenuation.edge.fitted_models import judgements
+from unitcad.attenuation.edge.fitted_models import assessments
 from unitcad.attenuation.edge.measured_levels import measured_table
 
 NAMES = measured_table().names
@@ -25,7 +25,7 @@ def levels(change=None):
 
 
 def said(drawn, bare):
-    return unexplained(measured_table(), {"drawn": drawn, "bare": bare}, {}, judgements()["paper"])
+    return unexplained(measured_table(), {"drawn": drawn, "bare": bare}, {}, assessments()["paper"])
 
 
 def test_a_control_is_the_geometric_mean_of_its_shapes_and_shows_both():
@@ -52,7 +52,7 @@ def test_who_gives_the_measured_orders_is_found_and_a_tie_is_no_order():
     measured = dict(zip(NAMES, measured_table().levels, strict=True))
     ordered = NineLevels({name: {"": float(level)} for name, level in measured.items()})
     solved = {"drawn": levels(), "bare": levels()}
-    text = unexplained(measured_table(), solved, {"table": ordered}, judgements()["paper"])
+    text = unexplained(measured_table(), solved, {"table": ordered}, assessments()["paper"])
     assert "D10 < E10 < D30, is given by table." in text
     assert text.count("is given by table.") == 3
 

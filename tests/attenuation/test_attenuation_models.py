@@ -6,15 +6,15 @@ import pytest
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.fitted_models import (
     STORED_FIT,
+    assessments,
     edge_levels,
     fit_divider,
-    judgements,
     measured_table,
     one_constant,
     paths,
     two_constants,
 )
-from unitcad.attenuation.edge.measured_levels import judge
+from unitcad.attenuation.edge.measured_levels import assess
 from unitcad.catalogue import measurements
 from unitcad.designs import shipped
 
@@ -167,7 +167,7 @@ def test_stored_fit_is_what_the_fit_gives():
     kappa, s = fit_divider(table, np.ones(9, dtype=bool))
     assert kappa == pytest.approx(STORED_FIT["kappa"], rel=1e-5)
     assert s == pytest.approx(STORED_FIT["s"], rel=1e-5)
-    found = judge(two_constants, fitted_ratios=True)
+    found = assess(two_constants, fitted_ratios=True)
     assert found.left_out.geometric_mean == pytest.approx(STORED_FIT["left_out_levels"], abs=1e-4)
     assert found.left_out_ratios.geometric_mean == pytest.approx(STORED_FIT["left_out_ratios"], abs=1e-4)
 
@@ -196,7 +196,7 @@ def test_fit_is_a_minimum():
 )
 def test_what_was_found_before(model, levels, left_out, ratios, directions):
     """Figures that were found by another program; a model's own ratios where no constant enters them."""
-    found = judgements()[model]
+    found = assessments()[model]
     assert found.levels.geometric_mean == pytest.approx(levels, abs=0.006)
     assert found.left_out.geometric_mean == pytest.approx(left_out, abs=0.006)
     assert found.directions == directions
@@ -205,21 +205,21 @@ def test_what_was_found_before(model, levels, left_out, ratios, directions):
 
 
 def test_paper_by_the_literal_reading_is_what_was_found_before():
-    found = judge(one_constant(lambda unit: cf.paper_path(unit, reading="literal")), fitted_ratios=False)
+    found = assess(one_constant(lambda unit: cf.paper_path(unit, reading="literal")), fitted_ratios=False)
     figures = (found.levels.geometric_mean, found.left_out.geometric_mean, found.ratios.geometric_mean)
     assert figures == pytest.approx((1.61, 1.71, 1.81), abs=0.006)
     assert found.directions == 12
 
 
 def test_null_and_divider_leave_one_unit_out_in_ratios():
-    found = judgements()
+    found = assessments()
     assert found["null"].left_out_ratios.geometric_mean == pytest.approx(1.75, abs=0.006)
     assert found["fitted"].left_out_ratios.geometric_mean == pytest.approx(1.33, abs=0.006)
 
 
 def test_judge_of_a_perfect_model_is_one():
     table = measured_table()
-    found = judge(lambda _, __: lambda other: table.levels, fitted_ratios=False)
+    found = assess(lambda _, __: lambda other: table.levels, fitted_ratios=False)
     assert found.levels.geometric_mean == 1
     assert found.ratios.worst == pytest.approx(1, abs=1e-15)
     assert found.directions == 12

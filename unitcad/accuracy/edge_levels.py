@@ -13,8 +13,8 @@ from unitcad.accuracy.result import Cell, Plot, Promise, Result, Say, Table, sta
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.accuracy.unexplained import NineLevels, unexplained
 from unitcad.accuracy.unit_fem import edge_level, pressed_skin
-from unitcad.attenuation.edge.fitted_models import STORED_FIT, edge_levels, fit_divider, judgements, null
-from unitcad.attenuation.edge.measured_levels import CONTROL, Fit, Judgement, MeasuredTable, judge, measured_table
+from unitcad.attenuation.edge.fitted_models import STORED_FIT, assessments, edge_levels, fit_divider, null
+from unitcad.attenuation.edge.measured_levels import CONTROL, Assessment, Fit, MeasuredTable, assess, measured_table
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.catalogue import measurements
@@ -32,7 +32,7 @@ _RADII = np.array([0, 2, 5, 7, 10, 15, 20, 30]) * 1e-3
 class _Model:
     """A model's comparison with the measured levels, its time, and how many constants were fitted to them."""
 
-    judged: Judgement
+    assessed: Assessment
     time: Timing
     constants: str
 
@@ -50,20 +50,20 @@ def run(quick: bool, say: Say) -> Result:
     two_levels = null(table, np.ones(len(table.names), dtype=bool))
     times = interleaved({**calls, "null": lambda: two_levels(table)}, 21)
     constants = {"paper": "1", "consistent": "1", "fitted": "2"}
-    for name, judged in judgements().items():
+    for name, assessed in assessments().items():
         if name in constants:
-            models[name] = _Model(judged, times[name], constants[name])
+            models[name] = _Model(assessed, times[name], constants[name])
         elif name == "null":
-            models["null: soft inside or not"] = _Model(judged, times["null"], "2")
+            models["null: soft inside or not"] = _Model(assessed, times["null"], "2")
         else:
-            models[f"{name} (k_t once or twice)"] = _Model(judged, times["paper"], "1")
+            models[f"{name} (k_t once or twice)"] = _Model(assessed, times["paper"], "1")
     solved: dict[str, NineLevels] = {}
     for pad, name in ((True, _DRAWN), (False, _BARE)):
         say(name)
         solved[name], seconds = finite_element_levels(1.0 if quick else 2.0, pad)
-        models[name] = _Model(judge(_given(solved[name].in_order(table)), False), timing(seconds), "0")
+        models[name] = _Model(assess(_given(solved[name].in_order(table)), False), timing(seconds), "0")
     closed = {name: NineLevels(_by_name(table, name, two_levels)) for name in (*constants, "crossings", "null")}
-    marks = stars([(model.time.median, model.judged.left_out.geometric_mean) for model in models.values()])
+    marks = stars([(model.time.median, model.assessed.left_out.geometric_mean) for model in models.values()])
     comparison = Table(
         "Against nine levels and twelve ratios to controls: geometric-mean factor error (1 is exact)",
         ("model", "constants", "levels", "left out", "ratios", "left out", "directions", "time a level", "frontier"),
@@ -78,7 +78,7 @@ def run(quick: bool, say: Say) -> Result:
         "Error against the measured levels, each unit left out, against time",
         "seconds a level",
         "geometric-mean factor error less 1",
-        {name: ((model.time.median, model.judged.left_out.geometric_mean - 1),) for name, model in models.items()},
+        {name: ((model.time.median, model.assessed.left_out.geometric_mean - 1),) for name, model in models.items()},
         frontier=True,
     )
     say("mesh convergence")
@@ -103,14 +103,14 @@ def run(quick: bool, say: Say) -> Result:
     return Result(
         suite="models",
         title="Models of the edge level",
-        text=unexplained(table, solved, closed, judgements()["paper"]),
+        text=unexplained(table, solved, closed, assessments()["paper"]),
         tables=(comparison, _units_table(table, closed, solved), meshes, bare),
         plots=(plot,),
         promises=(
             Promise("bare skin: layered solver from the finest mesh, over the mesh's own error", worst, 1.0),
             Promise("unit: last halving of the mesh changes a level by, relative", shrink, 0.01),
             Promise(
-                "fitted, left out: factor error of the levels", models["fitted"].judged.left_out.geometric_mean, 1.35
+                "fitted, left out: factor error of the levels", models["fitted"].assessed.left_out.geometric_mean, 1.35
             ),
         ),
         measured=machine("numpy", "scipy", "scikit-fem"),
@@ -218,15 +218,15 @@ def _given(levels: Sequence[float]) -> Fit:
 
 
 def _row(name: str, model: _Model) -> tuple[Cell, ...]:
-    judged, ratios = model.judged, model.judged.left_out_ratios
+    assessed, ratios = model.assessed, model.assessed.left_out_ratios
     return (
         name,
         model.constants,
-        judged.levels.geometric_mean,
-        judged.left_out.geometric_mean,
-        judged.ratios.geometric_mean,
+        assessed.levels.geometric_mean,
+        assessed.left_out.geometric_mean,
+        assessed.ratios.geometric_mean,
         ratios.geometric_mean if ratios else None,
-        f"{judged.directions} of {judged.ratios.count}",
+        f"{assessed.directions} of {assessed.ratios.count}",
         str(model.time),
     )
 

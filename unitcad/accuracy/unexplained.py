@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.attenuation.edge.closed_form import wave_speed
-from unitcad.attenuation.edge.measured_levels import CONTROL, Judgement, MeasuredTable
+from unitcad.attenuation.edge.measured_levels import CONTROL, Assessment, MeasuredTable
 from unitcad.catalogue import measurements
 
 
@@ -41,11 +41,11 @@ class NineLevels:
 
 
 def unexplained(
-    table: MeasuredTable, solved: Mapping[str, NineLevels], closed: Mapping[str, NineLevels], paper: Judgement
+    table: MeasuredTable, solved: Mapping[str, NineLevels], closed: Mapping[str, NineLevels], paper: Assessment
 ) -> str:
     """Write the paragraph.
 
-    `solved`: finite elements by variant, as drawn first; `closed`: the models; `paper`: the paper's judgement.
+    `solved`: finite elements by variant, as drawn first; `closed`: the models; `paper`: the paper's assessment.
     """
     soft = tuple(name for name, inside in zip(table.names, table.soft_inside, strict=True) if inside)
     controls = tuple(name for name in table.names if name.startswith(CONTROL))

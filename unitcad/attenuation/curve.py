@@ -61,7 +61,7 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
 
 
 def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float, ...]) -> list[float]:
-    """|u_z| over its value at the edge at some distances (mm) from the edge, at one frequency (Hz), nominal body."""
+    """Return |u_z| over its value at the edge, at distances (mm) from it and one frequency (Hz), nominal body."""
     r = variant.diameter / 2.0 + 1e-3 * np.array([0.0, *distances_mm])
     load = UniformDisc(variant.motor_diameter / 2.0)
     found = body(variant.tissue).response(load, 2.0 * np.pi * frequency, r, rtol=1e-3)
@@ -99,7 +99,7 @@ def _at_depth(
 
 
 def _paper_curves(variant: EstimateInput, radius: float, r: np.ndarray) -> dict[str, Any]:
-    """Equation 3b's factors for the skin, over their value at the edge: |J0(kr)|, k = omega/v_s, the exponential."""
+    """Return equation 3b's factors for the skin, over their value at the edge: |J0(kr)| and the exponential."""
     skin = variant.tissue[0]
     omega = 2.0 * np.pi * variant.frequency.middle
     speed = float(np.sqrt(skin.shear_modulus.middle / skin.density))

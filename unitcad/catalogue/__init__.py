@@ -62,19 +62,20 @@ _KINDS: dict[type, tuple[str, str]] = {
 
 
 def materials(own: Mapping[str, MaterialEntry] | None = None) -> dict[str, Material]:
-    """All silicones by name, the spec's own ones over the shipped ones. Raises `Refusal` for an own entry that can't
-    be.
+    """Return all silicones by name, a spec's own entries before shipped ones of that name.
+
+    Raises `Refusal` for an own entry that can't be.
     """
     return _entries(Material, own)
 
 
 def motors(own: Mapping[str, MotorEntry] | None = None) -> dict[str, Motor]:
-    """All motors by part name. Raises `Refusal` for an own entry that can't be."""
+    """Return all motors by part name. Raises `Refusal` for an own entry that can't be."""
     return _entries(Motor, own)
 
 
 def printers(own: Mapping[str, PrinterEntry] | None = None) -> dict[str, Printer]:
-    """All printers by name. Raises `Refusal` for an own entry that can't be."""
+    """Return all printers by name. Raises `Refusal` for an own entry that can't be."""
     return _entries(Printer, own)
 
 
@@ -108,7 +109,7 @@ def measurements() -> Measurements:
 
 
 def choose(kind: str, name: str, known: Mapping[str, _Entry]) -> _Entry:
-    """`known[name]`, or a `Refusal` that names the field `kind` and the closest names."""
+    """Return `known[name]`. Raises `Refusal` with the field `kind` and the closest names."""
     if name not in known:
         raise unknown_name(kind, name, known)
     return known[name]

@@ -1,4 +1,4 @@
-"""Plain data to typed tables by msgspec; what it finds wrong is said in our words, with field, value and limit."""
+"""Plain data to typed tables by msgspec; a value that can't be is refused with field, value and limit."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ CONTROL_PASSES = math.sqrt(2.0)
 
 
 def _quiet() -> np.errstate:
-    """At nu = 1/2 the pressure wave's speed is infinite: NaN says so, a warning would say it twice."""
+    """Silence numpy's warnings: at nu = 1/2 the pressure wave's speed is infinite, and NaN in the result says so."""
     return np.errstate(divide="ignore", invalid="ignore", over="ignore")
 
 
@@ -53,7 +53,7 @@ class Units:
             object.__setattr__(self, field.name, np.asarray(getattr(self, field.name), dtype=float))
 
     def control(self, layer: int) -> Units:
-        """Own-material controls: one layer of all the walls' thickness, of the material of `layer`, the same omega."""
+        """Return own-material controls: one layer as thick as all walls, of the material of `layer`, the same omega."""
         one = {name: getattr(self, name)[..., layer, None] for name in _MATERIAL}
         total = np.sum(np.broadcast_to(self.thickness, np.broadcast_shapes(*self._layered)), -1, keepdims=True)
         return Units(**one, thickness=total, omega=self.omega, passes=CONTROL_PASSES)
@@ -67,7 +67,10 @@ _MATERIAL = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
 
 
 def wave_speed(youngs_modulus: Any, density: Any, poisson_ratio: Any, wave: Wave) -> Any:
-    """v_p or v_s in m/s, equations 1c and 1d: sqrt((lambda + 2 mu)/rho), infinite at nu = 1/2, and sqrt(mu/rho)."""
+    """Return the wave speed in m/s by equations 1c and 1d.
+
+    v_p = sqrt((lambda + 2 mu)/rho), infinite at nu = 1/2; v_s = sqrt(mu/rho).
+    """
     shear = youngs_modulus / (2.0 * (1.0 + poisson_ratio))
     if wave == "s":
         return np.sqrt(shear / density)
@@ -76,19 +79,19 @@ def wave_speed(youngs_modulus: Any, density: Any, poisson_ratio: Any, wave: Wave
 
 
 def transmission(from_impedance: Any, to_impedance: Any) -> Any:
-    """k_t = 2 Z1/(Z1 + Z2), equation 4a: the displacement coefficient between two half-spaces."""
+    """Return k_t = 2 Z1/(Z1 + Z2), equation 4a: the displacement coefficient between two half-spaces."""
     with _quiet():
         return 2.0 * from_impedance / (from_impedance + to_impedance)
 
 
 def reflection(from_impedance: Any, to_impedance: Any) -> Any:
-    """k_r = (Z1 - Z2)/(Z1 + Z2), equation 4b."""
+    """Return k_r = (Z1 - Z2)/(Z1 + Z2), equation 4b."""
     with _quiet():
         return (from_impedance - to_impedance) / (from_impedance + to_impedance)
 
 
 def impedances(units: Units, wave: Wave) -> Any:
-    """rho v of each layer, shape (..., N), Pa s/m."""
+    """Return rho v of each layer, shape (..., N), Pa s/m."""
     return units.density * wave_speed(units.youngs_modulus, units.density, units.poisson_ratio, wave)
 
 
@@ -99,13 +102,13 @@ def with_air(layered: Any, wave: Wave) -> Any:
 
 
 def paper_transmissions(units: Units, wave: Wave = "s") -> Any:
-    """k_t at each interface, shape (..., N): Layer 1 to 2, ..., the last layer to air."""
+    """Return k_t at each interface, shape (..., N): Layer 1 to 2, ..., the last layer to air."""
     z = with_air(impedances(units, wave), wave)
     return transmission(z[..., :-1], z[..., 1:])
 
 
 def paper_exponents(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
-    """omega eta d/(E v) of each layer, equation 5, shape (..., N), by one of the `READINGS` of eta."""
+    """Return omega eta d/(E v) of each layer, equation 5, shape (..., N), by one of the `READINGS` of eta."""
     speed = wave_speed(units.youngs_modulus, units.density, units.poisson_ratio, wave)
     omega = units.omega[..., None]
     loss_rate = omega * units.tan_delta * units.thickness / speed
@@ -113,7 +116,10 @@ def paper_exponents(units: Units, wave: Wave = "s", reading: Reading = "loss_mod
 
 
 def paper_path(units: Units, wave: Wave = "s", reading: Reading = "loss_modulus") -> Any:
-    """Equation 5's product of k_t and exponentials along the walls, shape (...); f1, f2 and the skin's part cancel."""
+    """Return equation 5's product of k_t and exponentials along the walls, shape (...).
+
+    f1, f2 and the skin's part cancel.
+    """
     with _quiet():
         decay = np.exp(-np.sum(paper_exponents(units, wave, reading), axis=-1))
         return np.prod(paper_transmissions(units, wave), axis=-1) * decay
@@ -132,13 +138,16 @@ def consistent_path(units: Units, wave: Wave = "s") -> Any:
 
 
 def transmission_only(units: Units) -> Any:
-    """k_t of shear waves to the power of `passes` and no exponential: a reading that the print does not have."""
+    """Return k_t of shear waves to the power of `passes` and no exponential: a reading that the print does not have."""
     inner = np.prod(paper_transmissions(units)[..., :-1], axis=-1)
     return inner**units.passes
 
 
 def divider(units: Units, kappa: Any) -> Any:
-    """1/(1 + kappa n E_outer/E_inner): the empirical divider without its constant s; outermost and innermost layer."""
+    """Return 1/(1 + kappa n E_outer/E_inner), the empirical divider without its constant s.
+
+    E_outer and E_inner are those of the outermost and the innermost layer.
+    """
     e = units.youngs_modulus
     return 1.0 / (1.0 + kappa * units.passes * e[..., -1] / e[..., 0])
 
@@ -162,7 +171,7 @@ class Constraint:
 
 
 def constraints(units: Units, control: Units) -> list[Constraint]:
-    """Inequalities 6a to 6d with eta = E tan(delta)/omega in Pa s; 6c and 6d once for each neighbouring pair of layers.
+    """Return inequalities 6a to 6d, eta = E tan(delta)/omega in Pa s; 6c and 6d for each pair of neighbouring layers.
 
     6a and 6b compare sums of eta d/(E v), whose unit is s2; another reading of eta multiplies both sides by the same
     number. 6c and 6d say that the impedance grows outwards; they need no control.

@@ -7,9 +7,9 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from unitcad.attenuation.curve import decay_at, layered_block
-from unitcad.attenuation.edge.fitted_models import MODELS, judgements
+from unitcad.attenuation.edge.fitted_models import MODELS, assessments
 from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown
-from unitcad.attenuation.edge.measured_levels import Judgement
+from unitcad.attenuation.edge.measured_levels import Assessment
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 
 SIGNIFICANT_DIGITS = 9
@@ -34,7 +34,7 @@ Layered = Callable[[EstimateInput], dict[str, Any]]
 def estimate(
     variant: EstimateInput, models: Sequence[str] = MODELS, layered: Layered = layered_block
 ) -> dict[str, Any]:
-    """{variant, models, layered, measured, table_error, assumptions}; numbers to nine significant digits.
+    """Return {variant, models, layered, measured, table_error, assumptions}; numbers to nine significant digits.
 
     `layered` gives the layered solver's block, which reads no silicone: variants on one body share it.
     A quantity that can't be given is null beside a `reason`. Raises `Refusal` for values that no body has.
@@ -76,7 +76,7 @@ def summary(estimated: dict[str, Any]) -> dict[str, Any]:
 def frequency_table(
     variant: EstimateInput, frequencies: Sequence[float], models: Sequence[str] = MODELS
 ) -> dict[str, Any]:
-    """{variant, frequencies}: per frequency (Hz) each model's edge level and the layered decay at some distances."""
+    """Return {variant, frequencies}: per frequency (Hz) each model's edge level and the decay at `DECAY_AT_MM`."""
     rows = []
     for hertz in frequencies:
         at = replace(variant, frequency=Quantity(hertz))
@@ -121,13 +121,13 @@ def variant_block(variant: EstimateInput) -> dict[str, Any]:
 
 
 def table_error() -> dict[str, Any]:
-    """Every model's judgement against the measured table, the null's beside it."""
-    found: dict[str, Any] = {name: judgement_block(one) for name, one in judgements().items()}
+    """Return every model's errors against the measured table, and the null model's."""
+    found: dict[str, Any] = {name: assessment_block(one) for name, one in assessments().items()}
     return {**found, "what": TABLE_NOTE}
 
 
-def judgement_block(found: Judgement) -> dict[str, Any]:
-    """Return a judgement as data."""
+def assessment_block(found: Assessment) -> dict[str, Any]:
+    """Return a assessment as data."""
     return {
         "levels": asdict(found.levels),
         "ratios": asdict(found.ratios),

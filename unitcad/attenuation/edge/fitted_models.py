@@ -1,4 +1,4 @@
-"""The three models of the edge level as functions of arrays, their fitted constants, and the null they must beat.
+"""The three models of the edge level as functions of arrays, their fitted constants, and the null model beside them.
 
 `paper` and `consistent` leave the level at the motor open (f1, f2 are not printed): one constant, the geometric mean
 over the table. `fitted` has two constants. All are made from the catalogue's measured table when they are asked for.
@@ -14,13 +14,13 @@ import numpy as np
 
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.measured_levels import Fit, Judgement, MeasuredTable, Predict, judge, measured_table
+from unitcad.attenuation.edge.measured_levels import Assessment, Fit, MeasuredTable, Predict, assess, measured_table
 
 MODELS = ("paper", "consistent", "fitted")
 STORED_FIT = {"kappa": 0.282048, "s": 0.659429, "left_out_levels": 1.3345, "left_out_ratios": 1.3299}
 """The divider's constants and its leave-one-unit-out errors (geometric-mean factors) over the catalogue's nine levels.
 
-Made by `fit_divider(measured_table(), everyone)`, least squares of the log, and `judgements()["fitted"]`; shown by
+Made by `fit_divider(measured_table(), everyone)`, least squares of the log, and `assessments()["fitted"]`; shown by
 `unitcad accuracy models`; a test makes them again.
 """
 
@@ -31,7 +31,7 @@ def scale_of(path: Predict, table: MeasuredTable, chosen: np.ndarray) -> float:
 
 
 def one_constant(path: Predict) -> Fit:
-    """level = s path."""
+    """Return the fit of the one constant s in level = s path."""
 
     def fit(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
         s = scale_of(path, table, chosen)
@@ -41,7 +41,7 @@ def one_constant(path: Predict) -> Fit:
 
 
 def fit_divider(table: MeasuredTable, chosen: np.ndarray) -> tuple[float, float]:
-    """(kappa, s) of level = s / (1 + kappa n E_outer/E_inner): least squares of the log, golden section."""
+    """Fit (kappa, s) of level = s / (1 + kappa n E_outer/E_inner): least squares of the log, golden section."""
     logs, contrast = np.log(table.levels[chosen]), table.contrast[chosen]
 
     def parts(log_kappa: float) -> np.ndarray:
@@ -74,7 +74,7 @@ def two_constants(table: MeasuredTable, chosen: np.ndarray) -> Callable[[Measure
 
 
 def null(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
-    """Two constants: one level where the inner layer is the softer one, one for all others."""
+    """Fit two constants: one level where the inner layer is the softer one, one for all others."""
     logs = np.log(table.levels)
     soft = table.soft_inside
     levels = [float(np.exp(np.mean(logs[chosen & (soft == side)]))) for side in (False, True)]
@@ -82,7 +82,7 @@ def null(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], 
 
 
 def paths() -> dict[str, Predict]:
-    """Of each model, and of the reading with k_t alone, what it makes of a unit before any constant."""
+    """Return each model, and the reading with k_t alone, as a function of units, before any constant."""
     return {
         "paper": cf.paper_path,
         "consistent": cf.consistent_path,
@@ -92,8 +92,8 @@ def paths() -> dict[str, Predict]:
 
 
 @cache
-def judgements() -> dict[str, Judgement]:
-    """Every model, the reading with k_t alone and the null against the measured table; made on first use."""
+def assessments() -> dict[str, Assessment]:
+    """Compare every model, the reading with k_t alone and the null with the measured table."""
     found = paths()
     fits: dict[str, tuple[Fit, bool]] = {
         "paper": (one_constant(found["paper"]), False),
@@ -102,7 +102,7 @@ def judgements() -> dict[str, Judgement]:
         "crossings": (one_constant(found["crossings"]), False),
         "null": (null, True),
     }
-    return {name: judge(fit, in_ratios) for name, (fit, in_ratios) in fits.items()}
+    return {name: assess(fit, in_ratios) for name, (fit, in_ratios) in fits.items()}
 
 
 @cache
@@ -115,5 +115,5 @@ def scales() -> dict[str, float]:
 
 
 def edge_levels(units: Units, model: str) -> Any:
-    """Edge level (motor amplitude = 1) of arrays of variants by `paper`, `consistent` or `fitted`, shape (...)."""
+    """Return the edge level (motor amplitude = 1) by `paper`, `consistent` or `fitted`, shape (...)."""
     return scales()[model] * paths()[model](units)

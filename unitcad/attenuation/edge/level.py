@@ -72,7 +72,7 @@ def corners(variant: EstimateInput) -> Units:
 
 
 def _inputs(variant: EstimateInput) -> Iterator[tuple[tuple[str, str], Quantity]]:
-    """((material, field), quantity) of every distinct input, the frequency last."""
+    """Yield ((material, field), quantity) of every distinct input, the frequency last."""
     seen: dict[str, SiliconeLayer] = {}
     for layer in variant.layers:
         seen.setdefault(layer.material, layer)
@@ -97,7 +97,7 @@ def _units(variant: EstimateInput, rows: np.ndarray, only: list[int] | None) -> 
 
 
 def unknown(variant: EstimateInput) -> str:
-    """Why there can be no number: the first input that is not known; empty if all are."""
+    """Return why there can be no number: the first input that is not known; empty if all are."""
     for (name, field), quantity in _inputs(variant):
         if not quantity.known:
             return f"{name} {field}: {quantity.note}"
@@ -105,7 +105,7 @@ def unknown(variant: EstimateInput) -> str:
 
 
 def ranged(variant: EstimateInput) -> list[str]:
-    """Assumptions of the inputs that are known as a range only: their result is a range, without a value."""
+    """Return the assumptions of the inputs that are known as a range only: their result is a range without a value."""
     return [
         f"{name} {field}: {quantity.note}"
         for (name, field), quantity in _inputs(variant)
@@ -114,7 +114,10 @@ def ranged(variant: EstimateInput) -> list[str]:
 
 
 def spread(variant: EstimateInput, predict: Callable[[Units], Any]) -> dict[str, Any]:
-    """{value, low, high} of `predict`; value null if an input has a range only, all null if it can't be, and why."""
+    """Return {value, low, high} of `predict`, and a `reason` for what is null.
+
+    The value is null where an input has a range only; all three where an input is not known.
+    """
     reason = unknown(variant)
     if reason:
         return {"value": None, "low": None, "high": None, "reason": reason}
@@ -131,7 +134,7 @@ def spread(variant: EstimateInput, predict: Callable[[Units], Any]) -> dict[str,
 
 
 def model_block(variant: EstimateInput, model: str) -> dict[str, Any]:
-    """One entry of the estimate's `models`, without its error against the table."""
+    """Return one entry of the estimate's `models`, without its error against the table."""
     path, scale = paths()[model], scales()[model]
     block: dict[str, Any] = {
         "kind": KINDS[model],
@@ -169,7 +172,7 @@ def _controls(variant: EstimateInput) -> list[int]:
 
 
 def _ratio(variant: EstimateInput, model: str, index: int) -> dict[str, Any]:
-    """hierarchical/control against the control of layer `index`: by wave where the model has waves."""
+    """Return the level over that of the control of layer `index`, by wave where the model has waves."""
     name = variant.layers[index].material
     if model == "fitted":
         path = paths()["fitted"]
@@ -190,8 +193,8 @@ def _paper_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any
     for wave in _WAVES:
         z = cf.with_air(cf.impedances(units, wave), wave)
         coefficients[wave] = {
-            **_told("k_t", cf.transmission(z[..., :-1], z[..., 1:]), variant),
-            **_told("k_r", cf.reflection(z[..., :-1], z[..., 1:]), variant),
+            **_by_corner("k_t", cf.transmission(z[..., :-1], z[..., 1:]), variant),
+            **_by_corner("k_r", cf.reflection(z[..., :-1], z[..., 1:]), variant),
         }
     return {
         "wave_of_the_level": "s",
@@ -205,7 +208,7 @@ def _paper_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any
 
 
 def _constraints(variant: EstimateInput, units: Units, controls: list[int]) -> list[dict[str, Any]]:
-    """6a and 6b for each control, 6c and 6d, which need none, once."""
+    """Return 6a and 6b for each control; 6c and 6d, which need no control, once."""
     return [
         _constraint(found, variant.layers[index].material if found.name in ("6a", "6b") else None, variant)
         for index in controls
@@ -217,14 +220,14 @@ def _constraints(variant: EstimateInput, units: Units, controls: list[int]) -> l
 def _reading(variant: EstimateInput, units: Units, reading: str, controls: list[int]) -> dict[str, Any]:
     def ratio(index: int, wave: cf.Wave) -> dict[str, Any]:
         control = cf.paper_path(units.control(index), wave, reading)  # type: ignore[arg-type]
-        return _told(wave, cf.paper_path(units, wave, reading) / control, variant)  # type: ignore[arg-type]
+        return _by_corner(wave, cf.paper_path(units, wave, reading) / control, variant)  # type: ignore[arg-type]
 
     exponents = cf.paper_exponents(units, "s", reading)  # type: ignore[arg-type]
     return {
         "eta": reading,
         "meaning": cf.READINGS[reading],
         "unit_of_exponent": "s, which no exponent may have" if reading == "literal" else "1",
-        **_told("exponents_s_wave", exponents, variant),
+        **_by_corner("exponents_s_wave", exponents, variant),
         "hierarchical_over_control": [
             {"control": variant.layers[i].material, **ratio(i, "s"), **ratio(i, "p")} for i in controls
         ],
@@ -239,10 +242,10 @@ def _constraint(found: cf.Constraint, control: str | None, variant: EstimateInpu
         "equation": found.name,
         "text": found.text,
         "control": control,
-        **_told("left", found.left, variant),
+        **_by_corner("left", found.left, variant),
         "relation": found.relation,
-        **_told("right", found.right, variant),
-        **_told("margin", margins, variant),
+        **_by_corner("right", found.right, variant),
+        **_by_corner("margin", margins, variant),
         "holds": None if not finite else True if always else False if never else None,
         "unit": found.unit,
     }
@@ -251,8 +254,11 @@ def _constraint(found: cf.Constraint, control: str | None, variant: EstimateInpu
     return block
 
 
-def _told(name: str, values: Any, variant: EstimateInput) -> dict[str, Any]:
-    """`values`, a row for each corner, as {name}; of an input known as a range only: null, {name}_low, {name}_high."""
+def _by_corner(name: str, values: Any, variant: EstimateInput) -> dict[str, Any]:
+    """Return `values`, a row for each corner, as {name}.
+
+    Where an input is known as a range only, {name} is null beside {name}_low and {name}_high.
+    """
 
     def plain(row: Any) -> Any:
         return [_number(v) for v in row] if np.ndim(row) else _number(row)

@@ -44,7 +44,7 @@ class MeasuredTable:
         return self.evaluate(lambda units: units.youngs_modulus[..., -1] - units.youngs_modulus[..., 0]) > 0
 
     def evaluate(self, predict: Predict) -> np.ndarray:
-        """`predict` of every unit, at the nominal values of the catalogue."""
+        """Return `predict` of every unit, at the nominal values of the catalogue."""
         return np.array([float(predict(self.units(i))) for i in range(len(self.names))])
 
     @property
@@ -96,7 +96,7 @@ class Score:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Assessment:
     """A model against the table. `directions`: of how many ratios the side of 1 is right.
 
     `left_out` and `left_out_ratios`: each unit predicted by constants fitted without it (None: none in it).
@@ -109,7 +109,7 @@ class Judgement:
     left_out_ratios: Score | None
 
 
-def judge(fit: Fit, fitted_ratios: bool, table: MeasuredTable | None = None) -> Judgement:
+def assess(fit: Fit, fitted_ratios: bool, table: MeasuredTable | None = None) -> Assessment:
     """Fit to all units and to all but one, and compare. `fitted_ratios`: a fitted constant enters the ratios too."""
     table = table or measured_table()
     everyone = np.ones(len(table.names), dtype=bool)
@@ -120,7 +120,7 @@ def judge(fit: Fit, fitted_ratios: bool, table: MeasuredTable | None = None) -> 
     measured = np.array([table.levels[i] / table.levels[c] for i, c in pairs])
     ratios = np.array([levels[i] / levels[c] for i, c in pairs])
     names = [f"{table.names[i]} to {table.names[c]}" for i, c in pairs]
-    return Judgement(
+    return Assessment(
         levels=_score(levels, table.levels, table.names),
         ratios=_score(ratios, measured, names),
         directions=int(np.sum(np.sign(_log(ratios)) == np.sign(np.log(measured)))),
