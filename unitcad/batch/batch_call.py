@@ -14,7 +14,7 @@ from unitcad import notebook
 from unitcad.batch.batch_records import Summary
 from unitcad.batch.estimate_table import write_estimates
 from unitcad.batch.executors import Workers
-from unitcad.batch.run import BatchOptions, Watch, run
+from unitcad.batch.run import BatchOptions, Watch, run, trim
 from unitcad.batch.sweep import Sweep, load_sweep
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.spec.asked import Format
@@ -70,7 +70,9 @@ def make(
         return write_estimates(sweep, folder, options)
     with workers.executor(options.timeout) as (executor, number):
         remote = workers.scheduler is not None
-        return run(sweep, folder, options, executor, workers=number, remote=remote, watch=watch)
+        summary = run(sweep, folder, options, executor, workers=number, remote=remote, watch=watch)
+    trim(options)  # once the workers have let go of it
+    return summary
 
 
 def batch(

@@ -104,11 +104,10 @@ def run(
     finally:
         journal.close()
         store.close()
-        _trim(options)
     return summary
 
 
-def _trim(options: BatchOptions) -> None:
+def trim(options: BatchOptions) -> None:
     """Reduce the cache to its limit. A cache that was deleted meanwhile is no error."""
     with contextlib.suppress(UnitcadError, OSError):
         collect(options.cache or default_root(), int(options.cache_mb * 1e6))
@@ -280,7 +279,7 @@ class _Batch:
         self.made.add(_short(key))
         self.summary.geometries = len(self.made)
         if len(self.made) % COLLECT_EVERY == 0:
-            _trim(self.options)
+            trim(self.options)
 
     def _lost(self, task: Task, error: BaseException) -> None:
         """Handle a task whose worker ended: each of its variants is tried alone, to see which one ended it."""
