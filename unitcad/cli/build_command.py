@@ -85,8 +85,9 @@ def _print_result(manifest: Manifest) -> None:
     checks = manifest["laws"]
     for check in checks:
         if not check["ok"]:
-            measured = f"{check['value']:g} {check['unit']}, limit {check['limit']:g}"
-            typer.echo(f"{check['code']} {check['where']}: {measured}", err=True)
+            measured = f"{check['value']:.3g} {check['unit']}, limit {check['limit']:.3g}"
+            advice = f"; {check['advice']}" if check["advice"] else ""
+            typer.echo(f"{check['code']} {check['where']}: {measured}{advice}", err=True)
     for finding in manifest["check"]["findings"]:
         typer.echo(f"{finding['path']}: {finding['code']} {finding['message']}", err=True)
     if checks:

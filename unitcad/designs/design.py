@@ -42,7 +42,7 @@ class Design:
     dimensions   radii, heights, pad and exit that follow from a spec
     limits       raises Refusal for a spec that this design can't be made of
     advice       what is unwise and not refused, a sentence each
-    pad_radius   default radius of the circuit's pad (mm), from the asked spec and the cavity's radius
+    pad_radius   default radius of the circuit's pad (mm), from the asked spec and the radius inside the walls
     wire_sides   sides of a wire that need clearance in its exit: 2 in a slot, 1 in a notch
     tooling      "concentric": base, cups, tongues and blade drawn from the dimensions; "complement": what is left round
                  the cast layers; or a function from a spec and the cast layers' shapes to a Tooling

@@ -45,7 +45,7 @@ class Dimensions:
     """A unit's radii and heights; z = 0 is the skin.
 
     cavity_radius   r of the cavity and so of the core; Layer 1 begins there
-    radii[i]        outer radius of layer i
+    radii[i]        outer radius of layer i, in the section at y = 0 where it is not round
     core_height     top of the core
     heights[i]      top of layer i
     pad             the circuit's pad; None without a circuit
