@@ -9,6 +9,7 @@ import pytest
 
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import Spec, from_json, to_data, to_json, to_toml
+from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.spec.fields import fields_of, table_in
 from unitcad.validation import from_data, load, override, read, templates, warnings
 
@@ -149,6 +150,13 @@ def test_an_unknown_key_names_the_nearest_ones_first_and_where_all_are() -> None
         load("encapsulating", ["diametre_mm=1"])
     with pytest.raises(Refusal, match=r"known here: wall_mm, cap_mm, material; nearest"):
         load("encapsulating", ["layers.0.walls_mm=1"])
+
+
+def test_a_custom_design_without_its_text_is_refused() -> None:
+    allow({ANY})
+    with pytest.raises(Refusal, match=r"^design_source: is required with design = 'd\.py:unit'$"):
+        from_data({**read("encapsulating"), "design": "d.py:unit"})
+    allow_nothing()
 
 
 def test_a_missing_value_is_null_in_json() -> None:

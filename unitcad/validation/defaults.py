@@ -20,7 +20,6 @@ _PRINTER_LENGTHS = tuple(f for f in Moulds.__struct_fields__ if f in catalogue.P
 
 def effective(asked: AskedSpec) -> Spec:
     """Return the effective spec. Raises Refusal for the first value that can't be."""
-    design = design_of(asked)
     if is_custom(asked.design):
         if asked.design_source is None:
             raise Refusal("design_source", None, f"is required with design = {asked.design!r}")
@@ -30,6 +29,7 @@ def effective(asked: AskedSpec) -> Spec:
         for field in ("parameters", "design_source"):
             if getattr(asked, field):
                 raise Refusal(field, "...", f"only a custom design takes it; {asked.design} does not")
+    design = design_of(asked)
     spec = _with_defaults(asked, design)
     design.limits(spec, design.dimensions(spec))
     return spec
