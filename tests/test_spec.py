@@ -1,4 +1,4 @@
-"""The door: what is refused, with field, value, limit and a nearest value that is accepted."""
+"""Validation: what is refused, with field, value, limit and a nearest value that is accepted."""
 
 from __future__ import annotations
 

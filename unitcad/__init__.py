@@ -126,8 +126,8 @@ def __getattr__(name: str) -> object:
     from importlib import import_module
 
     module, _, attribute = _PLACES[name].partition(":")
-    found = import_module(f"{__name__}.{module}")
-    value = getattr(found, attribute) if attribute else found
+    loaded = import_module(f"{__name__}.{module}")
+    value = getattr(loaded, attribute) if attribute else loaded
     globals()[name] = value
     return value
 

@@ -139,7 +139,7 @@ def test_a_forgotten_tongue_is_a_leak() -> None:
 
 
 def test_an_unpulled_tongue_holds_the_cup() -> None:
-    """Out of the person's order: the cup can't go up while its tongue is in."""
+    """Out of the procedure's order: the cup can't go up while its tongue is in."""
     from unitcad.mould_checks.draw import blocked
 
     solids = set_of("encapsulating").solids

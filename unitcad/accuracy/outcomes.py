@@ -22,7 +22,7 @@ _MOST_STEPS = 40
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a spec.
+    """Result of a spec.
 
     `kind` is `BUILT`, `REFUSED` or a fault; `worst` the largest value met by each mould check's code; `chain` the
     fields that the nearest accepted values led through after a first refusal, and `chain_end` how that chain ended.

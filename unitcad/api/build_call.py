@@ -22,7 +22,7 @@ from unitcad.validation.tables import listed
 
 @dataclass(frozen=True, repr=False)
 class BuildResult(Built):
-    """Where a variant was built, its manifest, and its spec.
+    """A built variant: its folder, its manifest and its spec.
 
     `manifest` is manifest.json as data: parts, mould checks, mesh checks, what was left out; mm, mm2 and mm3.
     """
@@ -42,7 +42,9 @@ class BuildResult(Built):
         rows = [(part["name"], part["made"], part["material"], part["volume_mm3"]) for part in self.manifest["parts"]]
         bodies = notebook.table(("body", "made", "material", "volume, mm³"), rows, str(self.folder))
         broken = [
-            (law["code"], law["where"], law["value"], law["limit"]) for law in self.manifest["laws"] if not law["ok"]
+            (finding["code"], finding["where"], finding["value"], finding["limit"])
+            for finding in self.manifest["laws"]
+            if not finding["ok"]
         ]
         checks = notebook.table(("mould check", "place", "value", "limit"), broken, "broken") if broken else ""
         drawn = notebook.drawing(Variant(self.spec).section(), f"section of {self.spec.name}")
@@ -50,8 +52,8 @@ class BuildResult(Built):
 
     @property
     def _counts(self) -> list[tuple[str, int]]:
-        """What a person looks at first, and how many there are."""
-        broken = sum(not law["ok"] for law in self.manifest["laws"])
+        """The numbers of bodies, files, broken mould checks and errors in meshes."""
+        broken = sum(not finding["ok"] for finding in self.manifest["laws"])
         return [
             ("bodies", len(self.manifest["parts"])),
             ("files", len(self.manifest["files"])),

@@ -17,7 +17,7 @@ from unitcad.validation.tables import listed
 
 @dataclass(frozen=True, repr=False)
 class EdgeEstimate:
-    """How much of the motor's vibration reaches the unit's edge, by model.
+    """Share of the motor's vibration that reaches the unit's edge, by model.
 
     `data` is the whole estimate as JSON-ready data, as `unitcad estimate --json` prints it.
     """
@@ -27,12 +27,12 @@ class EdgeEstimate:
     @property
     def edge(self) -> dict[str, float | None]:
         """The amplitude at the edge over the motor's, by model; None where no number can be given."""
-        return {model: found["edge"] for model, found in summary(self.data)["models"].items()}
+        return {model: row["edge"] for model, row in summary(self.data)["models"].items()}
 
     @property
     def table_error(self) -> dict[str, float]:
         """The geometric-mean factor by which each model misses the measured levels; 1 is exact."""
-        return {model: found["table_error"] for model, found in summary(self.data)["models"].items()}
+        return {model: row["table_error"] for model, row in summary(self.data)["models"].items()}
 
     @property
     def measured(self) -> float | None:

@@ -35,9 +35,9 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
     r = radius + r_mm * 1e-3
     load = UniformDisc(variant.motor_diameter / 2.0)
     omega = 2.0 * np.pi * variant.frequency.middle
-    found = body(variant.tissue).response(load, omega, r, rtol=rtol)
-    edge = abs(found.u_z[0])
-    many = [(found.u_z, found.u_r)] + [_at_ends(variant, load, r, end) for end in _ends(variant)]
+    response = body(variant.tissue).response(load, omega, r, rtol=rtol)
+    edge = abs(response.u_z[0])
+    many = [(response.u_z, response.u_r)] + [_at_ends(variant, load, r, end) for end in _ends(variant)]
     curves = [np.abs([u_z, u_r]) / abs(u_z[0]) for u_z, u_r in many]
     low, high = np.min(curves, axis=0), np.max(curves, axis=0)
     return {
@@ -52,8 +52,8 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
         "depths": [_at_depth(variant, load, omega, r[::5], z, edge, rtol) for z in DEPTHS_MM],
         "paper_beside": _paper_curves(variant, radius, r),
         "surface_m_per_pa": {"u_z_at_the_edge": float(edge)},
-        "error_estimate": found.error / edge,
-        "wavenumbers": found.wavenumbers,
+        "error_estimate": response.error / edge,
+        "wavenumbers": response.wavenumbers,
         "hierarchical_over_control": None,
         "hierarchical_over_control_reason": NO_RATIO,
         "assumptions": ASSUMPTIONS,
@@ -64,8 +64,8 @@ def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float
     """Return |u_z| over its value at the edge, at distances (mm) from it and one frequency (Hz), nominal body."""
     r = variant.diameter / 2.0 + 1e-3 * np.array([0.0, *distances_mm])
     load = UniformDisc(variant.motor_diameter / 2.0)
-    found = body(variant.tissue).response(load, 2.0 * np.pi * frequency, r, rtol=1e-3)
-    return [float(v) for v in np.abs(found.u_z[1:] / found.u_z[0])]
+    response = body(variant.tissue).response(load, 2.0 * np.pi * frequency, r, rtol=1e-3)
+    return [float(v) for v in np.abs(response.u_z[1:] / response.u_z[0])]
 
 
 def _curve(value: np.ndarray, low: np.ndarray, high: np.ndarray) -> dict[str, list[float]]:
@@ -82,19 +82,19 @@ def _ends(variant: EstimateInput) -> list[dict[str, int]]:
 def _at_ends(variant: EstimateInput, load: UniformDisc, r: np.ndarray, end: dict[str, int]) -> tuple[Any, Any]:
     frequency: Quantity = variant.frequency
     hertz = frequency.ends[end["frequency"]] if "frequency" in end else frequency.middle
-    found = body(variant.tissue, end).response(load, 2.0 * np.pi * hertz, r, rtol=_SPREAD_RTOL)
-    return found.u_z, found.u_r
+    response = body(variant.tissue, end).response(load, 2.0 * np.pi * hertz, r, rtol=_SPREAD_RTOL)
+    return response.u_z, response.u_r
 
 
 def _at_depth(
     variant: EstimateInput, load: UniformDisc, omega: float, r: np.ndarray, z_mm: float, edge: float, rtol: float
 ) -> dict[str, Any]:
-    found = body(variant.tissue).response(load, omega, r, z=z_mm * 1e-3, rtol=rtol)
+    response = body(variant.tissue).response(load, omega, r, z=z_mm * 1e-3, rtol=rtol)
     return {
         "z_mm": z_mm,
         "r_mm": [float(v) for v in np.round((r - r[0]) * 1e3)],
-        "u_z": [float(v) for v in np.abs(found.u_z) / edge],
-        "u_r": [float(v) for v in np.abs(found.u_r) / edge],
+        "u_z": [float(v) for v in np.abs(response.u_z) / edge],
+        "u_r": [float(v) for v in np.abs(response.u_r) / edge],
     }
 
 

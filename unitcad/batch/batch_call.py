@@ -25,7 +25,7 @@ from unitcad.validation.tables import changes_of, listed
 
 @dataclass(frozen=True, repr=False)
 class BatchResult:
-    """Where a sweep's variants are, and what became of them."""
+    """A sweep's folder, and the result of each variant."""
 
     folder: Path
     summary: Summary

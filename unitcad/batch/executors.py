@@ -136,7 +136,7 @@ class ProcessExecutor(Executor):
 
 @dataclass(frozen=True)
 class Workers:
-    """Where tasks run: on the Dask cluster of `scheduler`, else in `jobs` processes.
+    """Executor of the tasks: on the Dask cluster of `scheduler`, else in `jobs` processes.
 
     None is a process for each core, 0 this process.
     """

@@ -62,27 +62,27 @@ _KINDS: dict[type, tuple[str, str]] = {
 
 
 def materials(own: Mapping[str, MaterialEntry] | None = None) -> dict[str, Material]:
-    """Return all silicones by name, a spec's own entries before shipped ones of that name.
+    """Return all silicones by name, a spec's entries before shipped ones of that name.
 
-    Raises `Refusal` for an own entry that can't be.
+    Raises `Refusal` for an entry of the spec that is not valid.
     """
     return _entries(Material, own)
 
 
 def motors(own: Mapping[str, MotorEntry] | None = None) -> dict[str, Motor]:
-    """Return all motors by part name. Raises `Refusal` for an own entry that can't be."""
+    """Return all motors by part name. Raises `Refusal` for an entry of the spec that is not valid."""
     return _entries(Motor, own)
 
 
 def printers(own: Mapping[str, PrinterEntry] | None = None) -> dict[str, Printer]:
-    """Return all printers by name. Raises `Refusal` for an own entry that can't be."""
+    """Return all printers by name. Raises `Refusal` for an entry of the spec that is not valid."""
     return _entries(Printer, own)
 
 
 def tissue(name: str = "forearm", own: Mapping[str, Mapping[str, TissueEntry]] | None = None) -> tuple[Tissue, ...]:
     """Return the layers of a body, skin first, the last one a half-space.
 
-    Raises `Refusal` for an unknown name and for a body of the spec that can't be.
+    Raises `Refusal` for an unknown name and for a body of the spec that is not valid.
     """
     shipped = _raw("tissue.toml")
     known: dict[str, Mapping[str, Any]] = {**shipped, **(own or {})}
@@ -117,15 +117,15 @@ def choose(kind: str, name: str, known: Mapping[str, _Entry]) -> _Entry:
 
 def _entries(kind: type[_Entry], own: Mapping[str, Struct] | None) -> dict[str, _Entry]:
     file, field = _KINDS[kind]
-    found = dict(_shipped(kind))
+    entries = dict(_shipped(kind))
     for name, table in (own or {}).items():
         given = _plain(table)
         base = given.pop("like", None)
         if base is not None and base not in _raw(file):
             raise unknown_name(f"{field}.{name}.like", base, _raw(file))
         start = _sourced(kind, _raw(file)[base]) if base else {}
-        found[name] = _entry(kind, name, {**start, **_sourced(kind, given)}, f"{field}.{name}")
-    return found
+        entries[name] = _entry(kind, name, {**start, **_sourced(kind, given)}, f"{field}.{name}")
+    return entries
 
 
 @cache

@@ -124,7 +124,7 @@ class Motor(Struct, frozen=True, kw_only=True):
 
 
 class Printer(Struct, frozen=True, kw_only=True):
-    """What a printer can do and the clearances that follow from it; all lengths mm, clearances per side."""
+    """A printer: its capability and the clearances that follow from it; all lengths mm, clearances per side."""
 
     name: str
     technology: Value[Technology]
@@ -184,11 +184,11 @@ def kinds_of(entry: type[Struct]) -> tuple[tuple[str, Any], ...]:
 
 def _entry_of(entry: type[Struct], like: bool = True) -> type[Struct]:
     """Return what a spec may give of an entry: a value, or a value with its source; the rest is as in `like`."""
-    said = "where values stand without it"
+    scope = "where values stand without it"
     fields: list[tuple[str, Any, Any]] = [
         *([("like", Annotated[str | None, Meta(description="the shipped entry to start from")], None)] if like else []),
-        ("status", Annotated[Status | None, Meta(description=said)], None),
-        ("source", Annotated[Source | None, Meta(description=said)], None),
+        ("status", Annotated[Status | None, Meta(description=scope)], None),
+        ("source", Annotated[Source | None, Meta(description=scope)], None),
         *((name, kind | Value[kind] | None, None) for name, kind in kinds_of(entry)),
     ]
     return msgspec.defstruct(
@@ -208,7 +208,7 @@ if TYPE_CHECKING:
     _Number = float | Value[float] | None
 
     class MaterialEntry(Struct, frozen=True, kw_only=True):
-        """What a spec may give of a silicone, as `_entry_of` makes it; a test compares the two."""
+        """The keys of a silicone in a spec, as `_entry_of` makes it; a test compares the two."""
 
         like: str | None = None
         status: Status | None = None

@@ -10,7 +10,7 @@ Level = Annotated[float, Meta(gt=0, description="amplitude at the edge over the 
 
 
 class MeasuredDesign(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What was measured of one design, by "Layer 1/Layer 2" in short names.
+    """Measurements of one design, by "Layer 1/Layer 2" in short names.
 
     `passes`: how often the wave from motor to skin passes the border between the layers. `also_printed`: a second
     figure of the paper for a level. `directions`: a comparison that the paper states without a figure.

@@ -36,7 +36,7 @@ def detail() -> Detail:
 
 @contextlib.contextmanager
 def detailed(locations: int, meshes: list[Mesh] | None = None) -> Iterator[None]:
-    """Keep so many locations, and meshes if a list is given, until the block ends."""
+    """Keep at most `locations` locations a finding, and meshes if a list is given, until the block ends."""
     before = _DETAIL.set(Detail(locations, meshes))
     try:
         yield

@@ -35,7 +35,7 @@ def point(values: Iterable[SupportsFloat]) -> Point:
 
 @dataclass(frozen=True)
 class Location:
-    """Where: faces' indices (from 0, file order), a point in mm, a line (from 1), a part of the package, an object.
+    """Place: faces' indices (from 0, file order), a point in mm, a line (from 1), a part of the package, an object.
 
     A polygon is one face, however it is cut into triangles. `object` is an id of a 3MF, or a name of an OBJ or GLB.
     `faces` are all that are concerned, both of a crossing; `face` is the first of them. Either may be given alone.
@@ -118,7 +118,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Facts:
-    """What the file holds, in mm; None where it could not be read or has no meaning."""
+    """Content of the file, in mm; None where it could not be read or has no meaning."""
 
     triangles: int | None = None
     vertices: int | None = None
@@ -162,7 +162,7 @@ class FileReport:
         return any(finding.code == code for finding in self.findings)
 
     def shortened(self, locations: int) -> FileReport:
-        """Return the report with so many locations a finding at most."""
+        """Return the report with at most `locations` locations a finding; the rest are counted."""
         kept = tuple(replace(item, locations=item.locations[:locations]) for item in self.findings)
         return replace(self, findings=kept)
 
@@ -194,7 +194,7 @@ def ending(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def with_places(finding: Finding, places: int) -> str:
-    """Return the message, and in brackets the first so many places."""
+    """Return the message, and in brackets its first `places` locations."""
     shown = ", ".join(text for place in finding.locations[:places] if (text := str(place)))
     return f"{finding.message}{f' (at {shown})' if shown else ''}"
 

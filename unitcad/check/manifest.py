@@ -46,7 +46,7 @@ class _Part(msgspec.Struct):
 
 
 class _Manifest(msgspec.Struct):
-    """What is read of a build's manifest."""
+    """The part of a build's manifest that is read."""
 
     parts: list[_Part]
     printer: object = None

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Options:
-    """What to check a file for, and for which printer.
+    """Options of a check: the rules, the output and the printer.
 
     `select`, `ignore`: prefixes of codes, the longest that fits decides, ignore on a tie; empty select: all. An error
     that ended the check of a file (not readable, a limit reached, no mesh) is kept whatever they say.

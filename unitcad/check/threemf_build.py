@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 # The core specification, 4.1 and 4.1.1, tells consumers to accept these and says what they mean (positive fill rule).
 _FILLED = {"G001", "G002", "G008"}
 MOST = 2000
-"""Instances compared; of more the first so many, and the message says so."""
+"""At most this many instances are compared; where there are more, a finding says "among those compared"."""
 _PAIRS = 2000
 _SHARE = 1e-6  # of the smaller volume, below which solids only touch
 

@@ -19,7 +19,7 @@ def accuracy(
         int | None,
         typer.Option(
             min=40,
-            help="The extremes with all sweeps and so many random specs, 3 % beyond the documented ranges.",
+            help="How many random specs the suite extremes takes, 3 % beyond the documented ranges; with all sweeps.",
         ),
     ] = None,
     out: Annotated[

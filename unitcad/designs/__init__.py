@@ -46,7 +46,7 @@ _MOTOR_COLOUR, _CIRCUIT_COLOUR = (0.70, 0.70, 0.78), (0.93, 0.56, 0.15)
 @cache
 def shipped() -> dict[str, Design]:
     """Return the designs of this package by name."""
-    modules = (import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__))
+    modules = (import_module(f"{__name__}.{file.name}") for file in pkgutil.iter_modules(__path__))
     return {module.DESIGN.name: module.DESIGN for module in modules if hasattr(module, "DESIGN")}
 
 

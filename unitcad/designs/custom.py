@@ -168,7 +168,7 @@ _EXPECTED: dict[str, Callable[[Any], str]] = {
     "assembly": _wrong_texts("assembly"),
     "left_out": _wrong_texts("left_out", many=2),
 }
-"""What is wrong with what each function of a Design returned, "" for nothing."""
+"""For each function of a Design, a check of its result: the fault as text, "" for none."""
 
 
 def _failed(design: str, error: BaseException) -> UnitcadError:

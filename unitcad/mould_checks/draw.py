@@ -169,4 +169,4 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-CHECK = MouldCheck("C300", "draw: every piece comes out in the person's order", findings)
+CHECK = MouldCheck("C300", "draw: every piece comes out in the order of the procedure", findings)

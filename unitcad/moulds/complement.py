@@ -162,7 +162,7 @@ def _standing(
     for piece in held:
         if not _stands(piece):
             raise _refused(spec, len(cast) - 1, f"a hollow of {_place(piece)} is closed in by silicone below and above")
-    found: list[Shape] = [Component(under, _inside(piece)) for piece in held]
+    standing: list[Shape] = [Component(under, _inside(piece)) for piece in held]
     edge = radius + BEYOND
     for i, rim in reversed(list(enumerate(rims))):
         if any(bounds(realise(shape, segments))[5] > rim + LEVEL for shape in there(i)):
@@ -178,7 +178,7 @@ def _standing(
             above = piece.trim_by_plane((0, 0, 1), 0.0)
             if i == len(rims) - 1:
                 held.append(above)
-                found.append(Component(beside, _inside(piece)))
+                standing.append(Component(beside, _inside(piece)))
             elif (above - Manifold.compose(held)).volume() > SLIVER:
                 why = f"a piece of {_place(above)} stands alone in layer {i + 1}, and a later layer takes its place"
                 raise _refused(spec, i, why)
@@ -188,7 +188,7 @@ def _standing(
             if lost.volume() > SLIVER:
                 why = f"layer {j + 1} lies under layer {i + 1} in a space of {_place(lost)}, where its core would stand"
                 raise _refused(spec, i, why)
-    return found, max([bounds(piece)[5] for piece in held], default=LEVEL)
+    return standing, max([bounds(piece)[5] for piece in held], default=LEVEL)
 
 
 def _pieces(solid: Manifold) -> list[Manifold]:

@@ -1,4 +1,4 @@
-"""Who needs what, once: from a spec to a folder of files."""
+"""The pipeline from a spec to a folder of files; each step runs once."""
 
 from unitcad.pipeline.variant import Variant
 

@@ -25,7 +25,7 @@ TRIES = 5
 
 @dataclass(frozen=True)
 class Built:
-    """Where a variant went, and its manifest."""
+    """A built variant: its folder and its manifest."""
 
     folder: Path
     manifest: Manifest

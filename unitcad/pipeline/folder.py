@@ -66,7 +66,7 @@ def earlier_formats(folder: Path, spec: Spec, *, ours: bool = False) -> tuple[st
 
 @dataclass(frozen=True)
 class Earlier:
-    """What an existing result has, for a later build to keep up: formats, outputs, whether it was checked."""
+    """Content of an existing result, which a later build keeps up: formats, outputs, whether it was checked."""
 
     formats: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()

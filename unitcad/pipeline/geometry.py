@@ -30,7 +30,7 @@ MESH_FORMATS = ("stl", "3mf")
 
 
 class Geometry(TypedDict):
-    """What a geometry is made of, as JSON data: `files` is path -> SHA-256 of content in the store.
+    """A geometry's content as JSON data: `files` is path -> SHA-256 of content in the store.
 
     The strains are compared with a limit by each variant, since it is that of its silicones.
     """

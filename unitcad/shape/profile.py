@@ -122,22 +122,22 @@ def rounded_rectangle(half_x: float, half_y: float, radius: float, key: float = 
 
 def points(profile: Profile, segments: int) -> np.ndarray:
     """Return the profile as a polygon, (n, 2) in mm: an arc gets its share of `segments` a turn, at least one side."""
-    found: list[tuple[float, float]] = []
+    corners: list[tuple[float, float]] = []
     for (x0, y0, bulge), (x1, y1, _) in sides(profile.vertices):
-        found.append((x0, y0))
+        corners.append((x0, y0))
         if bulge:
             cx, cy, radius = arc_centre((x0, y0), (x1, y1), bulge)
             angle = 4 * math.atan(bulge)
             start = math.atan2(y0 - cy, x0 - cx)
             count = max(1, math.ceil(abs(angle) / (2 * math.pi) * segments - 1e-9))
-            found += [
+            corners += [
                 (
                     cx + radius * math.cos(start + angle * i / count),
                     cy + radius * math.sin(start + angle * i / count),
                 )
                 for i in range(1, count)
             ]
-    return np.array(found)
+    return np.array(corners)
 
 
 def arc_middle(start: Vertex, end: Vertex) -> tuple[float, float]:
@@ -160,7 +160,7 @@ def arc_centre(p: tuple[float, float], q: tuple[float, float], bulge: float) -> 
 
 
 def _is_convex(polygon: np.ndarray) -> bool:
-    """Whether a polygon turns left all the way and once round: then it can't cross itself, and that is cheap to see."""
+    """Return whether a polygon turns left all the way and once round: a fast test that it can't cross itself."""
     corners = polygon.tolist()
     steps = [(x1 - x0, y1 - y0) for (x0, y0), (x1, y1) in zip(corners, corners[1:] + corners[:1], strict=True)]
     turned = 0.0
@@ -173,7 +173,7 @@ def _is_convex(polygon: np.ndarray) -> bool:
 
 
 def _crosses_itself(polygon: np.ndarray) -> bool:
-    """Whether two sides of a polygon meet other than neighbours in their common vertex."""
+    """Return whether two sides of a polygon meet other than neighbours in their common vertex."""
     a, b = polygon, np.roll(polygon, -1, axis=0)
     n = len(a)
     i, j = np.triu_indices(n, 1)

@@ -78,7 +78,7 @@ class Cut:
 
 @dataclass(frozen=True)
 class Common:
-    """What `parts` share."""
+    """The intersection of `parts`."""
 
     parts: tuple[Shape, ...]
 

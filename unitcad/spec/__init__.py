@@ -1,4 +1,4 @@
-"""What was asked for and what is built: the tables of a TOML spec, and the effective spec with every value there."""
+"""The requested and the effective spec: the tables of a TOML spec, and the effective spec with every value there."""
 
 from unitcad.spec.convert import check_plain, convert
 from unitcad.spec.effective import Spec, with_formats

@@ -1,4 +1,4 @@
-"""What a person may ask for: the tables of a spec as a TOML file holds them. Lengths in mm, the unit in each name.
+"""The requested spec: the tables of a spec as a TOML file holds them. Lengths in mm, the unit in each name.
 
 None means that the key is left out; `unitcad.spec.effective` has the same spec with every value there. Only types and
 ranges of single values are checked here. What depends on several values is checked by the design and `validation`.
@@ -120,7 +120,7 @@ class CastingTable(Table, frozen=True, kw_only=True):
 
 
 class EstimateTable(Table, frozen=True, kw_only=True):
-    """What the attenuation estimate is asked for; None takes the motor's value."""
+    """Inputs of the attenuation estimate; None takes the motor's value."""
 
     frequency_hz: kinds.Frequency | None = None
     amplitude_um: kinds.Amplitude | None = None

@@ -72,15 +72,15 @@ def bodies_in(design: str, text: str) -> dict[str, Polyhedron]:
     try:
         if not head.startswith(_HEAD) or not lines:
             raise ValueError("it has no bodies")
-        found = {}
+        bodies = {}
         for line in lines:
             name, *held = line.split(" ")
             vertices, faces = (base64.b64decode(part, validate=True) for part in held)
             _check_closed(np.frombuffer(vertices, "<i4").reshape(-1, 3), np.frombuffer(faces, "<i4").reshape(-1, 3))
-            found[name] = Polyhedron(vertices, faces)
+            bodies[name] = Polyhedron(vertices, faces)
     except (ValueError, binascii.Error) as error:
         raise UnitcadError(f"design {design}: design_source is damaged: {error}") from None
-    return found
+    return bodies
 
 
 def _is_step(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Plain data to typed tables by msgspec; a value that can't be is refused with field, value and limit."""
+"""Plain data to typed tables by msgspec; a value that is not valid is refused with field, value and limit."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
 
 
 def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
-    """Raise Refusal for what no key takes: huge numbers and NaN, dates, characters that nobody sees, deep nesting."""
+    """Raise Refusal for what no key takes: huge numbers and NaN, dates, invisible characters, deep nesting."""
     if isinstance(node, str) and SOURCE not in field.split("."):
         _check_text(node, field)
     if isinstance(node, float) and not math.isfinite(node):
@@ -71,9 +71,9 @@ def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
 
 
 def _check_text(text: str, field: str) -> None:
-    found = invisible(text)
-    if found is not None:
-        limit = f"holds {found!a}: control characters and those that turn the direction of text are refused"
+    refused = invisible(text)
+    if refused is not None:
+        limit = f"holds {refused!a}: control characters and those that turn the direction of text are refused"
         raise Refusal(field, text, limit, without_invisible(text).strip() or None)
 
 
@@ -140,18 +140,18 @@ def _out_of_range(value: float, kind: Any, field: str) -> Iterator[Refusal]:
 
 def _plain_kinds(kind: Any) -> set[type]:
     """Return the kinds of plain data that a `kind` is made from."""
-    found: set[type] = set()
+    kinds: set[type] = set()
     for one in alternatives(kind):
         of = typing.get_origin(one) or one
         if of is Literal:
-            found |= {type(word) for word in typing.get_args(one)}
+            kinds |= {type(word) for word in typing.get_args(one)}
         elif of in (list, tuple):
-            found.add(list)
+            kinds.add(list)
         elif of is dict or table_in(one):
-            found.add(dict)
+            kinds.add(dict)
         elif of in _NAMES:
-            found.add(of)
-    return found
+            kinds.add(of)
+    return kinds
 
 
 def _name(plain: type, table: type[msgspec.Struct] | None) -> str:

@@ -98,7 +98,7 @@ class Moulds(Table, frozen=True, kw_only=True):
 
 
 class Estimate(Table, frozen=True, kw_only=True):
-    """What the attenuation estimate is asked for: frequency in Hz, amplitude in um, the body and the models."""
+    """Inputs of the attenuation estimate: frequency in Hz, amplitude in um, the body and the models."""
 
     frequency_hz: float
     amplitude_um: float
@@ -114,7 +114,7 @@ if TYPE_CHECKING:
 else:
 
     class _Validated(type(Struct)):
-        """Makes a call of the class take what a TOML file may hold, and check it like one."""
+        """Metaclass of Spec: a call takes the keys of a TOML file and validates them."""
 
         def __call__(cls, /, *values: object, **keys: Any) -> Spec:
             if values:

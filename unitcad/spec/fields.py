@@ -1,4 +1,4 @@
-"""What the tables of a spec say of themselves: their keys, the kinds of value that a key takes, what a key means."""
+"""Introspection of the spec's tables: their keys, the kinds of value that a key takes, what a key means."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def alternatives(kind: Any) -> tuple[Any, ...]:
     if typing.get_origin(kind) is Annotated:
         return alternatives(typing.get_args(kind)[0])
     if typing.get_origin(kind) in _UNIONS:
-        return tuple(found for member in typing.get_args(kind) for found in alternatives(member))
+        return tuple(inner for member in typing.get_args(kind) for inner in alternatives(member))
     return (kind,)
 
 
@@ -45,10 +45,10 @@ def named_in(kind: Any) -> Any:
 
 def entry_in(kind: Any, index: int = 0) -> Any:
     """Return the kind of entry `index` of a list that `kind` allows; None where it allows no list so long."""
-    for found in alternatives(kind):
-        if typing.get_origin(found) in (tuple, list):
-            entries = typing.get_args(found)
-            if typing.get_origin(found) is list or entries[-1] is Ellipsis:
+    for member in alternatives(kind):
+        if typing.get_origin(member) in (tuple, list):
+            entries = typing.get_args(member)
+            if typing.get_origin(member) is list or entries[-1] is Ellipsis:
                 return entries[0]
             return entries[index] if index < len(entries) else None
     return None

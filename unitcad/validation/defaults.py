@@ -79,8 +79,8 @@ def _motor(asked: AskedSpec) -> tuple[catalogue.Motor | None, MotorSize]:
     for field, size in sizes.items():
         if size is None:
             raise Refusal(f"motor.{field}", None, "is required where no part is named")
-    found = {field: size for field, size in sizes.items() if size is not None}
-    return part, MotorSize(part=given.part, fill=given.fill, **found)
+    known = {field: size for field, size in sizes.items() if size is not None}
+    return part, MotorSize(part=given.part, fill=given.fill, **known)
 
 
 def _moulds(asked: AskedSpec, design: Design) -> Moulds:

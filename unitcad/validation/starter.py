@@ -35,8 +35,8 @@ def starter(name: str, template: str | None = None) -> str:
         flags=re.MULTILINE,
     )
     sections = re.split(r"\n(?=\[)", text)
-    found = [section.rstrip() + "\n" + _further_keys(section, there) for section in sections]
-    return "\n".join([*found, _further_tables(there)])
+    tables = [section.rstrip() + "\n" + _further_keys(section, there) for section in sections]
+    return "\n".join([*tables, _further_tables(there)])
 
 
 def _further_keys(section: str, there: dict[str, Any]) -> str:
@@ -48,7 +48,10 @@ def _further_keys(section: str, there: dict[str, Any]) -> str:
 
 
 def _further_tables(there: dict[str, Any]) -> str:
-    lines = ["# The tables below are as if left out: take the # away to change a value. ... means: from the catalogue."]
+    lines = [
+        "# The tables below show the defaults; ... stands for a value from the catalogue.",
+        "# To change a value, remove the # from its line and from its table's header.",
+    ]
     for name, field in fields_of(AskedSpec).items():
         if name in there or name in _NOT_OFFERED:
             continue
@@ -67,8 +70,8 @@ def _keys(table: type[Struct], given: set[str]) -> list[str]:
 
 
 def _note(field: FieldInfo) -> str:
-    said = meaning(field.type)
-    return f"  # {said}" if said else ""
+    text = meaning(field.type)
+    return f"  # {text}" if text else ""
 
 
 def _shown(field: FieldInfo) -> str:

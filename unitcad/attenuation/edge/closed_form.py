@@ -176,11 +176,11 @@ def constraints(units: Units, control: Units) -> list[Constraint]:
     6a and 6b compare sums of eta d/(E v), whose unit is s2; another reading of eta multiplies both sides by the same
     number. 6c and 6d say that the impedance grows outwards; they need no control.
     """
-    found = []
+    inequalities = []
     attenuation: list[tuple[str, Wave]] = [("6a", "p"), ("6b", "s")]
     for name, wave in attenuation:
         sides = [np.sum(paper_exponents(u, wave, "literal"), axis=-1) / u.omega for u in (units, control)]
-        found.append(
+        inequalities.append(
             Constraint(name, f"attenuation of {wave.upper()} waves: unit above control", ">", sides[0], sides[1], "s2")
         )
     growth: list[tuple[str, Wave]] = [("6c", "p"), ("6d", "s")]
@@ -188,5 +188,5 @@ def constraints(units: Units, control: Units) -> list[Constraint]:
         squared = impedances(units, wave) ** 2 * (2.0 if wave == "s" else 1.0)
         for i in range(squared.shape[-1] - 1):
             label = f"{wave.upper()} impedance squared: Layer {i + 1} below Layer {i + 2}"
-            found.append(Constraint(name, label, "<", squared[..., i], squared[..., i + 1], "Pa kg/m3"))
-    return found
+            inequalities.append(Constraint(name, label, "<", squared[..., i], squared[..., i + 1], "Pa kg/m3"))
+    return inequalities

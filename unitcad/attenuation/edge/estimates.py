@@ -122,19 +122,19 @@ def variant_block(variant: EstimateInput) -> dict[str, Any]:
 
 def table_error() -> dict[str, Any]:
     """Return every model's errors against the measured table, and the null model's."""
-    found: dict[str, Any] = {name: assessment_block(one) for name, one in assessments().items()}
-    return {**found, "what": TABLE_NOTE}
+    by_model: dict[str, Any] = {name: assessment_block(one) for name, one in assessments().items()}
+    return {**by_model, "what": TABLE_NOTE}
 
 
-def assessment_block(found: Assessment) -> dict[str, Any]:
-    """Return a assessment as data."""
+def assessment_block(assessment: Assessment) -> dict[str, Any]:
+    """Return an assessment as data."""
     return {
-        "levels": asdict(found.levels),
-        "ratios": asdict(found.ratios),
-        "directions": {"right": found.directions, "of": found.ratios.count},
+        "levels": asdict(assessment.levels),
+        "ratios": asdict(assessment.ratios),
+        "directions": {"right": assessment.directions, "of": assessment.ratios.count},
         "leave_one_unit_out": {
-            "levels": asdict(found.left_out),
-            "ratios": asdict(found.left_out_ratios) if found.left_out_ratios else None,
+            "levels": asdict(assessment.left_out),
+            "ratios": asdict(assessment.left_out_ratios) if assessment.left_out_ratios else None,
         },
     }
 

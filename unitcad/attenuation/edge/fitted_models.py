@@ -94,12 +94,12 @@ def paths() -> dict[str, Predict]:
 @cache
 def assessments() -> dict[str, Assessment]:
     """Compare every model, the reading with k_t alone and the null with the measured table."""
-    found = paths()
+    by_model = paths()
     fits: dict[str, tuple[Fit, bool]] = {
-        "paper": (one_constant(found["paper"]), False),
-        "consistent": (one_constant(found["consistent"]), False),
+        "paper": (one_constant(by_model["paper"]), False),
+        "consistent": (one_constant(by_model["consistent"]), False),
         "fitted": (two_constants, True),
-        "crossings": (one_constant(found["crossings"]), False),
+        "crossings": (one_constant(by_model["crossings"]), False),
         "null": (null, True),
     }
     return {name: assess(fit, in_ratios) for name, (fit, in_ratios) in fits.items()}
@@ -110,8 +110,8 @@ def scales() -> dict[str, float]:
     """Return the constant s of every model, from all nine levels; the divider's is stored."""
     table = measured_table()
     everyone = np.ones(len(table.names), dtype=bool)
-    found = {name: scale_of(path, table, everyone) for name, path in paths().items() if name != "fitted"}
-    return {**found, "fitted": STORED_FIT["s"]}
+    constants = {name: scale_of(path, table, everyone) for name, path in paths().items() if name != "fitted"}
+    return {**constants, "fitted": STORED_FIT["s"]}
 
 
 def edge_levels(units: Units, model: str) -> Any:

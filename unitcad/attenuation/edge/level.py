@@ -127,10 +127,10 @@ def spread(variant: EstimateInput, predict: Callable[[Units], Any]) -> dict[str,
         middle = float(values[0]) if np.isfinite(values[0]) else None
         return {"value": middle, "low": None, "high": None, "reason": reason}
     value = None if ranged(variant) else float(values[0])
-    found: dict[str, Any] = {"value": value, "low": float(values.min()), "high": float(values.max())}
+    level: dict[str, Any] = {"value": value, "low": float(values.min()), "high": float(values.max())}
     if ranged(variant):
-        found["reason"] = "; ".join(ranged(variant))
-    return found
+        level["reason"] = "; ".join(ranged(variant))
+    return level
 
 
 def model_block(variant: EstimateInput, model: str) -> dict[str, Any]:
@@ -210,10 +210,10 @@ def _paper_details(variant: EstimateInput, controls: list[int]) -> dict[str, Any
 def _constraints(variant: EstimateInput, units: Units, controls: list[int]) -> list[dict[str, Any]]:
     """Return 6a and 6b for each control; 6c and 6d, which need no control, once."""
     return [
-        _constraint(found, variant.layers[index].material if found.name in ("6a", "6b") else None, variant)
+        _constraint(constraint, variant.layers[index].material if constraint.name in ("6a", "6b") else None, variant)
         for index in controls
-        for found in cf.constraints(units, units.control(index))
-        if index == controls[0] or found.name in ("6a", "6b")
+        for constraint in cf.constraints(units, units.control(index))
+        if index == controls[0] or constraint.name in ("6a", "6b")
     ]
 
 
@@ -234,20 +234,20 @@ def _reading(variant: EstimateInput, units: Units, reading: str, controls: list[
     }
 
 
-def _constraint(found: cf.Constraint, control: str | None, variant: EstimateInput) -> dict[str, Any]:
-    margins = np.asarray(found.margin)
+def _constraint(constraint: cf.Constraint, control: str | None, variant: EstimateInput) -> dict[str, Any]:
+    margins = np.asarray(constraint.margin)
     finite = bool(np.all(np.isfinite(margins)))
     always, never = bool(np.all(margins > 0)), bool(np.all(margins <= 0))
     block = {
-        "equation": found.name,
-        "text": found.text,
+        "equation": constraint.name,
+        "text": constraint.text,
         "control": control,
-        **_by_corner("left", found.left, variant),
-        "relation": found.relation,
-        **_by_corner("right", found.right, variant),
+        **_by_corner("left", constraint.left, variant),
+        "relation": constraint.relation,
+        **_by_corner("right", constraint.right, variant),
         **_by_corner("margin", margins, variant),
         "holds": None if not finite else True if always else False if never else None,
-        "unit": found.unit,
+        "unit": constraint.unit,
     }
     if block["holds"] is None:
         block["reason"] = "depends" if finite else _NOT_FINITE
@@ -278,11 +278,11 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
     """Return the paper's measurement of this unit's design and materials, in both prints; None if there is none."""
     table, layers = measured_table(), tuple(layer.material for layer in variant.layers)
     design = CONTROL if len(layers) == 1 else variant.design
-    found = [i for i in range(len(table.names)) if table.designs[i] == design and table.layers[i] == layers]
+    rows = [i for i in range(len(table.names)) if table.designs[i] == design and table.layers[i] == layers]
     extra = printed_besides(design, layers)
-    if not found:
+    if not rows:
         return extra and {"level": None, **extra}
-    index = found[0]
+    index = rows[0]
     wall = sum(layer.thickness for layer in variant.layers)
     same = abs(wall - 2.5e-3) < 1e-6 and abs(variant.diameter - 14e-3) < 1e-6
     return {
@@ -308,9 +308,9 @@ def printed_besides(design: str, layers: tuple[str, ...]) -> dict[str, Any] | No
     if design not in data.designs or any(layer not in short for layer in layers):
         return None
     measured, pair = data.designs[design], "/".join(short[layer] for layer in layers)
-    found = {
+    prints = {
         "also_printed": measured.also_printed.get(pair),
         "over_a_control_not_named": measured.over_a_control_not_named.get(pair),
         "direction_stated": measured.directions.get(pair),
     }
-    return {key: value for key, value in found.items() if value is not None} or None
+    return {key: value for key, value in prints.items() if value is not None} or None

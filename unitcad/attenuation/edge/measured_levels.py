@@ -115,7 +115,7 @@ def assess(fit: Fit, fitted_ratios: bool, table: MeasuredTable | None = None) ->
     everyone = np.ones(len(table.names), dtype=bool)
     levels = fit(table, everyone)(table)
     without = [fit(table, _all_but(everyone, i))(table) for i in range(everyone.size)]
-    left_out = np.array([found[i] for i, found in enumerate(without)])
+    left_out = np.array([predicted[i] for i, predicted in enumerate(without)])
     pairs = table.pairs
     measured = np.array([table.levels[i] / table.levels[c] for i, c in pairs])
     ratios = np.array([levels[i] / levels[c] for i, c in pairs])
@@ -141,7 +141,7 @@ def _all_but(everyone: np.ndarray, index: int) -> np.ndarray:
     return chosen
 
 
-def _score(found: np.ndarray, measured: np.ndarray, names: Any) -> Score:
-    off = np.abs(np.log(found / measured))
+def _score(predicted: np.ndarray, measured: np.ndarray, names: Any) -> Score:
+    off = np.abs(np.log(predicted / measured))
     worst = int(np.argmax(off))
     return Score(float(np.exp(off.mean())), float(np.exp(off[worst])), str(names[worst]), off.size)

@@ -172,7 +172,7 @@ def _panels(end: float, stop: float, span: float, start: float = 0.0) -> np.ndar
 
 
 def _cut(panels: np.ndarray, pieces: int) -> np.ndarray:
-    """Cut each panel in so many equal pieces."""
+    """Cut each panel in `pieces` equal ones."""
     edges = panels[:, :1] + (panels[:, 1:] - panels[:, :1]) * (np.arange(pieces + 1) / pieces)
     return np.stack([edges[:, :-1].ravel(), edges[:, 1:].ravel()], axis=1)
 

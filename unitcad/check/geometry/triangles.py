@@ -19,7 +19,7 @@ _BLOCK = 1 << 12  # pairs whose corners stay in the processor's cache
 
 @dataclass(frozen=True)
 class Meeting:
-    """How the triangles of each pair meet.
+    """Relation of the triangles of each pair.
 
     `crosses`: each passes through the other; `touches`: they have a point in common; `overlaps`: they are coplanar with
     area in common. `side_a` (n, 3) are the sides of b's plane on which a's corners lie; `side_b` is the same the other

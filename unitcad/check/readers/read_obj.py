@@ -26,7 +26,7 @@ _ANY = re.compile(rb"(?m)^[ \t]*(?:v|f|o|g|mtllib|usemtl|#)\s")
 
 @dataclass
 class _Read:
-    """What has been read so far; `objects` and `groups` are (polygons before, name in a line) of o and g statements."""
+    """State of the reader; `objects` and `groups` are (polygons before, name in a line) of o and g statements."""
 
     vertices: list[Floats] = field(default_factory=list)
     corners: list[Ints] = field(default_factory=list)

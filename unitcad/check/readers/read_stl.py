@@ -94,7 +94,7 @@ def _is_text(head: bytes, data: memoryview) -> bool:
 
 @dataclass
 class _Text:
-    """What has been read of a text STL."""
+    """Content of a text STL as far as it was read."""
 
     findings: list[Finding]
     corners: list[Floats] = field(default_factory=list)

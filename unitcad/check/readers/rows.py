@@ -142,7 +142,7 @@ def spread(firsts: Ints, counts: Ints, step: int = 1) -> Ints:
 
 
 def columns(table: Rows, which: slice, most: int) -> Floats:
-    """Return the first so many numbers of each row. Raises `Unreadable` (F003) for a row that has fewer."""
+    """Return the first `most` numbers of each row. Raises `Unreadable` (F003) for a row that has fewer."""
     sizes, lines = table.sizes[which], table.lines[which]
     short = np.flatnonzero(sizes < most)
     if len(short):

@@ -52,7 +52,7 @@ VOLUME = 1e-3  # M001: a mesh's share of a B-rep's volume that tessellation may 
 
 @dataclass(frozen=True)
 class ListedFile:
-    """What the manifest says of one file: the parts in it (several for an assembly file)."""
+    """One file of the manifest: the parts in it (several for an assembly file)."""
 
     names: tuple[str, ...]
     tool: bool

@@ -73,7 +73,7 @@ def many(test: Test) -> Test:
 
 @dataclass(frozen=True)
 class ElementSchema:
-    """What one element must and may have; `children` are (name, least, most) in order; `open_`: foreign attributes."""
+    """Content of one element; `children` are (name, least, most) in order; `open_`: foreign attributes."""
 
     required: Mapping[str, Test] = field(default_factory=dict)
     optional: Mapping[str, Test] = field(default_factory=dict)

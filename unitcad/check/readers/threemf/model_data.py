@@ -61,7 +61,7 @@ class Object(Resource):
 
 @dataclass
 class Model:
-    """What a model part says."""
+    """Content of a model part."""
 
     part: str
     unit: str = "millimeter"

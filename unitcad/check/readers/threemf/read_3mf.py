@@ -22,7 +22,7 @@ _TICKET_TYPE = "application/vnd.ms-printing.printticket+xml"
 
 @dataclass(frozen=True)
 class Build:
-    """What a 3MF file asks a printer to make: the instances, and the unit that its start part names."""
+    """Print job of a 3MF file: the instances, and the unit that its start part names."""
 
     unit: str
     instances: list[Instance]
