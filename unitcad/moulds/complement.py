@@ -224,13 +224,19 @@ def _slid(spec: Spec, piece: Shape, solid: Manifold, wall: Manifold, rim: float,
 
 
 def _grown(piece: Shape, clearance: float) -> Shape:
-    """Return a piece and four copies of it, moved diagonally: every upright face moves out by `clearance` or more."""
-    return union((piece, *(moved(piece, x, y) for x in (-clearance, clearance) for y in (-clearance, clearance))))
+    """Return a piece and eight copies of it, moved by `clearance` along the axes and diagonally.
+
+    Every upright face moves out by `clearance` or more. So does an upright edge whose faces both look into one
+    quadrant, by a diagonal copy. A vertex of a circle of n sides that lies on an axis moves out by the copy along that
+    axis: `clearance` times the cosine of pi / n, as C210 allows. A sharper edge may come out nearer: C210 measures it.
+    """
+    steps = (-clearance, 0.0, clearance)
+    return union((piece, *(moved(piece, x, y) for x in steps for y in steps if x or y)))
 
 
 def _place(piece: Manifold) -> str:
-    box_of = bounds(piece)
-    x, y, z = ((box_of[k] + box_of[k + 3]) / 2 for k in range(3))
+    """Return a piece's volume and a point in it."""
+    x, y, z = _inside(max(piece.decompose(), key=Manifold.volume))
     return f"{piece.volume():.3g} mm3 at x = {x:.3g}, y = {y:.3g}, z = {z:.3g} mm"
 
 
