@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import signal
@@ -172,3 +173,15 @@ def test_an_answer_that_is_no_schedulers(sent: bytes) -> None:
         with pytest.raises(UnitcadError, match="not a Dask scheduler"):
             dask_executor(f"tcp://127.0.0.1:{other.getsockname()[1]}")
         kept[0].close()
+
+
+def test_a_cluster_is_reached_from_where_an_event_loop_runs(cluster: Cluster) -> None:
+    """As in a notebook's cell."""
+    from unitcad.batch.cluster import dask_executor
+
+    async def cell() -> int:
+        executor, threads = dask_executor(cluster.address)
+        executor.shutdown()
+        return threads
+
+    assert asyncio.run(cell()) == 2

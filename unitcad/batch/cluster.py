@@ -6,7 +6,7 @@ import asyncio
 import logging
 import ssl
 import time
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -91,7 +91,9 @@ def dask_executor(address: str, certificates: Certificates = FROM_DASK) -> tuple
     # Ask first: a client that reaches no scheduler takes long to give up.
     start = time.monotonic()
     try:
-        answer = asyncio.run(asyncio.wait_for(ask(), DASK_SECONDS))
+        # In a thread of its own, since a notebook has an event loop running in this one.
+        with ThreadPoolExecutor(1) as thread:
+            answer = thread.submit(lambda: asyncio.run(asyncio.wait_for(ask(), DASK_SECONDS))).result()
     except (OSError, TimeoutError) as error:
         waited = time.monotonic() - start > DASK_SECONDS - 1
         why = f" ({error})" if str(error) else ""
