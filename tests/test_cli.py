@@ -140,3 +140,19 @@ def test_help_cuts_no_option_s_name_and_no_square_bracket(command: str) -> None:
 def test_help_and_version() -> None:
     assert "build" in _run("--help").stdout
     assert _run("--version").stdout.startswith("unitcad 0.")
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        (["build", "encapsulatin"], "SPEC = 'encapsulatin'"),
+        (["build", "encapsulating", "--only", "units"], "--only = 'units'"),
+        (["build", "encapsulating", "--set", "x"], "--set = 'x'"),
+        (["batch", "papr"], "SWEEP = 'papr'"),
+    ],
+)
+def test_a_refused_argument_is_called_as_in_the_help(words: list[str], field: str, tmp_path: Path) -> None:
+    done = _run(*words, "--json", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"error: {field}: ")
+    assert json.loads(done.stdout)["error"]["field"] == field.partition(" ")[0]

@@ -241,6 +241,8 @@ def test_meshes_are_handed_out_in_both_libraries() -> None:
         variant.mesh("layer3")
     with pytest.raises(Refusal, match="library = 'open3d': not known"):
         variant.mesh("layer1", "open3d")  # type: ignore[call-overload]
+    with pytest.raises(Refusal, match="body = 1: takes a body's name or a Body"):
+        variant.mesh(1)  # type: ignore[call-overload]
     with pytest.raises(UnitcadError, match="Variant takes a Spec, not str"):
         unitcad.Variant("encapsulating")  # type: ignore[arg-type]
 
@@ -348,11 +350,32 @@ def test_arguments_that_can_not_be_are_refused(tmp_path: Path) -> None:
         (lambda: unitcad.load("encapsulating", set=3), "^set takes a dict by path or texts"),  # type: ignore[arg-type]
         (lambda: unitcad.load("encapsulating", set=[3]), "^set takes .*, not int$"),  # type: ignore[list-item]
         (lambda: unitcad.Spec("encapsulating"), "^Spec takes its keys by name"),  # type: ignore[call-arg]
+        (lambda: unitcad.load("encapsulatin"), "^spec = 'encapsulatin': not known"),
+        (lambda: unitcad.load("encapsulating", set="x"), "^set = 'x': needs the form path=value"),
+        (lambda: unitcad.build("embedded", 3), "^out = 3: takes a path, not int$"),  # type: ignore[arg-type]
+        (lambda: unitcad.build("embedded", only="units"), "^only = 'units': not known"),
+        (lambda: unitcad.build("embedded", only=[3]), "^only = 3: takes a text or a list of"),  # type: ignore[list-item]
+        (lambda: unitcad.estimate("embedded", models=3), "^models = 3: takes a text or"),  # type: ignore[arg-type]
+        (lambda: unitcad.batch("papr"), "^sweep = 'papr': not known"),
+        (lambda: unitcad.batch(None), "^sweep: takes a path, not NoneType$"),  # type: ignore[arg-type]
+        (lambda: unitcad.batch("paper", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
+        (lambda: unitcad.batch("paper", limit=0), "^limit = 0: must be a whole number from 1 "),
+        (lambda: unitcad.batch("paper", jobs=0, timeout=3), "^timeout = 3: only a worker process"),
+        (lambda: unitcad.check("a.stl", jobs="2"), "^jobs = '2': must be a whole number"),  # type: ignore[arg-type]
+        (lambda: unitcad.check("a.stl", timeout=True), "^timeout = true: must be a number"),
+        (lambda: unitcad.check(["a.stl"]), r'^files = \["a.stl"\]: takes a path, not list$'),  # type: ignore[arg-type]
+        (lambda: unitcad.check("a.stl", printer=3), "^printer = 3: takes a printer's name"),  # type: ignore[arg-type]
+        (lambda: unitcad.check("a.stl", unit=3), "^unit = 3: takes a unit's name"),  # type: ignore[arg-type]
+        (lambda: unitcad.check("a.stl", ignore=3), "^ignore = 3: takes a text or"),  # type: ignore[arg-type]
     ],
 )
-def test_arguments_of_another_type_are_refused_in_one_sentence(call: Callable[[], object], words: str) -> None:
+def test_arguments_of_another_type_are_refused_in_one_sentence(
+    call: Callable[[], object], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(UnitcadError, match=words):
         call()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_single_text_is_a_list_of_one(tmp_path: Path) -> None:

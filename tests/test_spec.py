@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.spec import Spec, from_json, to_data, to_json, to_toml
 from unitcad.spec.custom_code import ANY, allow, allow_nothing
 from unitcad.spec.fields import fields_of, table_in
@@ -125,6 +125,8 @@ def test_refused_with_a_nearest_value_that_is_accepted(
         ("motor.fill={ b = true }", r"^motor\.fill = \{ b = true \}: takes true or false$"),
         ("nonsense", "path=value"),
         ("name.x=1", "table"),
+        ("motor.part='foo'", r"^motor\.part = 'foo': not known; known: HD-EMC1003-2, [^;]*$"),
+        ("design='d.py'", r"^design = 'd\.py': name the function or Design in that file: d\.py:NAME$"),
     ],
 )
 def test_refused_in_plain_words(setting: str, words: str) -> None:
@@ -210,6 +212,22 @@ def test_a_spec_brings_its_own_material_motor_and_printer() -> None:
     spec["materials"]["house"]["poison_ratio"] = 0.4
     with pytest.raises(Refusal, match="poisson_ratio"):
         from_data(spec)
+
+
+def test_a_long_list_of_known_names_is_cut() -> None:
+    refused = unknown_name("body", "q", [f"cup{i:02}" for i in range(15)])
+    assert refused.limit.endswith("cup08, cup09 and 5 more")
+    assert refused.nearest is None
+
+
+def test_the_default_motor_is_that_of_a_spec_without_part_and_size() -> None:
+    data = read("encapsulating")
+    given = from_data({**data, "motor": {"part": "LCM0720A3463F", "fill": True}})
+    assert from_data({**data, "motor": {"fill": True}}) == given
+    assert from_data(tomllib.loads(to_toml(given))) == given
+    assert from_data({**data, "motor": {"diameter_mm": 7.0, "thickness_mm": 2.0}}).motor.part is None
+    with pytest.raises(Refusal, match=r"^motor\.thickness_mm: is required where no part is named$"):
+        from_data({**data, "motor": {"diameter_mm": 7.0}})
 
 
 def test_a_layer_below_its_casting_floor_is_a_warning() -> None:

@@ -48,16 +48,21 @@ class Refusal(UnitcadError):
         }
 
 
+class WrongArgument(Refusal):
+    """A refusal of a function's argument: `field` is the parameter's name, for which the command line has an option."""
+
+
 class UnknownKey(Refusal):
     """A key that its table does not have; `nearest` is the whole path of the closest one that it has."""
 
 
-def unknown_name(field: str, value: str, known: Iterable[str]) -> Refusal:
-    """Return a refusal of a name that is not in `known`, with the closest names that are."""
+def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusal] = Refusal) -> Refusal:
+    """Return a refusal, of class `kind`, of a name that is not in `known`, with the closest names that are."""
     known = sorted(known)
     close = difflib.get_close_matches(value, known, n=3, cutoff=0.4)
-    names = f"closest: {', '.join(close)}" if close else f"known: {', '.join(known)}"
-    return Refusal(field, value, f"not known; {names}", close[0] if close else next(iter(known), None))
+    more = f" and {len(known) - _MOST_NAMES} more" if len(known) > _MOST_NAMES else ""
+    names = f"closest: {', '.join(close)}" if close else f"known: {', '.join(known[:_MOST_NAMES])}{more}"
+    return kind(field, value, f"not known; {names}", close[0] if close else None)
 
 
 def unknown_key(field: str, value: object, known: Iterable[str], lists: str = "") -> UnknownKey:
@@ -116,5 +121,7 @@ def _text(value: object) -> str:
 
 _MOST_KEYS = 5
 """Keys of a table that are named for one that it does not have."""
+_MOST_NAMES = 10
+"""Names that are listed where none is close to one that is not known."""
 _LONGEST = 200
 """Characters of a value that are shown."""

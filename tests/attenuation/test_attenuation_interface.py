@@ -4,6 +4,7 @@ import ast
 import doctest
 import subprocess
 import sys
+from collections.abc import Callable
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import unitcad
 from unitcad import attenuation
 from unitcad.attenuation.layered import medium
 from unitcad.attenuation.layered.stack import Stack
+from unitcad.errors import Refusal
 
 PACKAGE = Path(unitcad.__file__).parent
 
@@ -46,6 +48,37 @@ def test_a_stack_with_a_loss_has_it_in_every_body():
     assert {m.shear.imag / m.shear.real for m in some.with_loss(0.25).materials(785.0)} == {0.25}
     assert isinstance(some, Stack)
     assert some.without_empty_layers().layers == some.layers[:1]
+
+
+BASE = attenuation.HalfSpace(1000, 1e4, 0.4)
+DISC = attenuation.UniformDisc(3e-3)
+MEDIUM = attenuation.LayeredMedium([], BASE)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: attenuation.LayeredMedium("abc", BASE), r"^layers\.0 = 'a': must be a Layer$"),
+        (lambda: attenuation.LayeredMedium(3, BASE), r"^layers\.0 = 3: must be a Layer$"),
+        (lambda: attenuation.LayeredMedium([], None), "^half_space = 'None': must be a HalfSpace$"),
+        (lambda: attenuation.HalfSpace(1000, 1e4, 0.4, "x"), r"^half_space\.damping = 'x': must be a LossFactor"),
+        (lambda: attenuation.Point(3), r"^load\.direction = '3': not known"),
+        (lambda: MEDIUM.response("x", 785.0, 7e-3), "^load = 'x': must be a Point or a UniformDisc$"),
+        (lambda: MEDIUM.response(DISC, 785.0, [7e-3, -2e-3, -1e-3]), "^r = -0.002: radii must be finite and not neg"),
+        (lambda: MEDIUM.response(DISC, 785.0, "x"), "^r = 'x': must be radii"),
+        (lambda: MEDIUM.response(DISC, 785.0, []), "^r: needs a radius$"),
+        (lambda: MEDIUM.compliance([1.0, -1.0], 785.0), r"^k = '\(-1\+0j\)': wavenumbers must be finite"),
+    ],
+)
+def test_what_is_of_another_kind_is_refused_in_one_sentence(call: Callable[[], object], words: str):
+    with pytest.raises(Refusal, match=words):
+        call()
+
+
+def test_a_medium_is_shown_short():
+    layer = attenuation.Layer(1.5e-3, 1000, 1e5, 0.4)
+    assert repr(attenuation.LayeredMedium([layer] * 2, BASE)) == "LayeredMedium(2 layers, 3 mm, on a half-space)"
+    assert repr(MEDIUM) == "LayeredMedium(half-space)"
 
 
 @pytest.mark.parametrize("room", ["attenuation", "accuracy"])

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from unitcad import notebook
+from unitcad.arguments import path, texts
 from unitcad.pipeline import Variant
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.build import Built
@@ -17,7 +18,6 @@ from unitcad.pipeline.folder import PAGE, held
 from unitcad.spec import Spec
 from unitcad.spec.asked import Format
 from unitcad.validation import Changes, Source, load
-from unitcad.validation.tables import listed
 
 
 @dataclass(frozen=True, repr=False)
@@ -83,8 +83,8 @@ def build(
     """
     spec = load(source, set)
     if formats is not None:
-        spec = load(spec, {"output.formats": listed(formats)})
-    built = build_spec(spec, Path(out), only=listed(only), check=check, say=progress or _silent)
+        spec = load(spec, {"output.formats": texts("formats", formats)})
+    built = build_spec(spec, Path(path("out", out)), only=texts("only", only), check=check, say=progress or _silent)
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
         from unitcad.report import write_report
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from unitcad import notebook
+from unitcad.arguments import texts
 from unitcad.attenuation.edge.estimates import summary
 from unitcad.estimating import estimate_spec
 from unitcad.spec.asked import Model
 from unitcad.validation import Changes, Source, load
-from unitcad.validation.tables import listed
 
 
 @dataclass(frozen=True, repr=False)
@@ -70,6 +70,9 @@ def estimate(
     that no model describes.
     """
     spec = load(source, set)
-    chosen = {"estimate.models": models and listed(models), "estimate.frequency_hz": frequency_hz}
+    chosen = {
+        "estimate.models": None if models is None else texts("models", models),
+        "estimate.frequency_hz": frequency_hz,
+    }
     wanted = {path: value for path, value in chosen.items() if value is not None}
     return EdgeEstimate(estimate_spec(load(spec, wanted)))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad import notebook
+from unitcad.arguments import check_number, path, texts
 from unitcad.batch.batch_records import Summary
 from unitcad.batch.estimate_table import write_estimates
 from unitcad.batch.executors import Workers
@@ -20,7 +21,7 @@ from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.spec.asked import Format
 from unitcad.text import toml
 from unitcad.validation import Changes
-from unitcad.validation.tables import changes_of, listed
+from unitcad.validation.tables import changes_of
 
 
 @dataclass(frozen=True, repr=False)
@@ -98,14 +99,19 @@ def batch(
     same call again goes on where an earlier one ended. What becomes of a variant is in the result. Raises Refusal or
     UnitcadError where nothing can be run.
     """
-    chosen = sweep if isinstance(sweep, Sweep) else load_sweep(sweep)
+    check_number("jobs", jobs, 0, 1024, whole=True)
+    check_number("timeout", timeout, 0.001, 1e9)
+    check_number("limit", limit, 1, 1e9, whole=True)
+    chosen = sweep if isinstance(sweep, Sweep) else load_sweep(path("sweep", sweep))
     overrides = [
         change if isinstance(change, str) else "=".join((change[0], toml(change[1]))) for change in changes_of(set)
     ]
-    wanted = chosen.overridden([*overrides, *([] if formats is None else [f"output.formats={listed(formats)}"])])
-    folder = Path("out") / wanted.slug if out is None else Path(out)
-    where = None if cache is None else Path(cache)
-    options = BatchOptions(tuple(listed(only)), check, keep_going, timeout, limit, where)
+    wanted = chosen.overridden(
+        [*overrides, *([] if formats is None else [f"output.formats={texts('formats', formats)}"])]
+    )
+    folder = Path("out") / wanted.slug if out is None else Path(path("out", out))
+    where = None if cache is None else Path(path("cache", cache))
+    options = BatchOptions(tuple(texts("only", only)), check, keep_going, timeout, limit, where)
     summary = make(wanted, folder, options, Workers(jobs))
     if report:
         from unitcad.report import write_report

@@ -23,7 +23,7 @@ from importlib.resources import files
 from typing import IO, Any
 
 from unitcad.batch.cluster import FROM_DASK, Certificates, check_certificates, dask_executor
-from unitcad.errors import Refusal
+from unitcad.errors import WrongArgument
 
 _START = "import sys; sys.path[:] = {path!r}; from unitcad.batch.worker import serve; serve({preload!r})"
 WARM = ("unitcad.pipeline.build", "unitcad.mould_checks", "unitcad.check", "unitcad.kernels.mesh")
@@ -154,7 +154,7 @@ class Workers:
         check_certificates(self.certificates, self.scheduler)
         if self.scheduler is not None:
             if self.jobs is not None:
-                raise Refusal("--jobs", self.jobs, "the scheduler knows its workers; leave it out with --scheduler")
+                raise WrongArgument("jobs", self.jobs, "the scheduler knows its workers; leave it out with --scheduler")
             cluster, threads = dask_executor(self.scheduler, self.certificates)
             try:
                 yield cluster, threads
@@ -162,7 +162,7 @@ class Workers:
                 cluster.shutdown(wait=False)  # which takes back what is still with the scheduler
         elif self.jobs == 0:
             if timeout is not None:
-                raise Refusal("--timeout", timeout, "only a worker process can be ended in time; with -j from 1 on")
+                raise WrongArgument("timeout", timeout, "only a worker process can be ended in time; with -j from 1 on")
             yield SerialExecutor(), 1
         else:
             processes = ProcessExecutor(self.jobs or _cores())

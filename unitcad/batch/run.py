@@ -23,7 +23,7 @@ from unitcad.batch.results import columns_of, write_results, write_timings
 from unitcad.batch.sweep import MOST, Sweep
 from unitcad.batch.task import Job, Task, VariantOutcome
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.folder import clear_leftovers, folder_name, whole
 from unitcad.pipeline.geometry import build_key
@@ -128,7 +128,7 @@ def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> Ba
 def counted(sweep: Sweep, limit: int | None) -> int:
     """Count the variants to make. Raises Refusal for more than MOST without a limit, and for a limit below one."""
     if limit is not None and limit < 1:
-        raise Refusal("--limit", limit, "needs a number of variants from 1 on", 1)
+        raise WrongArgument("limit", limit, "needs a number of variants from 1 on", 1)
     if limit is None and sweep.count > MOST:
         raise Refusal(
             "sweep", sweep.count, f"variants are more than {MOST:,}: ask for the first ones with --limit", MOST

@@ -25,7 +25,7 @@ from msgspec import Meta, Struct, field, structs
 
 from unitcad.batch.paths import check_path
 from unitcad.cache import digest
-from unitcad.errors import Refusal, unknown_name
+from unitcad.errors import Refusal, WrongArgument, unknown_name
 from unitcad.files import names_device
 from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.fields import fields_of
@@ -196,7 +196,7 @@ def load_sweep(source: str | os.PathLike[str]) -> Sweep:
     else:
         known = shipped()
         if text not in known:
-            raise unknown_name("SWEEP", text, known)
+            raise unknown_name("sweep", text, known, WrongArgument)
         path = known[text]
     return from_file(read_toml(path), path.parent, path.stem)
 

@@ -9,11 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from unitcad.arguments import check_number, path, texts
 from unitcad.check.findings import FileReport, Finding
 from unitcad.check.options import Options
 from unitcad.check.rules.f_limits import Limits
 from unitcad.check.units import unit_named
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import UnitcadError, WrongArgument
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer
@@ -90,19 +91,23 @@ def check(
     from unitcad.check import many_files
     from unitcad.check.rules.registry import check_prefixes
 
-    if isinstance(printer, str):
-        from unitcad.catalogue import choose, printers
+    if printer is not None:
+        from unitcad.catalogue import Printer, choose, printers
 
-        printer = choose("printer", printer, printers())
+        if isinstance(printer, str):
+            printer = choose("printer", printer, printers())
+        elif not isinstance(printer, Printer):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise WrongArgument("printer", printer, "takes a printer's name or its entry")
     if not files:
         raise UnitcadError("check needs a file, a folder or a glob")
-    for field, value, least in (("max_faces", max_faces, 1), ("timeout", timeout, 0.001), ("jobs", jobs, 1)):
-        if value is not None and not least <= value < _MOST:
-            raise Refusal(field, value, f"must be a number from {least:g} to {_MOST:g}", least)
+    names = [path("files", file) for file in files]
+    for field, value, least in (("max_faces", max_faces, 1), ("jobs", jobs, 1), ("shells", shells, 0)):
+        check_number(field, value, least, _MOST, whole=True)
+    check_number("timeout", timeout, 0.001, _MOST)
     default = Limits()
     options = Options(
-        select=check_prefixes("select", _listed(select)),
-        ignore=check_prefixes("ignore", _listed(ignore)),
+        select=check_prefixes("select", _listed("select", select)),
+        ignore=check_prefixes("ignore", _listed("ignore", ignore)),
         unit=unit_named("unit", unit),
         printer=printer,
         shells=shells,
@@ -113,12 +118,12 @@ def check(
             seconds=default.seconds if timeout is None else timeout,
         ),
     )
-    paths, missing = many_files.expand([os.fspath(file) for file in files])
+    paths, missing = many_files.expand(names)
     work = [(path, options) for path in paths]
     return CheckResult((*missing, *many_files.check_files(work, jobs=jobs)))
 
 
-def _listed(codes: Sequence[str]) -> list[str]:
+def _listed(name: str, codes: Sequence[str]) -> list[str]:
     """Return prefixes given as a list or as one text with commas."""
-    parts = codes.split(",") if isinstance(codes, str) else codes
+    parts = codes.split(",") if isinstance(codes, str) else texts(name, codes)
     return [part for part in parts if part.strip()]

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from unitcad.errors import UnitcadError
+from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.text import printable
 
 if TYPE_CHECKING:
@@ -34,9 +34,15 @@ def _unicode(stream: Any) -> bool:
 
 def say_error(error: UnitcadError, as_json: bool) -> None:
     """Print an error: a line on standard error and, with `--json`, an object on standard output."""
+    if isinstance(error, WrongArgument):
+        error = Refusal(_ARGUMENTS.get(error.field, f"--{error.field}"), error.value, error.limit, error.nearest)
     sys.stderr.write(f"error: {printable(str(error))}\n")
     if as_json:
         print_json({"error": error.as_dict()})
+
+
+_ARGUMENTS = {"spec": "SPEC", "sweep": "SWEEP"}
+"""What the help calls parameters that are no options."""
 
 
 def warn(line: str) -> None:

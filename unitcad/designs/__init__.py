@@ -12,7 +12,7 @@ from unitcad.designs.custom import custom
 from unitcad.designs.design import Design
 from unitcad.designs.dimensions import Dimensions
 from unitcad.designs.tooling import Tooling
-from unitcad.errors import UnitcadError, unknown_name
+from unitcad.errors import Refusal, UnitcadError, unknown_name
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
 from unitcad.spec.asked import AskedSpec
@@ -54,6 +54,8 @@ def design_of(spec: Spec | AskedSpec) -> Design:
     """Return the design of a spec. Raises Refusal for an unknown one, UnitcadError for a custom one that fails."""
     if is_custom(spec.design):
         return custom(spec.design, spec.design_source or "")
+    if spec.design.endswith(".py"):
+        raise Refusal("design", spec.design, f"name the function or Design in that file: {spec.design}:NAME")
     if spec.design not in shipped():
         raise unknown_name("design", spec.design, shipped())
     return shipped()[spec.design]

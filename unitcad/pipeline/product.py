@@ -11,7 +11,7 @@ from unitcad import __version__, files
 from unitcad.cache import Store, digest
 from unitcad.designs import design_of, no_estimate
 from unitcad.designs.design import Reason
-from unitcad.errors import Refusal, unknown_name
+from unitcad.errors import WrongArgument, unknown_name
 from unitcad.mould_checks.finding import FindingRecord
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import artifacts
@@ -92,9 +92,9 @@ def checked_outputs(only: Sequence[str]) -> tuple[str, ...]:
     """Return `only` in the order of OUTPUTS. Raises Refusal for an unknown one, or none."""
     for name in only:
         if name not in OUTPUTS:
-            raise unknown_name("--only", name, OUTPUTS)
+            raise unknown_name("only", name, OUTPUTS, WrongArgument)
     if not only:
-        raise Refusal("--only", "", f"needs at least one of {', '.join(OUTPUTS)}", OUTPUTS[0])
+        raise WrongArgument("only", "", f"needs at least one of {', '.join(OUTPUTS)}", OUTPUTS[0])
     return tuple(name for name in OUTPUTS if name in only)
 
 
@@ -102,7 +102,7 @@ def possible_outputs(spec: Spec, only: Sequence[str]) -> tuple[str, ...]:
     """Return what of `only` there can be: not every design has an estimate. Raises Refusal where nothing is left."""
     possible = tuple(name for name in only if name != "estimate" or design_of(spec).passes)
     if not possible:
-        raise Refusal("--only", ",".join(only), f"{spec.design} has no estimate: {no_estimate()}", "unit")
+        raise WrongArgument("only", ",".join(only), f"{spec.design} has no estimate: {no_estimate()}", "unit")
     return possible
 
 

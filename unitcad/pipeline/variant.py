@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from unitcad import notebook
 from unitcad.catalogue import materials
-from unitcad.errors import UnitcadError, unknown_name
+from unitcad.errors import UnitcadError, WrongArgument, unknown_name
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
@@ -59,7 +59,9 @@ class Variant(MouldSet):
         counter-clockwise from outside. Raises Refusal for a name or a library that there is not.
         """
         if library not in ("manifold3d", "trimesh"):
-            raise unknown_name("library", library, ("manifold3d", "trimesh"))
+            raise unknown_name("library", str(library), ("manifold3d", "trimesh"))
+        if not isinstance(body, Body | str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise WrongArgument("body", body, "takes a body's name or a Body")
         solid = super().mesh(self._body(body) if isinstance(body, str) else body)
         if library == "manifold3d":
             return solid

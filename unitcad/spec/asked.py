@@ -13,6 +13,8 @@ from msgspec import Meta, Struct
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
 
+DEFAULT_MOTOR = "LCM0720A3463F"
+"""The motor of a spec that gives neither a part nor a size."""
 LEAST_LAYER = 0.5
 """Least wall and cap of a layer, mm: thinner ones tear on demoulding and hide a printer's play."""
 LEAST_TAIL = 0.4
@@ -34,7 +36,10 @@ class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_u
 
 
 class MotorTable(Table, frozen=True, kw_only=True):
-    """The motor: a catalogue `part`, or its size; a size given beside a part overrides the catalogue's."""
+    """The motor: a catalogue `part`, or its size; a size given beside a part overrides the catalogue's.
+
+    Without either it is `DEFAULT_MOTOR`.
+    """
 
     part: str | None = None
     diameter_mm: kinds.MotorDiameter | None = None
@@ -141,7 +146,7 @@ class AskedSpec(Table, frozen=True, kw_only=True):
     name: Annotated[str, Meta(min_length=1, max_length=120)]
     design: str
     diameter_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM)]
-    motor: MotorTable = MotorTable(part="LCM0720A3463F")
+    motor: MotorTable = MotorTable(part=DEFAULT_MOTOR)
     fpcb: FpcbTable | None = None
     wires: WiresTable | None = None
     layers: Annotated[tuple[LayerTable, ...], Meta(min_length=1, max_length=15, description=_LAYERS)]

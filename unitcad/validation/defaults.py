@@ -9,7 +9,7 @@ from unitcad.designs import Design, design_of
 from unitcad.designs.limits import least_slot
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
-from unitcad.spec.asked import AskedSpec
+from unitcad.spec.asked import DEFAULT_MOTOR, AskedSpec
 from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.spec.effective import CastLayer, Circuit, Estimate, MotorSize, Moulds
 
@@ -73,14 +73,15 @@ def _motor(asked: AskedSpec) -> tuple[catalogue.Motor | None, MotorSize]:
     """Return the motor's catalogue entry and its size; a size given beside a part overrides the entry's."""
     given, part = asked.motor, None
     sizes = {"diameter_mm": given.diameter_mm, "thickness_mm": given.thickness_mm}
-    if given.part is not None:
-        part = catalogue.choose("motor.part", given.part, catalogue.motors(asked.motors))
+    name = DEFAULT_MOTOR if given.part is None and set(sizes.values()) == {None} else given.part
+    if name is not None:
+        part = catalogue.choose("motor.part", name, catalogue.motors(asked.motors))
         sizes = {field: float(getattr(part, field)) if size is None else size for field, size in sizes.items()}
     for field, size in sizes.items():
         if size is None:
             raise Refusal(f"motor.{field}", None, "is required where no part is named")
     known = {field: size for field, size in sizes.items() if size is not None}
-    return part, MotorSize(part=given.part, fill=given.fill, **known)
+    return part, MotorSize(part=name, fill=given.fill, **known)
 
 
 def _moulds(asked: AskedSpec, design: Design) -> Moulds:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.designs import default_design
-from unitcad.errors import Refusal, UnitcadError, UnknownKey, unknown_name
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
@@ -85,7 +85,7 @@ def read(source: str | os.PathLike[str]) -> dict[str, Any]:
     else:
         known = templates()
         if text not in known:
-            raise unknown_name("SPEC", text, known)
+            raise unknown_name("spec", text, known, WrongArgument)
         path = known[text]
     return with_source(read_toml(path), path.parent)
 
@@ -97,7 +97,7 @@ def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any
     for text in overrides:
         path, equals, raw = text.partition("=")
         if not equals or not path.strip():
-            raise Refusal("--set", text, "needs the form path=value, such as layers.0.wall_mm=1.0")
+            raise WrongArgument("set", text, "needs the form path=value, such as layers.0.wall_mm=1.0")
         put(result, path.strip(), _parsed(raw.strip()))
     return result
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from numbers import Integral, Real
 from typing import Any, Protocol, cast
 
@@ -37,11 +37,6 @@ _DERIVED = {
     "estimate": ("frequency_hz", "amplitude_um"),
 }
 """What validation works out from other values where a spec leaves it out."""
-
-
-def listed(given: Sequence[str]) -> list[str]:
-    """Return the entries of a list; a single text is a list of one."""
-    return [given] if isinstance(given, str) else list(given)
 
 
 def plain(node: object, field: str = "") -> Any:

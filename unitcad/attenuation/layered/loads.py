@@ -23,7 +23,7 @@ _DIRECTIONS = ("normal", "radial", "tangential")
 
 def _check(direction: str) -> None:
     if direction not in _DIRECTIONS:
-        raise unknown_name("load.direction", direction, _DIRECTIONS)
+        raise unknown_name("load.direction", str(direction), _DIRECTIONS)
 
 
 def _orders(direction: Direction) -> tuple[int, ...]:

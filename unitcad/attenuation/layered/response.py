@@ -64,9 +64,9 @@ def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rto
     for r = 0 under a surface point load, `UnitcadError` where no finite answer was found. If rtol can't be reached
     the errors say so.
     """
-    radii = np.asarray(r, dtype=float)
-    if radii.size == 0 or not np.all(np.isfinite(radii)) or np.any(radii < 0):
-        raise Refusal("r", "array", "radii must be finite and not negative, and there must be one")
+    if not isinstance(load, Load):
+        raise Refusal("load", str(load), "must be a Point or a UniformDisc")
+    radii = _radii(r)
     z, rtol = finite("z", z), finite("rtol", rtol, above=True)
     if not 1e-12 <= rtol <= 0.1:
         raise Refusal("rtol", rtol, "must be from 1e-12 to 0.1", min(max(rtol, 1e-12), 0.1))
@@ -94,6 +94,20 @@ def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rto
         zero = np.zeros(radii.shape)
         u, error = (rows[0], zero + 0j, rows[1]), (errors[0], zero, errors[1])
     return Response(*(part[()] for part in u), *(part[()] for part in error), wavenumbers=integrals.wavenumbers)
+
+
+def _radii(r: Any) -> w.Array:
+    """Return radii as an array. Raises `Refusal` with the first that can't be."""
+    try:
+        radii = np.asarray(r, dtype=float)
+    except (TypeError, ValueError):
+        raise Refusal("r", str(r), "must be radii: a number or an array of numbers") from None
+    if radii.size == 0:
+        raise Refusal("r", None, "needs a radius")
+    wrong = radii[~(np.isfinite(radii) & (radii >= 0))]
+    if wrong.size:
+        raise Refusal("r", float(wrong[0]), "radii must be finite and not negative", 0.0)
+    return radii
 
 
 _LIMIT = np.array([6.0, -15.0, 20.0, -15.0, 6.0, -1.0])

@@ -61,14 +61,32 @@ def _check_material(what: str, body: Layer | HalfSpace, above: bool) -> None:
     if nu > 0.5:
         raise Refusal(f"{what}.poisson_ratio", nu, "must be at most 0.5", 0.5)
     finite(f"{what}.poisson_ratio", nu, -1.0, above=True)
+    if not isinstance(body.damping, Damping):
+        raise Refusal(
+            f"{what}.damping", str(body.damping), "must be a LossFactor, KelvinVoigt, FractionalKelvinVoigt or None"
+        )
 
 
 class Stack:
-    """Layers, top first, on a half-space: its compliance and its transfer to a depth, per wavenumber."""
+    """Layers, top first, on a half-space: its compliance and its transfer to a depth, per wavenumber.
+
+    Raises `Refusal` for what is no `Layer` or no `HalfSpace`.
+    """
 
     def __init__(self, layers: Iterable[Layer], half_space: HalfSpace) -> None:
-        self.layers: tuple[Layer, ...] = tuple(layers)
+        entries: list[Any] = list(layers) if isinstance(layers, Iterable) else [layers]
+        for i, layer in enumerate(entries):
+            if not isinstance(layer, Layer):
+                raise Refusal(f"layers.{i}", layer, "must be a Layer")
+        if not isinstance(half_space, HalfSpace):
+            raise Refusal("half_space", str(half_space), "must be a HalfSpace")
+        self.layers: tuple[Layer, ...] = tuple(entries)
         self.half_space = half_space
+
+    def __repr__(self) -> str:
+        count, thickness = len(self.layers), sum(layer.thickness for layer in self.layers)
+        layers = f"{count} {'layer' if count == 1 else 'layers'}, {1000 * thickness:g} mm, on a " if count else ""
+        return f"{type(self).__name__}({layers}half-space)"
 
     def compliance(self, k: Any, omega: float) -> w.Array:
         """Return surface displacement (u_r, u_z) per surface traction (t_r, t_z), in m/Pa, shape k.shape + (2, 2).
@@ -78,8 +96,9 @@ class Stack:
         for k, for omega and for a body that nothing holds at omega = 0.
         """
         k = np.asarray(k, dtype=np.complex128)
-        if not (np.all(np.isfinite(k)) and np.all(k.real > 0)):
-            raise Refusal("k", "array", "wavenumbers must be finite, with a positive real part")
+        wrong = k[~(np.isfinite(k) & (k.real > 0))]
+        if wrong.size:
+            raise Refusal("k", str(wrong[0]), "wavenumbers must be finite, with a positive real part")
         top = self.planes(k.ravel(), omega)[0]
         with np.errstate(divide="ignore", invalid="ignore"):  # infinite at an undamped mode
             block = w.product(top.u, w.adjugate(top.t)) / w.determinant(top.t)
