@@ -23,31 +23,33 @@ HERE = Path(__file__).parent
 TITLES = {
     "paper": "paper, one constant",
     "consistent": "consistent, one constant",
-    "crossings": "k_t once embedded, twice encapsulating, one constant",
+    "crossings": "layer propagation (model `crossings`): k_t once embedded, twice encapsulating, one constant",
     "fitted": "fitted, the divider, two constants",
     "null": "null: softer layer inside or not, two constants",
 }
 
 
 def table_of_models() -> str:
-    """Every model against the measured table."""
+    """Return every model against the measured table."""
     rows = [
         "| model | levels, in-sample | a unit left out | ratios | worst ratio | a unit left out | directions |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, title in TITLES.items():
-        found = assessments()[name]
-        without = f"{found.left_out_ratios.geometric_mean:.2f}" if found.left_out_ratios else "no constant in it"
+        assessment = assessments()[name]
+        without = (
+            f"{assessment.left_out_ratios.geometric_mean:.2f}" if assessment.left_out_ratios else "no constant in it"
+        )
         rows.append(
-            f"| {title} | {found.levels.geometric_mean:.2f} | {found.left_out.geometric_mean:.2f} "
-            f"| {found.ratios.geometric_mean:.2f} | {found.ratios.worst:.2f} | {without} "
-            f"| {found.directions} of {found.ratios.count} |"
+            f"| {title} | {assessment.levels.geometric_mean:.2f} | {assessment.left_out.geometric_mean:.2f} "
+            f"| {assessment.ratios.geometric_mean:.2f} | {assessment.ratios.worst:.2f} | {without} "
+            f"| {assessment.directions} of {assessment.ratios.count} |"
         )
     return "\n".join(rows)
 
 
 def table_of_readings() -> str:
-    """The paper's model by each reading of eta and by each wave."""
+    """Return the paper's model by each reading of eta and by each wave."""
     rows = [
         "| eta read as | wave | levels | a unit left out | ratios | directions |",
         "| --- | --- | --- | --- | --- | --- |",
@@ -55,17 +57,17 @@ def table_of_readings() -> str:
     for reading in cf.READINGS:
         for wave in ("s", "p"):
             path = one_constant(lambda u, wave=wave, reading=reading: cf.paper_path(u, wave, reading))
-            found = assess(path, fitted_ratios=False)
+            assessment = assess(path, fitted_ratios=False)
             rows.append(
-                f"| {reading} | {wave.upper()} | {found.levels.geometric_mean:.2f} "
-                f"| {found.left_out.geometric_mean:.2f} | {found.ratios.geometric_mean:.2f}"
-                f" | {found.directions} of {found.ratios.count} |"
+                f"| {reading} | {wave.upper()} | {assessment.levels.geometric_mean:.2f} "
+                f"| {assessment.left_out.geometric_mean:.2f} | {assessment.ratios.geometric_mean:.2f}"
+                f" | {assessment.directions} of {assessment.ratios.count} |"
             )
     return "\n".join(rows)
 
 
 def table_of_units() -> str:
-    """Each measured unit beside the models."""
+    """Return each measured unit beside the models."""
     table = measured_table()
     rows = ["| unit | measured % | paper | consistent | fitted |", "| --- | --- | --- | --- | --- |"]
     for i, name in enumerate(table.names):
@@ -75,11 +77,11 @@ def table_of_units() -> str:
 
 
 def constants() -> str:
-    """The fitted constants."""
-    found = scales()
+    """Return the fitted constants."""
+    by_model = scales()
     return (
         f"kappa = {STORED_FIT['kappa']:.3f}, s = {STORED_FIT['s']:.3f} for the divider; "
-        f"s = {found['paper']:.3f} for paper, {found['consistent']:.3f} for consistent."
+        f"s = {by_model['paper']:.3f} for paper, {by_model['consistent']:.3f} for consistent."
     )
 
 

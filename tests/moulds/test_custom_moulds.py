@@ -55,12 +55,12 @@ def test_overlaps_inside_the_unit_are_errors_without_moulds_too(tmp_path: Path) 
     code = "def unit(spec):\n    return ring(5.75, 7.0, 0, 2.11)\n"
     done = built(tmp_path, code, circuit="[fpcb]\nthickness_mm = 0.11\n")
     assert not done.ok
-    (law,) = [law for law in done.manifest["laws"] if not law["ok"]]
-    assert (law["code"], law["where"]) == ("C200", "unit: layer1 and fpcb")
-    assert abs(law["value"] - 0.11 * 3 * 1.25) < 0.02
+    (finding,) = [finding for finding in done.manifest["laws"] if not finding["ok"]]
+    assert (finding["code"], finding["where"]) == ("C200", "unit: layer1 and fpcb")
+    assert abs(finding["value"] - 0.11 * 3 * 1.25) < 0.02
     whole = built(tmp_path, code.replace("2.11", "2.0"), circuit="[fpcb]\nthickness_mm = 0.11\n")
     assert whole.ok
-    assert [law["code"] for law in whole.manifest["laws"]] == ["C200"]
+    assert [finding["code"] for finding in whole.manifest["laws"]] == ["C200"]
 
 
 LUGS = """
@@ -255,7 +255,7 @@ def test_the_worked_examples_are_built_whole(name: str, change: dict[str, object
     spec = load(CUSTOM / f"{name}.toml", change | {"output.formats": ["stl", "svg"]})
     done = build(spec, tmp_path)
     assert done.ok
-    assert [law for law in done.manifest["laws"] if not law["ok"]] == []
+    assert [finding for finding in done.manifest["laws"] if not finding["ok"]] == []
     assert done.manifest["check"]["errors"] == 0
     pours = [f"moulds/step{i + 1}-cup.stl" for i in range(len(spec.layers))]
     assert {"casting.md", "bom.csv", "moulds/base.stl", "step1-section.svg", *pours} <= set(done.manifest["files"])

@@ -149,7 +149,7 @@ class Workers:
     def executor(self, timeout: float | None = None) -> Iterator[tuple[Executor, int]]:
         """Yield an executor and how many tasks it runs at once; the end of the block ends what was started for it.
 
-        Raises Refusal or UnitcadError for a combination that can't be, or a scheduler that does not answer.
+        Raises Refusal or UnitcadError for an invalid combination, or a scheduler that does not answer.
         """
         check_certificates(self.certificates, self.scheduler)
         if self.scheduler is not None:

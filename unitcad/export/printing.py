@@ -14,8 +14,8 @@ def print_ready(vertices: np.ndarray, faces: np.ndarray, upside_down: bool = Fal
     """Lay a closed mesh (vertices (n, 3) mm, faces (m, 3)) on the bed, rounded to single precision, still closed.
 
     Returns float32 vertices and faces in a canonical order (vertices sorted, each face from its least vertex, faces
-    sorted), every face thicker than single precision resolves at this size. Raises UnitcadError where that can't be
-    had.
+    sorted), every face thicker than single precision resolves at this size. Raises UnitcadError where that is
+    not possible.
     """
     return single_precision(laid_down(vertices, upside_down), faces)
 

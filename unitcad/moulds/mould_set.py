@@ -93,7 +93,7 @@ class MouldSet:
 
     @cached_property
     def plan(self) -> Plan:
-        """Tools and pours. Raises Refusal where the moulds can't be."""
+        """Tools and pours. Raises Refusal where the moulds can't be made."""
         if self.altered:
             return self.altered
         drawn = _drawn(self.geometry)

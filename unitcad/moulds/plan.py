@@ -81,8 +81,8 @@ class Plan:
 def plan(spec: Spec) -> Plan:
     """Return the plan of a spec: the tooling that its design asks for, labelled, and the pours.
 
-    Raises Refusal where the moulds can't be: beyond the bed, a tail that reaches no edge, a lid whose vents or a tongue
-    whose width can't clear the air, a piece that nothing holds.
+    Raises Refusal where the moulds can't be made: beyond the bed, a tail that reaches no edge, a lid whose vents or a
+    tongue whose width can't clear the air, a piece that nothing holds.
     """
     layers = cast_layers(spec)
     made = _tooling(spec, layers)

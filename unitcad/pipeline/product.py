@@ -47,7 +47,7 @@ class Product:
 
 
 def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
-    """Return everything asked for of a spec, nothing written yet. Raises Refusal where the moulds can't be."""
+    """Return everything asked for of a spec, nothing written yet. Raises Refusal where the moulds can't be made."""
     moulds, possible = MouldSet(spec), possible_outputs(spec, only)
     shape = geometry(moulds, possible, check, store, stages)
     drawn, no_pictures = _pictures(moulds, possible, store, stages)

@@ -19,7 +19,7 @@ _PRINTER_LENGTHS = tuple(f for f in Moulds.__struct_fields__ if f in catalogue.P
 
 
 def effective(asked: AskedSpec) -> Spec:
-    """Return the effective spec. Raises Refusal for the first value that can't be."""
+    """Return the effective spec. Raises Refusal for the first value that is not valid."""
     if is_custom(asked.design):
         if asked.design_source is None:
             raise Refusal("design_source", None, f"is required with design = {asked.design!r}")

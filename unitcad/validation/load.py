@@ -42,7 +42,7 @@ def load(source: Source, set: Changes = ()) -> Spec:
     a dict by dotted path ({"layers.0.wall_mm": 1.2}), or texts "path=value" with a value in TOML syntax (a bare word
     counts as a string). Lengths in mm. Values that follow from others follow the changed ones. A custom design's
     path starts at the file's folder, else at the working directory. Raises Refusal or UnitcadError, naming the
-    field, for whatever can't be.
+    field, for an invalid value.
     """
     changes = list(changes_of(set))
     if isinstance(source, str | os.PathLike):
@@ -125,7 +125,7 @@ def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
     """Return the validated, effective `Spec` of plain data.
 
     `folder` is where the path of a custom design starts, whose file is then read and may run; without one no
-    file is. Raises Refusal for the first thing that can't be; the value that it offers is accepted in that field.
+    file is. Raises Refusal for the first fault; the value that it offers is accepted in that field.
     """
     plain = with_source(dict(data), folder) if folder else dict(data)
     try:

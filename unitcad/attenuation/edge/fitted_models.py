@@ -1,7 +1,9 @@
 """The three models of the edge level as functions of arrays, their fitted constants, and the null model beside them.
 
 `paper` and `consistent` leave the level at the motor open (f1, f2 are not printed): one constant, the geometric mean
-over the table. `fitted` has two constants. All are made from the catalogue's measured table when they are asked for.
+over the table. `fitted` has two constants. `crossings`, layer propagation alone (k_t once for each pass of an
+interface), is compared with the table but gives no estimate. All are made from the catalogue's measured table when they
+are asked for.
 """
 
 from __future__ import annotations

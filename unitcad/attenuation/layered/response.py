@@ -60,7 +60,7 @@ class Response:
 def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
     """Return the displacement of `medium` under `load` at radii r (m, any shape), a depth z (m) and omega (rad/s).
 
-    rtol: wanted error over the largest |u| of all radii, 1e-12 to 0.1. Raises `Refusal` for values that can't be, and
+    rtol: wanted error over the largest |u| of all radii, 1e-12 to 0.1. Raises `Refusal` for invalid values, and
     for r = 0 under a surface point load, `UnitcadError` where no finite answer was found. If rtol can't be reached
     the errors say so.
     """

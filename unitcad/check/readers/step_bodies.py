@@ -85,7 +85,7 @@ def _solids(label: Any, called: str, place: Any) -> list[tuple[str, Any]]:
     if XCAFDoc_ShapeTool.IsAssembly_s(label):
         parts = TDF_LabelSequence()
         XCAFDoc_ShapeTool.GetComponents_s(label, parts)
-        return [found for i in range(1, parts.Length() + 1) for found in _solids(parts.Value(i), called, place)]
+        return [solid for i in range(1, parts.Length() + 1) for solid in _solids(parts.Value(i), called, place)]
     explorer, solids = TopExp_Explorer(XCAFDoc_ShapeTool.GetShape_s(label).Moved(place), TopAbs_SOLID), []
     while explorer.More():
         solids.append((called, explorer.Current()))
