@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from faulty_sets import broken, of_spec, set_of
 
+from unitcad.casting.procedure import procedure
 from unitcad.errors import Refusal
 from unitcad.kernels.mesh import realise
 from unitcad.mould_checks import check_moulds, mould_checks, opening
@@ -248,6 +249,44 @@ def test_a_build_writes_moulds_and_casting(tmp_path: Path) -> None:
 
 CUSTOM = templates()["embedded"].parent / "custom"
 FLAT_TOP = {"parameters.flat_mm": 1.6}
+
+
+OWN = """
+from unitcad.designs import Design
+from unitcad.designs.dimensions import concentric
+unit = Design(
+    "own",
+    "a ring",
+    layers=lambda spec, dims: {"layer1": ring(5.5, 7, 0, 3)},
+    dimensions=lambda spec: concentric(spec, spec.motor.thickness_mm, None),
+    MORE
+)
+"""
+
+
+def assembly_of(moulds: MouldSet) -> tuple[str, ...]:
+    return procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps]).assembly
+
+
+def test_motor_and_circuit_of_a_function_are_put_in() -> None:
+    solder, push, rest = assembly_of(of_spec(load(CUSTOM / "strap-lugs.toml")))
+    assert solder.startswith("Solder the motor to the circuit's pad")
+    assert push == "Push the motor, the pad ahead, into the cavity from the skin, and lay the tail in the notch."
+    assert "The design's file says nothing more of the assembly" in rest
+
+
+@pytest.mark.parametrize(
+    ("more", "first"),
+    [
+        ("", "Push the motor into the cavity from the skin."),
+        ("opens='above'", "Push the motor into the cavity from above."),
+        ("assembly=lambda spec, dims: ['Glue it in.']", "Glue it in."),
+    ],
+)
+def test_the_motor_goes_in_where_the_design_opens_or_as_it_says(more: str, first: str, tmp_path: Path) -> None:
+    steps = assembly_of(of_spec(load(written(tmp_path, OWN.replace("MORE", more)))))
+    assert steps[0] == first
+    assert len(steps) == (1 if "assembly" in more else 2)
 
 
 @pytest.mark.parametrize(("name", "change"), [("strap-lugs", {}), ("film-closed", {}), ("dome", FLAT_TOP)])

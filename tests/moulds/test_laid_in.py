@@ -9,13 +9,15 @@ from pathlib import Path
 import pytest
 from faulty_sets import broken, of_spec, with_fault
 
+from unitcad.casting.procedure import procedure
+from unitcad.casting.written import to_markdown
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.kernels.mesh import bounds
 from unitcad.mould_checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.build import build
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
-from unitcad.shape import cut, moved
+from unitcad.shape import box, cut, moved
 from unitcad.validation import load, templates
 
 FILM = templates()["embedded"].parent / "custom" / "film-closed.toml"
@@ -79,6 +81,30 @@ def test_it_is_laid_in_between_the_pours(tmp_path: Path) -> None:
     assert "nan" not in (done.folder / "section.svg").read_text("utf-8")
     kinds = {part["name"]: part["made"] for part in done.manifest["parts"]}
     assert (kinds["motor"], kinds["fpcb"], kinds["layer1"]) == ("bought", "bought", "cast")
+
+
+def test_its_words_are_those_of_its_tools() -> None:
+    """A groove only where the cup has one, no walls of rings, and what is laid in is not on the scale."""
+    moulds = of_spec(load(FILM))
+    casting = procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps])
+    spec, lay = moulds.spec, moulds.plan.layout
+    for step, pour in zip(moulds.plan.steps, casting.pours, strict=True):
+        # Measured: a groove takes the cup's material beside the land, half its width further out, under the rim.
+        radius = moulds.plan.dimensions.radii[step.index - 1] + spec.moulds.land_mm + spec.moulds.groove_width_mm / 2
+        probe = moved(box(-0.1, 0.1, -0.1, 0.1, step.rim - 0.1, step.rim), lay.cells[0].x, lay.cells[0].y + radius)
+        (there,) = moulds.meshes([probe])
+        open_there = (moulds.solids[step.cup] ^ there).is_empty()
+        assert step.groove == open_there == any("into the groove" in text for text in pour.steps)
+    assert [step.groove for step in moulds.plan.steps] == [False, True]
+    assert ("cup1", "groove's floor") not in {(edge.piece, edge.edge) for edge in casting.off_grid}
+    assert casting.walls == ()
+    text = to_markdown(casting)
+    for words in ("Walls at the skin", "cups' play on the plinth", "Its outside", "without motor and circuit"):
+        assert words not in text
+    assert "0.630 g. What was laid in comes on top" in casting.measure[-1]
+    coat = next(i for i, words in enumerate(casting.pours[1].steps) if "Coat the tail thinly" in words)
+    assert "Put cup 2 on" in casting.pours[1].steps[coat + 1]
+    assert "petroleum jelly" in {item.item for item in casting.bill}
 
 
 def test_pictures_show_it_laid_in() -> None:

@@ -151,6 +151,7 @@ def test_what_a_design_has_wrong_is_one_sentence(more: str, why: str, tmp_path: 
         ("cup_piece(1, cup)", "cup_piece(2, cup)", "its tooling has no cup1"),
         ("cup_piece(1, cup),", "cup_piece(1, cup), cup_piece(1, cup),", "its tooling has cup1 twice"),
         ("seals=((),)", "seals=()", "its tooling has seals of 0 pours, not of 1"),
+        ("seals=((),)", "seals=((),), grooves=(True, True)", "its tooling has grooves of 2 pours, not of 1"),
         ("return concentric(spec, spec.motor.thickness_mm, None)", "return 1", "dimensions returns a int"),
     ],
 )

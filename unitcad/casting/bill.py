@@ -96,6 +96,8 @@ def _consumables(moulds: MouldSet) -> Iterator[Item]:
     yield Item("mixing cups and sticks", pours, "set", "bought", "no latex, no sulphur clay: they inhibit")
     if moulds.plan.of_kind("tongue"):
         yield Item("petroleum jelly", 1, "dab", "bought", "for tongues and windows only")
+    elif not moulds.plan.concentric and any(step.seals or step.inserts for step in moulds.plan.steps):
+        yield Item("petroleum jelly", 1, "dab", "bought", "for what stands beside the cavity, and for slots")
     if pours > 1:
         yield Item("isopropanol and lint-free wipes", 1, "set", "bought", "to wipe a cured layer before the next")
     if lengths.pour == "injected":

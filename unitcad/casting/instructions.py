@@ -44,14 +44,20 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
     first, tongues = step.index == 1, moulds.plan.standing(step, "tongue")
     cells, sprue = len(moulds.plan.layout.cells), moulds.spec.moulds.sprue_mm
     if not first:
+        bond = "Its outside" if moulds.plan.concentric else f"The face that Layer {step.index} touches"
         yield (
-            f"Wipe Layer {step.index - 1} with isopropanol and let it dry. Its outside is the bond face: no release "
+            f"Wipe Layer {step.index - 1} with isopropanol and let it dry. {bond} is the bond face: no release "
             "agent on it, ever, no grease, no fingers. No sourced window exists for when to pour the next layer; as "
             "soon as it is firm and no longer tacky is the usual practice (assumed), and silicone bonds to cured "
             "silicone of its kind."
         )
     if moulds.design.laid_in == step.index:
         yield from assembly(moulds)
+    if any(body.kind in ("circuit", "wire") for body in step.inserts):
+        yield (
+            f"Coat the {_lead(moulds)} thinly with petroleum jelly where the slot of cup {step.index} comes, outside "
+            "the cavity only: it keeps silicone from weeping out."
+        )
     core = f" and on the {_holds(moulds)}, sparingly" if first else ""
     pushed = (
         ": the play is then on one side."
@@ -89,10 +95,11 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
             "every vent shows a bead without bubbles. Leave sprue and vents filled."
         )
     else:
+        taken = "into the groove" if step.groove else "onto a scrap, since this cup has no groove"
         yield (
             f"Pour in a thin thread at one place until {'the' if cells == 1 else 'every'} cavity stands over its rim. "
             "Wait for the bubbles, prick what you see. Strike off along the rim with the blade held upright; what it "
-            "takes goes into the groove."
+            f"takes goes {taken}."
         )
         if not moulds.plan.concentric and moulds.plan.dimensions.core_height > step.rim:
             yield "What stands on the base beside the cavity is higher than this rim: draw the blade past it."
@@ -133,13 +140,13 @@ def measurements(moulds: MouldSet, grams: Sequence[float], slot_height: float | 
     yield f"Height over all: {dims.heights[-1]:.2f} mm. A cup that did not seat shows here."
     if moulds.plan.concentric:
         yield f"Diameter at the skin: {2 * dims.outer_radius:.2f} mm, in two directions."
+        further = f", each further layer by {2 * play:g} mm unless both cups were pushed the same way"
+        yield (
+            "Walls at the skin, at four places: their spread is the cup's shift. Layer 1 may vary by "
+            f"{play:g} mm either way{further if len(grams) > 1 else ''}."
+        )
     else:
         yield f"Farthest corner from the motor's axis: {dims.outer_radius:.2f} mm."
-    further = f", each further layer by {2 * play:g} mm unless both cups were pushed the same way"
-    yield (
-        "Walls at the skin, at four places: their spread is the cup's shift. Layer 1 may vary by "
-        f"{play:g} mm either way{further if len(grams) > 1 else ''}."
-    )
     if dims.exit:
         opening = "notch" if dims.exit.high >= dims.heights[0] else "slot"
         layers = f"in layers of {spec.moulds.layer_mm:g}"
@@ -148,12 +155,42 @@ def measurements(moulds: MouldSet, grams: Sequence[float], slot_height: float | 
         yield f"The {opening}: {size}, open all the way."
     weights = " + ".join(f"{each:.3f}" for each in grams) + (f" = {sum(grams):.3f}" if len(grams) > 1 else "")
     low = "" if spec.moulds.pour == "injected" else " or a low strike"
-    yield f"Weigh one unit, trimmed, without motor and circuit: {weights} g. Less means air{low}."
+    if moulds.design.laid_in:
+        yield (
+            f"The silicone of one unit, trimmed, weighs {weights} g. What was laid in comes on top: weigh it before. "
+            f"Less means air{low}."
+        )
+    else:
+        yield f"Weigh one unit, trimmed, without motor and circuit: {weights} g. Less means air{low}."
 
 
 def assembly(moulds: MouldSet) -> tuple[str, ...]:
-    """Describe how motor and circuit go into the body, or into the mould, in the design's words."""
-    return tuple(moulds.design.assembly(moulds.spec, moulds.plan.dimensions))
+    """Describe how motor and circuit go into the body, or into the mould: in the design's words, where it has any."""
+    return tuple(moulds.design.assembly(moulds.spec, moulds.plan.dimensions)) or tuple(_by_opening(moulds))
+
+
+def _by_opening(moulds: MouldSet) -> Iterator[str]:
+    """Describe the assembly of a design that says nothing of it, from the side that it opens to."""
+    spec, design, lead = moulds.spec, moulds.design, _lead(moulds)
+    if spec.fpcb:
+        yield "Solder the motor to the circuit's pad, and try the motor."
+    elif spec.wires:
+        yield "Try the motor on its wires."
+    if design.laid_in:
+        yield "Lay everything that is not silicone where the drawing of this pour shows it."
+        return
+    ahead = ", the pad ahead," if spec.fpcb and design.opens == "below" else ""
+    way = f", and lay the {lead} in the notch" if lead else ""
+    yield f"Push the motor{ahead} into the cavity from {'the skin' if design.opens == 'below' else 'above'}{way}."
+    yield (
+        "A smear of Layer 1's silicone holds it (assumed: silicone bonds poorly to bare metal and polyimide). The "
+        "design's file says nothing more of the assembly; a Design with an assembly of its own can."
+    )
+
+
+def _lead(moulds: MouldSet) -> str:
+    """Return what leads out of the silicone."""
+    return "tail" if moulds.spec.fpcb else "wires" if moulds.spec.wires else ""
 
 
 def _holds(moulds: MouldSet) -> str:

@@ -40,9 +40,10 @@ def _edges(moulds: MouldSet) -> list[tuple[str, str, float]]:
     edges = [("base", "seat", -bottom), ("base", "core's top", dims.core_height - bottom)]
     if dims.exit:
         edges += [("base", "ledge", dims.exit.low - bottom), ("tongue", "thickness", dims.exit.height)]
-    for i, rim in enumerate(dims.heights):
-        cup = f"cup{i + 1}"
-        edges += [(cup, "seat", rim), (cup, "groove's floor", groove_depth_of(spec, rim))]
+    for step, rim in zip(moulds.plan.steps, dims.heights, strict=True):
+        cup = step.cup
+        edges += [(cup, "seat", rim)]
+        edges += [(cup, "groove's floor", groove_depth_of(spec, rim))] if step.groove else []
         if dims.exit:
             low, high = dims.exit.low - clearance, dims.exit.high + clearance
             edges += [(cup, "window's lower edge", rim - low)]

@@ -33,7 +33,10 @@ class Pour:
 
 @dataclass(frozen=True)
 class Procedure:
-    """A whole casting: numbered steps run on from `preparation` through the pours to `assembly`."""
+    """A whole casting: numbered steps run on from `preparation` through the pours to `assembly`.
+
+    `walls` is () where the tooling is not concentric: nothing tells which of its walls a cup's play changes.
+    """
 
     name: str
     label: str
@@ -84,7 +87,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
         release=tuple(release(moulds, mixes[0][0])),
         assembly=() if moulds.design.laid_in else assembly(moulds),
         measure=tuple(measurements(moulds, grams, _printed_slot_height(moulds, edges))),
-        walls=tuple(_walls(spec)),
+        walls=tuple(_walls(spec)) if plan.concentric else (),
         bill=bill(moulds, mixes),
     )
 

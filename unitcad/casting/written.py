@@ -57,7 +57,8 @@ def to_markdown(procedure: Procedure) -> str:
     if procedure.assembly:
         lines += ["## Motor in", "", *steps(procedure.assembly), ""]
     lines += ["## Measure on the first part", "", *(f"- {markdown(text)}" for text in procedure.measure), ""]
-    lines += ["The cups' play on the plinth is the largest error of all:", "", *_figures(procedure.walls), ""]
+    if procedure.walls:
+        lines += ["The cups' play on the plinth is the largest error of all:", "", *_figures(procedure.walls), ""]
     needed = [(markdown(i.item), f"{i.quantity:.4g} {i.unit}", i.made, markdown(i.note)) for i in procedure.bill]
     lines += ["## Needed", "", *_table(("item", "quantity", "made", "note"), needed)]
     return "\n".join(lines) + "\n"

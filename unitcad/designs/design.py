@@ -51,7 +51,7 @@ class Design:
     laid_in      the pour (from 1) before which all that is not cast is laid in, to stay; None: it goes in after casting
     caps         whether a layer has a cap over the one inside it, or is an open ring
     passes       how often the wave from motor to skin passes the border between the layers; None: no estimate
-    assembly     how motor and circuit go into the body, or into the mould, a sentence each
+    assembly     how motor and circuit go into the body, or into the mould, a sentence each; [] for a default
     left_out     pieces that this variant does without, and why
     default      whether to start from it where none is named; one design's is True
     """

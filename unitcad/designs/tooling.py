@@ -42,6 +42,7 @@ class Tooling:
                  what has no `step` stands in every pour, but for a blade
     seals        for each pour, what silicone is kept from though no tool fills it
     channels     for each pour under a lid, the silicone in sprue and vents, as many a cell; () where all pours are open
+    grooves      for each pour, whether its cup has an overflow groove; () where all have one
     concentric   whether the tools are those of rings: then the dimensions tell every hole and gap in them
     """
 
@@ -50,4 +51,5 @@ class Tooling:
     tools: tuple[Body, ...]
     seals: tuple[tuple[Shape, ...], ...]
     channels: tuple[tuple[Shape, ...], ...] = ()
+    grooves: tuple[bool, ...] = ()
     concentric: bool = False

@@ -77,7 +77,7 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
 
     base = stand(spec, lay, in_cells(standing))
     solid_of = [realise(piece, segments).trim_by_plane((0, 0, 1), 0.0) for piece in standing]
-    cups, sealed = [], []
+    cups, sealed, grooved = [], [], []
     for i, rim in enumerate(rims):
         blank, under = cup_blank(spec, lay, rim), Below(union(cast[: i + 1]), -BEYOND)
         slots = [_grown(Below(shape, skirt_end(spec) - BEYOND), clearance) for shape in there(i)]
@@ -93,6 +93,7 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         grooves = [groove(spec, dims, i, cell) for cell in lay.cells]
         if any((realise(grooves[0], segments) ^ realise(hole, segments)).volume() > 0 for hole in slid):
             grooves = []
+        grooved.append(bool(grooves))
         bores, holes = in_cells([under]), in_cells(slid)
         cup = cut(blank, [recess(spec, lay), *bores, *holes, *grooves])
         pieces = _pieces(realise(cup, segments))
@@ -109,7 +110,7 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         *(cup_piece(i + 1, cup) for i, cup in enumerate(cups)),
         blade_piece(blade(lay, dims.heights[-1])),
     )
-    return Tooling(dims, lay, tools, seals=tuple(sealed))
+    return Tooling(dims, lay, tools, seals=tuple(sealed), grooves=tuple(grooved))
 
 
 def _extent(spec: Spec, solids: Sequence[Manifold], segments: int) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -24,7 +24,7 @@ class Step:
     silicone is kept from though no tool fills it; `channels` the silicone in sprue and vents, as many a cell.
     `inserts` are motor and circuit where they are laid in before this pour, or lie there already: of all cells.
     `rim` is z of the plane that the blade runs on, `top` where the silicone is open: the rim or the lid's upper face.
-    `windows` counts the cup's passages for tongues that are closed all round.
+    `windows` counts the cup's passages for tongues that are closed all round; `groove`: it has an overflow groove.
     """
 
     index: int
@@ -38,6 +38,7 @@ class Step:
     top: float
     channels: tuple[Shape, ...] = ()
     windows: int = 0
+    groove: bool = True
     inserts: tuple[Body, ...] = ()
 
     @property
@@ -107,6 +108,7 @@ def plan(spec: Spec) -> Plan:
             top=lid.lid_top(dims, i) if made.channels else dims.heights[i],
             channels=made.channels[i] if made.channels else (),
             windows=tails if dims.exit and dims.exit.high < dims.heights[i] else 0,
+            groove=made.grooves[i] if made.grooves else True,
             inserts=laid if i + 1 >= laid_in else (),
         )
         for i, layer in enumerate(spec.layers)
@@ -131,7 +133,8 @@ def _tooling(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     needed = ["base", *(f"{kind}{i + 1}" for i in range(len(cast)) for kind in ("cup", "lid")[: 1 + injected])]
     wrong = [f"has no {name}" for name in needed if name not in names]
     wrong += [f"has {name} twice" for name in sorted({name for name in names if names.count(name) > 1})]
-    for field in ("seals", *(["channels"] if made.channels or injected else [])):
+    optional = [("channels", made.channels or injected), ("grooves", made.grooves)]
+    for field in ("seals", *(field for field, given in optional if given)):
         count = len(getattr(made, field))
         wrong += [f"has {field} of {count} pours, not of {len(cast)}"] if count != len(cast) else []
     if wrong:
