@@ -18,7 +18,7 @@ from unitcad.pipeline.build import build
 from unitcad.pipeline.scenes import moments
 from unitcad.pipeline.variant import Variant
 from unitcad.report import write_report
-from unitcad.validation import load
+from unitcad.validation import load, templates
 
 Image = pytest.importorskip("PIL.Image", reason="reading the screenshots needs Pillow")
 
@@ -343,6 +343,19 @@ def test_what_is_absent_says_what_to_ask_for(running: Any, tmp_path: Path) -> No
         ("checks", "unit,moulds"),
     ):
         assert f"--only {ask}" in seen.page.inner_text(f"#{where}")
+    assert seen.errors == seen.console == []
+    seen.close()
+
+
+@pytest.mark.parametrize("only", [["unit"], ["unit", "estimate"]])
+def test_a_design_without_an_estimate_says_why(running: Any, only: list[str], tmp_path: Path) -> None:
+    """Whether or not it was asked for: the command that asks for it would be refused."""
+    spec = load(next(iter(templates().values())).parent / "custom" / "dome.toml", ["output.formats=[]"])
+    seen = Visit(running, write_report(build(spec, tmp_path, only=only).folder))
+    seen.page.wait_for_selector("#estimate .absent", timeout=10_000)
+    shown = seen.page.inner_text("#estimate")
+    assert "No estimate: the models describe" in shown
+    assert "--only" not in shown
     assert seen.errors == seen.console == []
     seen.close()
 

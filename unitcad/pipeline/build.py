@@ -14,7 +14,7 @@ from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import FORMATS, OUTPUTS
 from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import Manifest, failed_codes
-from unitcad.pipeline.product import checked_outputs, make
+from unitcad.pipeline.product import checked_outputs, make, possible_outputs
 from unitcad.pipeline.stages import Say, Stages
 from unitcad.pipeline.versions import code_version
 from unitcad.spec import Spec, with_formats
@@ -51,7 +51,7 @@ def build(
     the folder has from before are made again beside the new ones. What others have made already comes out of `store`.
     Raises Refusal or UnitcadError before anything is written; a failed check is no exception, see `Built.ok`.
     """
-    only = checked_outputs(only)
+    only = possible_outputs(spec, checked_outputs(only))
     if out.exists() and not out.is_dir():
         raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o")
     folder = out / folders.folder_name(spec)

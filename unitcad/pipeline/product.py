@@ -81,7 +81,7 @@ def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Sta
         check=mesh_findings(shape["check"]),
         pictures=list(drawn),
         casting=sorted(path for path in own if path in artifacts.CASTING) if "casting" in possible else None,
-        left_out=[LeftOut(what=what, why=why) for what, why in [*no_pictures, *_left_out(spec, only, possible, check)]],
+        left_out=[LeftOut(what=what, why=why) for what, why in [*no_pictures, *_left_out(spec, possible, check)]],
         versions={"unitcad": __version__, **kernel_versions(spec.output.formats)},
         files=dict(sorted(listed.items())),
     )
@@ -141,7 +141,7 @@ def _material(spec: Spec, part: PartRecord) -> str | None:
     return spec.layers[part["step"] - 1].material if part["made"] == "cast" and part["step"] else None
 
 
-def _left_out(spec: Spec, asked: Sequence[str], only: Sequence[str], check: bool) -> Iterator[Reason]:
+def _left_out(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
     """Name what this variant does without, and why."""
     if not check or "moulds" not in only:
         yield "mould checks", NO_MOULDS if check else folders.UNCHECKED
@@ -156,6 +156,7 @@ def _left_out(spec: Spec, asked: Sequence[str], only: Sequence[str], check: bool
     yield from design.left_out(spec)
     for name in OUTPUTS:
         if name not in only:
-            yield name, no_estimate() if name in asked else "not asked for (--only)"
+            # The page offers the command for what was not asked for (report/app/estimate.js).
+            yield name, no_estimate() if name == "estimate" and not design.passes else "not asked for (--only)"
     if "step" not in spec.output.formats:
         yield "boundary representation", "no STEP asked for"

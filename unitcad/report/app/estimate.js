@@ -133,7 +133,12 @@
 
   function estimate(variant) {
     const data = variant.estimate;
-    if (!data) return section("estimate", "Attenuation estimate", el("p", { className: "absent" }, "No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")));
+    if (!data) {
+      const left = (variant.manifest.left_out || []).find((entry) => entry.what === "estimate");
+      const ask = !left || left.why === "not asked for (--only)";
+      return section("estimate", "Attenuation estimate", el("p", { className: "absent" },
+        ask ? ["No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")] : `No estimate: ${left.why}.`));
+    }
     return section("estimate", "Attenuation estimate",
       el("p", {}, "An estimate, not a measurement: how much of the motor's amplitude reaches the skin at the unit's edge, by each model, and how it decays from there."),
       levels(data), ratios(data), el("h3", {}, "Outwards from the edge"), curves(data.layered), margins(data.models || {}), errors(data), assumptions(data),
