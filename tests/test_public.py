@@ -393,6 +393,14 @@ def test_a_repr_shows_what_was_given() -> None:
     assert repr(unitcad.Motor(part="x")) == "MotorTable(part='x')"
 
 
+def test_records_with_shapes_have_a_short_repr() -> None:
+    variant = unitcad.Variant.of("single-encapsulating")
+    assert repr(variant.bodies["layer1"]) == "Body('layer1': layer, cast, Cut)"
+    assert repr(variant.plan) == f"Plan({variant.plan.label}: {', '.join(t.name for t in variant.plan.tools)}; 1 pour)"
+    assert repr(variant.plan.steps[0]).startswith("Step(1: layer1, ")
+    assert len(repr(variant.plan.steps)) < 120
+
+
 def test_a_table_of_a_spec_is_data() -> None:
     layer = unitcad.Layer(material="ecoflex-00-10", wall_mm=1.25, cap_mm=1.0)
     assert msgspec.to_builtins(layer) == LAYERS[0]

@@ -53,3 +53,6 @@ class Tooling:
     channels: tuple[tuple[Shape, ...], ...] = ()
     grooves: tuple[bool, ...] = ()
     concentric: bool = False
+
+    def __repr__(self) -> str:
+        return f"Tooling({', '.join(tool.name for tool in self.tools)})"

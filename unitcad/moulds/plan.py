@@ -41,6 +41,9 @@ class Step:
     groove: bool = True
     inserts: tuple[Body, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"Step({self.index}: {self.name}, {self.material or 'no material'}; {', '.join(self.tools)})"
+
     @property
     def cup(self) -> str:
         """The cup's name."""
@@ -65,6 +68,10 @@ class Plan:
     label: str
     dimensions: Dimensions
     concentric: bool = True
+
+    def __repr__(self) -> str:
+        pours = f"{len(self.steps)} {'pour' if len(self.steps) == 1 else 'pours'}"
+        return f"Plan({self.label}: {', '.join(tool.name for tool in self.tools)}; {pours})"
 
     def tool(self, name: str) -> Body:
         """Return the tool of that name. Raises KeyError."""

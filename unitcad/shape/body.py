@@ -32,3 +32,6 @@ class Body:
     step: int | None = None
     upside_down: bool = False
     removal: tuple[int, int, int] | None = None
+
+    def __repr__(self) -> str:
+        return f"Body({self.name!r}: {self.kind}, {self.made}, {type(self.shape).__name__})"
