@@ -128,5 +128,7 @@ def test_what_can_not_be_laid_in_is_refused(tmp_path: Path) -> None:
         altered(tmp_path, "laid_in=2", "laid_in=3")
     with pytest.raises(UnitcadError, match="laid_in is 'last', not the number of a pour"):
         altered(tmp_path, "laid_in=2", "laid_in='last'")
-    with pytest.raises(Refusal, match="closed in by silicone below and above"):
+    with pytest.raises(UnitcadError, match="laid_in is None, not the number of a pour"):
         altered(tmp_path, "laid_in=2", "laid_in=None")
+    with pytest.raises(Refusal, match="closed in by silicone below and above"):
+        altered(tmp_path, "laid_in=2", "laid_in=0")

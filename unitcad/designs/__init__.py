@@ -105,11 +105,11 @@ def unit_bodies(spec: Spec) -> tuple[Body, ...]:
 
 
 def inserts(spec: Spec) -> tuple[Body, ...]:
-    """Return the bodies that are laid into the mould before the pour `Design.laid_in`, to stay; () where it is None.
+    """Return the bodies that are laid into the mould before the pour `Design.laid_in`, to stay; () where it is 0.
 
     Raises UnitcadError where the spec has fewer pours.
     """
-    laid_in, pours = design_of(spec).laid_in or 0, len(spec.layers)
+    laid_in, pours = design_of(spec).laid_in, len(spec.layers)
     if laid_in > pours:
         raise UnitcadError(f"design {spec.design}: laid_in is {laid_in}, and there are {pours} pours")
     return tuple(body for body in unit_bodies(spec) if body.made != "cast") if laid_in else ()

@@ -93,7 +93,7 @@ def _check_values(design: Design) -> None:
     ways = ("concentric", "complement")
     if not callable(design.tooling) and design.tooling not in ways:
         raise UnitcadError(f"design {design.name}: tooling is {design.tooling!r}, not a function or one of {ways}")
-    if design.laid_in is not None and not (isinstance(design.laid_in, int) and design.laid_in > 0):
+    if not (isinstance(design.laid_in, int) and design.laid_in >= 0):
         raise UnitcadError(f"design {design.name}: laid_in is {design.laid_in!r}, not the number of a pour")
     if design.opens not in ("above", "below"):
         raise UnitcadError(f"design {design.name}: opens is {design.opens!r}, not 'above' or 'below'")

@@ -48,7 +48,7 @@ class Design:
                  the cast layers; or a function from a spec and the cast layers' shapes to a Tooling
     suction      whether a unit closed at the top holds to its core, so that a filament must let air in
     opens        where motor and circuit go in: "above" or "below" (the skin)
-    laid_in      the pour (from 1) before which all that is not cast is laid in, to stay; None: it goes in after casting
+    laid_in      the pour (from 1) before which all that is not cast is laid in, to stay; 0: it goes in after casting
     caps         whether a layer has a cap over the one inside it, or is an open ring
     passes       how often the wave from motor to skin passes the border between the layers; None: no estimate
     assembly     how motor and circuit go into the body, or into the mould, a sentence each; [] for a default
@@ -67,7 +67,7 @@ class Design:
     tooling: Literal["concentric", "complement"] | Callable[[Spec, Sequence[Shape]], Tooling] = "complement"
     suction: bool = False
     opens: Literal["above", "below"] = "below"
-    laid_in: int | None = None
+    laid_in: int = 0
     caps: bool = False
     passes: float | None = None
     assembly: Callable[[Spec, Dimensions], list[str]] = _nothing

@@ -56,7 +56,7 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         raise Refusal("moulds.pour", "injected", "moulds by complement have no lids; they are poured open", "open")
     given, clearance = dimensions(spec), spec.moulds.window_clearance_mm
     segments = segment_count(given.outer_radius, spec.output.tolerance_mm)
-    laid, laid_in = [body.shape for body in inserts(spec)], design_of(spec).laid_in or 0
+    laid, laid_in = [body.shape for body in inserts(spec)], design_of(spec).laid_in
     solids = [realise(shape, segments) for shape in cast]
     rims, radii = _extent(spec, solids, segments)
 

@@ -99,7 +99,7 @@ def plan(spec: Spec) -> Plan:
     label = content_hash(Union((*(tool.shape for tool in made.tools), *layers)))[:4].upper()
     tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in made.tools)
     cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
-    laid_in, laid = design_of(spec).laid_in or 0, inserts(spec)
+    laid_in, laid = design_of(spec).laid_in, inserts(spec)
     laid = tuple(replace(b, shape=union(placed(b.shape, dims, cell) for cell in lay.cells)) for b in laid)
     tails = sum(len(cell.sides) for cell in lay.cells) if dims.exit else 0
     steps = tuple(

@@ -94,7 +94,7 @@ def unit_apart(moulds: MouldSet) -> dict[str, Offset]:
     layers = [body for body in sorted(moulds.unit, key=lambda body: body.step or 0) if body.kind == "layer"]
     inside = [body for kind in ("motor", "circuit") for body in moulds.unit if body.kind == kind]
     inside += [body for body in moulds.unit if body not in layers and body not in inside]
-    below = moulds.design.laid_in - 1 if moulds.design.laid_in else 0
+    below = max(moulds.design.laid_in - 1, 0)
     order = [*layers[:below], *inside, *layers[below:]]
     if moulds.design.opens == "above" and not moulds.design.laid_in:
         order = [*reversed(layers), *inside]
