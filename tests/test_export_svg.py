@@ -68,6 +68,18 @@ def test_main_dimensions_and_every_layer_are_there(template):
     assert wanted <= said
 
 
+CUSTOM = templates()["embedded"].parent / "custom"
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [("strap-lugs", {"15", "4.61", "Ø7"}), ("film-closed", {"14", "4.36", "Ø7"}), ("dome", {"14", "4", "Ø7"})],
+)
+def test_a_custom_design_has_the_dimensions_of_its_sections(name, wanted):
+    said = {text.split("#")[0] for text in texts(ElementTree.fromstring(Variant.of(CUSTOM / f"{name}.toml").section()))}
+    assert {text for text in said if text.strip("ØR").replace(".", "").isdigit()} == wanted
+
+
 def test_regions_are_the_profiles():
     """Layer 1 of the sample: twice its half profile, less the slot through one wall and into the cap above the core."""
     first, second = svg.cut(layers(), 96)

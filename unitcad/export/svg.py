@@ -18,6 +18,7 @@ from unitcad.export.drawing import Point
 from unitcad.export.threemf import colour_hex
 from unitcad.kernels.mesh import realise
 from unitcad.shape.body import Body
+from unitcad.shape.profile import GRID_PER_MM
 
 HAIR_MM = 1 / 3000
 """The cut lies this far off its plane, and so in no plane of the length grid: a face in the plane itself, shared by two
@@ -69,12 +70,17 @@ class Note:
     at: Point
 
 
-def cut(bodies: Sequence[Body], segments: int, y: float = 0.0, reach: float = math.inf) -> list[Region]:
-    """Return what the plane at `y` (mm) cuts of `bodies`, up to |x| = `reach`; what it misses is left out."""
+def cut(
+    bodies: Sequence[Body], segments: int, y: float = 0.0, reach: float = math.inf, swell: float | None = None
+) -> list[Region]:
+    """Return what the plane at `y` (mm) cuts of `bodies`, up to |x| = `reach`; what it misses is left out.
+
+    `swell` as in `unitcad.kernels.mesh.realise`.
+    """
     window = CrossSection.square((2 * reach, 2e4), True) if math.isfinite(reach) else None
     regions = []
     for body in bodies:
-        flat: CrossSection = realise(body.shape, segments).transform(_UPRIGHT).slice(HAIR_MM - y)
+        flat: CrossSection = realise(body.shape, segments, swell).transform(_UPRIGHT).slice(HAIR_MM - y)
         if window is not None:
             flat = flat ^ window
         loops = tuple(tuple((float(px), float(pz)) for px, pz in loop) for loop in flat.to_polygons())
@@ -124,13 +130,44 @@ def unit_section(
     segments: int,
     title: str = "",
     labels: Mapping[str, str] | None = None,
+    concentric: bool = True,
 ) -> str:
-    """Draw the unit cut along its tail, in the plane y = 0: main dimensions, layers and air named."""
+    """Draw the unit cut along its tail, in the plane y = 0: main dimensions, layers and air named.
+
+    `concentric`: the layers are drawn to `dims`. Others get only the dimensions that are measured on their sections.
+    """
+    if not concentric:
+        measures = _measured(bodies, dims, segments)
+        reach = max(
+            (abs(x) for m in measures if m.side == "below" for x in (m.start, m.end)), default=dims.outer_radius
+        )
+        return section(cut(bodies, segments, reach=reach + TAIL_MM), measures, (), title, labels)
     regions = cut(bodies, segments, reach=dims.outer_radius + TAIL_MM)
     notes = []
     if dims.air_ring > 0:
         notes.append(Note("air", ((dims.motor_radius + dims.cavity_radius) / 2, dims.motor_height / 3)))
     return section(regions, _unit_measures(dims), notes, title, labels)
+
+
+def _measured(bodies: Sequence[Body], dims: Dimensions, segments: int) -> list[Measure]:
+    """Return width and height of the cast layers together, and the motor's diameter where the plane holds its axis."""
+    show, names = drawing.millimetres, {body.name for body in bodies if body.made == "cast"}
+    # A polygon's corners on the circle: a round body is then as wide as it is drawn.
+    regions = cut(bodies, segments, swell=1.0)
+    cast = [point for region in regions if region.name in names for loop in region.loops for point in loop]
+    if not cast:
+        return []
+    (left, low), (right, high) = np.min(cast, axis=0).tolist(), np.max(cast, axis=0).tolist()
+    measures = [
+        Measure(show(right - left), left, right, "below", 1, low),
+        Measure(show(high - low), low, high, "left", 0, left),
+    ]
+    for region in regions:
+        across = [x for loop in region.loops for x, _ in loop]
+        if region.name == "motor" and abs(max(across) - min(across) - 2 * dims.motor_radius) < 2 / GRID_PER_MM:
+            text = f"Ø{show(2 * dims.motor_radius)}"
+            measures.append(Measure(text, min(across), max(across), "below", 0, low))
+    return measures
 
 
 def _unit_measures(dims: Dimensions) -> list[Measure]:

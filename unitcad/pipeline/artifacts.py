@@ -84,14 +84,11 @@ def _drawings(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
     if "unit" in only:
         from unitcad.export import svg
 
-        key = partial(geometry_key, moulds, "section")
-        yield Artifact(
-            "section.svg",
-            "",
-            "drawing",
-            lambda: svg.unit_section(moulds.unit, moulds.dimensions, moulds.segments).encode(),
-            key,
-        )
+        def drawn() -> bytes:
+            concentric = moulds.design.tooling == "concentric"
+            return svg.unit_section(moulds.unit, moulds.dimensions, moulds.segments, concentric=concentric).encode()
+
+        yield Artifact("section.svg", "", "drawing", drawn, partial(geometry_key, moulds, "section"))
     if "casting" in only:
         from unitcad.casting.written import step_section
 

@@ -85,7 +85,8 @@ class Variant(MouldSet):
         """Return the drawing of the unit cut along its tail, with dimensions in mm, as SVG."""
         from unitcad.export.svg import unit_section
 
-        return unit_section(self.unit, self.dimensions, self.segments)
+        concentric = self.design.tooling == "concentric"
+        return unit_section(self.unit, self.dimensions, self.segments, concentric=concentric)
 
     def __repr__(self) -> str:
         return f"Variant({self.spec.summary})"
