@@ -252,7 +252,7 @@ def test_only_an_estimate_is_refused_beside_a_result_too(earlier: bool, tmp_path
     if earlier:
         built(tmp_path, lugs(), layers=2)
     there = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*") if path.is_file()}
-    with pytest.raises(Refusal, match=r"^--only = 'estimate'.*has no estimate: the models describe"):
+    with pytest.raises(Refusal, match=r"^only = 'estimate'.*has no estimate: the models describe"):
         built(tmp_path, lugs(), "estimate", layers=2)
     assert {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*") if path.is_file()} == there
 
