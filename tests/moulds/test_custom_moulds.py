@@ -11,7 +11,7 @@ import pytest
 from faulty_sets import broken, of_spec, set_of
 
 from unitcad.casting.procedure import procedure
-from unitcad.errors import Refusal
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.kernels.mesh import realise
 from unitcad.mould_checks import check_moulds, mould_checks, opening
 from unitcad.moulds.cavities import Cavity
@@ -21,7 +21,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import cast_layers
 from unitcad.pipeline.build import Built, build
 from unitcad.shape import Revolve, Shape, polygon, union
-from unitcad.validation import load, templates
+from unitcad.validation import custom_templates, load, templates
 
 SPEC = """
 name = "custom"
@@ -321,6 +321,10 @@ def test_every_worked_example_has_its_test() -> None:
     names = {file.stem for file in CUSTOM.glob("*.toml")}
     assert names == {"strap-lugs", "film-closed", "dome"}
     assert not names & set(templates())
+    assert set(custom_templates()) == {f"custom/{name}" for name in names}
+    assert load("custom/dome") == load(CUSTOM / "dome.toml")
+    with pytest.raises(UnitcadError, match="closest: custom/strap-lugs"):
+        load("strap-lugs")
 
 
 def test_an_opening_off_the_grid_is_seen() -> None:

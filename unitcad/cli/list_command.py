@@ -43,10 +43,12 @@ def _entries(kind: str) -> dict[str, Any]:
 
     from unitcad import catalogue
     from unitcad.designs import shipped
-    from unitcad.validation import read, templates
+    from unitcad.validation import custom_templates, templates
 
     if kind == "templates":
-        return {name: _first_comment(path.read_text("utf-8")) for name, path in templates().items() if read(name)}
+        return {
+            name: _first_comment(path.read_text("utf-8")) for name, path in (templates() | custom_templates()).items()
+        }
     if kind == "designs":
         return {name: design.about for name, design in shipped().items()}
     if kind == "rules":

@@ -25,9 +25,17 @@ _MOST_LIMITS = 5
 
 def templates() -> dict[str, Path]:
     """Return the shipped templates by name."""
+    return {file.stem: file for file in sorted(_folder().glob("*.toml"))}
+
+
+def custom_templates() -> dict[str, Path]:
+    """Return the shipped specs of custom designs by name, such as custom/strap-lugs."""
+    return {f"custom/{file.stem}": file for file in sorted((_folder() / "custom").glob("*.toml"))}
+
+
+def _folder() -> Path:
     package = Path(str(files("unitcad")))
-    folder = next((f for f in (package / "templates", package.parent / "templates") if f.is_dir()), package)
-    return {file.stem: file for file in sorted(folder.glob("*.toml"))}
+    return next((f for f in (package / "templates", package.parent / "templates") if f.is_dir()), package)
 
 
 def default_template() -> str:
@@ -38,7 +46,8 @@ def default_template() -> str:
 def load(source: Source, set: Changes = ()) -> Spec:
     """Return the effective spec of a template, a file, plain data, or another spec or variant.
 
-    A text is a file where it holds a path separator or ends in .toml, else a template's name. `set` changes values:
+    A text is a template's name (such as custom/strap-lugs), or a file where it holds a path separator or ends in .toml.
+    `set` changes values:
     a dict by dotted path ({"layers.0.wall_mm": 1.2}), or texts "path=value" with a value in TOML syntax (a bare word
     counts as a string). Lengths in mm. Values that follow from others follow the changed ones. A custom design's
     path starts at the file's folder, else at the working directory. Raises Refusal or UnitcadError, naming the
@@ -80,13 +89,13 @@ def read(source: str | os.PathLike[str]) -> dict[str, Any]:
     The code of a design that the file names may run from now on: see `unitcad.spec.custom_code`.
     """
     text = os.fspath(source)
-    if os.sep in text or "/" in text or text.endswith(".toml"):
+    known = templates() | custom_templates()
+    if text in known:
+        path = known[text]
+    elif os.sep in text or "/" in text or text.endswith(".toml"):
         path = Path(text)
     else:
-        known = templates()
-        if text not in known:
-            raise unknown_name("spec", text, known, WrongArgument)
-        path = known[text]
+        raise unknown_name("spec", text, known, WrongArgument)
     return with_source(read_toml(path), path.parent)
 
 
