@@ -80,7 +80,7 @@ def planted(tmp_path: Path) -> Planted:
         "build embedded.toml --only unit",
         "build results/one/spec.toml --only unit",
         "estimate embedded.toml",
-        "estimate named.toml",
+        "estimate results/one/spec.toml",
         "list templates",
         "check results",
     ],
@@ -112,9 +112,20 @@ def test_code_of_a_file_that_was_named_runs_and_other_code_when_allowed(argument
     assert planted.ran.exists()
 
 
+def test_an_estimate_reads_a_named_design_and_with_it_runs_its_file(planted: Planted) -> None:
+    """Its file says whether it has an estimate; a function has none."""
+    done = _unitcad("estimate", "named.toml", cwd=planted.folder)
+    assert planted.ran.exists()
+    assert done.returncode == 2, done.stderr
+    assert "has no estimate" in done.stderr
+
+
 def test_a_page_is_made_of_a_result_whose_code_does_not_run(planted: Planted) -> None:
+    assert _unitcad("build", "named.toml", "--only", "unit", "-o", "results", cwd=planted.folder).returncode == 0
+    planted.ran.unlink()
     done = _unitcad("report", "results", cwd=planted.folder)
     assert done.returncode == 0, done.stderr
     assert (planted.folder / "results" / "report.html").is_file()
+    assert not planted.ran.exists()
     assert _unitcad("report", "results", "--allow-code", cwd=planted.folder).returncode == 0
     assert planted.ran.exists()
