@@ -110,15 +110,22 @@ def _radii(r: Any) -> w.Array:
     return radii
 
 
-_LIMIT = np.array([6.0, -15.0, 20.0, -15.0, 6.0, -1.0])
-"""Weights that give a polynomial's value at 0 from those at 1 to 6, and, less by one degree, from those at 1 to 5."""
-_LOWER = np.array([5.0, -10.0, 10.0, -5.0, 1.0, 0.0])
+_LIMITS = np.array(
+    [
+        [6.0, -15.0, 20.0, -15.0, 6.0, -1.0],
+        [5.0, -10.0, 10.0, -5.0, 1.0, 0.0],
+        [4.0, -6.0, 4.0, -1.0, 0.0, 0.0],
+    ]
+)
+"""Weights that give a polynomial's value at 0 from those at 1 to 6 and, less by one and two degrees, to 5 and to 4."""
+_SLOWEST = 0.9  # rate of convergence that is still believed
 
 
 def _solve_lossless(bare: Problem, end: float, rtol: float) -> Integrals:
     """Return the limit of a loss that goes to 0: a polynomial through six small losses.
 
-    What one of a degree less would give differs by the error. Waves decay little over the distance at these losses;
+    The error is what one of a degree less would give differs by, d5, and the sum of the further differences where they
+    fall slowly, as (d5 / d4)^n. Waves decay little over the distance at these losses;
     next to a frequency at which a wave is cut off the displacement changes sooner, and smaller ones are tried. Where
     rounding next to the poles outweighs the polynomial's error, which it about does at the least of the first ones,
     larger ones are tried.
@@ -131,11 +138,13 @@ def _solve_lossless(bare: Problem, end: float, rtol: float) -> Integrals:
         wanted = max(0.008 * rtol, 2.0 * ROUNDING / loss)
         lossy = [
             _solve(replace(bare, medium=bare.medium.with_loss(i * loss)), end, wanted)
-            for i in range(1, _LIMIT.size + 1)
+            for i in range(1, _LIMITS.shape[1] + 1)
         ]
         values, errors = np.array([one.total for one in lossy]), np.array([one.error for one in lossy])
-        total = np.tensordot(_LIMIT, values, 1)
-        integrals, limit = np.tensordot(abs(_LIMIT), errors, 1), np.abs(total - np.tensordot(_LOWER, values, 1))
+        total, lower, lowest = np.tensordot(_LIMITS, values, 1)
+        integrals, limit = np.tensordot(abs(_LIMITS[0]), errors, 1), np.abs(total - lower)
+        rate = np.minimum(limit / np.maximum(np.abs(lower - lowest), 1e-300), _SLOWEST)
+        limit = limit * np.maximum(1.0, rate / (1.0 - rate))
         count += sum(one.wavenumbers for one in lossy)
         if best is None or np.max(integrals + limit) < np.max(best.error):
             best = replace(lossy[0], total=total, error=integrals + limit)
