@@ -8,6 +8,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from unitcad.accuracy import runner
@@ -34,6 +35,13 @@ def test_a_promise_is_kept_up_to_its_limit_and_never_by_nan():
     assert not Promise("", 1.1, 1.0).ok
     assert not Promise("", math.nan, 1.0).ok
     assert not RESULT.ok
+
+
+def test_a_promise_about_a_numpy_number_can_be_written():
+    result = Result("a", "A", "", promises=(Promise("error", np.float64(1e-3), 1e-2),))
+    assert json.loads(json.dumps(result.as_dict()))["promises"] == [
+        {"what": "error", "value": 1e-3, "limit": 1e-2, "ok": True}
+    ]
 
 
 def test_fastest_of_what_is_exact_enough():

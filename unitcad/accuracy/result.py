@@ -54,7 +54,7 @@ class Promise:
     @property
     def ok(self) -> bool:
         """Within the limit; a value that is no number is not."""
-        return self.value <= self.limit
+        return bool(self.value <= self.limit)
 
 
 @dataclass(frozen=True)
