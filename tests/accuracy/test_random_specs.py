@@ -125,12 +125,12 @@ def test_a_seed_is_a_spec():
 def test_faults_are_seen(monkeypatch):
     """A refusal whose value changes nothing is a circle; a failed mould check is no build."""
     import unitcad.accuracy.outcomes as outcomes
-    from unitcad.moulds import plan
+    from unitcad.moulds import concentric
 
     monkeypatch.setattr(outcomes, "put_in", lambda data, where, value: data)
     refused = next(data for data in map(seeded_spec, range(50)) if refusal_of(data) is not None)
     assert outcomes.outcome(refused).kind == CIRCLE
-    monkeypatch.setattr(plan, "seals", lambda *_: [])
+    monkeypatch.setattr(concentric, "seals", lambda *_: [])
     data = {
         "name": "leaks",
         "design": "encapsulating",

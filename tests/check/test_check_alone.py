@@ -12,7 +12,17 @@ from shapes import box, package, stl
 
 import unitcad
 
-BELOW = ("__init__.py", "errors.py", "text.py", "files.py", "children.py", "geometry", "catalogue", "check")
+BELOW = (
+    "__init__.py",
+    "arguments.py",
+    "errors.py",
+    "text.py",
+    "files.py",
+    "children.py",
+    "geometry",
+    "catalogue",
+    "check",
+)
 CODE = """
 import json, sys
 from unitcad.catalogue import printers
