@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import re
 import signal
@@ -176,12 +175,14 @@ def test_an_answer_that_is_no_schedulers(sent: bytes) -> None:
 
 
 def test_a_cluster_is_reached_from_where_an_event_loop_runs(cluster: Cluster) -> None:
-    """As in a notebook's cell."""
-    from unitcad.batch.cluster import dask_executor
-
-    async def cell() -> int:
-        executor, threads = dask_executor(cluster.address)
-        executor.shutdown()
-        return threads
-
-    assert asyncio.run(cell()) == 2
+    """As in a notebook's cell; in a process of its own, since a client's threads live on."""
+    cell = (
+        "import asyncio\n"
+        "from unitcad.batch.cluster import dask_executor\n"
+        "async def cell():\n"
+        f"    print(dask_executor({cluster.address!r})[1])\n"
+        "asyncio.run(cell())\n"
+    )
+    command = [sys.executable, "-c", cell]
+    done = subprocess.run(command, env=environment(), capture_output=True, text=True, check=False, timeout=60)
+    assert done.stdout == "2\n", done.stderr
