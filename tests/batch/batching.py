@@ -123,4 +123,7 @@ def rows(out: Path) -> list[dict[str, Any]]:
 
 
 def leftovers(out: Path) -> list[Path]:
-    return [path for path in out.iterdir() if path.name.startswith(".tmp-")]
+    """Return scratch folders. An empty one does not count: a kill just before its lock or just before its rmdir leaves
+    it, and nobody can tell it from one that a living process has just made.
+    """
+    return [path for path in out.iterdir() if path.name.startswith(".tmp-") and any(path.iterdir())]
