@@ -9,7 +9,7 @@ drives sideways. Its transform is that of the normal one.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -18,12 +18,10 @@ from unitcad.attenuation.layered.rheology import finite
 from unitcad.attenuation.layered.statics import Direction, disc_integrals
 from unitcad.errors import Refusal, unknown_name
 
-_DIRECTIONS = ("normal", "radial", "tangential")
-
 
 def _check(direction: str) -> None:
-    if direction not in _DIRECTIONS:
-        raise unknown_name("load.direction", str(direction), _DIRECTIONS)
+    if direction not in get_args(Direction):
+        raise unknown_name("load.direction", str(direction), get_args(Direction))
 
 
 def _orders(direction: Direction) -> tuple[int, ...]:

@@ -26,12 +26,8 @@ def compliance(half_space: w.Material, pieces: Sequence[Piece], k: w.Array) -> w
     u, t = np.ones_like(rate), half_space.shear * rate
     seen = u
     for material, h, above in reversed(pieces):
-        if not above:
-            u, t, _ = _raised(material, h, k, u, t)
-            seen = u
-        else:
-            u, t, scale = _raised(material, h, k, u, t)
-            seen = seen * scale
+        u, t, scale = _raised(material, h, k, u, t)
+        seen = seen * scale if above else u
     return seen / t
 
 
