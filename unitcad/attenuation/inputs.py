@@ -56,6 +56,51 @@ class SiliconeLayer:
 
 
 @dataclass(frozen=True)
+class LayerShape:
+    """Where a layer of the unit ends, m: its outer radius, the height of its top and its cap (0: an open ring)."""
+
+    outer_radius: float
+    top: float
+    cap: float = 0.0
+
+
+@dataclass(frozen=True)
+class Pad:
+    """The circuit's round pad, m: its radius, and its faces at the heights `low` and `high`."""
+
+    radius: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A unit's lengths in m, of the section through its axis; z = 0 is the skin, heights count away from it.
+
+    cavity_radius   where Layer 1 begins; equal to the motor's radius if Layer 1 reaches the motor
+    core_height     top of the cavity, under the first cap
+    layers          inside out
+    motor_mass      kg
+    pad             the circuit's pad, None without a circuit
+    floor           silicone between motor and skin; 0: the motor lies on the skin, as in every shipped design
+    """
+
+    cavity_radius: float
+    core_height: float
+    layers: tuple[LayerShape, ...]
+    motor_radius: float
+    motor_height: float
+    motor_mass: Quantity
+    pad: Pad | None = None
+    floor: float = 0.0
+
+    @property
+    def gap(self) -> float:
+        """Width of the ring of air between motor and Layer 1, m; 0 where the gap is filled."""
+        return self.cavity_radius - self.motor_radius
+
+
+@dataclass(frozen=True)
 class TissueLayer:
     """A layer of the body: thickness (m, None for the half-space), density (kg/m3), shear modulus (Pa), damping.
 
@@ -82,12 +127,17 @@ class EstimateInput:
     design: str
     passes: float
     diameter: float
-    motor_diameter: float
+    geometry: Geometry
     layers: tuple[SiliconeLayer, ...]
     tissue_name: str
     tissue: tuple[TissueLayer, ...]
     frequency: Quantity
     amplitude: float | None = None
+
+    @property
+    def motor_diameter(self) -> float:
+        """The motor's diameter, m."""
+        return 2.0 * self.geometry.motor_radius
 
 
 def body(tissue: tuple[TissueLayer, ...], end: dict[str, int] | None = None) -> LayeredMedium:
