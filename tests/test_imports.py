@@ -22,6 +22,7 @@ FLOORS = [
     {"batch"},
     {"report", "accuracy"},
     {"pipeline"},
+    {"lab"},
     {"casting", "mould_checks"},
     {"moulds", "estimating"},
     {"validation"},
