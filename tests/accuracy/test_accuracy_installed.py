@@ -18,7 +18,7 @@ CLONE = Path(__file__).parents[2]
 
 
 def test_what_is_missing_is_left_out_with_its_reason(monkeypatch, capsys):
-    def run(name, quick, say, specs):
+    def run(name, quick, say, count, seed):
         if name in ("speed", "models"):
             raise Missing(f"{name} needs what is not here")
         return Result(name, name, "", (), (), (), {})
@@ -33,7 +33,7 @@ def test_what_is_missing_is_left_out_with_its_reason(monkeypatch, capsys):
 
 
 def test_a_suite_that_is_named_and_lacks_something_is_an_error(monkeypatch):
-    def run(name, quick, say, specs):
+    def run(name, quick, say, count, seed):
         raise Missing("needs what is not here")
 
     monkeypatch.setattr(runner, "run", run)

@@ -89,6 +89,12 @@ def test_a_bad_option_or_folder_is_refused_before_the_work(tmp_path: Path, monke
     (tmp_path / "damaged" / "accuracy.json").write_text("{")
     with pytest.raises(Refusal, match="'extremes'"):
         accuracy(["stability"], quick=False, specs=10, out=None, as_json=False)
+    with pytest.raises(Refusal, match="'stability'"):
+        accuracy(["hankel"], media=600)
+    with pytest.raises(Refusal, match="--media"):
+        accuracy(["stability"], seed=7)
+    with pytest.raises(Refusal, match="--quick"):
+        accuracy(["stability"], quick=True, media=600)
     with pytest.raises(Refusal, match="--quick"):
         accuracy(["extremes"], quick=True, specs=10, out=None, as_json=False)
     with pytest.raises(Refusal, match=r"closest: left-out; nearest accepted: 'left-out'"):

@@ -1,12 +1,19 @@
 """Extreme media against the reference in ball arithmetic, and what the page promises of them."""
 
+import math
+from dataclasses import asdict, replace
+
 import numpy as np
 import pytest
 
+from unitcad.accuracy import extreme_responses
+from unitcad.accuracy.ball_reference import TooHard
 from unitcad.accuracy.extreme_responses import Row, cases, promises, rows, survey
 from unitcad.accuracy.hankel import DISC, RADII
-from unitcad.accuracy.random_media import CLASSES, Trial
+from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.loads import Point, UniformDisc
+from unitcad.errors import UnitcadError
 
 pytest.importorskip("flint")
 
@@ -33,14 +40,61 @@ def test_films_and_contrast_of_the_page():
     assert all(row.decided and row.met and row.over_bound <= 1 for row in responses)
 
 
-def test_the_survey_has_every_class_the_same_from_its_seed():
-    one, other = survey(2), survey(2)
-    assert {trial.kind for trial in one} == set(CLASSES)
-    assert len({type(trial.load).__name__ + trial.load.direction for trial in survey(6)}) == 4
-    assert any(trial.z > 0 for trial in survey(6))
-    for a, b in zip(one, other, strict=True):
-        assert (a.medium.layers, a.load, a.omega, a.z) == (b.medium.layers, b.load, b.omega, b.z)
-        assert np.array_equal(a.r, b.r)
+def test_the_media_have_every_class_and_load_the_same_from_their_seed():
+    media = [trial(kind, seed) for kind in CLASSES for seed in range(6)]
+    assert {(type(one.load), one.load.direction) for one in media} == {
+        (shape, direction) for shape in (Point, UniformDisc) for direction in ("normal", "radial", "tangential")
+    }
+    assert any(one.z > 0 for one in media)
+    for one in media[::7]:
+        again = trial(one.kind, int(one.name.split()[-1]))
+        assert (one.medium.layers, one.load, one.omega, one.z) == (
+            again.medium.layers,
+            again.load,
+            again.omega,
+            again.z,
+        )
+        assert np.array_equal(one.r, again.r)
+
+
+def test_an_interrupted_survey_resumes_and_another_seed_has_other_media(tmp_path, monkeypatch):
+    """Four media, stopped after two: two are computed, and the rows are those of one run."""
+    computed = []
+
+    def quick(job):
+        computed.append(job)
+        return [asdict(Row(f"{job[0]} {job[1]}", job[0], 0.1, 0.0, 0.1, math.inf, 0.0, 9))]
+
+    monkeypatch.setattr(extreme_responses, "_medium", quick)
+    journal = tmp_path / "out" / "media.jsonl"
+    going = survey(4, 3, journal)
+    first = [next(going), next(going)]
+    del going
+    assert list(survey(4, 3, journal))[:2] == first
+    assert computed == [(kind, 30_000) for kind in CLASSES[:4]]
+    list(survey(4, 4, journal))
+    assert len(computed) == 8
+
+
+def test_no_value_breaks_the_bound_and_no_reference_decides_nothing(monkeypatch):
+    one = trial("ordinary", 1)
+
+    def refused(*_, **__):
+        raise UnitcadError("no finite answer")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(LayeredMedium, "response", refused)
+        (row,) = rows([one], (0.1,))
+    assert not row.over_bound <= 1
+    assert not row.met
+
+    def hard(*_):
+        raise TooHard("too many panels")
+
+    monkeypatch.setattr(extreme_responses.ball_reference, "response", hard)
+    (row,) = rows([one], (0.1,))
+    assert not row.decided
+    assert row.over_bound == 0
 
 
 def test_what_is_promised_can_be_broken():
@@ -49,5 +103,6 @@ def test_what_is_promised_can_be_broken():
     over = [Row("a", "x", 1e-3, 2e-3, 1e-3, 1e-13, 2.0, 100)]
     undecided = [Row("a", "x", 1e-3, 2e-3, 1e-3, 1e-3, 0.0, 100)]
     worse = [Row("a", "x", rtol, 0.0, bound, 1e-13, 0.0, 100) for rtol, bound in ((1e-5, 4e-6), (1e-9, 0.48))]
-    for at, bad in enumerate((over, undecided, worse)):
-        assert [promise.ok for promise in promises(bad, bad)] == [i != at for i in range(3)]
+    stalled = [Row("a", "x", 1e-3, 0.0, 1e-3, 1e-13, 0.0, 100, seconds=61.0)]
+    for at, bad in enumerate((over, undecided, stalled, worse)):
+        assert [promise.ok for promise in promises(bad, bad)] == [i != at for i in range(4)]

@@ -26,7 +26,7 @@ from unitcad.accuracy.outcomes import (
     refusal_of,
 )
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, Ranges, random_spec, seeded_spec
-from unitcad.accuracy.runner import JOURNAL
+from unitcad.accuracy.runner import JOURNALS
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec.toml import text_of
 
@@ -144,7 +144,7 @@ def test_faults_are_seen(monkeypatch):
 
 @pytest.mark.long
 def test_ten_thousand_random_specs():
-    result = extremes.study(10_000, print, journal=JOURNAL)
+    result = extremes.study(10_000, print, journal=JOURNALS["extremes"])
     assert result.ok, [promise for promise in result.promises if not promise.ok]
 
 

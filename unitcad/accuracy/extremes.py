@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-import multiprocessing
-import os
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from unitcad.accuracy.long_study import in_order, journalled
 from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, NO_VALUE, REFUSED, Outcome, outcome
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
 from unitcad.accuracy.result import Promise, Result, Say, Table
 from unitcad.accuracy.timing import machine, timing
 from unitcad.designs import shipped
-from unitcad.errors import UnitcadError
-from unitcad.pipeline.versions import code_version
 from unitcad.validation import default_template, override, read
 
 PATIENCE = 1800.0
@@ -28,7 +23,6 @@ LEAST_BUILT = 0.6
 _DOCUMENTED = 0.97
 """Share of the random specs that is drawn from the documented ranges; an extreme one takes several times as long."""
 _SERIAL = 60
-_AHEAD = 16  # jobs handed to each worker, so that none waits for a slow one
 
 Job = tuple[str, dict[str, Any]]
 
@@ -102,61 +96,22 @@ def run_job(job: Job) -> tuple[str, Outcome]:
 
 
 def _journalled(jobs: Sequence[Job], journal: Path) -> Iterator[tuple[str, Outcome]]:
-    """Yield the same, with a line of JSON for each finished spec in `journal`, from which a study resumes.
+    """Yield the same, with a line of JSON for each finished spec in `journal`, from which a study resumes."""
 
-    Raises UnitcadError for a file that is no such journal.
-    """
-    names = [hashlib.sha256(f"{code_version()} {json.dumps(job)}".encode()).hexdigest()[:16] for job in jobs]
-    known: dict[str, Outcome] = {}
-    if journal.exists():
-        # A last line without its end was cut off by the interruption.
-        whole, end, cut = journal.read_bytes().rpartition(b"\n")
-        for line in whole.splitlines():
-            try:
-                name, data = json.loads(line)
-                known[name] = Outcome(**{**data, "chain": tuple(data["chain"])})
-            except (ValueError, TypeError, KeyError):
-                raise UnitcadError(f"{journal}: is not a journal of random specs; move it away") from None
-        if cut:
-            os.truncate(journal, len(whole + end))
-    journal.parent.mkdir(parents=True, exist_ok=True)
-    fresh = _outcomes([job for job, name in zip(jobs, names, strict=True) if name not in known])
-    with journal.open("ab") as file:
-        for job, name in zip(jobs, names, strict=True):
-            if name in known:
-                yield job[0], known[name]
-                continue
-            group, result = next(fresh)
-            file.write(json.dumps([name, asdict(result)]).encode() + b"\n")
-            file.flush()
-            yield group, result
+    def compute(left: Sequence[Job]) -> Iterator[Any]:
+        return ((group, asdict(result)) for group, result in _outcomes(left))
+
+    for group, data in journalled(jobs, compute, journal):
+        yield group, Outcome(**{**data, "chain": tuple(data["chain"])})
 
 
 def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:
-    """Yield the outcomes in order.
+    """Yield the outcomes in order. Many jobs go to worker processes: one that hangs is a fault of its spec."""
 
-    Many jobs go to worker processes: one that dies or hangs is a fault of its spec, not the end.
-    """
-    if len(jobs) < _SERIAL:
-        yield from map(run_job, jobs)
-        return
-    workers = os.cpu_count() or 1
-    context = multiprocessing.get_context("spawn")
-    waiting = deque(jobs)
-    while waiting:
-        with context.Pool(workers, maxtasksperchild=100) as pool:
-            running: deque[tuple[Job, Any]] = deque()
-            while waiting or running:
-                while waiting and len(running) < _AHEAD * workers:
-                    job = waiting.popleft()
-                    running.append((job, pool.apply_async(run_job, (job,))))
-                job, answer = running.popleft()
-                try:
-                    yield answer.get(PATIENCE)
-                except multiprocessing.TimeoutError:
-                    yield job[0], Outcome(HANG, f"no answer within {PATIENCE:g} s")
-                    waiting.extendleft(reversed([other for other, _ in running]))
-                    break
+    def hung(job: Job) -> tuple[str, Outcome]:
+        return job[0], Outcome(HANG, f"no answer within {PATIENCE:g} s")
+
+    return in_order(run_job, jobs, PATIENCE, hung, _SERIAL)
 
 
 def _sweeps(values: int | None) -> Iterator[Job]:

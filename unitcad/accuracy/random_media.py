@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,8 @@ def trial(kind: str, seed: int) -> Trial:
         r[0] = load.reach
     depth = sum(layer.thickness for layer in medium.layers)
     z = float(rng.choice([0.0, 0.0, 0.0, _between(rng, 3e-4, 1e-2), depth * rng.random()]))
+    if rng.random() < 1 / 3:
+        load = replace(load, direction="tangential")
     return Trial(f"{kind} {seed}", kind, medium, load, omega, np.array(r), z if z > 1e-4 else 0.0)
 
 

@@ -28,8 +28,8 @@ MODULES = {
 """Suites in the order of the page, and the module of each, whose function `run(quick, say)` returns its result."""
 SUITES = tuple(MODULES)
 
-JOURNAL = Path("out") / "extremes.jsonl"
-"""The outcomes that a study of the extremes has so far, from which it resumes."""
+JOURNALS = {"extremes": Path("out") / "extremes.jsonl", "stability": Path("out") / "stability.jsonl"}
+"""What the long study of a suite has so far, from which it resumes."""
 
 HEAD = """# Error against run time, and what holds at the extremes
 
@@ -48,15 +48,21 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in SUITES if not names or name in names)
 
 
-def run(name: str, quick: bool, say: Say, specs: int | None = None) -> Result:
+def run(name: str, quick: bool, say: Say, count: int | None = None, seed: int = 0) -> Result:
     """Return one suite's result. Raises Missing without an extra or a folder that it needs.
 
-    `specs`: how many of the extremes; that study keeps a journal in out/ and resumes from it.
+    `count`: how many specs the extremes take, how many random media the stability; both keep a journal in out/ and
+    resume from it. `seed`: of the media.
     """
-    if specs is not None and name == "extremes":
-        from unitcad.accuracy.extremes import study
+    if count is not None and name == "extremes":
+        from unitcad.accuracy import extremes
 
-        return replace(study(specs, say, journal=JOURNAL), options=f"--specs {specs}")
+        return replace(extremes.study(count, say, journal=JOURNALS[name]), options=f"--specs {count}")
+    if count is not None and name == "stability":
+        from unitcad.accuracy import stability
+
+        result = stability.study(count, say, seed, JOURNALS[name])
+        return replace(result, options=f"--media {count} --seed {seed}")
     result = import_module(f"unitcad.accuracy.{MODULES[name]}").run(quick, say)
     return replace(result, options="--quick" if quick else "")
 

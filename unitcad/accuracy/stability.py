@@ -7,11 +7,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from unitcad.accuracy import extreme_responses, thomson_haskell
+from unitcad.accuracy.random_media import CLASSES
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Table
 from unitcad.accuracy.timing import machine
 from unitcad.attenuation.layered.loads import Point, UniformDisc
@@ -62,8 +64,16 @@ def cases() -> list[Case]:
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Compute all frozen cases, grouped by each thing that is extreme, and exact answers of the response."""
-    known = cases()[:: 3 if quick else 1]
+    """Compute a third of the frozen cases and a medium a class if quick, else all and six; `study` takes any number."""
+    return study(len(CLASSES) if quick else 6 * len(CLASSES), say, every=3 if quick else 1)
+
+
+def study(media: int, say: Say, seed: int = 0, journal: Path | None = None, every: int = 1) -> Result:
+    """Compute every so many of the frozen cases, exact answers of the response, and `media` random media.
+
+    The comparisons of media that this code wrote into `journal` before are taken from there, new ones are appended.
+    """
+    known = cases()[::every]
     say(f"{len(known)} cases")
     condition = np.array([case.condition for case in known])
     error = np.array([_error(case.medium.compliance(case.k, case.omega), case) for case in known])
@@ -88,9 +98,10 @@ def run(quick: bool, say: Say) -> Result:
     exact = tuple(_exact_answers())
     say("responses")
     extreme = tuple(extreme_responses.rows(extreme_responses.cases()))
-    media = extreme_responses.survey(1 if quick else 6)
-    say(f"{len(media)} random media")
-    surveyed = tuple(extreme_responses.rows(media))
+    surveyed: list[extreme_responses.Row] = []
+    for i, found in enumerate(extreme_responses.survey(media, seed, journal)):
+        say(f"random media: {i + 1} of {media}")
+        surveyed += found
     wide = [i for i, case in enumerate(known) if case.kh > 0]
     return Result(
         suite="stability",
@@ -147,7 +158,7 @@ def run(quick: bool, say: Say) -> Result:
             *(Promise(name, error, limit) for name, error, limit in exact),
             *extreme_responses.promises(extreme, surveyed),
         ),
-        measured={**machine("numpy", "scipy"), "cases": len(known)},
+        measured={**machine("numpy", "scipy"), "cases": len(known), "random media": media, "seed": seed},
     )
 
 

@@ -22,6 +22,11 @@ def accuracy(
             help="How many random specs the suite extremes takes, 3 % beyond the documented ranges; with all sweeps.",
         ),
     ] = None,
+    media: Annotated[
+        int | None,
+        typer.Option(min=9, max=90_000, help="How many random media the suite stability takes."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random media: another one, other media.")] = 0,
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", help="Where accuracy.md and accuracy.json go: docs; nowhere if quick."),
@@ -40,8 +45,14 @@ def accuracy(
     names = runner.chosen(suites or [])
     if specs is not None and names != ("extremes",):
         raise Refusal("SUITE", " ".join(names), "--specs goes with the suite extremes alone", "extremes")
-    if specs is not None and quick:
-        raise Refusal("--quick", "set", "does not go with --specs, which says how many; leave one out")
+    if media is not None and names != ("stability",):
+        raise Refusal("SUITE", " ".join(names), "--media goes with the suite stability alone", "stability")
+    if seed and media is None:
+        raise Refusal("--seed", seed, "goes with --media, which says how many")
+    count = specs if specs is not None else media
+    if count is not None and quick:
+        option = "--specs" if media is None else "--media"
+        raise Refusal("--quick", "set", f"does not go with {option}, which says how many; leave one out")
     results = []
     left_out: dict[str, str] = {}
     folder = out if out is not None or quick else Path("docs")
@@ -51,15 +62,15 @@ def accuracy(
     for name in names:
         try:
             with progress(name) as say:
-                result = runner.run(name, quick, say, specs)
+                result = runner.run(name, quick, say, count, seed)
         except Missing as missing:
             if suites:
                 raise
             left_out[name] = str(missing)
             continue
         except KeyboardInterrupt:
-            if specs is not None:
-                typer.echo(f"{runner.JOURNAL} keeps the finished specs; the same command resumes", err=True)
+            if count is not None:
+                typer.echo(f"{runner.JOURNALS[name]} keeps what is finished; the same command resumes", err=True)
             raise
         results.append(result)
         if folder is not None:

@@ -1,0 +1,86 @@
+"""Long studies: jobs in worker processes, results in the order of the jobs, a journal from which a study resumes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from unitcad.errors import UnitcadError
+from unitcad.pipeline.versions import code_version
+
+J = TypeVar("J")
+T = TypeVar("T")
+
+_AHEAD = 16  # jobs handed to each worker, so that none waits for a slow one
+
+
+def in_order(
+    call: Callable[[J], T], jobs: Sequence[J], patience: float, late: Callable[[J], T], serial: int = 0
+) -> Iterator[T]:
+    """Yield call(job) of every job, in order, from worker processes; up to `serial` jobs run in this one.
+
+    A worker that dies, or has no answer within `patience` seconds, gives late(job), and the others go on.
+    """
+    if len(jobs) <= serial:
+        yield from map(call, jobs)
+        return
+    workers = _cores()
+    context = multiprocessing.get_context("spawn")
+    waiting = deque(jobs)
+    while waiting:
+        with context.Pool(workers, maxtasksperchild=100) as pool:
+            running: deque[tuple[J, Any]] = deque()
+            while waiting or running:
+                while waiting and len(running) < _AHEAD * workers:
+                    job = waiting.popleft()
+                    running.append((job, pool.apply_async(call, (job,))))
+                job, answer = running.popleft()
+                try:
+                    yield answer.get(patience)
+                except multiprocessing.TimeoutError:
+                    yield late(job)
+                    waiting.extendleft(reversed([other for other, _ in running]))
+                    break
+
+
+def journalled(jobs: Sequence[J], compute: Callable[[Sequence[J]], Iterator[Any]], journal: Path) -> Iterator[Any]:
+    """Yield what `compute` yields for the jobs, all JSON-ready, each a line of `journal` as soon as it is there.
+
+    What this code wrote into the journal before is read from there. Raises UnitcadError for a file that is no journal.
+    """
+    names = [hashlib.sha256(f"{code_version()} {json.dumps(job)}".encode()).hexdigest()[:16] for job in jobs]
+    known: dict[str, Any] = {}
+    if journal.exists():
+        # A last line without its end was cut off by the interruption.
+        whole, end, cut = journal.read_bytes().rpartition(b"\n")
+        for line in whole.splitlines():
+            try:
+                name, data = json.loads(line)
+            except (ValueError, TypeError):
+                raise UnitcadError(f"{journal}: is not a journal of this study; move it away") from None
+            known[name] = data
+        if cut:
+            os.truncate(journal, len(whole + end))
+    journal.parent.mkdir(parents=True, exist_ok=True)
+    fresh = compute([job for job, name in zip(jobs, names, strict=True) if name not in known])
+    with journal.open("ab") as file:
+        for name in names:
+            if name not in known:
+                known[name] = next(fresh)
+                file.write(json.dumps([name, known[name]]).encode() + b"\n")
+                file.flush()
+            yield known[name]
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1
