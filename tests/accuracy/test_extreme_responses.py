@@ -1,7 +1,7 @@
 """Extreme media against the reference in ball arithmetic, and what the page promises of them."""
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 import pytest
