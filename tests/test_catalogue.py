@@ -72,6 +72,8 @@ def test_the_shipped_body_passes_the_validation_of_a_own_entries() -> None:
         ("printers", "technology", "fmd", "fdm"),
         ("motors", "diameter_mm", -7, 1),
         ("motors", "rpm", 1e9, 300000),
+        ("motors", "drive", "axail", "axial"),
+        ("motors", "mass_g", 0, 0.001),
     ],
 )
 @pytest.mark.parametrize("form", ["", "value", "low"])
@@ -166,5 +168,6 @@ def test_the_docs_have_every_key_and_its_range() -> None:
     for kind, (entry, _, _) in ENTRIES.items():
         for key, annotated in kinds_of(entry):
             (note,) = annotated.__metadata__
-            span = f"{note.ge:g} to {note.le:g}" if note.ge is not None else "text" if key == "shore" else "fdm, sla"
+            words = ", ".join(typing.get_args(typing.get_args(annotated)[0]))
+            span = f"{note.ge:g} to {note.le:g}" if note.ge is not None else "text" if key == "shore" else words
             assert f"| `{kind}` | `{key}` | {span} | {note.description} |" in page

@@ -11,7 +11,7 @@ from unitcad.attenuation.edge.closed_form import CONTROL_PASSES
 from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
-from unitcad.catalogue import Material, Tissue, Value, choose, materials, motors, tissue
+from unitcad.catalogue import Material, Motor, Tissue, Value, choose, materials, motors, tissue
 from unitcad.designs import design_of, dimensions, no_estimate
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
@@ -57,7 +57,7 @@ def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInp
         design=spec.design,
         passes=CONTROL_PASSES if len(spec.layers) == 1 else passes,
         diameter=spec.diameter_mm * 1e-3,
-        geometry=_geometry(spec),
+        geometry=_geometry(spec, _motor_mass(spec, motor)),
         layers=tuple(
             _silicone(choose(f"layers.{i}.material", layer.material, silicones), layer.wall_mm * 1e-3, frequency)
             for i, layer in enumerate(spec.layers)
@@ -66,13 +66,13 @@ def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInp
         tissue=tuple(_tissue(layer) for layer in tissue(spec.estimate.tissue, spec.tissue)),
         frequency=frequency,
         amplitude=spec.estimate.amplitude_um * 1e-6,
+        drive=spec.motor.drive,
     )
 
 
-def _geometry(spec: Spec) -> Geometry:
+def _geometry(spec: Spec, motor_mass: Quantity) -> Geometry:
     dims = dimensions(spec)
     radius, height = dims.motor_radius * 1e-3, dims.motor_height * 1e-3
-    low, mass, high = (density * math.pi * radius**2 * height for density in _MOTOR_DENSITY)
     tops = zip(dims.radii, dims.heights, spec.layers, strict=True)
     return Geometry(
         cavity_radius=dims.cavity_radius * 1e-3,
@@ -80,9 +80,18 @@ def _geometry(spec: Spec) -> Geometry:
         layers=tuple(LayerShape(r * 1e-3, top * 1e-3, (layer.cap_mm or 0.0) * 1e-3) for r, top, layer in tops),
         motor_radius=radius,
         motor_height=height,
-        motor_mass=Quantity(mass, low, high, "assumed: the can's volume times 4 to 6.5 g/cm3"),
+        motor_mass=motor_mass,
         pad=Pad(dims.pad.radius * 1e-3, dims.pad.low * 1e-3, dims.pad.high * 1e-3) if dims.pad else None,
     )
+
+
+def _motor_mass(spec: Spec, motor: Motor | None) -> Quantity:
+    """Return the motor's mass in kg: its entry's, or that of a can of its size."""
+    if motor and motor.mass_g:
+        return _quantity(motor.mass_g, 1e-3)
+    volume = math.pi * (spec.motor.diameter_mm * 0.5e-3) ** 2 * spec.motor.thickness_mm * 1e-3
+    low, mass, high = (density * volume for density in _MOTOR_DENSITY)
+    return Quantity(mass, low, high, "assumed: the can's volume times 4 to 6.5 g/cm3")
 
 
 def _quantity(value: Value, factor: float = 1.0) -> Quantity:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy import special
 
 from unitcad.attenuation.edge import closed_form as cf
-from unitcad.attenuation.inputs import EstimateInput, Quantity, body
+from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
 from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.attenuation.layered.response import Response
+from unitcad.attenuation.layered.statics import Direction
 
 EDGE_TO_MM = 30
 DEPTHS_MM = (1.0, 3.0)
@@ -17,59 +20,129 @@ NO_RATIO = (
     "a laterally uniform half-space has no ring of silicone in it: it can't say what the layers do, so multiplying "
     "its curve by another model's ratio would not be a model"
 )
+FORCES: dict[Drive, str] = {
+    "flat": "turns in the plane of the skin: two forces in quadrature, alike at every angle",
+    "axial": "acts along the motor's axis, into the skin",
+}
+"""How the force of each drive acts."""
+WHAT_U_IS = (
+    "|u|, the root of the sum of the squares of the components' amplitudes: the root mean square of the skin's "
+    "motion over a turn, times sqrt(2)"
+)
 ASSUMPTIONS = [
-    "A uniform pressure on the motor's disc drives a laterally uniform body; unit, circuit and cavity are not in it.",
-    "An ERM lying flat drives sideways; every load here is axisymmetric. This is the largest thing that is left out.",
+    "A uniform traction on the motor's disc drives a laterally uniform body: a pressure from an axial drive, one that "
+    "turns in the skin's plane from a flat one. Unit, circuit and cavity are not in it, nor the moment of a flat "
+    "motor's force about the skin.",
     "The body's layers are a template from published ranges, not this person's arm nor the paper's phantom.",
 ]
+_DIRECTIONS: dict[Drive, Direction] = {"flat": "tangential", "axial": "normal"}
+_COMPONENTS = {"flat": ("u_r", "u_theta", "u_z"), "axial": ("u_r", "u_z")}
 _SPREAD_RTOL = 1e-3
 
 
 def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
-    """Return the estimate's `layered`: |u_z| and |u_r| over |u_z| at the edge, at 0 mm and `DEPTHS_MM`, with spread.
+    """Return the estimate's `layered`: the skin's motion under either drive, over that at the edge, with its spread.
 
-    The spread takes each kind of input (moduli, damping, thicknesses, frequency) by itself to its low and high end.
+    `drives`: the motor's own first, each over |u| at the edge under the same force. `flat_over_axial_per_newton`: |u|
+    by one newton that turns, over |u| by one newton of axial amplitude. `u_z`, `u_r`, `depths` and
+    `surface_m_per_pa` are the axial pressure's, over |u_z| at the edge. The spread takes each kind of input (moduli,
+    damping, thicknesses, frequency) by itself to its low and high end.
     """
     r_mm = np.arange(EDGE_TO_MM + 1)
     radius = variant.diameter / 2.0
     r = radius + r_mm * 1e-3
-    load = UniformDisc(variant.motor_diameter / 2.0)
-    omega = 2.0 * np.pi * variant.frequency.middle
-    response = body(variant.tissue).response(load, omega, r, rtol=rtol)
-    edge = abs(response.u_z[0])
-    many = [(response.u_z, response.u_r)] + [_at_ends(variant, load, r, end) for end in _ends(variant)]
-    curves = [np.abs([u_z, u_r]) / abs(u_z[0]) for u_z, u_r in many]
-    low, high = np.min(curves, axis=0), np.max(curves, axis=0)
+    order: tuple[Drive, ...] = ("flat", "axial") if variant.drive == "flat" else ("axial", "flat")
+    cases = [({}, rtol)] + [(end, _SPREAD_RTOL) for end in _ends(variant)]
+    found = {drive: [_response(variant, drive, r, end, to) for end, to in cases] for drive in order}
+    below = {drive: [_response(variant, drive, r[::5], {}, rtol, z * 1e-3) for z in DEPTHS_MM] for drive in order}
+    axial = found["axial"][0]
+    edge = abs(axial.u_z[0])
+    old = [np.abs([one.u_z, one.u_r]) / abs(one.u_z[0]) for one in found["axial"]]
+    ratio = [_size(flat) / _size(normal) for flat, normal in zip(found["flat"], found["axial"], strict=True)]
     return {
         "tissue": variant.tissue_name,
         "frequency_hz": variant.frequency.middle,
+        "drive": variant.drive,
         "r_mm": [float(v) for v in r_mm],
         "r_is": "distance from the unit's edge outwards",
+        "u_is": WHAT_U_IS,
+        "drives": {drive: _drive_block(variant, drive, found[drive], below[drive]) for drive in order},
+        "flat_over_axial_per_newton": _curve(ratio),
         "unit": "of |u_z| of the skin at the edge",
-        "u_z": _curve(curves[0][0], low[0], high[0]),
-        "u_r": _curve(curves[0][1], low[1], high[1]),
+        "u_z": _curve([one[0] for one in old]),
+        "u_r": _curve([one[1] for one in old]),
         "spread": "each kind of input (moduli, damping, thicknesses, frequency) by itself at both ends of its range",
-        "depths": [_at_depth(variant, load, omega, r[::5], z, edge, rtol) for z in DEPTHS_MM],
+        "depths": [
+            {"z_mm": z, "r_mm": [float(v) for v in r_mm[::5]], **{key: _over(one, key, edge) for key in ("u_z", "u_r")}}
+            for z, one in zip(DEPTHS_MM, below["axial"], strict=True)
+        ],
         "paper_beside": _paper_curves(variant, radius, r),
         "surface_m_per_pa": {"u_z_at_the_edge": float(edge)},
-        "error_estimate": response.error / edge,
-        "wavenumbers": response.wavenumbers,
+        "error_estimate": axial.error / edge,
+        "wavenumbers": axial.wavenumbers,
         "hierarchical_over_control": None,
         "hierarchical_over_control_reason": NO_RATIO,
         "assumptions": ASSUMPTIONS,
     }
 
 
-def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float, ...]) -> list[float]:
-    """Return |u_z| over its value at the edge, at distances (mm) from it and one frequency (Hz), nominal body."""
+def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float, ...]) -> dict[str, list[float]]:
+    """Return `u`, |u| under the motor's drive, and `u_z`, |u_z| under an axial one, each over its value at the edge.
+
+    At distances (mm) from the edge and one frequency (Hz), nominal body.
+    """
     r = variant.diameter / 2.0 + 1e-3 * np.array([0.0, *distances_mm])
-    load = UniformDisc(variant.motor_diameter / 2.0)
-    response = body(variant.tissue).response(load, 2.0 * np.pi * frequency, r, rtol=1e-3)
-    return [float(v) for v in np.abs(response.u_z[1:] / response.u_z[0])]
+    at = replace(variant, frequency=Quantity(frequency))
+    axial = _response(at, "axial", r, {}, _SPREAD_RTOL)
+    own = axial if variant.drive == "axial" else _response(at, variant.drive, r, {}, _SPREAD_RTOL)
+    parts = {"u": _size(own), "u_z": np.abs(axial.u_z)}
+    return {name: [float(v) for v in part[1:] / part[0]] for name, part in parts.items()}
 
 
-def _curve(value: np.ndarray, low: np.ndarray, high: np.ndarray) -> dict[str, list[float]]:
-    return {name: [float(v) for v in data] for name, data in (("value", value), ("low", low), ("high", high))}
+def _response(
+    variant: EstimateInput, drive: Drive, r: np.ndarray, end: dict[str, int], rtol: float, z: float = 0.0
+) -> Response:
+    """Return the skin's displacement under one pascal of a drive on the motor's disc; `end` as `inputs.body` has it."""
+    hertz = variant.frequency.ends[end["frequency"]] if "frequency" in end else variant.frequency.middle
+    load = UniformDisc(variant.motor_diameter / 2.0, _DIRECTIONS[drive])
+    return body(variant.tissue, end).response(load, 2.0 * np.pi * hertz, r, z=z, rtol=rtol)
+
+
+def _size(one: Response) -> np.ndarray:
+    """Return |u|: the root of the sum of the squares of the components' amplitudes."""
+    return np.sqrt(np.abs(one.u_r) ** 2 + np.abs(one.u_theta) ** 2 + np.abs(one.u_z) ** 2)
+
+
+def _drive_block(variant: EstimateInput, drive: Drive, found: list[Response], below: list[Response]) -> dict[str, Any]:
+    """Return a drive's curves over |u| at the edge: nominal and spread at the surface, nominal at `DEPTHS_MM`."""
+    edges = [_size(one)[0] for one in found]
+    disc = np.pi * (variant.motor_diameter / 2.0) ** 2
+    nominal = found[0]
+    error = np.sqrt(nominal.error_r**2 + nominal.error_theta**2 + nominal.error_z**2)
+    return {
+        "force": FORCES[drive],
+        "unit": "of |u| of the skin at the edge under the same force",
+        "u": _curve([_size(one) / edge for one, edge in zip(found, edges, strict=True)]),
+        **{
+            key: _curve([np.abs(getattr(one, key)) / edge for one, edge in zip(found, edges, strict=True)])
+            for key in _COMPONENTS[drive]
+        },
+        "depths": [
+            {"z_mm": z, "u": [float(v) for v in _size(one) / edges[0]]} for z, one in zip(DEPTHS_MM, below, strict=True)
+        ],
+        "m_per_n_at_the_edge": float(edges[0] / disc),
+        "error_estimate": float(np.max(error) / edges[0]),
+    }
+
+
+def _over(one: Response, key: str, edge: float) -> list[float]:
+    return [float(v) for v in np.abs(getattr(one, key)) / edge]
+
+
+def _curve(cases: list[np.ndarray]) -> dict[str, list[float]]:
+    """Return the first case as the value, and the least and the largest of all."""
+    parts = ("value", cases[0]), ("low", np.min(cases, axis=0)), ("high", np.max(cases, axis=0))
+    return {name: [float(v) for v in data] for name, data in parts}
 
 
 def _ends(variant: EstimateInput) -> list[dict[str, int]]:
@@ -77,25 +150,6 @@ def _ends(variant: EstimateInput) -> list[dict[str, int]]:
         ["frequency"] if variant.frequency.ends[0] < variant.frequency.ends[1] else []
     )
     return [{kind: end} for kind in kinds for end in (0, 1)]
-
-
-def _at_ends(variant: EstimateInput, load: UniformDisc, r: np.ndarray, end: dict[str, int]) -> tuple[Any, Any]:
-    frequency: Quantity = variant.frequency
-    hertz = frequency.ends[end["frequency"]] if "frequency" in end else frequency.middle
-    response = body(variant.tissue, end).response(load, 2.0 * np.pi * hertz, r, rtol=_SPREAD_RTOL)
-    return response.u_z, response.u_r
-
-
-def _at_depth(
-    variant: EstimateInput, load: UniformDisc, omega: float, r: np.ndarray, z_mm: float, edge: float, rtol: float
-) -> dict[str, Any]:
-    response = body(variant.tissue).response(load, omega, r, z=z_mm * 1e-3, rtol=rtol)
-    return {
-        "z_mm": z_mm,
-        "r_mm": [float(v) for v in np.round((r - r[0]) * 1e3)],
-        "u_z": [float(v) for v in np.abs(response.u_z) / edge],
-        "u_r": [float(v) for v in np.abs(response.u_r) / edge],
-    }
 
 
 def _paper_curves(variant: EstimateInput, radius: float, r: np.ndarray) -> dict[str, Any]:

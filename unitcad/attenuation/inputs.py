@@ -10,6 +10,8 @@ import numpy as np
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import KelvinVoigt, LossFactor
 
+Drive = Literal["flat", "axial"]
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -120,7 +122,8 @@ class TissueLayer:
 class EstimateInput:
     """A unit on a body: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known).
 
-    `passes`: how often the wave from motor to skin passes the border between the layers.
+    `passes`: how often the wave from motor to skin passes the border between the layers; `drive`: how the motor's force
+    acts, turning in the skin's plane (flat) or along the motor's axis (axial).
     """
 
     name: str
@@ -133,6 +136,7 @@ class EstimateInput:
     tissue: tuple[TissueLayer, ...]
     frequency: Quantity
     amplitude: float | None = None
+    drive: Drive = "flat"
 
     @property
     def motor_diameter(self) -> float:

@@ -84,11 +84,13 @@ def _inside(moulds: MouldSet) -> Iterator[Item]:
 
 
 def _ratings(spec: Spec) -> Iterator[str]:
-    """Yield what the catalogue knows of the motor's rating."""
+    """Yield what the catalogue knows of the motor's rating and mass."""
     if spec.motor.part:
         motor = motors(spec.motors)[spec.motor.part]
         ratings = {"V": motor.voltage_v, "mA": motor.current_ma, "g": motor.acceleration_g}
         yield from (f"{float(value):g} {unit}" for unit, value in ratings.items() if value)
+        if motor.mass_g:
+            yield f"mass {float(motor.mass_g):g} g"
 
 
 def _consumables(moulds: MouldSet) -> Iterator[Item]:

@@ -21,6 +21,10 @@ LONGEST_MM = 1000.0
 
 Source = Annotated[str, Meta(min_length=1, max_length=500)]
 Shore = Annotated[str, Meta(min_length=1, max_length=20, description="hardness as the data sheet has it")]
+Drive = Annotated[
+    Literal["flat", "axial"],
+    Meta(description="how the motor's force acts: turning in the can's plane (ERM) or along its axis (coin LRA)"),
+]
 Technology = Annotated[Literal["fdm", "sla"], Meta(description="molten filament, or cured resin")]
 Density = Annotated[float, Meta(ge=0.1, le=25, description="of the cured silicone")]
 Viscosity = Annotated[float, Meta(ge=1, le=1e8, description="of both parts mixed")]
@@ -40,6 +44,7 @@ FractionalOrder = Annotated[float, Meta(ge=0, le=1, description="order of a frac
 
 MotorDiameter = Annotated[float, Meta(ge=1, le=LONGEST_MM, description="of the motor's can")]
 MotorThickness = Annotated[float, Meta(ge=0.5, le=100, description="of the motor's can, along its axis")]
+MotorMass = Annotated[float, Meta(ge=0.001, le=1e4, description="of the motor")]
 Frequency = Annotated[float, Meta(ge=FREQUENCIES_HZ[0], le=FREQUENCIES_HZ[1], description="of the drive")]
 Amplitude = Annotated[float, Meta(ge=0.001, le=1e5, description="of the motor's vibration")]
 Speed = Annotated[float, Meta(ge=60 * FREQUENCIES_HZ[0], le=60 * FREQUENCIES_HZ[1], description="at the rated voltage")]
@@ -110,11 +115,13 @@ class Material(Struct, frozen=True, kw_only=True):
 
 
 class Motor(Struct, frozen=True, kw_only=True):
-    """A coin ERM motor."""
+    """A coin motor: an ERM, or an LRA (drive "axial")."""
 
     name: str
     diameter_mm: Value[MotorDiameter]
     thickness_mm: Value[MotorThickness]
+    drive: Value[Drive] | None = None
+    mass_g: Value[MotorMass] | None = None
     frequency_hz: Value[Frequency] | None = None
     amplitude_um: Value[Amplitude] | None = None
     rpm: Value[Speed] | None = None

@@ -27,6 +27,7 @@ def print_estimate(data: dict[str, Any]) -> None:
     if paper.get("readings") and paper["readings"][0]["hierarchical_over_control"]:
         screen.print(_readings(paper["readings"]))
     screen.print(_curve(data["layered"]))
+    screen.print(f"  {data['layered']['u_is']}", soft_wrap=True)
     screen.print(
         f"  no hierarchical / control from the layers: {data['layered']['hierarchical_over_control_reason']}",
         soft_wrap=True,
@@ -38,13 +39,14 @@ def print_estimate(data: dict[str, Any]) -> None:
 def print_frequencies(data: dict[str, Any]) -> None:
     """Print a row per frequency: edge level by model, decay of the skin's motion by distance."""
     rows = data["frequencies"]
-    table = Table("Hz", title=f"{data['variant']['name']}: edge level (motor = 1); |u_z| over its value at the edge")
+    decay = f"|u| over its value at the edge, {data['variant']['motor_drive']} drive"
+    table = Table("Hz", title=f"{data['variant']['name']}: edge level (motor = 1); {decay}")
     for model in rows[0]["edge_level"]:
         table.add_column(model)
-    for name in rows[0]["u_z_over_edge"]:
+    for name in rows[0]["u_over_edge"]:
         table.add_column(name.removeprefix("at_").replace("_", " "))
     for row in rows:
-        decay = [f"{value:.3g}" for value in row["u_z_over_edge"].values()]
+        decay = [f"{value:.3g}" for value in row["u_over_edge"].values()]
         table.add_row(f"{row['frequency_hz']:g}", *[level(one) for one in row["edge_level"].values()], *decay)
     console().print(table)
 
@@ -120,13 +122,19 @@ def _ranged(row: dict[str, Any], key: str) -> str:
 
 
 def _curve(layered: dict[str, Any]) -> Table:
-    table = Table("mm from the edge", title=f"|u_z| of the skin over its value at the edge, {layered['tissue']}")
+    """Tabulate the decay under either drive, the motor's own first, and one drive over the other per newton."""
+    title = (
+        f"|u| of the skin over its value at the edge, {layered['tissue']}, the motor's drive ({layered['drive']}) first"
+    )
+    table = Table("mm from the edge", title=title)
     picked = [i for i, r in enumerate(layered["r_mm"]) if r in (0, 2, 5, 10, 15, 20, 30)]
-    rows = [("layered", "value"), ("low", "low"), ("high", "high")]
     for i in picked:
         table.add_column(f"{layered['r_mm'][i]:g}")
-    for title, key in rows:
-        table.add_row(title, *[f"{layered['u_z'][key][i]:.3g}" for i in picked])
+    for drive, block in layered["drives"].items():
+        for name, key in ((drive, "value"), ("low", "low"), ("high", "high")):
+            table.add_row(name, *[f"{block['u'][key][i]:.3g}" for i in picked])
+    ratio = layered["flat_over_axial_per_newton"]["value"]
+    table.add_row("flat over axial, per newton", *[f"{ratio[i]:.3g}" for i in picked])
     return table
 
 

@@ -30,7 +30,7 @@ def geometric(spec: Spec) -> Spec:
     return structs.replace(
         spec,
         name="unit",
-        motor=structs.replace(spec.motor, part=None),
+        motor=structs.replace(spec.motor, part=None, drive="flat"),
         layers=tuple(structs.replace(layer, material="") for layer in spec.layers),
         casting=CastingTable(),
         estimate=Estimate(frequency_hz=0.0, amplitude_um=0.0, tissue="", models=()),

@@ -140,7 +140,7 @@ def estimated(moulds: MouldSet, store: Store) -> dict[str, Any]:
     from unitcad.estimating import estimate_spec
 
     def layered(asked: EstimateInput) -> dict[str, Any]:
-        reads = (asked.tissue_name, asked.tissue, asked.frequency, asked.diameter, asked.motor_diameter)
+        reads = (asked.tissue_name, asked.tissue, asked.frequency, asked.diameter, asked.motor_diameter, asked.drive)
         key = digest(repr((reads, code_version())).encode())
         return store.data(key, lambda: rounded(layered_block(asked)))
 

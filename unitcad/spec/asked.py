@@ -44,6 +44,7 @@ class MotorTable(Table, frozen=True, kw_only=True):
     part: str | None = None
     diameter_mm: kinds.MotorDiameter | None = None
     thickness_mm: kinds.MotorThickness | None = None
+    drive: kinds.Drive | None = None
     fill: Annotated[bool, Meta(description="Layer 1 reaches the motor: no ring of air between them")] = False
 
 

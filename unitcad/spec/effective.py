@@ -14,6 +14,7 @@ from msgspec import Struct, structs
 
 from unitcad import notebook
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
+from unitcad.catalogue.entries import Drive
 from unitcad.errors import UnitcadError
 from unitcad.spec.asked import (
     AskedSpec,
@@ -38,11 +39,12 @@ _MOST_LAYERS = 3
 
 
 class MotorSize(Table, frozen=True, kw_only=True):
-    """The motor's size; `part` names its catalogue entry, or None. With `fill` Layer 1 reaches it."""
+    """The motor's size and drive; `part` names its catalogue entry, or None. With `fill` Layer 1 reaches it."""
 
     part: str | None
     diameter_mm: float
     thickness_mm: float
+    drive: Drive
     fill: bool
 
 

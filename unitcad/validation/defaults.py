@@ -5,6 +5,7 @@ from __future__ import annotations
 from msgspec import structs
 
 from unitcad import catalogue
+from unitcad.catalogue.entries import Drive
 from unitcad.designs import Design, design_of
 from unitcad.designs.limits import least_slot
 from unitcad.errors import Refusal
@@ -15,6 +16,8 @@ from unitcad.spec.effective import CastLayer, Circuit, Estimate, MotorSize, Moul
 
 UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
 """What is assumed of a motor whose entry does not say: the paper's motor."""
+UNKNOWN_DRIVE: Drive = "flat"
+"""A coin ERM's, as the paper's motor is."""
 _PRINTER_LENGTHS = tuple(f for f in Moulds.__struct_fields__ if f in catalogue.Printer.__struct_fields__)
 
 
@@ -70,7 +73,7 @@ def _with_defaults(asked: AskedSpec, design: Design) -> Spec:
 
 
 def _motor(asked: AskedSpec) -> tuple[catalogue.Motor | None, MotorSize]:
-    """Return the motor's catalogue entry and its size; a size given beside a part overrides the entry's."""
+    """Return the motor's catalogue entry, and its size and drive; what is given beside a part overrides the entry's."""
     given, part = asked.motor, None
     sizes = {"diameter_mm": given.diameter_mm, "thickness_mm": given.thickness_mm}
     name = DEFAULT_MOTOR if given.part is None and set(sizes.values()) == {None} else given.part
@@ -81,7 +84,8 @@ def _motor(asked: AskedSpec) -> tuple[catalogue.Motor | None, MotorSize]:
         if size is None:
             raise Refusal(f"motor.{field}", None, "is required where no part is named")
     known = {field: size for field, size in sizes.items() if size is not None}
-    return part, MotorSize(part=name, fill=given.fill, **known)
+    drive = given.drive or (part.drive.value if part and part.drive else UNKNOWN_DRIVE)
+    return part, MotorSize(part=name, drive=drive, fill=given.fill, **known)
 
 
 def _moulds(asked: AskedSpec, design: Design) -> Moulds:

@@ -31,7 +31,7 @@ Changes = Mapping[str, object] | Iterable[str] | str
 
 _LENGTHS = tuple(set(Moulds.__struct_fields__) & set(Printer.__struct_fields__))
 _DERIVED = {
-    "motor": ("diameter_mm", "thickness_mm"),
+    "motor": ("diameter_mm", "thickness_mm", "drive"),
     "fpcb": ("pad_diameter_mm", "tail_end_width_mm"),
     "moulds": _LENGTHS,
     "estimate": ("frequency_hz", "amplitude_um"),

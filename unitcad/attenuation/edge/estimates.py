@@ -14,7 +14,8 @@ from unitcad.attenuation.inputs import EstimateInput, Quantity
 
 SIGNIFICANT_DIGITS = 9
 ASSUMPTIONS = [
-    "A flat ERM's sideways force is left out: every load and path here is axisymmetric. It is the largest omission.",
+    "A flat ERM's sideways force turns in the skin's plane. The layered curve takes it so (`layered.drives`); the "
+    "models of the edge level know no direction of the force.",
     "Amplitude at the edge is |u_z| of the skin at r = D/2, z = 0, over the motor's amplitude; the paper does not say "
     "which axis it measured.",
     "Poisson's ratio and loss factor of the silicones are assumed, with ranges; nobody has measured them for this.",
@@ -76,17 +77,19 @@ def summary(estimated: dict[str, Any]) -> dict[str, Any]:
 def frequency_table(
     variant: EstimateInput, frequencies: Sequence[float], models: Sequence[str] = MODELS
 ) -> dict[str, Any]:
-    """Return {variant, frequencies}: per frequency (Hz) each model's edge level and the decay at `DECAY_AT_MM`."""
-    rows = []
+    """Return {variant, frequencies}: per frequency (Hz) each model's edge level and the decay at `DECAY_AT_MM`.
+
+    `u_over_edge`: of |u| under the motor's drive; `u_z_over_edge`: of |u_z| under an axial one.
+    """
+    rows, places = [], [f"at_{d:g}_mm" for d in DECAY_AT_MM]
     for hertz in frequencies:
         at = replace(variant, frequency=Quantity(hertz))
+        decays = decay_at(at, hertz, DECAY_AT_MM)
         rows.append(
             {
                 "frequency_hz": hertz,
                 "edge_level": {model: model_block(at, model)["edge_level"] for model in models},
-                "u_z_over_edge": dict(
-                    zip([f"at_{d:g}_mm" for d in DECAY_AT_MM], decay_at(at, hertz, DECAY_AT_MM), strict=True)
-                ),
+                **{f"{name}_over_edge": dict(zip(places, decay, strict=True)) for name, decay in decays.items()},
             }
         )
     block = variant_block(variant)
@@ -102,6 +105,7 @@ def variant_block(variant: EstimateInput) -> dict[str, Any]:
         "design": variant.design,
         "diameter_mm": variant.diameter * 1e3,
         "motor_diameter_mm": variant.motor_diameter * 1e3,
+        "motor_drive": variant.drive,
         "frequency_hz": _quantity(variant.frequency, 1.0),
         "amplitude_um": None if variant.amplitude is None else variant.amplitude * 1e6,
         "tissue": variant.tissue_name,

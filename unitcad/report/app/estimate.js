@@ -82,24 +82,31 @@
     });
   }
 
+  const FORCES = { flat: "Force turning in the skin's plane", axial: "Force along the motor's axis" };
+
   function curves(layered) {
     if (!layered || !layered.r_mm) return el("p", { className: "absent" }, (layered && layered.reason) || "No curve.");
     const x = layered.r_mm;
-    const series = [];
-    const add = (name, block, more) => block && block.value && series.push({ name, x, y: block.value, low: block.low, high: block.high, ...more });
-    add("Layered skin, across it (u_z)", layered.u_z, { colour: 0 });
-    add("Layered skin, along it (u_r)", layered.u_r, { colour: 2 });
+    const drives = Object.entries(layered.drives || { axial: { u: layered.u_z } });
+    const series = drives.map(([drive, block], i) => ({
+      name: `${FORCES[drive] || drive}${drive === layered.drive ? " (this motor)" : ""}`, x, y: block.u.value, low: block.u.low, high: block.u.high, colour: i === 0 ? 0 : 2,
+    }));
     const print = layered.paper_beside;
     if (print) {
       if (print.j0) series.push({ name: "Paper: |J0(kr)|", x, y: print.j0.map(Math.abs), dash: true, colour: 1 });
       for (const [reading, values] of Object.entries(print.exponential || {})) series.push({ name: `Paper: exp, eta as ${reading.replace("_", " ")}`, x, y: values, dash: true, colour: reading === "loss_modulus" ? 3 : 4 });
     }
+    const columns = [...series];
+    for (const [drive, block] of drives) {
+      for (const key of ["u_r", "u_theta", "u_z"]) if (block[key]) columns.push({ name: `${drive}: |${key}|`, y: block[key].value });
+    }
+    if (layered.flat_over_axial_per_newton) columns.push({ name: "flat over axial, per newton", y: layered.flat_over_axial_per_newton.value });
     const every = Math.max(1, Math.floor(x.length / 7));
-    const rows = x.map((r, i) => [r, ...series.map((curve) => curve.y[i])]).filter((row, i) => i % every === 0);
+    const rows = x.map((r, i) => [r, ...columns.map((curve) => curve.y[i])]).filter((row, i) => i % every === 0);
     return [
-      curvePlot(series, { xLabel: "distance from the edge (mm)", yLabel: "of |u_z| at the edge", log: true, label: "Decay from the unit's edge outwards" }),
-      el("p", { className: "note" }, `At ${number(layered.frequency_hz)} Hz on ${layered.tissue}. The band is the spread: ${layered.spread}. No ratio to a control: ${layered.hierarchical_over_control_reason}.`),
-      el("details", {}, el("summary", {}, "The curve as numbers"), table(["r (mm)", ...series.map((curve) => curve.name)], rows, { label: "The curve as numbers" })),
+      curvePlot(series, { xLabel: "distance from the edge (mm)", yLabel: "of |u| at the edge", log: true, label: "Decay from the unit's edge outwards" }),
+      el("p", { className: "note" }, `At ${number(layered.frequency_hz)} Hz on ${layered.tissue}. ${layered.u_is ? `Each curve over its own value at the edge; ${layered.u_is}. ` : ""}The band is the spread: ${layered.spread}. No ratio to a control: ${layered.hierarchical_over_control_reason}.`),
+      el("details", {}, el("summary", {}, "The curve as numbers"), table(["r (mm)", ...columns.map((curve) => curve.name)], rows, { label: "The curve as numbers" })),
     ];
   }
 
