@@ -12,8 +12,21 @@ import numpy as np
 import pytest
 
 from unitcad.accuracy import runner
+from unitcad.accuracy.pages import front
 from unitcad.accuracy.plot import svg
-from unitcad.accuracy.result import Plot, Promise, Result, Table, fastest, frontier, markdown, shown
+from unitcad.accuracy.result import (
+    Plot,
+    Promise,
+    Result,
+    Summary,
+    Table,
+    fastest,
+    frontier,
+    kept,
+    markdown,
+    shown,
+    stars,
+)
 from unitcad.accuracy.timing import interleaved, timing
 from unitcad.cli.accuracy_command import accuracy
 from unitcad.errors import Refusal, UnitcadError
@@ -58,7 +71,21 @@ def test_the_page_names_command_and_machine():
     text = markdown(RESULT, ["p.svg"])
     assert "`unitcad accuracy stability --specs 9`; measured on: cores 2." in text
     assert "| y | - |" in text
-    assert "| broken | nan | 1 | BROKEN |" in text
+    assert "2 promises, **1 broken**." in text
+    assert "| broken | nan | 1 |" in text
+    assert "| kept |" not in text
+
+
+def test_promises_are_a_line_with_the_tightest():
+    promises = [Promise("none", 0, 0), Promise("loose", 0.1, 1.0), Promise("tight", 0.09, 0.1)]
+    assert kept(promises) == "3 promises, all kept; the tightest: tight (0.09, limit 0.1)"
+    assert kept(promises[:1]) == "1 promise, all kept"
+
+
+def test_an_error_beyond_use_has_no_star():
+    points = [(1.0, 0.96), (2.0, 0.5), (3.0, 1e-3), (4.0, 1e-3)]
+    assert stars(points) == ["*", "*", "*", ""]
+    assert stars(points, most=0.1) == ["", "", "*", ""]
 
 
 def test_lines_of_text_are_unchanged():
@@ -74,12 +101,24 @@ def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
     assert [r.suite for r in there] == ["moulds", "stability"]
     assert markdown(there[1], ["p.svg"]) == markdown(RESULT, ["p.svg"])
     assert there[1].plots == RESULT.plots
-    page = (tmp_path / "accuracy.md").read_text()
-    assert page.index("## Mould checks") < page.index("## Stability")
-    assert (tmp_path / "accuracy-stability-1.svg").is_file()
+    assert (tmp_path / "accuracy" / "moulds.md").read_text() == markdown(other, [])
+    assert (tmp_path / "accuracy" / "stability-1.svg").is_file()
+    runner.write([replace(RESULT, plots=())], tmp_path)
+    assert not (tmp_path / "accuracy" / "stability-1.svg").exists()
     (tmp_path / "accuracy.json").write_text("{}")
     with pytest.raises(UnitcadError, match="not a result"):
         runner.read(tmp_path)
+
+
+def test_the_front_page_has_picks_plots_and_a_line_for_every_suite():
+    summary = Summary((("a response", "1e-6", "rtol 1e-5"),), "case y: 1e-3", 0)
+    text = front(
+        [replace(RESULT, summary=summary, measured={"date": "2026-01-02"}), Result("moulds", "Mould checks", "")]
+    )
+    assert "| a response | 1e-6 | rtol 1e-5 |" in text
+    assert "| [![p](accuracy/stability-1.svg)](accuracy/stability.md) |  |" in text
+    assert "| [Stability](accuracy/stability.md) | case y: 1e-3 | 2 promises, **1 broken** | 2026-01-02 |" in text
+    assert "| [Mould checks](accuracy/moulds.md) | - | - |  |" in text
 
 
 def test_a_bad_option_or_folder_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

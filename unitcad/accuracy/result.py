@@ -58,11 +58,24 @@ class Promise:
 
 
 @dataclass(frozen=True)
-class Result:
-    """One suite's tables, plots and promises.
+class Summary:
+    """A suite on the front page.
 
-    `measured` says on what: machine, versions, size of the run. `options` are the options of the command that makes it
-    again.
+    picks: rows (for what, error, what to pick). worst: its worst case, a sentence. plot: the number of the plot that
+    the front page shows.
+    """
+
+    picks: tuple[tuple[str, str, str], ...] = ()
+    worst: str = ""
+    plot: int | None = None
+
+
+@dataclass(frozen=True)
+class Result:
+    """One suite's tables, plots and promises, and what of it stands on the front page.
+
+    `measured` says on what: machine, versions, date, size of the run. `options` are the options of the command that
+    makes it again.
     """
 
     suite: str
@@ -73,6 +86,7 @@ class Result:
     promises: tuple[Promise, ...] = ()
     measured: dict[str, str | int] = field(default_factory=dict)
     options: str = ""
+    summary: Summary = Summary()
 
     @property
     def ok(self) -> bool:
@@ -103,9 +117,9 @@ def frontier(points: Sequence[tuple[float, float]]) -> list[bool]:
     ]
 
 
-def stars(points: Sequence[tuple[float, float]]) -> list[str]:
-    """Return a star for each point on the frontier, for a column of a table."""
-    return ["*" if best else "" for best in frontier(points)]
+def stars(points: Sequence[tuple[float, float]], most: float = math.inf) -> list[str]:
+    """Return a star for each point on the frontier whose error is at most `most`, for a column of a table."""
+    return ["*" if best else "" for best in frontier([(c, e if e <= most else math.inf) for c, e in points])]
 
 
 def fastest(points: Sequence[tuple[str, float, float]], error: float) -> str | None:
@@ -127,22 +141,39 @@ def shown(value: Cell) -> str:
 
 
 def markdown(result: Result, picture: Sequence[str] | None = None) -> str:
-    """Return the suite's section; `picture[i]` is the file of plot i, None links no pictures."""
-    lines = [f"## {result.title}", "", result.text, ""]
-    size = ", ".join(f"{k} {v}" for k, v in result.measured.items())
+    """Return the suite's page; `picture[i]` is the file of plot i, None links no pictures."""
     command = f"unitcad accuracy {result.suite} {result.options}".strip()
-    lines += [f"`{command}`; measured on: {size}.", ""]
+    lines = [f"# {result.title}", "", result.text, "", f"`{command}`; measured on: {measured_on(result)}.", ""]
+    if result.promises:
+        lines += [f"{kept(result.promises)}.", ""]
+    broken = tuple((p.what, p.value, p.limit) for p in result.promises if not p.ok)
+    if broken:
+        lines += ["**Broken promises**", "", *table_lines(Table("", ("what", "value", "limit"), broken)), ""]
+    for plot, file in zip(result.plots, picture, strict=True) if picture is not None else ():
+        lines += [f"![{plot.title}]({file})", ""]
     for table in result.tables:
         lines += [f"**{table.title}**", "", *table_lines(table), ""]
         if table.note:
             lines += [table.note, ""]
-    for plot, file in zip(result.plots, picture, strict=True) if picture is not None else ():
-        lines += [f"![{plot.title}]({file})", ""]
-    if result.promises:
-        rows = tuple((p.what, p.value, p.limit, "kept" if p.ok else "BROKEN") for p in result.promises)
-        lines += ["**Promises (CI fails when one is broken)**", ""]
-        lines += [*table_lines(Table("", ("what", "value", "limit", ""), rows)), ""]
     return "\n".join(lines)
+
+
+def measured_on(result: Result) -> str:
+    """Return on what a result was measured, in a line."""
+    return ", ".join(f"{name} {value}" for name, value in result.measured.items())
+
+
+def kept(promises: Sequence[Promise]) -> str:
+    """Return a line on promises: how many, whether all are kept, and the one that uses most of its limit."""
+    number = f"{len(promises)} promise{'s' if len(promises) > 1 else ''}"
+    broken = [promise for promise in promises if not promise.ok]
+    if broken:
+        return f"{number}, **{len(broken)} broken**"
+    limited = [promise for promise in promises if promise.limit > 0]
+    if not limited:
+        return f"{number}, all kept"
+    tightest = max(limited, key=lambda promise: promise.value / promise.limit)
+    return f"{number}, all kept; the tightest: {tightest.what} ({shown(tightest.value)}, limit {shown(tightest.limit)})"
 
 
 def table_lines(table: Table) -> list[str]:

@@ -1,4 +1,4 @@
-"""Running suites, and writing docs/accuracy.md, its plots and accuracy.json from the same data."""
+"""Running suites, and keeping their results in accuracy.json, from which `pages` writes the pages."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from importlib import import_module
 from pathlib import Path
 
 from unitcad import files
-from unitcad.accuracy.plot import svg
-from unitcad.accuracy.result import Result, Say, from_dict, markdown
+from unitcad.accuracy import pages
+from unitcad.accuracy.result import Result, Say, from_dict
 from unitcad.errors import UnitcadError, unknown_name
 
 MODULES = {
@@ -25,19 +25,11 @@ MODULES = {
     "left-out": "left_out",
     "speed": "speed",
 }
-"""Suites in the order of the page, and the module of each, whose function `run(quick, say)` returns its result."""
+"""Suites in the order of the pages, and the module of each, whose function `run(quick, say)` returns its result."""
 SUITES = tuple(MODULES)
 
 JOURNALS = {"extremes": Path("out") / "extremes.jsonl", "stability": Path("out") / "stability.jsonl"}
 """What the long study of a suite has so far, from which it resumes."""
-
-HEAD = """# Error against run time, and what holds at the extremes
-
-This page is written by `unitcad accuracy` from what it computed; `accuracy.json` holds the same numbers. Each section
-names the command that makes it again and says on what it was measured. Errors are against exact or independent
-references. Run times are medians with quartiles, taken in turn in one run: compare them within a table only, since
-seconds differ between machines. A star marks the frontier: nothing in the table is both faster and more exact.
-"""
 
 
 def chosen(names: Sequence[str]) -> tuple[str, ...]:
@@ -82,7 +74,7 @@ def ready(folder: Path) -> list[Result]:
 
 
 def write(results: Sequence[Result], folder: Path) -> None:
-    """Put results into a folder's accuracy.json beside those there, and write the page and plots of all.
+    """Put results into a folder's accuracy.json beside those there, and write the pages and plots of all.
 
     Raises UnitcadError as `ready` does.
     """
@@ -90,13 +82,7 @@ def write(results: Sequence[Result], folder: Path) -> None:
     ordered = [known[name] for name in SUITES if name in known]
     text = json.dumps({"suites": [result.as_dict() for result in ordered]}, indent=1, allow_nan=False)
     files.write(folder / "accuracy.json", (text + "\n").encode())
-    sections = [HEAD]
-    for result in ordered:
-        pictures = [f"accuracy-{result.suite}-{i + 1}.svg" for i in range(len(result.plots))]
-        for file, plot in zip(pictures, result.plots, strict=True):
-            files.write(folder / file, svg(plot).encode())
-        sections.append(markdown(result, pictures))
-    files.write(folder / "accuracy.md", "\n".join(sections).encode())
+    pages.write(ordered, folder)
 
 
 def read(folder: Path) -> list[Result]:

@@ -10,6 +10,7 @@ import subprocess
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeVar
@@ -55,12 +56,13 @@ def timing(seconds: list[float], value: Any = None) -> Timing:
 
 
 def machine(*packages: str) -> dict[str, str | int]:
-    """Return what a measurement was made on: processor, cores, commit of a clone, versions of Python and `packages`."""
-    facts: dict[str, str | int] = {"processor": _processor(), "cores": os.cpu_count() or 1}
+    """Return when and on what: date, processor, cores, commit of a clone, versions of Python and `packages`."""
+    today = datetime.now(UTC).date().isoformat()
+    facts: dict[str, str | int] = {"date": today, "processor": _processor(), "cores": os.cpu_count() or 1}
     if commit := _commit():
         facts["commit"] = commit
     facts["Python"] = platform.python_version()
-    for name in packages:
+    for name in ("unitcad", *packages):
         try:
             facts[name] = version(name)
         except PackageNotFoundError:

@@ -29,7 +29,7 @@ def accuracy(
     seed: Annotated[int, typer.Option(min=0, help="Of the random media: another one, other media.")] = 0,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", help="Where accuracy.md and accuracy.json go: docs; nowhere if quick."),
+        typer.Option("-o", "--out", help="Where accuracy.md, its pages and accuracy.json go: docs; nowhere if quick."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
