@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from unitcad.attenuation.curve import layered_block
@@ -59,7 +60,12 @@ def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInp
         diameter=spec.diameter_mm * 1e-3,
         geometry=_geometry(spec, _motor_mass(spec, motor)),
         layers=tuple(
-            _silicone(choose(f"layers.{i}.material", layer.material, silicones), layer.wall_mm * 1e-3, frequency)
+            _silicone(
+                choose(f"layers.{i}.material", layer.material, silicones),
+                layer.wall_mm * 1e-3,
+                frequency,
+                spec.estimate.moduli == "quasi-static",
+            )
             for i, layer in enumerate(spec.layers)
         ),
         tissue_name=spec.estimate.tissue,
@@ -99,12 +105,12 @@ def _quantity(value: Value, factor: float = 1.0) -> Quantity:
     return Quantity(float(value) * factor, low, high)
 
 
-def _silicone(material: Material, wall: float, frequency: Quantity) -> SiliconeLayer:
+def _silicone(material: Material, wall: float, frequency: Quantity, slow: bool) -> SiliconeLayer:
     return SiliconeLayer(
         material=material.name,
         thickness=wall,
         density=float(material.density_g_cm3) * 1e3,
-        youngs_modulus=_youngs_modulus(material, frequency),
+        youngs_modulus=_quasistatic(material) if slow else _youngs_modulus(material, frequency),
         poisson_ratio=_quantity(material.poisson_ratio),
         tan_delta=_quantity(material.loss_factor),
     )
@@ -125,6 +131,17 @@ def _youngs_modulus(material: Material, frequency: Quantity) -> Quantity:
         f"({mu0.source})"
     )
     return Quantity(None, static, dynamic, note)
+
+
+def _quasistatic(material: Material) -> Quantity:
+    """Return the modulus of a slow pull in Pa, which says what it is; not known where nobody pulled the silicone."""
+    value = material.quasistatic_modulus_kpa
+    if value is None:
+        return Quantity(None, note="no quasistatic_modulus_kpa is known, which estimate.moduli asks for")
+    how = f" ({value.method})" if value.method else ""
+    return replace(
+        _quantity(value, 1e3), note=f"quasi-static, softer than at the motor's frequency{how}; {value.source}"
+    )
 
 
 def _no_modulus(material: Material) -> str:

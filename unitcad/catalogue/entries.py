@@ -13,7 +13,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 T = TypeVar("T")
-Status = Literal["datasheet", "paper", "secondary", "assumed", "spec"]
+Status = Literal["datasheet", "paper", "secondary", "assumed", "measured", "spec"]
 FREQUENCIES_HZ = (1.0, 5000.0)
 """What an estimate may be asked for: vibration motors, with room on both sides; above it waves are too short."""
 LONGEST_MM = 1000.0
@@ -38,6 +38,7 @@ Poisson = Annotated[float, Meta(ge=0, le=0.5, description="Poisson's ratio; 0.5:
 LossFactor = Annotated[float, Meta(ge=0, le=10, description="tan delta at the motor's frequency")]
 MixRatio = Annotated[float, Meta(ge=0.001, le=1000, description="parts A to one part B")]
 Young = Annotated[float, Meta(ge=0.01, le=1e8, description="Young's modulus at small strain and the motor's frequency")]
+QuasistaticYoung = Annotated[float, Meta(ge=0.01, le=1e8, description="Young's modulus, pulled slowly")]
 FractionalModulus = Annotated[float, Meta(ge=0.01, le=1e8, description="static shear modulus of a fractional law")]
 FractionalTime = Annotated[float, Meta(ge=0, le=1e9, description="time constant of a fractional law")]
 FractionalOrder = Annotated[float, Meta(ge=0, le=1, description="order of a fractional law")]
@@ -80,13 +81,17 @@ TissueViscosity = Annotated[float, Meta(ge=0, le=1e6, description="of shear; it 
 
 
 class Value(Struct, Generic[T], frozen=True, omit_defaults=True, repr_omit_defaults=True, forbid_unknown_fields=True):
-    """A number or a word with where it comes from; `low` and `high` bound it where a range is known."""
+    """A number or a word with where it comes from; `low` and `high` bound it where a range is known.
+
+    `method`: how a measured value was worked out, where several methods differ.
+    """
 
     value: T
     status: Status = "spec"
     source: Source = "the spec"
     low: T | None = None
     high: T | None = None
+    method: Source | None = None
 
     def __float__(self) -> float:
         return float(self.value)  # type: ignore[arg-type]
@@ -109,6 +114,7 @@ class Material(Struct, frozen=True, kw_only=True):
     loss_factor: Value[LossFactor]
     mix_ratio: Value[MixRatio]
     youngs_modulus_kpa: Value[Young] | None = None
+    quasistatic_modulus_kpa: Value[QuasistaticYoung] | None = None
     fractional_mu0_kpa: Value[FractionalModulus] | None = None
     fractional_tau_us: Value[FractionalTime] | None = None
     fractional_n: Value[FractionalOrder] | None = None
@@ -233,6 +239,7 @@ if TYPE_CHECKING:
         loss_factor: _Number = None
         mix_ratio: _Number = None
         youngs_modulus_kpa: _Number = None
+        quasistatic_modulus_kpa: _Number = None
         fractional_mu0_kpa: _Number = None
         fractional_tau_us: _Number = None
         fractional_n: _Number = None

@@ -22,6 +22,7 @@ LAWS: tuple[tuple[Law, float], ...] = (
 MOST_LAW_STRAIN = 1.0
 """A law that is fitted beyond this is shown, but it is no statement about small strain."""
 _GRID = 41
+_PASSES = 3
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,15 @@ def fit_toe(strain: np.ndarray, stress: np.ndarray, up_to: float) -> Toe | None:
     return Toe(float(found.x[1]), float(found.x[0] * slope), up_to)
 
 
+def fit_start(strain: np.ndarray, stress: np.ndarray, high: float) -> Toe | None:
+    """Fit the start of a curve up to the strain `high` counted from the fitted origin; None as `fit_toe`."""
+    toe = fit_toe(strain, stress, high)
+    for _ in range(_PASSES if toe else 0):
+        further = fit_toe(strain, stress, high + max(toe.origin, 0.0)) if toe else None
+        toe = further or toe
+    return toe
+
+
 def secant(strain: np.ndarray, stress: np.ndarray, at: float) -> float | None:
     """Return stress over strain at a strain, Pa, interpolated; None where the curve does not span it."""
     if not strain[0] <= at <= strain[-1]:
@@ -114,7 +124,7 @@ def _default(strain: np.ndarray, stress: np.ndarray, low: float, high: float) ->
     name = default_method(low, high)
     if strain[-1] < high:
         return Modulus(name, None, f"the curve ends at {100 * strain[-1]:.3g} %")
-    toe = fit_toe(strain, stress, high)
+    toe = fit_start(strain, stress, high)
     if toe is None:
         return Modulus(name, None, f"too few points below {100 * high:.3g} %, or no rising stress there")
     return Modulus(name, toe.secant(low, high))
@@ -123,7 +133,7 @@ def _default(strain: np.ndarray, stress: np.ndarray, low: float, high: float) ->
 def _secants(strain: np.ndarray, stress: np.ndarray) -> list[Modulus]:
     made = []
     for at in SECANTS:
-        standard = ", the 100 % modulus of ISO 37 and ASTM D412" if at == 1.0 else ""
+        standard = " (ISO 37, ASTM D412)" if at == 1.0 else ""
         value = secant(strain, stress, at)
         reason = "" if value is not None else f"the curve spans {100 * strain[0]:.3g} to {100 * strain[-1]:.3g} %"
         made.append(Modulus(f"secant at {100 * at:g} %{standard}", value, reason))

@@ -28,6 +28,7 @@ TailWidth = Annotated[float, Meta(ge=LEAST_TAIL, le=kinds.LONGEST_MM)]
 Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
 _LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
 _TISSUE = "one layer or more by name, skin first, each a table with density_kg_m3, poisson_ratio and a modulus"
+Moduli = Literal["dynamic", "quasi-static"]
 Model = Literal["paper", "consistent", "fitted"]
 
 
@@ -132,6 +133,9 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     amplitude_um: kinds.Amplitude | None = None
     tissue: str = "forearm"
     models: Annotated[tuple[Model, ...], Meta(min_length=1)] = ("paper", "consistent", "fitted")
+    moduli: Annotated[Moduli, Meta(description="of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")] = (
+        "dynamic"
+    )
 
 
 class OutputTable(Table, frozen=True, kw_only=True):

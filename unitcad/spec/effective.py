@@ -24,6 +24,7 @@ from unitcad.spec.asked import (
     FpcbTable,
     LayerTable,
     Model,
+    Moduli,
     MotorTable,
     MouldsTable,
     OutputTable,
@@ -100,12 +101,13 @@ class Moulds(Table, frozen=True, kw_only=True):
 
 
 class Estimate(Table, frozen=True, kw_only=True):
-    """Inputs of the attenuation estimate: frequency in Hz, amplitude in um, the body and the models."""
+    """Inputs of the attenuation estimate: frequency in Hz, amplitude in um, the body, the models, which moduli."""
 
     frequency_hz: float
     amplitude_um: float
     tissue: str
     models: tuple[Model, ...]
+    moduli: Moduli = "dynamic"
 
 
 if TYPE_CHECKING:

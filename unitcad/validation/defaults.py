@@ -123,4 +123,5 @@ def _estimate(asked: AskedSpec, part: catalogue.Motor | None) -> Estimate:
         field: getattr(asked.estimate, field) or float(getattr(part, field, None) or default)
         for field, default in unknown.items()
     }
-    return Estimate(tissue=asked.estimate.tissue, models=asked.estimate.models, **values)
+    chosen = asked.estimate
+    return Estimate(tissue=chosen.tissue, models=chosen.models, moduli=chosen.moduli, **values)

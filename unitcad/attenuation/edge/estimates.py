@@ -53,7 +53,11 @@ def estimate(
         "layered": layered(variant),
         "measured": measured_block(variant),
         "table_error": errors,
-        "assumptions": [*ASSUMPTIONS, *([f"A range, not a value: {note}" for note in notes])],
+        "assumptions": [
+            *ASSUMPTIONS,
+            *(f"A range, not a value: {note}" for note in notes),
+            *dict.fromkeys(_noted(variant)),
+        ],
     }
     return rounded(data)
 
@@ -141,6 +145,12 @@ def assessment_block(assessment: Assessment) -> dict[str, Any]:
             "ratios": asdict(assessment.left_out_ratios) if assessment.left_out_ratios else None,
         },
     }
+
+
+def _noted(variant: EstimateInput) -> list[str]:
+    """Return what is to be said of moduli that are known but not at the motor's frequency."""
+    moduli = [(layer.material, layer.youngs_modulus) for layer in variant.layers]
+    return [f"{name} youngs_modulus: {one.note}" for name, one in moduli if one.note and one.value is not None]
 
 
 def _quantity(quantity: Quantity, factor: float) -> dict[str, Any]:
