@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from dataclasses import replace
 
 import pytest
 from faulty_sets import set_of
 
-from unitcad.casting import figures, written
+from unitcad.casting import figures, instructions, release_agent, written
 from unitcad.casting import procedure as casting_procedure
 from unitcad.casting.layer_grid import off_grid
 from unitcad.casting.procedure import Procedure
+from unitcad.casting.release_agent import Face
+from unitcad.casting.rules import broken_rules
 from unitcad.catalogue import materials
 from unitcad.validation import templates
 
@@ -189,3 +193,44 @@ def test_a_motor_that_nothing_holds_is_fixed() -> None:
     """An open ring without a pad: silicone round the motor, or motor.fill."""
     ring = "layers=[{ material = 'ecoflex-00-10', wall_mm = 2.5 }]"
     assert "fill the ring of 1.00 mm" in procedure("no-fpcb", "design=embedded", ring).assembly[-1]
+
+
+@pytest.mark.parametrize("name", sorted(templates()))
+@pytest.mark.parametrize("more", [[], ["moulds.printer=sla"], ["casting.vacuum=false"]], ids=["", "sla", "no vacuum"])
+def test_a_procedure_keeps_every_rule(name: str, more: list[str]) -> None:
+    assert broken_rules(procedure(name, *more)) == []
+
+
+@pytest.mark.parametrize(
+    ("pour", "face"),
+    [(1, Face("cup1", "bore")), (1, Face("base", "core")), (2, Face("cup1", "bore")), (2, Face("base", "seat"))],
+    ids=lambda value: str(value),
+)
+def test_agent_on_a_bond_face_breaks_a_rule(pour: int, face: Face) -> None:
+    """Planted: Layer 2 and the motor don't bond where agent was."""
+    casting = procedure("encapsulating")
+    pours = [replace(p, agent=(face,)) if p.index == pour else p for p in casting.pours]
+    assert any("whose cast bonds to" in fault for fault in broken_rules(replace(casting, pours=tuple(pours))))
+
+
+def test_agent_before_the_last_pour_breaks_a_rule(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted where the procedure is made: data and words are of one source."""
+    for module in (casting_procedure, instructions):
+        monkeypatch.setattr(module, "agent_faces", lambda _moulds, step: (Face(step.cup, "bore"),))
+    casting = procedure("three-layer")
+    assert {fault.split(":")[0] for fault in broken_rules(casting)} == {"pour 1", "pour 2"}
+    assert "only on the bore of cup 1" in " ".join(casting.pours[0].steps)
+
+
+@pytest.mark.parametrize("name", sorted(templates()))
+def test_words_allow_agent_on_the_last_cups_bore_alone(name: str) -> None:
+    casting = procedure(name)
+    text = written.to_markdown(casting)
+    assert re.findall(r"only on the (bore of cup \d+)", text) == [f"bore of cup {len(casting.pours)}"]
+    assert text.count("No release agent on any piece") == len(casting.pours) - 1
+
+
+def test_a_custom_design_of_two_layers_gets_no_agent() -> None:
+    """Its last cup's bore may meet the first layer's edge, to which the second bonds."""
+    moulds = set_of("custom/film-closed")
+    assert [release_agent.agent_faces(moulds, step) for step in moulds.plan.steps] == [(), ()]

@@ -6,11 +6,13 @@ import math
 from collections.abc import Iterator, Sequence
 
 from unitcad.casting.figures import MIXING_MIN, MOST_ERROR_PCT, Mix
+from unitcad.casting.release_agent import agent_faces
 from unitcad.catalogue import Material
 from unitcad.moulds.lid import SKIRT_WALL
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.spec import printer_of
+from unitcad.text import spaced
 
 STRIKE_AGAIN_MIN = 10
 
@@ -58,16 +60,12 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
             f"Coat the {_lead(moulds)} thinly with petroleum jelly where the slot of cup {step.index} comes, outside "
             "the cavity only: it keeps silicone from weeping out."
         )
-    core = f" and on the {_holds(moulds)}, sparingly" if first else ""
     pushed = (
         ": the play is then on one side."
         if first
         else ", the same way as the cup before: Layer 2 lies between two cup positions."
     )
-    yield (
-        f"Release agent, if any, only on the bore of cup {step.index}{core}. Put cup {step.index} on and push it "
-        f"towards the cut corner{pushed}"
-    )
+    yield (f"{_release_agent(moulds, step)} Put cup {step.index} on and push it towards the cut corner{pushed}")
     if step.seals and not moulds.plan.concentric:
         yield "Grease the flanks of what stands on the base beside the cavity thinly, and wipe off the rest."
     if tongues:
@@ -185,6 +183,18 @@ def _by_opening(moulds: MouldSet) -> Iterator[str]:
     yield (
         "A smear of Layer 1's silicone holds it (assumed: silicone bonds poorly to bare metal and polyimide). The "
         "design's file says nothing more of the assembly; a Design with an assembly of its own can."
+    )
+
+
+def _release_agent(moulds: MouldSet, step: Step) -> str:
+    """Say which faces get release agent before a pour, and why no other."""
+    faces = agent_faces(moulds, step)
+    if not faces:
+        return "No release agent on any piece: what is cast here bonds later."
+    where = " and ".join(f"the {face.face} of {spaced(face.tool)}" for face in faces)
+    return (
+        f"Release agent, if any, sparingly and only on {where}: put it on away from the base and let it dry. No "
+        f"other face gets any, the {_holds(moulds)} neither."
     )
 
 

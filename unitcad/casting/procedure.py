@@ -11,6 +11,7 @@ from unitcad.casting.bill import Item, bill
 from unitcad.casting.figures import Figure, Mix, sourced
 from unitcad.casting.instructions import assembly, measurements, pour_steps, preparation, release
 from unitcad.casting.layer_grid import OffGrid, off_grid
+from unitcad.casting.release_agent import BondFace, Face, agent_faces, bond_faces
 from unitcad.catalogue import Material
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -20,13 +21,17 @@ from unitcad.spec import Spec
 
 @dataclass(frozen=True)
 class Pour:
-    """One pour: its figures, the verdict on bubbles, what the person does, and the drawing of it assembled."""
+    """One pour: its figures, the verdict on bubbles, what the person does, and the drawing of it assembled.
+
+    `agent`: the faces that may get release agent before it.
+    """
 
     index: int
     layer: str
     material: str
     figures: tuple[Figure, ...]
     verdict: str
+    agent: tuple[Face, ...]
     steps: tuple[str, ...]
     drawing: str
 
@@ -35,6 +40,7 @@ class Pour:
 class Procedure:
     """A whole casting: numbered steps run on from `preparation` through the pours to `assembly`.
 
+    `bonds` are the tools' faces that must never get release agent.
     `walls` is () where the tooling is not concentric: nothing tells which of its walls a cup's play changes.
     """
 
@@ -44,6 +50,7 @@ class Procedure:
     preparation: tuple[str, ...]
     off_grid: tuple[OffGrid, ...]
     pours: tuple[Pour, ...]
+    bonds: tuple[BondFace, ...]
     release: tuple[str, ...]
     assembly: tuple[str, ...]
     measure: tuple[str, ...]
@@ -71,6 +78,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
                 silicone.name,
                 _figures(moulds, step, silicone, mix, volume),
                 verdict,
+                agent_faces(moulds, step),
                 tuple(pour_steps(moulds, step, silicone, mix, verdict)),
                 f"step{step.index}-section.svg",
             )
@@ -84,6 +92,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
         preparation=tuple(preparation(moulds)),
         off_grid=edges,
         pours=tuple(pours),
+        bonds=bond_faces(moulds),
         release=tuple(release(moulds, mixes[0][0])),
         assembly=() if moulds.design.laid_in else assembly(moulds),
         measure=tuple(measurements(moulds, grams, _printed_slot_height(moulds, edges))),

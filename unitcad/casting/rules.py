@@ -1,0 +1,27 @@
+"""What a casting procedure must never say: each rule reads the procedure's data and names what breaks it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from unitcad.casting.procedure import Procedure
+
+
+def broken_rules(procedure: Procedure) -> list[str]:
+    """Return what a procedure does wrong, one sentence each; empty where it keeps every rule."""
+    return [fault for rule in (_agent,) for fault in rule(procedure)]
+
+
+def _agent(procedure: Procedure) -> Iterator[str]:
+    """Keep release agent off what bonds later, and off every pour but the last."""
+    bonds = {bond.face: bond.to for bond in procedure.bonds}
+    last = procedure.pours[-1].index
+    for pour in procedure.pours:
+        for face in pour.agent:
+            if face in bonds:
+                bond = f"whose cast bonds to {bonds[face]}"
+                yield f"pour {pour.index}: release agent on the {face.face} of {face.tool}, {bond}"
+            if pour.index != last:
+                yield f"pour {pour.index}: release agent before the last pour"
+            if face.tool != f"cup{last}" or face.face != "bore":
+                yield f"pour {pour.index}: release agent on the {face.face} of {face.tool}, not on the last cup's bore"
