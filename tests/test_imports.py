@@ -24,6 +24,7 @@ FLOORS = [
     {"pipeline"},
     {"lab"},
     {"casting", "mould_checks"},
+    {"experiments"},
     {"moulds", "estimating"},
     {"validation"},
     {"export"},

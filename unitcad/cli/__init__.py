@@ -20,6 +20,7 @@ from unitcad.cli.cache_command import cache
 from unitcad.cli.check_command import check
 from unitcad.cli.coupon_command import coupon
 from unitcad.cli.estimate_command import estimate
+from unitcad.cli.experiments_command import experiments
 from unitcad.cli.init_command import init
 from unitcad.cli.list_command import list_
 from unitcad.cli.output import say_error, speak_anywhere
@@ -53,6 +54,7 @@ app.command("build")(build)
 app.command("batch")(batch)
 app.command("check")(check)
 app.command("estimate")(estimate)
+app.command("experiments")(experiments)
 app.command("accuracy")(accuracy)
 app.command("coupon")(coupon)
 app.command("init")(init)

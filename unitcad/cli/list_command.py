@@ -8,7 +8,7 @@ import typer
 
 from unitcad.cli.shared_options import AsJson
 
-KINDS = ("templates", "designs", "materials", "motors", "printers", "rules")
+KINDS = ("templates", "designs", "materials", "motors", "printers", "experiments", "rules")
 
 
 def list_(
@@ -51,6 +51,10 @@ def _entries(kind: str) -> dict[str, Any]:
         }
     if kind == "designs":
         return {name: design.about for name, design in shipped().items()}
+    if kind == "experiments":
+        from unitcad.experiments.lab_file import shipped as labs
+
+        return {name: _first_comment(path.read_text("utf-8")) for name, path in labs().items()}
     if kind == "rules":
         from unitcad.check.rules.registry import rules
 

@@ -1,0 +1,106 @@
+"""`unitcad experiments`: what to measure next, as tables for a person, as JSON or as a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from unitcad.cli.output import console, print_json, progress
+from unitcad.cli.shared_options import AsJson, listed
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from unitcad.experiments.lab_file import Lab
+
+
+def experiments(
+    lab: Annotated[str, typer.Argument(metavar="LAB", help="a TOML file of what a lab has, or a shipped one's name")],
+    rivals: Annotated[
+        str | None, typer.Option(help="names separated by commas, or all; else the file's, or the usual ones")
+    ] = None,
+    draws: Annotated[int | None, typer.Option(help="of what is not known, for each rival; else the file's")] = None,
+    seed: Annotated[int | None, typer.Option(help="of the draws; else the file's")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Write experiments.json, .md and .svg into this folder.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Rank what a lab can measure by what it would say about rival models of the level at the edge.
+
+    Each experiment is a ratio of two readings. Its bits are the expected information about which rival holds, with the
+    error of that figure.
+    """
+    from unitcad.experiments.lab_file import load_lab
+    from unitcad.experiments.study import study
+    from unitcad.experiments.study_files import write_study
+
+    asked = {"rivals": None if rivals is None else listed(rivals), "draws": draws, "seed": seed}
+    loaded = load_lab(lab, {key: value for key, value in asked.items() if value is not None})
+    with progress("experiments") as stage:
+        data = study(loaded, stage)
+    folder = write_study(data, out) if out else None
+    if as_json:
+        print_json(data)
+        return
+    _print(data, loaded)
+    if folder:
+        typer.echo(str(folder))
+
+
+def _print(data: dict[str, Any], lab: Lab) -> None:
+    from unitcad.experiments.study_files import shown
+
+    screen = console()
+    names = [rival["name"] for rival in data["rivals"]]
+    found = shown(data)
+    screen.print(
+        f"{lab.name}: {len(data['experiments'])} ratios of {len(lab.conditions)} readings, {len(names)} rivals, "
+        f"{data['most_bits']:.2f} bits to know"
+    )
+    screen.print(_best(found))
+    screen.print(_ranges(found, names))
+    screen.print(_sets(data))
+    for rival in data["rivals"]:
+        known = f" (probability {rival['probability']:.2f})" if data["measured"] else ""
+        screen.print(f"  {rival['name']}{known}: {rival['says']}", soft_wrap=True)
+    for name, reason in data["left_out"].items():
+        screen.print(f"  left out: {name}: {reason}", soft_wrap=True)
+    screen.print(
+        f"  A reading scatters by {100 * data['noise']:g} %, a rival that holds misses a ratio by "
+        f"{100 * data['discrepancy']:g} %. Ranges: 10 to 90 % of {data['draws']} draws, without that scatter.",
+        soft_wrap=True,
+    )
+    screen.print(data["settles"], soft_wrap=True)
+
+
+def _best(found: list[dict[str, Any]]) -> Table:
+    from rich.table import Table
+
+    table = Table("", "ratio; of each comparison the best one", "bits")
+    for number, one in enumerate(found, 1):
+        table.add_row(str(number), one["experiment"], f"{one['bits']:.2f} ± {one['error']:.2f}")
+    return table
+
+
+def _ranges(found: list[dict[str, Any]], names: list[str]) -> Table:
+    from rich.table import Table
+
+    from unitcad.experiments.study_files import span_text
+
+    table = Table("rival", *[str(number) for number in range(1, len(found[:5]) + 1)], title="predicted ratio")
+    for name in names:
+        table.add_row(name, *[span_text(one["predicted"][name]) for one in found[:5]])
+    return table
+
+
+def _sets(data: dict[str, Any]) -> Table:
+    from rich.table import Table
+
+    table = Table("measured together", "bits", "not told apart")
+    for one in data["sets"]:
+        pairs = "\n".join(" and ".join(pair["rivals"]) for pair in one["not_told_apart"]) or "none"
+        table.add_row("\n".join(one["experiments"]), f"{one['bits']:.2f} ± {one['error']:.2f}", pairs)
+    return table

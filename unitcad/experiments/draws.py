@@ -1,0 +1,69 @@
+"""Draws of what a rival does not know: material constants within their ranges, fitted constants, the assembly.
+
+Every name has a stream of its own, so that a longer run begins with the draws of a shorter one and a new name changes
+no other.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
+
+
+@dataclass(frozen=True)
+class Draws:
+    """`count` independent draws for one rival. Of one name all conditions of a draw share the value.
+
+    `modulus_factor`: a silicone's modulus without a range lies between its value over and its value times this factor.
+    """
+
+    count: int
+    seed: int
+    rival: str = ""
+    modulus_factor: float = 1.5
+
+    def uniform(self, name: str) -> np.ndarray:
+        """Return the draws of that name between 0 and 1, shape (count,)."""
+        stream = hashlib.sha256(f"{self.rival}\n{name}".encode()).digest()[:8]
+        return np.random.default_rng([self.seed, int.from_bytes(stream, "big")]).random(self.count)
+
+    def between(self, name: str, low: float, high: float) -> np.ndarray:
+        """Return draws from `low` to `high`, uniform in the logarithm if both are above 0."""
+        part = self.uniform(name)
+        return low * (high / low) ** part if low > 0 else low + (high - low) * part
+
+    def quantity(self, name: str, quantity: Quantity) -> np.ndarray:
+        """Return draws within a quantity's range; its value where it has none."""
+        return self.between(name, *quantity.ends)
+
+    def youngs_modulus(self, layer: SiliconeLayer) -> np.ndarray:
+        """Return draws of a silicone's modulus, Pa; layers of one material share them."""
+        low, high = layer.youngs_modulus.ends
+        if low == high:
+            low, high = low / self.modulus_factor, high * self.modulus_factor
+        return self.between(f"{layer.material}.youngs_modulus", low, high)
+
+    def silicone(self, layer: SiliconeLayer) -> dict[str, np.ndarray]:
+        """Return draws of a layer's modulus (Pa), Poisson's ratio and loss factor, by field of `SiliconeLayer`."""
+        return {
+            "youngs_modulus": self.youngs_modulus(layer),
+            "poisson_ratio": self.quantity(f"{layer.material}.poisson_ratio", layer.poisson_ratio),
+            "tan_delta": self.quantity(f"{layer.material}.tan_delta", layer.tan_delta),
+        }
+
+    def units(self, variant: EstimateInput) -> Units:
+        """Return the closed forms' input of a variant, a row for each draw, at the variant's frequency."""
+        drawn = [self.silicone(layer) for layer in variant.layers]
+        columns = {field: np.stack([one[field] for one in drawn], axis=-1) for field in drawn[0]}
+        return Units(
+            **columns,
+            density=np.tile([layer.density for layer in variant.layers], (self.count, 1)),
+            thickness=np.tile([layer.thickness for layer in variant.layers], (self.count, 1)),
+            omega=np.full(self.count, 2.0 * np.pi * variant.frequency.middle),
+            passes=variant.passes,
+        )

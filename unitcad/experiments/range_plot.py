@@ -1,0 +1,78 @@
+"""What each rival predicts for the best experiments, as SVG: a bar from 10 to 90 % of its draws, a mark at the middle.
+
+The same data, the same bytes.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+WIDTH, LEFT, RIGHT, TOP, BOTTOM = 860, 300, 24, 64, 44
+BAR, GAP = 14, 18
+COLOURS = ("#1f6fb2", "#c8553d", "#3c8d5a", "#8059a8", "#b8860b", "#4d4d4d", "#d1478c", "#17868c")
+_LETTERS = 44
+
+
+def svg(experiments: Sequence[Mapping[str, Any]], rivals: Sequence[str]) -> str:
+    """Return the plot of experiments, each as `study` gives it, one below the other over a logarithmic axis."""
+    spans = [span for one in experiments for span in one["predicted"].values()]
+    low = math.log10(min(span["low"] for span in spans)) - 0.05
+    high = math.log10(max(span["high"] for span in spans)) + 0.05
+    row = BAR * len(rivals) + GAP
+    height = TOP + row * len(experiments) + BOTTOM
+
+    def across(ratio: float) -> float:
+        return LEFT + (math.log10(ratio) - low) / (high - low) * (WIDTH - LEFT - RIGHT)
+
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" font-family="sans-serif" '
+        'font-size="12">',
+        f'<rect width="{WIDTH}" height="{height}" fill="#ffffff"/>',
+        _text(12, 20, "What each rival predicts: 10 to 90 % of its draws", size=14),
+    ]
+    at = 12.0
+    for name, colour in zip(rivals, _colours(rivals), strict=True):
+        parts += [f'<rect x="{at:.1f}" y="33" width="10" height="10" fill="{colour}"/>', _text(at + 14, 43, name)]
+        at += 26 + 6.6 * len(name)
+    bottom = height - BOTTOM
+    for ratio in _ticks(low, high):
+        x = across(ratio)
+        stroke = "#888888" if ratio == 1.0 else "#e2e2e2"
+        parts += [
+            f'<line x1="{x:.1f}" y1="{TOP - 8}" x2="{x:.1f}" y2="{bottom}" stroke="{stroke}"/>',
+            _text(x, bottom + 16, f"{ratio:g}", "middle"),
+        ]
+    parts.append(_text((LEFT + WIDTH - RIGHT) / 2, height - 10, "ratio of the two readings", "middle"))
+    for i, one in enumerate(experiments):
+        y = TOP + i * row
+        lines = [*textwrap.wrap(one["experiment"], _LETTERS), f"{one['bits']:.2f} ± {one['error']:.2f} bits"]
+        parts += [_text(12, y + 12 + 15 * n, line) for n, line in enumerate(lines)]
+        for n, (name, colour) in enumerate(zip(rivals, _colours(rivals), strict=True)):
+            span, middle = one["predicted"][name], y + BAR * n + BAR / 2
+            x0, x1 = across(span["low"]), across(span["high"])
+            parts += [
+                f'<rect x="{x0 - 1:.1f}" y="{middle - 4:.1f}" width="{x1 - x0 + 2:.1f}" height="8" fill="{colour}" '
+                'fill-opacity="0.45"/>',
+                f'<line x1="{across(span["middle"]):.1f}" y1="{middle - 5:.1f}" x2="{across(span["middle"]):.1f}" '
+                f'y2="{middle + 5:.1f}" stroke="{colour}" stroke-width="3"/>',
+            ]
+    return "\n".join([*parts, "</svg>", ""])
+
+
+def _colours(rivals: Sequence[str]) -> list[str]:
+    return [COLOURS[i % len(COLOURS)] for i in range(len(rivals))]
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Return 1, 2 and 5 times powers of ten between the ends, powers alone where those are many."""
+    steps = (1.0, 2.0, 5.0) if high - low < 2.5 else (1.0,)
+    every = [step * 10.0**power for power in range(math.floor(low) - 1, math.ceil(high) + 1) for step in steps]
+    return [float(f"{ratio:.6g}") for ratio in every if low <= math.log10(ratio) <= high]
+
+
+def _text(x: float, y: float, text: str, anchor: str = "start", size: int = 12) -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}">{escape(text)}</text>'

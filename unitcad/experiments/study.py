@@ -1,0 +1,158 @@
+"""From a lab to the ranked experiments as JSON-ready data, and the sentence that says what would settle it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from unitcad.errors import Refusal
+from unitcad.experiments.draws import Draws
+from unitcad.experiments.lab_file import Lab
+from unitcad.experiments.protocol import Ratio, ratios
+from unitcad.experiments.ranking import Predictions, Ranked, best_sets, singles
+from unitcad.experiments.rivals import Available, Rival, available
+
+LARGEST_SET = 3
+SIGNIFICANT_DIGITS = 6
+RANGE = (0.1, 0.5, 0.9)
+"""Parts of the draws that lie below the low end, the middle and the high end of what a rival predicts."""
+Step = Callable[[str], None]
+
+
+def study(lab: Lab, step: Step = lambda stage: None) -> dict[str, Any]:
+    """Return {lab, rivals, left_out, most_bits, experiments, sets, settles, ...} as JSON-ready data.
+
+    The same lab gives the same numbers. Raises Refusal where fewer than two rivals or no ratio is left.
+    """
+    asked = available(lab.settings.rivals)
+    predicted = predictions(lab, asked.rivals, step)
+    prior = predicted.most_bits
+    predicted = predicted.updated(lab.measured)
+    ranked = singles(predicted, _candidates(lab, predicted), step)
+    sets = best_sets(predicted, ranked, LARGEST_SET, step)
+    return {
+        "lab": lab.name,
+        "noise": lab.settings.noise,
+        "discrepancy": lab.settings.discrepancy,
+        "draws": lab.settings.draws,
+        "seed": lab.settings.seed,
+        "rivals": _rivals(asked, predicted),
+        "left_out": asked.left_out,
+        "measured": [{"experiment": str(ratio), "ratio": value} for ratio, value in lab.measured],
+        "most_bits_before": _number(prior),
+        "most_bits": _number(predicted.most_bits),
+        "experiments": [_experiment(one, predicted) for one in ranked],
+        "sets": [_set(one) for one in sets],
+        "settles": settles(sets, predicted),
+    }
+
+
+def predictions(lab: Lab, rivals: Sequence[Rival], step: Step = lambda stage: None) -> Predictions:
+    """Return what each rival predicts for every condition of a lab.
+
+    Conditions are left out for which a rival has no finite answer. Raises Refusal where fewer than two rivals or two
+    conditions remain.
+    """
+    if len(rivals) < 2:
+        raise Refusal("rivals", [rival.name for rival in rivals], "two rivals or more are needed")
+    settings, logs = lab.settings, []
+    for rival in rivals:
+        draws = Draws(settings.draws, settings.seed, rival.name, settings.modulus_factor)
+        columns = []
+        for i, (condition, variant) in enumerate(lab.variants.items()):
+            step(f"{rival.name}: {condition} ({i + 1} of {len(lab.variants)})")
+            columns.append(rival.levels(variant, draws))
+        logs.append(np.log(np.maximum(np.stack(columns, axis=-1), settings.smallest_level)))
+    finite = np.all([np.isfinite(log).all(axis=0) for log in logs], axis=0)
+    if finite.sum() < 2:
+        raise Refusal("units", list(settings.units), "the rivals have an answer for fewer than two readings")
+    return Predictions(
+        tuple(rival.name for rival in rivals),
+        tuple(condition for condition, kept in zip(lab.conditions, finite, strict=True) if kept),
+        tuple(log[:, finite] for log in logs),
+        settings.noise,
+        settings.discrepancy,
+        settings.seed,
+    )
+
+
+def _candidates(lab: Lab, predicted: Predictions) -> list[Ratio]:
+    known = {ratio for ratio, _ in lab.measured}
+    found = [ratio for ratio in ratios(predicted.conditions, lab.settings.compare) if ratio not in known]
+    if not found:
+        raise Refusal("compare", lab.settings.compare, "the lab has no two readings that differ in one of these alone")
+    return found
+
+
+def _rivals(asked: Available, predicted: Predictions) -> list[dict[str, Any]]:
+    rows = zip(asked.rivals, predicted.weights, predicted.effective_draws, strict=True)
+    return [
+        {"name": rival.name, "says": rival.says, "probability": _number(weight), "effective_draws": _number(draws)}
+        for rival, weight, draws in rows
+    ]
+
+
+def ranges(ratio: Ratio, predicted: Predictions) -> dict[str, dict[str, float]]:
+    """Return {low, middle, high} of a ratio by rival: 10, 50 and 90 % of its draws, without a reading's errors."""
+    logs, _ = predicted.log_ratios([ratio])
+    found = {}
+    for name, log, share in zip(predicted.rivals, logs, predicted.shares, strict=True):
+        order = np.argsort(log[:, 0])
+        below = np.cumsum(share[order]) - share[order] / 2.0
+        ends = np.exp(np.interp(RANGE, below, log[order, 0]))
+        found[name] = dict(zip(("low", "middle", "high"), map(_number, ends), strict=True))
+    return found
+
+
+def _experiment(one: Ranked, predicted: Predictions) -> dict[str, Any]:
+    ratio = one.ratios[0]
+    return {
+        "experiment": str(ratio),
+        "changed": ratio.changed[0],
+        **{
+            end: {"unit": c.unit, "frequency_hz": c.frequency_hz, "body": c.body}
+            for end, c in (("above", ratio.above), ("below", ratio.below))
+        },
+        **_bits(one),
+        "predicted": ranges(ratio, predicted),
+    }
+
+
+def _set(one: Ranked) -> dict[str, Any]:
+    return {
+        "experiments": [str(ratio) for ratio in one.ratios],
+        **_bits(one),
+        "not_told_apart": [{"rivals": [a, b], "bits": _number(bits)} for a, b, bits in one.open],
+    }
+
+
+def _bits(one: Ranked) -> dict[str, float]:
+    found = one.information
+    return {
+        "bits": _number(found.bits),
+        "error": _number(found.error),
+        "low": _number(found.low),
+        "high": _number(found.high),
+        "standard_error": _number(found.standard_error),
+    }
+
+
+def settles(sets: Sequence[Ranked], predicted: Predictions) -> str:
+    """Say in a sentence or two what to measure and what is still open after it."""
+    first, last = sets[0], sets[-1]
+    most = predicted.most_bits
+    text = f"Measure first {first.ratios[0]}: {first.information.bits:.2f} of {most:.2f} bits."
+    if len(sets) > 1:
+        rest = "; then ".join(str(ratio) for ratio in last.ratios[1:])
+        text += f" Then {rest}: {last.information.bits:.2f} bits together."
+    if not last.open:
+        return f"{text} That settles it between every pair of rivals, as far as half a bit of one does."
+    pairs = ", ".join(f"{a} and {b}" for a, b, _ in last.open[:3])
+    more = f" and {len(last.open) - 3} more pairs" if len(last.open) > 3 else ""
+    return f"{text} That does not tell apart {pairs}{more}."
+
+
+def _number(value: float) -> float:
+    return float(f"{value:.{SIGNIFICANT_DIGITS}g}")

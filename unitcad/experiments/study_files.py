@@ -1,0 +1,84 @@
+"""A study's folder: experiments.json, experiments.md for a person, experiments.svg with the predicted ranges."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from unitcad.experiments.range_plot import svg
+from unitcad.files import write
+
+SHOWN = 8
+"""Experiments in the tables and in the plot; experiments.json has all."""
+
+
+def write_study(data: Mapping[str, Any], folder: Path) -> Path:
+    """Write the three files, each whole or not at all, into a folder that is made. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write(folder / "experiments.json", (json.dumps(data, indent=2, ensure_ascii=False) + "\n").encode())
+    rivals = [rival["name"] for rival in data["rivals"]]
+    write(folder / "experiments.svg", svg(shown(data), rivals).encode())
+    write(folder / "experiments.md", page(data).encode())
+    return folder
+
+
+def shown(data: Mapping[str, Any], count: int = SHOWN) -> list[dict[str, Any]]:
+    """Return the best experiments, of each comparison (two units, one unit at frequencies or on bodies) the best."""
+    best: dict[tuple[str, ...], dict[str, Any]] = {}
+    for one in data["experiments"]:
+        best.setdefault((one["changed"], one["above"]["unit"], one["below"]["unit"]), one)
+    return list(best.values())[:count]
+
+
+def page(data: Mapping[str, Any]) -> str:
+    """Return the study as Markdown."""
+    names = [rival["name"] for rival in data["rivals"]]
+    lines = [
+        f"# What to measure next: {data['lab']}",
+        "",
+        data["settles"],
+        "",
+        f"There are {data['most_bits']:.2f} bits to know. A reading scatters by {100 * data['noise']:g} %; a rival "
+        f"that holds misses a ratio by {100 * data['discrepancy']:g} %. {data['draws']} draws, seed {data['seed']}.",
+        "",
+        "![what each rival predicts](experiments.svg)",
+        "",
+        "## Single ratios",
+        "",
+        "Of each comparison the best one; all stand in experiments.json. In brackets 10 to 90 % of a rival's draws, "
+        "without the scatter of readings.",
+        "",
+        *experiment_rows(shown(data), names),
+        "",
+        "## Together",
+        "",
+        "| measure | bits | not told apart |",
+        "| --- | --- | --- |",
+    ]
+    for one in data["sets"]:
+        pairs = "; ".join(" and ".join(pair["rivals"]) for pair in one["not_told_apart"]) or "none"
+        lines.append(f"| {'; '.join(one['experiments'])} | {one['bits']:.2f} ± {one['error']:.2f} | {pairs} |")
+    lines += ["", "## Rivals", "", "| rival | what it says | probability |", "| --- | --- | --- |"]
+    lines += [f"| {rival['name']} | {rival['says']} | {rival['probability']:.2f} |" for rival in data["rivals"]]
+    lines += [f"\nLeft out: {name}: {reason}." for name, reason in data["left_out"].items()]
+    return "\n".join([*lines, ""])
+
+
+def experiment_rows(experiments: Sequence[Mapping[str, Any]], rivals: Sequence[str]) -> list[str]:
+    """Return a Markdown table of experiments: bits, and each rival's predicted ratio."""
+    rows = [
+        f"| ratio | bits | {' | '.join(rivals)} |",
+        f"| --- | --- | {' | '.join('---' for _ in rivals)} |",
+    ]
+    for one in experiments:
+        cells = [span_text(one["predicted"][name]) for name in rivals]
+        rows.append(f"| {one['experiment']} | {one['bits']:.2f} ± {one['error']:.2f} | {' | '.join(cells)} |")
+    return rows
+
+
+def span_text(span: Mapping[str, float]) -> str:
+    """Return a predicted ratio with its range."""
+    low, middle, high = (f"{span[end]:.3g}" for end in ("low", "middle", "high"))
+    return middle if low == high else f"{middle} ({low} to {high})"
