@@ -12,11 +12,14 @@ import numpy as np
 
 from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Plot
+from unitcad.attenuation import Point, UniformDisc
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import STORED_FIT, assessments, edge_levels, one_constant, scales
 from unitcad.attenuation.edge.measured_levels import assess, measured_table
-from unitcad.estimating import estimate_spec
+from unitcad.attenuation.inputs import body
+from unitcad.attenuation.layered.loads import Load
+from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.validation import load
 
 HERE = Path(__file__).parent
@@ -85,7 +88,46 @@ def constants() -> str:
     )
 
 
-BLOCKS = {"models": table_of_models, "readings": table_of_readings, "units": table_of_units, "constants": constants}
+def table_of_drives() -> str:
+    """Return the sideways over the normal force, per newton on the forearm, by what is compared."""
+    variant = estimate_input(load("encapsulating"))
+    forearm, disc = body(variant.tissue), variant.motor_diameter / 2
+    r = np.array([7e-3, 30e-3])
+
+    def compared(what: str, make: Callable[[Direction], Load], sideways: str, normal: str, share: float = 1.0) -> str:
+        def sizes(direction: Direction, hertz: float, names: str) -> np.ndarray:
+            response = forearm.response(make(direction), 2 * np.pi * hertz, r, rtol=1e-4)
+            return np.sqrt(sum(np.abs(getattr(response, name)) ** 2 for name in names.split()))
+
+        found = [(sizes("tangential", f, sideways) * share, sizes("normal", f, normal)) for f in (50.0, 125.0, 250.0)]
+        ratios = [f"{one[1] / other[1]:.3g}" for one, other in found]
+        falls = [f"{one[1] / one[0]:.3f}" for one in found[1]]
+        return f"| {' | '.join([what, *ratios, *falls])} |"
+
+    def uniform(direction: Direction) -> Load:
+        return UniformDisc(disc, direction)
+
+    in_line, turning = "u_r u_z", "u_r u_theta u_z"
+    return "\n".join(
+        [
+            "| what is compared | 50 Hz | 125 Hz | 250 Hz | fall, sideways | fall, normal |",
+            "| --- | --- | --- | --- | --- | --- |",
+            compared("a point, in line, sqrt(abs(u_r)^2 + abs(u_z)^2) of both", Point, in_line, in_line),
+            compared("the motor's disc, in line, the same", uniform, in_line, in_line),
+            compared("the motor's disc, in line, abs(u_r) over abs(u_z)", uniform, "u_r", "u_z"),
+            compared("the motor's disc, root mean square over all angles", uniform, turning, in_line, 2**-0.5),
+            compared("the disc's force turns: `flat_over_axial_per_newton`", uniform, turning, in_line),
+        ]
+    )
+
+
+BLOCKS = {
+    "models": table_of_models,
+    "readings": table_of_readings,
+    "units": table_of_units,
+    "constants": constants,
+    "drives": table_of_drives,
+}
 
 
 def filled(text: str) -> str:
@@ -128,20 +170,22 @@ def contrast_plot() -> Plot:
 
 
 def decay_plot() -> Plot:
-    """The layered half-space's curve with its spread, and the paper's exponentials, from the unit's edge outwards."""
+    """The skin's decay under both drives with its spread, and the paper's exponentials."""
     layered = estimate_spec(load("encapsulating"))["layered"]
-    r = layered["r_mm"]
     beside = layered["paper_beside"]["exponential"]
+    flat, axial = (layered["drives"][drive]["u"] for drive in ("flat", "axial"))
     series = {
-        "layered u_z": layered["u_z"]["value"],
-        "its low end": layered["u_z"]["low"],
-        "its high end": layered["u_z"]["high"],
-        "layered u_r": layered["u_r"]["value"],
+        "flat: turning": flat["value"],
+        "flat, low": flat["low"],
+        "flat, high": flat["high"],
+        "axial": axial["value"],
+        "axial, low": axial["low"],
+        "axial, high": axial["high"],
         "print, eta a modulus": beside["loss_modulus"],
         "print, half of it": beside["kelvin_voigt"],
     }
-    pairs = {name: tuple(zip(r, values, strict=True)) for name, values in series.items()}
-    axes = "distance from the edge, mm", "over |u_z| at the edge"
+    pairs = {name: tuple(zip(layered["r_mm"], values, strict=True)) for name, values in series.items()}
+    axes = "distance from the edge, mm", "|u| over |u| at the edge"
     return Plot("Skin outside the unit, forearm, 125 Hz", *axes, pairs, curves=tuple(pairs), linear_x=True)
 
 

@@ -91,16 +91,17 @@
     const series = drives.map(([drive, block], i) => ({
       name: `${FORCES[drive] || drive}${drive === layered.drive ? " (this motor)" : ""}`, x, y: block.u.value, low: block.u.low, high: block.u.high, colour: i === 0 ? 0 : 2,
     }));
+    const columns = [...series];
+    if (layered.flat_over_axial_per_newton) columns.push({ name: "flat over axial, per newton", y: layered.flat_over_axial_per_newton.value });
+    for (const [drive, block] of drives) {
+      for (const key of ["u_r", "u_theta", "u_z"]) if (block[key]) columns.push({ name: `${drive}: |${key}|`, y: block[key].value });
+    }
     const print = layered.paper_beside;
     if (print) {
       if (print.j0) series.push({ name: "Paper: |J0(kr)|", x, y: print.j0.map(Math.abs), dash: true, colour: 1 });
       for (const [reading, values] of Object.entries(print.exponential || {})) series.push({ name: `Paper: exp, eta as ${reading.replace("_", " ")}`, x, y: values, dash: true, colour: reading === "loss_modulus" ? 3 : 4 });
     }
-    const columns = [...series];
-    for (const [drive, block] of drives) {
-      for (const key of ["u_r", "u_theta", "u_z"]) if (block[key]) columns.push({ name: `${drive}: |${key}|`, y: block[key].value });
-    }
-    if (layered.flat_over_axial_per_newton) columns.push({ name: "flat over axial, per newton", y: layered.flat_over_axial_per_newton.value });
+    columns.push(...series.slice(drives.length));
     const every = Math.max(1, Math.floor(x.length / 7));
     const rows = x.map((r, i) => [r, ...columns.map((curve) => curve.y[i])]).filter((row, i) => i % every === 0);
     return [
