@@ -1,0 +1,100 @@
+"""One recording in every format, each column around a value of its own, so that a shifted column shows."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+RATE = 2000.0
+COUNT = 300
+CENTRES = {"motor": 100.0, "edge": 300.0, "skin": 500.0}
+"""Each channel lies within 50 of its centre."""
+
+
+def columns(count: int = COUNT) -> NDArray[np.float64]:
+    """Three channels (count, 3); whole numbers of 1/64, which every format holds exactly."""
+    time = np.arange(count) / RATE
+    waves = [np.sin(2 * np.pi * 125.0 * time + k) for k in range(3)]
+    return np.round(np.column_stack([c + 50 * w for c, w in zip(CENTRES.values(), waves, strict=True)]) * 64) / 64
+
+
+def write_text(path: Path, delimiter: str = ",", decimal: str = ".", end: str = "") -> None:
+    rows = np.column_stack([np.arange(COUNT) / RATE, columns()])
+    lines = ["Device;X 1", "Comment: made up", delimiter.join(["Time (s)", *(f"{name} (um)" for name in CENTRES)])]
+    lines += [delimiter.join(f"{v:.6f}".replace(".", decimal) for v in row) + end for row in rows]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def write_universal(path: Path, binary: int = 1) -> None:
+    import pyuff
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        sets = [
+            {
+                "type": 58, "binary": binary, "func_type": 1, "rsp_node": i + 1, "rsp_dir": 3, "ref_dir": 0,
+                "ref_node": 0, "data": columns()[:, i], "x": np.arange(COUNT) / RATE, "abscissa_spacing": 1,
+                "abscissa_min": 0, "abscissa_inc": 1 / RATE, "num_pts": COUNT, "id1": name, "rsp_ent_name": name,
+                "ref_ent_name": "NONE",
+                "ordinate_axis_lab": name, "ordinate_axis_units_lab": "um", "abscissa_spec_data_type": 17,
+                "ordinate_spec_data_type": 8, "orddenom_spec_data_type": 0, "z_axis_spec_data_type": 0,
+            }
+            for i, name in enumerate(CENTRES)
+        ]  # fmt: skip
+        path.unlink(missing_ok=True)  # its mode "overwrite" loses the first header of a binary file
+        pyuff.UFF(str(path)).write_sets(sets, mode="add")
+
+
+def write_tdms(path: Path) -> None:
+    from nptdms import ChannelObject, TdmsWriter
+
+    with TdmsWriter(str(path)) as writer:
+        properties = {"wf_increment": 1 / RATE, "unit_string": "um"}
+        writer.write_segment(
+            [ChannelObject("log", name, columns()[:, i], properties=properties) for i, name in enumerate(CENTRES)]
+        )
+
+
+def write_mat(path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(path, {name: columns()[:, i : i + 1] for i, name in enumerate(CENTRES)}, do_compression=True)
+
+
+def write_hdf5(path: Path, matlab: bool = False) -> None:
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512 if matlab else 0) as file:
+        for i, name in enumerate(CENTRES):
+            file[name] = columns()[:, i][None] if matlab else columns()[:, i]
+            if not matlab:
+                file[name].attrs["units"] = "um"
+    if matlab:
+        with open(path, "r+b") as file:
+            file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+
+
+def write_wav(path: Path, kind: str = "<f4") -> None:
+    from scipy.io import wavfile
+
+    data = columns() if kind == "<f4" else columns() * 50
+    wavfile.write(path, int(RATE), data.astype(kind))
+
+
+FORMATS = {
+    "comma.csv": write_text,
+    "semicolon.csv": lambda path: write_text(path, ";", ","),
+    "tab.txt": lambda path: write_text(path, "\t"),
+    "trailing.csv": lambda path: write_text(path, ",", end=","),
+    "binary.uff": write_universal,
+    "ascii.unv": lambda path: write_universal(path, 0),
+    "logger.tdms": write_tdms,
+    "v5.mat": write_mat,
+    "v73.mat": lambda path: write_hdf5(path, matlab=True),
+    "plain.h5": write_hdf5,
+    "float.wav": write_wav,
+    "int.wav": lambda path: write_wav(path, "<i2"),
+}

@@ -1,0 +1,162 @@
+"""Readers of recordings: every format gives the same columns, files by others are read, nothing is guessed."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from recordings import CENTRES, FORMATS, RATE, columns, write_text
+
+from unitcad.errors import Refusal
+from unitcad.lab.readers.formats import open_recording
+from unitcad.lab.readers.layout import Layout
+from unitcad.lab.recording import Recording, Unreadable
+
+DATA = Path(__file__).parent / "data"
+
+
+def numbers(recording: Recording, *indices: int) -> np.ndarray:
+    return np.concatenate(list(recording.read(indices or tuple(range(len(recording.channels))))))
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_gives_the_same_columns(name: str, tmp_path: Path) -> None:
+    FORMATS[name](tmp_path / name)
+    recording = open_recording(tmp_path / name)
+    ends = [channel.name.rpartition("/")[2] for channel in recording.channels]
+    shift = 1 if recording.form == "text" else 0
+    order = [ends.index(centre) for centre in CENTRES] if recording.form != "wav" else [0, 1, 2]
+    found = numbers(recording, *order)
+    factor = 2**15 / 50 if name == "int.wav" else 1.0
+    assert_allclose(found * factor, columns(), atol=0.05 if name == "int.wav" else 1e-6)
+    assert len(ends) == shift + 3
+    if recording.form in ("universal", "tdms", "wav"):
+        assert recording.channels[0].step_s == pytest.approx(1 / RATE, rel=1e-12)
+    if recording.form == "text":
+        assert recording.time == 0
+        assert recording.channels[0].step_s is None
+    if recording.form not in ("matlab", "wav") and name != "v73.mat":
+        assert {channel.unit for channel in recording.channels[shift:]} == {"um"}
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "channel", "unit", "step_s", "first", "last"),
+    [
+        ("pyuff/Sample_UFF58b_bin.uff", 79292, "Pressure", "Pa", 1.52588e-5, -0.0147552602, -0.00431469),
+        ("pyuff/binary8byte.uff", 250, "acc (g)", "g", 0.01, 0.0, np.sin(2 * np.pi * 5 * 0.01 * 249)),
+        ("pyuff/time-history-not-all-columns-filled.uff", 13, "1x", "m/s²", 5e-5, -3.81956, -5.84096),
+        ("nptdms/raw1.tdms", 2000, "Layer Data/First  Channel", "Volts", 2e-5, -0.184026612, 0.00091556),
+        ("nptdms/raw_timestamps.tdms", 128, "Untitled/Untitled", "", 1e-3, 0.0, np.sin(2 * np.pi * 127 / 128)),
+        ("rigolwfm/DS1052E.csv", 8192, "Voltage", "V", None, 1.72, -0.04),
+        ("rigolwfm/DS1074Z-A.csv", 1200, "CH1", "Volt", 2e-5, 0.0, None),
+        ("soft-robotics-materials-database/Ecoflex 00-10.csv", 751, "True Strain", "", None, 0.04361, None),
+        ("soft-robotics-materials-database/Ecoflex 00-30.csv", 705, "True Strain", "", None, 0.06574, None),
+        ("soft-robotics-materials-database/Ecoflex 00-50.csv", 721, "True Strain", "", None, 0.04364, None),
+        ("soft-robotics-materials-database/Dragon Skin 10 MEDIUM.csv", 457, "True Strain", "", None, 0.0436133, None),
+        ("soft-robotics-materials-database/Dragon Skin 30.csv", 311, "True Strain", "", None, 0.0436333333, None),
+    ],
+)  # fmt: skip
+def test_files_by_others_are_read(
+    name: str, count: int, channel: str, unit: str, step_s: float | None, first: float, last: float | None
+) -> None:
+    recording = open_recording(DATA / name)
+    at = [one.name for one in recording.channels].index(channel)
+    found = numbers(recording, at)
+    assert (len(found), recording.channels[at].unit) == (count, unit)
+    assert recording.channels[at].step_s == (None if step_s is None else pytest.approx(step_s, rel=1e-12))
+    assert found[0, 0] == pytest.approx(first, rel=1e-5)
+    if last is not None:
+        assert found[-1, 0] == pytest.approx(last, rel=2e-4)
+
+
+def test_an_oscilloscopes_index_is_not_time() -> None:
+    """Rigol's column X counts samples; its step stands in the header. The other family writes time with its unit."""
+    index = open_recording(DATA / "rigolwfm" / "DS1074Z-A.csv")
+    assert index.time is None
+    assert index.channels[0].name == "X"
+    assert_array_equal(numbers(index, 0)[:, 0], np.arange(1200))
+    assert open_recording(DATA / "rigolwfm" / "DS1052E.csv").time == 0
+    with pytest.raises(Refusal, match="several channels of this name"):
+        open_recording(DATA / "rigolwfm" / "DS1052E.csv").index("Voltage", "channel")
+
+
+def test_a_table_of_words_is_no_recording() -> None:
+    with pytest.raises(Unreadable, match="no block of lines"):
+        open_recording(DATA / "phantom-material-database" / "phantoms_table.csv")
+
+
+@pytest.mark.parametrize("ending", [".svd", ".pvd"])
+def test_polytecs_own_format_is_refused(ending: str, tmp_path: Path) -> None:
+    (tmp_path / f"scan{ending}").write_bytes(b"x")
+    with pytest.raises(Unreadable, match="export UFF"):
+        open_recording(tmp_path / f"scan{ending}")
+
+
+@pytest.mark.parametrize(
+    ("text", "field"),
+    [
+        ("1,5\n2,5\n3,5\n", "delimiter"),  # two columns of whole numbers, or one with a decimal comma
+        ("a,b\n.1,2\n.3,4\n5\n.6,7\n", ""),
+        ("a,b\n.1,2\n3,4\n5,6,7\n6,7\n", ""),
+        ("a,b\n.1,2\n3,x\n.6,7\n8,9\n", "skip_lines"),
+        ("a,b\n.1,2\n.3,3\n.6,\n", ""),
+        ("a,b\n1,2\n3,inf\n", ""),
+        ("a,b\n0.1,2\n3,4\nmean,3\n", ""),
+        ("words alone\nand more\n", ""),
+        ("", ""),
+    ],
+)
+def test_what_would_be_a_guess_is_refused(text: str, field: str, tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text(text)
+    with pytest.raises(Unreadable) as refused:
+        numbers(open_recording(file))
+    assert refused.value.field == (field or str(file))
+
+
+def test_a_declared_layout_settles_what_is_ambiguous(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text("1,5\n2,5\n3,5\n")
+    assert numbers(open_recording(file, Layout(decimal=","))).tolist() == [[1.5], [2.5], [3.5]]
+    assert numbers(open_recording(file, Layout(decimal="."))).tolist() == [[1, 5], [2, 5], [3, 5]]
+    file.write_text("4\n1.5\n2.5\n")
+    assert numbers(open_recording(file, Layout(skip_lines=1))).tolist() == [[1.5], [2.5]]
+
+
+def test_words_may_follow_the_numbers_and_a_gap_is_not_a_number(tmp_path: Path) -> None:
+    file = tmp_path / "a.txt"
+    file.write_text("# t [ms]\tu [um]\r\n0\t1e-3\r\n0.5\tnan\r\n1\t2\r\n\r\nEnd of data\r\n")
+    recording = open_recording(file)
+    assert [(one.name, one.unit) for one in recording.channels] == [("t", "ms"), ("u", "um")]
+    assert recording.time == 0
+    assert_array_equal(numbers(recording), [[0, 1e-3], [0.5, np.nan], [1, 2]])
+
+
+def test_text_longer_than_a_block_is_read_in_blocks(tmp_path: Path) -> None:
+    file = tmp_path / "long.csv"
+    count = 400_000
+    lines = "\n".join(f"{i},{i * 2}.0" for i in range(count))
+    file.write_text(f"n,twice\n{lines}\n")
+    blocks = list(open_recording(file).read((1,)))
+    assert len(blocks) > 2
+    assert_array_equal(np.concatenate(blocks)[:, 0], 2.0 * np.arange(count))
+    with open(file, "a") as more:
+        more.write("7\n8,9.0\n")
+    with pytest.raises(Unreadable, match=f"line {count + 2} "):
+        list(open_recording(file).read((0,)))
+
+
+def test_the_files_by_others_are_unchanged() -> None:
+    """Line ends and bytes as they were copied: a checkout that converts them would change what is tested."""
+    listed = dict(line.split("  ", 1)[::-1] for line in (DATA / "SHA256SUMS").read_text().splitlines())
+    there = {f.relative_to(DATA).as_posix() for f in DATA.rglob("*") if f.is_file()} - {"SHA256SUMS", "README.md"}
+    assert there == set(listed)
+    assert {name: hashlib.sha256((DATA / name).read_bytes()).hexdigest() for name in listed} == listed
+
+
+def test_a_text_with_spaces_is_read(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.txt", "   ")
+    assert_allclose(numbers(open_recording(tmp_path / "a.txt"), 1, 2, 3), columns(), atol=1e-6)

@@ -1,0 +1,97 @@
+"""Damaged recordings: a refusal or the right columns, never a crash, a hang, or a column that has shifted."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recordings import CENTRES, FORMATS
+
+from unitcad.errors import UnitcadError
+from unitcad.lab.readers.formats import open_recording
+
+LONGEST = 10.0
+"""Seconds that a damaged file of some kilobytes may take."""
+
+
+def mutated(content: bytes, rng: np.random.Generator) -> bytes:
+    """Change, insert, remove, copy or cut off some bytes.
+
+    Bytes removed in one place and as many inserted in another are no damage that a format without checksums shows.
+    """
+    data = bytearray(content)
+    moves = rng.random() < 0.6
+    for _ in range(int(rng.integers(1, 4))):
+        at = int(rng.integers(0, max(len(data), 1)))
+        span = min(int(rng.integers(1, 9)), len(data) - at)
+        match int(rng.integers(0, 6 if moves else 3)):
+            case 0:
+                data[at : at + 1] = bytes([int(rng.integers(0, 256))])
+            case 1:
+                data[at : at + 1] = b"\n,;\t .0-\xff\x00"[int(rng.integers(0, 10)) :][:1]
+            case 2:
+                other = int(rng.integers(0, max(len(data) - span, 1)))
+                data[at : at + span] = data[other : other + span]
+            case 3:
+                del data[at : at + span]
+            case 4:
+                data[at:at] = bytes(data[at : at + span])
+            case _:
+                if rng.random() < 0.3:
+                    del data[at:]
+    return mutated(content, rng) if moves and len(data) == len(content) else bytes(data)
+
+
+def shifted(path: Path) -> str | None:
+    """Read a file; say which column holds values that are another column's, if one does."""
+    recording = open_recording(path)
+    names = {channel.name.rpartition("/")[2]: i for i, channel in enumerate(recording.channels)}
+    if recording.form == "wav":
+        names = {name: i for i, name in enumerate(CENTRES) if i < len(recording.channels)}
+    factor = 2**15 / 50 if path.name == "int.wav" else 1.0
+    for name, centre in CENTRES.items():
+        if name not in names:
+            continue
+        found = np.concatenate(list(recording.read((names[name],))))[:, 0] * factor
+        away = np.abs(found - centre) > 51
+        if away.sum() > 12:
+            return f"{name}: {away.sum()} of {len(found)} values are not its own, such as {found[away][:3]}"
+    return None
+
+
+def damage(name: str, count: int, tmp_path: Path, seed: int) -> tuple[int, list[str]]:
+    """Return how many of `count` damaged files were refused, and what was wrong with the others."""
+    FORMATS[name](tmp_path / name)
+    content = (tmp_path / name).read_bytes()
+    refused, wrong = 0, []
+    for i in range(count):
+        (tmp_path / name).write_bytes(mutated(content, np.random.default_rng([seed, i])))
+        began = time.perf_counter()
+        try:
+            fault = shifted(tmp_path / name)
+        except UnitcadError:
+            refused, fault = refused + 1, None
+        if fault:
+            wrong.append(f"{i}: {fault}")
+        if time.perf_counter() - began > LONGEST:
+            wrong.append(f"{i}: took {time.perf_counter() - began:.0f} s")
+    return refused, wrong
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_damaged_recording_is_refused_or_right(name: str, tmp_path: Path) -> None:
+    refused, wrong = damage(name, 60, tmp_path, 1)
+    assert wrong == []
+    assert refused > 3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", FORMATS)
+def test_two_thousand_damaged_recordings(name: str, tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        refused, wrong = damage(name, 2000, tmp_path, 2)
+    assert wrong == []
+    print(name, refused)

@@ -1,0 +1,98 @@
+"""HDF5, and MATLAB files of version 7.3, which are HDF5, by h5py: read in blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from unitcad.geometry.arrays import Floats
+from unitcad.lab.readers.layout import Layout
+from unitcad.lab.readers.whole import columns_of
+from unitcad.lab.recording import Channel, Recording, Unreadable
+
+HDF5_MARK = b"\x89HDF\r\n\x1a\n"
+MOST_COLUMNS = 4096
+
+
+def read(path: Path, layout: Layout) -> Recording:
+    """Return the numeric data sets of one or two dimensions; those of two give a channel per line of the shorter side.
+
+    Data that lies in other files is refused. Raises Unreadable.
+    """
+    found = _columns(path)
+    if not found:
+        raise Unreadable(str(path), None, "holds no data set of numbers")
+
+    def blocks(indices: tuple[int, ...]) -> Iterator[Floats]:
+        import h5py
+
+        with h5py.File(path, "r") as file:
+            lazy = [_Column(file[found[i][0]], found[i][1]) for i in indices]
+            yield from columns_of(path, [found[i][2].name for i in indices], lazy)  # type: ignore[arg-type]
+
+    return Recording(path, "hdf5", tuple(channel for _, _, channel in found), blocks)
+
+
+class _Column:
+    """A line of a data set, which is read when it is sliced; `place` is its index and the side that samples run on."""
+
+    def __init__(self, data: Any, place: tuple[int, int]) -> None:
+        self.data, self.index, self.side = data, *place
+
+    def __len__(self) -> int:
+        return self.data.shape[self.side]
+
+    def __getitem__(self, span: slice) -> Floats:
+        if self.data.ndim == 1:
+            return self.data[span]
+        return self.data[span, self.index] if self.side == 0 else self.data[self.index, span]
+
+
+def _columns(path: Path) -> list[tuple[str, tuple[int, int], Channel]]:
+    import h5py
+
+    _expect_whole(path)
+    found: list[tuple[str, tuple[int, int], Channel]] = []
+
+    def visit(name: str, node: Any) -> None:
+        if not isinstance(node, h5py.Dataset) or name.startswith("#") or node.ndim not in (1, 2):
+            return
+        if node.dtype.kind not in "fiu" or not node.shape or max(node.shape) < 2:
+            return
+        if node.is_virtual or node.external:
+            raise Unreadable(str(path), None, f"{name} lies in another file")
+        side = 0 if node.ndim == 1 or node.shape[0] >= node.shape[1] else 1
+        count = 1 if node.ndim == 1 else min(node.shape)
+        if count > MOST_COLUMNS:
+            return
+        unit = next((_text(node.attrs[key]) for key in ("unit", "units") if key in node.attrs), "")
+        for i in range(count):
+            title = name if count == 1 else f"{name}:{i + 1}"
+            found.append((name, (i, side), Channel(title, unit, count=node.shape[side])))
+
+    with h5py.File(path, "r") as file:
+        file.visititems(visit)
+    return found
+
+
+def _expect_whole(path: Path) -> None:
+    """Raise Unreadable where the file does not end where its superblock states."""
+    size = path.stat().st_size
+    with open(path, "rb") as file:
+        base = 0
+        while base < size and file.read(8) != HDF5_MARK:
+            base = 2 * base or 512
+            file.seek(base)
+        rest = file.read(64)
+    if len(rest) < 64:
+        raise Unreadable(str(path), None, "is no HDF5 file")
+    at = {0: 32, 1: 36}.get(rest[0], 20)
+    lengths = rest[5] if rest[0] < 2 else rest[1]
+    end = int.from_bytes(rest[at : at + 8], "little")
+    if lengths == 8 and end not in (size, size - base):
+        raise Unreadable(str(path), None, f"states {end} bytes and has {size}: it was not closed, or is damaged")
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value if isinstance(value, str) else ""

@@ -1,0 +1,95 @@
+"""TDMS of LabVIEW and NI loggers, by npTDMS: scaled values, read in blocks."""
+
+from __future__ import annotations
+
+import logging
+import struct
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from unitcad.geometry.arrays import Floats
+from unitcad.lab.readers.layout import Layout
+from unitcad.lab.readers.whole import columns_of
+from unitcad.lab.recording import Channel, Recording, Unreadable
+
+
+def read(path: Path, layout: Layout) -> Recording:
+    """Return the channels of a TDMS file, named group/channel. Raises Unreadable where it holds no numbers."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = _channels(path)
+    if not found:
+        raise Unreadable(str(path), None, "holds no channel of numbers")
+
+    def blocks(indices: tuple[int, ...]) -> Iterator[Floats]:
+        from nptdms import TdmsFile
+
+        with open(path, "rb") as opened, TdmsFile.open(opened) as file:
+            chosen = [file[found[i][0]][found[i][1]] for i in indices]
+            yield from columns_of(path, [found[i][2].name for i in indices], chosen)  # type: ignore[arg-type]
+
+    return Recording(path, "tdms", tuple(channel for _, _, channel in found), blocks)
+
+
+def _channels(path: Path) -> list[tuple[str, str, Channel]]:
+    from nptdms import TdmsFile
+
+    logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # it writes whole damaged strings to standard error
+    size = path.stat().st_size
+    stated = _raw_bytes(path, size)
+    found = []
+    with open(path, "rb") as opened, TdmsFile.open(opened) as file:
+        everything = [channel for group in file.groups() for channel in group.channels()]
+        sizes = [getattr(channel.data_type, "size", None) for channel in everything]
+        if stated is not None and None not in sizes:
+            held = sum(len(channel) * (bytes_ or 0) for channel, bytes_ in zip(everything, sizes, strict=True))
+            if held != stated:
+                raise Unreadable(str(path), None, f"its channels state {held} bytes of samples, its segments {stated}")
+        for group in file.groups():
+            for channel in group.channels():
+                if not (isinstance(channel.dtype, np.dtype) and channel.dtype.kind in "fiu" and len(channel)):
+                    continue
+                if len(channel) > size:
+                    limit = f"channel {channel.name!r} states {len(channel)} samples in a file of {size} bytes"
+                    raise Unreadable(str(path), None, limit)
+                found.append((group.name, channel.name, _channel(group.name, channel)))
+    return found
+
+
+def _raw_bytes(path: Path, size: int) -> int | None:
+    """Walk the segments' lead-ins; return the bytes of their raw data, None for raw data of DAQmx.
+
+    Raises Unreadable where a segment does not begin where the one before ends, or the last one ends elsewhere.
+    """
+    raw, at, plain = 0, 0, True
+    with open(path, "rb") as file:
+        while at < size:
+            file.seek(at)
+            lead = file.read(_LEAD.size)
+            if len(lead) < _LEAD.size or not lead.startswith(b"TDSm"):
+                raise Unreadable(str(path), None, f"has no segment at byte {at}, where one is stated")
+            _, contents, _, following, before = _LEAD.unpack(lead)
+            plain = plain and not contents & _DAQMX
+            raw += following - before
+            at += _LEAD.size + following
+    if at != size or raw < 0:
+        raise Unreadable(str(path), None, f"states {at} bytes and has {size}: it was not closed, or is damaged")
+    return raw if plain else None
+
+
+_LEAD = struct.Struct("<4sIIQQ")
+"""A segment's lead-in: tag, contents, version, bytes to the next segment, bytes to the raw data."""
+_DAQMX = 1 << 7
+
+
+def _channel(group: str, channel: Any) -> Channel:
+    properties = channel.properties
+    step = properties.get("wf_increment")
+    usable = isinstance(step, float | int) and np.isfinite(step) and step > 0
+    unit = properties.get("unit_string") or ""
+    name = f"{group}/{channel.name}"
+    return Channel(name, unit if isinstance(unit, str) else "", float(step) if usable else None, len(channel))
