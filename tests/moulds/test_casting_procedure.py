@@ -39,14 +39,54 @@ def test_bubble_rise(name: str, seconds: float) -> None:
     assert seconds > 60 * float(silicone.pot_life_min)
 
 
-def test_only_ecoflex_00_30_clears_by_itself() -> None:
+def test_only_ecoflex_00_30_clears_without_a_vacuum() -> None:
+    """445 s of rise in a quarter of 45 min; the next best needs more than half of its pot life."""
     for name in materials():
-        pour = procedure("encapsulating", f"layers.0.material={name}").pours[0]
-        assert pour.verdict.startswith("Bubbles clear") == (name == "ecoflex-00-30")
+        pour = procedure("encapsulating", f"layers.0.material={name}", "casting.vacuum=false").pours[0]
+        assert ("Such bubbles should rise out" in pour.verdict) == (name == "ecoflex-00-30")
+        assert ("brush a thin coat" in pour.verdict) == (name != "ecoflex-00-30")
+        assert "optimistic" in pour.verdict
 
 
-def test_without_a_vacuum_the_verdict_names_a_way() -> None:
-    assert "brush a thin coat" in procedure("encapsulating", "casting.vacuum=false").pours[0].verdict
+@pytest.mark.parametrize("name", materials())
+def test_what_there_is_a_vacuum_for_is_degassed(name: str) -> None:
+    pour = procedure("encapsulating", f"layers.0.material={name}").pours[0]
+    assert pour.verdict.startswith("Degas for 3 min")
+    assert pour.verdict in pour.steps
+
+
+def test_allowance_is_a_quarter_of_the_pot_life() -> None:
+    """Ecoflex 00-30 rises 2 mm in 265 s: a quarter of 45 min is 675 s, at 41 degC 194 s."""
+    cold, hot = (
+        procedure("embedded", "layers.0.material=ecoflex-00-30", "casting.vacuum=false", f"casting.room_c={c}").pours[0]
+        for c in (23, 41)
+    )
+    assert "11.2 min, is allowed. Such bubbles should rise out" in cold.verdict
+    assert "3.23 min, is allowed. Such bubbles stay" in hot.verdict
+
+
+def test_not_degassing_breaks_a_rule() -> None:
+    """Planted: the step left out, the time left out, and a vacuum asked for that is not there."""
+    casting = procedure("encapsulating")
+    first, *more = casting.pours
+    for faulty in (
+        replace(first, steps=tuple(step for step in first.steps if not step.startswith("Degas"))),
+        replace(first, degassing_min=0.0),
+    ):
+        assert broken_rules(replace(casting, pours=(faulty, *more))) == [
+            "pour 1: not degassed, though there is a vacuum"
+        ]
+    without = broken_rules(replace(casting, vacuum=False))
+    assert "degassing container, at least, vacuum" in without[0]
+    assert without[-1].startswith("the bill asks")
+
+
+def test_nothing_of_a_vacuum_is_said_without_one() -> None:
+    files = written.files(procedure("encapsulating", "casting.vacuum=false"))
+    for text in (files["casting.md"], files["bom.csv"]):
+        assert "inHg" not in text
+        assert "container" not in text
+        assert "egas" not in text
 
 
 @pytest.mark.parametrize(("name", "grams"), [("embedded", (0.086, 0.107)), ("encapsulating", (0.227, 0.384))])
@@ -173,12 +213,13 @@ def test_drawing_of_every_pour_names_its_pieces() -> None:
             assert word in drawing
 
 
-def test_pot_life_is_spent_on_mixing_and_pouring_too() -> None:
-    """1730 s of rise against 1800 s of pot life: too little once three minutes went into mixing, two into pouring."""
-    pour = procedure("embedded", "motor.thickness_mm=2.8").pours[0]
-    assert pour.verdict.startswith("Degas for 3 min")
-    assert "1730 s" in pour.verdict
-    assert procedure("embedded").pours[0].verdict.startswith("Bubbles clear")
+def test_pot_life_is_spent_on_mixing_degassing_and_pouring() -> None:
+    """Eight minutes of work against a pot life of 30 min at 23 degC, 7.5 min at 43 degC."""
+    assert "after the pot life" not in procedure("embedded").pours[0].verdict
+    assert "ends 0.5 min after the pot life" in procedure("embedded", "casting.room_c=43").pours[0].verdict
+    assert (
+        "after the pot life" not in procedure("embedded", "casting.room_c=43", "casting.vacuum=false").pours[0].verdict
+    )
 
 
 @pytest.mark.parametrize("more", [[], ["moulds.cavities=[2,3]"], ["moulds.pour=injected"]], ids=["one", "gang", "lid"])

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from unitcad.casting.figures import Mix
+from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Mix
 from unitcad.catalogue import Material, motors
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
@@ -28,7 +28,7 @@ class Item:
 
 def bill(moulds: MouldSet, mixes: list[tuple[Material, Mix]]) -> tuple[Item, ...]:
     """List pieces, silicone (every pour's mix), motor, circuit or wires, consumables."""
-    return (*_pieces(moulds), *_silicone(mixes), *_inside(moulds), *_consumables(moulds))
+    return (*_pieces(moulds), *_silicone(mixes), *_inside(moulds), *_consumables(moulds, [mix for _, mix in mixes]))
 
 
 def to_csv(items: tuple[Item, ...]) -> str:
@@ -93,9 +93,14 @@ def _ratings(spec: Spec) -> Iterator[str]:
             yield f"mass {float(motor.mass_g):g} g"
 
 
-def _consumables(moulds: MouldSet) -> Iterator[Item]:
+def _consumables(moulds: MouldSet, mixes: list[Mix]) -> Iterator[Item]:
     pours, lengths = len(moulds.plan.steps), moulds.spec.moulds
     yield Item("mixing cups and sticks", pours, "set", "bought", "no latex, no sulphur clay: they inhibit")
+    if moulds.spec.casting.vacuum:
+        size = f"at least {CONTAINER * max(mix.millilitres for mix in mixes):.3g} ml, since silicone foams up"
+        yield Item(
+            "degassing container", pours, "piece", "bought", f"{size}; a chamber that reaches {VACUUM_INHG:g} inHg"
+        )
     if moulds.plan.of_kind("tongue"):
         yield Item("petroleum jelly", 1, "dab", "bought", "for tongues and windows only")
     elif not moulds.plan.concentric and any(step.seals or step.inserts for step in moulds.plan.steps):

@@ -17,6 +17,8 @@ CONTAINER = 4.0
 VACUUM_INHG, KPA_PER_INHG = 29.0, 3.386389
 MIXING_MIN, DEGASSING_MIN, POURING_MIN = 3.0, 3.0, 2.0
 """What the pot life is spent on before and after the bubbles (assumed: usual practice)."""
+WITHOUT_VACUUM = 0.25
+"""Share of the pot life in which bubbles must rise out by themselves (assumed): after it silicone is too thick."""
 MOST_ERROR_PCT = 5.0
 """What a scale may do to the ratio before a cure suffers (assumed)."""
 DATASHEET_C = 23.0

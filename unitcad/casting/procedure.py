@@ -23,7 +23,7 @@ from unitcad.spec import Spec
 class Pour:
     """One pour: its figures, the verdict on bubbles, what the person does, and the drawing of it assembled.
 
-    `agent`: the faces that may get release agent before it.
+    `agent`: the faces that may get release agent before it. `degassing_min`: in the vacuum; 0 without one.
     """
 
     index: int
@@ -32,6 +32,7 @@ class Pour:
     figures: tuple[Figure, ...]
     verdict: str
     agent: tuple[Face, ...]
+    degassing_min: float
     steps: tuple[str, ...]
     drawing: str
 
@@ -47,6 +48,7 @@ class Procedure:
     name: str
     label: str
     cells: int
+    vacuum: bool
     preparation: tuple[str, ...]
     off_grid: tuple[OffGrid, ...]
     pours: tuple[Pour, ...]
@@ -70,7 +72,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
     for step, volume in zip(plan.steps, layer_volumes_mm3, strict=True):
         silicone = known[step.material]
         mix = fig.mix(spec, silicone, len(plan.layout.cells) * volume + _channels_mm3(step))
-        verdict = _verdict(spec, step, silicone)
+        verdict = _bubbles(spec, step, silicone, mix)
         pours.append(
             Pour(
                 step.index,
@@ -79,6 +81,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
                 _figures(moulds, step, silicone, mix, volume),
                 verdict,
                 agent_faces(moulds, step),
+                fig.DEGASSING_MIN if spec.casting.vacuum else 0.0,
                 tuple(pour_steps(moulds, step, silicone, mix, verdict)),
                 f"step{step.index}-section.svg",
             )
@@ -89,6 +92,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
         name=spec.name,
         label=plan.label,
         cells=len(plan.layout.cells),
+        vacuum=spec.casting.vacuum,
         preparation=tuple(preparation(moulds)),
         off_grid=edges,
         pours=tuple(pours),
@@ -124,22 +128,16 @@ def _figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, volume:
             by_temperature + sourced(silicone.pot_life_min),
         ),
         Figure("mixing", fig.MIXING_MIN, "min", practice),
-        *([Figure("degassing", fig.DEGASSING_MIN, "min", practice)] if casting.vacuum else []),
         Figure("pouring and striking off", fig.POURING_MIN, "min", practice),
         Figure("viscosity, mixed", float(silicone.mixed_viscosity_cps), "cps", sourced(silicone.mixed_viscosity_cps)),
         Figure("depth of this pour", step.rim, "mm", "computed: the rim over the seat"),
         Figure(
             f"rise of a {fig.BUBBLE_MM} mm bubble through it",
-            fig.bubble_rise_s(step.rim, silicone),
-            "s",
-            "computed: Stokes' law at constant viscosity, so optimistic; the bubble is assumed",
+            fig.bubble_rise_s(step.rim, silicone) / 60,
+            "min",
+            "computed: Stokes' law at the viscosity just mixed, so optimistic; the bubble is assumed",
         ),
-        Figure(
-            "degassing container, at least", fig.CONTAINER * mix.millilitres, "ml", "assumed: 4 x the mix, it foams up"
-        ),
-        Figure(
-            "vacuum", fig.VACUUM_INHG, "inHg", f"assumed: usual advice; {fig.VACUUM_INHG * fig.KPA_PER_INHG:.1f} kPa"
-        ),
+        *(_vacuum(mix) if casting.vacuum else ()),
         Figure(
             "cure in this room",
             fig.at_room(float(silicone.cure_h), room),
@@ -154,29 +152,49 @@ def _figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, volume:
     return tuple(figures)
 
 
+def _vacuum(mix: Mix) -> tuple[Figure, ...]:
+    """Return what holds for degassing."""
+    pressure = f"assumed: usual advice; {fig.VACUUM_INHG * fig.KPA_PER_INHG:.3g} kPa below the room's pressure"
+    return (
+        Figure("degassing", fig.DEGASSING_MIN, "min", "assumed: usual practice"),
+        Figure(
+            "degassing container, at least", fig.CONTAINER * mix.millilitres, "ml", "assumed: 4 x the mix, it foams up"
+        ),
+        Figure("vacuum", fig.VACUUM_INHG, "inHg", pressure),
+    )
+
+
 def _channels_mm3(step: Step) -> float:
     return sum(map(exact_volume, step.channels))
 
 
-def _verdict(spec: Spec, step: Step, silicone: Material) -> str:
-    """State whether the pot life, less mixing, degassing and pouring, lets the bubbles rise out of the pour."""
-    rise = fig.bubble_rise_s(step.rim, silicone)
-    pot = 60 * fig.at_room(float(silicone.pot_life_min), spec.casting.room_c)
-    work = 60 * (fig.MIXING_MIN + fig.POURING_MIN)
-    spent = f"the pot life of {pot:.0f} s less {work:.0f} s for mixing and pouring"
-    if rise <= pot - work:
-        return f"Bubbles clear by themselves: {rise:.0f} s through {step.rim:.2f} mm, within {spent}."
-    if not spec.casting.vacuum:
-        return (
-            f"Bubbles stay: {rise:.0f} s against {spent}, and no vacuum (casting.vacuum). Get one, or brush a thin "
-            "coat onto core and bore first and pour in a thread from one side."
+def _bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix) -> str:
+    """Say how the bubbles leave: in the vacuum, or by themselves, for which a quarter of the pot life is allowed."""
+    pot = fig.at_room(float(silicone.pot_life_min), spec.casting.room_c)
+    work = fig.MIXING_MIN + fig.POURING_MIN
+    if spec.casting.vacuum:
+        work += fig.DEGASSING_MIN
+        said = (
+            f"Degas for {fig.DEGASSING_MIN:g} min (assumed) at {fig.VACUUM_INHG:g} inHg, in a container of at least "
+            f"{fig.CONTAINER * mix.millilitres:.3g} ml: the silicone foams up and falls back, then single bubbles "
+            "rise. Let the air in slowly."
         )
-    late = 60 * fig.DEGASSING_MIN - (pot - work)
-    slower = f" Degassing ends {late:.0f} s after the pot life: cool the room, or take a slower silicone."
-    return (
-        f"Degas for {fig.DEGASSING_MIN:g} min (assumed) before pouring: a bubble needs {rise:.0f} s, more than {spent}."
-        f"{slower if late > 0 else ''}"
-    )
+    else:
+        rise, allowed = fig.bubble_rise_s(step.rim, silicone) / 60, fig.WITHOUT_VACUUM * pot
+        stokes = (
+            f"No vacuum (casting.vacuum): a bubble of {fig.BUBBLE_MM:g} mm takes {rise:.3g} min through "
+            f"{step.rim:.3g} mm (Stokes, at the viscosity just mixed). That is optimistic, since silicone thickens "
+            f"from the start: a quarter of the pot life, {allowed:.3g} min, is allowed."
+        )
+        clears = "Such bubbles should rise out: let the mix stand for as long before it is struck off."
+        stays = (
+            "Such bubbles stay: get a vacuum, or brush a thin coat onto core and bore first and pour in a thread from "
+            "one side."
+        )
+        said = f"{stokes} {clears if rise <= allowed else stays}"
+    late = work - pot
+    slower = f" All this ends {late:.2g} min after the pot life: cool the room, or take a slower silicone."
+    return f"{said}{slower if late > 0 else ''}"
 
 
 def _printed_slot_height(moulds: MouldSet, edges: Sequence[OffGrid]) -> float | None:
