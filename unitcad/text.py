@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any
 
@@ -63,6 +64,12 @@ def toml(value: Any) -> str:
     if isinstance(value, str):
         return _quoted(value).replace("\x7f", "\\u007f")
     return str(value).lower() if isinstance(value, bool) else repr(value) if isinstance(value, float) else str(value)
+
+
+def listed(words: Iterable[str]) -> str:
+    """Return words as a list in a sentence: "base, cups and lids"."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def spaced(name: str) -> str:

@@ -174,7 +174,7 @@ def test_order_of_the_hands() -> None:
         words = " ".join(pour.steps)
         assert words.index("tongue out FIRST") < words.index("Lift cup")
     assert "filament" in casting.release[0]
-    assert "Peel" in casting.release[1]
+    assert "peel" in casting.release[1]
 
 
 def test_resin_and_lid_have_their_own_words() -> None:
@@ -275,3 +275,68 @@ def test_a_custom_design_of_two_layers_gets_no_agent() -> None:
     """Its last cup's bore may meet the first layer's edge, to which the second bonds."""
     moulds = set_of("custom/film-closed")
     assert [release_agent.agent_faces(moulds, step) for step in moulds.plan.steps] == [(), ()]
+
+
+def words(*source: str) -> str:
+    return written.to_markdown(procedure(*source))
+
+
+def test_each_layer_but_the_first_lies_between_two_cup_positions() -> None:
+    said = [re.findall(r"Layer (\d) lies between", " ".join(pour.steps)) for pour in procedure("three-layer").pours]
+    assert said == [[], ["2"], ["3"]]
+    assert "lies between" not in words("custom/strap-lugs") + words("single-encapsulating")
+
+
+def test_a_lid_set_speaks_of_lids_alone() -> None:
+    text = words("encapsulating", "moulds.pour=injected", "moulds.cavities=[2,2]")
+    assert "cups and lids upside down" in text
+    assert "Base, cups and lids are engraved" in text
+    assert "Touch the bead on a vent" in text
+    for other in ("overflow", "blade", "truck off", "Hold cup"):
+        assert other not in text
+
+
+def test_an_open_set_speaks_of_cups_and_blade() -> None:
+    text = words("encapsulating")
+    assert "cups and blade upside down" in text
+    assert "Touch the silicone in the groove" in text
+    assert "lid" not in text.replace("slide", "").replace("solid", "")
+
+
+def test_resin_has_no_strings() -> None:
+    assert "strings" not in words("encapsulating", "moulds.printer=sla")
+    assert "strings" in words("encapsulating")
+
+
+def test_a_cut_tongue_is_described() -> None:
+    """The film's thickness, width and the radius of the core's riser: it has no file."""
+    moulds = set_of("encapsulating", "moulds.printer=sla")
+    step = next(
+        text for text in procedure("encapsulating", "moulds.printer=sla").preparation if "Cut one tongue" in text
+    )
+    exit = moulds.plan.dimensions.exit
+    assert exit is not None
+    for value in (exit.height, exit.width, moulds.plan.dimensions.ledge_radius):
+        assert f"{value:.3g} mm" in step
+    assert "Cut" not in " ".join(procedure("encapsulating").preparation)
+
+
+def test_a_cup_that_nothing_holds_breaks_a_rule() -> None:
+    casting = procedure("encapsulating")
+    first, *more = casting.pours
+    held = [step for step in first.steps if step.startswith("Hold cup 1 down")]
+    assert len(held) == 1
+    for steps in (
+        tuple(step for step in first.steps if step not in held),
+        (*(step for step in first.steps if step not in held), *held),
+    ):
+        faults = broken_rules(replace(casting, pours=(replace(first, steps=steps), *more)))
+        assert faults == ["pour 1: nothing holds the cup down while it is struck off"]
+
+
+def test_a_cup_lifted_over_a_tongue_breaks_a_rule() -> None:
+    casting = procedure("encapsulating")
+    first, *more = casting.pours
+    steps = tuple(step for step in first.steps if "tongue out" not in step)
+    faults = broken_rules(replace(casting, pours=(replace(first, steps=steps), *more)))
+    assert faults == ["pour 1: the cup is lifted over a tongue"]

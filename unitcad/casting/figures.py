@@ -89,17 +89,23 @@ def weep_mm3(moulds: MouldSet, step: Step, material: Material) -> float:
 
     Plane Poiseuille flow through the window's clearance: clearance^3 perimeter pressure / (12 viscosity length).
     """
-    spec, dims, lay = moulds.spec, moulds.plan.dimensions, moulds.plan.layout
+    spec, dims = moulds.spec, moulds.plan.dimensions
     if not dims.exit:
         return 0.0
     clearance = spec.moulds.window_clearance_mm / 1000
     around = 2 * (dims.exit.width + dims.exit.height) / 1000
-    length = (lay.cup[0] - max(abs(c.x) for c in lay.cells) - dims.radii[step.index - 1]) / 1000
+    length = window_length(moulds, step) / 1000
     head = max(step.rim - (dims.exit.low + dims.exit.high) / 2, 0.0) / 1000
     pressure = 1000 * float(material.density_g_cm3) * GRAVITY * head
     flow = clearance**3 * around * pressure / (12 * float(material.mixed_viscosity_cps) / 1000 * length)
     seconds = 60 * at_room(float(material.pot_life_min), spec.casting.room_c)
     return len(dims.sides) * flow * seconds * 1e9
+
+
+def window_length(moulds: MouldSet, step: Step) -> float:
+    """Return how far a tongue lies in the wall of a pour's cup, mm."""
+    lay = moulds.plan.layout
+    return lay.cup[0] - max(abs(cell.x) for cell in lay.cells) - moulds.plan.dimensions.radii[step.index - 1]
 
 
 def wall_range(spec: Spec, layer: int) -> tuple[float, float]:

@@ -5,39 +5,61 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from unitcad.casting.figures import MIXING_MIN, MOST_ERROR_PCT, Mix
+from unitcad.casting.figures import MIXING_MIN, MOST_ERROR_PCT, Mix, at_room, window_length
 from unitcad.casting.release_agent import agent_faces
 from unitcad.catalogue import Material
-from unitcad.moulds.lid import SKIRT_WALL
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
+from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
 from unitcad.spec import printer_of
-from unitcad.text import spaced
+from unitcad.text import listed, spaced
 
 STRIKE_AGAIN_MIN = 10
+HOLD = "Hold"
+"""How the step begins that keeps an open cup on its base under the blade."""
 
 
 def preparation(moulds: MouldSet) -> Iterator[str]:
     """Describe the way from the printer to an empty mould."""
-    plan = moulds.plan
+    plan, lengths = moulds.plan, moulds.spec.moulds
+    printed = [tool for tool in plan.tools if tool.made == "printed"]
+    turned = listed(dict.fromkeys(f"{tool.kind}s" if tool.step else tool.kind for tool in printed if tool.upside_down))
+    marked = listed(["base", "cups", *(["lids"] if plan.of_kind("lid") else [])])
     yield (
-        "Print the pieces as they lie in their files: cups and blade upside down, the rest as drawn. Base and cups are "
-        f"engraved {plan.label}."
-    )
-    yield (
-        "Brush off strings and loose bits. Put each cup on the plinth once, dry: its cut corner lets it on one way "
-        "only, and it must sit down until seat and plinth touch."
+        f"Print the pieces as they lie in their files, without supports: {turned} upside down, the rest as drawn. "
+        f"{marked.capitalize()} are engraved {plan.label}."
     )
     if printer_of(moulds.spec).technology.value == "sla":
+        yield "Wash the pieces until nothing of them feels slippery, rinse holes and corners, and let them dry."
         yield (
-            "Resin keeps many platinum silicones from curing: wash, post-cure, bake (60 degC for 8 h, assumed), then "
+            "Resin keeps many platinum silicones from curing: post-cure, bake (60 degC for 8 h, assumed), then "
             "cure a drop of each silicone on a spot of the base that is no cavity. If it stays tacky, coat or reprint."
         )
+    else:
+        yield "Brush off strings and loose bits."
+    lids = " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
+    yield (
+        "Put each cup on the plinth once, dry: its cut corner lets it on one way only. It must sit down until seat and "
+        f"plinth touch; a slit of {lengths.seat_relief_mm:g} mm is then left between cup and plate, all round.{lids}"
+    )
+    yield from _cut_tongues(moulds)
     if plan.of_kind("stub"):
         yield (
             f"Push {_each(moulds)} filament stub up through the core from below until its end is flush with the core's "
-            "top, its bent end lying in the groove under the plate and on the bench. Trim its tip flush with a blade: "
+            "top, its bent end lying in the groove under the plate and on the bench. Trim its tip flush with a knife: "
             "0.5 mm low shows."
+        )
+
+
+def _cut_tongues(moulds: MouldSet) -> Iterator[str]:
+    """Say how to cut the tongues that are not printed."""
+    dims, tongues = moulds.plan.dimensions, [t for t in moulds.plan.of_kind("tongue") if t.made == "cut"]
+    if tongues and dims.exit:
+        length = moulds.plan.layout.cup[0] - min(abs(c.x) for c in moulds.plan.layout.cells) + GRIP_GAP + GRIP_LENGTH
+        yield (
+            f"Cut {_counted(len(tongues), 'tongue')} from film or steel {dims.exit.height:.3g} mm thick: a strip "
+            f"{dims.exit.width:.3g} mm wide and at least {length:.3g} mm long, one end cut hollow to a radius of "
+            f"{dims.ledge_radius:.3g} mm so that it fits the riser of the core's ledge. No burr."
         )
 
 
@@ -60,25 +82,32 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
             f"Coat the {_lead(moulds)} thinly with petroleum jelly where the slot of cup {step.index} comes, outside "
             "the cavity only: it keeps silicone from weeping out."
         )
-    pushed = (
-        ": the play is then on one side."
-        if first
-        else ", the same way as the cup before: Layer 2 lies between two cup positions."
-    )
-    yield (f"{_release_agent(moulds, step)} Put cup {step.index} on and push it towards the cut corner{pushed}")
+    pushed = ", so that the play lies on one side." if first else ", as the cup before."
+    if not first and moulds.plan.concentric:
+        pushed = f", as the cup before: Layer {step.index} lies between two cup positions."
+    yield f"{_release_agent(moulds, step)} Put cup {step.index} on and push it towards the cut corner{pushed}"
     if step.seals and not moulds.plan.concentric:
         yield "Grease the flanks of what stands on the base beside the cavity thinly, and wipe off the rest."
     if tongues:
         slot = "" if first else " and the slot that it left in the layer before"
+        seat = window_length(moulds, step)
         yield (
-            f"Grease {'the tongue' if len(tongues) == 1 else 'each tongue'} and the window thinly with petroleum "
-            "jelly, the tip not; wipe off what comes out into the bore. Push it in through the window"
-            f"{slot} until its round tip stops in the core and it lies on the ledge."
+            f"Push {'the tongue' if len(tongues) == 1 else 'each tongue'} in through the window{slot} until "
+            f"{seat:.2g} mm are still to go. Smear the {seat:.2g} mm just outside the cup thinly with petroleum jelly, "
+            "then push it home: its hollow end stops against the core, and it lies on the ledge. Wipe off what comes "
+            "into the bore."
         )
     if step.lid:
         yield (
-            f"Put lid {step.index} on. Seal it with a thin line of petroleum jelly on the rim outside the groove, and "
-            f"hold it down with a rubber band or a clamp across its skirt ({SKIRT_WALL:g} mm)."
+            f"Put lid {step.index} on, cut corner over cut corner, with a thin line of petroleum jelly on the rim "
+            "outside the groove. Hold it down with rubber bands round lid and base, or with a clamp, clear of sprue "
+            "and vents."
+        )
+    else:
+        yield (
+            f"{HOLD} cup {step.index} down while it is struck off: on each of the two sides without a pry slot run a "
+            "strip of tape from the cup's wall, below the rim, round the plate's edge to its underside. Clamps or "
+            "weights do as well where they leave the rim free for the blade."
         )
     yield (
         f"Weigh {mix.part_a_g:.2f} g of {silicone.name} part A and {mix.part_b_g:.2f} g of part B ({mix.net_g:.3f} g "
@@ -96,21 +125,26 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
         taken = "into the groove" if step.groove else "onto a scrap, since this cup has no groove"
         yield (
             f"Pour in a thin thread at one place until {'the' if cells == 1 else 'every'} cavity stands over its rim. "
-            "Wait for the bubbles, prick what you see. Strike off along the rim with the blade held upright; what it "
-            f"takes goes {taken}."
+            "Prick the bubbles that you see. Strike off along the rim with the blade upright, its narrow edge down; "
+            f"what it takes goes {taken}."
         )
         if not moulds.plan.concentric and moulds.plan.dimensions.core_height > step.rim:
             yield "What stands on the base beside the cavity is higher than this rim: draw the blade past it."
         again = " The window weeps a little." if tongues else ""
         yield f"Top up and strike again after {STRIKE_AGAIN_MIN} min (assumed).{again}"
-    yield "Let it cure, level, for the time above. Touch the overflow, not the layer, to see whether it is done."
+    cure = at_room(float(silicone.cure_h), moulds.spec.casting.room_c)
+    touched = (
+        "the bead on a vent" if step.lid else "the silicone in the groove" if step.groove else "what was struck off"
+    )
+    yield f"Let it cure, level, for {cure:.3g} h. Touch {touched}, not the layer, to see whether it is done."
     if tongues:
         each = "the tongue" if len(tongues) == 1 else "every tongue"
         yield f"Pull {each} out FIRST, sideways. A cup lifted over a tongue tears the layer."
     if step.lid:
-        yield "Lift the lid: sprue and vents tear off at the layer. Trim them flush with a blade."
+        yield "Lift the lid straight up: sprue and vents tear off at the layer. Trim them flush with a knife."
+    free = "" if step.lid else "Take off what held the cup down. "
     yield (
-        f"Lift cup {step.index} straight up, a screwdriver in each pry slot. Layer {step.index} stays on the "
+        f"{free}Lift cup {step.index} straight up, a screwdriver in each pry slot. Layer {step.index} stays on the "
         f"{_holds(moulds)}."
     )
 
@@ -124,7 +158,7 @@ def release(moulds: MouldSet, inner: Material) -> Iterator[str]:
             f"{tear:.1f} N on its end tear {inner.name} (computed: tensile strength, {inner.tensile_mpa.status}, x its "
             "area)."
         )
-    yield f"Peel the unit off the {_holds(moulds)} straight up, all round first. Trim the flash."
+    yield f"Loosen the unit's edge all round, then peel it off the {_holds(moulds)} straight up. Trim the flash."
 
 
 def measurements(moulds: MouldSet, grams: Sequence[float], slot_height: float | None) -> Iterator[str]:
@@ -206,6 +240,10 @@ def _lead(moulds: MouldSet) -> str:
 def _holds(moulds: MouldSet) -> str:
     """Return what the silicone is cast on: "core"; moulds by complement need not have one."""
     return "core" if moulds.plan.concentric else "base"
+
+
+def _counted(number: int, thing: str) -> str:
+    return f"one {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def _each(moulds: MouldSet) -> str:

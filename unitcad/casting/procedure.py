@@ -187,10 +187,9 @@ def _bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix) -> str:
             f"from the start: a quarter of the pot life, {allowed:.3g} min, is allowed."
         )
         clears = "Such bubbles should rise out: let the mix stand for as long before it is struck off."
-        stays = (
-            "Such bubbles stay: get a vacuum, or brush a thin coat onto core and bore first and pour in a thread from "
-            "one side."
-        )
+        brush = "brush a thin coat onto core and bore first and pour in a thread from one side"
+        way = "let the syringe stand, its tip up, before you inject slowly" if step.lid else brush
+        stays = f"Such bubbles stay: get a vacuum, or {way}."
         said = f"{stokes} {clears if rise <= allowed else stays}"
     late = work - pot
     slower = f" All this ends {late:.2g} min after the pot life: cool the room, or take a slower silicone."

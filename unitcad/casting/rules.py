@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from unitcad.casting.instructions import HOLD
 from unitcad.casting.procedure import Procedure
 
 
 def broken_rules(procedure: Procedure) -> list[str]:
     """Return what a procedure does wrong, one sentence each; empty where it keeps every rule."""
-    return [fault for rule in (_agent, _degassing) for fault in rule(procedure)]
+    return [fault for rule in (_agent, _degassing, _held) for fault in rule(procedure)]
 
 
 def _agent(procedure: Procedure) -> Iterator[str]:
@@ -39,3 +40,19 @@ def _degassing(procedure: Procedure) -> Iterator[str]:
     needs = [item.item for item in procedure.bill if "degassing" in item.item or "vacuum" in item.note]
     if needs and not procedure.vacuum:
         yield f"the bill asks for a vacuum that is not there: {', '.join(needs)}"
+
+
+def _held(procedure: Procedure) -> Iterator[str]:
+    """Hold an open cup down before it is struck off, and pull the tongue before a cup is lifted."""
+    for pour in procedure.pours:
+        strike, hold = _first(pour.steps, "Strike off"), _first(pour.steps, f"{HOLD} cup {pour.index} down")
+        if strike is not None and (hold is None or hold > strike):
+            yield f"pour {pour.index}: nothing holds the cup down while it is struck off"
+        inserted, pull, lift = (_first(pour.steps, words) for words in ("on the ledge", "tongue out", "Lift cup"))
+        if inserted is not None and (pull is None or lift is None or pull > lift):
+            yield f"pour {pour.index}: the cup is lifted over a tongue"
+
+
+def _first(steps: tuple[str, ...], words: str) -> int | None:
+    """Return the number of the first step (from 0) that says so."""
+    return next((i for i, step in enumerate(steps) if words in step), None)
