@@ -1,14 +1,14 @@
 """Extreme media against the reference in ball arithmetic, and what the page promises of them."""
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from unitcad.accuracy import extreme_responses
 from unitcad.accuracy.ball_reference import TooHard
-from unitcad.accuracy.extreme_responses import Row, cases, promises, rows, survey
+from unitcad.accuracy.extreme_responses import TOLERANCES, Row, cases, promises, rows, summary, survey
 from unitcad.accuracy.hankel import DISC, RADII
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
@@ -106,3 +106,13 @@ def test_what_is_promised_can_be_broken():
     stalled = [Row("a", "x", 1e-3, 0.0, 1e-3, 1e-13, 0.0, 100, seconds=61.0)]
     for at, bad in enumerate((over, undecided, stalled, worse)):
         assert [promise.ok for promise in promises(bad, bad)] == [i != at for i in range(4)]
+
+
+def test_the_front_page_has_the_response_that_is_closest_to_its_bound():
+    media = [Row("b 7", "x", rtol, 0.1 * rtol, rtol, 1e-13, 0.1, 100, 2.0) for rtol in TOLERANCES]
+    media[1] = replace(media[1], over_bound=0.5, bound=1.0)
+    picks, worst = summary(media)
+    assert worst == "b 7 at rtol 0.001: error 0.5 of its bound; no bounds broken in 5 responses of 1 media"
+    assert [error for _, error, _ in picks] == ["0.1", "1e-05", "1e-09"]
+    assert picks[0][2] == "`response(rtol=0.1)`: 100 % within rtol, at most 2 s"
+    assert "; 1 bounds broken" in summary([*media, replace(media[0], over_bound=math.nan)])[1]

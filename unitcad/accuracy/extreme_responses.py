@@ -15,7 +15,7 @@ from unitcad.accuracy import ball_reference
 from unitcad.accuracy.hankel import DISC, OMEGA, RADII
 from unitcad.accuracy.long_study import in_order, journalled
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
-from unitcad.accuracy.result import Cell, Plot, Promise, Table
+from unitcad.accuracy.result import Cell, Plot, Promise, Table, shown
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import Damping, KelvinVoigt, LossFactor
 from unitcad.errors import UnitcadError
@@ -202,11 +202,33 @@ def plot(surveyed: Sequence[Row]) -> Plot:
     )
 
 
+def summary(surveyed: Sequence[Row]) -> tuple[tuple[tuple[str, str, str], ...], str]:
+    """Return rows of (for what, error, what to pick), and the response that comes closest to its bound."""
+    picks = []
+    for rtol in TOLERANCES:
+        group = [row for row in surveyed if row.rtol == rtol]
+        met = sum(row.met for row in group) / len(group)
+        slowest = max(row.seconds for row in group)
+        picks.append(
+            (
+                "displacement of extreme random media, with a bound",
+                f"{rtol:g}",
+                f"`response(rtol={rtol:g})`: {100 * met:.3g} % within rtol, at most {shown(slowest)} s",
+            )
+        )
+    worst = max(surveyed, key=lambda row: row.over_bound)
+    media, broken = len({row.case for row in surveyed}), sum(not row.over_bound <= 1 for row in surveyed)
+    return tuple(picks[::2]), (
+        f"{worst.case} at rtol {worst.rtol:g}: error {shown(worst.over_bound)} of its bound; {broken or 'no'} bounds "
+        f"broken in {len(surveyed)} responses of {media} media"
+    )
+
+
 def promises(extreme: Sequence[Row], surveyed: Sequence[Row]) -> tuple[Promise, ...]:
     """Return what a solver whose bounds do not hold, or a reference that can't decide, would break."""
     both = (*extreme, *surveyed)
     return (
-        Promise("responses: largest error over its bound", max(r.over_bound for r in both), 1.0),
+        Promise("responses: largest error over its bound", float(np.max([r.over_bound for r in both])), 1.0),
         Promise("responses: share that the reference can't decide", float(np.mean([not r.decided for r in both])), 0.1),
         Promise("responses: how many took over a minute", sum(row.seconds > STALL for row in both), 0),
         Promise("responses: a tighter rtol's bound over a looser one's", _worsening(both), LEAST_GAIN),

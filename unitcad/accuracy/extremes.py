@@ -11,7 +11,7 @@ from typing import Any
 from unitcad.accuracy.long_study import in_order, journalled
 from unitcad.accuracy.outcomes import BUILT, CIRCLE, GOOD, HANG, NO_VALUE, REFUSED, Outcome, outcome
 from unitcad.accuracy.random_specs import DOCUMENTED, EXTREME, seeded_spec
-from unitcad.accuracy.result import Promise, Result, Say, Table
+from unitcad.accuracy.result import Promise, Result, Say, Summary, Table
 from unitcad.accuracy.timing import machine, timing
 from unitcad.designs import shipped
 from unitcad.validation import default_template, override, read
@@ -55,6 +55,7 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
     tried = groups.get("documented", [])
     built = sum(o.kind == BUILT for o in tried) / max(1, len(tried))
     refused = [o for o in everything if o.kind == REFUSED]
+    longest = max((o.seconds for o in everything if o.kind == BUILT), default=0.0)
     return Result(
         suite="extremes",
         title="Extreme geometry and random specs",
@@ -87,6 +88,7 @@ def study(count: int, say: Say, sweeps: int | None = None, journal: Path | None 
             Promise("documented ranges: share that does not build", 1 - built, 1 - LEAST_BUILT),
         ),
         measured={**machine("manifold3d"), "random specs": count},
+        summary=Summary(worst=f"{len(faults) or 'no'} faults in {len(jobs)} specs; the longest build {longest:.3g} s"),
     )
 
 

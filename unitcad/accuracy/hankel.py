@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from scipy import special
 
+from unitcad.accuracy import hankel_cost
 from unitcad.accuracy import hankel_peers as peers
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, fastest, stars
+from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
 from unitcad.accuracy.timing import Timing, interleaved, machine
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
@@ -28,6 +29,8 @@ _END = 3e5
 """Where the reference's path ends, 1/m: beyond it the remainder is nothing (checked by doubling the end)."""
 _FINEST = {"undamped": 1e-9}
 """The finest rtol that a case is promised to reach."""
+_MOST = 0.1
+"""The largest error that is of any use: beyond it a method gets no star."""
 _LEVELS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)
 """Errors for which the page says what to pick."""
 
@@ -100,8 +103,9 @@ def cases() -> list[Case]:
 
 
 def run(quick: bool, say: Say) -> Result:
-    """Solve every case by every method."""
+    """Solve every case by every method, and measure what responses of every load cost."""
     tables, plots, promises = [], [], []
+    closest: list[tuple[float, str]] = []
     ends: dict[str, list[tuple[str, float, float]]] = {}
     for case in cases():
         say(case.name)
@@ -110,8 +114,7 @@ def run(quick: bool, say: Say) -> Result:
         rows = _rows(case, reference, quick)
         counts = [case.medium.response(DISC, case.omega, RADII, rtol=rtol).wavenumbers for rtol in TOLERANCES]
         ends[case.name] = [(f"{row.method}, {row.setting}: {row.time}", row.time.median, row.error) for row in rows]
-        # A method that is off by as much as the answer is no choice at any time.
-        marks = stars([(row.time.median, row.error if row.error < 1 else math.inf) for row in rows])
+        marks = stars([(row.time.median, row.error) for row in rows], most=_MOST)
         tables.append(
             Table(
                 case.name,
@@ -141,17 +144,29 @@ def run(quick: bool, say: Say) -> Result:
             # The reference itself is good to about 1e-13: below that an estimate can't be checked.
             ratio = row.error / max(row.estimate or 0.0, 2e-13)
             promises.append(Promise(f"{case.name}: error over its estimate at rtol {rtol:g}", ratio, 1.0))
+            closest.append((ratio, f"{case.name} at rtol {rtol:g}: error {shown(row.error)}, {ratio:.2f} of its bound"))
     picks = tuple((level, *(fastest(points, level) for points in ends.values())) for level in _LEVELS)
     tables.append(Table("What to pick: the fastest method for an error", ("error", *ends), picks))
+    loads = hankel_cost.every_load(cases()[0].medium, RADII[::4] if quick else RADII, quick, say)
+    counts = [] if quick else hankel_cost.counted(cases()[0].medium, say)
     return Result(
         suite="hankel",
         title="The Hankel integral: error against time",
         text=TEXT,
-        tables=tuple(tables),
-        plots=tuple(plots),
-        promises=tuple(promises),
-        measured=machine("numpy", "scipy", "libdlf"),
+        tables=(tables[-1], *hankel_cost.tables(loads, counts), *tables[:-1]),
+        plots=(*plots, *hankel_cost.plots(loads, counts)),
+        promises=(*promises, *hankel_cost.promises([*loads, *counts])),
+        measured=machine("numpy", "scipy", "libdlf", "python-flint"),
+        summary=Summary(tuple(_picked(ends)), max(closest)[1], 0),
     )
+
+
+def _picked(ends: dict[str, list[tuple[str, float, float]]]) -> Iterator[tuple[str, str, str]]:
+    """Yield the fastest method for three errors on the damped forearm, and for one on the others."""
+    for name, points in ends.items():
+        for error in (1e-2, 1e-6, 1e-10) if name == "damped" else (1e-6,):
+            if best := fastest(points, error):
+                yield f"displacement of the forearm, {name}, 13 radii", f"{error:g}", best
 
 
 _PANELS = 1499

@@ -12,7 +12,7 @@ import numpy as np
 
 from unitcad.accuracy.measures import mesh_volume
 from unitcad.accuracy.random_specs import seeded_spec
-from unitcad.accuracy.result import Promise, Result, Say, Table
+from unitcad.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.timing import interleaved, machine, timing
 from unitcad.designs import shipped
 from unitcad.errors import Refusal
@@ -86,7 +86,18 @@ def run(quick: bool, say: Say) -> Result:
             "random specs": random,
             "bodies": bodies,
         },
+        summary=summary(worst, times, volume),
     )
+
+
+def summary(worst: dict[str, dict[str, float]], times: Sequence[tuple[str, str, float]], used: float) -> Summary:
+    """Return what each kernel costs and how far it is off; `used`: share of manifold3d's bound on the volume."""
+    cost = {kernel: time for kernel, time, _ in times}
+    picks = tuple(
+        (f"all solids of a spec: {what}", f"{shown(worst[kernel]['volume'])} of a volume", f"{kernel}: {cost[kernel]}")
+        for kernel, what in (("manifold3d", "meshes"), ("build123d", "B-reps"), ("CadQuery", "B-reps"))
+    )
+    return Summary(picks, f"manifold3d: {used:.2g} of the bound on its volume")
 
 
 def _variants(chosen: tuple[str, ...], random: int) -> Iterator[tuple[str, Variant]]:

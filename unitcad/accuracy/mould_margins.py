@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
 
 from unitcad.accuracy.random_specs import seeded_spec
-from unitcad.accuracy.result import Promise, Result, Say, Table
+from unitcad.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.timing import machine, timing
 from unitcad.cache import MemoryStore
 from unitcad.errors import Refusal
@@ -68,7 +69,18 @@ def run(quick: bool, say: Say) -> Result:
         ),
         promises=tuple(Promise(f"{code}: findings broken", margin.broken, 0) for code, margin in ordered),
         measured={**machine("manifold3d"), "specs": wanted},
+        summary=Summary(worst=closest(rows)),
     )
+
+
+def closest(rows: Sequence[tuple]) -> str:
+    """Return the finding that comes closest to its limit, of the rows of the table."""
+    broken = sum(row[3] for row in rows)
+    limited = [row for row in rows if row[4] and row[5]]
+    if broken or not limited:
+        return f"{broken} findings broken"
+    code, _, _, _, value, limit, unit, seed = max(limited, key=lambda row: min(row[4] / row[5], row[5] / row[4]))
+    return f"{code}, spec {seed}: {shown(value)} {unit}, limit {shown(limit)}"
 
 
 def _worst(finding: FindingRecord | None) -> tuple[float | None, float | None, str]:

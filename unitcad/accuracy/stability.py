@@ -14,7 +14,7 @@ import numpy as np
 
 from unitcad.accuracy import extreme_responses, thomson_haskell
 from unitcad.accuracy.random_media import CLASSES
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Table
+from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table
 from unitcad.accuracy.timing import machine
 from unitcad.attenuation.layered.loads import Point, UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
@@ -159,6 +159,7 @@ def study(media: int, say: Say, seed: int = 0, journal: Path | None = None, ever
             *extreme_responses.promises(extreme, surveyed),
         ),
         measured={**machine("numpy", "scipy"), "cases": len(known), "random media": media, "seed": seed},
+        summary=Summary(*extreme_responses.summary(surveyed), plot=1),
     )
 
 

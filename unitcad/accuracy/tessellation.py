@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.accuracy.measures import mesh_volume
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, shown, stars
+from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
 from unitcad.accuracy.timing import Timing, interleaved, machine
 from unitcad.kernels import bounds, mesh
 from unitcad.pipeline import Variant
@@ -79,10 +79,58 @@ def run(quick: bool, say: Say) -> Result:
             f"{_default(by_body, tolerances)}"
         ),
         tables=tuple(tables),
-        plots=tuple(plots),
+        plots=(overall(by_body), *plots),
         promises=tuple(promises),
         measured=machine("manifold3d", "build123d", "cadquery", "cadquery-ocp"),
+        summary=summary(by_body),
     )
+
+
+def overall(by_body: dict[str, list[_Row]]) -> Plot:
+    """Plot the farthest distance of all bodies against the time for all of them."""
+    points = _all_bodies(by_body, lambda row: row.distance)
+    methods = dict.fromkeys(method for method, _ in points)
+    return Plot(
+        f"Solids: distance from the exact surface, worst of {len(by_body)} bodies, against time",
+        "seconds for all of them, from the tree",
+        "distance, mm",
+        {name: tuple(point for (method, _), point in points.items() if method == name) for name in methods},
+        frontier=True,
+    )
+
+
+def summary(by_body: dict[str, list[_Row]]) -> Summary:
+    """Return the fastest method for some errors, and which of unitcad's meshes is closest to its limit."""
+    bodies = f"meshes of {len(by_body)} bodies"
+    picks = []
+    for what, error, levels, unit in (
+        ("distance from the exact surface", lambda row: row.distance, (0.1, 0.01, 0.002), " mm"),
+        ("volume", lambda row: row.volume_error, (1e-3, 1e-5), ""),
+    ):
+        points = _all_bodies(by_body, error)
+        named = [(f"{m} at {t:g} mm: {shown(1e3 * c)} ms", c, e) for (m, t), (c, e) in points.items()]
+        picks += [
+            (f"{bodies}: {what}", f"{level:g}{unit}", best) for level in levels if (best := fastest(named, level))
+        ]
+    name, worst = max(
+        ((name, row) for name, rows in by_body.items() for row in rows if row.method == _TRUE),
+        key=lambda one: one[1].distance / one[1].tolerance,
+    )
+    share = worst.distance / worst.tolerance / 1.5
+    return Summary(
+        tuple(picks), f"{name} at {worst.tolerance:g} mm: {shown(worst.distance)} mm, {share:.2f} of its limit", 0
+    )
+
+
+def _all_bodies(
+    by_body: dict[str, list[_Row]], error: Callable[[_Row], float]
+) -> dict[tuple[str, float], tuple[float, float]]:
+    """Return (seconds for all bodies, largest error) of each method and tolerance."""
+    together: dict[tuple[str, float], list[_Row]] = {}
+    for rows in by_body.values():
+        for row in rows:
+            together.setdefault((row.method, row.tolerance), []).append(row)
+    return {key: (sum(r.time.median for r in rows), max(map(error, rows))) for key, rows in together.items()}
 
 
 def _table(name: str, rows: list[_Row]) -> Table:
