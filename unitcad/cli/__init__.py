@@ -23,6 +23,7 @@ from unitcad.cli.estimate_command import estimate
 from unitcad.cli.experiments_command import experiments
 from unitcad.cli.init_command import init
 from unitcad.cli.list_command import list_
+from unitcad.cli.material_command import material
 from unitcad.cli.output import say_error, speak_anywhere
 from unitcad.cli.report_command import report
 from unitcad.cli.schema_command import schema
@@ -59,6 +60,7 @@ app.command("accuracy")(accuracy)
 app.command("coupon")(coupon)
 app.command("init")(init)
 app.command("list")(list_)
+app.command("material")(material)
 app.command("report")(report)
 app.command("schema")(schema)
 app.add_typer(cache, name="cache")

@@ -1,0 +1,269 @@
+"""`unitcad material`: layouts and units, several specimens, a table that a spec takes, refusals, dynamic tests."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tomllib
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from unitcad.attenuation import FractionalKelvinVoigt
+from unitcad.cli import app
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.estimating import estimate_input
+from unitcad.lab import hyperelastic as hyper
+from unitcad.lab.declared_columns import declared
+from unitcad.lab.dynamic_test import evaluate_dynamic, read_dynamic
+from unitcad.lab.tensile_curve import Specimen, header_of, read_curve
+from unitcad.lab.tensile_result import evaluate
+from unitcad.validation import load
+
+C10 = 1.2e4
+EXACT_15 = float(hyper.nominal_stress("neo-Hooke", {"c10": C10}, np.array(0.15))) / 0.15
+"""Secant modulus at 15 % of the synthetic silicone, Pa."""
+
+
+def _table(path: Path, head: str, columns: list[np.ndarray], lines: tuple[str, ...] = (), sign: str = ",") -> Path:
+    rows = [sign.join(f"{value:.9g}" for value in row) for row in np.stack(columns, axis=1)]
+    path.write_text("\n".join([*lines, head, *rows, ""]), "utf-8")
+    return path
+
+
+def _curve(factor: float = 1.0, most: float = 1.5) -> tuple[np.ndarray, np.ndarray]:
+    strain = np.linspace(0.0, most, 301)
+    return strain, factor * hyper.nominal_stress("neo-Hooke", {"c10": C10}, strain)
+
+
+def _layouts() -> dict[str, Callable[[Path], tuple[Path, dict[str, str], Specimen]]]:
+    strain, stress = _curve()
+    area, gauge = 18e-6, 33.0
+
+    def plain(folder: Path):
+        return _table(folder / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3]), {}, Specimen()
+
+    def true_values(folder: Path):
+        head = "Time (s);True Strain;True Stress (MPa)"
+        columns = [strain / 0.2, np.log1p(strain), stress * (1 + strain) / 1e6]
+        return _table(folder / "b.csv", head, columns, sign=";"), {}, Specimen()
+
+    def force_and_travel(folder: Path):
+        lines = ("Specimen Thickness (mm);3;", "Specimen Width (mm);6;", "Specimen Length (mm);33;", "Load Cell;50 N;")
+        head = "Extension (mm);Force (N);Time (s)"
+        columns = [12.0 + strain * gauge, stress * area, strain / 0.2]
+        return _table(folder / "c.csv", head, columns, lines, ";"), {}, Specimen()
+
+    def given_lengths(folder: Path):
+        columns = [strain * gauge, stress * area * 1e3]
+        return _table(folder / "d.csv", "Extension (mm),Load (mN)", columns), {}, Specimen(6.0, 3.0, gauge)
+
+    def declared_columns(folder: Path):
+        path = _table(folder / "e.txt", "a\tb\tc", [strain / 0.2, stress / 6894.757293168, 100 * strain], sign="\t")
+        return path, {"stress": "2:psi", "strain": "c:%"}, Specimen()
+
+    return {f.__name__: f for f in (plain, true_values, force_and_travel, given_lengths, declared_columns)}
+
+
+@pytest.mark.parametrize("layout", _layouts())
+def test_one_curve_in_every_layout_is_the_same_curve(layout: str, tmp_path: Path) -> None:
+    path, columns, specimen = _layouts()[layout](tmp_path)
+    curve = read_curve(path, declared(f"{q}={c}" for q, c in columns.items()), specimen)
+    assert float(np.interp(0.15, curve.strain, curve.stress)) / 0.15 == pytest.approx(EXACT_15, rel=1e-3)
+    result = evaluate([curve], (0.12, 0.24))
+    law = next(row for row in result.rows if row.method == "neo-Hooke up to 50 %")
+    assert law.value == pytest.approx(6 * C10, rel=1e-4)
+
+
+def test_a_header_says_what_the_machine_is(tmp_path: Path) -> None:
+    path, _, _ = _layouts()["force_and_travel"](tmp_path)
+    assert header_of(path) == Specimen(6.0, 3.0, 33.0, cell_n=50.0)
+    curve = read_curve(path, {}, Specimen(thickness_mm=1.5))
+    assert curve.specimen.thickness_mm == 1.5
+    assert curve.specimen.crosshead is True
+    assert curve.rate == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("head", "columns", "field", "part"),
+    [
+        ("Strain (%),Stress", [[1, 2, 3], [1, 2, 3]], "--column", "no unit"),
+        ("Strain (%),Stress (mm)", [[1, 2, 3], [1, 2, 3]], "--column", "'mm'"),
+        ("Strain (%),Stress (kPa),Stress (MPa)", [[1, 2, 3]] * 3, "--column", "several columns"),
+        ("Strain,Stress (kPa)", [[1, 200, 300], [1, 2, 3]], "--column", "no unit and reaches 300.2"),
+        ("x,y", [[1, 2, 3], [1, 2, 3]], "--column", "no column of strain"),
+        ("Extension (mm),Stress (kPa)", [[1, 2, 3], [1, 2, 3]], "--gauge-mm", "gauge length"),
+        ("Strain (%),Force (N)", [[1, 2, 3], [1, 2, 3]], "--width-mm", "width and thickness"),
+    ],
+)
+def test_what_would_be_a_guess_is_refused(head: str, columns: list, field: str, part: str, tmp_path: Path) -> None:
+    path = _table(tmp_path / "a.csv", head, [np.array(column) + 0.25 for column in columns])
+    with pytest.raises(Refusal) as refused:
+        read_curve(path, {}, Specimen())
+    assert refused.value.field == field
+    assert part in str(refused.value)
+
+
+def test_a_reversed_or_short_curve_is_refused(tmp_path: Path) -> None:
+    strain, stress = _curve()
+    with pytest.raises(UnitcadError, match="reversed"):
+        read_curve(_table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, -stress]), {}, Specimen())
+    with pytest.raises(UnitcadError, match="points"):
+        read_curve(_table(tmp_path / "b.csv", "Strain (%),Stress (kPa)", [strain[:3], stress[:3]]), {}, Specimen())
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [("stress", "QUANTITY=COLUMN"), ("stres=1", "'stres'"), ("stress=1:mm", "'mm'"), ("stress=", "QUANTITY=COLUMN")],
+)
+def test_a_wrong_declaration_is_refused(text: str, part: str) -> None:
+    with pytest.raises(Refusal, match="--column") as refused:
+        declared([text])
+    assert part in str(refused.value)
+
+
+def test_the_range_covers_methods_specimens_and_cross_section(tmp_path: Path) -> None:
+    factors = (0.9, 1.0, 1.1)
+    curves = [
+        read_curve(_table(tmp_path / f"{f}.csv", "Strain (%),Stress (kPa)", [100 * x, y / 1e3]), {}, Specimen(6.0, 3.0))
+        for f, (x, y) in ((f, _curve(f, 3.5)) for f in factors)
+    ]
+    result = evaluate(curves, (0.12, 0.24))
+    logs = np.log(factors)
+    scatter = 4.302652729749464 * np.std(logs, ddof=1) / math.sqrt(3)  # Student's t, two degrees of freedom
+    assert result.scatter == pytest.approx(scatter, rel=1e-9)
+    assert result.geometry == pytest.approx(math.hypot(0.05 / 6, 0.05 / 3))
+    mean = math.exp(np.mean(logs))
+    widened = math.exp(math.hypot(scatter, result.geometry))
+    assert result.high == pytest.approx(6 * C10 * mean * widened, rel=1e-3)  # neo-Hooke's own law is the stiffest
+    at_100 = 2 * C10 * (2 - 1 / 4) * mean
+    assert result.low == pytest.approx(at_100 / widened, rel=1e-3)
+    assert "specimens" not in {one.code for one in result.warnings}
+
+
+def test_cycles_count_by_their_first_pull(tmp_path: Path) -> None:
+    strain, stress = _curve(most=0.5)
+    there = np.concatenate([strain[:200], strain[199:0:-1], strain])
+    back = np.concatenate([stress[:200], 0.7 * stress[199:0:-1], 0.7 * stress[:200], stress[200:]])
+    curve = read_curve(_table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * there, back / 1e3]), {}, Specimen())
+    assert float(np.interp(0.15, curve.strain, curve.stress)) / 0.15 == pytest.approx(EXACT_15, rel=1e-3)
+    assert "cycles" in {one.code for one in evaluate([curve], (0.12, 0.24)).warnings}
+
+
+def _invoke(*words: str | Path, fails: bool = False):
+    done = CliRunner().invoke(app, ["material", *map(str, words)], catch_exceptions=True)
+    assert (done.exception is not None) == fails, done.output
+    return done
+
+
+def test_the_table_goes_into_a_spec_and_the_folder_holds_everything(tmp_path: Path) -> None:
+    curves = [
+        _table(tmp_path / f"{i}.csv", "Strain (%),Stress (kPa)", [100 * x, y / 1e3])
+        for i, (x, y) in enumerate((_curve(1.0, 3.5), _curve(1.05, 3.5)))
+    ]
+    done = _invoke(*curves, "--name", "our blend", "--like", "ecoflex-00-30", "-o", tmp_path / "out")
+    assert "quasi-static" in done.output
+    assert sorted(os.listdir(tmp_path / "out")) == ["material.json", "material.toml", "tensile.svg"]
+    ET.parse(tmp_path / "out" / "tensile.svg")
+    text = (tmp_path / "out" / "material.toml").read_text("utf-8")
+    entry = tomllib.loads(text)["materials"]["our blend"]
+    spec = load(
+        {
+            "name": "ours",
+            "design": "embedded",
+            "diameter_mm": 14.0,
+            "layers": [{"material": "our blend", "wall_mm": 2.5}],
+            "materials": {"our blend": entry},
+            "estimate": {"moduli": "quasi-static"},
+        }
+    )
+    value = entry["quasistatic_modulus_kpa"]
+    assert estimate_input(spec).layers[0].youngs_modulus.value == pytest.approx(1e3 * value["value"])
+    assert value["low"] < value["value"] < value["high"]
+    assert "youngs_modulus_kpa" not in entry
+    found = json.loads((tmp_path / "out" / "material.json").read_text("utf-8"))
+    assert len(found["tensile"]["methods"]) == 12
+    assert len(found["tensile"]["files"][0]["sha256"]) == 64
+    again = {name: (tmp_path / "out" / name).read_bytes() for name in os.listdir(tmp_path / "out")}
+    _invoke(*curves, "--name", "our blend", "--like", "ecoflex-00-30", "-o", tmp_path / "two")
+    assert again == {name: (tmp_path / "two" / name).read_bytes() for name in os.listdir(tmp_path / "two")}
+
+
+def test_a_refusal_leaves_nothing_behind(tmp_path: Path) -> None:
+    strain, stress = _curve(most=0.2)
+    path = _table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3])
+    for words, field in (
+        ((path,), "--like"),
+        ((path, "--like", "ecoflex-00-10"), "--strain"),
+        ((path, "--like", "ecoflex-00-10", "--strain", "30:10"), "--strain"),
+        ((path, "--like", "ecoflex-00-10", "--wall-mm", "x"), "--wall-mm"),
+        ((), "FILES"),
+    ):
+        done = _invoke(*words, "-o", tmp_path / "out", fails=True)
+        assert isinstance(done.exception, Refusal)
+        assert done.exception.field == field
+    assert not (tmp_path / "out").exists()
+
+
+LAW = {"static": 80e3, "tau": 400e-6, "n": 0.31}
+
+
+def _dynamic(path: Path, hertz: np.ndarray, noise: float = 0.0, seed: int = 1) -> Path:
+    law, random = FractionalKelvinVoigt(LAW["tau"], LAW["n"]), np.random.default_rng(seed)
+    modulus = np.array([law.complex_shear(LAW["static"], 2 * math.pi * f) for f in hertz])
+    storage, loss = (part * np.exp(noise * random.standard_normal(len(hertz))) for part in (modulus.real, modulus.imag))
+    return _table(path, "Frequency (Hz),E' (kPa),E'' (kPa)", [hertz, storage / 1e3, loss / 1e3])
+
+
+def test_an_exact_law_is_recovered_and_extrapolated(tmp_path: Path) -> None:
+    curve = read_dynamic(_dynamic(tmp_path / "a.csv", np.geomspace(0.1, 20, 25)), {})
+    assert curve.deformation == "tension"
+    result = evaluate_dynamic(curve, 125.0)
+    assert (result.static, result.tau, result.n) == pytest.approx((LAW["static"], LAW["tau"], LAW["n"]), rel=1e-3)
+    exact = FractionalKelvinVoigt(LAW["tau"], LAW["n"]).complex_shear(LAW["static"], 2 * math.pi * 125)
+    assert result.storage == pytest.approx(exact.real, rel=1e-4)
+    assert result.loss_factor == pytest.approx(exact.imag / exact.real, rel=1e-4)
+    assert result.extrapolated
+    assert result.error < 1e-3
+
+
+def test_the_stated_error_covers_the_truth(tmp_path: Path) -> None:
+    exact = FractionalKelvinVoigt(LAW["tau"], LAW["n"]).complex_shear(LAW["static"], 2 * math.pi * 60)
+    held = 0
+    for seed in range(20):
+        path = _dynamic(tmp_path / "a.csv", np.geomspace(1, 100, 15), 0.02, seed)
+        result = evaluate_dynamic(read_dynamic(path, {}), 60.0)
+        held += abs(math.log(result.storage / exact.real)) <= result.error
+    assert held >= 17
+
+
+def test_a_shear_test_gives_three_times_the_modulus_and_must_say_that_it_is_one(tmp_path: Path) -> None:
+    path = _dynamic(tmp_path / "a.csv", np.geomspace(1, 200, 20))
+    text = path.read_text().replace("E'", "storage modulus", 1).replace("E''", "loss modulus", 1)
+    path.write_text(text)
+    with pytest.raises(Refusal, match="--deformation"):
+        read_dynamic(path, {})
+    shear = evaluate_dynamic(read_dynamic(path, {}, "shear"), 125.0)
+    tension = evaluate_dynamic(read_dynamic(path, {}, "tension"), 125.0)
+    assert shear.storage == pytest.approx(3 * tension.storage, rel=1e-6)
+    assert not shear.extrapolated
+
+
+def test_a_dynamic_test_fills_the_modulus_at_the_motor_s_frequency(tmp_path: Path) -> None:
+    path = _dynamic(tmp_path / "ecoflex-00-30.csv", np.geomspace(1, 50, 20), 0.01)
+    done = _invoke("--dma", path, "-o", tmp_path / "out", "--json")
+    entry = tomllib.loads((tmp_path / "out" / "material.toml").read_text("utf-8"))["materials"]["ecoflex-00-30"]
+    assert {"youngs_modulus_kpa", "loss_factor", "fractional_mu0_kpa"} < set(entry)
+    assert "quasistatic_modulus_kpa" not in entry
+    spec = load("embedded", {"materials": {"mine": entry}, "layers.0.material": "mine"})
+    assert estimate_input(spec).layers[0].youngs_modulus.value == pytest.approx(
+        1e3 * entry["youngs_modulus_kpa"]["value"]
+    )
+    assert json.loads(done.stdout)["dynamic"]["extrapolated"] is True
+    assert "extrapolated from" in entry["youngs_modulus_kpa"]["source"]
+    ET.parse(tmp_path / "out" / "dynamic.svg")

@@ -1,0 +1,195 @@
+"""unitcad material."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from unitcad.cli.shared_options import AsJson
+from unitcad.errors import Refusal, unknown_name
+
+if TYPE_CHECKING:
+    from unitcad.lab.dynamic_test import DynamicResult
+    from unitcad.lab.tensile_result import TensileResult
+
+_DELIMITERS = {"tab": "\t", "space": " "}
+_Length = typer.Option(min=0.001, max=10000, help="Of the specimen; goes before the file's header.")
+
+
+def material(
+    curves: Annotated[
+        list[Path] | None, typer.Argument(metavar="FILES", help="Tensile curves, one a specimen.")
+    ] = None,
+    dma: Annotated[Path | None, typer.Option(help="Storage and loss modulus over frequency.")] = None,
+    name: Annotated[str, typer.Option(help="Of the entry; else the first file's name.")] = "",
+    like: Annotated[str, typer.Option(help="The shipped silicone that gives the other values; else that name.")] = "",
+    column: Annotated[
+        list[str] | None, typer.Option(metavar="QUANTITY=COLUMN[:UNIT]", help="A column by name or number, its unit.")
+    ] = None,
+    delimiter: Annotated[
+        str, typer.Option(help="Of the files' columns, where it is not plain: , ; tab or space.")
+    ] = "",
+    decimal: Annotated[str, typer.Option(help="The files' decimal sign, where it is not plain: . or a comma.")] = "",
+    width_mm: Annotated[float | None, _Length] = None,
+    thickness_mm: Annotated[float | None, _Length] = None,
+    gauge_mm: Annotated[float | None, _Length] = None,
+    cell_n: Annotated[float | None, typer.Option(min=0.001, help="Full scale of the force cell.")] = None,
+    strain: Annotated[
+        str, typer.Option(metavar="LOW:HIGH", help="Strain of use in %; else amplitude over the walls.")
+    ] = "",
+    amplitude_um: Annotated[float, typer.Option(min=0.001, max=1e5, help="Of the motor.")] = 300.0,
+    wall_mm: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Walls that the motor strains.")] = "1.25:2.5",
+    frequency_hz: Annotated[float, typer.Option(min=1, max=5000, help="Of the motor.")] = 125.0,
+    deformation: Annotated[str, typer.Option(help="Of --dma, where the file does not say: shear or tension.")] = "",
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for material.toml, .json and charts.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Turn tensile curves or a dynamic test into a [materials.NAME] table, with every usual method beside it.
+
+    A tensile test gives a quasi-static modulus: the estimate takes it where estimate.moduli = "quasi-static".
+    """
+    from unitcad import catalogue
+    from unitcad.cli.output import print_json, progress
+    from unitcad.lab import material_files as written
+    from unitcad.lab.declared_columns import declared
+    from unitcad.lab.dynamic_test import evaluate_dynamic, read_dynamic
+    from unitcad.lab.readers.layout import Layout
+    from unitcad.lab.tensile_curve import Specimen, read_curve
+    from unitcad.lab.tensile_result import evaluate
+
+    if not curves and dma is None:
+        raise Refusal("FILES", None, "name one tensile curve or more, or --dma with a file")
+    shipped = catalogue.materials()
+    named = name or _slug((curves or [dma])[0])  # type: ignore[arg-type]
+    base = like or named
+    if base not in shipped:
+        raise unknown_name("--like", base, shipped)
+    given = declared(column or [])
+    layout = Layout(_DELIMITERS.get(delimiter, delimiter), decimal)
+    used = _strain(strain, amplitude_um, wall_mm)
+    tensile = dynamic = None
+    with progress("material") as stage:
+        if curves:
+            specimen = Specimen(width_mm, thickness_mm, gauge_mm, cell_n=cell_n)
+            read = []
+            for path in curves:
+                stage(path.name)
+                read.append(read_curve(path, given, specimen, layout))
+            tensile = evaluate(read, used, shipped[base])
+        if dma is not None:
+            stage(dma.name)
+            ratio = float(shipped[base].poisson_ratio)
+            dynamic = evaluate_dynamic(read_dynamic(dma, given, deformation, layout), frequency_hz, ratio)
+    entry = written.table(tensile, dynamic, base, frequency_hz)
+    text = written.material_toml(named, entry, _comments(tensile is not None))
+    found = written.data(named, entry, tensile, dynamic, frequency_hz)
+    if out is not None:
+        contents = {"material.toml": text, "material.json": written.json_text(found)}
+        if tensile:
+            contents["tensile.svg"] = written.tensile_chart(named, tensile)
+        if dynamic:
+            factor = 2 * (1 + float(shipped[base].poisson_ratio)) if dynamic.curve.deformation == "shear" else 1.0
+            contents["dynamic.svg"] = written.dynamic_chart(named, dynamic, factor)
+        written.write(out, contents)
+    if as_json:
+        print_json({**found, **({"folder": str(out)} if out is not None else {})})
+        return
+    if tensile:
+        _print_tensile(named, tensile, found["tensile"])
+    if dynamic:
+        _print_dynamic(dynamic)
+    typer.echo(text, nl=False)
+    if out is not None:
+        typer.echo(str(out))
+
+
+def _comments(tensile: bool) -> tuple[str, ...]:
+    lines = ["For a spec: paste it there and name the silicone in [[layers]]."]
+    if tensile:
+        lines.append(
+            'A tensile test is quasi-static: the estimate takes it where the spec says moduli = "quasi-static"'
+        )
+        lines.append("under [estimate]; it is no modulus at the motor's frequency.")
+    return tuple(lines)
+
+
+def _slug(path: Path) -> str:
+    words = "".join(letter if letter.isalnum() else " " for letter in path.stem.lower()).split()
+    return "-".join(words) or "material"
+
+
+def _strain(strain: str, amplitude_um: float, wall_mm: str) -> tuple[float, float]:
+    """Return the strain of use as fractions: as given in %, or the motor's amplitude over the walls."""
+    if strain:
+        low, high = _pair("--strain", strain, "12:24")
+        used = low / 100, high / 100
+    else:
+        thin, thick = _pair("--wall-mm", wall_mm, "1.25:2.5")
+        used = amplitude_um / 1e3 / thick, amplitude_um / 1e3 / thin
+    if not 0.001 <= used[0] < used[1] <= 1.0:
+        shown = f"{100 * used[0]:.4g}:{100 * used[1]:.4g}"
+        raise Refusal("--strain", shown, "must rise, from 0.1 % or more to 100 % or less", "12:24")
+    return used
+
+
+def _pair(field: str, text: str, nearest: str) -> tuple[float, float]:
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise Refusal(field, text, "needs two numbers LOW:HIGH", nearest) from None
+    if not (math.isfinite(low) and math.isfinite(high) and 0 < low < high):
+        raise Refusal(field, text, "needs LOW above 0 and below HIGH", nearest)
+    return low, high
+
+
+def _print_tensile(name: str, result: TensileResult, found: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    from unitcad.cli.output import console, warn
+
+    screen = console()
+    low, high = result.low / 1e3, result.high / 1e3
+    screen.print(f"{name}: {result.value / 1e3:.4g} kPa ({low:.4g} to {high:.4g}), {result.method}", soft_wrap=True)
+    screen.print(f"  {found['quasistatic']}", soft_wrap=True)
+    table = Table("method", "kPa", "by specimen", "remark")
+    for row in result.rows:
+        value = "-" if row.value is None else f"{row.value / 1e3:.4g}"
+        each = " ".join("-" if one is None else f"{one / 1e3:.4g}" for one in row.by_specimen[:8])
+        table.add_row(row.method, value, each if len(row.by_specimen) > 1 else "", row.reason)
+    screen.print(table)
+    screen.print(
+        f"  range: the methods that could be defended differ by {result.spread:.3g}; "
+        f"specimens {_percent(result.scatter)}, cross-section {_percent(result.geometry)}",
+        soft_wrap=True,
+    )
+    for one in result.warnings:
+        warn(f"warning: {one.code}: {one.message}")
+
+
+def _percent(half_width: float | None) -> str:
+    return "not known" if half_width is None else f"+- {100 * half_width:.2g} %"
+
+
+def _print_dynamic(result: DynamicResult) -> None:
+    from unitcad.cli.output import console, warn
+
+    screen = console()
+    screen.print(
+        f"fractional Kelvin-Voigt: E0 {result.static / 1e3:.4g} kPa, tau {result.tau * 1e6:.4g} us, n {result.n:.4g}; "
+        f"misfit {100 * result.residual:.2g} %",
+        soft_wrap=True,
+    )
+    screen.print(
+        f"  at {result.frequency_hz:g} Hz: storage {result.storage / 1e3:.4g} kPa +- {100 * result.error:.2g} %, "
+        f"loss factor {result.loss_factor:.3g} +- {100 * result.loss_error:.2g} %",
+        soft_wrap=True,
+    )
+    if result.extrapolated:
+        tested = "too few points to test that"
+        if result.held_out_error is not None:
+            tested = f"the lower half of the span predicts the upper one within {100 * result.held_out_error:.2g} %"
+        low, high = result.curve.frequency[0], result.curve.frequency[-1]
+        warn(f"warning: extrapolated: measured from {low:g} to {high:g} Hz; {tested}")

@@ -1,0 +1,184 @@
+"""Storage and loss modulus over frequency to a fractional Kelvin-Voigt law, and on to the motor's frequency. SI.
+
+E*(w) = E0 (1 + (i w tau)^n), fitted in the logarithms of storage and loss, so that every point counts alike.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.lab.declared_columns import Declared, column_of, columns
+from unitcad.lab.readers.formats import open_recording
+from unitcad.lab.readers.layout import Layout
+
+Deformation = Literal["shear", "tension"]
+LEAST_POINTS = 5
+HELD_OUT = 0.5
+"""The part of the span, in logarithms of frequency, that is predicted from the rest to judge an extrapolation."""
+
+
+@dataclass(frozen=True)
+class DynamicCurve:
+    """Storage and loss (Pa, (n,)) over frequency (Hz, rising), of Young's modulus ("tension") or of shear."""
+
+    name: str
+    frequency: np.ndarray = field(repr=False)
+    storage: np.ndarray = field(repr=False)
+    loss: np.ndarray = field(repr=False)
+    deformation: Deformation
+    sha256: str
+
+
+@dataclass(frozen=True)
+class DynamicResult:
+    """The law (Young's modulus at rest in Pa, tau in s, n) and what it says at the motor's frequency.
+
+    `storage`, `loss_factor`: at `frequency_hz`, Pa and tan delta. `error`, `loss_error`: half-widths (95 %) of their
+    logarithms: the fit's and, outside the measured span, what was off when the upper half was predicted by the lower.
+    """
+
+    static: float
+    tau: float
+    n: float
+    residual: float
+    frequency_hz: float
+    storage: float
+    loss_factor: float
+    error: float
+    loss_error: float
+    held_out_error: float | None
+    extrapolated: bool
+    curve: DynamicCurve
+
+
+def read_dynamic(
+    path: Path, given: Mapping[str, Declared], deformation: str = "", layout: Layout | None = None
+) -> DynamicCurve:
+    """Return a file's storage and loss over frequency.
+
+    Raises Refusal for columns and units that are missing, and where the file does not say shear or tension.
+    """
+    recording = open_recording(path, layout)
+    wanted = {q: found for q in ("frequency", "storage", "loss") if (found := column_of(recording, q, given))}
+    if "loss" not in wanted and (found := column_of(recording, "tan_delta", given)):
+        wanted["tan_delta"] = found
+    names = ", ".join(f"{i + 1} {c.name}" for i, c in enumerate(recording.channels))
+    for quantity in ("frequency", "storage"):
+        if quantity not in wanted:
+            raise Refusal(
+                "--column", None, f"{path.name} has no column of {quantity}; its columns: {names}", f"{quantity}=1"
+            )
+    if len(wanted) < 3:
+        raise Refusal(
+            "--column", None, f"{path.name} has neither loss nor tan_delta; its columns: {names}", "loss=3:kPa"
+        )
+    data = columns(recording, wanted)
+    loss = data["loss"] if "loss" in data else data["tan_delta"] * data["storage"]
+    order = np.argsort(data["frequency"], kind="stable")
+    frequency, storage, loss = data["frequency"][order], data["storage"][order], loss[order]
+    if len(frequency) < LEAST_POINTS:
+        raise UnitcadError(f"{path}: {len(frequency)} frequencies; a law of three constants needs {LEAST_POINTS}")
+    if min(frequency.min(), storage.min(), loss.min()) <= 0:
+        raise UnitcadError(f"{path}: frequency, storage and loss must be above zero everywhere")
+    name = recording.channels[wanted["storage"][0]].name.lower()
+    if not deformation:
+        deformation = {"e": "tension", "g": "shear"}.get(name[0], "") if name[1:2] in ("'", "′") else ""
+    if deformation not in ("shear", "tension"):
+        raise Refusal("--deformation", deformation or None, "must be shear or tension: the file does not say", "shear")
+    content = hashlib.sha256(path.read_bytes()).hexdigest()
+    return DynamicCurve(path.name, frequency, storage, loss, deformation, content)  # type: ignore[arg-type]
+
+
+def evaluate_dynamic(curve: DynamicCurve, frequency_hz: float, poisson_ratio: float = 0.5) -> DynamicResult:
+    """Fit the law and evaluate it at a frequency, in terms of Young's modulus: 2 (1 + nu) times that of shear."""
+    factor = 2.0 * (1.0 + poisson_ratio) if curve.deformation == "shear" else 1.0
+    omega, storage, loss = 2.0 * np.pi * curve.frequency, factor * curve.storage, factor * curve.loss
+    constants, covariance, residual = _fit(omega, storage, loss)
+    at = 2.0 * np.pi * frequency_hz
+    value, gradient = _logs(constants, np.array([at])), _jacobian(constants, np.array([at]))
+    from scipy.stats import t
+
+    student = float(t.ppf(0.975, max(2 * len(omega) - 3, 1)))
+    errors = student * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", gradient, covariance, gradient), 0.0))
+    tangent = np.array([[-1.0, 1.0]]) @ gradient
+    loss_error = student * math.sqrt(max(float((tangent @ covariance @ tangent.T)[0, 0]), 0.0))
+    low, high = float(curve.frequency[0]), float(curve.frequency[-1])
+    outside = not low <= frequency_hz <= high
+    held_out = _held_out(omega, storage, loss)
+    error = float(errors[0])
+    if outside and held_out is not None:
+        span = math.log(high / low) * HELD_OUT
+        beyond = math.log(frequency_hz / high) if frequency_hz > high else math.log(low / frequency_hz)
+        grown = held_out * max(1.0, beyond / span)
+        error, loss_error = math.hypot(error, grown), math.hypot(loss_error, grown)
+    static, tau, n = _constants(constants)
+    return DynamicResult(
+        static, tau, n, residual, frequency_hz, float(np.exp(value[0])), float(np.exp(value[1] - value[0])),
+        error, loss_error, held_out, outside, curve,
+    )  # fmt: skip
+
+
+def _constants(p: np.ndarray) -> tuple[float, float, float]:
+    """Return E0, tau and n of ln E0, ln tau and the logit of n."""
+    return float(np.exp(p[0])), float(np.exp(p[1])), float(1.0 / (1.0 + np.exp(-p[2])))
+
+
+def _logs(p: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """Return ln storage and ln loss of the law, (2 n,)."""
+    static, tau, n = _constants(p)
+    law = FractionalKelvinVoigt(tau, n)
+    modulus = np.array([law.complex_shear(static, float(w)) for w in omega])
+    return np.log(np.concatenate([np.real(modulus), np.maximum(np.imag(modulus), 1e-300)]))
+
+
+def _jacobian(p: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    steps = 1e-6 * np.eye(3)
+    return np.stack([(_logs(p + step, omega) - _logs(p - step, omega)) / 2e-6 for step in steps], axis=1)
+
+
+def _fit(omega: np.ndarray, storage: np.ndarray, loss: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the constants, their covariance and the rms misfit of the logarithms."""
+    from scipy.optimize import least_squares
+
+    wanted = np.log(np.concatenate([storage, loss]))
+    middle = math.log(math.sqrt(omega[0] * omega[-1]))
+    best: Any = None
+    for n in (0.2, 0.5, 0.8):
+        for shift in (-3.0, 0.0, 3.0):
+            start = [wanted[0], shift - middle, math.log(n / (1 - n))]
+            low, high = [wanted.min() - 20, -60.0, -8.0], [wanted.max() + 5, 30.0, 8.0]
+            found: Any = least_squares(
+                lambda p: _logs(p, omega) - wanted,
+                start,
+                bounds=(low, high),
+                x_scale="jac",
+                xtol=1e-14,
+                ftol=1e-14,
+                gtol=1e-14,
+            )
+            if best is None or found.cost < best.cost:
+                best = found
+    freedom = max(len(wanted) - 3, 1)
+    gradient = _jacobian(best.x, omega)
+    covariance = np.linalg.pinv(gradient.T @ gradient) * 2.0 * best.cost / freedom
+    return best.x, covariance, math.sqrt(2.0 * best.cost / len(wanted))
+
+
+def _held_out(omega: np.ndarray, storage: np.ndarray, loss: np.ndarray) -> float | None:
+    """Fit the lower half of the span (in logarithms) and return the worst misfit of the upper half; None: too few."""
+    border = math.exp(math.log(omega[0]) * (1.0 - HELD_OUT) + math.log(omega[-1]) * HELD_OUT)
+    lower = omega <= border
+    if lower.sum() < LEAST_POINTS or lower.all():
+        return None
+    constants, _, _ = _fit(omega[lower], storage[lower], loss[lower])
+    measured = np.log(np.concatenate([storage[~lower], loss[~lower]]))
+    return float(np.max(np.abs(_logs(constants, omega[~lower]) - measured)))
