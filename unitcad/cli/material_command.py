@@ -47,9 +47,10 @@ def material(
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for material.toml, .json and charts.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Turn tensile curves or a dynamic test into a [materials.NAME] table, with every usual method beside it.
+    """Turn tensile curves into a silicone's table.
 
-    A tensile test gives a quasi-static modulus: the estimate takes it where estimate.moduli = "quasi-static".
+    The table is for a spec, [materials.NAME]; every usual method stands beside the default, with a range. --dma takes a
+    dynamic test. A tensile test gives a quasi-static modulus: the estimate takes it where estimate.moduli = "quasi-static".
     """
     from unitcad import catalogue
     from unitcad.cli.output import print_json, progress
