@@ -50,7 +50,8 @@ def material(
     """Turn tensile curves into a silicone's table.
 
     The table is for a spec, [materials.NAME]; every usual method stands beside the default, with a range. --dma takes a
-    dynamic test. A tensile test gives a quasi-static modulus: the estimate takes it where estimate.moduli = "quasi-static".
+    dynamic test. A tensile test gives a quasi-static modulus, which the estimate takes where the spec says
+    moduli = "quasi-static" under [estimate].
     """
     from unitcad import catalogue
     from unitcad.cli.output import print_json, progress
