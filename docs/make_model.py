@@ -6,6 +6,7 @@ python docs/make_model.py
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from unitcad.attenuation.edge.fitted_models import STORED_FIT, assessments, edge
 from unitcad.attenuation.edge.measured_levels import assess, measured_table
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import Load
+from unitcad.attenuation.layered.statics import Direction
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.validation import load
 

@@ -27,6 +27,9 @@ def test_the_rotating_force_is_two_in_quadrature(angle: float) -> None:
         sum(phase * turn(at) * part for phase, at in directions)
         for part, turn in ((one.u_r, np.cos), (one.u_theta, np.sin), (one.u_z, np.cos))
     )
+    assert [radial, around, normal] == [
+        pytest.approx(np.exp(-1j * angle) * part, rel=1e-12) for part in (one.u_r, 1j * one.u_theta, one.u_z)
+    ]
     x = radial * np.cos(angle) - around * np.sin(angle)
     y = radial * np.sin(angle) + around * np.cos(angle)
     turns = np.exp(1j * np.linspace(0, 2 * np.pi, 24, endpoint=False))[:, None]
