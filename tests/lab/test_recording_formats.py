@@ -12,7 +12,7 @@ from recordings import CENTRES, FORMATS, RATE, columns, write_text
 
 from unitcad.errors import Refusal
 from unitcad.lab.readers.formats import open_recording
-from unitcad.lab.readers.layout import Layout
+from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.recording import Recording, Unreadable
 
 DATA = Path(__file__).parent / "data"

@@ -58,7 +58,7 @@ def material(
     from unitcad.lab import material_files as written
     from unitcad.lab.declared_columns import declared
     from unitcad.lab.dynamic_test import evaluate_dynamic, read_dynamic
-    from unitcad.lab.readers.layout import Layout
+    from unitcad.lab.readers.recording_layout import Layout
     from unitcad.lab.tensile_curve import Specimen, read_curve
     from unitcad.lab.tensile_result import evaluate
 

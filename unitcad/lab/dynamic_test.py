@@ -18,7 +18,7 @@ from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.lab.declared_columns import Declared, column_of, columns
 from unitcad.lab.readers.formats import open_recording
-from unitcad.lab.readers.layout import Layout
+from unitcad.lab.readers.recording_layout import Layout
 
 Deformation = Literal["shear", "tension"]
 LEAST_POINTS = 5

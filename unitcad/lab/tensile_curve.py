@@ -14,7 +14,7 @@ from unitcad import files
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.lab.declared_columns import Declared, column_of, columns, expect_no_percentage
 from unitcad.lab.readers.formats import open_recording
-from unitcad.lab.readers.layout import Layout
+from unitcad.lab.readers.recording_layout import Layout
 
 LEAST_POINTS = 5
 _HEADER_LINES = 200

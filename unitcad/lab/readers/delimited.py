@@ -16,7 +16,7 @@ import numpy as np
 from unitcad import files
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.quantities import known
-from unitcad.lab.readers.layout import Layout
+from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.recording import Channel, Recording, Unreadable, in_blocks, is_time
 
 HEAD = 1_000_000

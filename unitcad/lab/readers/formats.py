@@ -14,7 +14,7 @@ from unitcad import files
 from unitcad.errors import Missing, UnitcadError
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.readers.hierarchical import HDF5_MARK
-from unitcad.lab.readers.layout import Layout
+from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.recording import Recording, Unreadable
 
 TEXT = (".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tab")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.geometry.arrays import Floats
-from unitcad.lab.readers.layout import Layout
+from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.readers.whole import columns_of, expect_small
 from unitcad.lab.recording import Channel, Recording, Unreadable
 

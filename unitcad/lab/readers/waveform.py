@@ -11,7 +11,7 @@ import numpy as np
 
 from unitcad import files
 from unitcad.geometry.arrays import Floats
-from unitcad.lab.readers.layout import Layout
+from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.readers.whole import expect_small
 from unitcad.lab.recording import ROWS, Channel, Recording, Unreadable
 
