@@ -63,6 +63,16 @@ def test_the_standard_error_is_the_scatter_over_seeds() -> None:
     assert 0.75 < stated / np.std([one.bits for one in found]) < 1.35  # the scatter of 80 is known to 8 %
 
 
+def test_the_standard_error_counts_what_rivals_draw_together() -> None:
+    """Two rivals whose predictions move against each other with one unknown: their information scatters more."""
+    found = []
+    for seed in range(80):
+        unknown = np.random.default_rng(seed).normal(0.0, 0.5, (60, 1))
+        found.append(expected_information([unknown, 1.0 - unknown], np.array([[SIGMA**2]]), np.array([0.5, 0.5])))
+    stated = np.mean([one.standard_error for one in found])
+    assert 0.75 < stated / np.std([one.bits for one in found]) < 1.35
+
+
 def test_the_error_covers_two_correlated_numbers() -> None:
     covariance = np.array([[0.06, 0.03], [0.03, 0.06]])
     spread = np.array([[0.1, -0.04], [-0.04, 0.05]])

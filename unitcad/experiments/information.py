@@ -65,8 +65,9 @@ def expected_information(
 
     `predicted`: an array (draws, d) for each rival; `covariance` (d, d) of the measurement's errors; `weights`: prior
     probability of each rival; `shares`: of each draw within its rival, summing to 1, else equal. Two dimensions and
-    more are integrated by Monte Carlo with that seed: its error is in the standard error. Raises ValueError for a
-    rival with fewer than two draws, numpy's LinAlgError for a covariance that is not positive definite.
+    more are integrated by Monte Carlo with that seed: its error is in the standard error. Draws of one index may
+    depend on each other over the rivals, those of different ones may not. Raises ValueError for a rival with fewer
+    than two draws, numpy's LinAlgError for a covariance that is not positive definite.
     """
     counts = np.array([len(one) for one in predicted])
     if counts.min() < 2:
@@ -114,12 +115,13 @@ def _bracket(mixture: _Mixture, score: Score) -> Information:
         without = max((without, *(score(width, True) for width in _WIDTHS)), key=lambda scores: float(total @ scores))
     most = entropy(mixture.weights)
     high, low = (float(np.clip(total @ scores, 0.0, most)) for scores in (with_itself, without))
-    variance = 0.0
+    # Summed over rivals before it is squared: draws of one number may share what they drew, and then go together.
+    influence = np.zeros(mixture.counts.max())
     for m, weight in enumerate(mixture.weights):
         mine = mixture.rival == m
         share = mixture.share[mine]
-        variance += weight**2 * float(np.sum(share**2 * (without[mine] - share @ without[mine]) ** 2))
-    return Information(min(low, high), max(low, high), float(np.sqrt(variance)))
+        influence[: mixture.counts[m]] += weight * share * (without[mine] - share @ without[mine])
+    return Information(min(low, high), max(low, high), float(np.sqrt(np.sum(influence**2))))
 
 
 def _by_quadrature(mixture: _Mixture) -> Score:
