@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
     from unitcad.experiments.lab_file import Lab
 
+_COLUMNS = 4
+"""Experiments whose predictions fit a terminal of 80 characters."""
+
 
 def experiments(
     lab: Annotated[str, typer.Argument(metavar="LAB", help="a TOML file of what a lab has, or a shipped one's name")],
@@ -22,6 +25,7 @@ def experiments(
         str | None, typer.Option(help="names separated by commas, or all; else the file's, or the usual ones")
     ] = None,
     draws: Annotated[int | None, typer.Option(help="of what is not known, for each rival; else the file's")] = None,
+    element_draws: Annotated[int | None, typer.Option(help="the same for finite elements, which cost more")] = None,
     seed: Annotated[int | None, typer.Option(help="of the draws; else the file's")] = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Write experiments.json, .md and .svg into this folder.")
@@ -33,14 +37,20 @@ def experiments(
     Each experiment is a ratio of two readings. Its bits are the expected information about which rival holds, with the
     error of that figure.
     """
+    from unitcad.cache import DiskStore, default_root
     from unitcad.experiments.lab_file import load_lab
     from unitcad.experiments.study import study
     from unitcad.experiments.study_files import write_study
 
-    asked = {"rivals": None if rivals is None else listed(rivals), "draws": draws, "seed": seed}
+    asked = {
+        "rivals": None if rivals is None else listed(rivals),
+        "draws": draws,
+        "element_draws": element_draws,
+        "seed": seed,
+    }
     loaded = load_lab(lab, {key: value for key, value in asked.items() if value is not None})
     with progress("experiments") as stage:
-        data = study(loaded, stage)
+        data = study(loaded, stage, DiskStore(default_root()))
     folder = write_study(data, out) if out else None
     if as_json:
         print_json(data)
@@ -51,7 +61,7 @@ def experiments(
 
 
 def _print(data: dict[str, Any], lab: Lab) -> None:
-    from unitcad.experiments.study_files import shown
+    from unitcad.experiments.study_files import draws_text, shown
 
     screen = console()
     names = [rival["name"] for rival in data["rivals"]]
@@ -70,7 +80,7 @@ def _print(data: dict[str, Any], lab: Lab) -> None:
         screen.print(f"  left out: {name}: {reason}", soft_wrap=True)
     screen.print(
         f"  A reading scatters by {100 * data['noise']:g} %, a rival that holds misses a ratio by "
-        f"{100 * data['discrepancy']:g} %. Ranges: 10 to 90 % of {data['draws']} draws, without that scatter.",
+        f"{100 * data['discrepancy']:g} %. Ranges: 10 to 90 % of {draws_text(data)}, without that scatter.",
         soft_wrap=True,
     )
     screen.print(data["settles"], soft_wrap=True)
@@ -88,11 +98,14 @@ def _best(found: list[dict[str, Any]]) -> Table:
 def _ranges(found: list[dict[str, Any]], names: list[str]) -> Table:
     from rich.table import Table
 
-    from unitcad.experiments.study_files import span_text
+    from unitcad.experiments.study import span_text
 
-    table = Table("rival", *[str(number) for number in range(1, len(found[:5]) + 1)], title="predicted ratio")
+    table = Table(title="predicted ratio")
+    table.add_column("rival", no_wrap=True)
+    for number, _ in enumerate(found[:_COLUMNS], 1):
+        table.add_column(str(number))
     for name in names:
-        table.add_row(name, *[span_text(one["predicted"][name]) for one in found[:5]])
+        table.add_row(name, *[span_text(one["predicted"][name]) for one in found[:_COLUMNS]])
     return table
 
 

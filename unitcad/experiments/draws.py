@@ -1,4 +1,7 @@
-"""Draws of what a rival does not know: material constants within their ranges, fitted constants, the assembly.
+"""What a rival is, and draws of what it does not know: material constants within their ranges, fitted constants.
+
+A rival predicts the amplitude at a unit's edge over the motor's. What multiplies all of its readings by one number
+cancels in the ratios that are compared.
 
 Every name has a stream of its own, so that a longer run begins with the draws of a shorter one and a new name changes
 no other.
@@ -7,6 +10,7 @@ no other.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,15 +21,11 @@ from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 
 @dataclass(frozen=True)
 class Draws:
-    """`count` independent draws for one rival. Of one name all conditions of a draw share the value.
-
-    `modulus_factor`: a silicone's modulus without a range lies between its value over and its value times this factor.
-    """
+    """`count` independent draws for one rival. Of one name all conditions of a draw share the value."""
 
     count: int
     seed: int
     rival: str = ""
-    modulus_factor: float = 1.5
 
     def uniform(self, name: str) -> np.ndarray:
         """Return the draws of that name between 0 and 1, shape (count,)."""
@@ -41,17 +41,10 @@ class Draws:
         """Return draws within a quantity's range; its value where it has none."""
         return self.between(name, *quantity.ends)
 
-    def youngs_modulus(self, layer: SiliconeLayer) -> np.ndarray:
-        """Return draws of a silicone's modulus, Pa; layers of one material share them."""
-        low, high = layer.youngs_modulus.ends
-        if low == high:
-            low, high = low / self.modulus_factor, high * self.modulus_factor
-        return self.between(f"{layer.material}.youngs_modulus", low, high)
-
     def silicone(self, layer: SiliconeLayer) -> dict[str, np.ndarray]:
-        """Return draws of a layer's modulus (Pa), Poisson's ratio and loss factor, by field of `SiliconeLayer`."""
+        """Return draws of a layer's modulus (Pa), Poisson's ratio and loss factor, the same for all of its material."""
         return {
-            "youngs_modulus": self.youngs_modulus(layer),
+            "youngs_modulus": self.quantity(f"{layer.material}.youngs_modulus", layer.youngs_modulus),
             "poisson_ratio": self.quantity(f"{layer.material}.poisson_ratio", layer.poisson_ratio),
             "tan_delta": self.quantity(f"{layer.material}.tan_delta", layer.tan_delta),
         }
@@ -67,3 +60,16 @@ class Draws:
             omega=np.full(self.count, 2.0 * np.pi * variant.frequency.middle),
             passes=variant.passes,
         )
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An account of the level: its name, what it says, and `levels`, draws of a variant's reading, shape (draws,).
+
+    `costly`: a draw is not a matter of microseconds.
+    """
+
+    name: str
+    says: str
+    levels: Callable[[EstimateInput, Draws], np.ndarray]
+    costly: bool = False

@@ -15,14 +15,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
 from msgspec import Meta, Struct, field
 
-from unitcad.attenuation.inputs import EstimateInput
+from unitcad.attenuation.inputs import EstimateInput, Quantity
 from unitcad.catalogue import TissueEntry, tissue
 from unitcad.catalogue.entries import Frequency
 from unitcad.errors import Refusal, WrongArgument, unknown_name
@@ -64,6 +64,7 @@ class LabFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     smallest_level: Annotated[float, Meta(ge=1e-9, le=1, description="that a reading tells from none")] = 0.001
     modulus_factor: Annotated[float, Meta(ge=1, le=10)] = 1.5
     draws: Annotated[int, Meta(ge=10, le=2000)] = 200
+    element_draws: Annotated[int, Meta(ge=10, le=2000, description="of rivals by finite elements")] = 40
     seed: Annotated[int, Meta(ge=0, le=2**32 - 1)] = 1
     tissue: dict[str, dict[str, TissueEntry]] = {}
     measured: list[MeasuredTable] = []
@@ -136,9 +137,20 @@ def lab_of_specs(specs: Mapping[str, Spec], settings: LabFile, name: str = "lab"
                 for at, layer in enumerate(variant.layers):
                     if not layer.youngs_modulus.known:
                         raise Refusal(f"units.{unit}.layers.{at}", layer.material, layer.youngs_modulus.note)
-                variants[Condition(unit, hertz, body)] = variant
+                variants[Condition(unit, hertz, body)] = _with_ranges(variant, settings.modulus_factor)
     measured = tuple(_measured(one, variants, f"measured.{i}") for i, one in enumerate(settings.measured))
     return Lab(name, settings, variants, measured)
+
+
+def _with_ranges(variant: EstimateInput, factor: float) -> EstimateInput:
+    """Give every modulus of a silicone that has none a range: its value over and its value times a factor."""
+
+    def ranged(modulus: Quantity) -> Quantity:
+        middle = modulus.middle
+        return modulus if modulus.low is not None else replace(modulus, low=middle / factor, high=middle * factor)
+
+    layers = tuple(replace(layer, youngs_modulus=ranged(layer.youngs_modulus)) for layer in variant.layers)
+    return replace(variant, layers=layers)
 
 
 def _spec(unit: str, table: dict[str, Any], folder: Path, bodies: Mapping[str, Any]) -> Spec:

@@ -69,7 +69,7 @@ def _colours(rivals: Sequence[str]) -> list[str]:
 
 def _ticks(low: float, high: float) -> list[float]:
     """Return 1, 2 and 5 times powers of ten between the ends, powers alone where those are many."""
-    steps = (1.0, 2.0, 5.0) if high - low < 2.5 else (1.0,)
+    steps = (1.0, 2.0, 5.0) if high - low < 3.0 else (1.0,)
     every = [step * 10.0**power for power in range(math.floor(low) - 1, math.ceil(high) + 1) for step in steps]
     return [float(f"{ratio:.6g}") for ratio in every if low <= math.log10(ratio) <= high]
 

@@ -1,8 +1,4 @@
-"""The rivals: accounts of the level at the edge, each as draws of the logarithm of a reading.
-
-A reading is the amplitude at the unit's edge over the motor's, as the measured table has it. What multiplies every
-reading of a rival by one number cancels in the ratios that are compared.
-"""
+"""The rivals by name: the closed forms, and finite elements where they are installed."""
 
 from __future__ import annotations
 
@@ -18,17 +14,10 @@ from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import fit_divider
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.inputs import EstimateInput
+from unitcad.cache import MemoryStore, Store
 from unitcad.errors import unknown_name
-from unitcad.experiments.draws import Draws
-
-
-@dataclass(frozen=True)
-class Rival:
-    """An account of the level: its name, what it says, and `levels`, draws of a variant's reading, shape (draws,)."""
-
-    name: str
-    says: str
-    levels: Callable[[EstimateInput, Draws], np.ndarray]
+from unitcad.experiments import element_rivals
+from unitcad.experiments.draws import Draws, Rival
 
 
 def _closed_form(path: Callable[[Units], Any]) -> Callable[[EstimateInput, Draws], np.ndarray]:
@@ -71,7 +60,7 @@ _CLOSED_FORMS = (
         _closed_form(cf.transmission_only),
     ),
     Rival(
-        "divider",
+        "fitted",
         "the empirical divider of the layers' moduli, fitted to the measured levels",
         _divider,
     ),
@@ -86,23 +75,23 @@ class Available:
     left_out: dict[str, str]
 
 
-def available(names: Sequence[str] = ()) -> Available:
+def available(names: Sequence[str] = (), store: Store | None = None) -> Available:
     """Return the rivals of those names in that order, ["all"], or the usual ones for none.
 
-    Raises Refusal for a name that no rival has.
+    `store` keeps what is costly. Raises Refusal for a name that no rival has.
     """
-    known = {rival.name: rival for rival in _CLOSED_FORMS}
-    missing: dict[str, str] = {}
-    if list(names) == ["all"]:
-        names = [*known, *missing]
-    for i, name in enumerate(names):
-        if name not in known and name not in missing:
-            raise unknown_name(f"rivals.{i}", name, [*known, *missing])
-    chosen = names or DEFAULT
+    elements = element_rivals.element_rivals(store or MemoryStore())
+    known = {rival.name: rival for rival in (*_CLOSED_FORMS, *elements)}
+    chosen = tuple(known) if list(names) == ["all"] else tuple(names) or DEFAULT
+    for i, name in enumerate(chosen):
+        if name not in known:
+            raise unknown_name(f"rivals.{i}", name, known)
+    missing = [name for name in chosen if known[name].costly and not element_rivals.installed()]
     return Available(
-        tuple(known[name] for name in dict.fromkeys(chosen) if name in known),
-        {name: missing[name] for name in chosen if name in missing},
+        tuple(known[name] for name in dict.fromkeys(chosen) if name not in missing),
+        dict.fromkeys(missing, element_rivals.MISSING),
     )
 
 
-DEFAULT = ("paper", "crossings", "divider")
+DEFAULT = ("crossings", "fitted", "mechanics-axial-edge", "mechanics-flat-edge", "mechanics-flat-skin")
+"""The rivals of a lab that names none."""

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from unitcad.cache import Store
 from unitcad.errors import Refusal
-from unitcad.experiments.draws import Draws
+from unitcad.experiments.draws import Draws, Rival
 from unitcad.experiments.lab_file import Lab
 from unitcad.experiments.protocol import Ratio, ratios
 from unitcad.experiments.ranking import Predictions, Ranked, best_sets, singles
-from unitcad.experiments.rivals import Available, Rival, available
+from unitcad.experiments.rivals import Available, available
 
 LARGEST_SET = 3
 SIGNIFICANT_DIGITS = 6
@@ -21,22 +22,24 @@ RANGE = (0.1, 0.5, 0.9)
 Step = Callable[[str], None]
 
 
-def study(lab: Lab, step: Step = lambda stage: None) -> dict[str, Any]:
+def study(lab: Lab, step: Step = lambda stage: None, store: Store | None = None) -> dict[str, Any]:
     """Return {lab, rivals, left_out, most_bits, experiments, sets, settles, ...} as JSON-ready data.
 
-    The same lab gives the same numbers. Raises Refusal where fewer than two rivals or no ratio is left.
+    `store` keeps the solutions of finite elements. The same lab gives the same numbers. Raises Refusal where fewer than
+    two rivals or no ratio is left.
     """
-    asked = available(lab.settings.rivals)
+    asked = available(lab.settings.rivals, store)
     predicted = predictions(lab, asked.rivals, step)
     prior = predicted.most_bits
     predicted = predicted.updated(lab.measured)
-    ranked = singles(predicted, _candidates(lab, predicted), step)
+    ranked = singles(predicted, candidates(lab, predicted), step)
     sets = best_sets(predicted, ranked, LARGEST_SET, step)
     return {
         "lab": lab.name,
         "noise": lab.settings.noise,
         "discrepancy": lab.settings.discrepancy,
         "draws": lab.settings.draws,
+        "element_draws": lab.settings.element_draws,
         "seed": lab.settings.seed,
         "rivals": _rivals(asked, predicted),
         "left_out": asked.left_out,
@@ -59,7 +62,7 @@ def predictions(lab: Lab, rivals: Sequence[Rival], step: Step = lambda stage: No
         raise Refusal("rivals", [rival.name for rival in rivals], "two rivals or more are needed")
     settings, logs = lab.settings, []
     for rival in rivals:
-        draws = Draws(settings.draws, settings.seed, rival.name, settings.modulus_factor)
+        draws = Draws(settings.element_draws if rival.costly else settings.draws, settings.seed, rival.name)
         columns = []
         for i, (condition, variant) in enumerate(lab.variants.items()):
             step(f"{rival.name}: {condition} ({i + 1} of {len(lab.variants)})")
@@ -78,7 +81,8 @@ def predictions(lab: Lab, rivals: Sequence[Rival], step: Step = lambda stage: No
     )
 
 
-def _candidates(lab: Lab, predicted: Predictions) -> list[Ratio]:
+def candidates(lab: Lab, predicted: Predictions) -> list[Ratio]:
+    """Return the ratios that a lab could measure and has not. Raises Refusal where there is none."""
     known = {ratio for ratio, _ in lab.measured}
     found = [ratio for ratio in ratios(predicted.conditions, lab.settings.compare) if ratio not in known]
     if not found:
@@ -89,21 +93,31 @@ def _candidates(lab: Lab, predicted: Predictions) -> list[Ratio]:
 def _rivals(asked: Available, predicted: Predictions) -> list[dict[str, Any]]:
     rows = zip(asked.rivals, predicted.weights, predicted.effective_draws, strict=True)
     return [
-        {"name": rival.name, "says": rival.says, "probability": _number(weight), "effective_draws": _number(draws)}
+        {
+            "name": rival.name,
+            "says": rival.says,
+            "costly": rival.costly,
+            "probability": _number(weight),
+            "effective_draws": _number(draws),
+        }
         for rival, weight, draws in rows
     ]
 
 
-def ranges(ratio: Ratio, predicted: Predictions) -> dict[str, dict[str, float]]:
-    """Return {low, middle, high} of a ratio by rival: 10, 50 and 90 % of its draws, without a reading's errors."""
-    logs, _ = predicted.log_ratios([ratio])
-    found = {}
-    for name, log, share in zip(predicted.rivals, logs, predicted.shares, strict=True):
-        order = np.argsort(log[:, 0])
-        below = np.cumsum(share[order]) - share[order] / 2.0
-        ends = np.exp(np.interp(RANGE, below, log[order, 0]))
-        found[name] = dict(zip(("low", "middle", "high"), map(_number, ends), strict=True))
-    return found
+def range_of(ratio: Ratio, predicted: Predictions, rival: str) -> dict[str, float]:
+    """Return {low, middle, high} of a ratio: 10, 50 and 90 % of a rival's draws, without a reading's errors."""
+    at = predicted.rivals.index(rival)
+    log, share = predicted.log_ratios([ratio])[0][at][:, 0], predicted.shares[at]
+    order = np.argsort(log)
+    below = np.cumsum(share[order]) - share[order] / 2.0
+    ends = np.exp(np.interp(RANGE, below, log[order]))
+    return dict(zip(("low", "middle", "high"), map(_number, ends), strict=True))
+
+
+def span_text(span: Mapping[str, float]) -> str:
+    """Return a predicted ratio with its range."""
+    low, middle, high = (f"{span[end]:.3g}" for end in ("low", "middle", "high"))
+    return middle if low == high else f"{middle} ({low} to {high})"
 
 
 def _experiment(one: Ranked, predicted: Predictions) -> dict[str, Any]:
@@ -116,7 +130,7 @@ def _experiment(one: Ranked, predicted: Predictions) -> dict[str, Any]:
             for end, c in (("above", ratio.above), ("below", ratio.below))
         },
         **_bits(one),
-        "predicted": ranges(ratio, predicted),
+        "predicted": {name: range_of(ratio, predicted, name) for name in predicted.rivals},
     }
 
 
@@ -148,10 +162,10 @@ def settles(sets: Sequence[Ranked], predicted: Predictions) -> str:
         rest = "; then ".join(str(ratio) for ratio in last.ratios[1:])
         text += f" Then {rest}: {last.information.bits:.2f} bits together."
     if not last.open:
-        return f"{text} That settles it between every pair of rivals, as far as half a bit of one does."
+        return f"{text} After that every pair of rivals is told apart by half a bit or more."
     pairs = ", ".join(f"{a} and {b}" for a, b, _ in last.open[:3])
     more = f" and {len(last.open) - 3} more pairs" if len(last.open) > 3 else ""
-    return f"{text} That does not tell apart {pairs}{more}."
+    return f"{text} That still does not tell apart {pairs}{more}."
 
 
 def _number(value: float) -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.experiments.range_plot import svg
+from unitcad.experiments.study import span_text
 from unitcad.files import write
 
 SHOWN = 8
@@ -41,7 +42,7 @@ def page(data: Mapping[str, Any]) -> str:
         data["settles"],
         "",
         f"There are {data['most_bits']:.2f} bits to know. A reading scatters by {100 * data['noise']:g} %; a rival "
-        f"that holds misses a ratio by {100 * data['discrepancy']:g} %. {data['draws']} draws, seed {data['seed']}.",
+        f"that holds misses a ratio by {100 * data['discrepancy']:g} %. {draws_text(data)}, seed {data['seed']}.",
         "",
         "![what each rival predicts](experiments.svg)",
         "",
@@ -66,6 +67,13 @@ def page(data: Mapping[str, Any]) -> str:
     return "\n".join([*lines, ""])
 
 
+def draws_text(data: Mapping[str, Any]) -> str:
+    """Return how many draws there are, of finite elements too where they are among the rivals."""
+    text = f"{data['draws']} draws"
+    elements = any(rival["costly"] for rival in data["rivals"])
+    return f"{text} ({data['element_draws']} of finite elements)" if elements else text
+
+
 def experiment_rows(experiments: Sequence[Mapping[str, Any]], rivals: Sequence[str]) -> list[str]:
     """Return a Markdown table of experiments: bits, and each rival's predicted ratio."""
     rows = [
@@ -76,9 +84,3 @@ def experiment_rows(experiments: Sequence[Mapping[str, Any]], rivals: Sequence[s
         cells = [span_text(one["predicted"][name]) for name in rivals]
         rows.append(f"| {one['experiment']} | {one['bits']:.2f} ± {one['error']:.2f} | {' | '.join(cells)} |")
     return rows
-
-
-def span_text(span: Mapping[str, float]) -> str:
-    """Return a predicted ratio with its range."""
-    low, middle, high = (f"{span[end]:.3g}" for end in ("low", "middle", "high"))
-    return middle if low == high else f"{middle} ({low} to {high})"
