@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import Any
+from typing import Any, SupportsFloat
 
 _INVISIBLE = re.compile(
     "[\x00-\x1f\x7f-\x9f"  # control characters, escape among them
@@ -64,6 +65,20 @@ def toml(value: Any) -> str:
     if isinstance(value, str):
         return _quoted(value).replace("\x7f", "\\u007f")
     return str(value).lower() if isinstance(value, bool) else repr(value) if isinstance(value, float) else str(value)
+
+
+def number(value: SupportsFloat, digits: int = 6, zeros: bool = False) -> str:
+    """Return a number as a person reads it, to so many significant digits: never -0, no power of ten.
+
+    `zeros` keeps those at its end, as an instrument shows them: 1.00. What is below a millionth is 0; from 1e15 on a
+    power of ten has to say it.
+    """
+    size = float(value)
+    if not 1e-6 <= abs(size) < 1e15:
+        return "0" if abs(size) < 1e-6 else f"{size:.{digits}g}"
+    rounded = float(f"{size:.{digits}g}")
+    text = f"{rounded:.{max(0, digits - 1 - math.floor(math.log10(abs(rounded))))}f}"
+    return text.rstrip("0").rstrip(".") if "." in text and not zeros else text
 
 
 def listed(words: Iterable[str]) -> str:

@@ -12,7 +12,7 @@ from unitcad.catalogue import Material, motors
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
-from unitcad.text import cell
+from unitcad.text import cell, number
 
 
 @dataclass(frozen=True)
@@ -48,39 +48,42 @@ def _pieces(moulds: MouldSet) -> Iterator[Item]:
         # Tongues and stubs are numbered by cell and otherwise alike; cups and lids are not.
         kinds.setdefault(tool.kind if tool.kind in ("tongue", "stub") else tool.name, []).append(tool)
     for name, (tool, *more) in kinds.items():
-        number = 1 + len(more)
+        count = 1 + len(more)
         if tool.kind == "stub":
             height = dims.core_height + spec.moulds.plinth_height_mm + spec.moulds.plate_mm
             length = f"{height + plan.layout.plate[1] + 10:.0f} mm each, the end bent by a right angle"
-            note = f"{spec.moulds.filament_mm:g} mm printer filament, {length}"
-            yield Item("filament stub", number, "piece", "cut", note)
+            note = f"{number(spec.moulds.filament_mm, 3)} mm printer filament, {length}"
+            yield Item("filament stub", count, "piece", "cut", note)
         elif tool.made == "cut":
             height = dims.exit.height if dims.exit else 0.0
-            yield Item(name, number, "piece", "cut", f"from film or steel strip of {height:.3g} mm")
+            yield Item(name, count, "piece", "cut", f"from film or steel strip of {number(height, 3)} mm")
         else:
             attitude = "printed upside down" if tool.upside_down else "printed as drawn"
-            note = f"{spec.moulds.printer}, layers of {spec.moulds.layer_mm:g} mm"
-            yield Item(name, number, "piece", attitude, note)
+            note = f"{spec.moulds.printer}, layers of {number(spec.moulds.layer_mm, 3)} mm"
+            yield Item(name, count, "piece", attitude, note)
 
 
 def _silicone(mixes: list[tuple[Material, Mix]]) -> Iterator[Item]:
     for material in dict.fromkeys(material for material, _ in mixes):
         own = [mix for other, mix in mixes if other == material]
         pours = f"{len(own)} pour{'' if len(own) == 1 else 's'}"
-        note = f"{pours}, mix ratio {float(material.mix_ratio):g} A to 1 B, Shore {material.shore.value}"
+        note = f"{pours}, mix ratio {number(material.mix_ratio, 3)} A to 1 B, Shore {material.shore.value}"
         yield Item(f"{material.name} part A", sum(m.part_a_g for m in own), "g", "bought", note)
         yield Item(f"{material.name} part B", sum(m.part_b_g for m in own), "g", "bought", note)
 
 
 def _inside(moulds: MouldSet) -> Iterator[Item]:
     cells, spec = len(moulds.plan.layout.cells), moulds.spec
-    size = f"{spec.motor.diameter_mm:g} x {spec.motor.thickness_mm:g} mm"
+    size = f"{number(spec.motor.diameter_mm, 3)} x {number(spec.motor.thickness_mm, 3)} mm"
     yield Item(spec.motor.part or "motor", cells, "piece", "bought", ", ".join([size, *_ratings(spec)]))
     if fpcb := spec.fpcb:
-        tail = f"tail {fpcb.tail_width_mm:g} wide to {fpcb.tail}, {fpcb.thickness_mm:g} thick"
-        yield Item("flexible circuit", cells, "piece", "bought", f"pad {fpcb.pad_diameter_mm:g}, {tail}")
+        sides = {"one": "one side", "both": "both sides"}.get(fpcb.tail, fpcb.tail)
+        tail = f"tail {number(fpcb.tail_width_mm, 3)} wide to {sides}, {number(fpcb.thickness_mm, 3)} thick"
+        yield Item("flexible circuit", cells, "piece", "bought", f"pad {number(fpcb.pad_diameter_mm, 3)} mm, {tail}")
     if wires := spec.wires:
-        yield Item("wire", cells * wires.count, "piece", "bought", f"{wires.diameter_mm:g} mm over the insulation")
+        yield Item(
+            "wire", cells * wires.count, "piece", "bought", f"{number(wires.diameter_mm, 3)} mm over the insulation"
+        )
 
 
 def _ratings(spec: Spec) -> Iterator[str]:
@@ -88,18 +91,22 @@ def _ratings(spec: Spec) -> Iterator[str]:
     if spec.motor.part:
         motor = motors(spec.motors)[spec.motor.part]
         ratings = {"V": motor.voltage_v, "mA": motor.current_ma, "g": motor.acceleration_g}
-        yield from (f"{float(value):g} {unit}" for unit, value in ratings.items() if value)
+        yield from (f"{number(value, 3)} {unit}" for unit, value in ratings.items() if value)
         if motor.mass_g:
-            yield f"mass {float(motor.mass_g):g} g"
+            yield f"mass {number(motor.mass_g, 3)} g"
 
 
 def _consumables(moulds: MouldSet, mixes: list[Mix]) -> Iterator[Item]:
     pours, lengths = len(moulds.plan.steps), moulds.spec.moulds
     yield Item("mixing cups and sticks", pours, "set", "bought", "no latex, no sulphur clay: they inhibit")
     if moulds.spec.casting.vacuum:
-        size = f"at least {CONTAINER * max(mix.millilitres for mix in mixes):.3g} ml, since silicone foams up"
+        size = f"at least {number(CONTAINER * max(mix.millilitres for mix in mixes), 2)} ml, since silicone foams up"
         yield Item(
-            "degassing container", pours, "piece", "bought", f"{size}; a chamber that reaches {VACUUM_INHG:g} inHg"
+            "degassing container",
+            pours,
+            "piece",
+            "bought",
+            f"{size}; a chamber that reaches {number(VACUUM_INHG, 3)} inHg",
         )
     if moulds.plan.of_kind("tongue"):
         yield Item("petroleum jelly", 1, "dab", "bought", "for tongues and windows only")
@@ -108,4 +115,4 @@ def _consumables(moulds: MouldSet, mixes: list[Mix]) -> Iterator[Item]:
     if pours > 1:
         yield Item("isopropanol and lint-free wipes", 1, "set", "bought", "to wipe a cured layer before the next")
     if lengths.pour == "injected":
-        yield Item("syringe", pours, "piece", "bought", f"tip up to {lengths.sprue_mm:g} mm")
+        yield Item("syringe", pours, "piece", "bought", f"tip up to {number(lengths.sprue_mm, 3)} mm")

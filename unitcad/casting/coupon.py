@@ -22,6 +22,7 @@ from unitcad.moulds.layout import PLINTH_DRAFT_DEG
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, turned, union
 from unitcad.shape.body import Body
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
+from unitcad.text import number
 
 SHARES = (0.5, 0.75, 1.0, 1.25, 1.5)
 """Of the catalogue's value, station by station."""
@@ -89,8 +90,8 @@ def to_markdown(printer: Printer) -> str:
     ]
     if _resin(printer):
         lines += [
-            f"The tongue is no file: cut a strip {wide:g} wide and 25 long from film or steel {thick:g} mm thick, as",
-            "the moulds' tongues are; printed resin is brittle.",
+            f"The tongue is no file: cut a strip {number(wide, 3)} wide and 25 long from film or steel",
+            f"{number(thick, 3)} mm thick, as the moulds' tongues are; printed resin is brittle.",
             "",
         ]
     lines += [
@@ -114,14 +115,16 @@ def to_markdown(printer: Printer) -> str:
     if any(abs(a - b) > NEAR * layer for a, b in zip(drawn, made, strict=True)):
         lines += [
             "",
-            f"A window's edges fall between layers of {layer:g} mm, as they do in a cup, and the slicer moves them:",
+            f"A window's edges fall between layers of {number(layer, 3)} mm, as they do in a cup, and the slicer moves",
+            "them:",
             "",
             "| height of the window, mm | 1 | 2 | 3 | 4 | 5 |",
             "| --- | --- | --- | --- | --- | --- |",
-            "| as drawn | " + " | ".join(f"{height:.4g}" for height in drawn) + " |",
-            "| in whole layers | " + " | ".join(f"{height:.4g}" for height in made) + " |",
+            "| as drawn | " + " | ".join(f"{number(height, 3)}" for height in drawn) + " |",
+            "| in whole layers | " + " | ".join(f"{number(height, 3)}" for height in made) + " |",
             "",
-            f"Stations of one height differ in width only. The tongue of {thick:g} mm is moved too: measure it.",
+            "Stations of one height differ in width only.",
+            f"The tongue of {number(thick, 3)} mm is moved too: measure it.",
         ]
     return "\n".join(lines) + "\n"
 

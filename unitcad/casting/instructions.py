@@ -12,7 +12,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
 from unitcad.spec import printer_of
-from unitcad.text import listed, spaced
+from unitcad.text import listed, number, spaced
 
 STRIKE_AGAIN_MIN = 10
 HOLD = "Hold"
@@ -40,7 +40,8 @@ def preparation(moulds: MouldSet) -> Iterator[str]:
     lids = " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
     yield (
         "Put each cup on the plinth once, dry: its cut corner lets it on one way only. It must sit down until seat and "
-        f"plinth touch; a slit of {lengths.seat_relief_mm:g} mm is then left between cup and plate, all round.{lids}"
+        f"plinth touch; a slit of {number(lengths.seat_relief_mm, 3)} mm is then left between cup and plate, all "
+        f"round.{lids}"
     )
     yield from _cut_tongues(moulds)
     if plan.of_kind("stub"):
@@ -57,9 +58,9 @@ def _cut_tongues(moulds: MouldSet) -> Iterator[str]:
     if tongues and dims.exit:
         length = moulds.plan.layout.cup[0] - min(abs(c.x) for c in moulds.plan.layout.cells) + GRIP_GAP + GRIP_LENGTH
         yield (
-            f"Cut {_counted(len(tongues), 'tongue')} from film or steel {dims.exit.height:.3g} mm thick: a strip "
-            f"{dims.exit.width:.3g} mm wide and at least {length:.3g} mm long, one end cut hollow to a radius of "
-            f"{dims.ledge_radius:.3g} mm so that it fits the riser of the core's ledge. No burr."
+            f"Cut {_counted(len(tongues), 'tongue')} from film or steel {number(dims.exit.height, 3)} mm thick: a "
+            f"strip {number(dims.exit.width, 3)} mm wide and at least {number(length, 2)} mm long, one end cut hollow "
+            f"to a radius of {number(dims.ledge_radius, 3)} mm so that it fits the riser of the core's ledge. No burr."
         )
 
 
@@ -90,10 +91,10 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
         yield "Grease the flanks of what stands on the base beside the cavity thinly, and wipe off the rest."
     if tongues:
         slot = "" if first else " and the slot that it left in the layer before"
-        seat = window_length(moulds, step)
+        seat = number(window_length(moulds, step), 2)
         yield (
             f"Push {'the tongue' if len(tongues) == 1 else 'each tongue'} in through the window{slot} until "
-            f"{seat:.2g} mm are still to go. Smear the {seat:.2g} mm just outside the cup thinly with petroleum jelly, "
+            f"{seat} mm are still to go. Smear the {seat} mm just outside the cup thinly with petroleum jelly, "
             "then push it home: its hollow end stops against the core, and it lies on the ledge. Wipe off what comes "
             "into the bore."
         )
@@ -110,16 +111,17 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
             "weights do as well where they leave the rim free for the blade."
         )
     yield (
-        f"Weigh {mix.part_a_g:.2f} g of {silicone.name} part A and {mix.part_b_g:.2f} g of part B ({mix.net_g:.3f} g "
-        f"go into {cells} cavit{'y' if cells == 1 else 'ies'}; so small a batch would be {mix.net_error_pct:.1f} % "
-        f"wrong in the ratio, this one {mix.mix_error_pct:.2f} %{_larger_batch(mix)}). Mix for {MIXING_MIN:g} min "
-        "(assumed), scraping the walls; the pot life runs from now."
+        f"Weigh {_shown(mix.part_a_g)} g of {silicone.name} part A and {_shown(mix.part_b_g)} g of part B "
+        f"({_shown(mix.net_g)} g go into {cells} cavit{'y' if cells == 1 else 'ies'}; so small a batch would be "
+        f"{number(mix.net_error_pct, 2)} % wrong in the ratio, this one "
+        f"{number(mix.mix_error_pct, 2)} %{_larger_batch(mix)}). Mix for {number(MIXING_MIN, 3)} min (assumed), "
+        "scraping the walls; the pot life runs from now."
     )
     yield verdict
     if step.lid:
         yield (
-            f"Draw the silicone into a syringe, press its tip into the sprue ({sprue:g} mm) and inject slowly until "
-            "every vent shows a bead without bubbles. Leave sprue and vents filled."
+            f"Draw the silicone into a syringe, press its tip into the sprue ({number(sprue, 3)} mm) and inject slowly "
+            "until every vent shows a bead without bubbles. Leave sprue and vents filled."
         )
     else:
         taken = "into the groove" if step.groove else "onto a scrap, since this cup has no groove"
@@ -136,7 +138,7 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
     touched = (
         "the bead on a vent" if step.lid else "the silicone in the groove" if step.groove else "what was struck off"
     )
-    yield f"Let it cure, level, for {cure:.3g} h. Touch {touched}, not the layer, to see whether it is done."
+    yield f"Let it cure, level, for {number(cure, 2)} h. Touch {touched}, not the layer, to see whether it is done."
     if tongues:
         each = "the tongue" if len(tongues) == 1 else "every tongue"
         yield f"Pull {each} out FIRST, sideways. A cup lifted over a tongue tears the layer."
@@ -155,37 +157,39 @@ def release(moulds: MouldSet, inner: Material) -> Iterator[str]:
     if moulds.plan.of_kind("stub"):
         yield (
             f"Pull {_each(moulds)} filament out downwards: it lets air in under the unit. Never push it through: "
-            f"{tear:.1f} N on its end tear {inner.name} (computed: tensile strength, {inner.tensile_mpa.status}, x its "
-            "area)."
+            f"{number(tear, 2)} N on its end tear {inner.name} (computed: tensile strength, "
+            f"{inner.tensile_mpa.status}, x its area)."
         )
     yield f"Loosen the unit's edge all round, then peel it off the {_holds(moulds)} straight up. Trim the flash."
 
 
-def measurements(moulds: MouldSet, grams: Sequence[float], slot_height: float | None) -> Iterator[str]:
+def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float | None) -> Iterator[str]:
     """Name what to measure on the first part, and what it should be.
 
-    `grams`: of each layer of one unit, trimmed. `slot_height`: of the slot as the slicer makes the tongue (mm), None
+    `masses_g`: of each layer of one unit, trimmed. `slot_height`: of the slot as the slicer makes the tongue (mm), None
     where it is the drawn one.
     """
     spec, dims = moulds.spec, moulds.plan.dimensions
     play = spec.moulds.plinth_clearance_mm
-    yield f"Height over all: {dims.heights[-1]:.2f} mm. A cup that did not seat shows here."
+    yield f"Height over all: {_shown(dims.heights[-1])} mm. A cup that did not seat shows here."
     if moulds.plan.concentric:
-        yield f"Diameter at the skin: {2 * dims.outer_radius:.2f} mm, in two directions."
-        further = f", each further layer by {2 * play:g} mm unless both cups were pushed the same way"
+        yield f"Diameter at the skin: {_shown(2 * dims.outer_radius)} mm, in two directions."
+        further = f", each further layer by {number(2 * play, 3)} mm unless both cups were pushed the same way"
         yield (
             "Walls at the skin, at four places: their spread is the cup's shift. Layer 1 may vary by "
-            f"{play:g} mm either way{further if len(grams) > 1 else ''}."
+            f"{number(play, 3)} mm either way{further if len(masses_g) > 1 else ''}."
         )
     else:
-        yield f"Farthest corner from the motor's axis: {dims.outer_radius:.2f} mm."
+        yield f"Farthest corner from the motor's axis: {_shown(dims.outer_radius)} mm."
     if dims.exit:
         opening = "notch" if dims.exit.high >= dims.heights[0] else "slot"
-        layers = f"in layers of {spec.moulds.layer_mm:g}"
-        printed = f" ({slot_height:.2f} if the tongue was printed {layers})" if slot_height else ""
-        size = f"{dims.exit.width:.2f} wide, {dims.exit.height:.2f} high{printed}"
+        layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
+        printed = f" ({_shown(slot_height)} if the tongue was printed {layers})" if slot_height else ""
+        size = f"{_shown(dims.exit.width)} wide, {_shown(dims.exit.height)} high{printed}"
         yield f"The {opening}: {size}, open all the way."
-    weights = " + ".join(f"{each:.3f}" for each in grams) + (f" = {sum(grams):.3f}" if len(grams) > 1 else "")
+    weights = " + ".join(_shown(each) for each in masses_g) + (
+        f" = {_shown(sum(masses_g))}" if len(masses_g) > 1 else ""
+    )
     low = "" if spec.moulds.pour == "injected" else " or a low strike"
     if moulds.design.laid_in:
         yield (
@@ -242,8 +246,13 @@ def _holds(moulds: MouldSet) -> str:
     return "core" if moulds.plan.concentric else "base"
 
 
-def _counted(number: int, thing: str) -> str:
-    return f"one {thing}" if number == 1 else f"{number} {thing}s"
+def _counted(count: int, thing: str) -> str:
+    return f"one {thing}" if count == 1 else f"{count} {thing}s"
+
+
+def _shown(value: float) -> str:
+    """Return grams or mm as a scale or a caliper shows them."""
+    return number(value, 3, zeros=True)
 
 
 def _each(moulds: MouldSet) -> str:
@@ -255,4 +264,4 @@ def _larger_batch(mix: Mix) -> str:
     if mix.mix_error_pct <= MOST_ERROR_PCT:
         return ""
     enough = mix.mix_g * mix.mix_error_pct / MOST_ERROR_PCT
-    return f": too much; mix at least {enough:.3g} g (casting.minimum_mix_g) or use a finer scale"
+    return f": too much; mix at least {number(enough, 3)} g (casting.minimum_mix_g) or use a finer scale"

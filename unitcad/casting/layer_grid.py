@@ -21,6 +21,11 @@ class OffGrid:
     height_mm: float
     nearest_mm: float
 
+    @property
+    def moved_mm(self) -> float:
+        """How far the slicer moves it."""
+        return self.nearest_mm - self.height_mm
+
 
 def off_grid(moulds: MouldSet) -> list[OffGrid]:
     """Return the edges that matter to a cavity and are off the grid."""

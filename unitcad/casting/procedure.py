@@ -17,6 +17,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape import exact_volume
 from unitcad.spec import Spec
+from unitcad.text import number
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
 def _figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, volume: float) -> tuple[Figure, ...]:
     casting, room = moulds.spec.casting, moulds.spec.casting.room_c
     by_temperature = "assumed: half the time for every 10 K more; at 23 degC "
-    digit = f"half of {casting.scale_resolution_g:g} g"
+    digit = f"half of {number(casting.scale_resolution_g, 3)} g"
     practice = "assumed: usual practice"
     channels = " + sprue and vents" if step.channels else ""
     figures = [
@@ -116,7 +117,12 @@ def _figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, volume:
         *([Figure("sprue and vents", _channels_mm3(step), "mm3", "computed: as drawn")] if channels else []),
         Figure("density", float(silicone.density_g_cm3), "g/cm3", sourced(silicone.density_g_cm3)),
         Figure("in the cavities, net", mix.net_g, "g", f"computed: (volume x cavities{channels}) x density"),
-        Figure("to mix", mix.mix_g, "g", f"assumed: {casting.waste:.0%} more, at least {casting.minimum_mix_g:g} g"),
+        Figure(
+            "to mix",
+            mix.mix_g,
+            "g",
+            f"assumed: {casting.waste:.0%} more, at least {number(casting.minimum_mix_g, 3)} g",
+        ),
         Figure("part A", mix.part_a_g, "g", "mix ratio, " + sourced(silicone.mix_ratio)),
         Figure("part B", mix.part_b_g, "g", "mix ratio, " + sourced(silicone.mix_ratio)),
         Figure("scale's error on a part, net", mix.net_error_pct, "%", digit),
@@ -154,7 +160,7 @@ def _figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, volume:
 
 def _vacuum(mix: Mix) -> tuple[Figure, ...]:
     """Return what holds for degassing."""
-    pressure = f"assumed: usual advice; {fig.VACUUM_INHG * fig.KPA_PER_INHG:.3g} kPa below the room's pressure"
+    pressure = f"assumed: usual advice; {number(fig.VACUUM_INHG * fig.KPA_PER_INHG, 3)} kPa below the room's pressure"
     return (
         Figure("degassing", fig.DEGASSING_MIN, "min", "assumed: usual practice"),
         Figure(
@@ -175,16 +181,16 @@ def _bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix) -> str:
     if spec.casting.vacuum:
         work += fig.DEGASSING_MIN
         said = (
-            f"Degas for {fig.DEGASSING_MIN:g} min (assumed) at {fig.VACUUM_INHG:g} inHg, in a container of at least "
-            f"{fig.CONTAINER * mix.millilitres:.3g} ml: the silicone foams up and falls back, then single bubbles "
-            "rise. Let the air in slowly."
+            f"Degas for {number(fig.DEGASSING_MIN, 3)} min (assumed) at {number(fig.VACUUM_INHG, 3)} inHg, in a "
+            f"container of at least {number(fig.CONTAINER * mix.millilitres, 2)} ml: the silicone foams up and falls "
+            "back, then single bubbles rise. Let the air in slowly."
         )
     else:
         rise, allowed = fig.bubble_rise_s(step.rim, silicone) / 60, fig.WITHOUT_VACUUM * pot
         stokes = (
-            f"No vacuum (casting.vacuum): a bubble of {fig.BUBBLE_MM:g} mm takes {rise:.3g} min through "
-            f"{step.rim:.3g} mm (Stokes, at the viscosity just mixed). That is optimistic, since silicone thickens "
-            f"from the start: a quarter of the pot life, {allowed:.3g} min, is allowed."
+            f"No vacuum (casting.vacuum): a bubble of {number(fig.BUBBLE_MM, 3)} mm takes {number(rise, 2)} min "
+            f"through {number(step.rim, 3)} mm (Stokes, at the viscosity just mixed). That is optimistic, since "
+            f"silicone thickens from the start: a quarter of the pot life, {number(allowed, 2)} min, is allowed."
         )
         clears = "Such bubbles should rise out: let the mix stand for as long before it is struck off."
         brush = "brush a thin coat onto core and bore first and pour in a thread from one side"
@@ -192,7 +198,7 @@ def _bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix) -> str:
         stays = f"Such bubbles stay: get a vacuum, or {way}."
         said = f"{stokes} {clears if rise <= allowed else stays}"
     late = work - pot
-    slower = f" All this ends {late:.2g} min after the pot life: cool the room, or take a slower silicone."
+    slower = f" All this ends {number(late, 2)} min after the pot life: cool the room, or take a slower silicone."
     return f"{said}{slower if late > 0 else ''}"
 
 
@@ -205,7 +211,7 @@ def _printed_slot_height(moulds: MouldSet, edges: Sequence[OffGrid]) -> float | 
 
 def _walls(spec: Spec) -> list[Figure]:
     times = "1 x for Layer 1, 2 x beyond it" if len(spec.layers) > 1 else "1 x"
-    source = f"computed: play of {spec.moulds.plinth_clearance_mm:g} mm a side, {times}"
+    source = f"computed: play of {number(spec.moulds.plinth_clearance_mm, 3)} mm a side, {times}"
     return [
         Figure(f"layer {i + 1} wall, {extreme}", wall, "mm", source)
         for i in range(len(spec.layers))

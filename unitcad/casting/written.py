@@ -15,7 +15,7 @@ from unitcad.export import svg
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape.body import Body
-from unitcad.text import markdown, spaced
+from unitcad.text import markdown, number, spaced
 
 UNPRINTED = "Nothing of this tooling has been printed yet: every clearance is a choice with a check behind it."
 
@@ -37,10 +37,10 @@ def to_json(procedure: Procedure) -> str:
 
 def to_markdown(procedure: Procedure) -> str:
     """Write the procedure for the bench: numbered steps that run through, tables of figures with their sources."""
-    number = count(1)
+    numbers = count(1)
 
     def steps(texts: tuple[str, ...]) -> list[str]:
-        return [f"{next(number)}. {markdown(text)}" for text in texts]
+        return [f"{next(numbers)}. {markdown(text)}" for text in texts]
 
     cavities = f"{procedure.cells} cavit{'y' if procedure.cells == 1 else 'ies'}"
     lines = [f"# Casting {markdown(procedure.name)}", ""]
@@ -48,8 +48,8 @@ def to_markdown(procedure: Procedure) -> str:
     lines += ["## Before the first pour", "", *steps(procedure.preparation), ""]
     if procedure.off_grid:
         lines += ["These edges fall between two of the printer's layers; the slicer moves them to the nearest:", ""]
-        rows = [(o.piece, o.edge, f"{o.height_mm:g}", f"{o.nearest_mm:g}") for o in procedure.off_grid]
-        lines += [*_table(("piece", "edge", "height as printed, mm", "nearest layer, mm"), rows), ""]
+        rows = [(spaced(o.piece), o.edge, number(o.height_mm, 3), number(o.moved_mm, 2)) for o in procedure.off_grid]
+        lines += [*_table(("piece", "edge", "height as printed, mm", "moved by, mm"), rows), ""]
     for pour in procedure.pours:
         lines += [f"## Pour {pour.index}: {spaced(pour.layer)}, {markdown(pour.material)}", ""]
         lines += [f"![pour {pour.index}]({pour.drawing})", "", *_figures(pour.figures), "", *steps(pour.steps), ""]
@@ -59,7 +59,15 @@ def to_markdown(procedure: Procedure) -> str:
     lines += ["## Measure on the first part", "", *(f"- {markdown(text)}" for text in procedure.measure), ""]
     if procedure.walls:
         lines += ["The cups' play on the plinth is the largest error of all:", "", *_figures(procedure.walls), ""]
-    needed = [(markdown(i.item), f"{i.quantity:.4g} {i.unit}", i.made, markdown(i.note)) for i in procedure.bill]
+    needed = [
+        (
+            markdown(spaced(i.item) if i.made.startswith("printed") else i.item),
+            f"{number(i.quantity, 3)} {i.unit}",
+            i.made,
+            markdown(i.note),
+        )
+        for i in procedure.bill
+    ]
     lines += ["## Needed", "", *_table(("item", "quantity", "made", "note"), needed)]
     return "\n".join(lines) + "\n"
 
@@ -88,7 +96,7 @@ def _merged(regions: list[svg.Region]) -> list[svg.Region]:
 
 
 def _figures(figures: tuple[Figure, ...]) -> list[str]:
-    rows = [(markdown(f.name), f"{f.value:.4g} {f.unit}", markdown(f.source)) for f in figures]
+    rows = [(markdown(f.name), f"{number(f.value, 3)} {f.unit}", markdown(f.source)) for f in figures]
     return _table(("figure", "value", "source"), rows)
 
 

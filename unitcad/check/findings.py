@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, SupportsFloat
 
 from unitcad.check.detail import detail
 from unitcad.geometry.ticks import Interrupted
+from unitcad.text import number
 
 if TYPE_CHECKING:
     from unitcad.check.geometry.triangle_mesh import Mesh
@@ -197,19 +197,6 @@ def with_places(finding: Finding, places: int) -> str:
     """Return the message, and in brackets its first `places` locations."""
     shown = ", ".join(text for place in finding.locations[:places] if (text := str(place)))
     return f"{finding.message}{f' (at {shown})' if shown else ''}"
-
-
-def number(length: SupportsFloat, digits: int = 6) -> str:
-    """Return a length, area or volume in a message: never -0, and no power of ten where digits can say it.
-
-    What is below a millionth of a mm is 0.
-    """
-    value = float(length)
-    if not 1e-6 <= abs(value) < 1e15:
-        return "0" if abs(value) < 1e-6 else f"{value:.{digits}g}"
-    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
-    text = f"{float(f'{value:.{digits}g}'):.{places}f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def counted(n: int, one: str, many: str = "") -> str:

@@ -16,6 +16,7 @@ from unitcad.errors import Refusal
 from unitcad.shape import Shape, cut, ring
 from unitcad.spec import Spec
 from unitcad.spec.asked import AskedSpec
+from unitcad.text import number
 
 
 def layers(spec: Spec, dims: Dimensions) -> dict[str, Shape]:
@@ -104,7 +105,7 @@ def assembly(spec: Spec, dims: Dimensions) -> list[str]:
     return [
         *steps,
         f"Nothing else holds it: lay the body on a greased flat, centre the motor, and fill the ring of "
-        f"{dims.air_ring:.2f} mm round it with Layer 1's silicone or a silicone adhesive (assumed). "
+        f"{number(dims.air_ring, 3)} mm round it with Layer 1's silicone or a silicone adhesive (assumed). "
         "motor.fill = true draws Layer 1 up to the motor instead.",
     ]
 

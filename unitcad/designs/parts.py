@@ -12,6 +12,7 @@ from unitcad.designs.dimensions import WIRE_GAP, Dimensions, Pad
 from unitcad.shape import Shape, box, cut, cylinder, moved, turned, union
 from unitcad.spec import Spec
 from unitcad.spec.effective import Circuit, Wires
+from unitcad.text import number
 
 BEYOND = 1.0
 """How far a cutting tool reaches past what it cuts, mm: never in one plane with it."""
@@ -26,7 +27,7 @@ def motor_hold(spec: Spec, dims: Dimensions) -> str:
     """Write what is round the motor once it is in, where something holds it."""
     if spec.motor.fill:
         return "Layer 1 holds the motor all round."
-    return f"A ring of air of {dims.air_ring:.2f} mm stays round the motor: what it is fixed to holds it."
+    return f"A ring of air of {number(dims.air_ring, 3)} mm stays round the motor: what it is fixed to holds it."
 
 
 def circuit(fpcb: Circuit, pad: Pad, dims: Dimensions) -> Shape:

@@ -5,13 +5,15 @@
   // The figures that are needed first, at the scale.
   const FIRST = [/^part A$/, /^part B$/, /^pot life/, /^cure/, /^rise of/];
 
-  const quantity = (figure) => `${number(figure.value, 4)} ${figure.unit || ""}`.trim();
+  // Three digits: what a scale, a caliper or a clock on the bench shows.
+  const shown = (value) => (typeof value === "number" ? number(value, 3) : value);
+  const quantity = (figure) => `${number(figure.value, 3)} ${figure.unit || ""}`.trim();
 
   function figures(list, summary) {
     if (!list || !list.length) return null;
     const rows = list.map((figure) => [figure.name, quantity(figure), figure.source]);
-    const shown = table(["Figure", "Value", "Source"], rows, { label: summary });
-    return el("details", {}, el("summary", {}, summary), shown);
+    const sources = table(["Figure", "Value", "Source"], rows, { label: summary });
+    return el("details", {}, el("summary", {}, summary), sources);
   }
 
   function cards(list) {
@@ -22,8 +24,8 @@
   function printing(sliced) {
     if (!sliced) return null;
     const minutes = (seconds) => number(seconds / 60, 2);
-    const rows = sliced.pieces.map((piece) => [partName(piece.file.replace(/\.stl$/, "")), minutes(piece.print_s), piece.filament_cm3]);
-    rows.push(["all", minutes(sliced.print_s), sliced.filament_cm3]);
+    const rows = sliced.pieces.map((piece) => [partName(piece.file.replace(/\.stl$/, "")), minutes(piece.print_s), shown(piece.filament_cm3)]);
+    rows.push(["all", minutes(sliced.print_s), shown(sliced.filament_cm3)]);
     return [table(["Piece", "Print time (min)", "Filament (cm³)"], rows, { label: "Print time and filament" }), el("p", {}, `${sliced.slicer}, ${sliced.printer}, layers of ${sliced.layer_mm} mm: ${sliced.note}`)];
   }
 
@@ -51,13 +53,13 @@
       el("div", { className: "tools" }, print, el("span", {}, `${data.label ? `mould set ${data.label}, ` : ""}${data.cells} ${data.cells === 1 ? "cavity" : "cavities"}`)),
       titled("Before the first pour", steps(data.preparation)),
       offGrid.length > 0 && el("details", {}, el("summary", {}, `${offGrid.length} edges fall between two of the printer's layers`),
-        table(["Piece", "Edge", "Height as printed (mm)", "Nearest layer (mm)"], offGrid.map((row) => [partName(row.piece), row.edge, row.height_mm, row.nearest_mm]), { label: "Edges off the layer grid" })),
+        table(["Piece", "Edge", "Height as printed (mm)", "Moved by (mm)"], offGrid.map((row) => [partName(row.piece), row.edge, shown(row.height_mm), number(row.nearest_mm - row.height_mm, 2)]), { label: "Edges off the layer grid" })),
       (data.pours || []).map(pour),
       titled("Out of the mould", steps(data.release)),
       titled("Motor in", steps(data.assembly)),
       titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text))), figures(data.walls, "What the cups' play does to the walls")),
       titled("Printing", printing(variant.slicer)),
-      titled("Needed", data.bill && table(["Item", "Quantity", "Made", "Note"], data.bill.map((row) => [partName(row.item), `${number(row.quantity)} ${row.unit}`, row.made, row.note]), { label: "Bill of materials" })));
+      titled("Needed", data.bill && table(["Item", "Quantity", "Made", "Note"], data.bill.map((row) => [partName(row.item), `${number(row.quantity, 3)} ${row.unit}`, row.made, row.note]), { label: "Bill of materials" })));
   }
 
   // A closed fold prints closed: the procedure's are opened for the printer, then put back.
