@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
@@ -12,11 +12,11 @@ import numpy as np
 from unitcad.accuracy.result import Cell, Plot, Promise, Result, Say, Table, stars
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.accuracy.unexplained import NineLevels, unexplained
-from unitcad.accuracy.unit_fem import edge_level, pressed_skin
 from unitcad.attenuation.edge.fitted_models import STORED_FIT, assessments, edge_levels, fit_divider, null
 from unitcad.attenuation.edge.measured_levels import CONTROL, Assessment, Fit, MeasuredTable, assess, measured_table
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.attenuation.mechanics.motor_level import Setting, amplitude, motion, pressed_skin
 from unitcad.catalogue import measurements
 from unitcad.designs import shipped
 from unitcad.estimating import estimate_input
@@ -131,6 +131,18 @@ def unit_spec(design: str, unit: str) -> Spec:
     return from_data({"name": unit, "design": design, "diameter_mm": 14.0, "fpcb": {}, "layers": layers})
 
 
+def edge_level(spec: Spec, fineness: float, pad: bool = True) -> tuple[float, int]:
+    """Return |u_z| of the skin at r = D/2 over an axial motor's, and the number of unknowns; bonded, nominal values.
+
+    Without `pad` there is no circuit. Raises UnitcadError for a material without a small-strain modulus.
+    """
+    variant = estimate_input(spec)
+    if not pad:
+        variant = replace(variant, geometry=replace(variant.geometry, pad=None))
+    moved = motion(variant, "axial", Setting(), fineness)
+    return amplitude(moved.skin, "axial", "normal") / abs(moved.motor), moved.unknowns
+
+
 @cache
 def finite_element_levels(fineness: float, pad: bool) -> tuple[NineLevels, list[float]]:
     """Return the units' levels and the seconds of each solution.
@@ -188,10 +200,10 @@ def bare_skin(finenesses: Sequence[float], repeats: int) -> tuple[Table, float]:
     medium = body(variant.tissue)
     exact = medium.response(UniformDisc(disc), omega, _RADII, rtol=1e-9).u_z
     scale = np.max(np.abs(exact))
-    calls = {n: partial(pressed_skin, medium, omega, disc, n) for n in finenesses}
+    calls = {n: partial(pressed_skin, medium, omega, "axial", disc, n) for n in finenesses}
     times = {n: interleaved({n: call}, repeats, warm=False)[n] for n, call in calls.items()}
     # The finite elements count z upwards.
-    values = [-time.value.at(_RADII) for time in times.values()]
+    values = [-time.value.skin(_RADII)[2][:, 0] for time in times.values()]
     rows = []
     for i, (n, solved) in enumerate(times.items()):
         from_solver = float(np.max(np.abs(values[i] - exact)) / scale)

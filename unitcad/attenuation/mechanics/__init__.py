@@ -1,0 +1,1 @@
+"""Finite elements of a unit on its body: model `mechanics`. Needs scikit-fem (extra `fem`)."""
