@@ -1,4 +1,4 @@
-"""k C(k) of a layered medium by the global matrix method in balls of 320 bits (python-flint).
+"""k C(k) of a layered medium by the global matrix method in ball arithmetic (python-flint), of 320 bits or more.
 
 Nothing here is shared with `unitcad.attenuation` but the description of the medium. The amplitudes of the waves of all
 layers solve one linear system, so that neither growing exponentials nor P and S alike cost a digit.
@@ -18,6 +18,13 @@ from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVo
 from unitcad.errors import Missing
 
 BITS = 320
+"""The least precision; it is doubled where the balls of the result are too wide."""
+_MOST_BITS = 5120
+_ENOUGH = 2.0**-56  # radius of a ball over the largest of the results
+
+
+class TooHard(Exception):
+    """A medium for which the reference needs too long."""
 
 
 class Kernel:
@@ -32,17 +39,14 @@ class Kernel:
             import mpmath  # noqa: F401  for the static radial disc
         except ImportError:
             raise Missing("the reference needs python-flint and mpmath: pip install 'unitcad[test]'") from None
-        self.flint, self.omega, self.z, self.count = flint, omega, z, 0
+        self.flint, self.omega, self.z, self.count, self.bits = flint, omega, z, 0, BITS
         self.sideways, self.column = load.direction == "tangential", 1 if load.direction == "normal" else 0
         self.least_loss, self.slowest = math.inf, 0.0
-        flint.ctx.prec = BITS
-        self.bodies = []
-        bodies = [layer for layer in medium.layers if layer.thickness > 0]
-        mass = sum(layer.density * layer.thickness for layer in bodies)
-        for body in (*bodies, medium.half_space):
-            mu, eps, ks2 = self._material(body)
-            h = flint.arb(body.thickness) if isinstance(body, Layer) else None
-            self.bodies.append((mu, eps, ks2, h))
+        layers = [layer for layer in medium.layers if layer.thickness > 0]
+        self.medium = (*layers, medium.half_space)
+        self._describe()
+        mass = sum(layer.density * layer.thickness for layer in layers)
+        for body, (mu, _, ks2, _) in zip(self.medium, self.bodies, strict=True):
             if body.youngs_modulus == 0.0:
                 continue
             slow = abs(complex(ks2)) ** 0.5
@@ -53,6 +57,14 @@ class Kernel:
             self.least_loss = min(self.least_loss, complex(mu).imag / abs(complex(mu)))
         mu, eps, _, _ = self.bodies[0]
         self.static = self._static(complex(mu), float(eps)) if complex(mu) else np.zeros(3 if self.sideways else 2)
+
+    def _describe(self) -> None:
+        """Write the bodies as balls of the present precision."""
+        self.flint.ctx.prec = self.bits
+        self.bodies = [
+            (*self._material(body), self.flint.arb(body.thickness) if isinstance(body, Layer) else None)
+            for body in self.medium
+        ]
 
     def _material(self, body: Layer | HalfSpace) -> tuple[Any, Any, Any]:
         arb, acb = self.flint.arb, self.flint.acb
@@ -76,14 +88,29 @@ class Kernel:
         return np.array([across, along] if self.column else [along, across])
 
     def __call__(self, k: np.ndarray) -> np.ndarray:
+        """Return the rows at wavenumbers k (1/m). Raises TooHard where no precision is enough."""
         self.count += k.size
+        self.flint.ctx.prec = self.bits
         return np.array([self._rows(complex(one)) for one in k])
 
     def _rows(self, k: complex) -> np.ndarray:
-        u_r, u_z = self._one(k)[:, self.column]
-        return np.array([u_r, self._shear(k), u_z] if self.sideways else [u_r, u_z])
+        while True:
+            try:
+                found = self._one(k)
+                if self.sideways:
+                    found.insert(1, self._shear(k))
+            except ZeroDivisionError:  # a pivot's ball holds zero
+                found = []
+            values = np.array([complex(ball) for ball in found])
+            wide = max((abs(float(part.rad())) for ball in found for part in (ball.real, ball.imag)), default=math.inf)
+            if wide <= _ENOUGH * np.max(np.abs(values), initial=0.0):
+                return values
+            if self.bits >= _MOST_BITS:
+                raise TooHard(f"more than {_MOST_BITS} bits at k = {k:g} /m")
+            self.bits *= 2
+            self._describe()
 
-    def _shear(self, k: complex) -> complex:
+    def _shear(self, k: complex) -> Any:
         """Return k times u_theta at the depth per traction, by a wave down (1, mu g) and one up (1, -mu g) a layer."""
         acb, mat = self.flint.acb, self.flint.acb_mat
         at, last, scale = acb(k), len(self.bodies) - 1, abs(complex(self.bodies[0][0]))
@@ -115,9 +142,10 @@ class Kernel:
                 seen[2 * i + 1] = (-rate * (top + h - depth)).exp()
             top = top + h
         right = [[acb(1) / scale]] + [[acb(0)] for _ in range(size - 1)]
-        return complex(at * (mat([seen]) * mat(_even(rows, right)).solve(mat(right)))[0, 0])
+        return at * (mat([seen]) * mat(_even(rows, right)).solve(mat(right)))[0, 0]
 
-    def _one(self, k: complex) -> np.ndarray:
+    def _one(self, k: complex) -> list[Any]:
+        """Return k times (u_r, u_z) at the depth per traction."""
         acb, mat = self.flint.acb, self.flint.acb_mat
         at, last, scale = acb(k), len(self.bodies) - 1, abs(complex(self.bodies[0][0]))
         free = complex(self.bodies[last][0]) == 0
@@ -157,7 +185,7 @@ class Kernel:
         right = [[acb(0), acb(0)] for _ in range(size)]
         right[0][0] = right[1][1] = acb(1) / scale
         solved = mat(seen) * mat(_even(rows, right)).solve(mat(right))
-        return np.array([[complex(at * solved[a, b]) for b in range(2)] for a in range(2)])
+        return [at * solved[a, self.column] for a in range(2)]
 
     def _waves(self, mu: Any, eps: Any, ks2: Any, k: Any) -> list[tuple[Callable[[Any], list[Any]], Any]]:
         """Return the two waves that go down: (u_r, u_z, t_r, t_z) at a depth less its exponential, and its rate."""

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from unitcad.accuracy.ball_kernel import Kernel
+from unitcad.accuracy.ball_kernel import Kernel, TooHard
 from unitcad.attenuation.layered.loads import Load, Point
 from unitcad.attenuation.layered.medium import LayeredMedium
 from unitcad.attenuation.layered.rheology import LossFactor
@@ -42,10 +42,6 @@ class Reference:
     u: np.ndarray
     doubt: np.ndarray
     wavenumbers: int
-
-
-class TooHard(Exception):
-    """A medium for which the reference needs too long."""
 
 
 def response(medium: LayeredMedium, load: Load, omega: float, r: np.ndarray, z: float = 0.0) -> Reference:
@@ -151,7 +147,8 @@ def _panels(
         scale = max(scale, float(np.max(np.abs(whole))))
         pending = []
         for a, b, depth, part, off, last, most in some:
-            if np.max(off) > 0.1 * _FINE * scale and np.any(last > 1e-14 * most) and depth < _DEEPEST:
+            noise = 1e-14 + 1e-16 * abs(b / (b - a))  # the last from the rounding of k
+            if np.max(off) > 0.1 * _FINE * scale and np.any(last > noise * most) and depth < _DEEPEST:
                 middle = (a + b) / 2
                 pending += [(a, middle, depth + 1), (middle, b, depth + 1)]
             else:
