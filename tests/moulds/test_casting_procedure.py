@@ -6,6 +6,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from faulty_sets import set_of
@@ -17,8 +18,9 @@ from unitcad.casting.procedure import Procedure
 from unitcad.casting.release_agent import Face
 from unitcad.casting.rules import broken_rules
 from unitcad.catalogue import materials
+from unitcad.pipeline.build import build
 from unitcad.text import number
-from unitcad.validation import templates
+from unitcad.validation import load, templates
 
 
 def procedure(*source: str) -> Procedure:
@@ -379,3 +381,25 @@ def test_figures_have_three_digits_at_most(source: list[str]) -> None:
 def test_number_has_no_power_of_ten(value: float, shown: str) -> None:
     assert number(value, 3) == shown
     assert float(number(value, 3, zeros=True)) == float(shown)
+
+
+def test_windows_that_resin_closes_are_cleared() -> None:
+    casting = procedure("three-layer", "moulds.printer=sla")
+    assert casting.tunnels == ("cup1", "cup2", "cup3")
+    said = [i for i, step in enumerate(casting.preparation) if "windows of cup 1, cup 2 and cup 3" in step]
+    assert len(said) == 1
+    assert "0.45 mm high" in casting.preparation[said[0]]
+    assert procedure("three-layer").tunnels == procedure("embedded", "moulds.printer=sla").tunnels == ()
+    for steps in (
+        tuple(step for i, step in enumerate(casting.preparation) if i not in said),
+        (*(step for i, step in enumerate(casting.preparation) if i not in said), casting.preparation[said[0]]),
+    ):
+        faults = broken_rules(replace(casting, preparation=steps))
+        assert len(faults) == 3
+        assert faults[0] == "the window of cup1 is not cleared of resin before the post-cure"
+
+
+@pytest.mark.parametrize("name", ["encapsulating", "chain", "three-layer"])
+def test_tools_in_resin_have_no_warning(name: str, tmp_path: Path) -> None:
+    done = build(load(name, ["moulds.printer=sla", "output.formats=['stl']"]), tmp_path, only=("moulds",))
+    assert done.manifest["check"] == {"errors": 0, "warnings": 0, "findings": []}

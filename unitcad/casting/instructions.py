@@ -29,8 +29,11 @@ def preparation(moulds: MouldSet) -> Iterator[str]:
         f"Print the pieces as they lie in their files, without supports: {turned} upside down, the rest as drawn. "
         f"{marked.capitalize()} are engraved {plan.label}."
     )
-    if printer_of(moulds.spec).technology.value == "sla":
+    yield from _cut_tongues(moulds)
+    if in_resin(moulds):
         yield "Wash the pieces until nothing of them feels slippery, rinse holes and corners, and let them dry."
+        if tunnels(moulds):
+            yield _clear_tunnels(moulds)
         yield (
             "Resin keeps many platinum silicones from curing: post-cure, bake (60 degC for 8 h, assumed), then "
             "cure a drop of each silicone on a spot of the base that is no cavity. If it stays tacky, coat or reprint."
@@ -43,13 +46,36 @@ def preparation(moulds: MouldSet) -> Iterator[str]:
         f"plinth touch; a slit of {number(lengths.seat_relief_mm, 3)} mm is then left between cup and plate, all "
         f"round.{lids}"
     )
-    yield from _cut_tongues(moulds)
     if plan.of_kind("stub"):
         yield (
             f"Push {_each(moulds)} filament stub up through the core from below until its end is flush with the core's "
             "top, its bent end lying in the groove under the plate and on the bench. Trim its tip flush with a knife: "
             "0.5 mm low shows."
         )
+
+
+def in_resin(moulds: MouldSet) -> bool:
+    """Tell whether the tools are printed in resin."""
+    return printer_of(moulds.spec).technology.value == "sla"
+
+
+def tunnels(moulds: MouldSet) -> tuple[str, ...]:
+    """Return the cups through whose wall a window runs that resin may cure shut."""
+    return tuple(step.cup for step in moulds.plan.steps if step.windows) if in_resin(moulds) else ()
+
+
+def _clear_tunnels(moulds: MouldSet) -> str:
+    """Say how the windows are cleared before the post-cure closes them for good."""
+    steps = [step for step in moulds.plan.steps if step.windows]
+    low, high = (number(pick(window_length(moulds, step) for step in steps), 2) for pick in (min, max))
+    exit = moulds.plan.dimensions.exit
+    height = number(exit.height + 2 * moulds.spec.moulds.window_clearance_mm, 2) if exit else ""
+    return (
+        f"Clear the windows of {listed(spaced(step.cup) for step in steps)} now, before the post-cure: resin stays in "
+        f"a slot {height} mm high that runs {low if low == high else f'{low} to {high}'} mm through the wall. Rinse "
+        "each with a syringe of isopropanol, push a strip of the tongue's film through until it slides freely, and "
+        "look through it against the light. What is cured in it has to be scraped out, or the cup printed again."
+    )
 
 
 def _cut_tongues(moulds: MouldSet) -> Iterator[str]:

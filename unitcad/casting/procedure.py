@@ -9,7 +9,7 @@ from unitcad import catalogue
 from unitcad.casting import figures as fig
 from unitcad.casting.bill import Item, bill
 from unitcad.casting.figures import Figure, Mix, sourced
-from unitcad.casting.instructions import assembly, measurements, pour_steps, preparation, release
+from unitcad.casting.instructions import assembly, measurements, pour_steps, preparation, release, tunnels
 from unitcad.casting.layer_grid import OffGrid, off_grid
 from unitcad.casting.release_agent import BondFace, Face, agent_faces, bond_faces
 from unitcad.catalogue import Material
@@ -43,6 +43,7 @@ class Procedure:
     """A whole casting: numbered steps run on from `preparation` through the pours to `assembly`.
 
     `bonds` are the tools' faces that must never get release agent.
+    `tunnels`: the cups whose windows resin may cure shut.
     `walls` is () where the tooling is not concentric: nothing tells which of its walls a cup's play changes.
     """
 
@@ -50,6 +51,7 @@ class Procedure:
     label: str
     cells: int
     vacuum: bool
+    tunnels: tuple[str, ...]
     preparation: tuple[str, ...]
     off_grid: tuple[OffGrid, ...]
     pours: tuple[Pour, ...]
@@ -94,6 +96,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
         label=plan.label,
         cells=len(plan.layout.cells),
         vacuum=spec.casting.vacuum,
+        tunnels=tunnels(moulds),
         preparation=tuple(preparation(moulds)),
         off_grid=edges,
         pours=tuple(pours),

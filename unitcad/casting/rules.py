@@ -6,11 +6,12 @@ from collections.abc import Iterator
 
 from unitcad.casting.instructions import HOLD
 from unitcad.casting.procedure import Procedure
+from unitcad.text import spaced
 
 
 def broken_rules(procedure: Procedure) -> list[str]:
     """Return what a procedure does wrong, one sentence each; empty where it keeps every rule."""
-    return [fault for rule in (_agent, _degassing, _held) for fault in rule(procedure)]
+    return [fault for rule in (_agent, _degassing, _held, _cleared) for fault in rule(procedure)]
 
 
 def _agent(procedure: Procedure) -> Iterator[str]:
@@ -51,6 +52,14 @@ def _held(procedure: Procedure) -> Iterator[str]:
         inserted, pull, lift = (_first(pour.steps, words) for words in ("on the ledge", "tongue out", "Lift cup"))
         if inserted is not None and (pull is None or lift is None or pull > lift):
             yield f"pour {pour.index}: the cup is lifted over a tongue"
+
+
+def _cleared(procedure: Procedure) -> Iterator[str]:
+    """Clear every window that resin may close, before the post-cure."""
+    clear, cure = _first(procedure.preparation, "Clear the windows"), _first(procedure.preparation, "post-cure, bake")
+    for cup in procedure.tunnels:
+        if clear is None or cure is None or clear > cure or spaced(cup) not in procedure.preparation[clear]:
+            yield f"the window of {cup} is not cleared of resin before the post-cure"
 
 
 def _first(steps: tuple[str, ...], words: str) -> int | None:
