@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.edge.closed_form import CONTROL_PASSES
-from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table
+from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.catalogue import Material, Motor, Tissue, Value, choose, materials, motors, tissue
@@ -18,6 +18,8 @@ from unitcad.errors import Refusal
 from unitcad.spec import Spec
 
 _MOTOR_DENSITY = (4000.0, 5000.0, 6500.0)  # kg/m3: low, value, high
+MECHANICS = "mechanics"
+"""The model by finite elements: a range, costly, and only made when it is asked for."""
 
 
 def estimate_spec(
@@ -25,12 +27,27 @@ def estimate_spec(
     models: Sequence[str] | None = None,
     frequency_hz: float | None = None,
     layered: Layered = layered_block,
+    say: Callable[[str], None] = lambda line: None,
 ) -> dict[str, Any]:
     """Return the estimate of a spec as JSON-ready data (`attenuation.edge.estimates`); same spec, same data.
 
+    The model `mechanics` is a range for each drive and reading, under the key "mechanics"; it costs seconds and needs
+    scikit-fem. `say` is told how far it is.
+
     Raises `Refusal` where no frequency is known, for an unknown material or tissue, and for values no body has.
     """
-    return estimate(estimate_input(spec, frequency_hz), tuple(models or spec.estimate.models), layered)
+    variant, asked = estimate_input(spec, frequency_hz), tuple(models or spec.estimate.models)
+    data = estimate(variant, closed_forms(asked), layered)
+    if MECHANICS in asked:
+        from unitcad.attenuation.mechanics.prior_range import range_block
+
+        data[MECHANICS] = rounded(range_block(variant, say=say))
+    return data
+
+
+def closed_forms(models: Sequence[str]) -> tuple[str, ...]:
+    """Return the models of a list that are formulas: all but `mechanics`."""
+    return tuple(model for model in models if model != MECHANICS)
 
 
 def frequency_table_of_spec(
@@ -38,7 +55,7 @@ def frequency_table_of_spec(
 ) -> dict[str, Any]:
     """Return a table over frequencies (Hz): edge level by model, and the layered decay; raises as `estimate_spec`."""
     variant = estimate_input(spec, frequencies_hz[0])
-    return frequency_table(variant, frequencies_hz, tuple(models or spec.estimate.models))
+    return frequency_table(variant, frequencies_hz, closed_forms(models or spec.estimate.models))
 
 
 def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:

@@ -26,7 +26,7 @@ from unitcad.batch.run import MOST_FAILURES, BatchOptions, batch_head, counted
 from unitcad.batch.sweep import Sweep
 from unitcad.batch.task import OK
 from unitcad.errors import UnitcadError
-from unitcad.estimating import estimate_input
+from unitcad.estimating import closed_forms, estimate_input
 from unitcad.spec import Spec
 from unitcad.validation import from_data, put
 
@@ -134,7 +134,7 @@ def _known(spec: Spec) -> _Known:
         omega=2.0 * np.pi * asked.frequency.middle,
         walls=tuple(layer.thickness for layer in asked.layers),
         silicones=np.array([_silicone(layer) for layer in asked.layers]),
-        models=tuple(spec.estimate.models),
+        models=closed_forms(spec.estimate.models),
     )
 
 

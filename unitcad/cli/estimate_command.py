@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from unitcad.cli.output import print_json, warn
+from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Sets
 from unitcad.errors import Refusal, unknown_name
 
@@ -34,11 +34,13 @@ def estimate(
     the model's error.
     """
     from unitcad.attenuation.edge.fitted_models import MODELS
-    from unitcad.estimating import estimate_spec, frequency_table_of_spec
+    from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec
     from unitcad.validation import load
 
-    if model not in ("", "all", *MODELS):
-        raise unknown_name("--model", model, (*MODELS, "all"))
+    if model not in ("", "all", *MODELS, MECHANICS):
+        raise unknown_name("--model", model, (*MODELS, MECHANICS, "all"))
+    if ":" in frequency and model == MECHANICS:
+        raise Refusal("--frequency", frequency, "must be one frequency for mechanics, whose draws cost seconds each")
     models = None if not model else MODELS if model == "all" else (model,)
     hertz = frequencies(frequency) if frequency else []
     loaded = [load(name, sets or []) for name in specs]
@@ -47,7 +49,8 @@ def estimate(
     if ":" in frequency:
         estimates = [frequency_table_of_spec(spec, hertz, models) for spec in loaded]
     else:
-        estimates = [estimate_spec(spec, models, hertz[0] if hertz else None) for spec in loaded]
+        with progress("estimate") as stage:
+            estimates = [estimate_spec(spec, models, hertz[0] if hertz else None, say=stage) for spec in loaded]
     if as_json:
         print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates})
         return

@@ -17,7 +17,10 @@ def print_estimate(data: dict[str, Any]) -> None:
     layers = " / ".join(layer["material"] for layer in variant["layers"])
     rest = f": {variant['design']}, {layers}, {level(variant['frequency_hz'], digits=4)} Hz"
     screen.print(Text.assemble((variant["name"], "bold"), rest))
-    screen.print(_models(data))
+    if data["models"]:
+        screen.print(_models(data))
+    if "mechanics" in data:
+        screen.print(_mechanics(data["mechanics"]))
     screen.print(_errors(data))
     for reason in _reasons(data):
         screen.print(f"  {reason}", soft_wrap=True)
@@ -49,6 +52,18 @@ def print_frequencies(data: dict[str, Any]) -> None:
         decay = [f"{value:.3g}" for value in row["u_over_edge"].values()]
         table.add_row(f"{row['frequency_hz']:g}", *[level(one) for one in row["edge_level"].values()], *decay)
     console().print(table)
+
+
+def _mechanics(block: dict[str, Any]) -> Table:
+    """Tabulate the range of each drive and reading over what is not known, which stands below."""
+    low, _, high = block["percent"]
+    table = Table("drive", "read on", f"{low} %", "median", f"{high} %", title="mechanics: edge level % over the draws")
+    for one in block["levels"]:
+        place = "skin at r = D/2" if one["reading"] == "skin" else "the unit's own edge"
+        numbers = [f"{100 * one[key]:.3g}" for key in ("low", "median", "high")]
+        table.add_row(one["drive"], place, numbers[0], f"{numbers[1]} (x/÷ {one['median_error']:.2f})", numbers[2])
+    table.caption = block.get("reason") or f"{block['draws']} draws; not known: {block['not_known']}"
+    return table
 
 
 def _models(data: dict[str, Any]) -> Table:

@@ -29,7 +29,7 @@ Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
 _LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
 _TISSUE = "one layer or more by name, skin first, each a table with density_kg_m3, poisson_ratio and a modulus"
 Moduli = Literal["dynamic", "quasi-static"]
-Model = Literal["paper", "consistent", "fitted"]
+Model = Literal["paper", "consistent", "fitted", "mechanics"]
 
 
 class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_unknown_fields=True):

@@ -54,7 +54,8 @@ def drawn(variant: EstimateInput, draw: Draw) -> tuple[EstimateInput, Setting]:
     """Return an input with every unknown set by a draw, and the draw's setting.
 
     Moduli, damping, thicknesses of the body, frequency and the motor's mass lie in their ranges; the ring of air
-    beside the motor is open or filled, a floor of Layer 1 under the motor is there or not, and so is the circuit.
+    beside the motor is open or filled, a floor of Layer 1 under the motor is there or not, and so is the circuit. The
+    ring is filled wherever nothing else would hold the motor.
     """
 
     def known(name: str, quantity: Quantity, spread: float = 1.0) -> Quantity:
@@ -95,12 +96,13 @@ def drawn(variant: EstimateInput, draw: Draw) -> tuple[EstimateInput, Setting]:
 
 def _geometry(geometry: Geometry, draw: Draw, mass: Quantity) -> Geometry:
     made = replace(geometry, motor_mass=mass)
-    if draw.either("gap filled"):
-        made = replace(made, cavity_radius=made.motor_radius)
     if draw.either("no circuit"):
         made = replace(made, pad=None)
     if made.floor == 0.0 and draw.either("floor"):
         made = lifted(made, draw.between("floor thickness", *FLOORS))
+    held = made.pad or made.floor or made.layers[0].cap
+    if draw.either("gap filled") or not held:
+        made = replace(made, cavity_radius=made.motor_radius)
     return made
 
 

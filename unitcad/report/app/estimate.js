@@ -73,6 +73,16 @@
     ];
   }
 
+  // Finite elements: a range for each drive and reading, from draws of what is not known; the dot is the median.
+  function mechanics(block) {
+    if (!block) return null;
+    const place = { skin: "skin at D/2", edge: "the unit's own edge" };
+    const rows = (block.levels || []).map((one) => ({ name: `${one.drive}, ${place[one.reading] || one.reading}`, entry: { value: one.median, low: one.low, high: one.high }, colour: "series-4" }));
+    return [el("h3", {}, "By finite elements"),
+      rangeChart(rows, [], `Amplitude along the drive over the motor's: median and ${(block.percent || [])[0]} to ${(block.percent || [])[2]} % of ${block.draws} draws.`),
+      el("p", { className: "note" }, block.reason || `Not known, and drawn: ${block.not_known}.`)];
+  }
+
   function ratios(data) {
     const controls = [...new Set(Object.values(data.models || {}).flatMap((block) => (block.hierarchical_over_control || []).map((entry) => entry.control)))];
     return controls.map((control) => {
@@ -149,7 +159,7 @@
     }
     return section("estimate", "Attenuation estimate",
       el("p", {}, "An estimate, not a measurement: how much of the motor's amplitude reaches the skin at the unit's edge, by each model, and how it decays from there."),
-      levels(data), ratios(data), el("h3", {}, "Outwards from the edge"), curves(data.layered), margins(data.models || {}), errors(data), assumptions(data),
+      levels(data), mechanics(data.mechanics), ratios(data), el("h3", {}, "Outwards from the edge"), curves(data.layered), margins(data.models || {}), errors(data), assumptions(data),
       el("details", {}, el("summary", {}, "All numbers"), facts(data)));
   }
 
