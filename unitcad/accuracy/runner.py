@@ -23,6 +23,7 @@ MODULES = {
     "models": "edge_levels",
     "extremes": "extremes",
     "left-out": "left_out",
+    "measure": "measure",
     "speed": "speed",
 }
 """Suites in the order of the pages, and the module of each, whose function `run(quick, say)` returns its result."""

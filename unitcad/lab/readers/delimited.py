@@ -194,11 +194,12 @@ def _expect_footer(path: Path, lines: list[str], block: Block, number: int) -> N
 def _channels(header: list[str], block: Block) -> tuple[list[Channel], float | None]:
     """Return the columns' names and units by the last lines of the header, and the step that it may state, in s."""
     rows = [_words(line, block.delimiter) for line in header if line.strip()][-2:]
-    rows = [row for row in rows if len(row) >= block.width]
     names, units = [f"column {i + 1}" for i in range(block.width)], [""] * block.width
+    step = _index_step(rows)
+    if step is None:  # a line of more names than columns says not which column each one names
+        rows = [row for row in rows if len(row) == block.width]
     if not rows:
         return [Channel(name) for name in names], None
-    step = _index_step(rows)
     last = rows[-1][: block.width]
     if len(rows) == 2 and (step is not None or all(known(word) for word in last if word)):
         names, units = rows[0][: block.width], [word if known(word) else "" for word in last]
@@ -224,7 +225,13 @@ def _words(line: str, delimiter: str) -> list[str]:
 
 def _index_step(rows: list[list[str]]) -> float | None:
     """Return the step that stands in the header of an oscilloscope whose first column is an index, in s (Rigol)."""
-    if len(rows) == 2 and rows[0][0] == "X" and rows[1][0] == "Sequence" and "Increment" in rows[0]:
+    if (
+        len(rows) == 2
+        and min(map(len, rows)) > 2
+        and rows[0][0] == "X"
+        and rows[1][0] == "Sequence"
+        and "Increment" in rows[0]
+    ):
         at = rows[0].index("Increment")
         if at < len(rows[1]) and _NUMBER.fullmatch(rows[1][at]) and float(rows[1][at]) > 0:
             return float(rows[1][at])

@@ -62,6 +62,8 @@ def _columns(path: Path) -> list[tuple[str, tuple[int, int], Channel]]:
             return
         if node.is_virtual or node.external:
             raise Unreadable(str(path), None, f"{name} lies in another file")
+        if not node.id.get_storage_size():
+            raise Unreadable(str(path), None, f"{name} has no samples stored")
         side = 0 if node.ndim == 1 or node.shape[0] >= node.shape[1] else 1
         count = 1 if node.ndim == 1 else min(node.shape)
         if count > MOST_COLUMNS:

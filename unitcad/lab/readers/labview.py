@@ -37,8 +37,9 @@ def read(path: Path, layout: Layout) -> Recording:
 
 def _channels(path: Path) -> list[tuple[str, str, Channel]]:
     from nptdms import TdmsFile
+    from nptdms.log import log_manager
 
-    logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # it writes whole damaged strings to standard error
+    log_manager.set_level(logging.CRITICAL)  # it writes whole damaged strings to standard error
     size = path.stat().st_size
     stated = _raw_bytes(path, size)
     found = []

@@ -1,0 +1,122 @@
+"""From samples to a line's slowly varying phase: coarse frequency, demodulation, steady span, smooth phases."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from unitcad.geometry.arrays import Bools, Floats
+
+WINDOW_S = 0.25
+"""Length of the Hann window that smooths a demodulated signal; it passes about 4 Hz to either side."""
+STEADY = 0.9
+"""Part of the median envelope that a line reaches before its record is used, and keeps to its end."""
+KNOTS_S = (0.5, 0.25)
+"""Distances of the knots of the phase's splines that are tried."""
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A line's phase in rad over time in s, and by how many parameters it was fitted."""
+
+    at: Callable[[Floats], Floats]
+    parameters: int
+
+
+def coarse_frequency(x: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> float:
+    """Return the frequency of the strongest line in a band, in Hz, by the peak of a spectrum with a Hann window.
+
+    A multiple of the mains' frequency is taken where it is more than three times as strong as any other line.
+    """
+    frequency, size = spectrum(x, rate)
+    inside = (frequency >= band[0]) & (frequency <= min(band[1], 0.45 * rate))
+    if not inside.any() or not np.any(size[inside] > 0):
+        return 0.0
+    width = 1.5 * rate / len(x)
+    off = inside & (np.abs(frequency - mains_hz * np.round(frequency / mains_hz)) > width)
+    peak = int(np.argmax(np.where(inside, size, 0.0)))
+    if off.any() and (other := int(np.argmax(np.where(off, size, 0.0)))) != peak and size[other] > size[peak] / 3:
+        peak = other
+    return _interpolated(size, peak) * rate / _length(len(x))
+
+
+def spectrum(x: Floats, rate: float) -> tuple[Floats, Floats]:
+    """Return frequencies in Hz and amplitudes in the signal's unit, by a Hann window, padded to twice the length."""
+    window = np.hanning(len(x))
+    size = np.abs(np.fft.rfft((x - x.mean()) * window, _length(len(x)))) * 2 / window.sum()
+    return np.fft.rfftfreq(_length(len(x)), 1 / rate), size
+
+
+def _length(count: int) -> int:
+    return 2 ** (int(count - 1).bit_length() + 1)
+
+
+def _interpolated(size: Floats, peak: int) -> float:
+    """Return the place of a peak between the bins, by a parabola through the logarithms."""
+    if not 0 < peak < len(size) - 1 or min(size[peak - 1 : peak + 2]) <= 0:
+        return float(peak)
+    low, top, high = np.log(size[peak - 1 : peak + 2])
+    bend = low - 2 * top + high
+    return peak + (0.5 * (low - high) / bend if bend < 0 else 0.0)
+
+
+def envelope(x: Floats, good: Bools, rate: float, frequency: float) -> tuple[Floats, Floats]:
+    """Return times in s and the line's complex amplitude there; samples that are not `good` count for nothing."""
+    from scipy.signal import oaconvolve
+
+    count = min(max(int(WINDOW_S * rate), 8), len(x) // 2)
+    window = np.hanning(count + 2)[1:-1]
+    time = np.arange(len(x)) / rate
+    turned = np.where(good, x, 0.0) * np.exp(-2j * np.pi * frequency * time)
+    weight = oaconvolve(good.astype(float), window, mode="same")
+    step = max(count // 8, 1)
+    full = weight[::step] > 0.5 * window.sum()
+    if full.sum() < 4:
+        return np.empty(0), np.empty(0, complex)
+    centre = oaconvolve(good * time, window, mode="same")[::step][full] / weight[::step][full]
+    return centre, 2 * oaconvolve(turned, window, mode="same")[::step][full] / weight[::step][full]
+
+
+def steady_span(time: Floats, line: Floats, length_s: float) -> tuple[float, float]:
+    """Return the span in s in which the line has spun up: the ends where it is below STEADY of its median are cut."""
+    size = np.abs(line)
+    enough = np.flatnonzero(size >= STEADY * np.median(size))
+    first, last = int(enough[0]), int(enough[-1])
+    start = float(time[first] + WINDOW_S / 2) if first else 0.0
+    end = float(time[last] - WINDOW_S / 2) if last < len(time) - 1 else length_s
+    return (start, end) if end - start > 0.25 * length_s else (0.0, length_s)
+
+
+def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
+    """Yield the line's phase, of rising flexibility: constant frequency, linear, cubic, splines."""
+    from scipy.interpolate import make_lsq_spline
+
+    angle = np.unwrap(np.angle(line))
+    weight = np.abs(line) / np.abs(line).max()
+    middle, half = (time[0] + time[-1]) / 2, max((time[-1] - time[0]) / 2, 1e-9)
+    omega = 2 * np.pi * frequency
+    for degree in (1, 2, 4):
+        if degree + 1 < len(time):
+            fitted = np.polynomial.Polynomial.fit(time, angle, degree, w=weight, domain=[middle - half, middle + half])
+            yield Phase(lambda t, fitted=fitted: omega * t + fitted(t), degree + 1)
+    for distance in KNOTS_S:
+        pieces = round((time[-1] - time[0]) / distance)
+        if pieces < 2 or pieces + 4 > len(time) / 2:
+            continue
+        inner = np.linspace(time[0], time[-1], pieces + 1)[1:-1]
+        knots = np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4])
+        spline = make_lsq_spline(time, angle, knots, 3, w=weight)
+        yield Phase(lambda t, spline=spline, time=time: omega * t + _straight_beyond(spline, t, time), pieces + 3)
+
+
+def _straight_beyond(spline: Callable[..., Floats], at: Floats, time: Floats) -> Floats:
+    """Return a spline's values, continued by its tangents beyond its ends."""
+    inside = np.clip(at, time[0], time[-1])
+    beyond = at - inside
+    value = spline(inside)
+    for end in (time[0], time[-1]):
+        out = (beyond != 0) & (inside == end)
+        value[out] += beyond[out] * float(spline(end, 1))
+    return value

@@ -1,0 +1,240 @@
+"""The chain `line`: a line of slowly varying phase, fitted with its harmonics, the mains, an offset and a slope.
+
+1. Coarse frequency by a spectrum. 2. Demodulate, cut the spin-up, smooth the phase. 3. Least squares on three
+harmonics, the lines of the mains that the record resolves, offset and slope, again without the samples that lie far
+off. Mains and outliers are then taken away and 2 and 3 repeated once. 4. The amplitude's uncertainty is that of the
+noise's density at the line over the record's length, of the scatter of blocks, and of mains that can't be told apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from unitcad.geometry.arrays import Bools, Floats
+from unitcad.lab.chains import demodulation, least_squares, uncertainty
+from unitcad.lab.chains.clipping import LOWEST, clip_mask
+from unitcad.lab.chains.demodulation import Phase
+from unitcad.lab.chains.result import LineFit
+from unitcad.lab.chains.several import several_lines
+
+BAND_HZ = (60.0, 250.0)
+FAR = 4.5
+"""Robust standard deviations of the residual beyond which a sample is a drop-out."""
+ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class Mains:
+    """The mains' frequency in Hz, and by multiple the amplitude that a motor-off record has, in the signal's unit."""
+
+    frequency_hz: float = 50.0
+    blank: tuple[tuple[int, float], ...] = ()
+
+    def amplitude(self, order: int) -> float | None:
+        """Return a multiple's amplitude in the motor-off record; None without such a record."""
+        return dict(self.blank).get(order, 0.0) if self.blank else None
+
+
+@dataclass(frozen=True)
+class _Solution:
+    """One least-squares solution of a record."""
+
+    value: complex
+    residual: Floats
+    mains: Floats
+    line: Floats
+    good: Bools
+    widening: float
+    """How much wider the line's amplitude is than if all columns were orthogonal and no sample left out."""
+
+
+def fit_line(
+    x: Floats,
+    rate: float,
+    band: tuple[float, float] = BAND_HZ,
+    mains: Mains | None = None,
+    full_scale: float | None = None,
+    phase: Phase | None = None,
+    span: tuple[float, float] | None = None,
+) -> LineFit | None:
+    """Return the line of samples x (n) at `rate` in Hz; None where the band holds no line.
+
+    With `phase` and `span`, which are another channel's, the line has that channel's phase and its own amplitude.
+    """
+    mains = mains or Mains()
+    good = np.isfinite(x)
+    x = np.where(good, x, 0.0)
+    if good.sum() < 16 or not np.ptp(x[good]) > 0:
+        return None
+    middle = float(np.median(x[good]))
+    x = np.where(good, x - middle, 0.0)
+    cut, level, part = clip_mask(x, good, None if full_scale is None else (full_scale - middle, full_scale + middle))
+    if part < LOWEST:  # nothing is left that says how high the line went
+        cut, level = np.zeros(len(x), bool), float("inf")
+    deviation = 1.4826 * np.median(np.abs(x[good]))
+    known = good & ~cut & (np.abs(x) < 6 * deviation if deviation > 0 else True)
+    time = np.arange(len(x)) / rate
+    if phase is not None and span is not None:
+        frequency = _frequency(phase, span)[0]
+        solution = _solve(x, time, rate, known & ~cut, good & ~cut, span, phase, frequency, mains)
+    else:
+        frequency = demodulation.coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
+        if frequency <= 0:
+            return None
+        found = _twice(x, time, rate, known, good, cut, level, frequency, mains)
+        if found is None:
+            return None
+        solution, phase, span = found
+    fit = _summary(solution, time, rate, phase, span, mains)
+    fit = replace(
+        fit,
+        masked=float(np.mean(~solution.good[good & ~cut])),
+        clipped=part,
+    )
+    inside = (time >= span[0]) & (time <= span[1])
+    return several_lines(x - solution.mains, solution.residual, time, inside & solution.good, fit, rate) or fit
+
+
+def _twice(
+    x: Floats,
+    time: Floats,
+    rate: float,
+    known: Bools,
+    good: Bools,
+    cut: Bools,
+    level: float,
+    frequency: float,
+    mains: Mains,
+) -> tuple[_Solution, Phase, tuple[float, float]] | None:
+    """Demodulate and fit; then again without the mains and the drop-outs of the first fit."""
+    clean, use, found, allowed = x, known, None, good & ~cut
+    for _ in range(3 if np.isfinite(level) else 2):
+        at, line = demodulation.envelope(clean, use, rate, frequency)
+        if len(at) < 4:
+            return None
+        span = demodulation.steady_span(at, line, len(x) / rate)
+        inside = (at >= span[0]) & (at <= span[1])
+        phase = _best_phase(clean, time, rate, use, span, demodulation.phases(at[inside], line[inside], frequency))
+        frequency = _frequency(phase, span)[0]
+        solution = _solve(x, time, rate, known & allowed, allowed, span, phase, frequency, mains)
+        found = solution, phase, span
+        left_out = (time >= span[0]) & (time <= span[1]) & ~solution.good
+        if np.isfinite(level):  # by the line, not by the samples: those would be chosen by their noise
+            rest = 2.5 * 1.4826 * float(np.median(np.abs(solution.residual[solution.good & (time >= span[0])])))
+            allowed = good & (np.abs(solution.line) < level - rest)
+        clean, use = np.where(left_out, solution.line, x - solution.mains), use | left_out
+    return found
+
+
+def _best_phase(
+    x: Floats, time: Floats, rate: float, use: Bools, span: tuple[float, float], candidates: Iterable[Phase]
+) -> Phase:
+    """Return the phase that explains the samples best for its number of parameters (Schwarz's criterion)."""
+    inside = slice(int(np.searchsorted(time, span[0])), int(np.searchsorted(time, span[1], side="right")))
+    here, part, weight = time[inside], x[inside], use[inside].astype(float)
+    scores = []
+    for candidate in candidates:
+        line = least_squares.line_columns(candidate.at(here), 0.5 * rate, rate)
+        columns = np.concatenate([line, least_squares.trend_columns(here)])
+        left = part - least_squares.solve(columns, part, weight) @ columns
+        squares = float(np.sum(weight * left**2)) / max(weight.sum(), 1)
+        score = weight.sum() * np.log(max(squares, 1e-300)) + candidate.parameters * np.log(max(weight.sum(), 2))
+        scores.append((score, len(scores), candidate))
+    return min(scores)[-1]
+
+
+def _frequency(phase: Phase, span: tuple[float, float]) -> tuple[float, float]:
+    """Return the mean of a phase's frequency over a span, and the range of its half-second means, in Hz."""
+    edges = np.linspace(*span, max(round((span[1] - span[0]) / 0.5), 2) + 1)
+    steps = np.diff(phase.at(edges)) / np.diff(edges) / (2 * np.pi)
+    return float(steps.mean()), float(np.ptp(steps))
+
+
+def _solve(
+    x: Floats,
+    time: Floats,
+    rate: float,
+    known: Bools,
+    allowed: Bools,
+    span: tuple[float, float],
+    phase: Phase,
+    frequency: float,
+    mains: Mains,
+) -> _Solution:
+    """Fit a line of given phase over a span, without the samples whose residual is far off."""
+    first, last = np.searchsorted(time, span[0]), np.searchsorted(time, span[1], side="right")
+    inside = slice(int(first), int(last))
+    here, part = time[inside], x[inside]
+    spread = _frequency(phase, span)[1]
+    orders = least_squares.mains_orders(mains.frequency_hz, rate, (frequency,), span[1] - span[0], spread)
+    columns = np.concatenate(
+        [
+            least_squares.line_columns(phase.at(here), frequency, rate),
+            least_squares.mains_columns(here, mains.frequency_hz, orders),
+            least_squares.trend_columns(here),
+        ]
+    )
+    use = known[inside].copy()
+    for _ in range(ROUNDS):
+        found, covariance = least_squares.solve_with_covariance(columns, part, use.astype(float))
+        residual = part - found @ columns
+        limit = FAR * 1.4826 * np.median(np.abs(residual[use]))
+        far = np.abs(residual) > limit if limit > 0 else np.zeros(len(part), bool)
+        far[1:] |= far[:-1].copy()
+        far[:-1] |= far[1:].copy()
+        fresh = allowed[inside] & ~far
+        if fresh.sum() < 0.3 * len(part) or np.array_equal(fresh, use):
+            break
+        use = fresh
+    removed, line = np.zeros(len(x)), np.zeros(len(x))
+    lines = len(columns) - 2 - 2 * len(orders)
+    removed[inside] = found[lines:-2] @ columns[lines:-2]
+    line[inside] = found[:lines] @ columns[:lines] + found[-2:] @ columns[-2:]
+    kept = known.copy()
+    kept[inside] = use
+    left = np.zeros(len(x))
+    left[inside] = np.where(use, residual, 0.0)
+    towards = found[:2] / max(float(np.hypot(*found[:2])), 1e-300)
+    widening = np.sqrt(max(float(towards @ covariance[:2, :2] @ towards) * use.sum() / 2, 1.0))
+    return _Solution(complex(found[0], -found[1]), left, removed, line, kept, float(widening))
+
+
+def _summary(
+    solution: _Solution, time: Floats, rate: float, phase: Phase, span: tuple[float, float], mains: Mains
+) -> LineFit:
+    """Return a solution's figures with their uncertainty."""
+    inside = (time >= span[0]) & (time <= span[1])
+    good = solution.good[inside]
+    turn = np.exp(-1j * phase.at(time[inside]))
+    residual = solution.residual[inside] * turn
+    noise = solution.widening * uncertainty.noise(residual, good, rate)
+    blocks = uncertainty.blocks(solution.value, residual, good, rate)
+    amplitude = abs(solution.value)
+    towards = np.real(blocks * np.conj(solution.value)) / max(amplitude, 1e-300)
+    wander, scatter = uncertainty.of_mean(towards, noise**2 * len(towards))
+    frequency, spread = _frequency(phase, span)
+    order = round(frequency / mains.frequency_hz)
+    apart = order * mains.frequency_hz
+    hidden = order not in least_squares.mains_orders(
+        mains.frequency_hz, rate, (frequency,), np.ptp(time[inside]), spread
+    )
+    share = (mains.amplitude(order) or 0.0) / np.sqrt(2) if hidden and order else 0.0
+    deviation = float(np.sqrt(np.mean(solution.residual[inside][good] ** 2)))
+    return LineFit(
+        amplitude=amplitude,
+        u=float(np.sqrt(noise**2 + wander**2 + share**2)),
+        u_mains=float(share),
+        value=solution.value,
+        frequency_hz=frequency,
+        drift=spread / frequency,
+        snr=amplitude / deviation if deviation > 0 else float("inf"),
+        scatter=scatter / amplitude if amplitude > 0 else float("inf"),
+        start_s=span[0],
+        end_s=span[1],
+        mains_hz=apart if hidden and order else 0.0,
+        phase=phase,
+        blocks=tuple(complex(b) for b in blocks),
+    )

@@ -1,0 +1,106 @@
+"""Several lines at once: each of constant frequency, refined together, where one line of varying phase leaves much."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from unitcad.geometry.arrays import Bools, Floats
+from unitcad.lab.chains import least_squares, uncertainty
+from unitcad.lab.chains.demodulation import spectrum
+from unitcad.lab.chains.result import Line, LineFit
+
+BESIDE_HZ = 15.0
+"""To either side of the strongest line, where others are looked for."""
+LEAST = 0.05
+"""Part of the strongest line's amplitude from which another one counts."""
+MOST = 6
+GAIN = 0.5
+"""Part of the one line's squares that several must leave at most, to be taken in its place."""
+STEPS = 12
+
+
+def several_lines(x: Floats, residual: Floats, time: Floats, use: Bools, fit: LineFit, rate: float) -> LineFit | None:
+    """Return the fit of several lines to samples x without mains, of which one line leaves `residual`.
+
+    None where one line explains them as well. The amplitude is then the strongest line's.
+    """
+    x = np.where(use, x, 0.0)
+    first, last = np.flatnonzero(use)[[0, -1]]
+    part, at, weight = x[first : last + 1], time[first : last + 1], use[first : last + 1].astype(float)
+    length = at[-1] - at[0]
+    noise = fit.amplitude / fit.snr if np.isfinite(fit.snr) else 0.0
+    least = max(LEAST * fit.amplitude, 8 * noise * np.sqrt(2 / max(weight.sum(), 1)))
+    alone = noise**2
+    frequency, size = spectrum(residual[first : last + 1] * weight, rate)
+    if not np.any(size[np.abs(frequency - fit.frequency_hz) < BESIDE_HZ] > least):
+        return None
+    found: list[float] = []
+    best = None
+    for _ in range(MOST):
+        left = part if best is None else best[1]
+        frequency, size = spectrum(left * weight, rate)
+        beside = np.abs(frequency - fit.frequency_hz) < BESIDE_HZ
+        peak = int(np.argmax(np.where(beside, size, 0.0)))
+        if size[peak] < least or any(abs(frequency[peak] - one) < 0.5 / length for one in found):
+            break
+        found = [*found, float(frequency[peak])]
+        best = _refined(part, at, weight, found, rate)
+        found = list(best[2])
+    if best is None or len(found) < 2:
+        return None
+    coefficients, left, frequencies = best
+    squares = float(np.mean(left[weight > 0] ** 2))
+    values = coefficients[: 2 * len(frequencies) : 2] - 1j * coefficients[1 : 2 * len(frequencies) : 2]
+    order = np.argsort(-np.abs(values))
+    strong = [i for i in order if abs(values[i]) > LEAST * abs(values[order[0]])]
+    if squares > GAIN * alone or len(strong) < 2:
+        return None
+    lines = tuple(_line(float(frequencies[i]), complex(values[i]), left, weight, at, rate) for i in strong)
+    main = lines[0]
+    deviation = float(np.sqrt(squares))
+    return replace(
+        fit, amplitude=main.amplitude, u=float(np.hypot(main.u, fit.u_mains)), value=complex(values[order[0]]),
+        frequency_hz=main.frequency_hz, drift=0.0, snr=main.amplitude / deviation if deviation > 0 else float("inf"),
+        lines=lines,
+    )  # fmt: skip
+
+
+def _refined(
+    x: Floats, time: Floats, weight: Floats, frequencies: list[float], rate: float
+) -> tuple[Floats, Floats, Floats]:
+    """Return coefficients, residual and frequencies after Gauss-Newton steps over all lines' frequencies at once."""
+    omega = 2 * np.pi * np.array(frequencies)
+    middle = time.mean()
+    length = max(time[-1] - time[0], 1e-9)
+    count = len(omega)
+    for step in range(STEPS + 1):
+        turns = np.exp(1j * omega[:, None] * (time - middle))
+        lines = np.empty((2 * count, len(time)))
+        lines[::2], lines[1::2] = turns.real, turns.imag
+        base = np.concatenate([lines, least_squares.trend_columns(time)])
+        found = least_squares.solve(base, x, weight)
+        residual = x - found @ base
+        if step == STEPS:
+            break
+        # d/d omega of a cos + b sin is t (-a sin + b cos)
+        slopes = (time - middle) * (
+            found[1 : 2 * count : 2, None] * turns.real - found[: 2 * count : 2, None] * turns.imag
+        )
+        change = least_squares.solve(np.concatenate([base, slopes]), x, weight)[-count:]
+        change = np.clip(change, -np.pi / length, np.pi / length)
+        omega = omega + change
+        if np.all(np.abs(change) * length < 1e-6):
+            break
+    return found, residual, omega / (2 * np.pi)
+
+
+def _line(frequency: float, value: complex, left: Floats, weight: Floats, time: Floats, rate: float) -> Line:
+    """Return a line with its uncertainty, by the noise beside it and the scatter of its blocks."""
+    turned = left * weight * np.exp(-2j * np.pi * frequency * (time - time.mean()))
+    noise = uncertainty.noise(turned, weight > 0, rate)
+    parts = uncertainty.blocks(value, turned, weight > 0, rate)
+    towards = np.real(parts * np.conj(value)) / abs(value)
+    wander, _ = uncertainty.of_mean(towards, noise**2 * len(towards))
+    return Line(float(frequency), float(abs(value)), float(np.hypot(noise, wander)))
