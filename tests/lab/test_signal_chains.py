@@ -12,8 +12,8 @@ from scipy.stats import ttest_ind, ttest_rel
 from unitcad.accuracy.synthetic_records import LENGTH_S, PLAIN, RATE, Scenario, synthetic
 from unitcad.errors import Refusal
 from unitcad.lab.chains.line import Mains, fit_line
+from unitcad.lab.chains.line_fit import LineFit
 from unitcad.lab.chains.paper import PaperChain
-from unitcad.lab.chains.result import LineFit
 from unitcad.lab.levels import level, paired_level
 
 TIME = np.arange(4000) / RATE

@@ -17,7 +17,7 @@ from unitcad.geometry.arrays import Bools, Floats
 from unitcad.lab.chains import demodulation, least_squares, uncertainty
 from unitcad.lab.chains.clipping import LOWEST, clip_mask
 from unitcad.lab.chains.demodulation import Phase
-from unitcad.lab.chains.result import LineFit
+from unitcad.lab.chains.line_fit import LineFit
 from unitcad.lab.chains.several import several_lines
 
 BAND_HZ = (60.0, 250.0)

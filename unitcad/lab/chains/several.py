@@ -9,7 +9,7 @@ import numpy as np
 from unitcad.geometry.arrays import Bools, Floats
 from unitcad.lab.chains import least_squares, uncertainty
 from unitcad.lab.chains.demodulation import spectrum
-from unitcad.lab.chains.result import Line, LineFit
+from unitcad.lab.chains.line_fit import Line, LineFit
 
 BESIDE_HZ = 15.0
 """To either side of the strongest line, where others are looked for."""
