@@ -18,9 +18,10 @@ from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import STORED_FIT, assessments, edge_levels, one_constant, scales
 from unitcad.attenuation.edge.measured_levels import assess, measured_table
-from unitcad.attenuation.inputs import body
+from unitcad.attenuation.inputs import Drive, body
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.statics import Direction
+from unitcad.attenuation.receivers import FORCES, Patch, influence, motion
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.validation import load
 
@@ -123,12 +124,57 @@ def table_of_drives() -> str:
     )
 
 
+def table_of_receivers() -> str:
+    """Return what masses of 1.2 g do to the transfer to a neighbour, in an array of 14 mm units and between two."""
+    forearm, radius, pitch = body(estimate_input(load("encapsulating")).tissue), 7e-3, 16e-3
+    places = [(pitch * column, pitch * row) for row in range(10) for column in range(10)]
+    middle = [places[55], places[56]]
+    array = [Patch(*place, radius, 1.2e-3) for place in middle + [one for one in places if one not in middle]]
+    x, y = np.array([(patch.x, patch.y) for patch in array]).T
+    apart, at = np.unique(np.round(np.hypot(x[:, None] - x, y[:, None] - y), 9), return_inverse=True)
+
+    def change(g: np.ndarray, drive: Drive, omega: float) -> str:
+        """Return by how much the masses change |u| of the second patch over that of the first, which drives."""
+        forces = np.zeros((len(g), 3), dtype=complex)
+        forces[0] = FORCES[drive]
+        masses = np.array([patch.mass for patch in array[: len(g)]])
+        bare, loaded = (np.linalg.norm(motion(g, m, forces, omega), axis=1) for m in (0.0 * masses, masses))
+        return f"{(loaded[1] / loaded[0]) / (bare[1] / bare[0]):.2f}"
+
+    columns = []
+    for hertz in (100, 125, 150, 300):
+        omega = 2 * np.pi * hertz
+        g = influence(forearm, array, omega)
+        normal, read = np.zeros_like(g), np.zeros_like(g)
+        normal[:, 2, :, 2] = g[:, 2, :, 2]
+        middles = forearm.response(UniformDisc(radius), omega, apart, rtol=1e-4).u_z / (np.pi * radius**2)
+        read[:, 2, :, 2] = np.where(np.eye(len(array)) > 0, g[:, 2, :, 2], middles[at.reshape(len(array), -1)])
+        pair = g[:2, :, :2]
+        columns.append(
+            [
+                *(change(each, "axial", omega) for each in (read, normal, g, pair)),
+                *(change(each, "flat", omega) for each in (g, pair)),
+            ]
+        )
+    names = [
+        "array, u_z alone, read at the neighbours' middles",
+        "array, u_z alone, mean over the neighbours' discs",
+        "array, axial drive, abs(u)",
+        "two units, axial drive, abs(u)",
+        "array, flat drive, abs(u)",
+        "two units, flat drive, abs(u)",
+    ]
+    rows = [f"| {' | '.join([name, *cells])} |" for name, *cells in zip(names, *columns, strict=True)]
+    return "\n".join(["| what | 100 Hz | 125 Hz | 150 Hz | 300 Hz |", "| --- | --- | --- | --- | --- |", *rows])
+
+
 BLOCKS = {
     "models": table_of_models,
     "readings": table_of_readings,
     "units": table_of_units,
     "constants": constants,
     "drives": table_of_drives,
+    "receivers": table_of_receivers,
 }
 
 

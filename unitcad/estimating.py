@@ -12,6 +12,7 @@ from unitcad.attenuation.edge.closed_form import CONTROL_PASSES
 from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
+from unitcad.attenuation.receivers import neighbours_block
 from unitcad.catalogue import Material, Motor, Tissue, Value, choose, materials, motors, tissue
 from unitcad.designs import design_of, dimensions, no_estimate
 from unitcad.errors import Refusal
@@ -56,6 +57,16 @@ def frequency_table_of_spec(
     """Return a table over frequencies (Hz): edge level by model, and the layered decay; raises as `estimate_spec`."""
     variant = estimate_input(spec, frequencies_hz[0])
     return frequency_table(variant, frequencies_hz, closed_forms(models or spec.estimate.models))
+
+
+def neighbours_of_specs(specs: Sequence[Spec], pitch_mm: float, frequencies_hz: Sequence[float] = ()) -> dict[str, Any]:
+    """Return how far the first unit moves the others of a row, `pitch_mm` apart, on bare skin and with their masses.
+
+    At the first unit's frequency where none are given. Raises `Refusal` as `attenuation.receivers.neighbours_block`.
+    """
+    variants = [estimate_input(spec) for spec in specs]
+    frequencies = frequencies_hz or [variants[0].frequency.middle]
+    return rounded(neighbours_block(variants, pitch_mm * 1e-3, frequencies))
 
 
 def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:

@@ -25,6 +25,12 @@ def estimate(
     frequency: Annotated[
         str, typer.Option(metavar="HZ|FROM:TO:STEP", help="one frequency, or a table over frequencies")
     ] = "",
+    pitch: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM", help="units in a row, so far apart: how far the first moves the others, with their masses"
+        ),
+    ] = None,
     sets: Sets = None,
     as_json: AsJson = False,
 ) -> None:
@@ -34,7 +40,7 @@ def estimate(
     the model's error.
     """
     from unitcad.attenuation.edge.fitted_models import MODELS
-    from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec
+    from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec, neighbours_of_specs
     from unitcad.validation import load
 
     if model not in ("", "all", *MODELS, MECHANICS):
@@ -46,18 +52,21 @@ def estimate(
     loaded = [load(name, sets or []) for name in specs]
     for spec in loaded:
         _warn_of_moulds(spec)
+    beside = {} if pitch is None else {"neighbours": neighbours_of_specs(loaded, pitch, hertz)}
     if ":" in frequency:
         estimates = [frequency_table_of_spec(spec, hertz, models) for spec in loaded]
     else:
         with progress("estimate") as stage:
             estimates = [estimate_spec(spec, models, hertz[0] if hertz else None, say=stage) for spec in loaded]
     if as_json:
-        print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates})
+        print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates, **beside})
         return
-    from unitcad.cli.estimate_tables import print_estimate, print_frequencies
+    from unitcad.cli.estimate_tables import print_estimate, print_frequencies, print_neighbours
 
     for one in estimates:
         (print_frequencies if ":" in frequency else print_estimate)(one)
+    for block in beside.values():
+        print_neighbours(block)
 
 
 def _warn_of_moulds(spec: Spec) -> None:

@@ -66,6 +66,24 @@ def _mechanics(block: dict[str, Any]) -> Table:
     return table
 
 
+def print_neighbours(data: dict[str, Any]) -> None:
+    """Print how far the first unit of a row moves each other one, on bare skin and with the units' masses."""
+    first, *_ = data["units"]
+    masses = ", ".join(f"{unit['name']} {level(unit['mass_g'])} g" for unit in data["units"])
+    row_of = f"units in a row, {data['pitch_mm']:g} mm apart"
+    title = f"|u| over that of {first['name']}, which drives ({data['drive']}): {row_of}"
+    table = Table("unit", "mm away", "Hz", "on bare skin", "with masses", "masses change it by", title=title)
+    for row in data["transfer"]:
+        bare, change = f"{row['on_bare_skin']:.3g}", f"x {row['masses_change_it_by']:.2f}"
+        place = f"{row['at_mm']:g}", f"{row['frequency_hz']:g}"
+        table.add_row(row["unit"], *place, bare, level(row["with_masses"]), change)
+    screen = console()
+    screen.print(table)
+    screen.print(f"  masses: {masses}", soft_wrap=True)
+    for line in data["assumptions"]:
+        screen.print(f"  {line}", soft_wrap=True)
+
+
 def _models(data: dict[str, Any]) -> Table:
     """Tabulate the edge level and, against the control of each of the unit's materials, hierarchical / control."""
     blocks, measured = data["models"], data["measured"] or {}

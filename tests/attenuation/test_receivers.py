@@ -1,0 +1,165 @@
+"""Units side by side: reciprocity, power, closed forms, an independent solve, and figures that were once measured."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from unitcad.attenuation import HalfSpace, LayeredMedium, Point, UniformDisc
+from unitcad.attenuation.inputs import body
+from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, neighbours_block, unit_mass
+from unitcad.cli import app
+from unitcad.designs import unit_bodies
+from unitcad.errors import Refusal
+from unitcad.estimating import estimate_input
+from unitcad.kernels.mesh import realise
+from unitcad.validation import load
+
+UNIT = estimate_input(load("encapsulating"))
+FOREARM = body(UNIT.tissue)
+OMEGA = 2 * np.pi * 150
+THREE = (Patch(0, 0, 7e-3, 1.2e-3), Patch(0.016, 0, 5e-3, 0.4e-3), Patch(0.003, 0.017, 7e-3, 0.9e-3))
+MASSES = np.array([patch.mass for patch in THREE])
+G = influence(FOREARM, THREE, OMEGA)
+
+
+def driven(drive: str, count: int = 3) -> np.ndarray:
+    forces = np.zeros((count, 3), dtype=complex)
+    forces[0] = FORCES[drive]
+    return forces
+
+
+def test_influence_is_reciprocal_and_takes_power() -> None:
+    g = G.reshape(9, 9)
+    assert np.max(np.abs(g - g.T)) < 1e-3 * np.max(np.abs(g))
+    assert np.linalg.eigvalsh((g.conj().T - g) / 2j).min() > 0
+
+
+def test_a_pair_is_the_mean_of_points_over_both_discs() -> None:
+    """By point loads, whose transform is another: a newton spread over points of one disc, read at the other's."""
+    rings, spokes = np.sqrt((np.arange(5) + 0.5) / 5), 2 * np.pi * np.arange(11) / 11
+    disc = (rings[:, None] * np.exp(1j * spokes)).ravel()
+    between = (0.016 + 5e-3 * disc[:, None]) - 7e-3 * disc[None]
+    distances, at = np.unique(np.round(np.abs(between), 6), return_inverse=True)
+    normal, sideways = (FOREARM.response(Point(way), OMEGA, distances, rtol=1e-4) for way in ("normal", "tangential"))
+    outwards = (between / np.abs(between)).ravel()
+    cos, sin, at = outwards.real, outwards.imag, at.ravel()
+    u_r, u_theta = sideways.u_r[at], sideways.u_theta[at]
+    size = np.max(np.abs(G))
+    assert abs(np.mean(normal.u_z[at]) - G[1, 2, 0, 2]) < 1e-3 * size
+    assert abs(np.mean(normal.u_r[at] * cos) - G[1, 0, 0, 2]) < 1e-3 * size
+    assert abs(np.mean(sideways.u_z[at] * cos) - G[1, 2, 0, 0]) < 1e-3 * size
+    assert abs(np.mean(u_r * cos**2 - u_theta * sin**2) - G[1, 0, 0, 0]) < 1e-3 * size
+    assert abs(np.mean(u_r * sin**2 - u_theta * cos**2) - G[1, 1, 0, 1]) < 1e-3 * size
+
+
+def test_own_motion_is_the_closed_form_on_a_half_space() -> None:
+    """Mean over a disc under its own uniform traction: 16 (1 - nu^2) / (3 pi^2 E a) a newton, sideways with C_sh."""
+    a, e, nu = 6e-3, 20e3, 0.4
+    g = influence(LayeredMedium([], HalfSpace(1000, e, nu)), (Patch(0, 0, a, 0.0),), 0.0)[0, :, 0, :]
+    normal = 16 * (1 - nu**2) / (3 * np.pi**2 * e * a)
+    assert g[2, 2] == pytest.approx(normal, rel=2e-4)
+    assert g[0, 0] == pytest.approx(normal * (2 - nu) / (2 * (1 - nu)), rel=2e-4)
+    assert g[0, 0] == g[1, 1]
+
+
+@pytest.mark.parametrize("drive", ["flat", "axial"])
+def test_masses_against_the_stiffness_of_the_skin(drive: str) -> None:
+    """The same by another way: the skin's dynamic stiffness, G inverted, with the masses on its diagonal."""
+    stiffness = np.linalg.inv(G.reshape(9, 9)) - OMEGA**2 * np.diag(np.repeat(MASSES, 3))
+    expected = np.linalg.solve(stiffness, driven(drive).ravel()).reshape(3, 3)
+    found = motion(G, MASSES, driven(drive), OMEGA)
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-12 * np.max(np.abs(expected)))
+
+
+def test_one_unit_is_the_closed_form() -> None:
+    alone = G[:1, :, :1, :]
+    for axis, drive in ((2, "axial"), (0, "flat")):
+        own = alone[0, axis, 0, axis]
+        found = motion(alone, [1.2e-3], driven(drive, 1), OMEGA)[0, axis]
+        assert found == pytest.approx(own / (1 - OMEGA**2 * 1.2e-3 * own), rel=1e-12)
+
+
+def test_masses_take_no_power() -> None:
+    """What the force gives over a period, the skin takes: the masses only swing."""
+    forces = driven("flat")
+    u = motion(G, MASSES, forces, OMEGA)
+    on_skin = forces + OMEGA**2 * MASSES[:, None] * u
+    given, taken = (-OMEGA / 2 * np.vdot(one, u).imag for one in (forces, on_skin))
+    through_g = on_skin.ravel()
+    absorbed = OMEGA / 2 * np.real(np.vdot(through_g, (G.reshape(9, 9).conj().T - G.reshape(9, 9)) / 2j @ through_g))
+    assert given == pytest.approx(taken, rel=1e-12)
+    assert given == pytest.approx(absorbed, rel=1e-9)
+    assert given > 0
+
+
+def test_no_mass_and_a_great_mass() -> None:
+    forces = driven("axial")
+    bare = motion(G, np.zeros(3), forces, OMEGA)
+    assert bare == pytest.approx(G[:, :, 0, 2], rel=1e-12)
+    assert motion(G, np.full(3, 1e-12), forces, OMEGA) == pytest.approx(bare, rel=1e-6)
+    anchored = motion(G, [0.0, 1.0, 0.0], forces, OMEGA)
+    assert np.linalg.norm(anchored[1]) < 0.01 * np.linalg.norm(bare[1])
+
+
+@pytest.mark.parametrize(("hertz", "change"), [(100, 1.02), (125, 0.64), (150, 0.53), (300, 0.69)])
+def test_transfer_to_a_neighbour_as_once_measured(hertz: float, change: float) -> None:
+    """A hundred units of 1.2 g, 14 mm wide, 16 mm apart; along the normal only, read at the others' middles."""
+    at = np.arange(10) * 0.016
+    x, y = (grid.ravel() for grid in np.meshgrid(at, at))
+    apart = np.hypot(x[:, None] - x, y[:, None] - y)
+    distances, index = np.unique(np.round(apart, 9), return_inverse=True)
+    omega, radius = 2 * np.pi * hertz, 7e-3
+    read = FOREARM.response(UniformDisc(radius), omega, distances, rtol=1e-4).u_z / (np.pi * radius**2)
+    g = read[index.reshape(apart.shape)]
+    np.fill_diagonal(g, influence(FOREARM, (Patch(0, 0, radius, 0.0),), omega)[0, 2, 0, 2])
+    sizes = [np.abs(np.linalg.solve(np.eye(100) - omega**2 * mass * g, g[:, 55])) for mass in (0.0, 1.2e-3)]
+    bare, loaded = (size[56] / size[55] for size in sizes)
+    assert loaded / bare == pytest.approx(change, abs=0.006)
+
+
+@pytest.mark.parametrize("name", ["encapsulating", "embedded", "three-layer"])
+def test_mass_is_that_of_the_drawn_silicone_and_the_motor(name: str) -> None:
+    spec = load(name)
+    variant = estimate_input(spec)
+    solids = {one.name: realise(one.shape, 128) for one in unit_bodies(spec)}
+    silicone = [solids[f"layer{i + 1}"].volume() * 1e-9 * layer.density for i, layer in enumerate(variant.layers)]
+    mass, motor = unit_mass(variant), variant.geometry.motor_mass
+    assert mass.value == pytest.approx(sum(silicone) + motor.middle, rel=0.03)
+    assert mass.ends == pytest.approx([mass.value - motor.middle + end for end in motor.ends])
+
+
+def test_neighbours_refuse_what_can_not_stand_side_by_side() -> None:
+    with pytest.raises(Refusal, match="overlap"):
+        influence(FOREARM, (THREE[0], Patch(0.011, 0, 5e-3, 0.0)), OMEGA)
+    other = estimate_input(
+        load(
+            "encapsulating",
+            [
+                "tissue.mine.all.density_kg_m3=1000",
+                "tissue.mine.all.poisson_ratio=0.4",
+                "tissue.mine.all.youngs_modulus_kpa=20",
+                "estimate.tissue=mine",
+            ],
+        )
+    )
+    with pytest.raises(Refusal) as refused:
+        neighbours_block([UNIT, other], 0.016, [125.0])
+    assert (refused.value.field, refused.value.nearest) == ("estimate.tissue", "forearm")
+
+
+def test_command_gives_the_neighbours() -> None:
+    pair = ["estimate", "encapsulating", "encapsulating", "--model", "fitted"]
+    done = CliRunner().invoke(app, [*pair, "--pitch", "16", "--frequency", "100:300:200", "--json"])
+    found = json.loads(done.stdout)["neighbours"]
+    assert [row["frequency_hz"] for row in found["transfer"]] == [100, 300]
+    for row in found["transfer"]:
+        assert row["masses_change_it_by"] == pytest.approx(row["with_masses"]["value"] / row["on_bare_skin"], rel=1e-6)
+        assert row["with_masses"]["low"] <= row["with_masses"]["value"] <= row["with_masses"]["high"]
+    shown = CliRunner().invoke(app, [*pair, "--pitch", "16"]).stdout
+    assert "on bare skin" in shown
+    for pitch, nearest in (("10", 14), ("1000", 200)):
+        refused = CliRunner().invoke(app, [*pair, "--pitch", pitch, "--json"])
+        assert isinstance(refused.exception, Refusal)
+        assert refused.exception.nearest == nearest
