@@ -7,19 +7,34 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Plot
-from unitcad.attenuation import Point, UniformDisc
 from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.bush import bush
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.fitted_models import STORED_FIT, assessments, edge_levels, one_constant, scales
-from unitcad.attenuation.edge.measured_levels import assess, measured_table
+from unitcad.attenuation.edge.fitted_models import (
+    MODELS,
+    assessments,
+    bush_forms,
+    choice,
+    compared,
+    edge_levels,
+    forms,
+    in_order,
+    one_constant,
+    pairwise,
+    stored,
+)
+from unitcad.attenuation.edge.measured_levels import measured_table
+from unitcad.attenuation.edge.scores import assess, left_out_errors
 from unitcad.attenuation.inputs import Drive, body
-from unitcad.attenuation.layered.loads import Load
+from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
 from unitcad.attenuation.layered.statics import Direction
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion
 from unitcad.estimating import estimate_input, estimate_spec
@@ -27,31 +42,123 @@ from unitcad.validation import load
 
 HERE = Path(__file__).parent
 TITLES = {
+    "bush": "bush, one constant",
+    "fitted": "fitted, the divider, two constants",
+    "crossings": "layer propagation (model `crossings`): k_t once embedded, twice encapsulating, one constant",
+    "null": "null: softer layer inside or not, two constants",
     "paper": "paper, one constant",
     "consistent": "consistent, one constant",
-    "crossings": "layer propagation (model `crossings`): k_t once embedded, twice encapsulating, one constant",
-    "fitted": "fitted, the divider, two constants",
-    "null": "null: softer layer inside or not, two constants",
 }
 
 
+def _range(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:.2f} to {ends[1]:.2f}"
+
+
 def table_of_models() -> str:
-    """Return every model against the measured table."""
+    """Return every model against the measured table, the best with a unit left out first."""
     rows = [
-        "| model | levels, in-sample | a unit left out | ratios | worst ratio | a unit left out | directions |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
+        "| model | levels, in-sample | a unit left out | range | ratios | worst ratio | a unit left out | directions |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for name, title in TITLES.items():
+    for name in in_order(assessments()):
         assessment = assessments()[name]
         without = (
             f"{assessment.left_out_ratios.geometric_mean:.2f}" if assessment.left_out_ratios else "no constant in it"
         )
         rows.append(
-            f"| {title} | {assessment.levels.geometric_mean:.2f} | {assessment.left_out.geometric_mean:.2f} "
+            f"| {TITLES[name]} | {assessment.levels.geometric_mean:.2f} | {assessment.left_out.geometric_mean:.2f} "
+            f"| {_range(assessment.left_out_range)} "
             f"| {assessment.ratios.geometric_mean:.2f} | {assessment.ratios.worst:.2f} | {without} "
             f"| {assessment.directions} of {assessment.ratios.count} |"
         )
     return "\n".join(rows)
+
+
+def table_of_tests() -> str:
+    """Return p of the sign-flip test of each pair of models."""
+    names = in_order(assessments())
+    p = {(better, worse): value for better, worse, value in pairwise(assessments())}
+    rows = [f"| better \\ worse | {' | '.join(names[1:])} |", "| --- |" + " --- |" * (len(names) - 1)]
+    for better in names[:-1]:
+        cells = [f"{p[better, worse]:.2g}" if (better, worse) in p else "" for worse in names[1:]]
+        rows.append(f"| {better} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def table_of_forms() -> str:
+    """Return every form that was tried, and the score of a choice among them made without the unit."""
+    table, found = measured_table(), choice()
+    rows = ["| form | levels, in-sample | a unit left out | chosen for |", "| --- | --- | --- | --- |"]
+    for name, fit in forms().items():
+        one = assess(fit, fitted_ratios=False, table=table)
+        count = found.chosen.count(name)
+        rows.append(
+            f"| {name} | {one.levels.geometric_mean:.2f} | {one.left_out.geometric_mean:.2f} "
+            f"| {f'{count} of {len(table.names)}' if count else ''} |"
+        )
+    score = f"{found.score.geometric_mean:.2f} ({_range(found.range)})"
+    said = f"Chosen for each unit by the other eight, among these {len(forms())} forms: {score}."
+    return "\n".join([*rows, "", said])
+
+
+def table_of_bushes() -> str:
+    """Return kappa and n of the bushes' forms, from the paper's lengths."""
+    rows = ["| bush | gap | floors | kappa | n |", "| --- | --- | --- | --- | --- |"]
+    table = measured_table()
+    for form in bush_forms():
+        stiff = []
+        for design in ("embedded", "encapsulating"):
+            units = table.units(table.designs.index(design))
+            ratio = units.youngs_modulus[..., -1] / units.youngs_modulus[..., 0]
+            stiff.append(float((1 / bush(units, form) - 1)[0] / ratio))
+        words = (
+            "long" if form.long else "short",
+            "filled" if form.filled else "as drawn",
+            "yes" if form.floors else "no",
+        )
+        rows.append(f"| {' | '.join(words)} | {stiff[0]:.3f} | {stiff[1] / stiff[0]:.2f} |")
+    return "\n".join(rows)
+
+
+def table_of_inputs() -> str:
+    """Return d ln level / d ln input of every model for the shipped encapsulating unit."""
+    blocks = estimate_spec(load("encapsulating"), MODELS, layered=lambda variant: {})["models"]
+    seen = {model: block["inputs_seen"]["by"] for model, block in blocks.items()}
+    every = next(iter(blocks.values()))["inputs_seen"]
+    names = sorted([*every["by"], *every["not_seen"]], key=lambda n: -max(abs(by.get(n, 0)) for by in seen.values()))
+    rows = [f"| input | {' | '.join(seen)} |", "| --- |" + " --- |" * len(seen)]
+    for name in names:
+        rows.append(f"| {name} | {' | '.join(f'{by[name]:+.2f}' if name in by else '-' for by in seen.values())} |")
+    return "\n".join(rows)
+
+
+def spread_of_scores() -> str:
+    """Return how far the scores move where moduli, damping and frequency are drawn from what is not known."""
+    table, rng = measured_table(), np.random.default_rng(7)
+    scores: dict[str, list[float]] = {name: [] for name in ("bush", "fitted", "paper")}
+    for _ in range(400):
+        factor = {name: np.exp(rng.uniform(*np.log([0.7, 1 / 0.7]))) for names in table.layers for name in names}
+        tan_delta = {name: rng.uniform(0.1, 0.3) for name in factor}
+        omega = 2 * np.pi * rng.uniform(100, 150)
+        drawn = replace(
+            table,
+            inputs=tuple(
+                replace(
+                    units,
+                    youngs_modulus=units.youngs_modulus * [factor[name] for name in names],
+                    tan_delta=[tan_delta[name] for name in names],
+                    omega=omega,
+                )
+                for units, names in zip(table.inputs, table.layers, strict=True)
+            ),
+        )
+        for name, found in scores.items():
+            found.append(float(np.exp(left_out_errors(compared()[name].fit, drawn).mean())))
+    return "; ".join(
+        f"{name} {np.median(found):.2f} ({_range(tuple(np.percentile(found, [5, 95])))})"
+        for name, found in scores.items()
+    )
 
 
 def table_of_readings() -> str:
@@ -63,7 +170,7 @@ def table_of_readings() -> str:
     for reading in cf.READINGS:
         for wave in ("s", "p"):
             path = one_constant(lambda u, wave=wave, reading=reading: cf.paper_path(u, wave, reading))
-            assessment = assess(path, fitted_ratios=False)
+            assessment = assess(path, fitted_ratios=False, table=measured_table())
             rows.append(
                 f"| {reading} | {wave.upper()} | {assessment.levels.geometric_mean:.2f} "
                 f"| {assessment.left_out.geometric_mean:.2f} | {assessment.ratios.geometric_mean:.2f}"
@@ -75,19 +182,21 @@ def table_of_readings() -> str:
 def table_of_units() -> str:
     """Return each measured unit beside the models."""
     table = measured_table()
-    rows = ["| unit | measured % | paper | consistent | fitted |", "| --- | --- | --- | --- | --- |"]
+    models = [name for name in in_order(assessments()) if name in MODELS]
+    rows = [f"| unit | measured % | {' | '.join(models)} |", "| --- | --- |" + " --- |" * len(models)]
     for i, name in enumerate(table.names):
-        levels = [100 * float(edge_levels(table.units(i), model)) for model in ("paper", "consistent", "fitted")]
+        levels = [100 * float(table.evaluate(partial(edge_levels, model=model))[i]) for model in models]
         rows.append(f"| {name} | {100 * table.levels[i]:.4g} | " + " | ".join(f"{v:.1f}" for v in levels) + " |")
     return "\n".join(rows)
 
 
 def constants() -> str:
     """Return the fitted constants."""
-    by_model = scales()
+    found = stored()
     return (
-        f"kappa = {STORED_FIT['kappa']:.3f}, s = {STORED_FIT['s']:.3f} for the divider; "
-        f"s = {by_model['paper']:.3f} for paper, {by_model['consistent']:.3f} for consistent."
+        f"kappa = {found['fitted']['kappa']:.3f}, s = {found['fitted']['s']:.3f} for the divider; "
+        f"s = {found['bush']['s']:.3f} for bush, {found['paper']['s']:.3f} for paper, "
+        f"{found['consistent']['s']:.3f} for consistent."
     )
 
 
@@ -97,7 +206,7 @@ def table_of_drives() -> str:
     forearm, disc = body(variant.tissue), variant.motor_diameter / 2
     r = np.array([7e-3, 30e-3])
 
-    def compared(what: str, make: Callable[[Direction], Load], sideways: str, normal: str, share: float = 1.0) -> str:
+    def row(what: str, make: Callable[[Direction], Load], sideways: str, normal: str, share: float = 1.0) -> str:
         def sizes(direction: Direction, hertz: float, names: str) -> np.ndarray:
             response = forearm.response(make(direction), 2 * np.pi * hertz, r, rtol=1e-4)
             return np.sqrt(sum(np.abs(getattr(response, name)) ** 2 for name in names.split()))
@@ -115,11 +224,11 @@ def table_of_drives() -> str:
         [
             "| what is compared | 50 Hz | 125 Hz | 250 Hz | fall, sideways | fall, normal |",
             "| --- | --- | --- | --- | --- | --- |",
-            compared("a point, in line, sqrt(abs(u_r)^2 + abs(u_z)^2) of both", Point, in_line, in_line),
-            compared("the motor's disc, in line, the same", uniform, in_line, in_line),
-            compared("the motor's disc, in line, abs(u_r) over abs(u_z)", uniform, "u_r", "u_z"),
-            compared("the motor's disc, root mean square over all angles", uniform, turning, in_line, 2**-0.5),
-            compared("the disc's force turns: `flat_over_axial_per_newton`", uniform, turning, in_line),
+            row("a point, in line, sqrt(abs(u_r)^2 + abs(u_z)^2) of both", Point, in_line, in_line),
+            row("the motor's disc, in line, the same", uniform, in_line, in_line),
+            row("the motor's disc, in line, abs(u_r) over abs(u_z)", uniform, "u_r", "u_z"),
+            row("the motor's disc, root mean square over all angles", uniform, turning, in_line, 2**-0.5),
+            row("the disc's force turns: `flat_over_axial_per_newton`", uniform, turning, in_line),
         ]
     )
 
@@ -170,6 +279,11 @@ def table_of_receivers() -> str:
 
 BLOCKS = {
     "models": table_of_models,
+    "tests": table_of_tests,
+    "forms": table_of_forms,
+    "bushes": table_of_bushes,
+    "inputs": table_of_inputs,
+    "spread": spread_of_scores,
     "readings": table_of_readings,
     "units": table_of_units,
     "constants": constants,

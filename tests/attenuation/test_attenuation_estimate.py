@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from unitcad.accuracy.result import Plot, Result, markdown
 from unitcad.attenuation.curve import NO_RATIO
-from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.closed_form import Section, Units
 from unitcad.attenuation.edge.fitted_models import edge_levels
 from unitcad.attenuation.edge.level import corners
 from unitcad.cli import app
@@ -34,7 +34,7 @@ def encapsulating() -> dict:
 
 def test_contract(encapsulating):
     assert list(encapsulating) == ["variant", "models", "layered", "measured", "table_error", "assumptions"]
-    assert list(encapsulating["models"]) == ["paper", "consistent", "fitted"]
+    assert list(encapsulating["models"]) == ["bush", "fitted", "paper", "consistent"]
     for block in encapsulating["models"].values():
         assert {"edge_level", "hierarchical_over_control", "table_error", "assumptions"} <= set(block)
         assert {"levels", "ratios", "directions", "leave_one_unit_out"} <= set(block["table_error"])
@@ -50,7 +50,8 @@ def test_contract(encapsulating):
 
 def test_level_is_the_array_function_at_nominal_values(encapsulating):
     e, rho = [15e3, 355e3], [1040.0, 1080.0]
-    units = Units(e, rho, [0.4999] * 2, [0.2] * 2, [1.25e-3] * 2, 2 * math.pi * 125, 2.0)
+    section = Section(4.5e-3, 3.5e-3, 2.11e-3, [5.75e-3, 7e-3], [1.25e-3] * 2)
+    units = Units(e, rho, [0.4999] * 2, [0.2] * 2, [1.25e-3] * 2, 2 * math.pi * 125, 2.0, section)
     for model, block in encapsulating["models"].items():
         assert block["edge_level"]["value"] == pytest.approx(float(edge_levels(units, model)), rel=1e-8)
         amplitude = block["edge_amplitude_um"]["value"]
@@ -185,7 +186,7 @@ def test_frequency_table():
     found = frequency_table_of_spec(load("encapsulating"), [100.0, 150.0])
     assert [row["frequency_hz"] for row in found["frequencies"]] == [100, 150]
     first = found["frequencies"][0]
-    assert set(first["edge_level"]) == {"paper", "consistent", "fitted"}
+    assert list(first["edge_level"]) == ["bush", "fitted", "paper", "consistent"]
     assert first["u_z_over_edge"]["at_30_mm"] < first["u_z_over_edge"]["at_5_mm"] < 1
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from unitcad.attenuation.edge.fitted_models import paths
+from unitcad.attenuation.edge.fitted_models import path_of
 from unitcad.attenuation.edge.level import nominal
 from unitcad.errors import Refusal
 from unitcad.experiments.draws import Draws
@@ -124,11 +124,11 @@ def test_a_closed_form_without_unknowns_is_the_model_of_the_estimate(name: str) 
         found = rival.levels(variant, Draws(400, 1, name))
         ranges = [layer.tan_delta.ends for layer in variant.layers]
         assert ranges == [(0.1, 0.3)] * 2
-        assert found.min() <= float(paths()[name](nominal(variant))[0]) * (1 + 1e-6)
-        assert found.max() >= float(paths()[name](nominal(variant))[0]) * (1 - 1e-6)
+        assert found.min() <= float(path_of(name)(nominal(variant))[0]) * (1 + 1e-6)
+        assert found.max() >= float(path_of(name)(nominal(variant))[0]) * (1 - 1e-6)
         if name == "crossings":
             assert found == pytest.approx(
-                np.full(400, float(paths()[name](nominal(variant))[0])), rel=1e-4
+                np.full(400, float(path_of(name)(nominal(variant))[0])), rel=1e-4
             )  # Poisson's ratio to 1/2
 
 

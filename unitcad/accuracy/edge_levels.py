@@ -9,11 +9,13 @@ from functools import cache, partial
 
 import numpy as np
 
+from unitcad.accuracy.level_scores import score_tables
 from unitcad.accuracy.result import Cell, Plot, Promise, Result, Say, Table, stars
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.accuracy.unexplained import NineLevels, unexplained
-from unitcad.attenuation.edge.fitted_models import STORED_FIT, assessments, edge_levels, fit_divider, null
-from unitcad.attenuation.edge.measured_levels import CONTROL, Assessment, Fit, MeasuredTable, assess, measured_table
+from unitcad.attenuation.edge.fitted_models import MODELS, assessments, compared, edge_levels, in_order, stored
+from unitcad.attenuation.edge.measured_levels import CONTROL, MeasuredTable, measured_table
+from unitcad.attenuation.edge.scores import Assessment, Fit, assess
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.mechanics.motor_level import Setting, amplitude, motion, pressed_skin
@@ -24,6 +26,7 @@ from unitcad.spec import Spec
 from unitcad.validation import default_template, from_data, load
 
 _WALL = 1.25
+_TITLES = {"null": "null: soft inside or not", "crossings": "crossings (k_t once or twice)"}
 _DRAWN, _BARE = "finite elements, as drawn", "finite elements, without the circuit"
 _RADII = np.array([0, 2, 5, 7, 10, 15, 20, 30]) * 1e-3
 
@@ -43,36 +46,37 @@ def run(quick: bool, say: Say) -> Result:
     Bare skin and mesh convergence come with them.
     """
     table = measured_table()
-    models: dict[str, _Model] = {}
+    everyone = np.ones((1, len(table.names)), dtype=bool)
+    levels = {name: one.fit(table, everyone)[0] for name, one in compared().items()}
     calls: dict[str, Callable[[], object]] = {
-        name: lambda name=name: edge_levels(table.units(4), name) for name in ("paper", "consistent", "fitted")
+        name: lambda name=name: edge_levels(table.units(4), name) for name in MODELS
     }
-    two_levels = null(table, np.ones(len(table.names), dtype=bool))
-    times = interleaved({**calls, "null": lambda: two_levels(table)}, 21)
-    constants = {"paper": "1", "consistent": "1", "fitted": "2"}
-    for name, assessed in assessments().items():
-        if name in constants:
-            models[name] = _Model(assessed, times[name], constants[name])
-        elif name == "null":
-            models["null: soft inside or not"] = _Model(assessed, times["null"], "2")
-        else:
-            models[f"{name} (k_t once or twice)"] = _Model(assessed, times["paper"], "1")
+    times = interleaved(calls, 21)
+    models = {
+        _TITLES.get(name, name): _Model(
+            assessments()[name], times[name if name in times else "paper"], str(compared()[name].constants)
+        )
+        for name in in_order(assessments())
+    }
     solved: dict[str, NineLevels] = {}
     for pad, name in ((True, _DRAWN), (False, _BARE)):
         say(name)
         solved[name], seconds = finite_element_levels(1.0 if quick else 2.0, pad)
-        models[name] = _Model(assess(_given(solved[name].in_order(table)), False), timing(seconds), "0")
-    closed = {name: NineLevels(_by_name(table, name, two_levels)) for name in (*constants, "crossings", "null")}
+        models[name] = _Model(assess(_given(solved[name].in_order(table)), False, table), timing(seconds), "0")
+    closed = {
+        name: NineLevels({unit: {"": float(level)} for unit, level in zip(table.names, own, strict=True)})
+        for name, own in levels.items()
+    }
     marks = stars([(model.time.median, model.assessed.left_out.geometric_mean) for model in models.values()])
     comparison = Table(
         "Against nine levels and twelve ratios to controls: geometric-mean factor error (1 is exact)",
         ("model", "constants", "levels", "left out", "ratios", "left out", "directions", "time a level", "frontier"),
         tuple((*_row(name, model), mark) for (name, model), mark in zip(models.items(), marks, strict=True)),
-        f"The divider's constants, fitted when this runs: kappa {fit_divider(table, np.ones(9, bool))[0]:.4g}, s "
-        f"{fit_divider(table, np.ones(9, bool))[1]:.4g} (stored: {STORED_FIT['kappa']:.4g}, {STORED_FIT['s']:.4g}). "
-        "Left out: each unit by constants fitted without it. Directions: of twelve ratios, how many lie on the right "
-        "side of 1. The finite elements' time is the median over their solutions, one run each; the others are of 21 "
-        "runs.",
+        "Best score with a unit left out first. The divider's constants, fitted when this runs: kappa "
+        f"{stored()['fitted']['kappa']:.4g}, s {stored()['fitted']['s']:.4g}. Left out: each unit by constants fitted "
+        "without it. Directions: of twelve ratios, how many lie on the right side of 1. crossings and null take the "
+        "time of paper. The finite elements' time is the median over their solutions, one run each; the others are of "
+        "21 runs.",
     )
     plot = Plot(
         "Error against the measured levels, each unit left out, against time",
@@ -98,20 +102,20 @@ def run(quick: bool, say: Say) -> Result:
         f"{shrink:.1e} of it; the one nearest to its measurement is off by {apart:.2g} of it, {apart / shrink:.0f} "
         "times as much.",
     )
+    say("scores on shuffled and simulated tables")
+    scores, of_scores = score_tables(200 if quick else 1000)
     say("bare skin")
     bare, worst = bare_skin(finenesses, repeats=1 if quick else 3)
     return Result(
         suite="models",
         title="Models of the edge level",
         text=unexplained(table, solved, closed, assessments()["paper"]),
-        tables=(comparison, _units_table(table, closed, solved), meshes, bare),
+        tables=(comparison, *scores, _units_table(table, closed, solved), meshes, bare),
         plots=(plot,),
         promises=(
             Promise("bare skin: layered solver from the finest mesh, over the mesh's own error", worst, 1.0),
             Promise("unit: last halving of the mesh changes a level by, relative", shrink, 0.01),
-            Promise(
-                "fitted, left out: factor error of the levels", models["fitted"].assessed.left_out.geometric_mean, 1.35
-            ),
+            *of_scores,
         ),
         measured=machine("numpy", "scipy", "scikit-fem"),
     )
@@ -161,14 +165,6 @@ def finite_element_levels(fineness: float, pad: bool) -> tuple[NineLevels, list[
     return NineLevels(levels), seconds
 
 
-def _by_name(
-    table: MeasuredTable, model: str, two_levels: Callable[[MeasuredTable], np.ndarray]
-) -> dict[str, dict[str, float]]:
-    """Return the levels of a model that knows no shape."""
-    levels = two_levels(table) if model == "null" else [edge_levels(table.units(i), model) for i in range(9)]
-    return {name: {"": float(level)} for name, level in zip(table.names, levels, strict=True)}
-
-
 def _measured(table: MeasuredTable, unit: str) -> float:
     """Return the measured level of a unit of the page, whose controls have a shape."""
     name = unit if unit in table.names else f"{CONTROL} {unit.split(' ')[1]}"
@@ -178,13 +174,13 @@ def _measured(table: MeasuredTable, unit: str) -> float:
 def _units_table(table: MeasuredTable, closed: dict[str, NineLevels], solved: dict[str, NineLevels]) -> Table:
     rows: list[tuple] = []
     for i, name in enumerate(table.names):
-        models = [level for model in ("paper", "fitted") for level in closed[model].levels[name].values()]
+        models = [level for model in ("bush", "fitted", "paper") for level in closed[model].levels[name].values()]
         rows.append((name, float(table.levels[i]), *models, *(levels.shown(name) for levels in solved.values())))
     return Table(
         "Each unit's edge level, motor = 1",
-        ("unit", "measured", "paper", "fitted", *solved),
+        ("unit", "measured", "bush", "fitted", "paper", *solved),
         tuple(rows),
-        "paper and fitted carry constants from all nine levels, the finite elements none. The paper does not say in "
+        "The models carry constants from all nine levels, the finite elements none. The paper does not say in "
         "which shape a control was measured, so its finite-element level is the geometric mean of both, shown beside "
         "it.",
     )
@@ -223,8 +219,8 @@ def bare_skin(finenesses: Sequence[float], repeats: int) -> tuple[Table, float]:
 
 
 def _given(levels: Sequence[float]) -> Fit:
-    def fit(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
-        return lambda other: np.array(levels)
+    def fit(table: MeasuredTable, chosen: np.ndarray) -> np.ndarray:
+        return np.broadcast_to(levels, chosen.shape)
 
     return fit
 

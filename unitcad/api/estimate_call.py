@@ -65,9 +65,9 @@ def estimate(
 ) -> EdgeEstimate:
     """Estimate the vibration at a unit's edge, and on the skin beyond it.
 
-    `source` and `set` are as for `unitcad.load`. `models` ("paper", "consistent", "fitted"; "mechanics", which needs
-    scikit-fem and seconds) and `frequency_hz` stand in for the spec's. Nothing is drawn or written. Raises Refusal for
-    a value that is not valid, and for a custom design that no model describes.
+    `source` and `set` are as for `unitcad.load`. `models` ("bush", "fitted", "paper", "consistent"; "mechanics", which
+    needs scikit-fem and seconds) and `frequency_hz` stand in for the spec's. Nothing is drawn or written. Raises
+    Refusal for a value that is not valid, and for a custom design that no model describes.
     """
     spec = load(source, set)
     chosen = {

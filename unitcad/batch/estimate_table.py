@@ -1,6 +1,6 @@
 """The estimate-only sweep: no folders, one table, the closed forms evaluated over arrays of variants.
 
-A variant's edge level reads its design, its walls, its silicones and the frequency. Silicones and the frequency are
+A variant's edge level reads its design, its lengths, its silicones and the frequency. Silicones and the frequency are
 looked up value by value; everything else that is swept is validated once for each combination. Both are then put
 together as arrays, a block of variants at a time.
 """
@@ -16,8 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from unitcad.attenuation.edge.bush import sections
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import edge_levels
+from unitcad.attenuation.inputs import Geometry
 from unitcad.batch import task as tasks
 from unitcad.batch.batch_records import Failure, JournalEntry, Summary
 from unitcad.batch.journal import Journal
@@ -38,7 +40,7 @@ FIELDS = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
 
 @dataclass(frozen=True)
 class _Known:
-    """Input of the models for one combination: passes, walls (m), omega, and (N, 4) of the layers' FIELDS.
+    """Input of the models for one combination: passes, lengths (m), omega, and (N, 4) of the layers' FIELDS.
 
     A silicone that is known as a range only has NaN: no number can be given.
     """
@@ -48,6 +50,7 @@ class _Known:
     diameter_mm: float
     passes: float
     omega: float
+    geometry: Geometry
     walls: tuple[float, ...]
     silicones: np.ndarray
     models: tuple[str, ...]
@@ -132,6 +135,7 @@ def _known(spec: Spec) -> _Known:
         diameter_mm=spec.diameter_mm,
         passes=asked.passes,
         omega=2.0 * np.pi * asked.frequency.middle,
+        geometry=asked.geometry,
         walls=tuple(layer.thickness for layer in asked.layers),
         silicones=np.array([_silicone(layer) for layer in asked.layers]),
         models=closed_forms(spec.estimate.models),
@@ -178,6 +182,7 @@ def _block(
             thickness=np.array([entry.walls for entry in there]),
             omega=omega,
             passes=np.array([entry.passes for entry in there]),
+            section=sections([entry.geometry for entry in there]),
         )
         unknown = np.isnan(silicones).any(axis=(1, 2))
         for model in dict.fromkeys(model for entry in there for model in entry.models):

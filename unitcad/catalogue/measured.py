@@ -12,11 +12,13 @@ Level = Annotated[float, Meta(gt=0, description="amplitude at the edge over the 
 class MeasuredDesign(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Measurements of one design, by "Layer 1/Layer 2" in short names.
 
-    `passes`: how often the wave from motor to skin passes the border between the layers. `also_printed`: a second
-    figure of the paper for a level. `directions`: a comparison that the paper states without a figure.
+    `passes`: how often the wave from motor to skin passes the border between the layers. `caps`: whether the layers
+    close over the motor. `also_printed`: a second figure of the paper for a level. `directions`: a comparison that the
+    paper states without a figure.
     """
 
     passes: Annotated[float, Meta(gt=0)]
+    caps: bool = False
     levels: dict[str, Level]
     also_printed: dict[str, Level] = {}
     over_a_control_not_named: dict[str, Level] = {}

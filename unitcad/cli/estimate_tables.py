@@ -21,7 +21,11 @@ def print_estimate(data: dict[str, Any]) -> None:
         screen.print(_models(data))
     if "mechanics" in data:
         screen.print(_mechanics(data["mechanics"]))
+    inputs = _inputs(data)
+    if inputs:
+        screen.print(inputs)
     screen.print(_errors(data))
+    screen.print(_choice(data["table_error"]["chosen_without"]), soft_wrap=True)
     for reason in _reasons(data):
         screen.print(f"  {reason}", soft_wrap=True)
     paper = data["models"].get("paper", {})
@@ -101,18 +105,51 @@ def _models(data: dict[str, Any]) -> Table:
 
 
 def _errors(data: dict[str, Any]) -> Table:
-    """Tabulate each model's error against the measured values, beside the null model of two constants."""
-    table = Table("model", "levels", "unit left out", "ratios", "worst", "directions", title="error against the table")
-    for name in (*data["models"], "null"):
-        error = data["table_error"][name]
+    """Tabulate each model's error against the measured values, the best one with a unit left out first."""
+    errors = data["table_error"]
+    best = errors["order"][0]
+    table = Table("model", "levels", "unit left out", f"p ({best})", "ratios", "directions", title=_ERRORS)
+    for name in errors["order"]:
+        error = errors[name]
+        left_out = error["leave_one_unit_out"]["levels"]
+        p = error["against_best"]["p"]
         table.add_row(
             name,
             f"x {error['levels']['geometric_mean']:.2f}",
-            f"x {error['leave_one_unit_out']['levels']['geometric_mean']:.2f}",
+            f"x {left_out['geometric_mean']:.2f} ({left_out['range']['low']:.2f} to {left_out['range']['high']:.2f})",
+            "-" if p is None else f"{p:.2g}",
             f"x {error['ratios']['geometric_mean']:.2f}",
-            f"x {error['ratios']['worst']:.2f}",
             f"{error['directions']['right']} of {error['directions']['of']}",
         )
+    return table
+
+
+_ERRORS = "error against the table"
+
+
+def _choice(chosen: dict[str, Any]) -> str:
+    """Say what the score is when the form is chosen without the unit too."""
+    low, high = chosen["range"]["low"], chosen["range"]["high"]
+    return (
+        f"  chosen among {len(chosen['forms'])} forms without the unit too: x {chosen['geometric_mean']:.2f} "
+        f"({low:.2f} to {high:.2f}); p above 0.05: not told apart by nine units"
+    )
+
+
+def _inputs(data: dict[str, Any]) -> Table | None:
+    """Tabulate the percent by which a level grows with 1 % more of an input; inputs that no model reads stand below."""
+    seen = {name: block["inputs_seen"]["by"] for name, block in data["models"].items() if "inputs_seen" in block}
+    seen = {name: by for name, by in seen.items() if by is not None}
+    if not seen:
+        return None
+    table = Table("1 % more of", *seen, title="changes the edge level by, %")
+    every = next(iter(seen))
+    names = [*seen[every], *data["models"][every]["inputs_seen"]["not_seen"]]
+    for name in sorted(names, key=lambda name: -max(abs(by.get(name, 0.0)) for by in seen.values())):
+        if any(name in by for by in seen.values()):
+            table.add_row(name, *[f"{by[name]:+.2f}" if name in by else "not seen" for by in seen.values()])
+    unread = [name for name in names if not any(name in by for by in seen.values())]
+    table.caption = f"seen by none: {', '.join(unread)}" if unread else None
     return table
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from unitcad.attenuation.edge.bush import sections
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 
@@ -59,6 +60,7 @@ class Draws:
             thickness=np.tile([layer.thickness for layer in variant.layers], (self.count, 1)),
             omega=np.full(self.count, 2.0 * np.pi * variant.frequency.middle),
             passes=variant.passes,
+            section=sections([variant.geometry]),
         )
 
 

@@ -29,7 +29,7 @@ Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
 _LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
 _TISSUE = "one layer or more by name, skin first, each a table with density_kg_m3, poisson_ratio and a modulus"
 Moduli = Literal["dynamic", "quasi-static"]
-Model = Literal["paper", "consistent", "fitted", "mechanics"]
+Model = Literal["bush", "fitted", "paper", "consistent", "mechanics"]
 
 
 class Table(Struct, frozen=True, kw_only=True, repr_omit_defaults=True, forbid_unknown_fields=True):
@@ -132,7 +132,7 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     frequency_hz: kinds.Frequency | None = None
     amplitude_um: kinds.Amplitude | None = None
     tissue: str = "forearm"
-    models: Annotated[tuple[Model, ...], Meta(min_length=1)] = ("paper", "consistent", "fitted")
+    models: Annotated[tuple[Model, ...], Meta(min_length=1)] = ("bush", "fitted", "paper", "consistent")
     moduli: Annotated[Moduli, Meta(description="of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")] = (
         "dynamic"
     )

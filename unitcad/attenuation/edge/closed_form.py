@@ -7,7 +7,7 @@ through the walls of the layers, inside out, at the skin, and ends at the outer 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -32,12 +32,26 @@ def _quiet() -> np.errstate:
 
 
 @dataclass(frozen=True)
+class Section:
+    """Lengths of variants of N layers, m: outer_radii and caps (0: open rings) have the layers as last axis."""
+
+    cavity_radius: Any
+    motor_radius: Any
+    core_height: Any
+    outer_radii: Any
+    caps: Any
+
+    def __post_init__(self) -> None:
+        _as_arrays(self)
+
+
+@dataclass(frozen=True)
 class Units:
     """Variants of N layers: arrays whose last axis runs over the layers, inside out; omega and passes lack it.
 
     youngs_modulus Pa, density kg/m3, poisson_ratio, tan_delta, thickness m (of the walls), omega rad/s; passes is the
     divider's n: how often the wave from motor to skin passes the border between the layers; `CONTROL_PASSES` for a
-    control.
+    control. Only `bush` reads the section.
     """
 
     youngs_modulus: Any
@@ -47,20 +61,22 @@ class Units:
     thickness: Any
     omega: Any
     passes: Any
+    section: Section | None = None
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            object.__setattr__(self, field.name, np.asarray(getattr(self, field.name), dtype=float))
+        _as_arrays(self)
 
     def control(self, layer: int) -> Units:
-        """Return own-material controls: one layer as thick as all walls, of the material of `layer`, the same omega."""
-        one = {name: getattr(self, name)[..., layer, None] for name in _MATERIAL}
-        total = np.sum(np.broadcast_to(self.thickness, np.broadcast_shapes(*self._layered)), -1, keepdims=True)
-        return Units(**one, thickness=total, omega=self.omega, passes=CONTROL_PASSES)
+        """Return own-material controls: the same unit, every layer of the material of `layer`."""
+        one = {name: np.broadcast_to(v[..., layer, None], v.shape) for name in _MATERIAL for v in [getattr(self, name)]}
+        return replace(self, **one, passes=CONTROL_PASSES)
 
-    @property
-    def _layered(self) -> list[tuple[int, ...]]:
-        return [getattr(self, name).shape for name in (*_MATERIAL, "thickness")]
+
+def _as_arrays(record: Units | Section) -> None:
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if value is not None and not isinstance(value, Section):
+            object.__setattr__(record, field.name, np.asarray(value, dtype=float))
 
 
 _MATERIAL = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")

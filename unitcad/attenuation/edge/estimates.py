@@ -7,25 +7,39 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from unitcad.attenuation.curve import decay_at, layered_block
-from unitcad.attenuation.edge.fitted_models import MODELS, assessments
+from unitcad.attenuation.edge.fitted_models import MODELS, assessments, choice, forms, in_order, pairwise
 from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown
-from unitcad.attenuation.edge.measured_levels import Assessment
+from unitcad.attenuation.edge.scores import RANGE_PERCENT, Assessment
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 
 SIGNIFICANT_DIGITS = 9
 ASSUMPTIONS = [
-    "A flat ERM's sideways force turns in the skin's plane. The layered curve takes it so (`layered.drives`); the "
-    "models of the edge level know no direction of the force.",
+    "A flat ERM's sideways force turns in the skin's plane. The layered curve takes it so (`layered.drives`), and bush "
+    "its motion; the other models of the edge level know no direction of the force.",
     "Amplitude at the edge is |u_z| of the skin at r = D/2, z = 0, over the motor's amplitude; the paper does not say "
     "which axis it measured.",
     "Poisson's ratio and loss factor of the silicones are assumed, with ranges; nobody has measured them for this.",
-    "The cavity's air, the circuit, the bond and the motor's mass are in none of the models.",
+    "The cavity's air, the circuit's stiffness, the bond and the motor's mass are in none of the closed forms.",
 ]
 TABLE_NOTE = (
     "nine measured levels; twelve ratios of six units to the controls of their own materials (eight of them "
     "independent); geometric-mean factor, 1 is exact; left out: each unit predicted by constants fitted without it; "
     "null: two constants, the softer layer inside or not; computed when this was made"
 )
+RANGE_NOTE = (
+    "5 to 95 % of the score over units drawn again with replacement; of nine units it holds the score of new ones less "
+    "often than that (docs/model.md has the share)"
+)
+P_NOTE = (
+    "two-sided p of the mean difference of two models' errors with the unit left out, over all flips of the units' "
+    "signs; not corrected for the number of pairs"
+)
+CHOICE_NOTE = (
+    "each unit predicted by the form that is best on the other units, each of them left out; its constants are fitted "
+    "without the unit too"
+)
+SAME_P = 0.05
+"""Two models whose sign-flip p is above it are not told apart."""
 DECAY_AT_MM = (5.0, 10.0, 20.0, 30.0)
 
 
@@ -42,7 +56,7 @@ def estimate(
     """
     errors = table_error()
     blocks = {}
-    for model in models:
+    for model in sorted(models, key=errors["order"].index):
         block = model_block(variant, model)
         block["table_error"] = errors[model]
         blocks[model] = block
@@ -86,6 +100,7 @@ def frequency_table(
     `u_over_edge`: of |u| under the motor's drive; `u_z_over_edge`: of |u_z| under an axial one.
     """
     rows, places = [], [f"at_{d:g}_mm" for d in DECAY_AT_MM]
+    models = sorted(models, key=in_order(assessments()).index)
     for hertz in frequencies:
         at = replace(variant, frequency=Quantity(hertz))
         decays = decay_at(at, hertz, DECAY_AT_MM)
@@ -129,9 +144,36 @@ def variant_block(variant: EstimateInput) -> dict[str, Any]:
 
 
 def table_error() -> dict[str, Any]:
-    """Return every model's errors against the measured table, and the null model's."""
-    by_model: dict[str, Any] = {name: assessment_block(one) for name, one in assessments().items()}
-    return {**by_model, "what": TABLE_NOTE}
+    """Return every model's errors against the measured table, and the null model's.
+
+    `order`: by the score with a unit left out, the best first. `sign_flip`: p of each pair, the better one first.
+    `chosen_without`: the score when the form is chosen without the unit too.
+    """
+    found = assessments()
+    order = in_order(found)
+    by_model: dict[str, Any] = {name: assessment_block(found[name]) for name in order}
+    best = {worse: p for better, worse, p in pairwise(found) if better == order[0]}
+    for name in order:
+        p = best.get(name)
+        by_model[name]["against_best"] = {"model": order[0], "p": p, "told_apart": p is not None and p <= SAME_P}
+    chosen = choice()
+    return {
+        **by_model,
+        "what": TABLE_NOTE,
+        "range": RANGE_NOTE,
+        "order": order,
+        "sign_flip": {
+            "what": P_NOTE,
+            "pairs": [{"better": better, "worse": worse, "p": p} for better, worse, p in pairwise(found)],
+        },
+        "chosen_without": {
+            "what": CHOICE_NOTE,
+            **asdict(chosen.score),
+            "range": _range(chosen.range),
+            "forms": list(forms()),
+            "chosen": list(chosen.chosen),
+        },
+    }
 
 
 def assessment_block(assessment: Assessment) -> dict[str, Any]:
@@ -141,7 +183,7 @@ def assessment_block(assessment: Assessment) -> dict[str, Any]:
         "ratios": asdict(assessment.ratios),
         "directions": {"right": assessment.directions, "of": assessment.ratios.count},
         "leave_one_unit_out": {
-            "levels": asdict(assessment.left_out),
+            "levels": {**asdict(assessment.left_out), "range": _range(assessment.left_out_range)},
             "ratios": asdict(assessment.left_out_ratios) if assessment.left_out_ratios else None,
         },
     }
@@ -151,6 +193,10 @@ def _noted(variant: EstimateInput) -> list[str]:
     """Return what is to be said of moduli that are known but not at the motor's frequency."""
     moduli = [(layer.material, layer.youngs_modulus) for layer in variant.layers]
     return [f"{name} youngs_modulus: {one.note}" for name, one in moduli if one.note and one.value is not None]
+
+
+def _range(ends: tuple[float, float]) -> dict[str, Any]:
+    return {"low": ends[0], "high": ends[1], "percent": list(RANGE_PERCENT)}
 
 
 def _quantity(quantity: Quantity, factor: float) -> dict[str, Any]:

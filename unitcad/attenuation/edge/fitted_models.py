@@ -1,121 +1,183 @@
-"""The three models of the edge level as functions of arrays, their fitted constants, and the null model beside them.
+"""The models of the edge level, what is fitted to a measured table, and how well each does there.
 
-`paper` and `consistent` leave the level at the motor open (f1, f2 are not printed): one constant, the geometric mean
-over the table. `fitted` has two constants. `crossings`, layer propagation alone (k_t once for each pass of an
-interface), is compared with the table but gives no estimate. All are made from the catalogue's measured table when they
-are asked for.
+`paper`, `consistent` and `bush` leave the level at the motor open: one constant s, the geometric mean over the table.
+`fitted`, the divider, has two constants. `crossings` (layer propagation alone, k_t once for each pass of an interface)
+and the null model of two levels are compared with the table but give no estimate.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from typing import Any
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any, get_args
 
 import numpy as np
 
 from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.bush import CHOSEN, Form, bush
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.measured_levels import Assessment, Fit, MeasuredTable, Predict, assess, measured_table
+from unitcad.attenuation.edge.measured_levels import MeasuredTable, Predict, measured_table
+from unitcad.attenuation.edge.scores import Assessment, Choice, Fit, assess, choose_without, sign_flip_p
 
-MODELS = ("paper", "consistent", "fitted")
-STORED_FIT = {"kappa": 0.282048, "s": 0.659429, "left_out_levels": 1.3345, "left_out_ratios": 1.3299}
-"""The divider's constants and its leave-one-unit-out errors (geometric-mean factors) over the catalogue's nine levels.
-
-Made by `fit_divider(measured_table(), everyone)`, least squares of the log, and `assessments()["fitted"]`; shown by
-`unitcad accuracy models`; a test makes them again.
-"""
-
-
-def scale_of(path: Predict, table: MeasuredTable, chosen: np.ndarray) -> float:
-    """Return the one constant s of level = s path: geometric mean of measured / path over the chosen units."""
-    return float(np.exp(np.mean(np.log(table.levels / table.evaluate(path))[chosen])))
+MODELS = ("bush", "fitted", "paper", "consistent")
+"""The models that give an estimate."""
 
 
 def one_constant(path: Predict) -> Fit:
-    """Return the fit of the one constant s in level = s path."""
+    """Return the fit of the one constant s in level = s path: the geometric mean of measured / path."""
 
-    def fit(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
-        s = scale_of(path, table, chosen)
-        return lambda other: s * other.evaluate(path)
+    def fit(table: MeasuredTable, chosen: np.ndarray) -> np.ndarray:
+        levels = table.evaluate(path)
+        s = np.exp(chosen @ np.log(table.levels / levels) / chosen.sum(axis=1))
+        return s[:, None] * levels
 
     return fit
 
 
-def fit_divider(table: MeasuredTable, chosen: np.ndarray) -> tuple[float, float]:
-    """Fit (kappa, s) of level = s / (1 + kappa n E_outer/E_inner): least squares of the log, golden section."""
-    logs, contrast = np.log(table.levels[chosen]), table.contrast[chosen]
+def fit_divider(table: MeasuredTable, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Fit (kappa, s) of level = s / (1 + kappa n E_outer/E_inner) for masks or counts (M, units), shape (M,) each.
 
-    def parts(log_kappa: float) -> np.ndarray:
-        return logs + np.log1p(np.exp(log_kappa) * contrast)
+    Least squares of the log, by golden section in ln kappa.
+    """
+    logs, contrast, count = np.log(table.levels), table.contrast, chosen.sum(axis=1)
 
-    def misfit(log_kappa: float) -> float:
-        return float(np.var(parts(log_kappa)))
+    def parts(log_kappa: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        each = logs + np.log1p(np.exp(log_kappa)[:, None] * contrast)
+        mean = np.sum(each * chosen, axis=1) / count
+        return mean, np.sum((each - mean[:, None]) ** 2 * chosen, axis=1)
 
-    low, high = np.log(1e-3), np.log(1e2)
+    low, high = np.full(len(chosen), np.log(1e-3)), np.full(len(chosen), np.log(1e2))
     golden = (np.sqrt(5.0) - 1.0) / 2.0
-    left, right = high - golden * (high - low), low + golden * (high - low)
-    at_left, at_right = misfit(left), misfit(right)
-    while high - low > 1e-9:
-        if at_left < at_right:
-            high, right, at_right = right, left, at_left
-            left = high - golden * (high - low)
-            at_left = misfit(left)
-        else:
-            low, left, at_left = left, right, at_right
-            right = low + golden * (high - low)
-            at_right = misfit(right)
+    while np.max(high - low) > 1e-9:
+        left, right = high - golden * (high - low), low + golden * (high - low)
+        lower = parts(left)[1] < parts(right)[1]
+        low, high = np.where(lower, low, left), np.where(lower, right, high)
     best = (low + high) / 2.0
-    return float(np.exp(best)), float(np.exp(np.mean(parts(best))))
+    return np.exp(best), np.exp(parts(best)[0])
 
 
-def two_constants(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
-    """Return the divider fitted to the chosen units."""
+def two_constants(table: MeasuredTable, chosen: np.ndarray) -> np.ndarray:
+    """Return the divider's levels, fitted to each mask's units."""
     kappa, s = fit_divider(table, chosen)
-    return lambda other: s / (1.0 + kappa * other.contrast)
+    return s[:, None] / (1.0 + kappa[:, None] * table.contrast)
 
 
-def null(table: MeasuredTable, chosen: np.ndarray) -> Callable[[MeasuredTable], np.ndarray]:
+def null(table: MeasuredTable, chosen: np.ndarray) -> np.ndarray:
     """Fit two constants: one level where the inner layer is the softer one, one for all others."""
-    logs = np.log(table.levels)
-    soft = table.soft_inside
-    levels = [float(np.exp(np.mean(logs[chosen & (soft == side)]))) for side in (False, True)]
-    return lambda other: np.where(other.soft_inside, levels[1], levels[0])
+    logs, soft = np.log(table.levels), table.soft_inside
+    sides = []
+    for side in (soft, ~soft):
+        used = chosen & side
+        used = np.where(used.any(axis=1, keepdims=True), used, chosen)
+        sides.append(np.exp(np.sum(logs * used, axis=1) / used.sum(axis=1)))
+    return np.where(soft, sides[0][:, None], sides[1][:, None])
 
 
-def paths() -> dict[str, Predict]:
-    """Return each model, and the reading with k_t alone, as a function of units, before any constant."""
+@dataclass(frozen=True)
+class Compared:
+    """A model as it is compared with a table: its fit, how many constants, whether they enter ratios too."""
+
+    fit: Fit
+    constants: int
+    in_ratios: bool = False
+
+
+def compared() -> dict[str, Compared]:
+    """Return every model, the reading with k_t alone and the null."""
     return {
-        "paper": cf.paper_path,
-        "consistent": cf.consistent_path,
-        "fitted": lambda units: cf.divider(units, STORED_FIT["kappa"]),
-        "crossings": cf.transmission_only,
+        **{name: Compared(one_constant(path), 1) for name, path in _PATHS.items()},
+        "fitted": Compared(two_constants, 2, in_ratios=True),
+        "null": Compared(null, 2, in_ratios=True),
     }
+
+
+def forms() -> dict[str, Fit]:
+    """Return every form that was tried: each model in each of its readings."""
+    tried: dict[str, Fit] = {}
+    for wave in get_args(cf.Wave):
+        for reading in get_args(cf.Reading):
+            path = partial(cf.paper_path, wave=wave, reading=reading)
+            tried[f"paper, {wave.upper()} wave, {reading}"] = one_constant(path)
+        tried[f"consistent, {wave.upper()} wave"] = one_constant(partial(cf.consistent_path, wave=wave))
+    for form in bush_forms():
+        words = ("long" if form.long else "short", "filled" if form.filled else "gap as drawn")
+        name = ", ".join(("bush", *words, "floors" if form.floors else "no floors"))
+        tried[name] = one_constant(partial(bush, form=form))
+    return {**tried, **{name: compared()[name].fit for name in ("fitted", "crossings", "null")}}
+
+
+def bush_forms() -> list[Form]:
+    """Return the forms of `bush` that were tried, the chosen one first."""
+    every = [
+        Form(floors, filled, long) for long in (False, True) for floors in (True, False) for filled in (False, True)
+    ]
+    return sorted(every, key=lambda form: form != CHOSEN)
+
+
+_PATHS: dict[str, Predict] = {
+    "bush": bush,
+    "paper": cf.paper_path,
+    "consistent": cf.consistent_path,
+    "crossings": cf.transmission_only,
+}
+"""The models of one constant, before it."""
 
 
 @cache
 def assessments() -> dict[str, Assessment]:
-    """Compare every model, the reading with k_t alone and the null with the measured table."""
-    by_model = paths()
-    fits: dict[str, tuple[Fit, bool]] = {
-        "paper": (one_constant(by_model["paper"]), False),
-        "consistent": (one_constant(by_model["consistent"]), False),
-        "fitted": (two_constants, True),
-        "crossings": (one_constant(by_model["crossings"]), False),
-        "null": (null, True),
-    }
-    return {name: assess(fit, in_ratios) for name, (fit, in_ratios) in fits.items()}
+    """Compare every model, the reading with k_t alone and the null with the catalogue's measured table."""
+    return assess_all(measured_table())
+
+
+def assess_all(table: MeasuredTable) -> dict[str, Assessment]:
+    """Compare every model, the reading with k_t alone and the null with a measured table."""
+    return {name: assess(one.fit, one.in_ratios, table) for name, one in compared().items()}
+
+
+def in_order(found: dict[str, Assessment]) -> list[str]:
+    """Return the models by their score with a unit left out, the best first; of equals the one of fewer constants."""
+    return sorted(found, key=lambda name: (round(found[name].left_out.geometric_mean, 3), compared()[name].constants))
+
+
+def pairwise(found: dict[str, Assessment]) -> list[tuple[str, str, float]]:
+    """Return (better, worse, p) of each pair, in order: the sign-flip test of their errors with the unit left out."""
+    names = in_order(found)
+    return [
+        (a, b, sign_flip_p(found[a].left_out_errors, found[b].left_out_errors))
+        for i, a in enumerate(names)
+        for b in names[i + 1 :]
+    ]
 
 
 @cache
-def scales() -> dict[str, float]:
-    """Return the constant s of every model, from all nine levels; the divider's is stored."""
-    table = measured_table()
-    everyone = np.ones(len(table.names), dtype=bool)
-    constants = {name: scale_of(path, table, everyone) for name, path in paths().items() if name != "fitted"}
-    return {**constants, "fitted": STORED_FIT["s"]}
+def choice() -> Choice:
+    """Choose among all `forms` without the unit, over the catalogue's measured table."""
+    return choose_without(forms(), measured_table())
+
+
+def constants(table: MeasuredTable) -> dict[str, dict[str, float]]:
+    """Return the constants of every model that gives an estimate, from all units of the table, to six digits."""
+    everyone = np.ones((1, len(table.names)), dtype=bool)
+    kappa, s = fit_divider(table, everyone)
+    made = {"fitted": {"kappa": float(kappa[0]), "s": float(s[0])}}
+    for name, path in _PATHS.items():
+        made[name] = {"s": float(np.exp(np.mean(np.log(table.levels / table.evaluate(path)))))}
+    return {name: {key: float(f"{v:.6g}") for key, v in made[name].items()} for name in MODELS}
+
+
+@cache
+def stored() -> dict[str, dict[str, float]]:
+    """Return the constants from the catalogue's measured table."""
+    return constants(measured_table())
+
+
+def path_of(model: str) -> Predict:
+    """Return a model as a function of units, before its constant s. Raises KeyError for the null model."""
+    if model == "fitted":
+        return partial(cf.divider, kappa=stored()["fitted"]["kappa"])
+    return _PATHS[model]
 
 
 def edge_levels(units: Units, model: str) -> Any:
-    """Return the edge level (motor amplitude = 1) by `paper`, `consistent` or `fitted`, shape (...)."""
-    return scales()[model] * paths()[model](units)
+    """Return the edge level (motor amplitude = 1) by a model of `MODELS`, shape (...)."""
+    return stored()[model]["s"] * path_of(model)(units)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.bush import sections
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.fitted_models import STORED_FIT, paths, scales
+from unitcad.attenuation.edge.fitted_models import edge_levels, path_of, stored
+from unitcad.attenuation.edge.inputs_seen import inputs_seen
 from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 from unitcad.catalogue import measurements
@@ -23,6 +25,8 @@ KINDS = {
     "constant s from the table (f1 and f2 are not printed)",
     "consistent": "the same path with complex moduli, complex impedances and the exact attenuation; one constant s",
     "fitted": "empirical: a divider with two constants fitted to the measured table, no mechanics in it",
+    "bush": "the layers as bonded rubber bushes that a motor moving sideways works against, and the outer ones sheared "
+    "on a stiff base; one constant s from the table; a form that was chosen by its fit, not a proven mechanism",
 }
 ASSUMPTIONS = {
     "paper": [
@@ -42,12 +46,35 @@ ASSUMPTIONS = {
         "do not enter it.",
         "More than two layers: the outermost against the innermost one, which nobody has measured.",
     ],
+    "bush": [
+        "Layers with caps are taken to close under the motor too, with floors as thick as the caps. unitcad draws "
+        "none; without them the form puts units with caps above open rings, against the measurement.",
+        "Motor and what fills the cavity move sideways as one rigid core, whatever drive the motor has; the circuit's "
+        "stiffness is not in it.",
+        "Short bushes, free to bulge at their ends; a wall is about as thick as it is high, so the true stiffness lies "
+        "between a short and a long one's, and the long one's does not fit.",
+        "Quasi-static: the layers' inertia is 1 to 20 % of their stiffness at 125 Hz and is left out.",
+        "Continuum models with the same sideways motion fit the table worse.",
+    ],
 }
 
 
 def nominal(variant: EstimateInput) -> Units:
     """Return the variant's middle values as closed-form input."""
-    return _units(variant, np.array([[q.middle for _, q in _inputs(variant)]]), [0])
+    return stacked([variant])
+
+
+def stacked(variants: Sequence[EstimateInput]) -> Units:
+    """Return the middle values of variants of one number of layers as closed-form input, a row each."""
+    layers = [variant.layers for variant in variants]
+    return Units(
+        **{field: [[getattr(layer, field).middle for layer in row] for row in layers] for field in _FIELDS},
+        density=[[layer.density for layer in row] for row in layers],
+        thickness=[[layer.thickness for layer in row] for row in layers],
+        omega=[2.0 * np.pi * variant.frequency.middle for variant in variants],
+        passes=[variant.passes for variant in variants],
+        section=sections([variant.geometry for variant in variants]),
+    )
 
 
 def corners(variant: EstimateInput) -> Units:
@@ -68,7 +95,7 @@ def corners(variant: EstimateInput) -> Units:
         rows = np.repeat(middle[None], 2 * len(moving), axis=0)
         for row, i in enumerate(moving):
             rows[2 * row : 2 * row + 2, i] = ends[i]
-    return _units(variant, np.concatenate([middle[None], rows]), None)
+    return _units(variant, np.concatenate([middle[None], rows]))
 
 
 def _inputs(variant: EstimateInput) -> Iterator[tuple[tuple[str, str], Quantity]]:
@@ -82,10 +109,8 @@ def _inputs(variant: EstimateInput) -> Iterator[tuple[tuple[str, str], Quantity]
     yield ("", "frequency"), variant.frequency
 
 
-def _units(variant: EstimateInput, rows: np.ndarray, only: list[int] | None) -> Units:
+def _units(variant: EstimateInput, rows: np.ndarray) -> Units:
     at = {key: i for i, (key, _) in enumerate(_inputs(variant))}
-    if only is not None:
-        rows = rows[only]
     columns = {field: rows[:, [at[layer.material, field] for layer in variant.layers]] for field in _FIELDS}
     return Units(
         **columns,
@@ -93,6 +118,7 @@ def _units(variant: EstimateInput, rows: np.ndarray, only: list[int] | None) -> 
         thickness=np.tile([layer.thickness for layer in variant.layers], (len(rows), 1)),
         omega=2.0 * np.pi * rows[:, -1],
         passes=variant.passes,
+        section=sections([variant.geometry]),
     )
 
 
@@ -135,7 +161,7 @@ def spread(variant: EstimateInput, predict: Callable[[Units], Any]) -> dict[str,
 
 def model_block(variant: EstimateInput, model: str) -> dict[str, Any]:
     """Return one entry of the estimate's `models`, without its error against the table."""
-    path, scale = paths()[model], scales()[model]
+    path, scale = path_of(model), stored()[model]["s"]
     block: dict[str, Any] = {
         "kind": KINDS[model],
         "edge_level": {
@@ -146,11 +172,9 @@ def model_block(variant: EstimateInput, model: str) -> dict[str, Any]:
     if variant.amplitude is not None:
         factor = scale * variant.amplitude * 1e6
         block["edge_amplitude_um"] = spread(variant, lambda units: factor * path(units))
-    block["constants"] = (
-        {"s": scale, "kappa": STORED_FIT["kappa"], "made_by": "least squares of the log of nine measured levels"}
-        if model == "fitted"
-        else {"s": scale, "made_by": "geometric mean of measured level over path, nine levels"}
-    )
+    by_squares = "least squares of the log of nine measured levels"
+    by_mean = "geometric mean of measured level over path, nine levels"
+    block["constants"] = {**stored()[model], "made_by": by_squares if model == "fitted" else by_mean}
     controls = _controls(variant)
     block["hierarchical_over_control"] = [_ratio(variant, model, index) for index in controls] or None
     if not controls:
@@ -159,6 +183,7 @@ def model_block(variant: EstimateInput, model: str) -> dict[str, Any]:
         block |= _paper_details(variant, controls)
     if model == "consistent":
         block["wave_of_the_level"] = "s"
+    block["inputs_seen"] = inputs_seen(variant, lambda variants: edge_levels(stacked(variants), model))
     block["assumptions"] = ASSUMPTIONS[model]
     return block
 
@@ -174,13 +199,12 @@ def _controls(variant: EstimateInput) -> list[int]:
 def _ratio(variant: EstimateInput, model: str, index: int) -> dict[str, Any]:
     """Return the level over that of the control of layer `index`, by wave where the model has waves."""
     name = variant.layers[index].material
-    if model == "fitted":
-        path = paths()["fitted"]
+    if model in ("fitted", "bush"):
+        path = path_of(model)
         return {"control": name, **spread(variant, lambda u: path(u) / path(u.control(index)))}
-    path_of = cf.paper_path if model == "paper" else cf.consistent_path
+    along = cf.paper_path if model == "paper" else cf.consistent_path
     by_wave = {
-        wave: spread(variant, lambda u, wave=wave: path_of(u, wave) / path_of(u.control(index), wave))
-        for wave in _WAVES
+        wave: spread(variant, lambda u, wave=wave: along(u, wave) / along(u.control(index), wave)) for wave in _WAVES
     }
     return {"control": name, **by_wave["s"], "wave": "s", "p": by_wave["p"]}
 

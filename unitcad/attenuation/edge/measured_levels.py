@@ -1,4 +1,4 @@
-"""The paper's measured table, and how far a model is from it: levels, ratios to controls, directions, leave-one-out."""
+"""Measured units as data, what a model's levels of them are, and the catalogue's own table: the paper's nine levels."""
 
 from __future__ import annotations
 
@@ -9,28 +9,32 @@ from typing import Any
 
 import numpy as np
 
-from unitcad.attenuation.edge.closed_form import CONTROL_PASSES, Units
-from unitcad.catalogue import materials, measurements
+from unitcad.attenuation.edge.closed_form import CONTROL_PASSES, Section, Units
+from unitcad.catalogue import materials, measurements, motors
 
 CONTROL = "single"
 """What stands for the design in a control's name."""
-_WALL = 1.25e-3  # m, section II-B
+_MOTOR = "LCM0720A3463F"  # section III-A
+_WALL, _DIAMETER = 1.25e-3, 14e-3  # m, section II-B
+_CIRCUIT = 0.11e-3  # m, assumed: a usual two-layer stock
 _OMEGA = 2 * np.pi * 125.0  # rad/s, the middle of the 100 to 150 Hz of section III-A
 
 Predict = Callable[[Units], Any]
 """Levels of units of one number of layers, shape (...)."""
-Fit = Callable[["MeasuredTable", np.ndarray], "Callable[[MeasuredTable], np.ndarray]"]
-"""From a table and a mask of the units to use, a function that gives the levels of a table's units."""
 
 
 @dataclass(frozen=True)
 class MeasuredTable:
-    """The measured units, controls first: names, design (`CONTROL`: one layer), layers inside out, level."""
+    """Measured units: names, design (`CONTROL`: one layer), layers inside out, level (motor = 1), the models' input.
+
+    A unit of which more than one shape is possible has an input with a row for each; its level is the geometric mean.
+    """
 
     names: tuple[str, ...]
     designs: tuple[str, ...]
     layers: tuple[tuple[str, ...], ...]
     levels: np.ndarray
+    inputs: tuple[Units, ...]
 
     @property
     def pairs(self) -> list[tuple[int, int]]:
@@ -41,11 +45,11 @@ class MeasuredTable:
     @property
     def soft_inside(self) -> np.ndarray:
         """Whether the innermost layer of a unit is softer than the outermost, a truth value each."""
-        return self.evaluate(lambda units: units.youngs_modulus[..., -1] - units.youngs_modulus[..., 0]) > 0
+        return self.evaluate(lambda units: units.youngs_modulus[..., -1] / units.youngs_modulus[..., 0]) > 1
 
     def evaluate(self, predict: Predict) -> np.ndarray:
-        """Return `predict` of every unit, at the nominal values of the catalogue."""
-        return np.array([float(predict(self.units(i))) for i in range(len(self.names))])
+        """Return `predict` of every unit."""
+        return np.array([np.exp(np.mean(np.log(predict(units)))) for units in self.inputs])
 
     @property
     def contrast(self) -> np.ndarray:
@@ -54,21 +58,7 @@ class MeasuredTable:
 
     def units(self, index: int) -> Units:
         """Return the closed forms' input for one unit of the table."""
-        return _units(self.designs[index], self.layers[index])
-
-
-@cache
-def _units(design: str, layers: tuple[str, ...]) -> Units:
-    known = [materials()[name] for name in layers]
-    return Units(
-        youngs_modulus=[1e3 * float(m.youngs_modulus_kpa or np.nan) for m in known],
-        density=[1e3 * float(m.density_g_cm3) for m in known],
-        poisson_ratio=[float(m.poisson_ratio) for m in known],
-        tan_delta=[float(m.loss_factor) for m in known],
-        thickness=[2 * _WALL / len(known)] * len(known),
-        omega=_OMEGA,
-        passes=CONTROL_PASSES if design == CONTROL else measurements().designs[design].passes,
-    )
+        return self.inputs[index]
 
 
 @cache
@@ -82,66 +72,32 @@ def measured_table() -> MeasuredTable:
             designs.append(design)
             layers.append(data.layers(unit))
             levels.append(level)
-    return MeasuredTable(tuple(names), tuple(designs), tuple(layers), np.array(levels))
+    inputs = tuple(_units(design, unit) for design, unit in zip(designs, layers, strict=True))
+    return MeasuredTable(tuple(names), tuple(designs), tuple(layers), np.array(levels), inputs)
 
 
-@dataclass(frozen=True)
-class Score:
-    """Geometric-mean and worst factor error (1 is exact) of a set of figures, and which one is the worst."""
-
-    geometric_mean: float
-    worst: float
-    worst_at: str
-    count: int
-
-
-@dataclass(frozen=True)
-class Assessment:
-    """A model against the table. `directions`: of how many ratios the side of 1 is right.
-
-    `left_out` and `left_out_ratios`: each unit predicted by constants fitted without it (None: none in it).
-    """
-
-    levels: Score
-    ratios: Score
-    directions: int
-    left_out: Score
-    left_out_ratios: Score | None
-
-
-def assess(fit: Fit, fitted_ratios: bool, table: MeasuredTable | None = None) -> Assessment:
-    """Fit to all units and to all but one, and compare. `fitted_ratios`: a fitted constant enters the ratios too."""
-    table = table or measured_table()
-    everyone = np.ones(len(table.names), dtype=bool)
-    levels = fit(table, everyone)(table)
-    without = [fit(table, _all_but(everyone, i))(table) for i in range(everyone.size)]
-    left_out = np.array([predicted[i] for i, predicted in enumerate(without)])
-    pairs = table.pairs
-    measured = np.array([table.levels[i] / table.levels[c] for i, c in pairs])
-    ratios = np.array([levels[i] / levels[c] for i, c in pairs])
-    names = [f"{table.names[i]} to {table.names[c]}" for i, c in pairs]
-    return Assessment(
-        levels=_score(levels, table.levels, table.names),
-        ratios=_score(ratios, measured, names),
-        directions=int(np.sum(np.sign(_log(ratios)) == np.sign(np.log(measured)))),
-        left_out=_score(left_out, table.levels, table.names),
-        left_out_ratios=_score(np.array([without[i][i] / without[i][c] for i, c in pairs]), measured, names)
-        if fitted_ratios
-        else None,
+def _units(design: str, layers: tuple[str, ...]) -> Units:
+    """Return the input of a unit of the paper, at the catalogue's nominal values; a control's in every design."""
+    known = [materials()[name] for name in layers]
+    all_designs = measurements().designs
+    shapes = list(all_designs.values()) if design == CONTROL else [all_designs[design]]
+    motor = motors()[_MOTOR]
+    height = float(motor.thickness_mm) * 1e-3
+    wall = 2 * _WALL / len(layers)
+    section = Section(
+        cavity_radius=[_DIAMETER / 2 - 2 * _WALL] * len(shapes),
+        motor_radius=[float(motor.diameter_mm) * 1e-3 / 2] * len(shapes),
+        core_height=[height + (_CIRCUIT if shape.caps else 0.0) for shape in shapes],
+        outer_radii=[[_DIAMETER / 2 - wall * i for i in reversed(range(len(layers)))]] * len(shapes),
+        caps=[[wall if shape.caps else 0.0] * len(layers) for shape in shapes],
     )
-
-
-def _log(ratios: np.ndarray) -> np.ndarray:
-    return np.where(np.abs(ratios - 1.0) < 1e-9, 0.0, np.log(ratios))
-
-
-def _all_but(everyone: np.ndarray, index: int) -> np.ndarray:
-    chosen = everyone.copy()
-    chosen[index] = False
-    return chosen
-
-
-def _score(predicted: np.ndarray, measured: np.ndarray, names: Any) -> Score:
-    off = np.abs(np.log(predicted / measured))
-    worst = int(np.argmax(off))
-    return Score(float(np.exp(off.mean())), float(np.exp(off[worst])), str(names[worst]), off.size)
+    return Units(
+        youngs_modulus=[1e3 * float(m.youngs_modulus_kpa or np.nan) for m in known],
+        density=[1e3 * float(m.density_g_cm3) for m in known],
+        poisson_ratio=[float(m.poisson_ratio) for m in known],
+        tan_delta=[float(m.loss_factor) for m in known],
+        thickness=[wall] * len(layers),
+        omega=_OMEGA,
+        passes=CONTROL_PASSES if design == CONTROL else all_designs[design].passes,
+        section=section,
+    )

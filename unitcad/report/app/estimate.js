@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const { el, number, section, table, facts, theme, curvePlot } = window.unitcad;
-  const NAMES = { paper: "Paper, as printed", consistent: "Paper's path, corrected", fitted: "Fitted divider", crossings: "Interfaces alone", null: "Null: two constants" };
+  const NAMES = { bush: "Rubber bushes", paper: "Paper, as printed", consistent: "Paper's path, corrected", fitted: "Fitted divider", crossings: "Interfaces alone", null: "Null: two constants" };
   const nameOf = (model) => NAMES[model] || model;
   const known = (value) => typeof value === "number" && Number.isFinite(value);
 
@@ -59,7 +59,7 @@
     return el("figure", { className: "ranges" }, el("figcaption", {}, caption), rows.map(line), scale, legend.length > 0 && el("ul", { className: "key" }, legend));
   }
 
-  const COLOURS = { paper: "series-1", consistent: "series-3", fitted: "series-2" };
+  const COLOURS = { paper: "series-1", consistent: "series-3", fitted: "series-2", bush: "series-5" };
 
   function levels(data) {
     const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: block.edge_level || {}, colour: COLOURS[model] || "series-4" }));
@@ -131,15 +131,36 @@
   }
 
   function errors(data) {
-    const compared = Object.entries(data.table_error || {}).filter(([, entry]) => entry && entry.levels);
+    const all = data.table_error || {};
+    const compared = Object.entries(all).filter(([, entry]) => entry && entry.levels);
     if (!compared.length) return null;
+    const order = all.order || [];
+    compared.sort(([a], [b]) => order.indexOf(a) - order.indexOf(b));
+    const chosen = all.chosen_without;
+    const ends = (range) => (range ? `${number(range.low, 3)} to ${number(range.high, 3)}` : "–");
+    const test = ({ against_best: against }) => (against && known(against.p) ? against.p : "–");
     const factor = (entry) => (entry ? entry.geometric_mean : "–");
     const out = (entry, key) => factor((entry.leave_one_unit_out || {})[key]);
     return [el("h3", {}, "Error against the measured table"),
-      table(["Model", "Nine levels", "left out", "worst", "Twelve ratios", "left out", "Directions"], compared.map(([model, entry]) => [
-        nameOf(model), factor(entry.levels), out(entry, "levels"), entry.levels.worst, factor(entry.ratios), out(entry, "ratios"),
+      table(["Model", "Nine levels", "left out", "5 to 95 %", "p to the best", "worst", "Twelve ratios", "left out", "Directions"], compared.map(([model, entry]) => [
+        nameOf(model), factor(entry.levels), out(entry, "levels"), ends(((entry.leave_one_unit_out || {}).levels || {}).range), test(entry), entry.levels.worst, factor(entry.ratios), out(entry, "ratios"),
         entry.directions ? `${entry.directions.right} of ${entry.directions.of}` : "–"]), { label: "Error against the measured table" }),
-      el("p", { className: "note" }, `Factors; 1 is exact. ${(data.table_error.what || "")}`)];
+      el("p", { className: "note" }, `Factors; 1 is exact. ${all.what || ""}`),
+      all.range && el("p", { className: "note" }, `Range: ${all.range}. p: ${all.sign_flip.what}.`),
+      chosen && el("p", { className: "note" }, `Chosen among ${chosen.forms.length} forms without the unit too: ${number(chosen.geometric_mean, 3)} (${ends(chosen.range)}).`)];
+  }
+
+  // What a percent more of each input does to each model's level, in percent; what no model reads is named below.
+  function inputs(models) {
+    const reading = Object.entries(models).map(([model, block]) => [model, block.inputs_seen || {}]).filter(([, seen]) => seen.by);
+    if (!reading.length) return null;
+    const names = [...Object.keys(reading[0][1].by), ...reading[0][1].not_seen];
+    const most = (name) => Math.max(...reading.map(([, seen]) => Math.abs(seen.by[name] || 0)));
+    const [read, unread] = [names.filter((name) => most(name) > 0), names.filter((name) => most(name) === 0)];
+    read.sort((a, b) => most(b) - most(a));
+    return [el("h3", {}, "Inputs that a model sees"),
+      table(["1 % more of", ...reading.map(([model]) => nameOf(model))], read.map((name) => [name, ...reading.map(([, seen]) => (name in seen.by ? seen.by[name] : "not seen"))]), { label: "Inputs that a model sees" }),
+      el("p", { className: "note" }, `Change of the level at the edge in percent, at the middle of the inputs' ranges.${unread.length ? ` Seen by none: ${unread.join(", ")}.` : ""}`)];
   }
 
   function assumptions(data) {
@@ -159,7 +180,7 @@
     }
     return section("estimate", "Attenuation estimate",
       el("p", {}, "An estimate, not a measurement: how much of the motor's amplitude reaches the skin at the unit's edge, by each model, and how it decays from there."),
-      levels(data), mechanics(data.mechanics), ratios(data), el("h3", {}, "Outwards from the edge"), curves(data.layered), margins(data.models || {}), errors(data), assumptions(data),
+      levels(data), mechanics(data.mechanics), ratios(data), inputs(data.models || {}), el("h3", {}, "Outwards from the edge"), curves(data.layered), margins(data.models || {}), errors(data), assumptions(data),
       el("details", {}, el("summary", {}, "All numbers"), facts(data)));
   }
 

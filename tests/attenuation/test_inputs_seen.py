@@ -1,0 +1,100 @@
+"""What a model reads: slopes against those of specs that were changed and worked out anew, and against formulas."""
+
+import math
+
+import numpy as np
+import pytest
+
+from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels, stored
+from unitcad.attenuation.edge.inputs_seen import changed, inputs_seen
+from unitcad.attenuation.edge.level import nominal, stacked
+from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.validation import load
+
+SPECS = {
+    "encapsulating": (),
+    "embedded": (),
+    "filled": ("motor.fill=true",),
+    "three-layer": (),
+    "single-encapsulating": (),
+}
+STEP = 1e-3
+
+
+def spec_of(name: str, *more: str):
+    return load("encapsulating" if name == "filled" else name, [*SPECS[name], *more])
+
+
+def asked(spec, path: str) -> float | None:
+    """The spec's value at a path of the estimate's inputs; None for what a spec has elsewhere or not at all."""
+    parts = path.split(".")
+    if parts[0] == "layers" and parts[2] in ("wall_mm", "cap_mm"):
+        return getattr(spec.layers[int(parts[1])], parts[2])
+    if path == "diameter_mm":
+        return spec.diameter_mm
+    if path in ("motor.diameter_mm", "motor.thickness_mm"):
+        return getattr(spec.motor, parts[1])
+    if path in ("fpcb.pad_diameter_mm", "fpcb.thickness_mm"):
+        return getattr(spec.fpcb, parts[1])
+    return spec.estimate.frequency_hz if path == "estimate.frequency_hz" else None
+
+
+@pytest.mark.parametrize("name", SPECS)
+@pytest.mark.parametrize("model", ["bush", "paper"])
+def test_slopes_are_those_of_specs_that_were_changed(name: str, model: str) -> None:
+    spec = spec_of(name)
+    variant = estimate_input(spec)
+    found = inputs_seen(variant, lambda variants: edge_levels(stacked(variants), model))
+    compared = 0
+    for path in changed(variant):
+        value = asked(spec, path)
+        if value is None:
+            continue
+        pad = spec.fpcb and path != "fpcb.pad_diameter_mm"
+        keep = [f"fpcb.pad_diameter_mm={spec.fpcb.pad_diameter_mm!r}"] if pad else []
+        specs = [spec_of(name, *keep, f"{path}={value * factor!r}") for factor in (math.exp(-STEP), math.exp(STEP))]
+        low, high = (float(edge_levels(nominal(estimate_input(one)), model)[0]) for one in specs)
+        slope = math.log(high / low) / (2 * STEP)
+        assert found["by"].get(path, 0.0) == pytest.approx(slope, abs=2e-4), path
+        compared += 1
+    assert compared >= 6
+
+
+def test_slopes_by_formula() -> None:
+    """The divider: x/(1 + x) with x = kappa n E2/E1. The paper: the exponents along the walls."""
+    blocks = estimate_spec(load("encapsulating"))["models"]
+    x = stored()["fitted"]["kappa"] * 2 * 355 / 15
+    slopes = {"layers.0.youngs_modulus_kpa": x / (1 + x), "layers.1.youngs_modulus_kpa": -x / (1 + x)}
+    assert blocks["fitted"]["inputs_seen"]["by"] == pytest.approx(slopes, abs=1e-4)
+    paper = blocks["paper"]["inputs_seen"]["by"]
+    (exponents,) = (one["exponents_s_wave"] for one in blocks["paper"]["readings"] if one["eta"] == "loss_modulus")
+    assert [paper[f"layers.{i}.wall_mm"] for i in (0, 1)] == pytest.approx([-e for e in exponents], abs=1e-4)
+    assert paper["estimate.frequency_hz"] == pytest.approx(-sum(exponents), abs=1e-4)
+
+
+@pytest.mark.parametrize("name", SPECS)
+def test_each_input_is_seen_or_named_as_not_seen(name: str) -> None:
+    spec = spec_of(name)
+    for model, block in estimate_spec(spec)["models"].items():
+        seen = block["inputs_seen"]
+        assert model in MODELS
+        assert {*seen["by"], *seen["not_seen"]} == set(changed(estimate_input(spec)))
+        assert not set(seen["by"]) & set(seen["not_seen"])
+    bush = estimate_spec(spec)["models"]["bush"]["inputs_seen"]["by"]
+    assert {"diameter_mm", "motor.thickness_mm"} <= set(bush)
+    # Layer 1 reaches a filled gap's motor whatever its wall, and one layer's modulus cancels.
+    assert ("layers.0.wall_mm" in bush) == (name != "filled")
+    assert ("layers.0.youngs_modulus_kpa" in bush) == (not name.startswith("single"))
+
+
+def test_another_model_s_slopes_come_from_the_same_function() -> None:
+    variant = estimate_input(load("encapsulating"))
+
+    def cube_of_the_mass(variants):
+        return [one.geometry.motor_mass.middle**3 * one.tissue[0].shear_modulus.middle ** -0.5 for one in variants]
+
+    found = inputs_seen(variant, cube_of_the_mass)
+    assert found["by"] == {"motor mass": 3.0, "tissue shear modulus": -0.5}
+    nothing = inputs_seen(variant, lambda variants: np.full(len(variants), np.nan))
+    assert nothing["by"] is None
+    assert "no finite level" in nothing["reason"]

@@ -1,0 +1,141 @@
+"""Scores against scipy's bootstrap and permutation test, brute-force loops, and tables whose truth is known."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from unitcad.accuracy.level_scores import permutation_p, simulated, with_levels
+from unitcad.attenuation.edge.fitted_models import (
+    assess_all,
+    assessments,
+    choice,
+    compared,
+    forms,
+    in_order,
+    one_constant,
+    pairwise,
+)
+from unitcad.attenuation.edge.measured_levels import measured_table
+from unitcad.attenuation.edge.scores import bootstrap_range, choose_without, left_out_errors, sign_flip_p
+from unitcad.estimating import estimate_spec
+from unitcad.validation import load
+
+TABLE = measured_table()
+RNG = np.random.default_rng(3)
+
+
+def test_left_out_errors_are_those_of_single_fits() -> None:
+    """Each mask on its own; with one constant also the closed form n/(n - 1) of the residual."""
+    for name, model in compared().items():
+        errors = left_out_errors(model.fit, TABLE)
+        for i in range(9):
+            mask = np.arange(9) != i
+            alone = model.fit(TABLE, mask[None])[0, i]
+            assert errors[i] == pytest.approx(abs(np.log(alone / TABLE.levels[i])), rel=1e-6), name
+        if model.constants == 1:
+            residuals = np.log(TABLE.levels / model.fit(TABLE, np.ones((1, 9), dtype=bool))[0])
+            assert errors == pytest.approx(np.abs(residuals) * 9 / 8, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["bush", "fitted", "null"])
+def test_the_range_is_scipy_s_percentile_bootstrap(name: str) -> None:
+    errors = assessments()[name].left_out_errors
+    reference = stats.bootstrap(
+        (errors,), np.mean, confidence_level=0.9, n_resamples=40_000, method="percentile", rng=np.random.default_rng(1)
+    ).confidence_interval
+    assert bootstrap_range(errors) == pytest.approx(tuple(np.exp(reference)), rel=0.01)
+
+
+def test_ranges_that_were_measured_before() -> None:
+    """By another program, to a hundredth or two of resampling."""
+    found = {name: one.left_out_range for name, one in assessments().items()}
+    for name, ends in {"fitted": (1.18, 1.53), "crossings": (1.22, 1.48), "null": (1.30, 1.79)}.items():
+        assert found[name] == pytest.approx(ends, abs=0.015)
+    p = {frozenset(pair): value for *pair, value in pairwise(assessments())}
+    assert p[frozenset(("crossings", "fitted"))] == pytest.approx(0.92, abs=0.005)
+    assert p[frozenset(("fitted", "paper"))] == pytest.approx(0.055, abs=0.0005)
+
+
+@pytest.mark.parametrize(("a", "b"), [*itertools.combinations(("bush", "fitted", "crossings", "paper", "null"), 2)])
+def test_sign_flips_are_scipy_s_exact_permutation_test(a: str, b: str) -> None:
+    errors, others = (assessments()[name].left_out_errors for name in (a, b))
+    reference = stats.permutation_test(
+        (errors, others),
+        lambda x, y, axis: np.mean(x - y, axis=axis),
+        permutation_type="samples",
+        n_resamples=np.inf,
+        vectorized=True,
+    )
+    assert sign_flip_p(errors, others) == pytest.approx(reference.pvalue, abs=1e-12)
+    assert sign_flip_p(others, errors) == sign_flip_p(errors, others)
+
+
+def test_sign_flips_of_many_units_are_drawn_and_agree_with_all_of_them() -> None:
+    errors, others = RNG.normal(0.3, 1, 14), np.zeros(14)
+    signs = np.array(list(itertools.product((1, -1), repeat=14)))
+    exact = np.mean(np.abs(signs @ errors) >= abs(errors.sum()) - 1e-12)
+    assert sign_flip_p(errors, others) == pytest.approx(exact, abs=0.02)
+    assert sign_flip_p(errors, errors) == 1
+    assert sign_flip_p(np.full(9, 1.0), np.zeros(9)) == 2 / 512
+
+
+def test_the_choice_without_a_unit_is_what_loops_give() -> None:
+    fits = forms()
+    found = choose_without(fits, TABLE)
+    errors = []
+    for i in range(9):
+        others = [j for j in range(9) if j != i]
+
+        def error(fit, unit, without):
+            mask = np.array([j not in without for j in range(9)])
+            return abs(np.log(fit(TABLE, mask[None])[0, unit] / TABLE.levels[unit]))
+
+        inner = {name: np.mean([error(fit, j, (i, j)) for j in others]) for name, fit in fits.items()}
+        best = min(inner, key=inner.__getitem__)
+        assert inner[found.chosen[i]] == pytest.approx(inner[best], rel=1e-9)
+        errors.append(error(fits[found.chosen[i]], i, (i,)))
+    assert found.score.geometric_mean == pytest.approx(np.exp(np.mean(errors)), rel=1e-9)
+    assert choice().score == found.score
+    assert found.score.geometric_mean > min(one.left_out.geometric_mean for one in assessments().values())
+
+
+def test_a_true_model_is_first_and_chosen_and_the_order_follows_the_scores() -> None:
+    true = with_levels(TABLE, compared()["crossings"].fit(TABLE, np.ones((1, 9), dtype=bool))[0])
+    found = assess_all(true)
+    assert in_order(found)[0] == "crossings"
+    assert found["crossings"].left_out.geometric_mean == pytest.approx(1, abs=1e-9)
+    assert set(choose_without(forms(), true).chosen) == {"crossings"}
+    left_out = [found[name].left_out.geometric_mean for name in in_order(found)]
+    assert left_out == sorted(left_out)
+    estimated = estimate_spec(load("embedded"))
+    assert estimated["table_error"]["order"] == in_order(assessments())
+    assert list(estimated["models"]) == [n for n in in_order(assessments()) if n in estimated["models"]]
+
+
+def test_a_table_of_other_units_is_scored_as_well() -> None:
+    """Seven of the units in another order: nothing holds the number nine."""
+    kept = [8, 0, 3, 4, 1, 6, 2]
+    part = {name: tuple(getattr(TABLE, name)[i] for i in kept) for name in ("names", "designs", "layers", "inputs")}
+    found = assess_all(replace(TABLE, **part, levels=TABLE.levels[kept]))
+    assert all(one.left_out.count == 7 for one in found.values())
+    assert found["bush"].left_out_errors.shape == (7,)
+
+
+def test_simulated_tables_know_the_truth_and_shuffled_ones_nothing() -> None:
+    study = simulated("bush", 60, TABLE)
+    assert study.told_apart.keys() == set(compared()) - {"bush"}
+    assert 0.6 < study.holds < 1
+    assert study.false < 0.2
+    assert study.told_apart["consistent"] > study.told_apart["fitted"]
+    assert permutation_p("bush", 99, TABLE) <= 0.05
+    shuffled = with_levels(TABLE, np.roll(TABLE.levels, 4))
+    assert permutation_p("bush", 99, shuffled) > 0.05  # what the promise would break on
+
+
+def test_without_noise_a_simulated_score_is_certain() -> None:
+    true = with_levels(TABLE, one_constant(lambda u: u.passes)(TABLE, np.ones((1, 9), dtype=bool))[0])
+    assert left_out_errors(one_constant(lambda u: u.passes), true) == pytest.approx(np.zeros(9), abs=1e-12)
+    assert bootstrap_range(np.zeros(9)) == (1.0, 1.0)

@@ -1,0 +1,160 @@
+"""What the scores of the edge level's models are worth: permuted tables, and simulated ones whose truth is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from unitcad.accuracy.result import Promise, Table
+from unitcad.attenuation.edge.fitted_models import (
+    assessments,
+    choice,
+    compared,
+    forms,
+    in_order,
+    pairwise,
+)
+from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
+from unitcad.attenuation.edge.scores import RANGE_HOLDS, Fit, assess, bootstrap_range, left_out_errors, sign_flip_p
+
+LEVEL = 0.05
+"""Of a test: two models are told apart at or below it."""
+_SEED = 5417
+
+
+@dataclass(frozen=True)
+class Study:
+    """Outcomes over simulated tables. `truth`: the model that made them, each level off by `noise` (of its log).
+
+    holds        share of tables whose range holds the truth's own score
+    told_apart   by rival: share in which the sign-flip test puts it behind the truth
+    first        share in which no rival has a better score than the truth
+    false        share in which two models that are equally far off are told apart
+    """
+
+    truth: str
+    noise: float
+    count: int
+    holds: float
+    told_apart: dict[str, float]
+    first: float
+    false: float
+
+
+def with_levels(table: MeasuredTable, levels: np.ndarray) -> MeasuredTable:
+    """Return the table with other levels."""
+    return replace(table, levels=levels)
+
+
+def simulated(truth: str, count: int, table: MeasuredTable) -> Study:
+    """Make tables by a one-constant model and log-normal noise as large as its own misfit, and score its rivals.
+
+    The truth's score with a unit left out is then known: exp(noise sqrt(2/pi) sqrt(n/(n - 1))).
+    """
+    models = compared()
+    fit, units = models[truth].fit, len(table.names)
+    exact = fit(table, np.ones((1, units), dtype=bool))[0]
+    noise = float(np.std(np.log(table.levels / exact), ddof=1))
+    own_score = noise * math.sqrt(2.0 / math.pi * units / (units - 1))
+    rng = np.random.default_rng(_SEED)
+    holds = first = false = 0
+    told = dict.fromkeys((name for name in models if name != truth), 0)
+    for _ in range(count):
+        made = with_levels(table, exact * np.exp(noise * rng.standard_normal(units)))
+        errors = {name: left_out_errors(model.fit, made) for name, model in models.items()}
+        low, high = np.log(bootstrap_range(errors[truth]))
+        holds += bool(low <= own_score <= high)
+        first += all(errors[truth].mean() <= errors[name].mean() for name in told)
+        for name in told:
+            behind = errors[name].mean() > errors[truth].mean()
+            told[name] += bool(behind and sign_flip_p(errors[truth], errors[name]) <= LEVEL)
+        equal = [left_out_errors(_off(exact, noise, rng), made) for _ in range(2)]
+        false += sign_flip_p(*equal) <= LEVEL
+    shares = {name: n / count for name, n in told.items()}
+    return Study(truth, noise, count, holds / count, shares, first / count, false / count)
+
+
+def _off(exact: np.ndarray, noise: float, rng: np.random.Generator) -> Fit:
+    """Return the fit of one constant to levels that are off by `noise`."""
+    levels = exact * np.exp(noise * rng.standard_normal(exact.size))
+
+    def fit(table: MeasuredTable, chosen: np.ndarray) -> np.ndarray:
+        s = np.exp(chosen @ np.log(table.levels / levels) / chosen.sum(axis=1))
+        return s[:, None] * levels
+
+    return fit
+
+
+def permutation_p(name: str, count: int, table: MeasuredTable) -> float:
+    """Return how often the model's left-out score is as good on levels shuffled among the units; seeded."""
+    fit = compared()[name].fit
+    rng = np.random.default_rng(_SEED)
+    observed = left_out_errors(fit, table).mean()
+    shuffled = (left_out_errors(fit, with_levels(table, rng.permutation(table.levels))).mean() for _ in range(count))
+    return (1 + sum(bool(score <= observed + 1e-12) for score in shuffled)) / (1 + count)
+
+
+def score_tables(count: int) -> tuple[tuple[Table, ...], tuple[Promise, ...]]:
+    """Return the tables of scores, forms and simulations, and the promises on them, over `count` tables each."""
+    table, found = measured_table(), assessments()
+    order = in_order(found)
+    best = order[0]
+    p = {name: permutation_p(name, count, table) for name in order}
+    against = {worse: p for better, worse, p in pairwise(found) if better == best}
+    rows = tuple(
+        (
+            name,
+            compared()[name].constants,
+            found[name].left_out.geometric_mean,
+            "{:.2f} to {:.2f}".format(*found[name].left_out_range),
+            against.get(name),
+            p[name],
+        )
+        for name in order
+    )
+    study = simulated(next(name for name in order if compared()[name].constants == 1), count, table)
+    error = math.sqrt(LEVEL * (1 - LEVEL) / count)
+    chosen = choice()
+    scores = Table(
+        "Scores with a unit left out",
+        ("model", "constants", "left out", "range over units", f"p against {best}", "p, levels shuffled"),
+        rows,
+        f"Range: 5 to 95 % over units drawn again. p: sign-flip test of the paired errors, all {2**9} patterns; and "
+        f"how often a score is as good when the levels are shuffled among the units ({count} times). Choosing among "
+        f"all {len(forms())} forms without the unit too scores {chosen.score.geometric_mean:.2f} "
+        f"({chosen.range[0]:.2f} to {chosen.range[1]:.2f}).",
+    )
+    tried = Table(
+        "Every form that was tried",
+        ("form", "levels", "left out", "chosen without the unit"),
+        tuple(
+            (name, one.levels.geometric_mean, one.left_out.geometric_mean, chosen.chosen.count(name) or None)
+            for name, fit in forms().items()
+            for one in [assess(fit, False, table)]
+        ),
+        "Chosen: for how many of the nine units it is the best form on the other eight.",
+    )
+    power = Table(
+        f"What nine units can tell: {count} simulated tables, truth {study.truth}, noise {study.noise:.2f} of ln level",
+        ("what", "share of the tables"),
+        (
+            ("the 5 to 95 % range holds the truth's score", study.holds),
+            ("two models equally far off are told apart (should be 0.05)", study.false),
+            ("the truth has the best score", study.first),
+            *((f"{name} is told apart from the truth", share) for name, share in study.told_apart.items()),
+        ),
+    )
+    promises = (
+        Promise(
+            "sign-flip test: equal models told apart, over 0.05 and 3 standard errors", study.false, LEVEL + 3 * error
+        ),
+        Promise(
+            f"range over units: share that misses the true score (said: {1 - RANGE_HOLDS:g})",
+            1 - study.holds,
+            1 - RANGE_HOLDS,
+        ),
+        Promise(f"{best}: p of its left-out score, levels shuffled", p[best], LEVEL),
+    )
+    return (scores, tried, power), promises
