@@ -97,7 +97,7 @@ def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInp
             for i, layer in enumerate(spec.layers)
         ),
         tissue_name=spec.estimate.tissue,
-        tissue=tuple(_tissue(layer) for layer in tissue(spec.estimate.tissue, spec.tissue)),
+        tissue=tuple(tissue_layer(layer) for layer in tissue(spec.estimate.tissue, spec.tissue)),
         frequency=frequency,
         amplitude=spec.estimate.amplitude_um * 1e-6,
         drive=spec.motor.drive,
@@ -179,7 +179,8 @@ def _no_modulus(material: Material) -> str:
     )
 
 
-def _tissue(layer: Tissue) -> TissueLayer:
+def tissue_layer(layer: Tissue) -> TissueLayer:
+    """Return a body's layer in SI. Raises `Refusal` for one without a modulus."""
     nu = float(layer.poisson_ratio)
     if layer.shear_modulus_kpa:
         shear = _quantity(layer.shear_modulus_kpa, 1e3)

@@ -25,6 +25,7 @@ from unitcad.cli.init_command import init
 from unitcad.cli.list_command import list_
 from unitcad.cli.material_command import material
 from unitcad.cli.output import say_error, speak_anywhere
+from unitcad.cli.phantom_command import phantom
 from unitcad.cli.report_command import report
 from unitcad.cli.schema_command import schema
 from unitcad.errors import UnitcadError
@@ -61,6 +62,7 @@ app.command("coupon")(coupon)
 app.command("init")(init)
 app.command("list")(list_)
 app.command("material")(material)
+app.command("phantom")(phantom)
 app.command("report")(report)
 app.command("schema")(schema)
 app.add_typer(cache, name="cache")

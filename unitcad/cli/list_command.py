@@ -8,7 +8,7 @@ import typer
 
 from unitcad.cli.shared_options import AsJson
 
-KINDS = ("templates", "designs", "materials", "motors", "printers", "experiments", "rules")
+KINDS = ("templates", "designs", "materials", "motors", "printers", "experiments", "phantoms", "rules")
 
 
 def list_(
@@ -55,6 +55,10 @@ def _entries(kind: str) -> dict[str, Any]:
         from unitcad.experiments.lab_file import shipped as labs
 
         return {name: _first_comment(path.read_text("utf-8")) for name, path in labs().items()}
+    if kind == "phantoms":
+        from unitcad.lab.phantom.description import phantoms
+
+        return {name: _first_comment(path.read_text("utf-8")) for name, path in phantoms().items()}
     if kind == "rules":
         from unitcad.check.rules.registry import rules
 

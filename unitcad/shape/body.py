@@ -8,7 +8,20 @@ from typing import Literal
 from unitcad.shape.tree import Shape
 
 Kind = Literal[
-    "layer", "printed", "motor", "circuit", "wire", "base", "cup", "lid", "tongue", "stub", "blade", "coupon"
+    "layer",
+    "printed",
+    "motor",
+    "circuit",
+    "wire",
+    "base",
+    "cup",
+    "lid",
+    "tongue",
+    "stub",
+    "blade",
+    "coupon",
+    "frame",
+    "holder",
 ]
 """What a body is: a part of the unit (layer to wire) or a piece of tooling."""
 

@@ -1,0 +1,214 @@
+"""`unitcad phantom`: recipe, box and coupons against their lengths, response and echo, refusals, a spec's tissue."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium, LossFactor, UniformDisc
+from unitcad.cli import app
+from unitcad.errors import Refusal
+from unitcad.estimating import estimate_spec
+from unitcad.kernels.mesh import bounds, realise
+from unitcad.lab.phantom import bench, phantom_files, tensile_coupons
+from unitcad.lab.phantom.description import PhantomTable, load_phantom, phantoms
+from unitcad.lab.phantom.phantom_set import PhantomSet, phantom_set
+from unitcad.lab.phantom.recipe import recipe
+from unitcad.shape import box, exact_volume
+from unitcad.spec import convert
+from unitcad.validation import load
+
+DATA = Path(__file__).parent / "data" / "phantom-material-database" / "phantoms_table.csv"
+LAYERS = [
+    {"name": "skin", "silicone": "ecoflex-00-50", "thinner_pct": 6.0, "thickness_mm": 1.5},
+    {"name": "muscle", "silicone": "ecoflex-00-10", "thinner_pct": 62.5, "thickness_mm": 20.0},
+]
+
+
+@cache
+def _skin() -> PhantomSet:
+    return phantom_set(load_phantom("skin"))
+
+
+def _made(**changed: object) -> PhantomSet:
+    return phantom_set(convert({"name": "ours", "layers": LAYERS, **changed}, PhantomTable))
+
+
+def test_every_tested_share_has_the_modulus_of_the_source() -> None:
+    with open(DATA, encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 15
+    for row in rows:
+        family, share = row["sample_label"].split("_")
+        one = recipe(f"ecoflex-00-{family.removeprefix('EF')}", float(share.removesuffix("T")), "layers.0")
+        mean, deviation = float(row["elastic_modulus_mean_kPa"]), float(row["elastic_modulus_std_kPa"])
+        assert one.modulus_kpa == pytest.approx(mean)
+        assert one.high_kpa - one.low_kpa == pytest.approx(4 * deviation)
+    assert recipe("ecoflex-00-50", 6.0, "layers.0").modulus_kpa == pytest.approx(130, rel=0.02)
+
+
+def test_the_walls_and_the_response_are_those_of_another_program() -> None:
+    made = _skin()
+    assert made.expected.wall_mm == pytest.approx(63, abs=0.5)
+    assert made.inside_mm == 130
+    assert made.size.tops[0] == 30.5
+    assert made.expected.echo_pct < 5
+    assert made.expected.factor == pytest.approx(2.4, abs=0.05)
+    assert made.expected.sensitivity["skin"] == pytest.approx(-0.045, abs=0.01)
+    assert abs(made.expected.sensitivity["muscle"]) < 0.01
+
+
+def test_the_response_is_the_layered_solver_s() -> None:
+    made = _skin()
+    layers = [
+        Layer(t * 1e-3, one.density_g_cm3 * 1e3, one.modulus_kpa * 1e3, 0.4999, LossFactor(0.2))
+        for t, one in zip((1.5, 4.0, 25.0), made.recipes, strict=True)
+    ]
+    stack = LayeredMedium(layers, HalfSpace(1190.0, 3e9, 0.37, LossFactor(0.05)))
+    u = np.abs(stack.response(UniformDisc(3.5e-3), 2 * math.pi * 125, [7e-3, 22e-3, 37e-3, 93e-3], rtol=1e-6).u_z)
+    assert made.expected.value[3] == pytest.approx(u[1] / u[0], rel=1e-3)
+    assert made.expected.value[-1] == pytest.approx(u[2] / u[0], rel=1e-3)
+    assert made.expected.echo_pct == pytest.approx(100 * u[3] / u[2], rel=1e-2)
+    assert made.expected.low[-1] < made.expected.value[-1] < made.expected.high[-1]
+
+
+def test_tools_and_layers_fill_the_box_without_overlap() -> None:
+    """Tools are drawn from lengths, not by subtracting the layers: together they leave nothing of the cavity."""
+    made = _skin()
+    layers = [realise(body.shape, 64) for body in made.layers]
+    assembled = [realise(b.shape, 64) for b in made.tools if b.kind in ("base", "frame") or b.made == "cut"]
+    for layer in layers:
+        for tool in assembled:
+            assert (layer ^ tool).volume() == pytest.approx(0, abs=1e-6)
+    half, top = made.size.outer - 0.5, made.size.tops[0]
+    space = realise(box(-half, half, -half, half, 0.0, top), 64)
+    left = space.volume() - sum((space ^ one).volume() for one in (*layers, *assembled))
+    grid = 8 * made.size.rim * 25.0 / 1024 / 2  # corners lie on 1/1024 mm, the taper of the tray between them
+    assert left == pytest.approx(0, abs=grid / 2)
+    side = [2 * made.size.inner, 2 * made.size.rim]
+    frustum = 25.0 / 3 * (side[0] ** 2 + side[0] * side[1] + side[1] ** 2)
+    assert made.volumes_mm3 == pytest.approx((side[1] ** 2 * 1.5, side[1] ** 2 * 4.0, frustum), rel=1e-5)
+
+
+def test_the_blade_passes_the_pegs_and_lies_on_both_rims() -> None:
+    made = _skin()
+    blade = next(bounds(realise(b.shape, 64)) for b in made.tools if b.kind == "blade")
+    assert made.size.outer <= blade[3] < made.size.peg_x - 3.0
+    assert blade[2] == pytest.approx(made.size.tray_rim)
+
+
+def test_the_coupon_is_die_c() -> None:
+    """ASTM D412 die C: 115 over all, 25 wide, 6 over the narrow 33; the arcs meet without a step."""
+    outline = tensile_coupons.outline()
+    assert outline.bounds == pytest.approx((-57.5, -12.5, 57.5, 12.5))
+    narrow = [v for v in outline.vertices if abs(v[1]) == 3.0]
+    assert sorted({abs(v[0]) for v in narrow}) == [16.5]
+    reach = math.sqrt(39.0**2 - 29.5**2)
+    meet, y = 16.5 + reach * 14 / 39, 17 - 29.5 * 14 / 39
+    x = np.linspace(0, 57.5, 400001)
+    low = 17 - np.sqrt(np.maximum(14.0**2 - (x - 16.5) ** 2, 0))
+    high = -12.5 + np.sqrt(np.maximum(25.0**2 - (x - 16.5 - reach) ** 2, 0))
+    width = np.where(x < 16.5, 3.0, np.where(x < meet, low, np.where(x < 16.5 + reach, high, 12.5)))
+    assert y == pytest.approx(float(low[np.searchsorted(x, meet)]), abs=1e-3)
+    assert outline.area == pytest.approx(4 * float(np.trapezoid(width, x)), rel=1e-4)
+    assert tensile_coupons.volume_mm3(3) == pytest.approx(9 * outline.area)
+
+
+def test_the_grams_are_the_volumes_and_the_thinner_the_recipe() -> None:
+    made = _skin()
+    pours = bench.pours(made)
+    assert [pour.name for pour in pours] == ["muscle", "hypodermis", "skin"]
+    for pour in pours:
+        layer, one = made.table.layers[pour.layer], made.recipes[pour.layer]
+        assert pour.box_g == pytest.approx(made.volumes_mm3[pour.layer] * one.density_g_cm3 / 1e3)
+        assert pour.thinner_g / (pour.part_a_g + pour.part_b_g) == pytest.approx(layer.thinner_pct / 100)
+        assert pour.part_a_g + pour.part_b_g + pour.thinner_g == pytest.approx(1.1 * pour.net_g)
+        assert pour.grams_per_mm * layer.thickness_mm == pytest.approx(pour.box_g)
+    skin = pours[-1]
+    assert skin.off_grid
+    assert skin.frame_mm / skin.print_layer_mm == pytest.approx(8)
+
+
+def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["phantom", "-o", str(tmp_path), "--json"])
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    folder = Path(found["folder"])
+    assert found["findings"] == []
+    names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    pieces = {
+        f"moulds/{n}.stl"
+        for n in ("tray", "frame1", "frame2", "lid", "blade", "holder", *(f"coupons{i}" for i in (1, 2, 3)))
+    }
+    pages = {
+        "casting.md",
+        "casting.json",
+        "bom.csv",
+        "sheet.md",
+        "tissue.toml",
+        "response.json",
+        "response.svg",
+        "section.svg",
+    }
+    assert names == pieces | pages | {"moulds/moulds.3mf"}
+    casting = (folder / "casting.md").read_text("utf-8")
+    assert "repeatable, not skin-like" in casting
+    assert "0.1875 mm" in casting
+    tissue = tomllib.loads((folder / "tissue.toml").read_text("utf-8"))["tissue"]
+    spec = load("embedded", {"tissue": tissue, "estimate.tissue": "phantom-skin"})
+    layered = estimate_spec(spec, ["fitted"])["layered"]
+    assert layered["tissue"] == "phantom-skin"
+    axial = layered["drives"]["axial"]
+    value = axial["u_z"]["value"]
+    assert value[30] / value[0] == pytest.approx(found["response"]["value"][-1], rel=1e-2)
+    again = phantom_files.contents(_skin())
+    assert all((folder / name).read_bytes() == content for name, content in again.items())
+
+
+@pytest.mark.parametrize(
+    ("changed", "field", "part"),
+    [
+        ({"inside_mm": 100.0}, "inside_mm", "echo is"),
+        ({"printer": "sla"}, "printer", "inside would fit"),
+        ({"printer": "fdm"}, "printer", "closest"),
+        ({"layers": [{**LAYERS[0], "thinner_pct": 40.0}]}, "layers.0.thinner_pct", "25"),
+        ({"layers": [{**LAYERS[0], "silicone": "dragon-skin-30"}]}, "layers.0.silicone", "not known"),
+        ({"layers": [LAYERS[0], LAYERS[0]]}, "layers", "name of its own"),
+        ({"layers": [{**LAYERS[0], "thickness_mm": 0.1}]}, "layers.0.thickness_mm", "0.5"),
+        ({"most_echo_pct": 0.1}, "most_echo_pct", "0.5"),
+        ({"depth_mm": 3.0}, "depth_mm", "unknown key"),
+        ({"name": "Our Phantom"}, "name", ""),
+    ],
+)
+def test_what_can_not_be_is_refused(changed: dict, field: str, part: str) -> None:
+    with pytest.raises(Refusal) as refused:
+        _made(**changed)
+    assert refused.value.field == field
+    assert part in str(refused.value)
+    if field == "inside_mm":
+        assert _made(inside_mm=refused.value.nearest).expected.echo_pct <= 5.0
+
+
+def test_a_refused_phantom_leaves_no_folder(tmp_path: Path) -> None:
+    file = tmp_path / "p.toml"
+    file.write_text(phantoms()["skin"].read_text("utf-8").replace('"fdm-0.4"', '"sla"'), "utf-8")
+    done = CliRunner().invoke(app, ["phantom", str(file), "-o", str(tmp_path / "out")])
+    assert isinstance(done.exception, Refusal)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_solid_of_the_box_is_exact() -> None:
+    lengths = _skin().size
+    frame = next(b for b in _skin().tools if b.name == "frame1")
+    ears = 4 * 14.0 * 18.0 - 4 * math.pi * lengths.hole**2
+    ring = 4 * (lengths.outer**2 - lengths.rim**2)
+    assert realise(frame.shape, 256).volume() == pytest.approx(1.5 * (ring + ears), rel=1e-3)
+    assert exact_volume(_skin().layers[0].shape) == pytest.approx(1.5 * 4 * lengths.rim**2, rel=1e-5)

@@ -1,0 +1,83 @@
+"""unitcad phantom."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from unitcad.cli.shared_options import AsJson
+
+if TYPE_CHECKING:
+    from unitcad.lab.phantom.phantom_set import PhantomSet
+
+
+def phantom(
+    source: Annotated[
+        str, typer.Argument(metavar="PHANTOM", help="A shipped phantom's name, or a TOML file (unitcad list phantoms).")
+    ] = "skin",
+    out: Annotated[Path, typer.Option("-o", "--out", help="Where the phantom's folder goes.")] = Path("out"),
+    as_json: AsJson = False,
+) -> None:
+    """Make a skin phantom to cast, and its response.
+
+    Recipe, box with a screed frame a layer, lid, stage holder, tensile coupons, procedure, bench sheet, the tissue for
+    an estimate, and the response to expect. The last line printed is the folder.
+    """
+    from unitcad.cli.output import print_json, progress, warn
+    from unitcad.lab.phantom import phantom_files
+    from unitcad.lab.phantom.description import load_phantom
+    from unitcad.lab.phantom.phantom_set import phantom_set
+
+    table = load_phantom(source)
+    with progress("phantom") as stage:
+        stage("response")
+        made = phantom_set(table)
+        found = phantom_files.contents(made, stage)
+        stage("checks")
+        folder = out / f"phantom-{table.name}"
+        faults = phantom_files.write(folder, found, made.printer.name)
+    if as_json:
+        from dataclasses import asdict
+
+        print_json(
+            {
+                "folder": str(folder),
+                "findings": faults,
+                "response": asdict(made.expected),
+                **phantom_files.casting_data(made),
+            }
+        )
+    else:
+        _print(made)
+        typer.echo(str(folder))
+    for fault in faults:
+        warn(f"finding: {fault}")
+    if faults:
+        raise typer.Exit(1)
+
+
+def _print(made: PhantomSet) -> None:
+    from rich.table import Table
+
+    from unitcad.cli.output import console
+
+    screen, e = console(), made.expected
+    layers = Table("layer", "silicone", "thinner", "kPa", "mm", "0.1 mm thinner")
+    for layer, one in zip(made.table.layers, made.recipes, strict=True):
+        change = f"{100 * e.sensitivity[layer.name]:+.2g} %"
+        modulus, thinner = f"{one.modulus_kpa:.3g}", f"{one.thinner_pct:g} %"
+        layers.add_row(layer.name, one.silicone.name, thinner, modulus, f"{layer.thickness_mm:g}", change)
+    screen.print(layers)
+    response = Table("mm", *(f"{d:g}" for d in e.distances_mm))
+    response.add_row("expected", *(f"{v:.3f}" for v in e.value))
+    response.add_row("forearm", *(f"{v:.3f}" for v in e.forearm))
+    screen.print(response)
+    screen.print(
+        f"  inside {made.inside_mm:g} mm: an echo of {e.echo_pct:.2g} % at {e.distances_mm[-1]:g} mm; "
+        f"{made.table.most_echo_pct:g} % "
+        f"need walls {e.wall_mm:g} mm from the unit's centre",
+        soft_wrap=True,
+    )
+    screen.print(f"  repeatable, not skin-like: off the forearm template by a factor of {e.factor:.2g}", soft_wrap=True)

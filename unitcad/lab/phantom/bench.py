@@ -1,0 +1,323 @@
+"""The phantom's casting procedure in words and numbers, and the sheet that is filled in at the bench."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from unitcad.casting.bill import Item
+from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, at_room, bubble_rise_s
+from unitcad.lab.phantom.phantom_response import THINNER_MM
+from unitcad.lab.phantom.phantom_set import PhantomSet, printed
+from unitcad.lab.phantom.screed_box import bolts
+from unitcad.text import markdown
+
+NEAR_LAYER = 0.02
+"""A height this much of a printed layer off the grid counts as on it."""
+EDGE_MM = 10.0
+"""Nothing is measured nearer to the walls than this: the silicone climbs there."""
+
+
+@dataclass(frozen=True)
+class PhantomPour:
+    """One pour: grams of part A, part B and thinner to weigh, what goes into box and coupons, the layer's own weight.
+
+    `grams_per_mm`: of the layer in the box, which tells its thickness by the scale. `frame_mm`: height that the frame
+    (or, for the first pour, the tray's rim above the plate) gives.
+    """
+
+    index: int
+    layer: int
+    name: str
+    part_a_g: float
+    part_b_g: float
+    thinner_g: float
+    net_g: float
+    box_g: float
+    grams_per_mm: float
+    frame_mm: float
+    cure_h: float
+    pot_life_min: float
+    print_layer_mm: float
+    off_grid: bool
+
+
+def pours(phantom: PhantomSet) -> list[PhantomPour]:
+    """Return the pours in their order, the lowest layer first."""
+    found, table = [], phantom.table
+    for index, i in enumerate(reversed(range(len(table.layers))), 1):
+        layer, one = table.layers[i], phantom.recipes[i]
+        box = phantom.volumes_mm3[i] * one.density_g_cm3 / 1e3
+        net = box + phantom.coupon_mm3 * one.density_g_cm3 / 1e3
+        total = net * (1 + table.waste)
+        silicone = total * 100.0 / (100.0 + one.thinner_pct)
+        share = float(one.silicone.mix_ratio) / (1 + float(one.silicone.mix_ratio))
+        height = float(phantom.printer.layer_mm)
+        count = layer.thickness_mm / height
+        fitted = layer.thickness_mm / math.ceil(count - NEAR_LAYER)
+        found.append(
+            PhantomPour(
+                index,
+                i,
+                layer.name,
+                silicone * share,
+                silicone * (1 - share),
+                total - silicone,
+                net,
+                box,
+                box / layer.thickness_mm,
+                layer.thickness_mm,
+                at_room(float(one.silicone.cure_h), table.room_c),
+                at_room(float(one.silicone.pot_life_min), table.room_c),
+                fitted,
+                abs(count - round(count)) > NEAR_LAYER and i < len(table.layers) - 1,
+            )
+        )
+    return found
+
+
+def casting_markdown(phantom: PhantomSet) -> str:
+    """Write the procedure for the bench."""
+    table, found = phantom.table, pours(phantom)
+    lines = [f"# Casting the phantom {markdown(table.name)}", ""]
+    lines += [
+        "Nothing of this tooling has been printed yet: every clearance is a choice with a check behind it. The "
+        "phantom is "
+        "repeatable, not skin-like: read [what to expect](#what-to-expect) first.",
+        "",
+    ]
+    lines += [
+        "## Recipe",
+        "",
+        "| layer, from the skin down | silicone | thinner to 100 of A + B | E, kPa | thickness, mm |",
+    ]
+    lines += ["| --- | --- | --- | --- | --- |"]
+    for layer, one in zip(table.layers, phantom.recipes, strict=True):
+        lines.append(
+            f"| {layer.name} | {one.silicone.name} | {one.thinner_pct:g} | {one.modulus_kpa:.3g} ({one.low_kpa:.3g} "
+            f"to {one.high_kpa:.3g}) | {layer.thickness_mm:g} |"
+        )
+    lines += [
+        "",
+        f"Moduli in compression: {phantom.recipes[0].source}. The range is two standard deviations of that table.",
+        "",
+    ]
+    number = iter(range(1, 1000))
+
+    def steps(texts: Iterator[str]) -> list[str]:
+        return [f"{next(number)}. {text}" for text in texts]
+
+    lines += ["## Before the first pour", "", *steps(_preparation(phantom, found)), ""]
+    for pour in found:
+        silicone = phantom.recipes[pour.layer].silicone
+        lines += [f"## Pour {pour.index}: {pour.name}, {silicone.name}", ""]
+        lines += ["| figure | value | source |", "| --- | --- | --- |"]
+        lines += [f"| {' | '.join(row)} |" for row in _figures(phantom, pour)]
+        lines += ["", *steps(_pour(phantom, pour)), ""]
+    lines += ["## Marks, and out of the box", "", *steps(_release(phantom)), ""]
+    lines += ["## What to expect", "", *_expectations(phantom), ""]
+    lines += ["## Needed", "", "| item | quantity | made | note |", "| --- | --- | --- | --- |"]
+    lines += [f"| {i.item} | {i.quantity:.4g} {i.unit} | {i.made} | {markdown(i.note)} |" for i in bill(phantom)]
+    return "\n".join(lines) + "\n"
+
+
+def sheet_markdown(phantom: PhantomSet) -> str:
+    """Write the sheet to fill in: one row a pour, then the coupons, so that two labs' phantoms can be compared."""
+    lines = [
+        f"# Bench sheet: phantom {markdown(phantom.table.name)}",
+        "",
+        "Date:                    Made by:                    Room, degC:",
+        "",
+    ]
+    lines += [
+        "| pour | layer | lot A / lot B | A, g (wanted) | B, g (wanted) | thinner, g (wanted) | mixed at | poured "
+        "at | box before, g "
+        "| box after, g | thickness = difference over |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for p in pours(phantom):
+        lines.append(
+            f"| {p.index} | {p.name} | | ({p.part_a_g:.1f}) | ({p.part_b_g:.1f}) | ({p.thinner_g:.1f}) | | | | | "
+            f"{p.grams_per_mm:.2f} g/mm: |"
+        )
+    lines += [
+        "",
+        "| coupon of pour | width, mm | thickness, mm | file of the curve | modulus, kPa (unitcad material) |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for p in pours(phantom):
+        lines += [f"| {p.index}.{i + 1} | | | | |" for i in range(phantom.table.coupons)]
+    lines += [
+        "",
+        "Frame heights by calliper, mm (wanted): " + ", ".join(f"{p.name} ({p.frame_mm:g})" for p in pours(phantom)),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def bill(phantom: PhantomSet) -> list[Item]:
+    """Return what is printed, cut, bought and weighed."""
+    table, found = phantom.table, pours(phantom)
+    items = [
+        Item(
+            body.name,
+            1,
+            "piece",
+            "printed upside down" if body.upside_down else "printed as drawn",
+            f"{phantom.printer.name}",
+        )
+        for body in printed(phantom.tools)
+    ]
+    side = 2 * phantom.size.inner - 0.6
+    items.append(
+        Item("plate", 1, "piece", "cut", f"acrylic, {side:.1f} x {side:.1f} x {table.plate_thickness_mm:g} mm")
+    )
+    for name in dict.fromkeys(one.silicone.name for one in phantom.recipes):
+        own = [p for p in found if phantom.recipes[p.layer].silicone.name == name]
+        items.append(Item(f"{name} part A", sum(p.part_a_g for p in own), "g", "bought", f"{len(own)} pours"))
+        items.append(Item(f"{name} part B", sum(p.part_b_g for p in own), "g", "bought", f"{len(own)} pours"))
+    items.append(Item("silicone thinner", sum(p.thinner_g for p in found), "g", "bought", "of the silicones' maker"))
+    items.append(Item("bolt", 4, "piece", "bought", f"M{table.stage_bolt_mm:g}, for the holder"))
+    return items
+
+
+def _preparation(phantom: PhantomSet, found: Sequence[PhantomPour]) -> Iterator[str]:
+    table, size = phantom.table, phantom.size
+    yield (
+        "Print the pieces as they lie in their files: the blade upside down, the rest as drawn, the lid's lettering up."
+    )
+    for p in found:
+        if p.off_grid:
+            yield (
+                f"Print the frame of the {p.name} in layers of {p.print_layer_mm:.4g} mm: {p.frame_mm:g} mm is no "
+                f"whole number of {float(phantom.printer.layer_mm):g} mm layers, and half a layer more or less shows "
+                "in the response."
+            )
+    sensitive = min(phantom.expected.sensitivity.items(), key=lambda pair: -abs(pair[1]))
+    yield (
+        f"Measure every frame's height at eight places. The {sensitive[0]} {THINNER_MM:g} mm thinner changes the "
+        f"response at {max(table.points_mm):g} mm by {100 * sensitive[1]:.2g} %: reprint a frame that is more than "
+        "0.05 mm off."
+    )
+    yield (
+        f"Cut the acrylic plate, {2 * size.inner - 0.6:.1f} mm square, {table.plate_thickness_mm:g} mm thick. Lay it "
+        "into the tray, clean, and seal its edge all round with a thin bead of petroleum jelly; the holes below "
+        "stay free."
+    )
+    yield (
+        "Release agent sparingly on the inner walls of tray and frames, none on the plate: the muscle must stick to "
+        "it, or the stack slides. Level the tray to 0.2 mm over its side."
+    )
+
+
+def _figures(phantom: PhantomSet, p: PhantomPour) -> Iterator[tuple[str, str, str]]:
+    one = phantom.recipes[p.layer]
+    parts = "computed: volume x density (mixed by weight; thinner 0.97 g/cm3, assumed)"
+    yield "in the box", f"{p.box_g:.1f} g", parts
+    if phantom.coupon_mm3:
+        yield "in the coupons", f"{p.net_g - p.box_g:.1f} g", parts
+    yield "part A", f"{p.part_a_g:.1f} g", f"with {100 * phantom.table.waste:g} % extra"
+    yield "part B", f"{p.part_b_g:.1f} g", f"with {100 * phantom.table.waste:g} % extra"
+    yield "thinner", f"{p.thinner_g:.1f} g", f"{one.thinner_pct:g} parts to 100 of A + B, by weight (assumed)"
+    yield (
+        "pot life",
+        f"{p.pot_life_min:.3g} min",
+        "without thinner; thinner makes it longer (assumed: half the time for 10 K more)",
+    )
+    yield (
+        "cure",
+        f"{p.cure_h:.3g} h",
+        f"without thinner, at {phantom.table.room_c:g} degC (data sheet at {DATASHEET_C:g}); thinner: longer",
+    )
+    seconds = bubble_rise_s(p.frame_mm, one.silicone)
+    yield (
+        "bubble of 0.2 mm through the layer",
+        f"{seconds / 60:.3g} min",
+        "computed: Stokes, without thinner; optimistic",
+    )
+    yield "weight of a millimetre", f"{p.grams_per_mm:.2f} g", "computed: tells the thickness by the scale"
+
+
+def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
+    one, frame = phantom.recipes[p.layer], f"frame {p.layer + 1}"
+    if p.index > 1:
+        yield (
+            f"When the layer before is firm: trim the film off the rim below, put {frame} on the pegs and press it "
+            "down all round; tape it or weigh it down. A thin line of petroleum jelly between the rims keeps it "
+            "tight. No release agent on the silicone: the layers must bond."
+        )
+    yield "Weigh the box with what is in it, and write that down."
+    yield (
+        f"Weigh {p.part_a_g:.1f} g of {one.silicone.name} part A, {p.part_b_g:.1f} g of part B and {p.thinner_g:.1f} "
+        f"g of thinner. Mix for {MIXING_MIN:g} min (assumed), scraping the walls; degas; the pot life runs from now, "
+        f"and pouring takes {POURING_MIN:g} min or more."
+    )
+    rim = "the tray's rim" if p.index == 1 else f"the rim of {frame}"
+    yield (
+        f"Pour in a thin thread at one corner until the silicone stands over {rim}, fill coupon mould {p.layer + 1} "
+        "from the same mix, and prick the bubbles that rise."
+    )
+    yield (
+        f"Strike off with the blade: along x, its edge on {rim} at both sides, drawn once from one end to the other "
+        "along y, between the pegs. Strike the coupons off too. Wipe the rims and weigh the box again: the "
+        f"difference over {p.grams_per_mm:.2f} g/mm is the thickness; {0.05 * p.grams_per_mm:.2g} g are 0.05 mm. Top "
+        "up and strike again if it is low."
+    )
+    yield (
+        "Cure level, covered, until a touch on the overflow is dry. Much thinner stays tacky: talc, after the last "
+        "layer."
+    )
+
+
+def _release(phantom: PhantomSet) -> Iterator[str]:
+    seat = phantom.table.unit_diameter_mm
+    yield (
+        f"Talc the skin, put the lid on and mark with a pen: the seat of the unit, a circle of {seat:g} mm whose "
+        "notch is the point at 0 mm, and the points at "
+        f"{', '.join(f'{d:g}' for d in sorted(phantom.table.points_mm))} mm from its edge. Take the lid off."
+    )
+    x, y = bolts(phantom.table, phantom.size)
+    yield (
+        "Measure in the box: its walls count in the design. The holder is bolted to the table by four "
+        f"M{phantom.table.stage_bolt_mm:g} at {2 * x:g} x {2 * y:g} mm; the tray stands between its fences, held "
+        "down by a rubber band."
+    )
+    yield (
+        "To take the slab out: lift the frames off, run a thin wet blade round the wall, and push the plate up "
+        "through the four holes of the tray, evenly. The cavity widens upwards. Never pull the silicone: it is "
+        "carried on its plate."
+    )
+    yield (
+        f"Keep what is measured {EDGE_MM:g} mm or more from the walls. Cut nothing off the skin. Pull the coupons "
+        "with the same machine each time, and read them with unitcad material: their modulus, not the table's, "
+        "belongs into tissue.toml."
+    )
+
+
+def _expectations(phantom: PhantomSet) -> Iterator[str]:
+    table, e = phantom.table, phantom.expected
+    yield (
+        f"|u_z| of the skin at {table.frequency_hz:g} Hz over its value at the unit's edge, the motor's disc "
+        "pressing evenly, by the layered solver. The range takes loss factors (half to one and a half times), "
+        "moduli and thicknesses each by itself."
+    )
+    yield ""
+    yield "| mm from the edge | expected | low | high | the forearm template |"
+    yield "| --- | --- | --- | --- | --- |"
+    for row in zip(e.distances_mm, e.value, e.low, e.high, e.forearm, strict=True):
+        yield f"| {row[0]:g} | {row[1]:.3f} | {row[2]:.3f} | {row[3]:.3f} | {row[4]:.3f} |"
+    yield ""
+    for name, change in e.sensitivity.items():
+        yield f"- {name} {THINNER_MM:g} mm thinner: {100 * change:+.2g} % at {e.distances_mm[-1]:g} mm"
+    yield ""
+    yield (
+        "It is repeatable, not skin-like: silicone decays too little, and the curve is off the forearm template's "
+        f"by a factor of {e.factor:.2g} on average. Two labs compare their chains on it, not their skins."
+    )
+    yield ""
+    yield (
+        f"A wall sends back {e.echo_pct:.2g} % at {e.distances_mm[-1]:g} mm at most: {phantom.inside_mm / 2:g} mm "
+        f"from the unit's centre, where {e.wall_mm:g} mm would give {table.most_echo_pct:g} % (a mirror's estimate). "
+        f"With half the loss factor it is {e.soft_echo_pct:.2g} %."
+    )

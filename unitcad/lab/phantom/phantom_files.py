@@ -1,0 +1,134 @@
+"""A phantom's folder: printable pieces, procedure, bench sheet, tissue entry, expected response; checked as meshes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from unitcad import check, files
+from unitcad.attenuation.edge.estimates import rounded
+from unitcad.casting.bill import to_csv
+from unitcad.errors import UnitcadError
+from unitcad.export import stl, svg, threemf
+from unitcad.export.chart import Series, chart
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays, realise
+from unitcad.lab.phantom import bench
+from unitcad.lab.phantom.phantom_set import SEGMENTS, PhantomSet, printed, tissue_table
+from unitcad.text import toml, toml_key
+
+FINISHED = "casting.md"
+"""The file that is put in place last: a folder that has it is whole."""
+
+
+def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: None) -> dict[str, bytes]:
+    """Return the files of a phantom's folder by their names, the pieces as STL and one 3MF."""
+    found: dict[str, bytes] = {}
+    parts = []
+    for body in printed(phantom.tools):
+        stage(body.name)
+        ready = print_ready(*arrays(realise(body.shape, SEGMENTS)), body.upside_down)
+        found[f"moulds/{body.name}.stl"] = stl.content(*ready, body.name)
+        parts.append(threemf.MeshPart(body.name, body.colour, *ready))
+    bed = float(phantom.printer.bed_x_mm), float(phantom.printer.bed_y_mm)
+    found["moulds/moulds.3mf"] = threemf.content(parts, bed)
+    stage("pages")
+    texts = {
+        "section.svg": _section(phantom),
+        "response.svg": _response_chart(phantom),
+        "response.json": json.dumps(rounded(asdict(phantom.expected)), indent=1, allow_nan=False) + "\n",
+        "tissue.toml": tissue_toml(phantom),
+        "casting.json": json.dumps(rounded(casting_data(phantom)), indent=1, allow_nan=False, ensure_ascii=False)
+        + "\n",
+        "bom.csv": to_csv(tuple(bench.bill(phantom))),
+        "sheet.md": bench.sheet_markdown(phantom),
+        FINISHED: bench.casting_markdown(phantom),
+    }
+    return {**found, **{name: text.encode() for name, text in texts.items()}}
+
+
+def tissue_toml(phantom: PhantomSet) -> str:
+    """Return [tissue.NAME] for a spec, which chooses it by estimate.tissue."""
+    name = toml_key(f"phantom-{phantom.table.name}")
+    lines = [
+        "# For a spec: paste it there, and choose it:",
+        "# [estimate]",
+        f'# tissue = "phantom-{phantom.table.name}"',
+    ]
+    for layer, table in tissue_table(phantom).items():
+        lines += ["", f"[tissue.{name}.{toml_key(layer)}]", *(f"{key} = {toml(value)}" for key, value in table.items())]
+    return "\n".join(lines) + "\n"
+
+
+def casting_data(phantom: PhantomSet) -> dict[str, Any]:
+    """Return recipe, pours and lengths as JSON-ready data."""
+    return {
+        "name": phantom.table.name,
+        "inside_mm": phantom.inside_mm,
+        "printer": phantom.printer.name,
+        "pours": [asdict(pour) for pour in bench.pours(phantom)],
+        "recipes": [
+            {
+                "layer": layer.name,
+                "silicone": one.silicone.name,
+                "thinner_pct": one.thinner_pct,
+                "modulus_kpa": one.modulus_kpa,
+                "low_kpa": one.low_kpa,
+                "high_kpa": one.high_kpa,
+                "density_g_cm3": one.density_g_cm3,
+                "source": one.source,
+            }
+            for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True)
+        ],
+        "bill": [asdict(item) for item in bench.bill(phantom)],
+    }
+
+
+def write(folder: Path, found: Mapping[str, bytes], printer: str) -> list[str]:
+    """Write the files into a folder, then check the meshes there; return the findings that are errors, as lines.
+
+    All are written under another name first; the procedure is put in place last. Raises UnitcadError where that fails.
+    """
+    try:
+        (folder / "moulds").mkdir(parents=True, exist_ok=True)
+        with files.scratch(folder) as fresh:
+            (fresh / "moulds").mkdir()
+            for name, content in found.items():
+                files.write_new(fresh / name, content)
+            (folder / FINISHED).unlink(missing_ok=True)
+            for name in found:
+                (fresh / name).replace(folder / name)
+    except OSError as error:
+        raise UnitcadError(f"{folder}: {error.strerror or error}") from None
+    meshes = sorted(str(folder / name) for name in found if name.endswith((".stl", ".3mf")))
+    result = check.check(*meshes, printer=printer)
+    return [
+        f"{Path(report.path).name}: {finding.code} {finding.message}"
+        for report in result.reports
+        for finding in report.findings
+        if finding.severity == "error"
+    ]
+
+
+def _section(phantom: PhantomSet) -> str:
+    """Draw the box filled, cut through the pegs of one side and, of the lid, nothing: frames, layers and plate."""
+    shown = [body for body in phantom.tools if body.kind in ("base", "frame") or body.made == "cut"]
+    regions = svg.cut([*shown, *phantom.layers], SEGMENTS)
+    return svg.section(regions, title=f"Phantom {phantom.table.name}: box and layers", ground="plate")
+
+
+def _response_chart(phantom: PhantomSet) -> str:
+    e = phantom.expected
+    series = [
+        Series("expected", e.distances_mm, e.value),
+        Series("low", e.distances_mm, e.low, dashed=True),
+        Series("high", e.distances_mm, e.high, dashed=True),
+        Series("the forearm template", e.distances_mm, e.forearm),
+    ]
+    title = (
+        f"Phantom {phantom.table.name} at {phantom.table.frequency_hz:g} Hz: |u_z| over its value at the unit's edge"
+    )
+    return chart(series, title, "distance from the unit's edge, mm", "|u_z| / |u_z| at the edge", log_y=True)

@@ -1,0 +1,237 @@
+"""The phantom's box: a tray with the stiff plate in it, a screed frame a further layer, lid, blade and stage holder.
+
+        section, x to the right           peg
+                                        .-.
+          lid     =====================.' '.====   marks seat and points, last
+          frame   ===.             .===.' '.====   1 skin: struck off along its top
+          frame   ===|             |===.' '.====   2 hypodermis
+                  .--'             '--.-----.
+          tray    |  \\   muscle    /  | ear |      struck off along the tray's own rim
+                  |   |===plate===|   |     |      acrylic, z = 0 at its top
+                  '---'--o-----o--'---'-----'      holes: the plate is pushed up through them
+
+The cavity widens upwards, so the slab comes up with its plate. Layers are numbered from the skin down, poured from the
+last. The blade passes between the pegs and is drawn along y.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from unitcad.catalogue import Printer
+from unitcad.designs import layer_colour
+from unitcad.lab.phantom.description import PhantomTable
+from unitcad.moulds.blade import bar
+from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rectangle, turned, union
+from unitcad.shape.body import Body
+from unitcad.shape.lettering import HEIGHT, engraving, text_width
+
+WALL, FLOOR, LID, HOLDER = 4.0, 3.0, 4.0, 6.0
+"""Walls beside the cavity at its rim, the tray's floor, thickness of lid and holder, mm."""
+DRAFT_DEG = 1.0
+EAR, EAR_HALF, EAR_AT = 14.0, 9.0, 0.65
+"""How far an ear stands out, its half width, and its middle as a part of the half side, mm."""
+PEG_RADIUS, PEG_FROM_WALL = 3.0, 8.0
+PUSH_RADIUS = 8.0
+PLATE_PLAY = 0.3
+"""Of the plate in the tray, per side, mm."""
+POINT_RADIUS = 1.25
+FENCE, FENCE_LONG, FENCE_HIGH = 4.0, 12.0, 10.0
+_COLOURS = {
+    "base": (0.76, 0.76, 0.76),
+    "frame": (0.96, 0.83, 0.66),
+    "lid": (0.55, 0.75, 0.55),
+    "holder": (0.6, 0.66, 0.8),
+}
+_PLATE, _BLADE = (0.8, 0.9, 0.95), (0.90, 0.30, 0.30)
+
+
+@dataclass(frozen=True)
+class BoxLengths:
+    """Lengths of a box, mm: half sides of the cavity at the plate and at the rim, of the walls, and the heights.
+
+    `tops`: the height above the plate that each layer is struck off at, skin first.
+    """
+
+    inner: float
+    rim: float
+    outer: float
+    tops: tuple[float, ...]
+    plate: float
+    hole: float
+    peg_x: float
+    ear_y: float
+
+    @property
+    def tray_rim(self) -> float:
+        """Height of the tray's rim: the lowest layer's."""
+        return self.tops[-1]
+
+    @property
+    def bottom(self) -> float:
+        """Height of the tray's foot, below the plate."""
+        return -self.plate - FLOOR
+
+
+def lengths(phantom: PhantomTable, inside_mm: float, printer: Printer) -> BoxLengths:
+    """Return the box's lengths for a cavity of `inside_mm` at the plate."""
+    thickness = [layer.thickness_mm for layer in phantom.layers]
+    tops = tuple(sum(thickness[i:]) for i in range(len(thickness)))
+    rim = inside_mm / 2 + tops[-1] * math.tan(math.radians(DRAFT_DEG))
+    outer = rim + WALL
+    play = float(printer.plinth_clearance_mm) + 0.1
+    return BoxLengths(
+        inside_mm / 2,
+        rim,
+        outer,
+        tops,
+        phantom.plate_thickness_mm,
+        PEG_RADIUS + play,
+        outer + PEG_FROM_WALL,
+        EAR_AT * outer,
+    )
+
+
+def cast(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
+    """Draw the cast layers, skin first."""
+    bodies = []
+    for i, layer in enumerate(phantom.layers):
+        low = size.tops[i + 1] if i + 1 < len(size.tops) else 0.0
+        shape: Shape = Extrude(_square(size.rim), low, size.tops[i])
+        if low == 0.0:
+            shape = Extrude(_square(size.inner), 0.0, size.tops[i], top=_square(size.rim))
+        bodies.append(Body(layer.name, "unit", "layer", shape, layer_colour(i), made="cast", step=len(size.tops) - i))
+    return bodies
+
+
+def pieces(phantom: PhantomTable, size: BoxLengths, printer: Printer) -> list[Body]:
+    """Draw tray, plate, frames (skin first), lid, blade and holder as assembled."""
+    stroke, depth = float(printer.engraving_stroke_mm), float(printer.engraving_depth_mm)
+    frames = [
+        Body(
+            f"frame{i + 1}",
+            "tool",
+            "frame",
+            _frame(size, size.tops[i + 1], size.tops[i]),
+            _COLOURS["frame"],
+            step=len(size.tops) - i,
+        )
+        for i in range(len(size.tops) - 1)
+    ]
+    blade = moved(turned(bar(size.outer + PEG_FROM_WALL - PEG_RADIUS - 1.0, 0.0), "z", 1), 0, 0, size.tray_rim)
+    plate = Extrude(_square(size.inner - PLATE_PLAY), -size.plate, 0.0)
+    return [
+        Body("tray", "tool", "base", _tray(size), _COLOURS["base"]),
+        Body("plate", "tool", "holder", plate, _PLATE, made="cut"),
+        *frames,
+        Body("lid", "tool", "lid", _lid(phantom, size, stroke, depth), _COLOURS["lid"]),
+        Body("blade", "tool", "blade", blade, _BLADE, upside_down=True),
+        Body("holder", "tool", "holder", _holder(phantom, size), _COLOURS["holder"]),
+    ]
+
+
+def _square(half: float) -> Profile:
+    return rectangle(-half, -half, half, half)
+
+
+def _tray(size: BoxLengths) -> Shape:
+    body = _outline(size, size.bottom, size.tray_rim)
+    top = size.tops[0] + LID
+    pegs = [moved(cylinder(PEG_RADIUS, size.tray_rim - 1.0, top), x, y) for x, y in _pegs(size)]
+    # The taper runs on above the rim, so that no face of the tool lies in the rim's.
+    beyond = 1.0
+    wide = size.rim + beyond * (size.rim - size.inner) / size.tray_rim
+    cavity = Extrude(_square(size.inner), 0.0, size.tray_rim + beyond, top=_square(wide))
+    pocket = Extrude(_square(size.inner), -size.plate, 0.5)
+    reach = 0.6 * size.inner
+    holes = [
+        moved(cylinder(PUSH_RADIUS, size.bottom - 1.0, -size.plate + 1.0), sx * reach, sy * reach)
+        for sx in (-1, 1)
+        for sy in (-1, 1)
+    ]
+    return union((cut(body, [cavity, pocket, *holes]), *pegs))
+
+
+def _frame(size: BoxLengths, low: float, high: float) -> Shape:
+    return cut(
+        _outline(size, low, high), [Extrude(_square(size.rim), low - 1.0, high + 1.0), *_peg_holes(size, low, high)]
+    )
+
+
+def _outline(size: BoxLengths, low: float, high: float) -> Shape:
+    inside = size.outer - 2.0
+    ears = [
+        box(
+            min(inside * s, (size.outer + EAR) * s),
+            max(inside * s, (size.outer + EAR) * s),
+            y - EAR_HALF,
+            y + EAR_HALF,
+            low,
+            high,
+        )
+        for s in (-1, 1)
+        for y in (-size.ear_y, size.ear_y)
+    ]
+    return union((Extrude(_square(size.outer), low, high), *ears))
+
+
+def _pegs(size: BoxLengths) -> list[tuple[float, float]]:
+    return [(x, y) for x in (-size.peg_x, size.peg_x) for y in (-size.ear_y, size.ear_y)]
+
+
+def _peg_holes(size: BoxLengths, low: float, high: float) -> list[Shape]:
+    return [moved(cylinder(size.hole, low - 1.0, high + 1.0), x, y) for x, y in _pegs(size)]
+
+
+def _lid(phantom: PhantomTable, size: BoxLengths, stroke: float, depth: float) -> Shape:
+    """Draw the lid: the unit's seat as a hole of its size, a hole a point along +x, each with its number."""
+    low, high = size.tops[0], size.tops[0] + LID
+    radius = phantom.unit_diameter_mm / 2
+    tools: list[Shape] = [cylinder(radius, low - 1.0, high + 1.0), *_peg_holes(size, low, high)]
+    for i, distance in enumerate(sorted(phantom.points_mm)):
+        x = radius + distance
+        tools.append(moved(cylinder(POINT_RADIUS, low - 1.0, high + 1.0), x, 0.0))
+        text = f"{distance:g}".replace(".", "")
+        above = i % 2 == 0
+        y = POINT_RADIUS + 2.0 if above else -POINT_RADIUS - 2.0 - HEIGHT * stroke
+        tools.append(moved(engraving(text, stroke, high - depth, high + 1.0), x - text_width(text, stroke) / 2, y))
+    return cut(_outline(size, low, high), tools)
+
+
+def _holder(phantom: PhantomTable, size: BoxLengths) -> Shape:
+    """Draw the plate that holds the tray on a table with threaded holes: fences at its corners, four bolt holes."""
+    low, high = size.bottom - HOLDER, size.bottom
+    play = 0.3
+    x_bolt, y_bolt = bolts(phantom, size)
+    half_x = max(size.outer + play + FENCE, x_bolt + phantom.stage_bolt_mm + 4.0)
+    half_y = y_bolt + phantom.stage_bolt_mm + 4.0
+    solids: list[Shape] = [box(-half_x, half_x, -half_y, half_y, low, high)]
+    face = size.outer + play
+    for sx in (-1, 1):
+        for sy in (-1, 1):
+            solids.append(
+                _box(sx, face - FENCE_LONG, face + FENCE, sy, face, face + FENCE, high - 1.0, high + FENCE_HIGH)
+            )
+            solids.append(
+                _box(sx, face, face + FENCE, sy, face - FENCE_LONG, face + FENCE, high - 1.0, high + FENCE_HIGH)
+            )
+    window = 0.75 * size.inner
+    hole = phantom.stage_bolt_mm / 2 + 0.3
+    tools: list[Shape] = [box(-window, window, -window, window, low - 1.0, high + 1.0)]
+    tools += [
+        moved(cylinder(hole, low - 1.0, high + 1.0), sx * x_bolt, sy * y_bolt) for sx in (-1, 1) for sy in (-1, 1)
+    ]
+    return cut(union(solids), tools)
+
+
+def bolts(phantom: PhantomTable, size: BoxLengths) -> tuple[float, float]:
+    """Return x and y of the holder's bolt holes: on the table's pitch, beyond the fences along y."""
+    half = phantom.stage_pitch_mm / 2
+    needed = size.outer + 0.3 + FENCE + phantom.stage_bolt_mm + 1.0
+    across = math.floor(0.8 * size.outer / half)
+    return max(across, 1) * half, math.ceil(needed / half) * half
+
+
+def _box(sx: int, x0: float, x1: float, sy: int, y0: float, y1: float, z0: float, z1: float) -> Shape:
+    return box(min(sx * x0, sx * x1), max(sx * x0, sx * x1), min(sy * y0, sy * y1), max(sy * y0, sy * y1), z0, z1)
