@@ -6,10 +6,12 @@ store, so that a second run, or one that was interrupted, solves nothing twice.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache, partial
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +19,15 @@ from unitcad.attenuation.inputs import EstimateInput
 from unitcad.cache import Store, digest
 from unitcad.experiments.draws import Draws, Rival
 
+if TYPE_CHECKING:
+    from unitcad.attenuation.mechanics.motor_level import Drive
+
 FINENESS = 1.0
 """Of the mesh; see docs/experiments.md for what it costs in accuracy."""
 BLOCK = 10
 """Draws that are solved and kept together."""
+SMALLEST = 1e-7
+"""What a vibrometer shows where less moves, m, under the force of a small motor, about one newton."""
 NAMES = {
     "mechanics-axial-edge": "finite elements, motor driven along its axis, the unit's own edge was read",
     "mechanics-flat-edge": "finite elements, motor driven sideways, the unit's own edge was read",
@@ -32,43 +39,54 @@ MISSING = "needs scikit-fem: pip install 'unitcad[fem]'"
 
 def installed() -> bool:
     """Tell whether the library of the finite elements is there."""
-    return find_spec("skfem") is not None and find_spec("unitcad.attenuation.mechanics") is not None
+    return find_spec("skfem") is not None
 
 
-def element_rivals(store: Store) -> tuple[Rival, ...]:
-    """Return the four rivals, whose solutions are kept in `store`."""
+def element_rivals(store: Store, smallest: float = SMALLEST) -> tuple[Rival, ...]:
+    """Return the four rivals, whose solutions are kept in `store`; `smallest`: see `SMALLEST`."""
     return tuple(
-        Rival(name, says, partial(_levels, store, *name.split("-")[1:]), costly=True) for name, says in NAMES.items()
+        Rival(name, says, partial(_levels, store, smallest, *name.split("-")[1:]), costly=True)
+        for name, says in NAMES.items()
     )
 
 
-def _levels(store: Store, drive: str, reading: str, variant: EstimateInput, draws: Draws) -> np.ndarray:
+def _levels(
+    store: Store, smallest: float, drive: Drive, reading: str, variant: EstimateInput, draws: Draws
+) -> np.ndarray:
     starts = range(0, draws.count, BLOCK)
-    solved = [
-        store.data(_key(variant, drive, draws.seed, i), partial(_solve, variant, drive, draws.seed, i)) for i in starts
+    blocks = [
+        store.data(_key(variant, drive, draws.seed, start), partial(_solve, variant, drive, draws.seed, start))
+        for start in starts
     ]
-    return np.concatenate([block[reading] for block in solved])[: draws.count]
+    read, motor = (
+        np.maximum(np.concatenate([block[at] for block in blocks])[: draws.count], smallest)
+        for at in (reading, "motor")
+    )
+    return read / motor
 
 
-def _solve(variant: EstimateInput, drive: str, seed: int, start: int) -> dict[str, list[float]]:
-    """Return the levels of a block of draws at both readings, which share their solutions."""
-    from unitcad.attenuation.mechanics.motor_level import level
-    from unitcad.attenuation.mechanics.unknowns import Draw
+def _solve(variant: EstimateInput, drive: Drive, seed: int, start: int) -> dict[str, list[float]]:
+    """Return amplitudes under one newton (m) of a block of draws: at both readings and of the motor."""
+    from unitcad.attenuation.mechanics.motor_level import amplitude, motion
+    from unitcad.attenuation.mechanics.unknowns import Draw, drawn
 
-    found: dict[str, list[float]] = {"skin": [], "edge": []}
+    found: dict[str, list[float]] = {"skin": [], "edge": [], "motor": []}
     for index in range(start, start + BLOCK):
-        for reading, values in found.items():
-            hertz = variant.frequency.middle
-            values.append(level(variant, hertz, drive, reading, Draw(seed, index), FINENESS))  # type: ignore[arg-type]
+        made, setting = drawn(variant, Draw(seed, index))
+        moved = motion(replace(made, frequency=variant.frequency), drive, setting, FINENESS)
+        found["skin"].append(amplitude(moved.skin, drive, "along"))
+        found["edge"].append(amplitude(moved.edge, drive, "along"))
+        found["motor"].append(abs(moved.motor))
     return found
 
 
-def _key(variant: EstimateInput, drive: str, seed: int, start: int) -> str:
-    return digest(repr(("levels", _solver(), FINENESS, BLOCK, variant, drive, seed, start)).encode())
+def _key(variant: EstimateInput, drive: Drive, seed: int, start: int) -> str:
+    return digest(repr(("amplitudes", _solver(), FINENESS, BLOCK, variant, drive, seed, start)).encode())
 
 
 @cache
 def _solver() -> str:
     """Return a digest of the code that solves: a changed line reuses nothing."""
     folder = Path(str(files("unitcad"))) / "attenuation"
-    return digest(b"".join(file.read_bytes() for file in sorted(folder.rglob("*.py"))))
+    code = [folder / "inputs.py", *sorted(folder.glob("layered/*.py")), *sorted(folder.glob("mechanics/*.py"))]
+    return digest(b"".join(file.read_bytes() for file in code))

@@ -61,7 +61,7 @@ class LabFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     rivals: list[str] = []
     noise: Annotated[float, Meta(ge=0.001, le=2)] = 0.1
     discrepancy: Annotated[float, Meta(ge=0, le=2)] = 0.15
-    smallest_level: Annotated[float, Meta(ge=1e-9, le=1, description="that a reading tells from none")] = 0.001
+    smallest_um: Annotated[float, Meta(ge=1e-6, le=1000, description="amplitude that is told from none")] = 0.1
     modulus_factor: Annotated[float, Meta(ge=1, le=10)] = 1.5
     draws: Annotated[int, Meta(ge=10, le=2000)] = 200
     element_draws: Annotated[int, Meta(ge=10, le=2000, description="of rivals by finite elements")] = 40

@@ -40,7 +40,7 @@ def most_telling(
     measures (its units are not read). Raises Refusal as `study` does, also for a rival that is not installed.
     """
     lab = lab_of_specs(specs, settings)
-    predicted = predictions(lab, available(rivals, store).rivals, step)
+    predicted = predictions(lab, available(rivals, store, settings.smallest_um * 1e-6).rivals, step)
     best = singles(predicted, candidates(lab, predicted), step)[0]
     ratio, found = best.ratios[0], best.information
     says = " and ".join(f"{name} {span_text(range_of(ratio, predicted, name))}" for name in rivals)

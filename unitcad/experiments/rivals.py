@@ -75,12 +75,15 @@ class Available:
     left_out: dict[str, str]
 
 
-def available(names: Sequence[str] = (), store: Store | None = None) -> Available:
+def available(
+    names: Sequence[str] = (), store: Store | None = None, smallest: float = element_rivals.SMALLEST
+) -> Available:
     """Return the rivals of those names in that order, ["all"], or the usual ones for none.
 
-    `store` keeps what is costly. Raises Refusal for a name that no rival has.
+    `store` keeps what is costly; `smallest`: the least amplitude that is read, m. Raises Refusal for a name that no
+    rival has.
     """
-    elements = element_rivals.element_rivals(store or MemoryStore())
+    elements = element_rivals.element_rivals(store or MemoryStore(), smallest)
     known = {rival.name: rival for rival in (*_CLOSED_FORMS, *elements)}
     chosen = tuple(known) if list(names) == ["all"] else tuple(names) or DEFAULT
     for i, name in enumerate(chosen):

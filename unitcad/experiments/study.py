@@ -28,7 +28,7 @@ def study(lab: Lab, step: Step = lambda stage: None, store: Store | None = None)
     `store` keeps the solutions of finite elements. The same lab gives the same numbers. Raises Refusal where fewer than
     two rivals or no ratio is left.
     """
-    asked = available(lab.settings.rivals, store)
+    asked = available(lab.settings.rivals, store, lab.settings.smallest_um * 1e-6)
     predicted = predictions(lab, asked.rivals, step)
     prior = predicted.most_bits
     predicted = predicted.updated(lab.measured)
@@ -67,7 +67,7 @@ def predictions(lab: Lab, rivals: Sequence[Rival], step: Step = lambda stage: No
         for i, (condition, variant) in enumerate(lab.variants.items()):
             step(f"{rival.name}: {condition} ({i + 1} of {len(lab.variants)})")
             columns.append(rival.levels(variant, draws))
-        logs.append(np.log(np.maximum(np.stack(columns, axis=-1), settings.smallest_level)))
+        logs.append(np.log(np.stack(columns, axis=-1)))
     finite = np.all([np.isfinite(log).all(axis=0) for log in logs], axis=0)
     if finite.sum() < 2:
         raise Refusal("units", list(settings.units), "the rivals have an answer for fewer than two readings")
