@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +19,11 @@ from unitcad.casting.procedure import Procedure
 from unitcad.casting.release_agent import Face
 from unitcad.casting.rules import broken_rules
 from unitcad.catalogue import materials
+from unitcad.designs.dimensions import Exit
+from unitcad.moulds.cup import window_section
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.build import build
+from unitcad.spec import Spec
 from unitcad.text import number
 from unitcad.validation import load, templates
 
@@ -126,7 +131,9 @@ def test_play_moves_walls() -> None:
 
 
 def test_weep_goes_with_the_cube_of_the_clearance() -> None:
-    one, two = (set_of("encapsulating", f"moulds.window_clearance_mm={c}") for c in (0.05, 0.1))
+    one, two = (
+        set_of("encapsulating", f"moulds.window_clearance_mm={c}", "moulds.layer_mm=0.005") for c in (0.05, 0.1)
+    )
     silicone = materials()["ecoflex-00-30"]
     weep = [figures.weep_mm3(m, m.plan.steps[0], silicone) for m in (one, two)]
     assert weep[1] / weep[0] == pytest.approx(8, rel=1e-9)
@@ -182,7 +189,7 @@ def test_order_of_the_hands() -> None:
 
 def test_resin_and_lid_have_their_own_words() -> None:
     text = written.to_markdown(procedure("encapsulating", "moulds.printer=sla", "moulds.pour=injected"))
-    for words in ("post-cure", "syringe", "from film or steel strip of 0.35 mm", "Lift the lid"):
+    for words in ("post-cure", "syringe", "from film or steel strip of 0.35 mm", "what held the lid down"):
         assert words in text
     assert "Strike off" not in text
 
@@ -198,13 +205,60 @@ def test_bill_counts_pieces() -> None:
 
 
 def test_edges_off_the_layer_grid() -> None:
+    """What the unit itself asks for stays; a window's edges end layers."""
     moulds = set_of("encapsulating")
     edges = {(e.piece, e.edge): e for e in off_grid(moulds)}
-    # As printed, upside down, the window's edges lie 3.36 - 1.705 and 3.36 - 2.405 above the bed.
-    assert edges["cup1", "window's lower edge"].height_mm == pytest.approx(1.655)
-    assert edges["cup1", "window's upper edge"].nearest_mm == pytest.approx(1.0)
+    assert edges["cup1", "seat"].height_mm == pytest.approx(3.36)
+    assert edges["cup1", "seat"].moved_mm == pytest.approx(0.04)
     assert ("base", "seat") not in edges
     assert off_grid(set_of("encapsulating", "moulds.layer_mm=0.005")) == []
+
+
+@pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25", "sla"])
+@pytest.mark.parametrize("name", sorted(templates()))
+def test_no_window_of_a_template_is_off_the_grid(name: str, printer: str) -> None:
+    edges = off_grid(set_of(name, f"moulds.printer={printer}"))
+    assert [e for e in edges if "window" in e.edge] == []
+
+
+def as_printed(moulds: MouldSet, windows: Callable[..., tuple[float, float, float]]) -> list[float]:
+    """Return the gaps under and over the tongue in every cup, cup, ledge and tongue in whole layers: worked out apart.
+
+    Heights over the seat, in layers: the cup's count down from its rim, the ledge's up from the plate.
+    """
+    spec, exit, layer = moulds.spec, moulds.plan.dimensions.exit, moulds.spec.moulds.layer_mm
+    if not exit:
+        return []
+    seat = (spec.moulds.plate_mm + spec.moulds.plinth_height_mm) / layer
+    ledge = round(exit.low / layer + seat) - round(seat)
+    cut = moulds.plan.of_kind("tongue")[0].made == "cut"
+    thick = exit.height / layer if cut else round(exit.height / layer)
+    gaps = []
+    for step in moulds.plan.steps:
+        _, low, high = windows(spec, exit, step.rim)
+        rim = round(step.rim / layer)
+        gaps.append(ledge - (rim - round((step.rim - low) / layer)))
+        if step.windows:
+            gaps.append(rim - round((step.rim - high) / layer) - (ledge + thick))
+    return [gap * layer for gap in gaps]
+
+
+@pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25", "sla"])
+@pytest.mark.parametrize("name", sorted(templates()))
+def test_a_tongue_has_its_clearance_in_whole_layers_too(name: str, printer: str) -> None:
+    moulds = set_of(name, f"moulds.printer={printer}")
+    least = moulds.spec.moulds.window_clearance_mm
+    assert min(as_printed(moulds, window_section), default=least) >= least - 1e-9
+
+
+def test_a_window_drawn_to_the_clearance_alone_meets_the_tongue_in_whole_layers() -> None:
+    """Planted: window edges that snap to nothing leave no gap in the first cup."""
+
+    def unsnapped(spec: Spec, exit: Exit, _rim: float) -> tuple[float, float, float]:
+        clearance = spec.moulds.window_clearance_mm
+        return exit.width / 2 + clearance, exit.low - clearance, exit.high + clearance
+
+    assert min(as_printed(set_of("encapsulating"), unsnapped)) == pytest.approx(0)
 
 
 def test_drawing_of_every_pour_names_its_pieces() -> None:
@@ -388,7 +442,7 @@ def test_windows_that_resin_closes_are_cleared() -> None:
     assert casting.tunnels == ("cup1", "cup2", "cup3")
     said = [i for i, step in enumerate(casting.preparation) if "windows of cup 1, cup 2 and cup 3" in step]
     assert len(said) == 1
-    assert "0.45 mm high" in casting.preparation[said[0]]
+    assert "0.5 mm high" in casting.preparation[said[0]]
     assert procedure("three-layer").tunnels == procedure("embedded", "moulds.printer=sla").tunnels == ()
     for steps in (
         tuple(step for i, step in enumerate(casting.preparation) if i not in said),

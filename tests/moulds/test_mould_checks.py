@@ -88,7 +88,7 @@ def shifted(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[[Shape],
 FAULTS: list[Fault] = [
     ("C000", "cup1", "empty", lambda shape: Common((box(0, 1, 0, 1, 0, 1), box(2, 3, 2, 3, 2, 3)))),
     ("C000", "cup1", "in two pieces", less(box(-99, 99, 9, 9.5, -99, 99))),
-    ("C000", "cup2", "window closed", more(box(8, 10, -3, 3, 1.5, 2.6))),
+    ("C000", "cup2", "window closed", more(box(8, 10, -3, 3, 1.5, 2.7))),
     ("C000", "cup2", "a hollow inside", less(box(9, 9.5, 4, 5, 1, 1.5))),
     ("C100", "base", "a pit of 0.3 in the core", less(moved(cylinder(0.15, 1.81, 9), 2.5, 1.5))),
     ("C100", "base", "a scratch under the seat", less(box(4, 20, 3, 3.2, -0.1, 0.5))),

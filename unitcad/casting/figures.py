@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from unitcad.catalogue import Material, Value
+from unitcad.moulds.cup import window_section
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.spec import Spec
@@ -87,17 +88,18 @@ def at_room(value: float, room_c: float) -> float:
 def weep_mm3(moulds: MouldSet, step: Step, material: Material) -> float:
     """Return what flows out beside the tongues of one cell during the whole pot life without grease, mm3.
 
-    Plane Poiseuille flow through the window's clearance: clearance^3 perimeter pressure / (12 viscosity length).
+    Plane Poiseuille flow through the gaps round the tongue, each gap^3 width pressure / (12 viscosity length).
     """
     spec, dims = moulds.spec, moulds.plan.dimensions
     if not dims.exit:
         return 0.0
-    clearance = spec.moulds.window_clearance_mm / 1000
-    around = 2 * (dims.exit.width + dims.exit.height) / 1000
+    half, low, high = window_section(spec, dims.exit, step.rim)
+    over, under, beside = high - dims.exit.high, dims.exit.low - low, half - dims.exit.width / 2
+    gaps = ((over**3 + under**3) * dims.exit.width + 2 * beside**3 * dims.exit.height) / 1000**4
     length = window_length(moulds, step) / 1000
     head = max(step.rim - (dims.exit.low + dims.exit.high) / 2, 0.0) / 1000
     pressure = 1000 * float(material.density_g_cm3) * GRAVITY * head
-    flow = clearance**3 * around * pressure / (12 * float(material.mixed_viscosity_cps) / 1000 * length)
+    flow = gaps * pressure / (12 * float(material.mixed_viscosity_cps) / 1000 * length)
     seconds = 60 * at_room(float(material.pot_life_min), spec.casting.room_c)
     return len(dims.sides) * flow * seconds * 1e9
 

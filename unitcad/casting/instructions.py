@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from unitcad.casting.figures import MIXING_MIN, MOST_ERROR_PCT, Mix, at_room, window_length
 from unitcad.casting.release_agent import agent_faces
 from unitcad.catalogue import Material
+from unitcad.moulds.cup import window_section
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
@@ -69,7 +70,8 @@ def _clear_tunnels(moulds: MouldSet) -> str:
     steps = [step for step in moulds.plan.steps if step.windows]
     low, high = (number(pick(window_length(moulds, step) for step in steps), 2) for pick in (min, max))
     exit = moulds.plan.dimensions.exit
-    height = number(exit.height + 2 * moulds.spec.moulds.window_clearance_mm, 2) if exit else ""
+    windows = [window_section(moulds.spec, exit, step.rim) for step in steps] if exit else []
+    height = number(min(high - low for _, low, high in windows), 2)
     return (
         f"Clear the windows of {listed(spaced(step.cup) for step in steps)} now, before the post-cure: resin stays in "
         f"a slot {height} mm high that runs {low if low == high else f'{low} to {high}'} mm through the wall. Rinse "
@@ -169,7 +171,10 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
         each = "the tongue" if len(tongues) == 1 else "every tongue"
         yield f"Pull {each} out FIRST, sideways. A cup lifted over a tongue tears the layer."
     if step.lid:
-        yield "Lift the lid straight up: sprue and vents tear off at the layer. Trim them flush with a knife."
+        yield (
+            "Take off what held the lid down. Lift the lid straight up: sprue and vents tear off at the layer. Trim "
+            "them flush with a knife."
+        )
     free = "" if step.lid else "Take off what held the cup down. "
     yield (
         f"{free}Lift cup {step.index} straight up, a screwdriver in each pry slot. Layer {step.index} stays on the "
@@ -197,21 +202,21 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
     """
     spec, dims = moulds.spec, moulds.plan.dimensions
     play = spec.moulds.plinth_clearance_mm
-    yield f"Height over all: {_shown(dims.heights[-1])} mm. A cup that did not seat shows here."
+    yield f"Height over all: {_shown(dims.heights[-1], 2)} mm. A cup that did not seat shows here."
     if moulds.plan.concentric:
-        yield f"Diameter at the skin: {_shown(2 * dims.outer_radius)} mm, in two directions."
+        yield f"Diameter at the skin: {_shown(2 * dims.outer_radius, 2)} mm, in two directions."
         further = f", each further layer by {number(2 * play, 3)} mm unless both cups were pushed the same way"
         yield (
             "Walls at the skin, at four places: their spread is the cup's shift. Layer 1 may vary by "
             f"{number(play, 3)} mm either way{further if len(masses_g) > 1 else ''}."
         )
     else:
-        yield f"Farthest corner from the motor's axis: {_shown(dims.outer_radius)} mm."
+        yield f"Farthest corner from the motor's axis: {_shown(dims.outer_radius, 2)} mm."
     if dims.exit:
         opening = "notch" if dims.exit.high >= dims.heights[0] else "slot"
         layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
-        printed = f" ({_shown(slot_height)} if the tongue was printed {layers})" if slot_height else ""
-        size = f"{_shown(dims.exit.width)} wide, {_shown(dims.exit.height)} high{printed}"
+        printed = f" ({_shown(slot_height, 2)} if the tongue was printed {layers})" if slot_height else ""
+        size = f"{_shown(dims.exit.width, 2)} wide, {_shown(dims.exit.height, 2)} high{printed}"
         yield f"The {opening}: {size}, open all the way."
     weights = " + ".join(_shown(each) for each in masses_g) + (
         f" = {_shown(sum(masses_g))}" if len(masses_g) > 1 else ""
@@ -276,9 +281,9 @@ def _counted(count: int, thing: str) -> str:
     return f"one {thing}" if count == 1 else f"{count} {thing}s"
 
 
-def _shown(value: float) -> str:
-    """Return grams or mm as a scale or a caliper shows them."""
-    return number(value, 3, zeros=True)
+def _shown(value: float, decimals: int = 3) -> str:
+    """Return grams, or mm to two decimals, as a scale or a caliper shows them."""
+    return min(number(value, 3, zeros=True), f"{value:.{decimals}f}", key=len)
 
 
 def _each(moulds: MouldSet) -> str:

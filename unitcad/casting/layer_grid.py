@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from unitcad.moulds.base import plate_bottom
-from unitcad.moulds.cup import groove_depth_of
+from unitcad.moulds.cup import groove_depth_of, window_section
 from unitcad.moulds.mould_set import MouldSet
 
 NEAR = 0.02
@@ -41,7 +41,7 @@ def off_grid(moulds: MouldSet) -> list[OffGrid]:
 def _edges(moulds: MouldSet) -> list[tuple[str, str, float]]:
     """Return piece, edge and height above the bed, mm. Cups lie upside down: theirs count from the rim."""
     spec, dims = moulds.spec, moulds.plan.dimensions
-    bottom, clearance = plate_bottom(spec), spec.moulds.window_clearance_mm
+    bottom = plate_bottom(spec)
     edges = [("base", "seat", -bottom), ("base", "core's top", dims.core_height - bottom)]
     if dims.exit:
         edges += [("base", "ledge", dims.exit.low - bottom), ("tongue", "thickness", dims.exit.height)]
@@ -50,7 +50,7 @@ def _edges(moulds: MouldSet) -> list[tuple[str, str, float]]:
         edges += [(cup, "seat", rim)]
         edges += [(cup, "groove's floor", groove_depth_of(spec, rim))] if step.groove else []
         if dims.exit:
-            low, high = dims.exit.low - clearance, dims.exit.high + clearance
+            _, low, high = window_section(spec, dims.exit, rim)
             edges += [(cup, "window's lower edge", rim - low)]
             edges += [(cup, "window's upper edge", rim - high)] if high < rim else []
     return edges

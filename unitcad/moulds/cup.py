@@ -8,10 +8,12 @@ from unitcad.designs import Dimensions
 from unitcad.designs.dimensions import Exit
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Cell, Layout
-from unitcad.moulds.base import outline, plate_top, tapered
+from unitcad.moulds.base import outline, plate_bottom, plate_top, tapered
 from unitcad.moulds.layout import MARK, PLINTH_DRAFT_DEG
 from unitcad.shape import Extrude, Shape, box, cut, cylinder, moved, ring
-from unitcad.spec import Spec
+from unitcad.spec import Spec, printer_of
+
+EPS = 1e-6
 
 
 def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
@@ -20,7 +22,7 @@ def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
     tools: list[Shape] = [recess(spec, lay)]
     tools += [moved(cylinder(radius, -BEYOND, rim + BEYOND), c.x, c.y) for c in lay.cells]
     tools += [groove(spec, dims, layer, c) for c in lay.cells]
-    tools += windows(spec, dims, lay)
+    tools += windows(spec, dims, lay, rim)
     return cut(cup_blank(spec, lay, rim), tools)
 
 
@@ -49,7 +51,7 @@ def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
     channel = ring(inner, outer, rim - depth, rim + BEYOND)
     if dims.exit:
         wall = moulds.least_wall_mm
-        half, _, high = window_section(spec, dims.exit)
+        half, _, high = window_section(spec, dims.exit, rim)
         if rim - depth - high < wall:
             stops = (
                 box(min(0, s * (outer + 1)), max(0, s * (outer + 1)), -half - wall, half + wall, 0, rim + 2 * BEYOND)
@@ -64,11 +66,11 @@ def groove_depth_of(spec: Spec, rim: float) -> float:
     return min(spec.moulds.groove_depth_mm, rim / 2)
 
 
-def windows(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:
-    """Draw the passages of the tongues through a cup's wall, from each cell outwards to the edge."""
+def windows(spec: Spec, dims: Dimensions, lay: Layout, rim: float) -> list[Shape]:
+    """Draw the passages of the tongues through the wall of a cup of that rim, from each cell outwards to the edge."""
     if not dims.exit:
         return []
-    half, low, high = window_section(spec, dims.exit)
+    half, low, high = window_section(spec, dims.exit, rim)
     edge = lay.cup[0] + BEYOND
     return [
         box(min(c.x, s * edge), max(c.x, s * edge), c.y - half, c.y + half, low, high)
@@ -77,7 +79,27 @@ def windows(spec: Spec, dims: Dimensions, lay: Layout) -> list[Shape]:
     ]
 
 
-def window_section(spec: Spec, exit: Exit) -> tuple[float, float, float]:
-    """Return half width, bottom and top of a window, mm."""
-    clearance = spec.moulds.window_clearance_mm
-    return exit.width / 2 + clearance, exit.low - clearance, exit.high + clearance
+def window_section(spec: Spec, exit: Exit, rim: float) -> tuple[float, float, float]:
+    """Return half width, bottom and top of a window in a cup of that rim, mm.
+
+    As the cup is printed, upside down from its rim, bottom and top end whole layers. They keep the clearance to the
+    tongue both as drawn and as the layers make cup, ledge and tongue. Where the wall over or under the window would be
+    thinner than the least wall, the clearance alone is kept.
+    """
+    moulds, layer = spec.moulds, spec.moulds.layer_mm
+    low, high = exit.low - moulds.window_clearance_mm, exit.high + moulds.window_clearance_mm
+
+    def printed(height: float) -> float:
+        return math.floor(height / layer + 0.5 + EPS) * layer
+
+    seat = -plate_bottom(spec)
+    ledge = printed(exit.low + seat) - printed(seat)
+    thickness = exit.height if printer_of(spec).technology.value == "sla" else printed(exit.height)
+    rise = max(rim, printed(rim)) - (min(exit.low, ledge) - moulds.window_clearance_mm)
+    drop = min(rim, printed(rim)) - (max(exit.high, ledge + thickness) + moulds.window_clearance_mm)
+    bottom, top = rim - math.ceil(rise / layer - EPS) * layer, rim - math.floor(drop / layer + EPS) * layer
+    return (
+        exit.width / 2 + moulds.window_clearance_mm,
+        bottom if bottom >= moulds.least_wall_mm - EPS else low,
+        top if rim - top >= moulds.least_wall_mm - EPS else high,
+    )

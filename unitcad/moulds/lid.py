@@ -17,6 +17,7 @@ from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Layout
 from unitcad.errors import Refusal
 from unitcad.moulds.base import outline
+from unitcad.moulds.cup import window_section
 from unitcad.moulds.dents import MESH_ROOM, TILT_DEG, deepest
 from unitcad.moulds.layout import MARK
 from unitcad.shape import Extrude, Revolve, Shape, cut, cylinder, moved, polygon
@@ -38,7 +39,7 @@ def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
     rim, top, play = dims.heights[layer], lid_top(dims, layer), spec.moulds.plinth_clearance_mm
     low = rim - SKIRT
     if dims.exit:
-        low = max(low, dims.exit.high + spec.moulds.window_clearance_mm + SKIRT_OFF_WINDOW)
+        low = max(low, window_section(spec, dims.exit, rim)[2] + SKIRT_OFF_WINDOW)
     tools = [Extrude(outline(lay.cup, MARK, play), low - BEYOND, rim), *channels(spec, dims, lay, layer, beyond=BEYOND)]
     return cut(Extrude(outline(lay.cup, MARK, play + SKIRT_WALL), low, top), tools)
 

@@ -25,7 +25,7 @@ def seals(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
             cup_blank(spec, lay, dims.heights[layer]),
             [moved(cylinder(dims.radii[layer], -BEYOND, dims.heights[layer] + BEYOND), c.x, c.y) for c in lay.cells],
         )
-        seals += [cut(Common((walls, window)), around) for window in windows(spec, dims, lay)]
+        seals += [cut(Common((walls, window)), around) for window in windows(spec, dims, lay, dims.heights[layer])]
         seals += [
             cut(Common((moved(core(dims), c.x, c.y), moved(notch(spec, dims, dims.exit, s), c.x, c.y))), around)
             for c in lay.cells
