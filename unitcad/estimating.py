@@ -41,8 +41,10 @@ def estimate_spec(
     data = estimate(variant, closed_forms(asked), layered)
     if MECHANICS in asked:
         from unitcad.attenuation.mechanics.prior_range import range_block
+        from unitcad.attenuation.mechanics.sensitivities import mechanics_inputs
 
-        data[MECHANICS] = rounded(range_block(variant, say=say))
+        block = range_block(variant, say=say)
+        data[MECHANICS] = rounded({**block, "inputs_seen": mechanics_inputs(variant, say)})
     return data
 
 

@@ -112,12 +112,13 @@ def test_an_unknown_drive_or_reading_is_refused():
 
 
 def test_it_is_made_only_when_it_is_asked_for(monkeypatch):
-    from unitcad.attenuation.mechanics import prior_range
+    from unitcad.attenuation.mechanics import prior_range, sensitivities
 
     monkeypatch.setattr(prior_range, "range_block", lambda variant, say: {"draws": 0})
+    monkeypatch.setattr(sensitivities, "mechanics_inputs", lambda variant, say: [])
     assert "mechanics" not in estimate_spec(load("encapsulating"))
     data = estimate_spec(load("encapsulating"), models=("paper", "mechanics"))
-    assert data["mechanics"] == {"draws": 0}
+    assert data["mechanics"] == {"draws": 0, "inputs_seen": []}
     assert list(data["models"]) == ["paper"]
 
 

@@ -138,13 +138,15 @@ def _choice(chosen: dict[str, Any]) -> str:
 
 def _inputs(data: dict[str, Any]) -> Table | None:
     """Tabulate the percent by which a level grows with 1 % more of an input; inputs that no model reads stand below."""
-    seen = {name: block["inputs_seen"]["by"] for name, block in data["models"].items() if "inputs_seen" in block}
-    seen = {name: by for name, by in seen.items() if by is not None}
+    found = {name: block["inputs_seen"] for name, block in data["models"].items()}
+    for one in data.get("mechanics", {}).get("inputs_seen", ()):
+        found[f"mechanics, {one['reading']}"] = one
+    seen = {name: one["by"] for name, one in found.items() if one["by"] is not None}
     if not seen:
         return None
     table = Table("1 % more of", *seen, title="changes the edge level by, %")
-    every = next(iter(seen))
-    names = [*seen[every], *data["models"][every]["inputs_seen"]["not_seen"]]
+    some = found[next(iter(seen))]
+    names = [*some["by"], *some["not_seen"]]
     for name in sorted(names, key=lambda name: -max(abs(by.get(name, 0.0)) for by in seen.values())):
         if any(name in by for by in seen.values()):
             table.add_row(name, *[f"{by[name]:+.2f}" if name in by else "not seen" for by in seen.values()])

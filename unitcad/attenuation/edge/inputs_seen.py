@@ -80,7 +80,11 @@ def _times(quantity: Any, factor: float) -> Any:
 
 def _silicone(index: int, field: str, variant: EstimateInput, factor: float) -> EstimateInput:
     layers = list(variant.layers)
-    layers[index] = replace(layers[index], **{field: _times(getattr(layers[index], field), factor)})
+    quantity = getattr(layers[index], field)
+    if field == "poisson_ratio" and quantity.middle * max(factor, 1.0 / factor) > 0.5:
+        # No ratio lies above 1/2: the whole difference is taken below the value.
+        factor = min(factor**2, 1.0)
+    layers[index] = replace(layers[index], **{field: _times(quantity, factor)})
     return replace(variant, layers=tuple(layers))
 
 

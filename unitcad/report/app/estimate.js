@@ -151,15 +151,17 @@
   }
 
   // What a percent more of each input does to each model's level, in percent; what no model reads is named below.
-  function inputs(models) {
-    const reading = Object.entries(models).map(([model, block]) => [model, block.inputs_seen || {}]).filter(([, seen]) => seen.by);
+  function inputs(data) {
+    const closed = Object.entries(data.models || {}).map(([model, block]) => [nameOf(model), block.inputs_seen || {}]);
+    const solved = ((data.mechanics || {}).inputs_seen || []).map((one) => [`Finite elements, ${one.reading}`, one]);
+    const reading = [...closed, ...solved].filter(([, seen]) => seen.by);
     if (!reading.length) return null;
     const names = [...Object.keys(reading[0][1].by), ...reading[0][1].not_seen];
     const most = (name) => Math.max(...reading.map(([, seen]) => Math.abs(seen.by[name] || 0)));
     const [read, unread] = [names.filter((name) => most(name) > 0), names.filter((name) => most(name) === 0)];
     read.sort((a, b) => most(b) - most(a));
     return [el("h3", {}, "Inputs that a model sees"),
-      table(["1 % more of", ...reading.map(([model]) => nameOf(model))], read.map((name) => [name, ...reading.map(([, seen]) => (name in seen.by ? seen.by[name] : "not seen"))]), { label: "Inputs that a model sees" }),
+      table(["1 % more of", ...reading.map(([model]) => model)], read.map((name) => [name, ...reading.map(([, seen]) => (name in seen.by ? seen.by[name] : "not seen"))]), { label: "Inputs that a model sees" }),
       el("p", { className: "note" }, `Change of the level at the edge in percent, at the middle of the inputs' ranges.${unread.length ? ` Seen by none: ${unread.join(", ")}.` : ""}`)];
   }
 
@@ -180,7 +182,7 @@
     }
     return section("estimate", "Attenuation estimate",
       el("p", {}, "An estimate, not a measurement: how much of the motor's amplitude reaches the skin at the unit's edge, by each model, and how it decays from there."),
-      levels(data), mechanics(data.mechanics), ratios(data), inputs(data.models || {}), el("h3", {}, "Outwards from the edge"), curves(data.layered), margins(data.models || {}), errors(data), assumptions(data),
+      levels(data), mechanics(data.mechanics), ratios(data), inputs(data), el("h3", {}, "Outwards from the edge"), curves(data.layered), margins(data.models || {}), errors(data), assumptions(data),
       el("details", {}, el("summary", {}, "All numbers"), facts(data)));
   }
 
