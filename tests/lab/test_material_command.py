@@ -113,6 +113,9 @@ def test_a_reversed_or_short_curve_is_refused(tmp_path: Path) -> None:
     strain, stress = _curve()
     with pytest.raises(UnitcadError, match="reversed"):
         read_curve(_table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, -stress]), {}, Specimen())
+    empty = np.full_like(strain, np.nan)
+    with pytest.raises(UnitcadError, match="no row"):
+        read_curve(_table(tmp_path / "c.csv", "Strain (%),Stress (kPa)", [100 * strain, empty]), {}, Specimen())
     with pytest.raises(UnitcadError, match="points"):
         read_curve(_table(tmp_path / "b.csv", "Strain (%),Stress (kPa)", [strain[:3], stress[:3]]), {}, Specimen())
 
@@ -168,6 +171,7 @@ def test_the_table_goes_into_a_spec_and_the_folder_holds_everything(tmp_path: Pa
     ]
     done = _invoke(*curves, "--name", "our blend", "--like", "ecoflex-00-30", "-o", tmp_path / "out")
     assert "quasi-static" in done.output
+    assert "Without that" not in done.output  # ecoflex-00-30 has no modulus that would be taken instead
     assert sorted(os.listdir(tmp_path / "out")) == ["material.json", "material.toml", "tensile.svg"]
     ET.parse(tmp_path / "out" / "tensile.svg")
     text = (tmp_path / "out" / "material.toml").read_text("utf-8")

@@ -200,6 +200,8 @@ def test_what_can_not_be_is_refused(changed: dict, field: str, part: str) -> Non
 def test_a_refused_phantom_leaves_no_folder(tmp_path: Path) -> None:
     file = tmp_path / "p.toml"
     file.write_text(phantoms()["skin"].read_text("utf-8").replace('"fdm-0.4"', '"sla"'), "utf-8")
+    with pytest.raises(Refusal, match="known: skin"):
+        load_phantom("nope")
     done = CliRunner().invoke(app, ["phantom", str(file), "-o", str(tmp_path / "out")])
     assert isinstance(done.exception, Refusal)
     assert not (tmp_path / "out").exists()

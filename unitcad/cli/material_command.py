@@ -12,6 +12,7 @@ from unitcad.cli.shared_options import AsJson
 from unitcad.errors import Refusal, unknown_name
 
 if TYPE_CHECKING:
+    from unitcad.catalogue import Material
     from unitcad.lab.dynamic_test import DynamicResult
     from unitcad.lab.tensile_result import TensileResult
 
@@ -86,7 +87,7 @@ def material(
             ratio = float(shipped[base].poisson_ratio)
             dynamic = evaluate_dynamic(read_dynamic(dma, given, deformation, layout), frequency_hz, ratio)
     entry = written.table(tensile, dynamic, base, frequency_hz)
-    text = written.material_toml(named, entry, _comments(tensile is not None))
+    text = written.material_toml(named, entry, _comments(entry, shipped[base]))
     found = written.data(named, entry, tensile, dynamic, frequency_hz)
     if out is not None:
         contents = {"material.toml": text, "material.json": written.json_text(found)}
@@ -108,13 +109,17 @@ def material(
         typer.echo(str(out))
 
 
-def _comments(tensile: bool) -> tuple[str, ...]:
+def _comments(entry: dict[str, Any], base: Material) -> tuple[str, ...]:
     lines = ["For a spec: paste it there and name the silicone in [[layers]]."]
-    if tensile:
+    if "quasistatic_modulus_kpa" in entry:
         lines.append(
             'A tensile test is quasi-static: the estimate takes it where the spec says moduli = "quasi-static"'
         )
         lines.append("under [estimate]; it is no modulus at the motor's frequency.")
+        if base.youngs_modulus_kpa and "youngs_modulus_kpa" not in entry:
+            lines.append(
+                f"Without that the estimate takes what {base.name} has: {base.youngs_modulus_kpa.value:g} kPa."
+            )
     return tuple(lines)
 
 

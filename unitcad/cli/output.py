@@ -41,7 +41,7 @@ def say_error(error: UnitcadError, as_json: bool) -> None:
         print_json({"error": error.as_dict()})
 
 
-_ARGUMENTS = {"spec": "SPEC", "sweep": "SWEEP"}
+_ARGUMENTS = {"spec": "SPEC", "sweep": "SWEEP", "phantom": "PHANTOM"}
 """What the help calls parameters that are no options."""
 
 

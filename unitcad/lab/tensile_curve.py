@@ -162,7 +162,9 @@ def _trimmed(
     path: Path, strain: np.ndarray, stress: np.ndarray, time: np.ndarray | None, specimen: Specimen
 ) -> TensileCurve:
     """Return the curve up to its largest stress, without points whose strain had been passed before."""
-    if len(stress) == 0 or np.max(stress) <= 0:
+    if len(stress) == 0:
+        raise UnitcadError(f"{path}: no row has a number in each of the columns that are read")
+    if np.max(stress) <= 0:
         raise UnitcadError(f"{path}: the stress is nowhere above zero: no pull, or the sign of the force is reversed")
     end = int(np.argmax(stress)) + 1
     strain, stress = strain[:end], stress[:end]

@@ -72,5 +72,5 @@ def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
     elif os.sep in text or "/" in text or text.endswith(".toml"):
         path = Path(text)
     else:
-        raise unknown_name("PHANTOM", text, known, WrongArgument)
+        raise unknown_name("phantom", text, known, WrongArgument)
     return convert(read_toml(path), PhantomTable)
