@@ -10,7 +10,7 @@ from functools import cache, partial
 import numpy as np
 
 from unitcad.accuracy.level_scores import score_tables
-from unitcad.accuracy.result import Cell, Plot, Promise, Result, Say, Table, stars
+from unitcad.accuracy.result import Cell, Plot, Promise, Result, Say, Summary, Table, stars
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.accuracy.unexplained import NineLevels, unexplained
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments, compared, edge_levels, in_order, stored
@@ -118,7 +118,23 @@ def run(quick: bool, say: Say) -> Result:
             *of_scores,
         ),
         measured=machine("numpy", "scipy", "scikit-fem"),
+        summary=_summary(models),
     )
+
+
+def _summary(models: dict[str, _Model]) -> Summary:
+    """Return the three models with the best scores for a unit that they were not fitted to, and the worst model."""
+    scored = sorted((model.assessed.left_out.geometric_mean, name) for name, model in models.items())
+    picks = tuple(
+        (
+            "amplitude at a unit's edge, this unit left out of the fit",
+            f"factor {score:.2f}",
+            f"{name}: {models[name].time}",
+        )
+        for score, name in scored[:3]
+    )
+    score, name = scored[-1]
+    return Summary(picks, f"{name}: off by a factor of {score:.2f}", 0)
 
 
 _SHOWN = ("E10/D30", "D10")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unitcad.accuracy.chain_peers import CHAINS
-from unitcad.accuracy.result import Plot, Promise, Result, Say, Table, stars
+from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, shown, stars
 from unitcad.accuracy.synthetic_records import (
     CLIPPED,
     LENGTH_S,
@@ -142,6 +142,24 @@ def run(quick: bool, say: Say) -> Result:
             Promise("paper: gain at 100 Hz", PaperChain().gain(100.0), 1e-6),
         ),
         measured={**machine("numpy", "scipy"), "records": trials, "seed": SEED},
+        summary=_summary(rows, coverage),
+    )
+
+
+def _summary(rows: list, coverage: list[Coverage]) -> Summary:
+    """Return the chain with the smallest median error, and the record on which `line` is farthest off."""
+    name, median, _, _, ms = min(rows, key=lambda row: row[1])
+    worst = max(coverage, key=lambda one: one.highest)
+    return Summary(
+        (
+            (
+                f"amplitude from a record of {LENGTH_S:g} s",
+                f"{shown(median)} %, median",
+                f"chain {name}: {shown(ms)} ms",
+            ),
+        ),
+        f"`line`, {worst.name}: {shown(100 * worst.highest)} %, 95th percentile",
+        0,
     )
 
 
