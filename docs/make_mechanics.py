@@ -15,7 +15,7 @@ from unitcad.accuracy.mechanics_search import as_data, drawn_levels, unit_levels
 from unitcad.attenuation.edge.measured_levels import measured_table
 
 FILE = Path(__file__).parent / "mechanics.json"
-SEED, DRAWS, FINENESS = 1, 256, 0.5
+SEED, DRAWS, FINENESS = 1, 256, 1.0
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else DRAWS

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, get_args
 
 import numpy as np
@@ -120,17 +120,21 @@ def one_constant(levels: np.ndarray, measured: np.ndarray) -> tuple[float, float
 
 
 def as_data(seed: int, fineness: float, nominal: np.ndarray, levels: np.ndarray) -> dict[str, Any]:
-    """Return computed levels for a file, to four digits."""
+    """Return levels along the drive over the motor's motion, to four digits, and the searches over all of them."""
+    along = [COMPONENTS.index("radial" if drive == "flat" else "normal") for drive in DRIVES]
 
     def short(values: np.ndarray) -> Any:
-        return np.vectorize(lambda v: float(f"{v:.4g}"))(values).tolist()
+        chosen = np.stack([values[..., i, :, k, 0] for i, k in enumerate(along)], axis=-2)
+        return np.vectorize(lambda v: float(f"{v:.4g}"))(chosen).tolist()
 
     return {
-        "what": "levels by finite elements: units, then drives, readings, components, references; draws first",
+        "what": "levels by finite elements, along the drive over the motor's: units, drives, readings; draws first",
         "seed": seed,
         "fineness": fineness,
         "units": list(measured_table().names),
-        "axes": [list(DRIVES), list(READINGS), list(COMPONENTS), list(REFERENCES)],
+        "drives": list(DRIVES),
+        "readings": list(READINGS),
+        "searches": {name: asdict(one) for name, one in searches(levels, seed).items()},
         "nominal": short(nominal),
         "draws": short(levels),
     }

@@ -21,6 +21,7 @@ MODULES = {
     "hankel": "hankel",
     "stability": "stability",
     "models": "edge_levels",
+    "mechanics": "unit_elements",
     "extremes": "extremes",
     "left-out": "left_out",
     "measure": "measure",

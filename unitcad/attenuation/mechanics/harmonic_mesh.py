@@ -16,13 +16,16 @@ from unitcad.errors import Missing
 
 try:
     import skfem
+    from threadpoolctl import threadpool_limits
 except ImportError as error:  # pragma: no cover - depends on the installation
-    raise Missing("finite elements need scikit-fem: pip install 'unitcad[fem]'") from error
+    raise Missing("finite elements need scikit-fem and threadpoolctl: pip install 'unitcad[fem]'") from error
 
 SIZE, GROWTH, LARGEST = 1e-3, 0.3, 4e-3
 """The mesh of fineness 1: an element's size at corners of the geometry (m), its growth per distance from one, and its
 largest size (m). Fineness n divides all three, so that errors fall with the elements' order."""
 TINY = 1e-9
+one_thread = threadpool_limits.wrap(limits=1)
+"""Keeps a function's linear algebra on one thread: its blocks are small, and threads on them cost ten times."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
 from unitcad.attenuation.mechanics.harmonic_elements import FIELDS, element_matrices
-from unitcad.attenuation.mechanics.harmonic_mesh import TINY, Block, HarmonicMesh
+from unitcad.attenuation.mechanics.harmonic_mesh import TINY, Block, HarmonicMesh, one_thread
 
 Contact = Literal["bonded", "resting"]
 """How skin carries unit and motor: it sticks, or slides without friction and does not lift off."""
@@ -97,6 +97,7 @@ def disc_response(mesh: HarmonicMesh, blocks: Sequence[Block], omega: float, har
     return _respond(mesh, blocks, omega, harmonic, "bonded", np.zeros_like(load), np.zeros(load.shape[:2], bool), load)
 
 
+@one_thread
 def _respond(
     mesh: HarmonicMesh,
     blocks: Sequence[Block],

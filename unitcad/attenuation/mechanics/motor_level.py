@@ -61,8 +61,8 @@ def level(
     drive           "flat" (sideways force) or "axial"
     reading         "skin" or "edge"
     draw            `Draw(seed, index)` of all that is not known; None: nominal values, bonded, the unit as drawn
-    fineness        of the mesh: at 1 one core needs about 0.2 s and bonded levels are within 1 %; at 0.5 0.05 s
-                    and they are within 2 %, small levels of resting units within 10 % (`unitcad accuracy mechanics`)
+    fineness        of the mesh: at 1 one core needs about 0.1 s and bonded levels are within 1 %; at 0.5 0.02 s and
+                    2 %, but 25 % where a resting unit is near a resonance (`unitcad accuracy mechanics`)
 
     Both readings of one call come from one solution, which is kept: ask for the second one next. Plain arguments and
     results: a process pool can call it. Raises Refusal for an unknown drive or reading, UnitcadError for a material

@@ -11,7 +11,7 @@ from unitcad.attenuation.inputs import EstimateInput
 from unitcad.attenuation.mechanics.motor_level import Drive, Reading, level
 from unitcad.attenuation.mechanics.unknowns import Draw, drawn
 
-SEED, DRAWS, FINENESS = 1, 24, 0.5
+SEED, DRAWS, FINENESS = 1, 24, 1.0
 PERCENT = (5, 50, 95)
 NOT_KNOWN = (
     "moduli and damping of silicones and body, thicknesses of the body, frequency, mass of the motor; whether the ring "
