@@ -28,7 +28,7 @@ def preparation(moulds: MouldSet) -> Iterator[str]:
     marked = listed(["base", "cups", *(["lids"] if plan.of_kind("lid") else [])])
     yield (
         f"Print the pieces as they lie in their files, without supports: {turned} upside down, the rest as drawn. "
-        f"{marked.capitalize()} are engraved {plan.label}."
+        f"{marked.capitalize()} are engraved {plan.label}; step1-cup.stl is cup 1, and so on."
     )
     yield from _cut_tongues(moulds)
     if in_resin(moulds):
@@ -49,9 +49,9 @@ def preparation(moulds: MouldSet) -> Iterator[str]:
     )
     if plan.of_kind("stub"):
         yield (
-            f"Push {_each(moulds)} filament stub up through the core from below until its end is flush with the core's "
-            "top, its bent end lying in the groove under the plate and on the bench. Trim its tip flush with a knife: "
-            "0.5 mm low shows."
+            f"Push {_each(moulds)} straight piece of filament up through the core from below until its end is flush "
+            "with the core's top, and bend what stands out below by a right angle into the groove under the plate: it "
+            "lies on the bench and can't sink. Trim the upper end flush with a knife: 0.5 mm low shows."
         )
 
 
@@ -161,7 +161,7 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
         if not moulds.plan.concentric and moulds.plan.dimensions.core_height > step.rim:
             yield "What stands on the base beside the cavity is higher than this rim: draw the blade past it."
         again = " The window weeps a little." if tongues else ""
-        yield f"Top up and strike again after {STRIKE_AGAIN_MIN} min (assumed).{again}"
+        yield f"Wipe the blade. Top up and strike again after {STRIKE_AGAIN_MIN} min (assumed).{again}"
     cure = at_room(float(silicone.cure_h), moulds.spec.casting.room_c)
     touched = (
         "the bead on a vent" if step.lid else "the silicone in the groove" if step.groove else "what was struck off"

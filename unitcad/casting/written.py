@@ -47,7 +47,8 @@ def to_markdown(procedure: Procedure) -> str:
     lines += [f"Mould set {procedure.label}, {cavities}. {UNPRINTED}", ""]
     lines += ["## Before the first pour", "", *steps(procedure.preparation), ""]
     if procedure.off_grid:
-        lines += ["These edges fall between two of the printer's layers; the slicer moves them to the nearest:", ""]
+        lines += ["These edges fall between two of the printer's layers; the slicer moves them to the nearest.", ""]
+        lines += ["Core's top and cups' seats are the unit's own heights, ledge and tongue those of its slot.", ""]
         rows = [(spaced(o.piece), o.edge, number(o.height_mm, 3), number(o.moved_mm, 2)) for o in procedure.off_grid]
         lines += [*_table(("piece", "edge", "height as printed, mm", "moved by, mm"), rows), ""]
     for pour in procedure.pours:
