@@ -38,6 +38,18 @@ SWEEPS = {
         "encapsulating",
         {"mode": "zip", "layers.0.material": SILICONES, "estimate.frequency_hz": [50.0, 60.0, 70.0, 80.0, 90.0]},
     ),
+    "moduli": (
+        "encapsulating",
+        {"estimate.moduli": ["dynamic", "quasi-static"], "layers.0.material": ["ecoflex-00-10", "dragon-skin-30"]},
+    ),
+    "own silicone": (
+        "encapsulating",
+        {
+            "materials.ours.like": ["ecoflex-00-10"],
+            "materials.ours.youngs_modulus_kpa": [20.0, 80.0],
+            "layers.0.material": ["ours", "ecoflex-00-10"],
+        },
+    ),
     "models": (
         "encapsulating",
         {"estimate.models": [["paper"], ["paper", "fitted"]], "layers.0.material": SILICONES[::2]},

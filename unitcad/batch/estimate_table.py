@@ -35,6 +35,8 @@ from unitcad.validation import from_data, put
 BLOCK = 1 << 15
 FREE = re.compile(r"layers\.(\d+)\.material|estimate\.frequency_hz|name|casting\..+")
 """Paths that are validated one by one: no other value decides whether theirs is accepted, without a tail end width."""
+SILICONES = re.compile(r"materials(\.|$)|estimate\.moduli")
+"""Paths that decide what a silicone's name means: beside one of them a layer's material is not independent."""
 FIELDS = ("youngs_modulus", "density", "poisson_ratio", "tan_delta")
 
 
@@ -111,7 +113,12 @@ def _free_axes(sweep: Sweep) -> list[int]:
     """Return the axes (by position) whose values are independent of each other."""
     if sweep.mode != "product" or any("tail_end_width_mm" in repr(base) for base in (sweep.bases, sweep.paths)):
         return []
-    return [i for i, axis in enumerate(sweep.axes) if FREE.fullmatch(axis.path)]
+    silicones_vary = any(SILICONES.match(path) for path in sweep.paths)
+    return [
+        i
+        for i, axis in enumerate(sweep.axes)
+        if FREE.fullmatch(axis.path) and not (silicones_vary and axis.path.endswith(".material"))
+    ]
 
 
 def _of(sweep: Sweep, index: int, free: set[str]) -> _Known | UnitcadError:

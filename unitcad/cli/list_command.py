@@ -34,8 +34,9 @@ def list_(
             continue
         typer.echo(name)
         for key, value in entry.items():
+            how = f"; {value['method']}" if "method" in value else ""
             bounds = f" ({value['low']:g} to {value['high']:g})" if "low" in value else ""
-            typer.echo(f"  {key} = {value['value']}{bounds}  [{value['status']}] {value['source']}")
+            typer.echo(f"  {key} = {value['value']}{bounds}  [{value['status']}] {value['source']}{how}")
 
 
 def _entries(kind: str) -> dict[str, Any]:
