@@ -24,6 +24,7 @@ from unitcad.cli.experiments_command import experiments
 from unitcad.cli.init_command import init
 from unitcad.cli.list_command import list_
 from unitcad.cli.material_command import material
+from unitcad.cli.measure_command import measure
 from unitcad.cli.output import say_error, speak_anywhere
 from unitcad.cli.phantom_command import phantom
 from unitcad.cli.report_command import report
@@ -62,6 +63,7 @@ app.command("coupon")(coupon)
 app.command("init")(init)
 app.command("list")(list_)
 app.command("material")(material)
+app.command("measure")(measure)
 app.command("phantom")(phantom)
 app.command("report")(report)
 app.command("schema")(schema)

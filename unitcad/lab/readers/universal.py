@@ -33,7 +33,7 @@ def read(path: Path, layout: Layout) -> Recording:
         kinds = [int(kind) for kind in file.get_set_types()]
         if 0 in kinds:
             raise Unreadable(str(path), None, f"the type of its data set {kinds.index(0) + 1} can't be read")
-        sets: list[dict[str, Any]] = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
+        sets: list[Any] = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
     records = [one for one in sets if int(one["func_type"]) in TIME_RESPONSE]
     if not records:
         raise Unreadable(

@@ -1,0 +1,45 @@
+"""unitcad measure."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from unitcad.cli.shared_options import AsJson
+
+
+def measure(
+    campaign: Annotated[Path, typer.Argument(metavar="CAMPAIGN.toml", help="Units, their recordings, the sensor.")],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for the results; out/measure-CAMPAIGN if not given.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure units from recordings of a vibrometer, a displacement sensor or an accelerometer.
+
+    Gives the level at the edge and along the skin, normalised by the motor, with an interval of 95 % from the repeats.
+    Exit 1 when a finding says that a record or a level is in doubt. The last line printed is the folder.
+    """
+    from unitcad.cli.output import print_json, progress, warn
+    from unitcad.lab import measured_files, measuring
+    from unitcad.lab.campaign import read_campaign
+
+    asked = read_campaign(campaign)
+    folder = out or Path("out") / f"measure-{campaign.stem}"
+    with progress(asked.name) as say:
+        result = measuring.measure(asked, campaign.parent, say)
+        say("files")
+        measured_files.write(result, folder)
+    for finding in result.findings:
+        warn(f"{finding.code} {finding.severity}: {finding.where}: {finding.message}")
+    if as_json:
+        print_json({"folder": str(folder), **measured_files.as_data(result)})
+    else:
+        for line in measured_files.lines(result):
+            typer.echo(line)
+        typer.echo(str(folder))
+    if result.findings:
+        sys.exit(1)

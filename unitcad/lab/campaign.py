@@ -1,0 +1,123 @@
+"""The campaign file: which recordings are of which unit and place, by which sensor, and what no file can tell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from unitcad.errors import Refusal
+from unitcad.lab.quantities import Quantity
+from unitcad.spec.asked import Table
+from unitcad.spec.convert import convert
+from unitcad.spec.toml import read_toml
+
+Name = Annotated[str, Meta(min_length=1, max_length=100)]
+Record = Annotated[str, Meta(min_length=1, max_length=1000)]
+Records = Annotated[tuple[Record, ...], Meta(max_length=1000)]
+Positive = Annotated[float, Meta(ge=1e-12, le=1e12)]
+Column = Annotated[int, Meta(ge=1, le=4096)] | Name
+Hertz = Annotated[float, Meta(ge=1, le=20000)]
+
+
+class SensorTable(Table, frozen=True, kw_only=True):
+    """What the samples are: quantity and unit after `scale`, which is that unit per unit in the file."""
+
+    quantity: Quantity
+    unit: Name
+    scale: Positive = 1.0
+    full_scale: Annotated[Positive | None, Meta(description="largest value that the sensor gives, in unit")] = None
+
+
+class RecordingTable(Table, frozen=True, kw_only=True):
+    """How the files are read, where they don't say it themselves."""
+
+    rate_hz: Annotated[float, Meta(ge=1, le=1e10)] | None = None
+    channel: Column | None = None
+    motor_channel: Annotated[Column | None, Meta(description="the motor, recorded at the same time")] = None
+    time_column: Column | None = None
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None
+    delimiter: Literal["", ",", ";", "\t", " "] = ""
+    decimal: Literal["", ".", ","] = ""
+    skip_lines: Annotated[int, Meta(ge=0, le=100000)] = 0
+
+
+class BlankTable(Table, frozen=True, kw_only=True):
+    """Records with the motor off: they tell the mains."""
+
+    records: Records
+
+
+class PointTable(Table, frozen=True, kw_only=True):
+    """Records at a distance from the unit's edge along the skin."""
+
+    distance_mm: Annotated[float, Meta(ge=0.01, le=1000)]
+    records: Records
+
+
+class UnitTable(Table, frozen=True, kw_only=True):
+    """One unit: its spec or the record of its casting, and its records."""
+
+    name: Name
+    spec: Name | None = None
+    cast: Name | None = None
+    reference: Annotated[Records, Meta(description="the motor alone, where no channel has it")] = ()
+    edge: Records = ()
+    point: tuple[PointTable, ...] = ()
+
+
+class ChainTable(Table, frozen=True, kw_only=True):
+    """The chains and their parameters; the first one's levels are the result. The paper's are assumed ones."""
+
+    use: Annotated[tuple[Literal["line", "paper"], ...], Meta(min_length=1, max_length=2)] = ("line",)
+    mains_hz: Annotated[float, Meta(ge=40, le=400)] = 50.0
+    band_hz: tuple[Hertz, Hertz] = (60.0, 250.0)
+    order: Annotated[int, Meta(ge=1, le=10)] = 4
+    q: Annotated[float, Meta(ge=1, le=1000)] = 30.0
+    zero_phase: bool = True
+    measure: Literal["rms", "peak"] = "rms"
+    trim_s: Annotated[float, Meta(ge=0, le=1000)] = 0.25
+
+
+class Campaign(Table, frozen=True, kw_only=True):
+    """A campaign: one sensor, units with their records."""
+
+    name: Name
+    note: Annotated[str, Meta(max_length=1000)] = ""
+    sensor: SensorTable
+    recording: RecordingTable = RecordingTable()
+    motor_sensor: SensorTable | None = None
+    blank: BlankTable | None = None
+    chain: ChainTable = ChainTable()
+    unit: Annotated[tuple[UnitTable, ...], Meta(min_length=1, description="one [[unit]] table or more")]
+
+
+def read_campaign(path: Path) -> Campaign:
+    """Return the campaign of a TOML file. Raises Refusal for the first value that is not valid."""
+    campaign = convert(read_toml(path), Campaign)
+    if campaign.chain.band_hz[0] >= campaign.chain.band_hz[1]:
+        raise Refusal("chain.band_hz", list(campaign.chain.band_hz), "must rise", [60.0, 250.0])
+    names = [unit.name for unit in campaign.unit]
+    for i, unit in enumerate(campaign.unit):
+        field = f"unit.{i}"
+        if names.index(unit.name) != i:
+            raise Refusal(f"{field}.name", unit.name, "is the name of two units")
+        if unit.spec and unit.cast:
+            raise Refusal(f"{field}.cast", unit.cast, "stands beside spec; leave one out")
+        if not unit.edge and not unit.point:
+            raise Refusal(f"{field}.edge", None, "is required, or a [[unit.point]]")
+        distances = [point.distance_mm for point in unit.point]
+        if len(set(distances)) < len(distances):
+            raise Refusal(f"{field}.point", distances, "has a distance twice; put its records together")
+        if unit.reference and campaign.recording.motor_channel is not None:
+            raise Refusal(f"{field}.reference", list(unit.reference), "stands beside recording.motor_channel")
+        if not unit.reference and campaign.recording.motor_channel is None:
+            raise Refusal(f"{field}.reference", None, "is required, or recording.motor_channel")
+    return campaign
+
+
+def plain_data(campaign: Campaign) -> dict[str, object]:
+    """Return the campaign as JSON-ready data."""
+    return msgspec.to_builtins(campaign)
