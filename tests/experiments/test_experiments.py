@@ -203,7 +203,7 @@ def _run(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_command_prints_the_same_bytes_again_and_writes_a_folder(tmp_path: Path) -> None:
-    words = ("paper", "--rivals", "crossings,fitted", "--draws", "20", "--json", "-o", "found")
+    words = ("paper", "--rivals", "crossings,fitted", "--compare", "unit", "--draws", "20", "--json", "-o", "found")
     first, second = (_run(*words, folder=tmp_path) for _ in range(2))
     assert (first.returncode, first.stderr) == (0, "")
     assert first.stdout == second.stdout

@@ -24,6 +24,9 @@ def experiments(
     rivals: Annotated[
         str | None, typer.Option(help="names separated by commas, or all; else the file's, or the usual ones")
     ] = None,
+    compare: Annotated[
+        str | None, typer.Option(help="what the readings of a ratio differ in: unit,frequency,body; else the file's")
+    ] = None,
     draws: Annotated[int | None, typer.Option(help="of what is not known, for each rival; else the file's")] = None,
     element_draws: Annotated[int | None, typer.Option(help="the same for finite elements, which cost more")] = None,
     seed: Annotated[int | None, typer.Option(help="of the draws; else the file's")] = None,

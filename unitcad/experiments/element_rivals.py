@@ -22,7 +22,7 @@ from unitcad.experiments.draws import Draws, Rival
 if TYPE_CHECKING:
     from unitcad.attenuation.mechanics.motor_level import Drive
 
-FINENESS = 1.0
+FINENESS = 0.5
 """Of the mesh; see docs/experiments.md for what it costs in accuracy."""
 BLOCK = 10
 """Draws that are solved and kept together."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.bush import CHOSEN, bush
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import fit_divider
 from unitcad.attenuation.edge.measured_levels import measured_table
@@ -28,6 +29,12 @@ def _divider(variant: EstimateInput, draws: Draws) -> np.ndarray:
     kappas = _resampled_kappas()
     kappa = kappas[(draws.uniform("kappa") * len(kappas)).astype(int)]
     return np.asarray(cf.divider(draws.units(variant), kappa))
+
+
+def _bush(variant: EstimateInput, draws: Draws) -> np.ndarray:
+    units = draws.units(variant)
+    filled = bush(units, replace(CHOSEN, filled=True))
+    return np.where(draws.uniform("gap filled") < 0.5, filled, bush(units))
 
 
 @cache
@@ -64,6 +71,11 @@ _CLOSED_FORMS = (
         "the empirical divider of the layers' moduli, fitted to the measured levels",
         _divider,
     ),
+    Rival(
+        "bush",
+        "the layers as rubber bushes in a row, whose stiffness against a sideways motion follows from their lengths",
+        _bush,
+    ),
 )
 
 
@@ -96,5 +108,5 @@ def available(
     )
 
 
-DEFAULT = ("crossings", "fitted", "mechanics-axial-edge", "mechanics-flat-edge", "mechanics-flat-skin")
+DEFAULT = ("crossings", "fitted", "bush", "mechanics-axial-edge", "mechanics-flat-edge", "mechanics-flat-skin")
 """The rivals of a lab that names none."""
