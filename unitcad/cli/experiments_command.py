@@ -47,6 +47,7 @@ def experiments(
 
     asked = {
         "rivals": None if rivals is None else listed(rivals),
+        "compare": None if compare is None else listed(compare),
         "draws": draws,
         "element_draws": element_draws,
         "seed": seed,
