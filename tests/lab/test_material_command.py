@@ -205,6 +205,7 @@ def test_a_refusal_leaves_nothing_behind(tmp_path: Path) -> None:
         ((path,), "--like"),
         ((path, "--like", "ecoflex-00-10"), "--strain"),
         ((path, "--like", "ecoflex-00-10", "--strain", "30:10"), "--strain"),
+        ((path, "--like", "ecoflex-00-10", "--strain", "30:40"), "--strain"),
         ((path, "--like", "ecoflex-00-10", "--wall-mm", "x"), "--wall-mm"),
         ((), "FILES"),
     ):
@@ -212,6 +213,34 @@ def test_a_refusal_leaves_nothing_behind(tmp_path: Path) -> None:
         assert isinstance(done.exception, Refusal)
         assert done.exception.field == field
     assert not (tmp_path / "out").exists()
+
+
+def test_a_damaged_file_is_read_as_it_was_or_refused(tmp_path: Path) -> None:
+    """Bytes changed, cut out or doubled: a curve without gaps, or one clear error."""
+    random = np.random.default_rng(7)
+    whole = _layouts()["force_and_travel"](tmp_path)[0].read_bytes()
+    path, read = tmp_path / "damaged.csv", 0
+    for _ in range(150):
+        data = bytearray(whole)
+        for _ in range(int(random.integers(1, 4))):
+            at, kind = int(random.integers(len(data))), int(random.integers(3))
+            if kind == 0:
+                data[at] = int(random.integers(256))
+            elif kind == 1:
+                del data[at : at + int(random.integers(1, 40))]
+            else:
+                data[at:at] = data[at : at + int(random.integers(1, 40))]
+        path.write_bytes(bytes(data))
+        try:
+            curve = read_curve(path, {}, Specimen())
+            evaluate([curve], (0.12, 0.24))
+        except UnitcadError:
+            continue
+        read += 1
+        assert np.isfinite(curve.strain).all()
+        assert np.isfinite(curve.stress).all()
+        assert (np.diff(curve.strain) > 0).all()
+    assert 10 < read < 145
 
 
 LAW = {"static": 80e3, "tau": 400e-6, "n": 0.31}

@@ -78,7 +78,8 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
     name = default_method(*used)
     chosen = next(row for row in rows if row.method == name)
     if chosen.value is None:
-        nearest = f"{100 * used[0]:g}:{100 * min(curve.strain[-1] for curve in curves):g}"
+        reach = math.floor(1000 * min(float(curve.strain[-1]) for curve in curves)) / 10
+        nearest = f"{100 * used[0]:g}:{reach:g}" if reach > 100 * used[0] else None
         raise Refusal("--strain", f"{100 * used[0]:g}:{100 * used[1]:g}", chosen.reason, nearest)
     values = [row.value for row in rows if row.value is not None and row.defensible]
     scatter = _scatter([v for v in chosen.by_specimen if v is not None])
