@@ -5,6 +5,7 @@ python docs/make_model.py
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -277,7 +278,49 @@ def table_of_receivers() -> str:
     return "\n".join(["| what | 100 Hz | 125 Hz | 150 Hz | 300 Hz |", "| --- | --- | --- | --- | --- |", *rows])
 
 
+def _elements() -> dict:
+    return json.loads((HERE / "mechanics.json").read_text("utf-8"))
+
+
+def table_of_elements() -> str:
+    """Return the nine units by finite elements: median and range over the draws, and the unit as drawn, %."""
+    data = _elements()
+    draws, drawn = np.array(data["draws"]), np.array(data["nominal"])
+    cases = [(i, j) for i in range(len(data["drives"])) for j in range(len(data["readings"]))]
+    names = [f"{data['drives'][i]}, {'skin' if data['readings'][j] == 'skin' else 'own edge'}" for i, j in cases]
+    rows = [
+        "| unit | measured % | " + " | ".join(names) + " |",
+        "| --- | --- | " + " | ".join("---" for _ in names) + " |",
+    ]
+    for u, (name, measured) in enumerate(zip(data["units"], measured_table().levels, strict=True)):
+        cells = []
+        for i, j in cases:
+            low, median, high = 100 * np.percentile(draws[:, u, i, j], (5, 50, 95))
+            cells.append(f"{median:.3g} ({low:.3g} to {high:.3g}); drawn {100 * drawn[u, i, j]:.3g}")
+        rows.append(f"| {name} | {100 * measured:.4g} | " + " | ".join(cells) + " |")
+    return "\n".join(rows)
+
+
+def table_of_searches() -> str:
+    """Return how the draws' readings compare with the measured levels."""
+    data = _elements()
+    rows = [
+        f"{len(data['draws'])} draws, seed {data['seed']}, fineness {data['fineness']:g}.",
+        "",
+        "| read on, drive | hypotheses | best | chosen without the unit | p | the best one |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, one in data["searches"].items():
+        rows.append(
+            f"| {name.replace('edge', 'own edge')} | {one['count']} | {one['best']:.2f} | {one['nested']:.2f} "
+            f"| {one['chance']:.2g} | {one['what']} |"
+        )
+    return "\n".join(rows)
+
+
 BLOCKS = {
+    "elements": table_of_elements,
+    "searches": table_of_searches,
     "models": table_of_models,
     "tests": table_of_tests,
     "forms": table_of_forms,

@@ -20,7 +20,7 @@ _MOST_FREQUENCIES = 1000
 def estimate(
     specs: Annotated[list[str], typer.Argument(metavar="SPEC", help="a template's name or a path to a TOML file")],
     model: Annotated[
-        str, typer.Option(help="bush, fitted, paper, consistent or all; the spec's own models if not given")
+        str, typer.Option(help="bush, fitted, paper, consistent or all of them; or mechanics; else the spec's")
     ] = "",
     frequency: Annotated[
         str, typer.Option(metavar="HZ|FROM:TO:STEP", help="one frequency, or a table over frequencies")
