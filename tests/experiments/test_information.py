@@ -39,6 +39,30 @@ def test_two_gaussian_rivals_without_unknowns_are_exact() -> None:
     assert found.standard_error < 1e-9
 
 
+def test_few_draws_of_one_and_the_same_prediction_are_no_information() -> None:
+    """Twenty draws each of N(0, 1), read to 0.05: no reading lies under two kernels, yet there is nothing to know."""
+    found = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        rivals = [rng.normal(0, 1, (20, 1)) for _ in range(2)]
+        found.append(expected_information(rivals, np.array([[0.05**2]]), np.array([0.5, 0.5])))
+    assert np.mean([one.high for one in found]) > 0.3  # the draws alone would say so
+    assert np.mean([one.low for one in found]) < 0.02
+    assert all(one.bits - one.error <= 0.01 for one in found)
+
+
+def test_numbers_that_say_the_same_are_integrated_alike_in_one_and_two_dimensions() -> None:
+    """Two points two standard deviations apart: turned in the plane, their distance is all that counts."""
+    even = np.array([0.5, 0.5])
+    line = expected_information([np.full((3, 1), x) for x in (-1.0, 1.0)], np.eye(1), even)
+    turned = np.array([0.6, 0.8])
+    rivals = [np.tile(x * turned, (300, 1)) for x in (-1.0, 1.0)]
+    found = [expected_information(rivals, np.eye(2), even, seed=seed) for seed in range(10)]
+    of_mean = np.sqrt(np.mean([one.standard_error**2 for one in found]) / len(found))
+    assert of_mean < 0.01
+    assert np.mean([one.high for one in found]) == pytest.approx(line.high, abs=3 * of_mean)
+
+
 @pytest.mark.parametrize("count", [30, 200])
 def test_the_stated_error_covers_the_true_information(count: int) -> None:
     true = _true_information()
