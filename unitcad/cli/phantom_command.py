@@ -18,6 +18,7 @@ def phantom(
         str, typer.Argument(metavar="PHANTOM", help="A shipped phantom's name, or a TOML file (unitcad list phantoms).")
     ] = "skin",
     out: Annotated[Path, typer.Option("-o", "--out", help="Where the phantom's folder goes.")] = Path("out"),
+    png: Annotated[bool, typer.Option("--png", help="Also box.png: the box taken apart.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Make a skin phantom to cast, and its response.
@@ -35,6 +36,9 @@ def phantom(
         stage("response")
         made = phantom_set(table)
         found = phantom_files.contents(made, stage)
+        if png:
+            stage("picture")
+            found["box.png"] = phantom_files.box_picture(made)
         stage("checks")
         folder = out / f"phantom-{table.name}"
         faults = phantom_files.write(folder, found, made.printer.name)

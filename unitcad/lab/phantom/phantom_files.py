@@ -8,18 +8,24 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from unitcad import check, files
 from unitcad.attenuation.edge.estimates import rounded
 from unitcad.casting.bill import to_csv
 from unitcad.errors import UnitcadError
 from unitcad.export import stl, svg, threemf
 from unitcad.export.chart import Series, chart
+from unitcad.export.picture import Drawn, Scene, draw
 from unitcad.export.printing import print_ready
-from unitcad.kernels.mesh import arrays, realise
+from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.lab.phantom import bench
 from unitcad.lab.phantom.phantom_set import SEGMENTS, PhantomSet, printed, tissue_table
+from unitcad.shape.body import Body
 from unitcad.text import toml, toml_key
 
+APART_MM = 14.0
+"""Between two pieces of the box taken apart."""
 FINISHED = "casting.md"
 """The file that is put in place last: a folder that has it is whole."""
 
@@ -48,6 +54,25 @@ def contents(phantom: PhantomSet, stage: Callable[[str], None] = lambda name: No
         FINISHED: bench.casting_markdown(phantom),
     }
     return {**found, **{name: text.encode() for name, text in texts.items()}}
+
+
+def box_picture(phantom: PhantomSet) -> bytes:
+    """Draw the box taken apart as a PNG file. Raises NoPicture where this machine can't draw."""
+    shown = [body for body in phantom.tools if body.kind not in ("blade", "coupon")]
+    bodies = sorted([*shown, *phantom.layers], key=lambda body: _middle(phantom, body))
+    parts, height = [], 0.0
+    for body in bodies:
+        vertices, faces = arrays(realise(body.shape, SEGMENTS))
+        low, high = vertices[:, 2].min(), vertices[:, 2].max()
+        parts.append(Drawn(body.colour, vertices + np.array([0.0, 0.0, height - low]), faces, body.name))
+        height += (high - low) + APART_MM
+    return draw([Scene(tuple(parts), (1.0, -2.0, 0.7))])[0]
+
+
+def _middle(phantom: PhantomSet, body: Body) -> tuple[float, bool]:
+    """Return a body's place in the stack: its top's height, but the tray's foot, and a layer after its frame."""
+    _, _, low, _, _, high = bounds(realise(body.shape, SEGMENTS))
+    return (low if body.kind in ("base", "holder") else high, body.kind == "layer")
 
 
 def tissue_toml(phantom: PhantomSet) -> str:
