@@ -25,10 +25,24 @@ class MeasuredDesign(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     directions: dict[str, str] = {}
 
 
+Length = Annotated[float, Meta(gt=0)]
+
+
+class MeasuredUnit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the measured units share: motor, diameter, wall of each of two layers, circuit, frequency."""
+
+    motor: str
+    diameter_mm: Length
+    wall_mm: Length
+    circuit_mm: Length
+    frequency_hz: Length
+
+
 class Measurements(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The measured levels: short names of silicones, one-layer controls, and units by their design."""
 
     source: str
+    unit: MeasuredUnit
     names: dict[str, str]
     controls: dict[str, Level]
     designs: dict[str, MeasuredDesign]

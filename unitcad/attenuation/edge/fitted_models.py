@@ -7,6 +7,7 @@ and the null model of two levels are compared with the table but give no estimat
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, get_args
@@ -67,7 +68,7 @@ def null(table: MeasuredTable, chosen: np.ndarray) -> np.ndarray:
     logs, soft = np.log(table.levels), table.soft_inside
     sides = []
     for side in (soft, ~soft):
-        used = chosen & side
+        used = chosen * side
         used = np.where(used.any(axis=1, keepdims=True), used, chosen)
         sides.append(np.exp(np.sum(logs * used, axis=1) / used.sum(axis=1)))
     return np.where(soft, sides[0][:, None], sides[1][:, None])
@@ -171,13 +172,16 @@ def stored() -> dict[str, dict[str, float]]:
     return constants(measured_table())
 
 
-def path_of(model: str) -> Predict:
-    """Return a model as a function of units, before its constant s. Raises KeyError for the null model."""
+def path_of(model: str, constants: Mapping[str, float] | None = None) -> Predict:
+    """Return a model as a function of units, before its constant s. Raises KeyError for the null model.
+
+    `constants` stand in for the stored ones.
+    """
     if model == "fitted":
-        return partial(cf.divider, kappa=stored()["fitted"]["kappa"])
+        return partial(cf.divider, kappa=(constants or stored()["fitted"])["kappa"])
     return _PATHS[model]
 
 
-def edge_levels(units: Units, model: str) -> Any:
-    """Return the edge level (motor amplitude = 1) by a model of `MODELS`, shape (...)."""
-    return stored()[model]["s"] * path_of(model)(units)
+def edge_levels(units: Units, model: str, constants: Mapping[str, float] | None = None) -> Any:
+    """Return the edge level (motor amplitude = 1) by a model of `MODELS`, shape (...), by the stored constants."""
+    return (constants or stored()[model])["s"] * path_of(model, constants)(units)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,15 @@ from unitcad.attenuation.edge.bush import sections
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import edge_levels, path_of, stored
 from unitcad.attenuation.edge.inputs_seen import inputs_seen
+from unitcad.attenuation.edge.lab_fit import LabFit, predictive_block
 from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
+from unitcad.attenuation.edge.variant_units import FIELDS, nominal, stacked
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 from unitcad.catalogue import measurements
 
 _MOST_CORNERS = 12
 _NOT_FINITE = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"
 _WAVES: tuple[cf.Wave, ...] = ("s", "p")
-_FIELDS = ("youngs_modulus", "poisson_ratio", "tan_delta")
 KINDS = {
     "paper": "the paper's closed form as printed: transmission coefficients and exponentials along the walls, one "
     "constant s from the table (f1 and f2 are not printed)",
@@ -59,24 +60,6 @@ ASSUMPTIONS = {
 }
 
 
-def nominal(variant: EstimateInput) -> Units:
-    """Return the variant's middle values as closed-form input."""
-    return stacked([variant])
-
-
-def stacked(variants: Sequence[EstimateInput]) -> Units:
-    """Return the middle values of variants of one number of layers as closed-form input, a row each."""
-    layers = [variant.layers for variant in variants]
-    return Units(
-        **{field: [[getattr(layer, field).middle for layer in row] for row in layers] for field in _FIELDS},
-        density=[[layer.density for layer in row] for row in layers],
-        thickness=[[layer.thickness for layer in row] for row in layers],
-        omega=[2.0 * np.pi * variant.frequency.middle for variant in variants],
-        passes=[variant.passes for variant in variants],
-        section=sections([variant.geometry for variant in variants]),
-    )
-
-
 def corners(variant: EstimateInput) -> Units:
     """Yield the variant with inputs at the ends of their ranges: all corners, or one input at a time if there are many.
 
@@ -104,14 +87,14 @@ def _inputs(variant: EstimateInput) -> Iterator[tuple[tuple[str, str], Quantity]
     for layer in variant.layers:
         seen.setdefault(layer.material, layer)
     for name, layer in seen.items():
-        for field in _FIELDS:
+        for field in FIELDS:
             yield (name, field), getattr(layer, field)
     yield ("", "frequency"), variant.frequency
 
 
 def _units(variant: EstimateInput, rows: np.ndarray) -> Units:
     at = {key: i for i, (key, _) in enumerate(_inputs(variant))}
-    columns = {field: rows[:, [at[layer.material, field] for layer in variant.layers]] for field in _FIELDS}
+    columns = {field: rows[:, [at[layer.material, field] for layer in variant.layers]] for field in FIELDS}
     return Units(
         **columns,
         density=np.tile([layer.density for layer in variant.layers], (len(rows), 1)),
@@ -159,9 +142,13 @@ def spread(variant: EstimateInput, predict: Callable[[Units], Any]) -> dict[str,
     return level
 
 
-def model_block(variant: EstimateInput, model: str) -> dict[str, Any]:
-    """Return one entry of the estimate's `models`, without its error against the table."""
-    path, scale = path_of(model), stored()[model]["s"]
+def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -> dict[str, Any]:
+    """Return one entry of the estimate's `models`, without its error against the table.
+
+    With a lab's `fit` the constants are its own, and the level has a predictive range.
+    """
+    constants = fit.constants(model) if fit else stored()[model]
+    path, scale = path_of(model, constants), constants["s"]
     block: dict[str, Any] = {
         "kind": KINDS[model],
         "edge_level": {
@@ -169,21 +156,24 @@ def model_block(variant: EstimateInput, model: str) -> dict[str, Any]:
             "unit": "of the motor's amplitude",
         },
     }
+    if fit:
+        block["predictive"] = predictive_block(fit, model, variant)
     if variant.amplitude is not None:
         factor = scale * variant.amplitude * 1e6
         block["edge_amplitude_um"] = spread(variant, lambda units: factor * path(units))
     by_squares = "least squares of the log of nine measured levels"
     by_mean = "geometric mean of measured level over path, nine levels"
-    block["constants"] = {**stored()[model], "made_by": by_squares if model == "fitted" else by_mean}
+    by_fit = fit and f"{fit.name}: {fit.units} units of the lab's own, shrunk towards the stored constants"
+    block["constants"] = {**constants, "made_by": by_fit or (by_squares if model == "fitted" else by_mean)}
     controls = _controls(variant)
-    block["hierarchical_over_control"] = [_ratio(variant, model, index) for index in controls] or None
+    block["hierarchical_over_control"] = [_ratio(variant, model, index, constants) for index in controls] or None
     if not controls:
         block["hierarchical_over_control_reason"] = "a single layer is its own control"
     if model == "paper":
         block |= _paper_details(variant, controls)
     if model == "consistent":
         block["wave_of_the_level"] = "s"
-    block["inputs_seen"] = inputs_seen(variant, lambda variants: edge_levels(stacked(variants), model))
+    block["inputs_seen"] = inputs_seen(variant, lambda variants: edge_levels(stacked(variants), model, constants))
     block["assumptions"] = ASSUMPTIONS[model]
     return block
 
@@ -196,11 +186,11 @@ def _controls(variant: EstimateInput) -> list[int]:
     return [names.index(name) for name in dict.fromkeys(names)]
 
 
-def _ratio(variant: EstimateInput, model: str, index: int) -> dict[str, Any]:
+def _ratio(variant: EstimateInput, model: str, index: int, constants: Mapping[str, float]) -> dict[str, Any]:
     """Return the level over that of the control of layer `index`, by wave where the model has waves."""
     name = variant.layers[index].material
     if model in ("fitted", "bush"):
-        path = path_of(model)
+        path = path_of(model, constants)
         return {"control": name, **spread(variant, lambda u: path(u) / path(u.control(index)))}
     along = cf.paper_path if model == "paper" else cf.consistent_path
     by_wave = {
@@ -308,7 +298,8 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
         return extra and {"level": None, **extra}
     index = rows[0]
     wall = sum(layer.thickness for layer in variant.layers)
-    same = abs(wall - 2.5e-3) < 1e-6 and abs(variant.diameter - 14e-3) < 1e-6
+    shared = measurements().unit
+    same = abs(wall - 2e-3 * shared.wall_mm) < 1e-6 and abs(variant.diameter - 1e-3 * shared.diameter_mm) < 1e-6
     return {
         "level": float(table.levels[index]),
         **(extra or {}),

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from unitcad.attenuation.edge.closed_form import CONTROL_PASSES, Section, Units
-from unitcad.catalogue import materials, measurements, motors
+from unitcad.catalogue import Material, materials, measurements, motors
 
 CONTROL = "single"
 """What stands for the design in a control's name."""
-_MOTOR = "LCM0720A3463F"  # section III-A
-_WALL, _DIAMETER = 1.25e-3, 14e-3  # m, section II-B
-_CIRCUIT = 0.11e-3  # m, assumed: a usual two-layer stock
-_OMEGA = 2 * np.pi * 125.0  # rad/s, the middle of the 100 to 150 Hz of section III-A
 
+Moduli = Literal["dynamic", "quasi-static", "data sheet"]
+"""At the motor's frequency, as the paper has them; of a slow pull; of the data sheet, at 100 % strain."""
 Predict = Callable[[Units], Any]
 """Levels of units of one number of layers, shape (...)."""
 
@@ -62,8 +60,11 @@ class MeasuredTable:
 
 
 @cache
-def measured_table() -> MeasuredTable:
-    """Return the nine levels of the catalogue's measurements, as the results section prints them."""
+def measured_table(moduli: Moduli = "dynamic") -> MeasuredTable:
+    """Return the nine levels of the catalogue's measurements, as the results section prints them.
+
+    `moduli`: which of the silicones' moduli stand in the models' input.
+    """
     data = measurements()
     names, designs, layers, levels = [], [], [], []
     for design, measured in {CONTROL: data.controls, **{name: d.levels for name, d in data.designs.items()}}.items():
@@ -72,32 +73,44 @@ def measured_table() -> MeasuredTable:
             designs.append(design)
             layers.append(data.layers(unit))
             levels.append(level)
-    inputs = tuple(_units(design, unit) for design, unit in zip(designs, layers, strict=True))
+    inputs = tuple(_units(design, unit, moduli) for design, unit in zip(designs, layers, strict=True))
     return MeasuredTable(tuple(names), tuple(designs), tuple(layers), np.array(levels), inputs)
 
 
-def _units(design: str, layers: tuple[str, ...]) -> Units:
+def _units(design: str, layers: tuple[str, ...], moduli: Moduli) -> Units:
     """Return the input of a unit of the paper, at the catalogue's nominal values; a control's in every design."""
     known = [materials()[name] for name in layers]
-    all_designs = measurements().designs
+    all_designs, shared = measurements().designs, measurements().unit
     shapes = list(all_designs.values()) if design == CONTROL else [all_designs[design]]
-    motor = motors()[_MOTOR]
-    height = float(motor.thickness_mm) * 1e-3
-    wall = 2 * _WALL / len(layers)
+    motor = motors()[shared.motor]
+    height, radius = float(motor.thickness_mm) * 1e-3, shared.diameter_mm * 1e-3 / 2
+    walls = 2 * shared.wall_mm * 1e-3
+    wall = walls / len(layers)
     section = Section(
-        cavity_radius=[_DIAMETER / 2 - 2 * _WALL] * len(shapes),
+        cavity_radius=[radius - walls] * len(shapes),
         motor_radius=[float(motor.diameter_mm) * 1e-3 / 2] * len(shapes),
-        core_height=[height + (_CIRCUIT if shape.caps else 0.0) for shape in shapes],
-        outer_radii=[[_DIAMETER / 2 - wall * i for i in reversed(range(len(layers)))]] * len(shapes),
+        core_height=[height + (shared.circuit_mm * 1e-3 if shape.caps else 0.0) for shape in shapes],
+        outer_radii=[[radius - wall * i for i in reversed(range(len(layers)))]] * len(shapes),
         caps=[[wall if shape.caps else 0.0] * len(layers) for shape in shapes],
     )
     return Units(
-        youngs_modulus=[1e3 * float(m.youngs_modulus_kpa or np.nan) for m in known],
+        youngs_modulus=[_modulus(material, moduli) for material in known],
         density=[1e3 * float(m.density_g_cm3) for m in known],
         poisson_ratio=[float(m.poisson_ratio) for m in known],
         tan_delta=[float(m.loss_factor) for m in known],
         thickness=[wall] * len(layers),
-        omega=_OMEGA,
+        omega=2 * np.pi * shared.frequency_hz,
         passes=CONTROL_PASSES if design == CONTROL else all_designs[design].passes,
         section=section,
     )
+
+
+def _modulus(material: Material, moduli: Moduli) -> float:
+    """Return Young's modulus in Pa, NaN where there is none."""
+    by_source = {
+        "dynamic": material.youngs_modulus_kpa,
+        "quasi-static": material.quasistatic_modulus_kpa,
+        "data sheet": material.modulus_100pct_kpa,
+    }
+    value = by_source[moduli]
+    return np.nan if value is None else 1e3 * float(value)

@@ -1,0 +1,180 @@
+"""A lab's fit as it is stored: the models' constants, what a new unit's level may be, the lab's own measurements.
+
+A new unit's ln level is Student-t distributed: `scale`^2 = discrepancy^2 (1 + g' C g), where g is the gradient of the
+model's ln level in the logarithms of its constants, and C their covariance over discrepancy^2.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from msgspec import Meta, Struct
+
+from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels
+from unitcad.attenuation.edge.variant_units import nominal
+from unitcad.attenuation.inputs import EstimateInput
+
+Positive = Annotated[float, Meta(gt=0, le=1e9)]
+PERCENT = (10, 90)
+"""Ends of a predictive range."""
+
+
+class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A model fitted to a lab's units: constants, where they were stored, and the predictive.
+
+    `discrepancy`: standard deviation of a unit's ln level about the model. `covariance`: of the constants' logarithms,
+    in the order of `constants`, over discrepancy^2. `left_out` is the factor with the unit left out.
+    """
+
+    constants: dict[str, Positive]
+    low: dict[str, Positive]
+    high: dict[str, Positive]
+    stored: dict[str, Positive]
+    degrees_of_freedom: Annotated[int, Meta(ge=1, le=100000)]
+    discrepancy: Annotated[float, Meta(gt=0, le=10)]
+    covariance: list[list[Annotated[float, Meta(ge=-1e9, le=1e9)]]]
+    left_out: Positive
+    left_out_low: Positive
+    left_out_high: Positive
+    own_left_out: Positive | None = None
+    own_by_stored: Positive | None = None
+    against_null: float | None = None
+    against_null_error: float | None = None
+    against_null_p: float | None = None
+    held: str = ""
+
+
+class OwnLevel(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A unit's level as the lab measured it, with its 95 % interval; `key` is its `unit_key`."""
+
+    unit: str
+    key: str
+    value: Positive
+    low: Positive | None = None
+    high: Positive | None = None
+    frequency_hz: Positive
+    source: str = ""
+
+
+class InputFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A file that the fit read."""
+
+    file: str
+    sha256: str
+
+
+class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A lab's fit: `units` of its own, beside the paper's nine or not, by which moduli.
+
+    `between_labs`: standard deviation between labs of a constant's logarithm over that between units of one lab.
+    """
+
+    format: Literal[1]
+    name: Annotated[str, Meta(min_length=1, max_length=100)]
+    units: Annotated[int, Meta(ge=1, le=100000)]
+    moduli: Literal["dynamic", "quasi-static"]
+    with_paper: bool
+    between_labs: Annotated[float, Meta(ge=0, le=100)]
+    seed: int
+    model: dict[str, ModelFit]
+    null: ModelFit
+    measured: list[OwnLevel] = []
+    input: list[InputFile] = []
+
+    def constants(self, model: str) -> dict[str, float]:
+        """Return a model's constants. Raises KeyError for one that it does not have."""
+        return self.model[model].constants
+
+
+def fault(fit: LabFit) -> tuple[str, Any, str] | None:
+    """Return (field, value, limit) of the first thing wrong with a fit that its types do not show."""
+    needed = {model: {"kappa", "s"} if model == "fitted" else {"s"} for model in MODELS}
+    for model, names in needed.items():
+        if model not in fit.model:
+            return f"model.{model}", None, "is required"
+        one = fit.model[model]
+        if set(one.constants) != names:
+            return f"model.{model}.constants", sorted(one.constants), f"must be {' and '.join(sorted(names))}"
+        matrix = one.covariance
+        if [len(row) for row in matrix] != [len(names)] * len(names):
+            return f"model.{model}.covariance", len(matrix), f"needs {len(names)} rows of as many numbers"
+        symmetric = np.allclose(matrix, np.transpose(matrix), rtol=1e-6)
+        if not symmetric or np.linalg.eigvalsh(matrix).min() < -1e-9 * max(1.0, float(np.max(matrix))):
+            return f"model.{model}.covariance", None, "is no covariance: not symmetric, or negative in a direction"
+    return None
+
+
+def gradient(model: str, units: Units, constants: Mapping[str, float]) -> np.ndarray:
+    """Return d ln level / d ln constant, shape (..., constants), in the order of `constants`."""
+    columns = {"s": np.ones(np.shape(units.passes))}
+    if model == "fitted":
+        e = units.youngs_modulus
+        x = constants["kappa"] * units.passes * e[..., -1] / e[..., 0]
+        columns["kappa"] = -x / (1.0 + x)
+    return np.stack([np.broadcast_to(columns[name], np.shape(units.passes)) for name in constants], axis=-1)
+
+
+def predictive(fit: LabFit, model: str, variant: EstimateInput) -> tuple[int, float, float]:
+    """Return (degrees of freedom, centre, scale) of the Student-t distribution of a variant's ln level in the lab.
+
+    At the middle of the inputs' ranges; centre and scale are NaN where an input is not known.
+    """
+    units, one = nominal(variant), fit.model[model]
+    centre = float(np.log(edge_levels(units, model, one.constants))[0])
+    g = gradient(model, units, one.constants)[0]
+    scale = one.discrepancy * float(np.sqrt(1.0 + g @ np.array(one.covariance) @ g))
+    return one.degrees_of_freedom, centre, scale if np.isfinite(centre) else float("nan")
+
+
+def quantiles(df: int, centre: float, scale: float) -> tuple[float, ...]:
+    """Return the levels at `PERCENT` of a predictive of ln level."""
+    from scipy.special import stdtrit
+
+    return tuple(float(np.exp(centre + scale * stdtrit(df, percent / 100))) for percent in PERCENT)
+
+
+def predictive_block(fit: LabFit, model: str, variant: EstimateInput) -> dict[str, Any]:
+    """Return a variant's predictive as data: P10, P90, and the distribution of ln level."""
+    df, centre, scale = predictive(fit, model, variant)
+    if not np.isfinite(centre):
+        return {"p10": None, "p90": None, "reason": "an input is not known"}
+    low, high = quantiles(df, centre, scale)
+    return {
+        "p10": low,
+        "p90": high,
+        "degrees_of_freedom": df,
+        "centre": centre,
+        "scale": scale,
+        "discrepancy": fit.model[model].discrepancy,
+        "what": "where a new unit of this kind is expected in this lab: Student-t of ln level, at the inputs' middle",
+    }
+
+
+def unit_key(variant: EstimateInput) -> str:
+    """Return what tells one unit from another: a hash of design, silicones and lengths; not of body or frequency."""
+    geometry = variant.geometry
+    lengths = [
+        geometry.cavity_radius,
+        geometry.core_height,
+        geometry.motor_radius,
+        geometry.motor_height,
+        *(length for layer in geometry.layers for length in (layer.outer_radius, layer.top, layer.cap)),
+    ]
+    names = [layer.material for layer in variant.layers]
+    text = json.dumps([variant.design, names, [f"{1e3 * length:.6f}" for length in lengths]])
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def own_block(fit: LabFit, variant: EstimateInput) -> list[dict[str, Any]]:
+    """Return the lab's own measurements of this unit."""
+    key = unit_key(variant)
+    return [
+        {name: getattr(one, name) for name in ("unit", "value", "low", "high", "frequency_hz", "source")}
+        for one in fit.measured
+        if one.key == key
+    ]
