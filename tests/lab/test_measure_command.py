@@ -215,3 +215,21 @@ def test_what_is_not_known_is_asked_for(text: str, field: str, tmp_path: Path) -
     with pytest.raises(Refusal) as refused:
         campaign(tmp_path, text, '[sensor]\nquantity = "displacement"\nunit = "um"\n')
     assert refused.value.field == field
+
+
+def test_the_shipped_campaign_has_the_levels_put_in() -> None:
+    """What docs/measuring.md shows: computed recordings, which say so."""
+    path = Path(__file__).parents[2] / "templates" / "lab" / "campaign.toml"
+    asked = read_campaign(path)
+    assert "synthetic" in asked.note
+    result = measure(asked, path.parent)
+    assert result.findings == ()
+    assert [one.distance_mm for one in result.levels] == [0, 0, 10, 10, 20, 20]
+    for one, truth in zip(result.levels, (0.42, 0.42, 0.15, 0.15, 0.06, 0.06), strict=True):
+        assert one.level.low < truth < one.level.high
+    assert result.levels[0].level.value == pytest.approx(0.418, abs=5e-4)
+
+
+def test_every_finding_is_on_the_page() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "measuring.md").read_text("utf-8")
+    assert [code for code in RULES if f"| {code} |" not in page] == []

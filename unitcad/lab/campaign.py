@@ -19,7 +19,7 @@ Record = Annotated[str, Meta(min_length=1, max_length=1000)]
 Records = Annotated[tuple[Record, ...], Meta(max_length=1000)]
 Positive = Annotated[float, Meta(ge=1e-12, le=1e12)]
 Column = Annotated[int, Meta(ge=1, le=4096)] | Name
-Hertz = Annotated[float, Meta(ge=1, le=20000)]
+Hertz = Annotated[float, Meta(ge=1, le=500)]
 
 
 class SensorTable(Table, frozen=True, kw_only=True):

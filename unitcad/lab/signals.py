@@ -22,7 +22,7 @@ SECTION = 2**18
 """Samples that are fitted at a time: a longer record is fitted in sections."""
 IRREGULAR = 0.3
 """Steps by which a time may lie off an even grid."""
-HIGHEST_RATE = 20_000.0
+HIGHEST_RATE = 5_000.0
 """Hz; records of more than twice this rate are averaged down to it."""
 
 

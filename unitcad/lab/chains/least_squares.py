@@ -62,8 +62,12 @@ def mains_columns(time: Floats, mains_hz: float, orders: list[int]) -> Floats:
     if not orders:
         return np.empty((0, len(time)))
     turn = np.exp(2j * np.pi * mains_hz * time)
-    turns: list[Floats] = [turn**m for m in orders]
-    return np.concatenate([[np.real(one), np.imag(one)] for one in turns])
+    columns, power = [], np.ones(len(time), complex)
+    for order in range(1, max(orders) + 1):
+        power = power * turn
+        if order in orders:
+            columns += [power.real, power.imag]
+    return np.array(columns)
 
 
 def trend_columns(time: Floats) -> Floats:

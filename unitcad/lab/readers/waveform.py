@@ -30,6 +30,7 @@ def read(path: Path, layout: Layout) -> Recording:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         rate, data = wavfile.read(path, mmap=mapped)
+    offset = data.offset if isinstance(data, np.memmap) else None
     data = data.reshape(len(data), -1)
     if rate <= 0 or len(data) < 2:
         raise Unreadable(str(path), None, "holds no samples, or states no rate")
@@ -41,10 +42,20 @@ def read(path: Path, layout: Layout) -> Recording:
 
     def blocks(indices: tuple[int, ...]) -> Iterator[Floats]:
         for start in range(0, len(data), ROWS):
-            rows = np.asarray(data[start : start + ROWS, list(indices)], float)
+            rows = np.asarray(_rows(path, data, offset, start)[:, list(indices)], float)
             yield (rows - middle) / largest if whole else rows
 
     return Recording(path, "wav", channels, blocks)
+
+
+def _rows(path: Path, data: Floats, offset: int | None, start: int) -> Floats:
+    """Return a block of rows; of a mapped file by reading it, since touched pages would stay in memory."""
+    if offset is None:
+        return data[start : start + ROWS]
+    width = data.shape[1]
+    count = min(ROWS, len(data) - start) * width
+    at = offset + start * width * data.dtype.itemsize
+    return np.fromfile(path, data.dtype, count, offset=at).reshape(-1, width)
 
 
 def _expect_consistent(path: Path) -> int:
