@@ -18,7 +18,9 @@ from unitcad.lab.record_result import RecordResult
 from unitcad.spec.toml import text_of
 
 SHOWN_S = 0.1
-"""Seconds of a record's middle that its chart shows."""
+"""Seconds of a record's middle that a chart shows."""
+STRETCHES = 100
+"""Parts of a record of which its chart shows the least and the largest value."""
 COMB_HZ = 50.0
 
 
@@ -113,6 +115,7 @@ def _charts(result: Measured) -> dict[str, str]:
             number += 1
             stem = f"record-{number:02d}"
             out[f"{stem}-time.svg"] = _time_chart(record, unit_of)
+            out[f"{stem}-periods.svg"] = _periods_chart(record, unit_of)
             out[f"{stem}-spectrum.svg"] = _spectrum_chart(record, unit_of)
     for i, unit in enumerate(result.campaign.unit, 1):
         levels = [one for one in result.levels if one.unit == unit.name]
@@ -122,22 +125,24 @@ def _charts(result: Measured) -> dict[str, str]:
 
 
 def _time_chart(record: RecordResult, unit: str) -> str:
+    """Chart the whole record by its least and largest values in a hundred stretches."""
+    time, samples = record.picture[:2]
+    step = max(len(time) // STRETCHES, 1)
+    count = len(time) // step
+    folded = samples[: count * step].reshape(count, step)
+    middles = time[step // 2 : count * step : step][:count]
+    ends = {"largest": np.fmax.reduce(folded, axis=1), "least": np.fmin.reduce(folded, axis=1)} if count else {}
+    series = [Series(f"{name} of each stretch", middles, values) for name, values in ends.items()]
+    return chart(series, f"{record.file}: whole record", "time, s", f"signal, {unit}")
+
+
+def _periods_chart(record: RecordResult, unit: str) -> str:
+    """Chart some periods of the record's middle."""
     time, samples = record.picture[:2]
     middle = len(time) // 2
     half = max(int(SHOWN_S / 2 * len(time) / max(time[-1], 1e-9)), 8) if len(time) else 0
     part = slice(max(middle - half, 0), middle + half)
-    step = max(len(time) // 1000, 1)
-    count = len(time) // step
-    folded = samples[: count * step].reshape(count, step)
-    # the whole record as its band from least to largest, and some periods of its middle
-    ends = [np.nanmin(folded, axis=1), np.nanmax(folded, axis=1)] if step > 1 and count else []
-    whole = [
-        Series(f"whole record, {word}", time[: count * step : step], end)
-        for word, end in zip(("least", "largest"), ends, strict=False)
-    ]
-    stretch = (time[part] - time[part][0]) / max(float(np.ptp(time[part])), 1e-9) * time[-1] if len(time) else time
-    name = f"{1e3 * float(np.ptp(time[part])):.0f} ms of the middle, stretched" if len(time) else ""
-    return chart([*whole, Series(name, stretch, samples[part])], record.file, "time, s", f"signal, {unit}")
+    return chart([Series("signal", time[part], samples[part])], f"{record.file}: middle", "time, s", f"signal, {unit}")
 
 
 def _spectrum_chart(record: RecordResult, unit: str) -> str:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from unitcad import children
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.readers.whole import columns_of
@@ -13,6 +17,8 @@ from unitcad.lab.recording import Channel, Recording, Unreadable
 
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
 MOST_COLUMNS = 4096
+LONGEST_S = 60.0
+"""Seconds after which a file that is not listed yet is taken for a damaged one."""
 
 
 def read(path: Path, layout: Layout) -> Recording:
@@ -20,7 +26,7 @@ def read(path: Path, layout: Layout) -> Recording:
 
     Data that lies in other files is refused. Raises Unreadable.
     """
-    found = _columns(path)
+    found = _listed(path)
     if not found:
         raise Unreadable(str(path), None, "holds no data set of numbers")
 
@@ -49,10 +55,38 @@ class _Column:
         return self.data[span, self.index] if self.side == 0 else self.data[self.index, span]
 
 
+def _listed(path: Path) -> list[tuple[str, tuple[int, int], Channel]]:
+    """Return a file's columns as a process of its own lists them: HDF5 may never return from a damaged file."""
+    _expect_whole(path)
+    code = "from unitcad.lab.readers.hierarchical import tell; import sys; tell(sys.argv[1])"
+    try:
+        done = children.run([sys.executable, "-P", "-c", code, str(path.resolve())], timeout=LONGEST_S)
+    except subprocess.TimeoutExpired:
+        raise Unreadable(str(path), None, f"is damaged: HDF5 did not return in {LONGEST_S:g} s") from None
+    if done.returncode:
+        said = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:] or ["HDF5 crashed"]
+        if "No module named 'h5py'" in said[0]:
+            raise ModuleNotFoundError(said[0], name="h5py")
+        raise Unreadable(str(path), None, f"is damaged, or no {path.suffix} file ({said[0][:200]})")
+    listed = json.loads(done.stdout)
+    return [(name, (i, side), Channel(title, unit, count=count)) for name, i, side, title, unit, count in listed]
+
+
+def tell(path: str) -> None:
+    """Print a file's columns as JSON, after a look at the first and the last sample of each."""
+    import h5py
+
+    found = _columns(Path(path))
+    with h5py.File(path, "r") as file:
+        for name, place, _ in found:
+            column = _Column(file[name], place)
+            column[0:1], column[len(column) - 1 : len(column)]
+    print(json.dumps([[name, *place, one.name, one.unit, one.count] for name, place, one in found]))
+
+
 def _columns(path: Path) -> list[tuple[str, tuple[int, int], Channel]]:
     import h5py
 
-    _expect_whole(path)
     found: list[tuple[str, tuple[int, int], Channel]] = []
 
     def visit(name: str, node: Any) -> None:
