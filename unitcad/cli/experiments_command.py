@@ -35,10 +35,10 @@ def experiments(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Rank what a lab can measure by what it would say about rival models of the level at the edge.
+    """Rank what a lab can measure next.
 
-    Each experiment is a ratio of two readings. Its bits are the expected information about which rival holds, with the
-    error of that figure.
+    The order is by what a measurement would say about rival models of the level at the edge. Each experiment is a ratio
+    of two readings. Its bits are the expected information about which rival holds, with the error of that figure.
     """
     from unitcad.cache import DiskStore, default_root
     from unitcad.experiments.lab_file import load_lab

@@ -18,9 +18,10 @@ def measure(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure units from recordings of a vibrometer, a displacement sensor or an accelerometer.
+    """Measure units from recordings in a lab.
 
-    Gives the level at the edge and along the skin, normalised by the motor, with an interval of 95 % from the repeats.
+    Of a vibrometer, a displacement sensor or an accelerometer. Gives the level at the edge and along the skin,
+    normalised by the motor, with an interval of 95 % from the repeats.
     Exit 1 when a finding says that a record or a level is in doubt. The last line printed is the folder.
     """
     from unitcad.cli.output import print_json, progress, warn
