@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from recordings import CENTRES, FORMATS, RATE, columns, write_text
 
 from unitcad.errors import Refusal
+from unitcad.lab.readers import hierarchical
 from unitcad.lab.readers.formats import open_recording
 from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.recording import Recording, Unreadable
@@ -161,3 +162,11 @@ def test_the_files_by_others_are_unchanged() -> None:
 def test_a_text_with_spaces_is_read(tmp_path: Path) -> None:
     write_text(tmp_path / "a.txt", "   ")
     assert_allclose(numbers(open_recording(tmp_path / "a.txt"), 1, 2, 3), columns(), atol=1e-6)
+
+
+def test_a_library_that_never_returns_is_a_refusal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """HDF5 loops for ever over the attributes of some damaged files: its process is ended."""
+    FORMATS["plain.h5"](tmp_path / "plain.h5")
+    monkeypatch.setattr(hierarchical, "LONGEST_S", 0.01)
+    with pytest.raises(Unreadable, match="did not return"):
+        open_recording(tmp_path / "plain.h5")
