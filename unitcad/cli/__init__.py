@@ -21,6 +21,7 @@ from unitcad.cli.check_command import check
 from unitcad.cli.coupon_command import coupon
 from unitcad.cli.estimate_command import estimate
 from unitcad.cli.experiments_command import experiments
+from unitcad.cli.fit_command import fit
 from unitcad.cli.init_command import init
 from unitcad.cli.list_command import list_
 from unitcad.cli.material_command import material
@@ -60,6 +61,7 @@ app.command("estimate")(estimate)
 app.command("experiments")(experiments)
 app.command("accuracy")(accuracy)
 app.command("coupon")(coupon)
+app.command("fit")(fit)
 app.command("init")(init)
 app.command("list")(list_)
 app.command("material")(material)

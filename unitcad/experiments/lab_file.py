@@ -111,7 +111,13 @@ def lab_of_data(data: Mapping[str, Any], folder: Path, name: str) -> Lab:
     """Return the lab of a file's data; `folder` is where its relative paths start. Raises as `load_lab`."""
     settings = convert(data, LabFile)
     _check_twice(settings)
-    specs = {unit: _spec(unit, table, folder, data.get("tissue", {})) for unit, table in settings.units.items()}
+    bodies = {f"tissue.{name}": layers for name, layers in data.get("tissue", {}).items()}
+    specs = {
+        unit: spec_with(
+            f"units.{unit}", table.get("base"), {k: v for k, v in table.items() if k != "base"}, folder, bodies
+        )
+        for unit, table in settings.units.items()
+    }
     return lab_of_specs(specs, settings, name)
 
 
@@ -153,25 +159,35 @@ def _with_ranges(variant: EstimateInput, factor: float) -> EstimateInput:
     return replace(variant, layers=layers)
 
 
-def _spec(unit: str, table: dict[str, Any], folder: Path, bodies: Mapping[str, Any]) -> Spec:
-    base = table.get("base")
+def spec_with(
+    field: str,
+    base: object,
+    changes: Mapping[str, Any],
+    folder: Path,
+    entries: Mapping[str, Any],
+    base_key: str = "base",
+) -> Spec:
+    """Return the spec `base` names, a template or a file that starts at `folder`, with `entries` and `changes` by path.
+
+    Raises Refusal whose field begins with `field`.
+    """
+    where = f"{field}.{base_key}"
     if not isinstance(base, str):
-        raise Refusal(f"units.{unit}.base", base, "must name a template or a spec file")
+        raise Refusal(where, base, "must name a template or a spec file")
     named = base if not (os.sep in base or "/" in base or base.endswith(".toml")) else folder / base
     try:
         data = read(named)
     except WrongArgument as refusal:
-        raise Refusal(f"units.{unit}.base", base, refusal.limit, refusal.nearest) from None
+        raise Refusal(where, base, refusal.limit, refusal.nearest) from None
     check_plain(data)
-    for name, layers in bodies.items():
-        put(data, f"tissue.{name}", layers)
+    for path, entry in entries.items():
+        put(data, path, entry)
     try:
-        for path, value in table.items():
-            if path != "base":
-                put(data, path, value)
+        for path, value in changes.items():
+            put(data, path, value)
         return from_data(data, folder)
     except Refusal as refusal:
-        raise type(refusal)(f"units.{unit}.{refusal.field}", refusal.value, refusal.limit, refusal.nearest) from None
+        raise type(refusal)(f"{field}.{refusal.field}", refusal.value, refusal.limit, refusal.nearest) from None
 
 
 def _on(spec: Spec, body: str) -> dict[str, Any]:

@@ -21,13 +21,17 @@ _GREY, _DARK = "#e2e2e2", "#444444"
 
 @dataclass(frozen=True)
 class Series:
-    """A series: x and y of the same length; drawn as `points`, else as a curve, `dashed` or not."""
+    """A series: x and y of the same length; drawn as `points`, else as a curve, `dashed` or not.
+
+    `bars`: (low, high) of y at each point, drawn as a line.
+    """
 
     name: str
     x: Sequence[float] | np.ndarray
     y: Sequence[float] | np.ndarray
     points: bool = False
     dashed: bool = False
+    bars: Sequence[tuple[float, float]] = ()
 
 
 def chart(
@@ -42,7 +46,8 @@ def chart(
     """Return the chart as an SVG document; `shaded` marks a range of x. What an axis can't show is left out."""
     kept = [(one, _kept(one, log_x, log_y)) for one in series]
     across = _axis(np.concatenate([xy[0] for _, xy in kept] or [np.zeros(0)]), log_x, LEFT, WIDTH - RIGHT)
-    up = _axis(np.concatenate([xy[1] for _, xy in kept] or [np.zeros(0)]), log_y, HEIGHT - BOTTOM, TOP)
+    ends = [np.ravel(np.asarray(one.bars, float)) for one in series]
+    up = _axis(np.concatenate([*(xy[1] for _, xy in kept), *ends] or [np.zeros(0)]), log_y, HEIGHT - BOTTOM, TOP)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
         'font-family="sans-serif" font-size="12">',
@@ -70,6 +75,9 @@ def chart(
     for i, (one, (xs, ys)) in enumerate(kept):
         colour = COLOURS[i % len(COLOURS)]
         spots = [(across.at(float(a)), up.at(float(b))) for a, b in zip(xs, ys, strict=True)]
+        for (x, _), ends_of_one in zip(spots, one.bars, strict=False):
+            low, high = (up.at(float(end)) for end in ends_of_one)
+            parts.append(_line(x, low, x, high, colour))
         parts += _drawn(one, spots, colour)
         parts += _drawn(one, [(WIDTH - RIGHT + 10.0, y - 4.0), (WIDTH - RIGHT + 24.0, y - 4.0)], colour)
         for line in textwrap.wrap(one.name, LEGEND_LETTERS):

@@ -19,7 +19,7 @@ RANGE_PERCENT = (5.0, 95.0)
 """Ends of a bootstrap range."""
 RANGE_HOLDS = 0.75
 """In this share of simulated tables of nine units, at least, such a range holds the true score."""
-_DRAWS, _SEED = 10_000, 1954
+_DRAWS, SEED = 10_000, 1954
 _MOST_EXACT = 12
 """Up to this many units every pattern of signs is tried."""
 
@@ -86,7 +86,7 @@ def all_but_one(table: MeasuredTable) -> np.ndarray:
 
 def bootstrap_range(errors: np.ndarray) -> tuple[float, float]:
     """Return the `RANGE_PERCENT` of exp(mean error) over units drawn again with replacement, seeded."""
-    drawn = np.random.default_rng(_SEED).integers(0, errors.size, (_DRAWS, errors.size))
+    drawn = np.random.default_rng(SEED).integers(0, errors.size, (_DRAWS, errors.size))
     low, high = np.exp(np.percentile(errors[drawn].mean(axis=1), RANGE_PERCENT))
     return float(low), float(high)
 
@@ -101,7 +101,7 @@ def sign_flip_p(errors: np.ndarray, others: np.ndarray) -> float:
     if count <= _MOST_EXACT:
         signs = 1.0 - 2.0 * ((np.arange(2**count)[:, None] >> np.arange(count)) & 1)
     else:
-        signs = np.random.default_rng(_SEED).choice((-1.0, 1.0), (_DRAWS, count))
+        signs = np.random.default_rng(SEED).choice((-1.0, 1.0), (_DRAWS, count))
         signs[0] = 1.0
     means = np.abs(signs @ differences)
     return float(np.mean(means >= abs(differences.sum()) * (1 - 1e-9) - 1e-15))

@@ -1,0 +1,140 @@
+"""`unitcad fit`: what the file may hold, what is refused, what is written."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+import tomli_w
+from typer.testing import CliRunner
+
+from unitcad.attenuation.edge.lab_fit import unit_key
+from unitcad.cli import app
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.estimating import estimate_input
+from unitcad.lab.fit_files import contents
+from unitcad.lab.fit_lab import load_fit_lab
+from unitcad.lab.fitting import fit_lab
+from unitcad.validation import load
+
+UNITS = [
+    {"name": "a", "spec": "embedded", "level": {"value": 0.11, "low": 0.1, "high": 0.12}},
+    {"name": "b", "spec": "encapsulating", "frequency_hz": 110.0, "level": {"value": 0.06}},
+]
+
+
+def _written(folder: Path, **changes: object) -> str:
+    data = {"name": "bench", "unit": UNITS, **changes}
+    path = folder / "lab.toml"
+    path.write_text(tomli_w.dumps({key: value for key, value in data.items() if value is not None}))
+    return str(path)
+
+
+def test_the_shipped_lab_says_that_it_is_synthetic_and_gives_the_same_bytes() -> None:
+    lab = load_fit_lab("synthetic-bench")
+    assert "Synthetic" in lab.settings.note
+    made = contents(fit_lab(lab))
+    assert made == contents(fit_lab(lab))
+    fit = tomllib.loads(made["lab-fit.toml"])
+    assert fit["units"] == 3
+    assert set(fit["model"]) == {"bush", "fitted", "paper", "consistent", "crossings"}
+    assert "null" in made["fit.md"]
+    assert "Synthetic" in made["fit.md"]
+    data = json.loads(made["fit.json"])
+    assert len(data["units"]) == 12
+    assert set(data["by_moduli"]) == {"dynamic", "quasi-static", "data sheet"}
+
+
+def test_constants_lie_between_the_stored_and_the_lab_s_own(tmp_path: Path) -> None:
+    """One own unit of a one-constant model: the weights are 0.9 and 1 without an error of measurement."""
+    fit = fit_lab(load_fit_lab(_written(tmp_path, unit=[UNITS[1]]))).fit
+    spec = estimate_input(load("encapsulating"), 110.0)
+    from unitcad.attenuation.edge.fitted_models import path_of
+    from unitcad.attenuation.edge.variant_units import nominal
+
+    own = 0.06 / float(path_of("bush")(nominal(spec))[0])
+    one = fit.model["bush"]
+    assert one.constants["s"] == pytest.approx((one.stored["s"] ** 0.9 * own) ** (1 / 1.9), rel=1e-5)
+    assert fit.measured[0].key == unit_key(estimate_input(load("encapsulating")))
+    assert fit.measured[0].key != unit_key(estimate_input(load("encapsulating", ["layers.0.wall_mm=1.2"])))
+
+
+def test_levels_come_from_a_file_of_measure(tmp_path: Path) -> None:
+    level = {"distance_mm": 0.0, "value": 0.2, "low": 0.18, "high": 0.22, "frequency_hz": 131.5}
+    rows = [
+        {"unit": "b", "chain": "line", **level},
+        {"unit": "b", "chain": "paper", **level, "value": 0.3},
+        {"unit": "b", "chain": "line", **level, "distance_mm": 5.0, "value": 0.1},
+    ]
+    (tmp_path / "u.toml").write_text(Path("templates/embedded.toml").read_text())
+    sha = hashlib.sha256((tmp_path / "u.toml").read_bytes()).hexdigest()
+    measured = {
+        "status": "measured",
+        "chain": "line",
+        "level": rows,
+        "source": [{"file": "u.toml", "sha256": sha}],
+    }
+    (tmp_path / "measured.toml").write_text(tomli_w.dumps(measured))
+    units = [UNITS[0], {"name": "b", "spec": "u.toml", "measured": "measured.toml"}]
+    lab = load_fit_lab(_written(tmp_path, unit=units))
+    assert lab.units[1].level.value == 0.2
+    assert lab.units[1].frequency_hz == 131.5
+    assert {one.file for one in lab.inputs} == {"lab.toml", "u.toml", "measured.toml"}
+    (tmp_path / "u.toml").write_text((tmp_path / "u.toml").read_text() + "# changed\n")
+    with pytest.raises(Refusal, match="SHA-256 differs"):
+        load_fit_lab(_written(tmp_path, unit=units))
+    (tmp_path / "u.toml").write_bytes(b"")
+    units[1] = {**units[1], "name": "c"}
+    with pytest.raises(UnitcadError):
+        load_fit_lab(_written(tmp_path, unit=units))
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"unit": []}, "unit"),
+        ({"unit": [UNITS[0], UNITS[0]]}, "unit.1.name"),
+        ({"unit": [{"name": "a", "spec": "embedded"}]}, "unit.0.level"),
+        ({"unit": [{**UNITS[0], "measured": "m.toml"}]}, "unit.0.level"),
+        ({"unit": [{"name": "a", "spec": "embedded", "measured": "m.toml"}]}, "unit.0.measured"),
+        ({"unit": [{**UNITS[0], "spec": "embeded"}]}, "unit.0.spec"),
+        ({"unit": [{**UNITS[0], "set": {"layers.0.wall_mm": -1}}]}, "unit.0.layers.0.wall_mm"),
+        ({"unit": [{**UNITS[0], "level": {"value": 0.2, "low": 0.3, "high": 0.4}}]}, "unit.0.level.value"),
+        ({"unit": [{**UNITS[0], "level": {"value": 0.2, "low": 0.1}}]}, "unit.0.level.high"),
+        ({"unit": [{**UNITS[0], "level": {"value": -0.2}}]}, "unit.0.level.value"),
+        ({"unit": [{**UNITS[0], "frequency_hz": 0.1}]}, "unit.0.frequency_hz"),
+        ({"with_paper": False}, "unit"),
+        ({"moduli": "static"}, "moduli"),
+        ({"between_labs": -1.0}, "between_labs"),
+        ({"levels": 3}, "levels"),
+    ],
+)
+def test_what_is_refused(tmp_path: Path, changes: dict, field: str) -> None:
+    with pytest.raises(Refusal) as refused:
+        fit_lab(load_fit_lab(_written(tmp_path, **changes)))
+    assert refused.value.field.startswith(field)
+
+
+def test_a_silicone_without_a_modulus_leaves_that_source_out(tmp_path: Path) -> None:
+    """Nobody measured Ecoflex 00-50 at the motor's frequency; its tensile test and data sheet stand."""
+    units = [*UNITS, {**UNITS[0], "name": "c", "set": {"layers.0.material": "ecoflex-00-50"}}]
+    with pytest.raises(Refusal, match="no modulus is known"):
+        fit_lab(load_fit_lab(_written(tmp_path, unit=units)))
+    made = fit_lab(load_fit_lab(_written(tmp_path, unit=units, moduli="quasi-static")))
+    assert made.by_source["dynamic"].reason.startswith("unit.2.layers.0")
+    assert made.fit.moduli == "quasi-static"
+    assert "ecoflex-00-50" in contents(made)["fit.md"]
+
+
+def test_the_command_writes_four_files_and_prints_the_null(tmp_path: Path) -> None:
+    out = tmp_path / "fit"
+    done = CliRunner().invoke(app, ["fit", _written(tmp_path), "-o", str(out)])
+    assert done.exit_code == 0, done.output
+    assert "null" in done.output
+    assert done.output.strip().splitlines()[-1] == str(out)
+    assert sorted(file.name for file in out.iterdir()) == ["fit.json", "fit.md", "fit.svg", "lab-fit.toml"]
+    shown = CliRunner().invoke(app, ["fit", _written(tmp_path), "--json"])
+    assert json.loads(shown.output)["fit"] == tomllib.loads((out / "lab-fit.toml").read_text())

@@ -1,0 +1,84 @@
+"""unitcad fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from unitcad.cli.shared_options import AsJson
+
+if TYPE_CHECKING:
+    from unitcad.lab.fitting import Fitted
+
+
+def fit(
+    lab: Annotated[
+        str, typer.Argument(metavar="LAB", help="a TOML file of the units a lab measured, or a shipped one's name")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for lab-fit.toml, fit.json, fit.md and fit.svg.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Judge the edge-level models with a lab's units, and fit them.
+
+    Each unit is predicted without it, the null of two levels beside the models. The constants are shrunk towards the
+    stored ones by how many units there are. `estimate --fit` and `build --fit` take lab-fit.toml.
+    """
+    from unitcad.cli.output import print_json, progress
+    from unitcad.lab import fit_files
+    from unitcad.lab.fit_lab import load_fit_lab
+    from unitcad.lab.fitting import fit_lab
+
+    loaded = load_fit_lab(lab)
+    with progress("fit") as stage:
+        result = fit_lab(loaded, stage)
+        made = fit_files.contents(result) if out is not None else {}
+    if out is not None:
+        fit_files.write(out, made)
+    if as_json:
+        print_json({**fit_files.as_data(result), **({"folder": str(out)} if out is not None else {})})
+        return
+    _print(result)
+    if out is not None:
+        typer.echo(str(out))
+
+
+def _print(result: Fitted) -> None:
+    from rich.table import Table
+
+    from unitcad.cli.output import console
+    from unitcad.lab import fit_files
+
+    screen, chosen, settings = console(), result.chosen, result.lab.settings
+    screen.print(f"{settings.name}: {result.fit.units} units of its own, {settings.moduli} moduli", soft_wrap=True)
+    if settings.note:
+        screen.print(f"  {settings.note}", soft_wrap=True)
+    table = Table("model", "unit left out", "own: stored -> fitted", "against the null", "80 %")
+    for name in chosen.order:
+        one = fit_files.entry(result, name)
+        own = "-" if one.own_left_out is None else f"x {one.own_left_out:.2f}"
+        if one.own_by_stored is not None:
+            own = f"{one.own_by_stored:.2f} -> {one.own_left_out:.2f}"
+        score = f"x {one.left_out:.2f} ({one.left_out_low:.2f} to {one.left_out_high:.2f})"
+        table.add_row(name, score, own, fit_files.against_text(one), one.held)
+    screen.print(table)
+    screen.print("constants, stored -> fitted (90 %):")
+    for name in chosen.order:
+        screen.print(f"  {name}: {fit_files.constants_text(fit_files.entry(result, name))}", soft_wrap=True)
+    by_source = Table("moduli", *chosen.judged, title="unit left out, by where the moduli come from")
+    for source, compared in result.by_source.items():
+        by_source.add_row(
+            source, *[f"{compared.judged[n].score:.2f}" if compared.judged else "-" for n in chosen.judged]
+        )
+    screen.print(by_source)
+    for source, compared in result.by_source.items():
+        if compared.reason:
+            screen.print(f"  {source}: {compared.reason}", soft_wrap=True)
+    screen.print(f"  {fit_files.prior_text(result)}", soft_wrap=True)
+    screen.print(
+        "  against the null: difference of |ln(predicted/measured)|, below 0 is better; 80 %: units in their range",
+        soft_wrap=True,
+    )

@@ -1,0 +1,211 @@
+"""What `unitcad fit` writes: lab-fit.toml, fit.json, fit.md and fit.svg. The same input, the same bytes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from unitcad import files
+from unitcad.attenuation.edge.lab_fit import PERCENT, ModelFit, quantiles
+from unitcad.export.chart import Series, chart
+from unitcad.lab.fitting import Compared, Fitted
+from unitcad.spec.toml import text_of
+
+FIT = "lab-fit.toml"
+
+
+def contents(result: Fitted) -> dict[str, str]:
+    """Return the files by name."""
+    return {
+        FIT: fit_toml(result),
+        "fit.json": json.dumps(as_data(result), indent=1, ensure_ascii=False, allow_nan=False) + "\n",
+        "fit.svg": _chart(result),
+        "fit.md": page(result),
+    }
+
+
+def write(folder: Path, made: dict[str, str]) -> None:
+    """Write the files, each whole or not at all, into a folder that is made. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in made.items():
+        files.write(folder / name, text.encode())
+
+
+def fit_toml(result: Fitted) -> str:
+    """Return the fit as an estimate takes it (`[estimate] fit`)."""
+    return text_of(_plain(msgspec.to_builtins(result.fit)))
+
+
+def as_data(result: Fitted) -> dict[str, Any]:
+    """Return everything as JSON-ready data."""
+    settings = result.lab.settings
+    return {
+        "name": settings.name,
+        "note": settings.note,
+        "moduli": settings.moduli,
+        "by_moduli": {source: _scores(one) for source, one in result.by_source.items()},
+        "units": unit_rows(result),
+        "fit": _plain(msgspec.to_builtins(result.fit)),
+        "prior": prior_text(result),
+    }
+
+
+def unit_rows(result: Fitted) -> list[dict[str, Any]]:
+    """Return each unit's measured level and, by the best model, what was predicted without it."""
+    chosen = result.chosen
+    assert chosen.campaigns is not None
+    name = best(chosen)
+    judged, table = chosen.judged[name], chosen.campaigns.table
+    rows = []
+    for i, unit in enumerate(table.names):
+        low, high = quantiles(judged.df, judged.centre[i], judged.scale[i])
+        rows.append(
+            {
+                "unit": unit,
+                "own": bool(judged.own[i]),
+                "measured": _short(table.levels[i]),
+                "model": name,
+                "predicted": _short(np.exp(judged.centre[i])),
+                "p10": _short(low),
+                "p90": _short(high),
+            }
+        )
+    return rows
+
+
+def best(compared: Compared) -> str:
+    """Return the model with the best score that is not the null."""
+    return next(name for name in compared.order if name != "null")
+
+
+def entry(result: Fitted, name: str) -> ModelFit:
+    """Return a model's part of the fit, the null's too."""
+    return result.fit.null if name == "null" else result.fit.model[name]
+
+
+def prior_text(result: Fitted) -> str:
+    """Say what the stored constants weigh."""
+    settings, chosen = result.lab.settings, result.chosen
+    assert chosen.campaigns is not None
+    count = int(np.sum(~chosen.campaigns.own))
+    if not count:
+        return "The lab's own units alone: nothing is shrunk."
+    weight = count / (count * settings.between_labs**2 + 1)
+    return (
+        f"The stored constants, of {count} units, weigh as much as {weight:.2g} of the lab's own "
+        f"(between_labs {settings.between_labs:g}: assumed, not measured)."
+    )
+
+
+def constants_text(one: ModelFit) -> str:
+    """Return stored -> fitted (90 % range) of each constant."""
+    parts = []
+    for name, value in one.constants.items():
+        stored = f"{one.stored[name]:.3g} -> " if one.stored else ""
+        parts.append(f"{name} {stored}{value:.3g} ({one.low[name]:.3g} to {one.high[name]:.3g})")
+    return "; ".join(parts)
+
+
+def against_text(one: ModelFit) -> str:
+    """Return the paired difference to the null in ln, with its standard error and p."""
+    if one.against_null is None:
+        return "-"
+    return f"{one.against_null:+.2f} +- {one.against_null_error:.2f}, p {one.against_null_p:.2g}"
+
+
+def page(result: Fitted) -> str:
+    """Return the result as Markdown."""
+    settings, chosen = result.lab.settings, result.chosen
+    own = result.fit.units
+    lines = [f"# Models fitted with the units of {settings.name}", ""]
+    lines += [settings.note, ""] if settings.note else []
+    lines += [
+        f"{own} units of the lab's own"
+        + (" beside the paper's nine" if settings.with_paper else "")
+        + f", {settings.moduli} moduli. {prior_text(result)}",
+        "",
+        "| model | unit left out | own units | own, stored constants | against the null | in 80 % | constants |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name in chosen.order:
+        one = entry(result, name)
+        lines.append(
+            f"| {name} | {one.left_out:.2f} ({one.left_out_low:.2f} to {one.left_out_high:.2f}) | "
+            f"{_factor(one.own_left_out)} | {_factor(one.own_by_stored)} | {against_text(one)} | {one.held} | "
+            f"{constants_text(one)} |"
+        )
+    lines += [
+        "",
+        "Factors are geometric means of predicted over measured, 1 is exact; in brackets 5 to 95 % over units drawn "
+        "again. Against the null: mean difference of |ln(predicted/measured)| with its standard error, and the "
+        "sign-flip test; below 0 is better than two levels alone. In 80 %: units within the range that was predicted "
+        "without them.",
+        "",
+        "## By source of the moduli",
+        "",
+        f"| moduli | {' | '.join(chosen.judged)} |",
+        "| --- |" + " --- |" * len(chosen.judged),
+    ]
+    for source, compared in result.by_source.items():
+        scores = [f"{compared.judged[name].score:.2f}" if compared.judged else "-" for name in chosen.judged]
+        lines.append(f"| {source} | {' | '.join(scores)} |")
+    lines += [f"\n{source}: {one.reason}." for source, one in result.by_source.items() if one.reason]
+    lines += [
+        "",
+        "## Units",
+        "",
+        f"Predicted without the unit by {best(chosen)}; 80 % intervals.",
+        "",
+        "![predicted against measured](fit.svg)",
+        "",
+        "| unit | measured | predicted | P10 | P90 |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for row in unit_rows(result):
+        numbers = " | ".join(f"{row[key]:.3g}" for key in ("measured", "predicted", "p10", "p90"))
+        lines.append(f"| {row['unit']}{' (own)' if row['own'] else ''} | {numbers} |")
+    lines += ["", "## Files that were read", ""]
+    lines += [f"- {one.file}: SHA-256 {one.sha256}" for one in result.fit.input]
+    return "\n".join(lines) + "\n"
+
+
+def _scores(compared: Compared) -> dict[str, Any]:
+    if compared.reason:
+        return {"reason": compared.reason}
+    return {
+        name: {"left_out": _short(one.score), "range": [_short(end) for end in one.range], "held_80": one.held()}
+        for name, one in compared.judged.items()
+    }
+
+
+def _chart(result: Fitted) -> str:
+    rows = unit_rows(result)
+    series = []
+    for label, own in (("the paper's units", False), ("the lab's own", True)):
+        there = [row for row in rows if row["own"] == own]
+        if there:
+            measured, predicted = ([row[key] for row in there] for key in ("measured", "predicted"))
+            bars = [(row["p10"], row["p90"]) for row in there]
+            series.append(Series(f"{label}, with {PERCENT[0]} to {PERCENT[1]} %", measured, predicted, True, bars=bars))
+    ends = [min(row["measured"] for row in rows), max(row["measured"] for row in rows)]
+    series.append(Series("predicted = measured", ends, ends, dashed=True))
+    title = f"{result.fit.name}: {best(result.chosen)}, each unit left out"
+    return chart(series, title, "measured level", "predicted level", log_x=True, log_y=True)
+
+
+def _factor(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
+
+
+def _plain(node: Any) -> Any:
+    if isinstance(node, dict):
+        return {key: _plain(value) for key, value in node.items() if value is not None}
+    return [_plain(value) for value in node] if isinstance(node, list) else node
+
+
+def _short(value: float) -> float:
+    return float(f"{float(value):.6g}")
