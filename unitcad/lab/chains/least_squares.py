@@ -66,7 +66,7 @@ def mains_columns(time: Floats, mains_hz: float, orders: list[int]) -> Floats:
     for order in range(1, max(orders) + 1):
         power = power * turn
         if order in orders:
-            columns += [power.real, power.imag]
+            columns += [np.real(power), np.imag(power)]
     return np.array(columns)
 
 

@@ -80,7 +80,7 @@ def tell(path: str) -> None:
     with h5py.File(path, "r") as file:
         for name, place, _ in found:
             column = _Column(file[name], place)
-            column[0:1], column[len(column) - 1 : len(column)]
+            _ = column[0:1], column[len(column) - 1 : len(column)]
     print(json.dumps([[name, *place, one.name, one.unit, one.count] for name, place, one in found]))
 
 
