@@ -37,7 +37,7 @@ def element_matrices(mesh: HarmonicMesh, harmonic: int) -> ElementMatrices:
     x = np.asarray(basis.global_coordinates())
     functions = [f[0] for f in basis.basis]
     n = np.moveaxis(np.array([np.broadcast_to(np.asarray(f), x.shape[1:]) for f in functions]), 0, -1)
-    dr, dz = (np.moveaxis(np.array([f.grad[i] for f in functions]), 0, -1) for i in (0, 1))
+    dr, dz = (np.moveaxis(np.array([np.asarray(f.grad)[i] for f in functions]), 0, -1) for i in (0, 1))
     weight = x[0] * basis.dx * (2 * np.pi if harmonic == 0 else np.pi)
     strains = _strains(harmonic, n, dr, dz, x[0][..., None])
     shear = sum(
