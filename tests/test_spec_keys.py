@@ -15,6 +15,9 @@ from unitcad import catalogue
 from unitcad.cache import MemoryStore, digest
 from unitcad.catalogue.entries import kinds_of
 from unitcad.errors import Refusal
+from unitcad.lab.fit_files import fit_toml
+from unitcad.lab.fit_lab import load_fit_lab
+from unitcad.lab.fitting import fit_lab
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.product import make
 from unitcad.pipeline.stages import Stages
@@ -38,6 +41,13 @@ def drawn(radius, height): return cut(cylinder(radius, 0, height), [cylinder(4, 
 def plain(spec): return drawn(6, spec.parameters["height_mm"])
 def wide(spec): return drawn(7, spec.parameters["height_mm"])
 """
+
+
+@cache
+def _fit_text() -> str:
+    return fit_toml(fit_lab(load_fit_lab("synthetic-bench")))
+
+
 OTHERS: dict[str, tuple[Any, ...]] = {
     "name": ("another",),
     "design": ("d.py:wide",),
@@ -56,6 +66,8 @@ OTHERS: dict[str, tuple[Any, ...]] = {
     "printers.ours.bed_x_mm": (60.0,),
     "printers.ours.bed_y_mm": (40.0,),
     "design_source": (_SOURCE.replace("2.2", "2.4"),),
+    "estimate.fit": ("other.toml",),
+    "estimate.fit_source": (_fit_text().replace("synthetic-bench", "another"),),
 }
 """Values for keys whose type and range give none: names, texts and lists."""
 FIRST: dict[str, tuple[str, Any]] = {
@@ -109,6 +121,7 @@ def _bases() -> dict[str, dict[str, Any]]:
         "whole": whole,
         "own": own,
         "like": like,
+        "fitted": {**whole, "estimate": {"fit": "lab-fit.toml", "fit_source": _fit_text()}},
         "pulled": {**own, "estimate": {"tissue": OWN, "moduli": "quasi-static"}},
         "open rings": {**read("embedded"), "output": coarse},
         "wires": {**{k: v for k, v in whole.items() if k != "fpcb"}, "wires": {"diameter_mm": 0.5}},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -10,6 +11,7 @@ from typing import Any
 from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.edge.closed_form import CONTROL_PASSES
 from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded
+from unitcad.attenuation.edge.lab_fit import LabFit
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.attenuation.receivers import neighbours_block
@@ -17,6 +19,7 @@ from unitcad.catalogue import Material, Motor, Tissue, Value, choose, materials,
 from unitcad.designs import design_of, dimensions, no_estimate
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
+from unitcad.validation.fit_text import lab_fit
 
 _MOTOR_DENSITY = (4000.0, 5000.0, 6500.0)  # kg/m3: low, value, high
 MECHANICS = "mechanics"
@@ -38,7 +41,10 @@ def estimate_spec(
     Raises `Refusal` where no frequency is known, for an unknown material or tissue, and for values no body has.
     """
     variant, asked = estimate_input(spec, frequency_hz), tuple(models or spec.estimate.models)
-    data = estimate(variant, closed_forms(asked), layered)
+    data = estimate(variant, closed_forms(asked), layered, fit_of(spec))
+    if spec.estimate.fit_source is not None:
+        sha256 = hashlib.sha256(spec.estimate.fit_source.encode()).hexdigest()
+        data["fit"] = {"file": spec.estimate.fit, "sha256": sha256, **data["fit"]}
     if MECHANICS in asked:
         from unitcad.attenuation.mechanics.prior_range import range_block
         from unitcad.attenuation.mechanics.sensitivities import mechanics_inputs
@@ -46,6 +52,11 @@ def estimate_spec(
         block = range_block(variant, say=say)
         data[MECHANICS] = rounded({**block, "inputs_seen": mechanics_inputs(variant, say)})
     return data
+
+
+def fit_of(spec: Spec) -> LabFit | None:
+    """Return the lab's fit that a spec names."""
+    return None if spec.estimate.fit_source is None else lab_fit(spec.estimate.fit_source)
 
 
 def closed_forms(models: Sequence[str]) -> tuple[str, ...]:
@@ -58,7 +69,7 @@ def frequency_table_of_spec(
 ) -> dict[str, Any]:
     """Return a table over frequencies (Hz): edge level by model, and the layered decay; raises as `estimate_spec`."""
     variant = estimate_input(spec, frequencies_hz[0])
-    return frequency_table(variant, frequencies_hz, closed_forms(models or spec.estimate.models))
+    return frequency_table(variant, frequencies_hz, closed_forms(models or spec.estimate.models), fit_of(spec))
 
 
 def neighbours_of_specs(specs: Sequence[Spec], pitch_mm: float, frequencies_hz: Sequence[float] = ()) -> dict[str, Any]:

@@ -31,6 +31,7 @@ from unitcad.errors import UnitcadError
 from unitcad.estimating import closed_forms, estimate_input
 from unitcad.spec import Spec
 from unitcad.validation import from_data, put
+from unitcad.validation.fit_text import lab_fit
 
 BLOCK = 1 << 15
 FREE = re.compile(r"layers\.(\d+)\.material|estimate\.frequency_hz|name|casting\..+")
@@ -56,6 +57,7 @@ class _Known:
     walls: tuple[float, ...]
     silicones: np.ndarray
     models: tuple[str, ...]
+    fit: str | None = None
 
 
 @dataclass(frozen=True)
@@ -146,6 +148,7 @@ def _known(spec: Spec) -> _Known:
         walls=tuple(layer.thickness for layer in asked.layers),
         silicones=np.array([_silicone(layer) for layer in asked.layers]),
         models=closed_forms(spec.estimate.models),
+        fit=spec.estimate.fit_source,
     )
 
 
@@ -194,8 +197,10 @@ def _block(
         unknown = np.isnan(silicones).any(axis=(1, 2))
         for model in dict.fromkeys(model for entry in there for model in entry.models):
             column = levels.setdefault(model, np.full(len(known), np.nan))
-            asked = np.array([model in entry.models for entry in there])
-            column[chosen] = np.where(asked & ~unknown, edge_levels(units, model), np.nan)
+            for fit in dict.fromkeys(entry.fit for entry in there):
+                asked = np.array([model in entry.models and entry.fit == fit for entry in there])
+                constants = lab_fit(fit).constants(model) if fit else None
+                column[chosen] = np.where(asked & ~unknown, edge_levels(units, model, constants), column[chosen])
     return EstimateBlock(start, levels, known)
 
 

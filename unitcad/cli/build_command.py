@@ -12,6 +12,7 @@ from unitcad.cli.output import warn
 from unitcad.cli.shared_options import (
     AllowCode,
     AsJson,
+    Fit,
     Formats,
     NoCheck,
     Only,
@@ -20,6 +21,7 @@ from unitcad.cli.shared_options import (
     allow_code,
     outputs,
     overrides,
+    with_fit,
 )
 
 if TYPE_CHECKING:
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 def build(
     specs: Annotated[list[str], typer.Argument(metavar="SPEC", help="A spec file, or the name of a template.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Where the result's folder goes.")] = Path("out"),
+    fit: Fit = None,
     sets: Sets = None,
     formats: Formats = None,
     only: Only = None,
@@ -47,7 +50,7 @@ def build(
     from unitcad.pipeline.slicing import slice_tools
     from unitcad.validation import load
 
-    changes, chosen = overrides(sets, formats), outputs(only)
+    changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
     allow_code(code)
     # Every spec is validated before the first one is built.
     wanted = [load(spec, changes) for spec in specs]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from unitcad.cli.output import print_json, progress, warn
-from unitcad.cli.shared_options import AsJson, Sets
+from unitcad.cli.shared_options import AsJson, Fit, Sets, with_fit
 from unitcad.errors import Refusal, unknown_name
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ def estimate(
             metavar="MM", help="units in a row, so far apart: how far the first moves the others, with their masses"
         ),
     ] = None,
+    fit: Fit = None,
     sets: Sets = None,
     as_json: AsJson = False,
 ) -> None:
@@ -49,7 +50,7 @@ def estimate(
         raise Refusal("--frequency", frequency, "must be one frequency for mechanics, whose draws cost seconds each")
     models = None if not model else MODELS if model == "all" else (model,)
     hertz = frequencies(frequency) if frequency else []
-    loaded = [load(name, sets or []) for name in specs]
+    loaded = [load(name, with_fit(sets, fit)) for name in specs]
     for spec in loaded:
         _warn_of_moulds(spec)
     beside = {} if pitch is None else {"neighbours": neighbours_of_specs(loaded, pitch, hertz)}

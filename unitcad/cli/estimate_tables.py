@@ -19,6 +19,8 @@ def print_estimate(data: dict[str, Any]) -> None:
     screen.print(Text.assemble((variant["name"], "bold"), rest))
     if data["models"]:
         screen.print(_models(data))
+        if "fit" in data:
+            screen.print(_fit_line(data["fit"]), soft_wrap=True)
     if "mechanics" in data:
         screen.print(_mechanics(data["mechanics"]))
     inputs = _inputs(data)
@@ -92,15 +94,26 @@ def _models(data: dict[str, Any]) -> Table:
     """Tabulate the edge level and, against the control of each of the unit's materials, hierarchical / control."""
     blocks, measured = data["models"], data["measured"] or {}
     controls = [one["control"] for one in next(iter(blocks.values()))["hierarchical_over_control"] or []]
-    table = Table("model", "edge level %", *[f"over {name}" for name in controls])
+    fitted = data.get("fit")
+    ranges = ["P10 to P90"] if fitted else []
+    table = Table("model", "edge level %", *ranges, *[f"over {name}" for name in controls])
     for name, block in blocks.items():
         ratios = [level(one) for one in block["hierarchical_over_control"] or []]
-        table.add_row(name, level(block["edge_level"], 100), *ratios)
+        spread = [_predicted(block["predictive"])] if fitted else []
+        table.add_row(name, level(block["edge_level"], 100), *spread, *ratios)
+    for own in data.get("own_measured", ()):
+        shown = level(own, 100), f"{own['unit']}, {own['frequency_hz']:g} Hz"
+        table.add_row("measured here", *shown, *["-"] * len(controls))
     if measured:
         levels = [measured[key] for key in ("level", "also_printed") if measured.get(key) is not None]
         ratios = {one["control"]: f"{one['value']:.3g}" for one in measured.get("hierarchical_over_control") or []}
         text = " and ".join(f"{100 * value:.4g}" for value in levels) or "-"
-        table.add_row("measured", text, *[ratios.get(name, "-") for name in controls])
+        table.add_row(
+            "measured, paper" if fitted else "measured",
+            text,
+            *["-"] * len(ranges),
+            *[ratios.get(name, "-") for name in controls],
+        )
     return table
 
 
@@ -122,6 +135,18 @@ def _errors(data: dict[str, Any]) -> Table:
             f"{error['directions']['right']} of {error['directions']['of']}",
         )
     return table
+
+
+def _predicted(block: dict[str, Any]) -> str:
+    return "-" if block["p10"] is None else f"{100 * block['p10']:.3g} to {100 * block['p90']:.3g}"
+
+
+def _fit_line(fit: dict[str, Any]) -> str:
+    """Say which fit it is, and its scores."""
+    scores = ", ".join(f"{name} x {one['geometric_mean']:.2f}" for name, one in fit["left_out"].items())
+    beside = " beside the paper's nine" if fit["with_paper"] else ""
+    units = f"{fit['own_units']} units of the lab's own{beside}"
+    return f"  fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]}): {units}; unit left out: {scores}"
 
 
 _ERRORS = "error against the table"

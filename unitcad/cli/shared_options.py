@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.")]
 Sets = Annotated[list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the spec.")]
+Fit = Annotated[
+    Path | None, typer.Option(help="A lab-fit.toml of unitcad fit: the lab's constants and ranges in the estimate.")
+]
 Formats = Annotated[str | None, typer.Option(help="stl,3mf,step,svg,png,glb; else the spec's.")]
 Only = Annotated[
     str | None, typer.Option(help="unit,moulds,estimate,casting; else all. In a batch estimate alone makes a table.")
@@ -17,6 +21,13 @@ NoCheck = Annotated[bool, typer.Option("--no-check", help="Leave out the mould c
 AllowCode = Annotated[
     bool, typer.Option("--allow-code", help="Run Python code that came with a spec (design_source), not from a file.")
 ]
+
+
+def with_fit(sets: list[str] | None, fit: Path | None) -> list[str]:
+    """Return what --set and --fit override in a spec."""
+    import json
+
+    return [*(sets or ()), *([] if fit is None else [f"estimate.fit={json.dumps(str(fit))}"])]
 
 
 def overrides(sets: list[str] | None, formats: str | None) -> list[str]:

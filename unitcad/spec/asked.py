@@ -136,6 +136,10 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     moduli: Annotated[Moduli, Meta(description="of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")] = (
         "dynamic"
     )
+    fit: Annotated[str | None, Meta(description="a lab-fit.toml of unitcad fit: a lab's own constants and ranges")] = (
+        None
+    )
+    fit_source: Annotated[str | None, Meta(description="the text of that file; filled in when it is read")] = None
 
 
 class OutputTable(Table, frozen=True, kw_only=True):

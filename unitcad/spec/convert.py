@@ -30,8 +30,8 @@ _HALF_PAIR = re.compile(r"[\ud800-\udfff]")
 _MOST_KEYS = 5
 """Keys of a table that a refusal names."""
 _LARGEST_INT = 2**63 - 1
-SOURCE = "design_source"
-"""The field whose text has lines."""
+SOURCES = frozenset({"design_source", "fit_source"})
+"""The fields whose text has lines."""
 DEEPEST = 20
 """Tables in tables that data may have: more than any spec or sweep needs."""
 
@@ -51,7 +51,7 @@ def convert(data: Mapping[str, Any], kind: type[T], field: str = "") -> T:
 
 def check_plain(node: Any, field: str = "", depth: int = 0) -> None:
     """Raise Refusal for what no key takes: huge numbers and NaN, dates, invisible characters, deep nesting."""
-    if isinstance(node, str) and SOURCE not in field.split("."):
+    if isinstance(node, str) and not SOURCES.intersection(field.split(".")):
         _check_text(node, field)
     if isinstance(node, float) and not math.isfinite(node):
         raise Refusal(field, node, "must be a finite number")

@@ -36,11 +36,12 @@ def name_in_file(design: str) -> str:
 
 
 def with_source(data: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Return a spec's data with its custom design's text in `design_source`, where it has one.
+    """Return a spec's data with its custom design's text in `design_source`, where it has one, and its fit's.
 
     A relative path starts at `folder`. Such a file is the person's own: its code may run.
     Raises UnitcadError for a file that can't be read.
     """
+    data = _with_fit(data, folder)
     design = data.get("design")
     if not is_custom(design) or data.get("design_source") is not None:
         return data
@@ -58,6 +59,19 @@ def with_source(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     named = f"{path.name}:{name}"
     allow({_digest(named, source)})
     return {**data, "design": named, "design_source": source}
+
+
+def _with_fit(data: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return a spec's data with the text of the lab's fit that it names in `estimate.fit_source`."""
+    table = data.get("estimate")
+    if not isinstance(table, dict) or not isinstance(table.get("fit"), str) or table.get("fit_source") is not None:
+        return data
+    path = folder / table["fit"]
+    try:
+        source = read_text(path, largest=LARGEST)
+    except UnitcadError as error:
+        raise Refusal("estimate.fit", table["fit"], str(error)) from None
+    return {**data, "estimate": {**table, "fit": path.name, "fit_source": source}}
 
 
 # Code runs only where somebody has allowed it: it came from a file that the command line led to, or with --allow-code.

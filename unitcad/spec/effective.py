@@ -101,13 +101,18 @@ class Moulds(Table, frozen=True, kw_only=True):
 
 
 class Estimate(Table, frozen=True, kw_only=True):
-    """Inputs of the attenuation estimate: frequency in Hz, amplitude in um, the body, the models, which moduli."""
+    """Inputs of the attenuation estimate: frequency in Hz, amplitude in um, the body, the models, which moduli.
+
+    `fit` names a lab's fit, `fit_source` is the text of that file.
+    """
 
     frequency_hz: float
     amplitude_um: float
     tissue: str
     models: tuple[Model, ...]
     moduli: Moduli = "dynamic"
+    fit: str | None = None
+    fit_source: str | None = None
 
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from unitcad.spec import Spec
 from unitcad.spec.asked import DEFAULT_MOTOR, AskedSpec
 from unitcad.spec.custom_code import is_body_file, is_custom
 from unitcad.spec.effective import CastLayer, Circuit, Estimate, MotorSize, Moulds
+from unitcad.validation.fit_text import check_fit
 
 UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
 """What is assumed of a motor whose entry does not say: the paper's motor."""
@@ -124,4 +125,13 @@ def _estimate(asked: AskedSpec, part: catalogue.Motor | None) -> Estimate:
         for field, default in unknown.items()
     }
     chosen = asked.estimate
-    return Estimate(tissue=chosen.tissue, models=chosen.models, moduli=chosen.moduli, **values)
+    if chosen.fit is not None or chosen.fit_source is not None:
+        check_fit(chosen)
+    return Estimate(
+        tissue=chosen.tissue,
+        models=chosen.models,
+        moduli=chosen.moduli,
+        fit=chosen.fit,
+        fit_source=chosen.fit_source,
+        **values,
+    )

@@ -126,6 +126,7 @@ def put(data: dict[str, Any], path: str, value: Any) -> None:
         node[_index(node, last, path)] = value
     elif isinstance(node, dict):
         node[last] = value
+        node.pop(f"{last}_source", None)  # the text of the file that stood there before
     else:
         raise Refusal(path, value, "the path runs through a value, not a table")
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from unitcad.attenuation.curve import decay_at, layered_block
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments, choice, forms, in_order, pairwise
+from unitcad.attenuation.edge.lab_fit import LabFit, own_block
 from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown
 from unitcad.attenuation.edge.scores import RANGE_PERCENT, Assessment
 from unitcad.attenuation.inputs import EstimateInput, Quantity
@@ -47,17 +48,21 @@ Layered = Callable[[EstimateInput], dict[str, Any]]
 
 
 def estimate(
-    variant: EstimateInput, models: Sequence[str] = MODELS, layered: Layered = layered_block
+    variant: EstimateInput,
+    models: Sequence[str] = MODELS,
+    layered: Layered = layered_block,
+    fit: LabFit | None = None,
 ) -> dict[str, Any]:
     """Return {variant, models, layered, measured, table_error, assumptions}; numbers to nine significant digits.
 
-    `layered` gives the layered solver's block, which reads no silicone: variants on one body share it.
+    With a lab's `fit` the constants are its own, each model has a predictive range, and the data have `fit` and
+    `own_measured`. `layered` gives the layered solver's block, which reads no silicone: variants on one body share it.
     A quantity that can't be given is null beside a `reason`. Raises `Refusal` for values that no body has.
     """
     errors = table_error()
     blocks = {}
     for model in sorted(models, key=errors["order"].index):
-        block = model_block(variant, model)
+        block = model_block(variant, model, fit)
         block["table_error"] = errors[model]
         blocks[model] = block
     notes = ranged(variant)
@@ -73,7 +78,24 @@ def estimate(
             *dict.fromkeys(_noted(variant)),
         ],
     }
+    if fit:
+        data |= {"fit": fit_block(fit, models), "own_measured": own_block(fit, variant)}
     return rounded(data)
+
+
+def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
+    """Return what a fit is and how well the models do there, the null's score beside them."""
+    scores = {name: fit.model[name] for name in models} | {"null": fit.null}
+    return {
+        "name": fit.name,
+        "own_units": fit.units,
+        "with_paper": fit.with_paper,
+        "moduli": fit.moduli,
+        "left_out": {
+            name: {"geometric_mean": one.left_out, "low": one.left_out_low, "high": one.left_out_high}
+            for name, one in scores.items()
+        },
+    }
 
 
 def summary(estimated: dict[str, Any]) -> dict[str, Any]:
@@ -93,7 +115,10 @@ def summary(estimated: dict[str, Any]) -> dict[str, Any]:
 
 
 def frequency_table(
-    variant: EstimateInput, frequencies: Sequence[float], models: Sequence[str] = MODELS
+    variant: EstimateInput,
+    frequencies: Sequence[float],
+    models: Sequence[str] = MODELS,
+    fit: LabFit | None = None,
 ) -> dict[str, Any]:
     """Return {variant, frequencies}: per frequency (Hz) each model's edge level and the decay at `DECAY_AT_MM`.
 
@@ -107,7 +132,7 @@ def frequency_table(
         rows.append(
             {
                 "frequency_hz": hertz,
-                "edge_level": {model: model_block(at, model)["edge_level"] for model in models},
+                "edge_level": {model: model_block(at, model, fit)["edge_level"] for model in models},
                 **{f"{name}_over_edge": dict(zip(places, decay, strict=True)) for name, decay in decays.items()},
             }
         )

@@ -19,7 +19,7 @@ from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels
 from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput
 
-Positive = Annotated[float, Meta(gt=0, le=1e9)]
+Positive = Annotated[float, Meta(ge=1e-9, le=1e9)]
 PERCENT = (10, 90)
 """Ends of a predictive range."""
 
@@ -36,7 +36,7 @@ class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     high: dict[str, Positive]
     stored: dict[str, Positive]
     degrees_of_freedom: Annotated[int, Meta(ge=1, le=100000)]
-    discrepancy: Annotated[float, Meta(gt=0, le=10)]
+    discrepancy: Annotated[float, Meta(ge=1e-6, le=10)]
     covariance: list[list[Annotated[float, Meta(ge=-1e9, le=1e9)]]]
     left_out: Positive
     left_out_low: Positive
@@ -74,7 +74,7 @@ class LabFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     `between_labs`: standard deviation between labs of a constant's logarithm over that between units of one lab.
     """
 
-    format: Literal[1]
+    format: Annotated[int, Meta(ge=1, le=1)]
     name: Annotated[str, Meta(min_length=1, max_length=100)]
     units: Annotated[int, Meta(ge=1, le=100000)]
     moduli: Literal["dynamic", "quasi-static"]

@@ -64,13 +64,24 @@
   function levels(data) {
     const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: block.edge_level || {}, colour: COLOURS[model] || "series-4" }));
     const measured = data.measured || {};
-    const marks = [{ name: "Measured", value: measured.level }, { name: "Also printed", value: measured.also_printed, dashed: true }].filter(({ value }) => known(value));
+    const marks = [{ name: "Measured", value: measured.level }, { name: "Also printed", value: measured.also_printed, dashed: true }, ...(data.own_measured || []).map((own) => ({ name: `Measured here (${own.unit})`, value: own.value }))].filter(({ value }) => known(value));
+    const fit = data.fit;
     const reasons = [...new Set(rows.map(({ entry }) => entry.reason).filter(Boolean))];
     return [
       rangeChart(rows, marks, "Level at the unit's edge, of the motor's amplitude; a bar is the spread from the inputs' ranges."),
       reasons.map((reason) => el("p", { className: "note" }, reason)),
-      marks.length > 0 ? el("p", { className: "note" }, measured.note, measured.same_size === false ? " It was measured at another size." : "") : el("p", { className: "note" }, "The paper measured no such unit."),
+      fit && predicted(data, fit),
+      measured.note ? el("p", { className: "note" }, measured.note, measured.same_size === false ? " It was measured at another size." : "") : el("p", { className: "note" }, "The paper measured no such unit."),
     ];
+  }
+
+  // What a lab's own fit expects of a new unit: 80 % ranges, and which fit it is.
+  function predicted(data, fit) {
+    const rows = Object.entries(data.models || {}).filter(([, block]) => block.predictive).map(([model, block]) => ({ name: nameOf(model), entry: { value: block.edge_level.value, low: block.predictive.p10, high: block.predictive.p90 }, colour: COLOURS[model] || "series-4" }));
+    const scores = Object.entries(fit.left_out).map(([model, one]) => `${nameOf(model)} ${number(one.geometric_mean)}`).join(", ");
+    const marks = (data.own_measured || []).map((own) => ({ name: `Measured here (${own.unit})`, value: own.value }));
+    return [rangeChart(rows, marks, `Where a new unit is expected in the lab ${fit.name}: 10 to 90 %.`),
+      el("p", { className: "note" }, `Constants: ${fit.file}, SHA-256 ${fit.sha256.slice(0, 12)}, ${fit.own_units} units of the lab's own. Factor with a unit left out: ${scores}.`)];
   }
 
   // Finite elements: a range for each drive and reading, from draws of what is not known; the dot is the median.
