@@ -42,9 +42,8 @@ def estimate_spec(
     """
     variant, asked = estimate_input(spec, frequency_hz), tuple(models or spec.estimate.models)
     data = estimate(variant, closed_forms(asked), layered, fit_of(spec))
-    if spec.estimate.fit_source is not None:
-        sha256 = hashlib.sha256(spec.estimate.fit_source.encode()).hexdigest()
-        data["fit"] = {"file": spec.estimate.fit, "sha256": sha256, **data["fit"]}
+    if "fit" in data:
+        data["fit"] = {**_fit_file(spec), **data["fit"]}
     if MECHANICS in asked:
         from unitcad.attenuation.mechanics.prior_range import range_block
         from unitcad.attenuation.mechanics.sensitivities import mechanics_inputs
@@ -59,6 +58,14 @@ def fit_of(spec: Spec) -> LabFit | None:
     return None if spec.estimate.fit_source is None else lab_fit(spec.estimate.fit_source)
 
 
+def _fit_file(spec: Spec) -> dict[str, Any]:
+    """Return name and SHA-256 of the file of a spec's fit."""
+    return {
+        "file": spec.estimate.fit,
+        "sha256": hashlib.sha256((spec.estimate.fit_source or "").encode()).hexdigest(),
+    }
+
+
 def closed_forms(models: Sequence[str]) -> tuple[str, ...]:
     """Return the models of a list that are formulas: all but `mechanics`."""
     return tuple(model for model in models if model != MECHANICS)
@@ -69,7 +76,9 @@ def frequency_table_of_spec(
 ) -> dict[str, Any]:
     """Return a table over frequencies (Hz): edge level by model, and the layered decay; raises as `estimate_spec`."""
     variant = estimate_input(spec, frequencies_hz[0])
-    return frequency_table(variant, frequencies_hz, closed_forms(models or spec.estimate.models), fit_of(spec))
+    fit = fit_of(spec)
+    data = frequency_table(variant, frequencies_hz, closed_forms(models or spec.estimate.models), fit)
+    return {**data, "fit": {**_fit_file(spec), "name": fit.name}} if fit else data
 
 
 def neighbours_of_specs(specs: Sequence[Spec], pitch_mm: float, frequencies_hz: Sequence[float] = ()) -> dict[str, Any]:

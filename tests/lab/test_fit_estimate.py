@@ -62,7 +62,9 @@ def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file: P
     assert data["measured"]["level"] == plain["measured"]["level"]
     thicker = load(spec, {"layers.0.wall_mm": 1.3})
     assert estimate_spec(thicker)["own_measured"] == []
-    rows = frequency_table_of_spec(spec, [100.0])["frequencies"]
+    table = frequency_table_of_spec(spec, [100.0])
+    assert table["fit"] == {key: data["fit"][key] for key in ("file", "sha256", "name")}
+    rows = table["frequencies"]
     assert rows[0]["edge_level"]["bush"]["value"] == pytest.approx(data["models"]["bush"]["edge_level"]["value"])
 
 

@@ -58,6 +58,9 @@ def print_frequencies(data: dict[str, Any]) -> None:
         decay = [f"{value:.3g}" for value in row["u_over_edge"].values()]
         table.add_row(f"{row['frequency_hz']:g}", *[level(one) for one in row["edge_level"].values()], *decay)
     console().print(table)
+    if "fit" in data:
+        fit = data["fit"]
+        console().print(f"  fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]})", soft_wrap=True)
 
 
 def _mechanics(block: dict[str, Any]) -> Table:
