@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
-from scipy.optimize import curve_fit
-from scipy.stats import ttest_ind, ttest_rel
+from scipy.optimize import curve_fit, minimize
+from scipy.stats import norm, ttest_ind, ttest_rel
 
 from unitcad.accuracy.synthetic_records import LENGTH_S, PLAIN, RATE, Scenario, synthetic
 from unitcad.errors import Refusal
+from unitcad.lab.chains.censored import solve_censored
 from unitcad.lab.chains.line import Mains, fit_line
 from unitcad.lab.chains.line_fit import LineFit
 from unitcad.lab.chains.paper import PaperChain
@@ -107,6 +109,42 @@ def test_clipping_is_seen_and_measured(level_: float, severe: bool) -> None:
     if not severe:
         assert fit.clipped == pytest.approx(level_, rel=0.02)
         assert fit.amplitude == pytest.approx(2.0, rel=0.02)
+
+
+@pytest.mark.parametrize("hz", [2000 / 14, 2000 / 15, 2000 / 16 + 0.03, 104.8, 149.2])
+def test_a_clipped_line_lies_within_its_uncertainty(hz: float) -> None:
+    """At a small fraction of the rate, samples come at few phases, and those off the plateau say little alone."""
+    for seed in range(4):
+        record = synthetic(Scenario("clip", clip=0.8), np.random.default_rng([11, seed]), 20.0, hz)
+        fit = fitted(record.x)
+        assert fit.u < 0.005 * fit.amplitude
+        assert abs(fit.amplitude - record.amplitude) < 3.5 * fit.u
+        assert fit.masked < 0.01
+
+
+def test_samples_beyond_a_limit_give_what_a_general_optimiser_finds() -> None:
+    """The likelihood written with scipy.stats and maximised by a simplex search."""
+    rng = np.random.default_rng(2)
+    columns = np.array([np.cos(0.4 * np.arange(400)), np.sin(0.4 * np.arange(400)), np.ones(400)])
+    x = np.array([2.0, 1.0, 0.3]) @ columns + 0.2 * rng.standard_normal(400)
+    side = np.where(x > 1.2, 1.0, np.where(x < -1.1, -1.0, 0.0))
+    limit = np.where(side > 0, 1.2, -1.1)
+
+    def cost(at: np.ndarray) -> float:
+        line, deviation = at[:3] @ columns, math.exp(at[3])
+        each = norm.logpdf(x, line, deviation)
+        each = np.where(side > 0, norm.logsf(limit, line, deviation), each)
+        return -float(np.sum(np.where(side < 0, norm.logcdf(limit, line, deviation), each)))
+
+    best = minimize(cost, [1.5, 0.5, 0, -1], method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-9})
+    found, covariance = solve_censored(columns, x, np.ones(400, bool), side, limit)
+    assert found == pytest.approx(best.x[:3], abs=1e-5)
+    step, unit = 1e-3, np.eye(4)
+    bend = np.zeros((4, 4))
+    for i, j, a, b in itertools.product(range(4), range(4), (1, -1), (1, -1)):
+        bend[i, j] += a * b * cost(best.x + step * (a * unit[i] + b * unit[j]))
+    expected = np.linalg.inv(bend / (4 * step**2))[:3, :3]
+    assert math.exp(2 * best.x[3]) * covariance == pytest.approx(expected, rel=1e-3, abs=1e-7)
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])

@@ -15,7 +15,8 @@ import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats
 from unitcad.lab.chains import demodulation, least_squares, uncertainty
-from unitcad.lab.chains.clipping import LOWEST, clip_mask
+from unitcad.lab.chains.censored import solve_censored
+from unitcad.lab.chains.clipping import LOWEST, NEAR, clip_mask
 from unitcad.lab.chains.demodulation import Phase
 from unitcad.lab.chains.line_fit import LineFit
 from unitcad.lab.chains.several import several_lines
@@ -71,20 +72,20 @@ def fit_line(
         return None
     middle = float(np.median(x[good]))
     x = np.where(good, x - middle, 0.0)
-    cut, level, part = clip_mask(x, good, None if full_scale is None else (full_scale - middle, full_scale + middle))
+    cut, _, part = clip_mask(x, good, None if full_scale is None else (full_scale - middle, full_scale + middle))
     if part < LOWEST:  # nothing is left that says how high the line went
-        cut, level = np.zeros(len(x), bool), float("inf")
+        cut = np.zeros(len(x), bool)
     deviation = 1.4826 * np.median(np.abs(x[good]))
     known = good & ~cut & (np.abs(x) < 6 * deviation if deviation > 0 else True)
     time = np.arange(len(x)) / rate
     if phase is not None and span is not None:
         frequency = _frequency(phase, span)[0]
-        solution = _solve(x, time, rate, known & ~cut, good & ~cut, span, phase, frequency, mains)
+        solution = _solve(x, time, rate, known, good & ~cut, cut, span, phase, frequency, mains)
     else:
         frequency = demodulation.coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
         if frequency <= 0:
             return None
-        found = _twice(x, time, rate, known, good, cut, level, frequency, mains)
+        found = _twice(x, time, rate, known, good & ~cut, cut, frequency, mains)
         if found is None:
             return None
         solution, phase, span = found
@@ -103,15 +104,14 @@ def _twice(
     time: Floats,
     rate: float,
     known: Bools,
-    good: Bools,
+    allowed: Bools,
     cut: Bools,
-    level: float,
     frequency: float,
     mains: Mains,
 ) -> tuple[_Solution, Phase, tuple[float, float]] | None:
     """Demodulate and fit; then again without the mains and the drop-outs of the first fit."""
-    clean, use, found, allowed = x, known, None, good & ~cut
-    for _ in range(3 if np.isfinite(level) else 2):
+    clean, use, found = x, known, None
+    for _ in range(2):
         at, line = demodulation.envelope(clean, use, rate, frequency)
         if len(at) < 4:
             return None
@@ -119,12 +119,9 @@ def _twice(
         inside = (at >= span[0]) & (at <= span[1])
         phase = _best_phase(clean, time, rate, use, span, demodulation.phases(at[inside], line[inside], frequency))
         frequency = _frequency(phase, span)[0]
-        solution = _solve(x, time, rate, known & allowed, allowed, span, phase, frequency, mains)
+        solution = _solve(x, time, rate, known, allowed, cut, span, phase, frequency, mains)
         found = solution, phase, span
         left_out = (time >= span[0]) & (time <= span[1]) & ~solution.good
-        if np.isfinite(level):  # by the line, not by the samples: those would be chosen by their noise
-            rest = 2.5 * 1.4826 * float(np.median(np.abs(solution.residual[solution.good & (time >= span[0])])))
-            allowed = good & (np.abs(solution.line) < level - rest)
         clean, use = np.where(left_out, solution.line, x - solution.mains), use | left_out
     return found
 
@@ -159,12 +156,17 @@ def _solve(
     rate: float,
     known: Bools,
     allowed: Bools,
+    cut: Bools,
     span: tuple[float, float],
     phase: Phase,
     frequency: float,
     mains: Mains,
 ) -> _Solution:
-    """Fit a line of given phase over a span, without the samples whose residual is far off."""
+    """Fit a line of given phase over a span, without the samples whose residual is far off.
+
+    Of samples that are `cut` the fit knows that the line lies beyond them. To leave them out, and those near them by
+    their own noise, would bias it; and where the rate is a small multiple of the frequency, too few phases are left.
+    """
     first, last = np.searchsorted(time, span[0]), np.searchsorted(time, span[1], side="right")
     inside = slice(int(first), int(last))
     here, part = time[inside], x[inside]
@@ -177,12 +179,19 @@ def _solve(
             least_squares.trend_columns(here),
         ]
     )
-    use = known[inside].copy()
+    use, beyond = known[inside].copy(), cut[inside].copy()
+    side = np.where(beyond, np.sign(part), 0.0)
+    ends = [(1 - NEAR) * float(np.max(sign * x[cut], initial=0.0)) for sign in (1, -1)]
     for _ in range(ROUNDS):
-        found, covariance = least_squares.solve_with_covariance(columns, part, use.astype(float))
+        if beyond.any():
+            plateau = np.where(side > 0, ends[0], -ends[1])
+            found, covariance = solve_censored(columns, part, use | beyond, side, plateau)
+        else:
+            found, covariance = least_squares.solve_with_covariance(columns, part, use.astype(float))
         residual = part - found @ columns
         limit = FAR * 1.4826 * np.median(np.abs(residual[use]))
-        far = np.abs(residual) > limit if limit > 0 else np.zeros(len(part), bool)
+        beyond &= residual * side < limit  # a drop-out may touch the plateau too
+        far = (np.abs(residual) > limit) & ~beyond if limit > 0 else np.zeros(len(part), bool)
         far[1:] |= far[:-1].copy()
         far[:-1] |= far[1:].copy()
         fresh = allowed[inside] & ~far
