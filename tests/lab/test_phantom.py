@@ -23,6 +23,7 @@ from unitcad.lab.phantom.description import PhantomTable, load_phantom, phantoms
 from unitcad.lab.phantom.phantom_set import PhantomSet, phantom_set
 from unitcad.lab.phantom.recipe import recipe
 from unitcad.shape import box, exact_volume
+from unitcad.shape.lettering import engraving
 from unitcad.spec import convert
 from unitcad.validation import load
 
@@ -31,6 +32,9 @@ LAYERS = [
     {"name": "skin", "silicone": "ecoflex-00-50", "thinner_pct": 6.0, "thickness_mm": 1.5},
     {"name": "muscle", "silicone": "ecoflex-00-10", "thinner_pct": 62.5, "thickness_mm": 20.0},
 ]
+
+
+COUPONS = ("coupons1-muscle", "coupons2-hypodermis", "coupons3-skin")
 
 
 @cache
@@ -122,6 +126,25 @@ def test_the_coupon_is_die_c() -> None:
     assert tensile_coupons.volume_mm3(3) == pytest.approx(9 * outline.area)
 
 
+def test_a_coupon_has_the_number_of_its_pour_wherever_it_stands() -> None:
+    """Mould, pour and sheet name one number and one layer; the engraved figure is that number's."""
+    made = _skin()
+    words, sheet = bench.casting_markdown(made), bench.sheet_markdown(made)
+    moulds = [body for body in made.tools if body.kind == "coupon"]
+    assert tuple(body.name for body in moulds) == COUPONS
+    printer = made.printer
+    for pour, body in zip(bench.pours(made), moulds, strict=True):
+        assert body.name == f"coupons{pour.index}-{pour.name}"
+        own = words.split(f"## Pour {pour.index}: {pour.name}")[1].split("\n## ")[0]
+        assert f"fill coupon mould {pour.index} ({pour.name})" in own
+        assert f"| {pour.index}.1 {pour.name} |" in sheet
+        stroke, depth = float(printer.engraving_stroke_mm), float(printer.engraving_depth_mm)
+        figure = realise(engraving(str(pour.index), stroke, 0.0, depth / 2), 64).volume()
+        _, y0, _, x1, y1, top = bounds(realise(body.shape, 64))
+        lettered = box(x1 - 8.0, x1 - 1.0, y0 + 1.0, y1 - 1.0, top - 0.75 * depth, top - 0.25 * depth)
+        assert (realise(lettered, 64) - realise(body.shape, 64)).volume() == pytest.approx(figure, rel=2e-2)
+
+
 def test_the_grams_are_the_volumes_and_the_thinner_the_recipe() -> None:
     made = _skin()
     pours = bench.pours(made)
@@ -144,10 +167,7 @@ def test_the_folder_prints_checks_and_goes_into_a_spec(tmp_path: Path) -> None:
     folder = Path(found["folder"])
     assert found["findings"] == []
     names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    pieces = {
-        f"moulds/{n}.stl"
-        for n in ("tray", "frame1", "frame2", "lid", "blade", "holder", *(f"coupons{i}" for i in (1, 2, 3)))
-    }
+    pieces = {f"moulds/{n}.stl" for n in ("tray", "frame2", "frame3", "lid", "blade", "holder", *COUPONS)}
     pages = {
         "casting.md",
         "casting.json",
@@ -216,7 +236,7 @@ def test_a_refused_phantom_leaves_no_folder(tmp_path: Path) -> None:
 
 def test_a_solid_of_the_box_is_exact() -> None:
     lengths = _skin().size
-    frame = next(b for b in _skin().tools if b.name == "frame1")
+    frame = next(b for b in _skin().tools if b.name == "frame3")
     ears = 4 * 14.0 * 18.0 - 4 * math.pi * lengths.hole**2
     ring = 4 * (lengths.outer**2 - lengths.rim**2)
     assert realise(frame.shape, 256).volume() == pytest.approx(1.5 * (ring + ears), rel=1e-3)

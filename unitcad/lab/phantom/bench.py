@@ -147,7 +147,7 @@ def sheet_markdown(phantom: PhantomSet) -> str:
         "| --- | --- | --- | --- | --- |",
     ]
     for p in pours(phantom):
-        lines += [f"| {p.index}.{i + 1} | | | | |" for i in range(phantom.table.coupons)]
+        lines += [f"| {p.index}.{i + 1} {p.name} | | | | |" for i in range(phantom.table.coupons)]
     lines += [
         "",
         "Frame heights by calliper, mm (wanted): " + ", ".join(f"{p.name} ({p.frame_mm:g})" for p in pours(phantom)),
@@ -240,7 +240,7 @@ def _figures(phantom: PhantomSet, p: PhantomPour) -> Iterator[tuple[str, str, st
 
 
 def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
-    one, frame = phantom.recipes[p.layer], f"frame {p.layer + 1}"
+    one, frame = phantom.recipes[p.layer], f"frame {p.index} ({p.name})"
     if p.index > 1:
         yield (
             f"When the layer before is firm: trim the film off the rim below, put {frame} on the pegs and press it "
@@ -255,8 +255,8 @@ def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
     )
     rim = "the tray's rim" if p.index == 1 else f"the rim of {frame}"
     yield (
-        f"Pour in a thin thread at one corner until the silicone stands over {rim}, fill coupon mould {p.layer + 1} "
-        "from the same mix, and prick the bubbles that rise."
+        f"Pour in a thin thread at one corner until the silicone stands over {rim}, "
+        f"{_coupon_step(phantom, p)}and prick the bubbles that rise."
     )
     yield (
         f"Strike off with the blade: along x, its edge on {rim} at both sides, drawn once from one end to the other "
@@ -268,6 +268,10 @@ def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
         "Cure level, covered, until a touch on the overflow is dry. Much thinner stays tacky: talc, after the last "
         "layer."
     )
+
+
+def _coupon_step(phantom: PhantomSet, p: PhantomPour) -> str:
+    return f"fill coupon mould {p.index} ({p.name}) from the same mix, " if phantom.table.coupons else ""
 
 
 def _release(phantom: PhantomSet) -> Iterator[str]:

@@ -3,15 +3,15 @@
         section, x to the right           peg
                                         .-.
           lid     =====================.' '.====   marks seat and points, last
-          frame   ===.             .===.' '.====   1 skin: struck off along its top
-          frame   ===|             |===.' '.====   2 hypodermis
+          frame 3 ===.             .===.' '.====   skin: struck off along its top
+          frame 2 ===|             |===.' '.====   hypodermis
                   .--'             '--.-----.
           tray    |  \\   muscle    /  | ear |      struck off along the tray's own rim
                   |   |===plate===|   |     |      acrylic, z = 0 at its top
                   '---'--o-----o--'---'-----'      holes: the plate is pushed up through them
 
-The cavity widens upwards, so the slab comes up with its plate. Layers are numbered from the skin down, poured from the
-last. The blade passes between the pegs and is drawn along y.
+The cavity widens upwards, so the slab comes up with its plate. Layers are listed from the skin down and poured from the
+last; frames and coupon moulds have the number of their pour. The blade passes between the pegs and is drawn along y.
 """
 
 from __future__ import annotations
@@ -106,11 +106,11 @@ def cast(phantom: PhantomTable, size: BoxLengths) -> list[Body]:
 
 
 def pieces(phantom: PhantomTable, size: BoxLengths, printer: Printer) -> list[Body]:
-    """Draw tray, plate, frames (skin first), lid, blade and holder as assembled."""
+    """Draw tray, plate, frames (skin first, each with its pour's number), lid, blade and holder as assembled."""
     stroke, depth = float(printer.engraving_stroke_mm), float(printer.engraving_depth_mm)
     frames = [
         Body(
-            f"frame{i + 1}",
+            f"frame{len(size.tops) - i}",
             "tool",
             "frame",
             _frame(size, size.tops[i + 1], size.tops[i]),

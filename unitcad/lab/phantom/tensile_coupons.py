@@ -39,12 +39,15 @@ def outline() -> Profile:
 
 
 def moulds(phantom: PhantomTable, printer: Printer) -> list[Body]:
-    """Draw an open mould for each layer, its number engraved, as printed; none where no coupons are asked for."""
+    """Draw an open mould for each pour, its number engraved, as printed; none where no coupons are asked for.
+
+    A mould's name has the layer's too, which the engraving's characters can't write.
+    """
     if not phantom.coupons:
         return []
     return [
-        Body(f"coupons{i + 1}", "tool", "coupon", _mould(phantom.coupons, str(i + 1), printer), _COLOUR)
-        for i in range(len(phantom.layers))
+        Body(f"coupons{pour}-{layer.name}", "tool", "coupon", _mould(phantom.coupons, str(pour), printer), _COLOUR)
+        for pour, layer in enumerate(reversed(phantom.layers), 1)
     ]
 
 
