@@ -41,6 +41,22 @@ def test_a_suite_that_is_named_and_lacks_something_is_an_error(monkeypatch):
         accuracy(["speed"], quick=True)
 
 
+@pytest.mark.parametrize(
+    ("suite", "module", "extra"),
+    [("stability", "flint", "test"), ("hankel", "libdlf", "fem"), ("models", "skfem", "fem")],
+)
+def test_what_a_suite_lacks_is_said_before_any_work(suite, module, extra, monkeypatch):
+    """Without python-flint the stability suite once worked for minutes and said so afterwards."""
+    monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setattr(runner, "import_module", lambda name: pytest.fail("worked"))
+    monkeypatch.setattr("unitcad.accuracy.stability.study", lambda *_: pytest.fail("worked"))
+    expected = rf"the suite {suite} needs {module}: pip install 'unitcad\[{extra}\]'"
+    with pytest.raises(Missing, match=expected):
+        accuracy([suite], media=9 if suite == "stability" else None)
+    with pytest.raises(Missing, match=expected):
+        accuracy(["moulds", suite], quick=True)  # nor is the suite before it begun
+
+
 @pytest.mark.long
 def test_a_wheel_runs_outside_the_clone(tmp_path):
     """Without anything of tests/ or benchmarks/: the 60-digit references are in it, speed is left out."""

@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 
 from unitcad.cache import DiskStore, MemoryStore
+from unitcad.errors import Missing
 from unitcad.experiments.draws import Draws
 from unitcad.experiments.element_rivals import BLOCK, FINENESS
 from unitcad.experiments.lab_file import Lab, load_lab
+from unitcad.experiments.most_telling import most_telling
 from unitcad.experiments.rivals import available
+from unitcad.experiments.study import study
+from unitcad.validation import load
 
 pytest.importorskip("skfem")
 
@@ -81,3 +85,13 @@ def test_without_the_library_the_elements_are_left_out_with_the_reason(monkeypat
     found = available(["crossings", "mechanics-flat-edge"])
     assert [rival.name for rival in found.rivals] == ["crossings"]
     assert "unitcad[fem]" in found.left_out["mechanics-flat-edge"]
+
+
+@pytest.mark.parametrize("rivals", [["mechanics-flat-skin", "bush"], ["mechanics-flat-skin", "mechanics-axial-skin"]])
+def test_without_the_library_too_few_rivals_name_it(rivals: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("unitcad.experiments.element_rivals.installed", lambda: False)
+    with pytest.raises(Missing, match=r"mechanics-flat-skin needs scikit-fem: pip install 'unitcad\[fem\]'"):
+        study(load_lab("paper", {"rivals": rivals}))
+    specs = {"open": load("embedded")}
+    with pytest.raises(Missing, match="mechanics-flat-skin needs scikit-fem"):
+        most_telling((rivals[0], rivals[1]), specs)

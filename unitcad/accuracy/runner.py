@@ -7,12 +7,13 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 from unitcad import files
 from unitcad.accuracy import pages
 from unitcad.accuracy.result import Result, Say, from_dict
-from unitcad.errors import UnitcadError, unknown_name
+from unitcad.errors import Missing, UnitcadError, unknown_name
 
 MODULES = {
     "tessellation": "tessellation",
@@ -30,6 +31,16 @@ MODULES = {
 """Suites in the order of the pages, and the module of each, whose function `run(quick, say)` returns its result."""
 SUITES = tuple(MODULES)
 
+_REFERENCE = {"flint": "test", "mpmath": "test"}
+_ELEMENTS = {"skfem": "fem", "threadpoolctl": "fem"}
+NEEDS = {
+    "hankel": {**_REFERENCE, "libdlf": "fem"},
+    "stability": _REFERENCE,
+    "models": _ELEMENTS,
+    "mechanics": _ELEMENTS,
+}
+"""What a suite imports beyond the core: each module, and the extra that installs it."""
+
 JOURNALS = {"extremes": Path("out") / "extremes.jsonl", "stability": Path("out") / "stability.jsonl"}
 """What the long study of a suite has so far, from which it resumes."""
 
@@ -42,12 +53,21 @@ def chosen(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in SUITES if not names or name in names)
 
 
+def check(name: str) -> None:
+    """Check, before the work, that a suite's packages are installed. Raises Missing with all that are not."""
+    lacking = {module: extra for module, extra in NEEDS.get(name, {}).items() if find_spec(module) is None}
+    if lacking:
+        extras = ",".join(sorted(set(lacking.values())))
+        raise Missing(f"the suite {name} needs {' and '.join(lacking)}: pip install 'unitcad[{extras}]'")
+
+
 def run(name: str, quick: bool, say: Say, count: int | None = None, seed: int = 0) -> Result:
     """Return one suite's result. Raises Missing without an extra or a folder that it needs.
 
     `count`: how many specs the extremes take, how many random media the stability; both keep a journal in out/ and
     resume from it. `seed`: of the media.
     """
+    check(name)
     if count is not None and name == "extremes":
         from unitcad.accuracy import extremes
 

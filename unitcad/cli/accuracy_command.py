@@ -58,6 +58,8 @@ def accuracy(
     folder = out if out is not None or quick else Path("docs")
     if folder is not None:
         runner.ready(folder)
+    for name in suites or ():
+        runner.check(name)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # worker processes end with us
     for name in names:
         try:

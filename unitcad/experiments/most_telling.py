@@ -11,7 +11,7 @@ from unitcad.experiments.lab_file import LabFile, lab_of_specs
 from unitcad.experiments.protocol import Ratio
 from unitcad.experiments.ranking import singles
 from unitcad.experiments.rivals import available
-from unitcad.experiments.study import Step, candidates, predictions, range_of, span_text
+from unitcad.experiments.study import Step, candidates, check_two, predictions, range_of, span_text
 from unitcad.spec import Spec
 
 USUAL = LabFile(units={}, frequencies_hz=[60.0, 125.0, 200.0], bodies=["rigid-plate", "gel-50kpa"])
@@ -37,10 +37,12 @@ def most_telling(
     """Return the ratio of two readings that decides best between two rivals, with the units of `specs` by name.
 
     The rivals are names as in a lab's file; `settings` says at which frequencies, on which bodies and how well the lab
-    measures (its units are not read). Raises Refusal as `study` does, also for a rival that is not installed.
+    measures (its units are not read). Raises Refusal and Missing as `study` does.
     """
     lab = lab_of_specs(specs, settings)
-    predicted = predictions(lab, available(rivals, store, settings.smallest_um * 1e-6).rivals, step)
+    asked = available(rivals, store, settings.smallest_um * 1e-6)
+    check_two(asked)
+    predicted = predictions(lab, asked.rivals, step)
     best = singles(predicted, candidates(lab, predicted), step)[0]
     ratio, found = best.ratios[0], best.information
     says = " and ".join(f"{name} {span_text(range_of(ratio, predicted, name))}" for name in rivals)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.cache import Store
-from unitcad.errors import Refusal
+from unitcad.errors import Missing, Refusal
 from unitcad.experiments.draws import Draws, Rival
 from unitcad.experiments.lab_file import Lab
 from unitcad.experiments.protocol import Ratio, ratios
@@ -26,9 +26,10 @@ def study(lab: Lab, step: Step = lambda stage: None, store: Store | None = None)
     """Return {lab, rivals, left_out, most_bits, experiments, sets, settles, ...} as JSON-ready data.
 
     `store` keeps the solutions of finite elements. The same lab gives the same numbers. Raises Refusal where fewer than
-    two rivals or no ratio is left.
+    two rivals or no ratio is left, Missing where that is for want of a library.
     """
     asked = available(lab.settings.rivals, store, lab.settings.smallest_um * 1e-6)
+    check_two(asked)
     predicted = predictions(lab, asked.rivals, step)
     prior = predicted.most_bits
     predicted = predicted.updated(lab.measured)
@@ -52,14 +53,22 @@ def study(lab: Lab, step: Step = lambda stage: None, store: Store | None = None)
     }
 
 
+def check_two(asked: Available) -> None:
+    """Check that two rivals are left. Raises Missing where others lack a library, else Refusal."""
+    names = [rival.name for rival in asked.rivals]
+    if len(names) < 2 and asked.left_out:
+        others = "; ".join(f"{name} {reason}" for name, reason in asked.left_out.items())
+        raise Missing(f"two rivals or more are needed, {' and '.join(names) or 'none'} can be asked here: {others}")
+    if len(names) < 2:
+        raise Refusal("rivals", names, "two rivals or more are needed")
+
+
 def predictions(lab: Lab, rivals: Sequence[Rival], step: Step = lambda stage: None) -> Predictions:
     """Return what each rival predicts for every condition of a lab.
 
-    Conditions are left out for which a rival has no finite answer. Raises Refusal where fewer than two rivals or two
-    conditions remain.
+    Conditions are left out for which a rival has no finite answer. Raises Refusal where fewer than two conditions
+    remain.
     """
-    if len(rivals) < 2:
-        raise Refusal("rivals", [rival.name for rival in rivals], "two rivals or more are needed")
     settings, logs = lab.settings, []
     for rival in rivals:
         draws = Draws(settings.element_draws if rival.costly else settings.draws, settings.seed, rival.name)
