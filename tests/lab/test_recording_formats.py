@@ -170,3 +170,21 @@ def test_a_library_that_never_returns_is_a_refusal(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(hierarchical, "LONGEST_S", 0.01)
     with pytest.raises(Unreadable, match="did not return"):
         open_recording(tmp_path / "plain.h5")
+
+
+def test_numbers_of_no_standard_layout_are_refused(tmp_path: Path) -> None:
+    """One damaged byte of a type makes 64 bits something else, which HDF5 converts to zeros without a word."""
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["edge"] = np.arange(300.0).astype(">f4")
+    (block,) = open_recording(tmp_path / "a.h5").read((0,))
+    assert_array_equal(block[:, 0], np.arange(300.0))
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        odd = h5py.h5t.IEEE_F64LE.copy()
+        odd.set_fields(63, 52, 11, 0, 51)
+        space = h5py.h5s.create_simple((300,))
+        data = h5py.h5d.create(file.id, b"edge", odd, space)
+        data.write(h5py.h5s.ALL, h5py.h5s.ALL, np.arange(300.0))
+    with pytest.raises(Unreadable, match="no standard layout"):
+        open_recording(tmp_path / "b.h5")

@@ -87,6 +87,9 @@ def tell(path: str) -> None:
 def _columns(path: Path) -> list[tuple[str, tuple[int, int], Channel]]:
     import h5py
 
+    sizes = [("STD_I", bits) for bits in (8, 16, 32, 64)] + [("STD_U", bits) for bits in (8, 16, 32, 64)]
+    sizes += [("IEEE_F", bits) for bits in (16, 32, 64)]
+    plain = [getattr(h5py.h5t, f"{start}{bits}{order}") for start, bits in sizes for order in ("LE", "BE")]
     found: list[tuple[str, tuple[int, int], Channel]] = []
 
     def visit(name: str, node: Any) -> None:
@@ -98,6 +101,8 @@ def _columns(path: Path) -> list[tuple[str, tuple[int, int], Channel]]:
             raise Unreadable(str(path), None, f"{name} lies in another file")
         if not node.id.get_storage_size():
             raise Unreadable(str(path), None, f"{name} has no samples stored")
+        if not any(node.id.get_type() == kind for kind in plain):
+            raise Unreadable(str(path), None, f"the numbers of {name} have no standard layout: it is damaged")
         side = 0 if node.ndim == 1 or node.shape[0] >= node.shape[1] else 1
         count = 1 if node.ndim == 1 else min(node.shape)
         if count > MOST_COLUMNS:
