@@ -9,7 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from unitcad.lab.campaign import RecordingTable, SensorTable
+from unitcad.lab import signals
+from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, UnitTable
+from unitcad.lab.chains.line import Mains
+from unitcad.lab.record_result import measure_record
 from unitcad.lab.signals import SECTION, open_signal
 
 SENSOR = SensorTable(quantity="displacement", unit="um", scale=500.0)
@@ -63,6 +66,24 @@ def test_sections_are_the_file_in_order(tmp_path: Path) -> None:
         assert (signal.averaged, signal.count) == (every, count)
         expected = x[: count // every * every].reshape(-1, every).mean(axis=1) / 2**15 * 500
         assert np.abs(whole - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize(("stops", "codes"), [(8000, ["L113"]), (12_000, [])])
+def test_a_section_without_a_line_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stops: int, codes: list[str]
+) -> None:
+    from scipy.io import wavfile
+
+    monkeypatch.setattr(signals, "SECTION", 4000)
+    time = np.arange(12_000) / 2000
+    x = np.where(np.arange(12_000) < stops, 0.5 * np.cos(2 * np.pi * 123.4 * time), 0.0)
+    wavfile.write(tmp_path / "a.wav", 2000, np.round(x * 32768).astype("<i2"))
+    campaign = Campaign(name="long", sensor=SENSOR, unit=(UnitTable(name="a"),))
+    result = measure_record(tmp_path / "a.wav", "edge", campaign, (SENSOR,), Mains(), (60.0, 250.0), "a.wav")
+    assert [one.code for one in result.findings] == codes
+    assert result.amplitude_um == pytest.approx(250.0, rel=1e-3)
+    if codes:
+        assert "1 of 3 sections, the first from 4 s of 6 s" in result.findings[0].message
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="resource is a module of POSIX")

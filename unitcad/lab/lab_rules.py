@@ -51,6 +51,10 @@ RULES = {
             """L112 error: too few repeats
             Fewer than three usable records are left: no level is given. Example: One of three is
             clipped. Fix: Repeat.""",
+            """L113 warning: no line in a part
+            A section of a long record has no line where others have one; the amplitude is that of the
+            others. Example: The motor stopped. Fix: Cut the record where the motor stopped, or
+            repeat.""",
         ),
     )
 }

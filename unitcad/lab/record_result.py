@@ -92,6 +92,8 @@ def measure_record(
     signal = open_signal(path, campaign.recording, sensors, shown)
     sections: list[_Section] = []
     clipped, findings = float("inf"), []
+    silent: list[float] = []
+    at_s = 0.0
     picture: Any = None
     for samples in signal.sections():
         limit = None if sensors[0].full_scale is None else sensors[0].full_scale
@@ -103,6 +105,8 @@ def measure_record(
             clipped = min(clipped, one.fit.clipped, one.motor.clipped if one.motor else clipped)
         else:
             clipped = min(clipped, _clipped(samples[:, 0]))
+            silent.append(at_s)
+        at_s += len(samples) / signal.rate
     if picture is None:
         picture = (np.empty(0),) * 4
     shared = (shown, sha256(path), role, signal.raw_rate, signal.count)
@@ -116,6 +120,10 @@ def measure_record(
         return _without_line(shared, tuple(findings), picture)
     fit = _together(sections)
     findings += _line_findings(fit, signal, shown, campaign)
+    if silent:
+        count = len(sections) + len(silent)
+        message = f"{len(silent)} of {count} sections, the first from {silent[0]:.0f} s of {at_s:.0f} s"
+        findings.append(found("L113", shown, message))
     factor = _displacement(sensors[0], fit.frequency_hz) / signal.gain(fit.frequency_hz)
     ratio, lag = _ratio(sections, sensors, fit.frequency_hz)
     chain = _paper(campaign)
