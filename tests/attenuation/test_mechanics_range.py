@@ -1,18 +1,24 @@
 """The range of model `mechanics`: seeded, the same for a material in every unit, made only when it is asked for."""
 
+import itertools
 import json
+import math
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("skfem")
 
 from unitcad.attenuation.inputs import Quantity
+from unitcad.attenuation.mechanics import prior_range
 from unitcad.attenuation.mechanics.motor_level import Setting, level, motion
-from unitcad.attenuation.mechanics.prior_range import range_block
-from unitcad.attenuation.mechanics.unknowns import Draw, drawn
+from unitcad.attenuation.mechanics.prior_range import DRAWS, range_block
+from unitcad.attenuation.mechanics.unknowns import CHOICES, Draw, drawn
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.validation import load
@@ -97,6 +103,57 @@ def test_the_range_is_repeatable_and_orders_its_numbers():
     assert [one["median"] for one in other["levels"]] != [one["median"] for one in block["levels"]]
 
 
+def test_draws_are_spread_evenly():
+    draws = [Draw(4, index, DRAWS) for index in range(DRAWS)]
+    combinations = Counter(tuple(draw.either(name) for name in CHOICES) for draw in draws)
+    assert combinations == dict.fromkeys(itertools.product((True, False), repeat=len(CHOICES)), DRAWS // 16)
+    for group in (draws[::2], draws[1::2]):
+        strata = sorted(math.floor(draw.position("frequency") * len(group)) for draw in group)
+        assert strata == list(range(len(group)))
+    assert draws[3].position("frequency") != Draw(5, 3, DRAWS).position("frequency")
+
+
+def test_the_error_of_the_median_covers(monkeypatch):
+    """A surrogate of two groups, as the elements have them: other seeds against 1,000 independent draws."""
+
+    def surrogate(variant, frequency, drive, reading, draw=None, fineness=1.0):
+        made, setting = drawn(variant, draw) if draw else (variant, Setting())
+        part = made.layers[0].youngs_modulus.middle / variant.layers[0].youngs_modulus.middle
+        apart = {("flat", "skin"): 0.05, ("flat", "edge"): 0.7}.get((drive, reading), 1.0)
+        return (
+            part
+            * (frequency / 125.0)
+            * (1.3 if made.geometry.floor else 1.0)
+            * (apart if setting.contact == "resting" else 1.0)
+        )
+
+    cases = [("flat", "skin"), ("flat", "edge"), ("axial", "skin")]
+    made = [(Draw(99, index), *drawn(UNIT, Draw(99, index))) for index in range(1000)]
+    contacts = np.array([setting.contact for _, _, setting in made])
+    exact = [np.array([surrogate(UNIT, one.frequency.middle, *case, draw) for draw, one, _ in made]) for case in cases]
+    monkeypatch.setattr(prior_range, "level", surrogate)
+    blocks = [range_block(UNIT, seed=seed)["levels"] for seed in range(30)]
+    for i, (case, values) in enumerate(zip(cases, exact, strict=True)):
+        for contact in (None, "bonded", "resting"):
+            median = np.median(values if contact is None else values[contacts == contact])
+            found = [one[i] if contact is None else one[i]["by_contact"][contact] for one in blocks]
+            inside = [abs(math.log(one["median"] / median)) <= math.log(one["median_error"]) for one in found]
+            assert np.mean(inside) >= 0.68, (case, contact)
+    assert np.median([one[0]["median_error"] for one in blocks]) > 2  # the median lies between the groups
+    assert np.median([one[2]["median_error"] for one in blocks]) < 1.2
+
+
+def test_the_default_draws_agree_with_256_independent_ones():
+    data = json.loads((Path(__file__).parents[2] / "docs/mechanics.json").read_text("utf-8"))
+    known = np.array(data["draws"])[:, data["units"].index("encapsulating E10/D30")]
+    bonded = np.array([Draw(data["seed"], index).either("contact") for index in range(len(known))])
+    for one in range_block(UNIT)["levels"]:
+        levels = known[:, data["drives"].index(one["drive"]), data["readings"].index(one["reading"])]
+        for contact, part in (("bonded", levels[bonded]), ("resting", levels[~bonded])):
+            group = one["by_contact"][contact]
+            assert abs(math.log(group["median"] / np.median(part))) < 2 * math.log(group["median_error"]), one
+
+
 def test_a_unit_of_unknown_modulus_has_a_reason():
     unknown = replace(UNIT, layers=(replace(UNIT.layers[0], youngs_modulus=Quantity(None, note="nobody knows")),) * 2)
     assert range_block(unknown, draws=1)["levels"] == []
@@ -112,7 +169,7 @@ def test_an_unknown_drive_or_reading_is_refused():
 
 
 def test_it_is_made_only_when_it_is_asked_for(monkeypatch):
-    from unitcad.attenuation.mechanics import prior_range, sensitivities
+    from unitcad.attenuation.mechanics import sensitivities
 
     monkeypatch.setattr(prior_range, "range_block", lambda variant, say: {"draws": 0})
     monkeypatch.setattr(sensitivities, "mechanics_inputs", lambda variant, say: [])

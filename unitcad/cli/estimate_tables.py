@@ -22,7 +22,10 @@ def print_estimate(data: dict[str, Any]) -> None:
         if "fit" in data:
             screen.print(_fit_line(data["fit"]), soft_wrap=True)
     if "mechanics" in data:
-        screen.print(_mechanics(data["mechanics"]))
+        if data["mechanics"]["levels"]:
+            screen.print(_mechanics(data["mechanics"]))
+        for line in _mechanics_lines(data["mechanics"]):
+            screen.print(f"  {line}", soft_wrap=True)
     inputs = _inputs(data)
     if inputs:
         screen.print(inputs)
@@ -64,15 +67,31 @@ def print_frequencies(data: dict[str, Any]) -> None:
 
 
 def _mechanics(block: dict[str, Any]) -> Table:
-    """Tabulate the range of each drive and reading over what is not known, which stands below."""
+    """Tabulate each drive and reading over what is not known: all draws, then bonded and resting skin apart."""
     low, _, high = block["percent"]
-    table = Table("drive", "read on", f"{low} %", "median", f"{high} %", title="mechanics: edge level % over the draws")
+    heads = ("drive", "read on", "skin", f"{low} %", "median", f"{high} %", "as drawn")
+    table = Table(*heads, title="mechanics: edge level, %, over the draws")
     for one in block["levels"]:
-        place = "skin at r = D/2" if one["reading"] == "skin" else "the unit's own edge"
-        numbers = [f"{100 * one[key]:.3g}" for key in ("low", "median", "high")]
-        table.add_row(one["drive"], place, numbers[0], f"{numbers[1]} (x/÷ {one['median_error']:.2f})", numbers[2])
-    table.caption = block.get("reason") or f"{block['draws']} draws; not known: {block['not_known']}"
+        place = "skin, r = D/2" if one["reading"] == "skin" else "own edge"
+        for name, group in {"both": one, **one["by_contact"]}.items():
+            numbers = [f"{100 * group[key]:.3g}" for key in ("low", "median", "high")]
+            numbers[1] += "" if group["median_error"] is None else f" (x/: {group['median_error']:.2f})"
+            first = (one["drive"], place) if name == "both" else ("", "")
+            table.add_row(*first, name, *numbers, f"{100 * one['drawn_as']:.3g}" if name == "both" else "")
+        table.add_section()
     return table
+
+
+def _mechanics_lines(block: dict[str, Any]) -> list[str]:
+    """Say how to read the table of `mechanics`, or why it is empty."""
+    if "reason" in block:
+        return [block["reason"]]
+    return [
+        f"{block['draws']} draws, spread evenly. bonded: skin sticks to the unit; resting: it slides.",
+        "x/: standard error of the median, a factor: times or divided by.",
+        "as drawn: the unit of the spec, bonded, nominal values.",
+        f"Not known, and drawn: {block['not_known']}.",
+    ]
 
 
 def print_neighbours(data: dict[str, Any]) -> None:

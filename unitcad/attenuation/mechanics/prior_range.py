@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from statistics import NormalDist
 from typing import Any, get_args
 
 import numpy as np
+from scipy.stats import binom
 
 from unitcad.attenuation.inputs import EstimateInput
+from unitcad.attenuation.mechanics.harmonic_response import Contact
 from unitcad.attenuation.mechanics.motor_level import Drive, Reading, level
 from unitcad.attenuation.mechanics.unknowns import Draw, drawn
 
-SEED, DRAWS, FINENESS = 1, 24, 1.0
+SEED, DRAWS, FINENESS = 1, 32, 1.0
+"""Twice every combination of the choices."""
 PERCENT = (5, 50, 95)
+WITHIN = NormalDist().cdf(1.0) - NormalDist().cdf(-1.0)
+"""How often a value lies within one standard error."""
+MEDIAN_ERROR = (
+    "a factor: the median of all possible draws lies between the median divided by it and times it in two of three "
+    "cases or more; wide where bonded and resting levels lie far apart, since the median then falls between them"
+)
 NOT_KNOWN = (
     "moduli and damping of silicones and body, thicknesses of the body, frequency, mass of the motor; whether the ring "
     "of air beside the motor is filled, silicone lies under it, the circuit stiffens the unit, and whether skin sticks "
@@ -29,10 +39,10 @@ def range_block(
 ) -> dict[str, Any]:
     """Return {kind, not_known, draws, seed, fineness, percent, levels}: a range for each drive and reading.
 
-    low, median and high are percentiles of the draws; median_error is the factor by which the median of other draws
-    would differ (one standard deviation, by drawing them again with replacement). `drawn_as`: the level of the unit as
+    The draws are spread evenly (`Draw.of`). low, median and high are percentiles; `by_contact` has them for bonded and
+    for resting skin apart. median_error: `MEDIAN_ERROR`; None below three draws. `drawn_as`: the level of the unit as
     its spec draws it, bonded, all values nominal: one of many, not the estimate. A unit with a silicone of unknown
-    modulus has null and a `reason`.
+    modulus has an empty `levels` and a `reason`.
     """
     data: dict[str, Any] = {
         "kind": KIND,
@@ -41,37 +51,48 @@ def range_block(
         "seed": seed,
         "fineness": FINENESS,
         "percent": list(PERCENT),
+        "median_error": MEDIAN_ERROR,
     }
     reason = next((layer.youngs_modulus.note for layer in variant.layers if not layer.youngs_modulus.known), None)
     if reason:
         return {**data, "levels": [], "reason": reason}
     cases: list[tuple[Drive, Reading]] = [(drive, at) for drive in get_args(Drive) for at in get_args(Reading)]
     found: dict[tuple[Drive, Reading], list[float]] = {case: [] for case in cases}
+    contacts: list[Contact] = []
     for index in range(draws):
         say(f"finite elements: draw {index + 1} of {draws}")
-        draw = Draw(seed, index)
-        frequency = drawn(variant, draw)[0].frequency.middle
+        draw = Draw(seed, index, draws)
+        made, setting = drawn(variant, draw)
+        contacts.append(setting.contact)
         for drive, at in cases:
-            found[drive, at].append(level(variant, frequency, drive, at, draw, FINENESS))
+            found[drive, at].append(level(variant, made.frequency.middle, drive, at, draw, FINENESS))
     nominal = variant.frequency.middle
-    levels = []
-    for (drive, at), values in found.items():
-        low, median, high = (float(value) for value in np.percentile(values, PERCENT))
-        levels.append(
-            {
-                "drive": drive,
-                "reading": at,
-                "low": low,
-                "median": median,
-                "high": high,
-                "median_error": _median_error(values, seed),
-                "drawn_as": level(variant, nominal, drive, at, None, FINENESS),
-            }
-        )
+    levels = [
+        {
+            "drive": drive,
+            "reading": at,
+            **spread(values),
+            "drawn_as": level(variant, nominal, drive, at, None, FINENESS),
+            "by_contact": {
+                contact: spread([value for value, one in zip(values, contacts, strict=True) if one == contact])
+                for contact in dict.fromkeys(contacts)
+            },
+        }
+        for (drive, at), values in found.items()
+    ]
     return {**data, "levels": levels}
 
 
-def _median_error(values: list[float], seed: int) -> float:
-    rng = np.random.default_rng(seed)
-    again = rng.choice(np.log(values), (400, len(values)))
-    return float(np.exp(np.std(np.median(again, axis=1))))
+def spread(values: Sequence[float]) -> dict[str, float | None]:
+    """Return low, median, high of draws and the median's error, a factor.
+
+    The error spans the narrowest pair of ordered draws, as far from either end, between which the median of
+    independent draws of any distribution lies with the probability `WITHIN`: its rank is binomial.
+    """
+    low, median, high = (float(value) for value in np.percentile(values, PERCENT))
+    ordered, n = np.sort(values), len(values)
+    ranks = [k for k in range(n // 2) if 1 - 2 * binom.cdf(k, n, 0.5) >= WITHIN]
+    error = None
+    if ranks:
+        error = float(max(ordered[n - 1 - ranks[-1]] / median, median / ordered[ranks[-1]]))
+    return {"low": low, "median": median, "high": high, "median_error": error}

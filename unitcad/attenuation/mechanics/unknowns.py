@@ -18,19 +18,34 @@ CIRCUIT_MODULUS = (1e9, 3e9, 5e9)
 """Young's modulus of polyimide with copper, Pa: lowest, nominal, highest; assumed."""
 
 
+CHOICES = ("contact", "gap filled", "floor", "no circuit")
+"""What is drawn with even odds; the contact is the first since it parts the levels into two groups."""
+
+
 @dataclass(frozen=True)
 class Draw:
     """One draw of everything that is not known: the same seed, index and name give the same value on any machine.
 
     A value belongs to its name (a silicone, a tissue layer, "contact"), so that two units of one draw share it.
+
+    of   how many draws are spread evenly: each 16 of them have every combination of `CHOICES` once, and any other
+         value is a Latin hypercube over the bonded draws and over the resting ones. None: all draws are independent
     """
 
     seed: int
     index: int
+    of: int | None = None
 
     def position(self, name: str) -> float:
         """Return a uniform number between 0 and 1."""
-        return float(np.random.default_rng([self.seed, self.index, zlib.crc32(name.encode())]).random())
+        key = zlib.crc32(name.encode())
+        within = float(np.random.default_rng([self.seed, self.index, key]).random())
+        if self.of is None:
+            return within
+        group, rank = self.index % 2, self.index // 2
+        count = (self.of + 1 - group) // 2
+        strata = np.random.default_rng([self.seed, key, group, count]).permutation(count)
+        return (float(strata[rank]) + within) / count
 
     def between(self, name: str, low: float, high: float) -> float:
         """Return a number of log-uniform distribution between two above 0, or uniform from 0."""
@@ -39,7 +54,9 @@ class Draw:
 
     def either(self, name: str) -> bool:
         """Return true or false with even odds."""
-        return self.position(name) < 0.5
+        if self.of is None:
+            return self.position(name) < 0.5
+        return (self.index >> CHOICES.index(name)) % 2 == 0
 
 
 @dataclass(frozen=True)

@@ -88,9 +88,15 @@
   function mechanics(block) {
     if (!block) return null;
     const place = { skin: "skin at D/2", edge: "the unit's own edge" };
-    const rows = (block.levels || []).map((one) => ({ name: `${one.drive}, ${place[one.reading] || one.reading}`, entry: { value: one.median, low: one.low, high: one.high }, colour: "series-4" }));
-    return [el("h3", {}, "By finite elements"),
-      rangeChart(rows, [], `Amplitude along the drive over the motor's: median and ${(block.percent || [])[0]} to ${(block.percent || [])[2]} % of ${block.draws} draws.`),
+    const row = (name, one, colour) => ({ name, entry: { value: one.median, low: one.low, high: one.high }, colour });
+    const rows = (block.levels || []).flatMap((one) => {
+      const name = `${one.drive}, ${place[one.reading] || one.reading}`;
+      return [row(name, one, "series-4"), ...Object.entries(one.by_contact || {}).map(([contact, group]) => row(`${name}: ${contact}`, group, "series-2"))];
+    });
+    const numbers = (block.levels || []).map((one) => [one.drive, place[one.reading] || one.reading, one.median, one.median_error === null ? "–" : one.median_error, one.drawn_as]);
+    return [el("h3", {}, "By finite elements (mechanics)"),
+      rangeChart(rows, [], `Amplitude along the drive over the motor's: median and ${(block.percent || [])[0]} to ${(block.percent || [])[2]} % of ${block.draws} draws, then those with bonded and with resting skin apart.`),
+      numbers.length > 0 && table(["Drive", "Read on", "Median", "Its error, times or divided by", "Unit as drawn"], numbers, { label: "Medians by finite elements" }),
       el("p", { className: "note" }, block.reason || `Not known, and drawn: ${block.not_known}.`)];
   }
 
