@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from recordings import CENTRES, FORMATS, RATE, columns, write_text
 
 from unitcad.errors import Refusal
-from unitcad.lab.readers import hierarchical
+from unitcad.lab import readers
+from unitcad.lab.readers import formats, hierarchical
 from unitcad.lab.readers.formats import open_recording
 from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.recording import Recording, Unreadable
@@ -188,3 +190,26 @@ def test_numbers_of_no_standard_layout_are_refused(tmp_path: Path) -> None:
         data.write(h5py.h5s.ALL, h5py.h5s.ALL, np.arange(300.0))
     with pytest.raises(Unreadable, match="no standard layout"):
         open_recording(tmp_path / "b.h5")
+
+
+def test_a_reader_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "array_file.py").write_text(
+        "import numpy as np\n"
+        "from unitcad.lab.recording import Channel, Recording, in_blocks\n"
+        'ENDINGS = (".npy",)\n'
+        "def read(path, layout):\n"
+        "    data = np.load(path)\n"
+        '    channels = tuple(Channel(str(i), "um", 0.001, len(data)) for i in range(data.shape[1]))\n'
+        '    return Recording(path, "npy", channels, lambda indices: in_blocks(data[:, list(indices)]))\n'
+    )
+    np.save(tmp_path / "a.npy", columns())
+    with pytest.raises(Unreadable, match="no reader"):
+        open_recording(tmp_path / "a.npy")
+    monkeypatch.setattr(readers, "__path__", [*readers.__path__, str(tmp_path)])
+    monkeypatch.setattr(formats, "by_ending", formats.by_ending.__wrapped__)
+    monkeypatch.delitem(sys.modules, "unitcad.lab.readers.array_file", raising=False)
+    (block,) = open_recording(tmp_path / "a.npy").read((2, 0))
+    assert_array_equal(block, columns()[:, [2, 0]])
+    (tmp_path / "b.npy").write_bytes(b"\x93NUMPY")
+    with pytest.raises(Unreadable, match="is damaged"):
+        open_recording(tmp_path / "b.npy")

@@ -19,6 +19,7 @@ from unitcad.lab.quantities import known
 from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.recording import Channel, Recording, Unreadable, in_blocks, is_time
 
+ENDINGS = (".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tab")
 HEAD = 1_000_000
 """Bytes from a file's beginning in which its header ends."""
 PIECE = 4_000_000

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import pkgutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib import import_module
@@ -13,26 +15,26 @@ import numpy as np
 from unitcad import files
 from unitcad.errors import Missing, UnitcadError
 from unitcad.geometry.arrays import Floats
+from unitcad.lab import readers
 from unitcad.lab.readers.hierarchical import HDF5_MARK
 from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.recording import Recording, Unreadable
 
-TEXT = (".csv", ".txt", ".tsv", ".asc", ".dat", ".lvm", ".tab")
-READERS = {
-    **dict.fromkeys(TEXT, "delimited"),
-    ".uff": "universal",
-    ".unv": "universal",
-    ".tdms": "labview",
-    ".mat": "matlab",
-    ".h5": "hierarchical",
-    ".hdf5": "hierarchical",
-    ".wav": "waveform",
-}
-"""Endings and the module that reads each."""
 VENDOR = (".svd", ".pvd")
 _LARGEST = 1e30
 """Beyond it, and beyond its inverse, a number is none that was measured."""
 _EXTRA = {"pyuff": "pyuff", "nptdms": "npTDMS", "h5py": "h5py"}
+
+
+@functools.cache
+def by_ending() -> dict[str, str]:
+    """Return the reader's module by ending: every module of this package that has ENDINGS."""
+    found: dict[str, str] = {}
+    for one in pkgutil.iter_modules(readers.__path__):
+        if one.name != "formats":
+            module = import_module(f"{readers.__name__}.{one.name}")
+            found |= dict.fromkeys(getattr(module, "ENDINGS", ()), one.name)
+    return found
 
 
 def open_recording(path: Path, layout: Layout | None = None) -> Recording:
@@ -44,10 +46,10 @@ def open_recording(path: Path, layout: Layout | None = None) -> Recording:
     ending = path.suffix.lower()
     if ending in VENDOR:
         raise Unreadable(str(path), ending, "Polytec's own format is read by Polytec's library alone: export UFF")
-    if ending not in READERS:
-        raise Unreadable(str(path), ending, f"no reader; known endings: {', '.join((*READERS, *VENDOR))}", ".csv")
+    if ending not in by_ending():
+        raise Unreadable(str(path), ending, f"no reader; known endings: {', '.join((*by_ending(), *VENDOR))}", ".csv")
     first = _first_bytes(path)
-    module = READERS[ending]
+    module = by_ending()[ending]
     if module == "matlab" and first.startswith((HDF5_MARK, b"MATLAB 7.3")):
         module = "hierarchical"
     reader: Callable[[Path, Layout], Recording] = import_module(f"unitcad.lab.readers.{module}").read

@@ -15,6 +15,7 @@ from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.readers.whole import columns_of
 from unitcad.lab.recording import Channel, Recording, Unreadable
 
+ENDINGS = (".h5", ".hdf5")
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
 MOST_COLUMNS = 4096
 LONGEST_S = 60.0

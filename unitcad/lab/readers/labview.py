@@ -16,6 +16,8 @@ from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.readers.whole import columns_of
 from unitcad.lab.recording import Channel, Recording, Unreadable
 
+ENDINGS = (".tdms",)
+
 
 def read(path: Path, layout: Layout) -> Recording:
     """Return the channels of a TDMS file, named group/channel. Raises Unreadable where it holds no numbers."""

@@ -15,6 +15,7 @@ from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.readers.whole import columns_of, expect_small
 from unitcad.lab.recording import Channel, Recording, Unreadable
 
+ENDINGS = (".mat",)
 MOST_NUMBERS = 2**26
 """Numbers that a file's variables may have together: compressed, a small file can state many."""
 NUMERIC = ("double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")

@@ -15,6 +15,7 @@ from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.readers.whole import columns_of, expect_small
 from unitcad.lab.recording import Channel, Recording, Unreadable
 
+ENDINGS = (".uff", ".unv")
 TIME_RESPONSE = (0, 1)
 """Function types that are a record over time: general, time response."""
 TIME_UNITS = 17

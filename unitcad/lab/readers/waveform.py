@@ -15,6 +15,7 @@ from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.readers.whole import expect_small
 from unitcad.lab.recording import ROWS, Channel, Recording, Unreadable
 
+ENDINGS = (".wav",)
 FULL_SCALE = "FS"
 """The unit of whole numbers: parts of the largest one."""
 
