@@ -14,12 +14,12 @@ import msgspec
 
 from unitcad import catalogue
 from unitcad.batch.sweep import Range, SweepFile
-from unitcad.spec import Spec
+from unitcad.spec.asked import AskedSpec
 from unitcad.spec.toml import text_of
 from unitcad.validation import put
 
 SCHEMAS = {
-    kind: msgspec.json.schema(table) for kind, table in {"spec": Spec, "sweep": SweepFile, "range": Range}.items()
+    kind: msgspec.json.schema(table) for kind, table in {"spec": AskedSpec, "sweep": SweepFile, "range": Range}.items()
 }
 ENTRY = {"materials": "ecoflex-00-30", "motors": "LCM0720A3463F", "printers": "fdm-0.4"}
 """The free tables of a spec, and what an entry of each starts from."""
