@@ -15,8 +15,9 @@ from unitcad.experiments.draws import Draws
 from unitcad.experiments.element_rivals import BLOCK, FINENESS
 from unitcad.experiments.lab_file import Lab, load_lab
 from unitcad.experiments.most_telling import most_telling
+from unitcad.experiments.protocol import ratios
 from unitcad.experiments.rivals import available
-from unitcad.experiments.study import study
+from unitcad.experiments.study import predictions, range_of, span_text, study
 from unitcad.validation import load
 
 pytest.importorskip("skfem")
@@ -78,6 +79,30 @@ def test_what_was_interrupted_goes_on_where_it_was(monkeypatch: pytest.MonkeyPat
     found = rival.levels(variant, Draws(2 * BLOCK, 1, rival.name))
     assert found[:BLOCK] == pytest.approx(1.0 + np.arange(BLOCK))
     assert len(calls) == 2 * BLOCK + 5
+
+
+def test_what_moves_less_than_the_instrument_shows_is_called_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the plate the unit's edge moves by 1 um in 30 % of the draws, by 0.01 um in the others."""
+    from unitcad.attenuation.mechanics import motor_level
+
+    moves = iter(range(10_000))
+
+    def motion(variant: Any, drive: str, setting: Any, fineness: float) -> motor_level.Motion:
+        small = next(moves) % 10 >= 3 and variant.tissue[0].density > 2000
+        moved = (complex(1e-8 if small else 1e-6), 0j, 0j)
+        return motor_level.Motion(1e-5 + 0j, 0j, moved, moved, 1)
+
+    monkeypatch.setattr(motor_level, "motion", motion)
+    lab = _part("encapsulating E10/D10", frequencies_hz=(60, 200), bodies=("rigid-plate", "gel-50kpa"))
+    rivals = available(["crossings", "mechanics-flat-edge"], MemoryStore()).rivals
+    predicted = predictions(lab, rivals)
+    unread = {}
+    for ratio in ratios(predicted.conditions, ["frequency", "body"]):
+        span = range_of(ratio, predicted, "mechanics-flat-edge")
+        unread[str(ratio)] = span["unread"]
+        assert (span_text(span) == "below what can be read") == ("rigid-plate" in str(ratio))
+        assert span_text(range_of(ratio, predicted, "crossings")) == "1"
+    assert sorted(unread.values()) == pytest.approx([0.0, 0.7, 0.7, 0.7])
 
 
 def test_without_the_library_the_elements_are_left_out_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,6 +15,7 @@ from scipy.stats import multivariate_normal
 
 from unitcad.attenuation.edge.fitted_models import path_of
 from unitcad.attenuation.edge.level import nominal
+from unitcad.cli.experiments_command import experiments
 from unitcad.errors import Refusal
 from unitcad.experiments.draws import Draws
 from unitcad.experiments.lab_file import Lab, lab_of_data, load_lab
@@ -23,6 +24,7 @@ from unitcad.experiments.protocol import Condition, Ratio, ratios
 from unitcad.experiments.ranking import Predictions, best_sets, singles
 from unitcad.experiments.rivals import available
 from unitcad.experiments.study import predictions, study
+from unitcad.experiments.study_files import shown, write_study
 from unitcad.validation import load
 
 UNITS = {
@@ -220,6 +222,44 @@ def test_the_command_prints_the_same_bytes_again_and_writes_a_folder(tmp_path: P
     assert data["experiments"][0]["experiment"] in page
     other = json.loads(_run(*words, "--seed", "2", folder=tmp_path).stdout)
     assert other["experiments"][0]["bits"] != data["experiments"][0]["bits"]
+
+
+def test_where_nothing_tells_rivals_apart_the_study_says_so_and_lists_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The closed forms alone, compared by frequency and body: every ratio is 1. Once it said "Measure first ..."."""
+    monkeypatch.setattr("unitcad.experiments.element_rivals.installed", lambda: False)
+    data = study(load_lab("paper", {"draws": 20}))
+    assert data["settles"] == (
+        "Nothing here tells these rivals apart: the best measurements say 0.00 ± 0.00 of 1.58 bits."
+    )
+    assert shown(data) == []
+    (tmp_path / "experiments.svg").touch()  # of an earlier study
+    write_study(data, tmp_path)
+    assert {file.name for file in tmp_path.iterdir()} == {"experiments.json", "experiments.md"}
+    page = (tmp_path / "experiments.md").read_text("utf-8")
+    assert "0.00 ± 0.00 |" not in page
+    assert page.index("Left out, needs scikit-fem") < page.index("Nothing here tells")
+    assert page.count("needs scikit-fem") == 1
+
+
+def test_the_terminal_says_what_a_bit_is_what_is_left_out_and_where_the_rest_stands(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("unitcad.experiments.element_rivals.installed", lambda: False)
+    monkeypatch.setenv("COLUMNS", "100")
+    experiments("paper", rivals="all", compare="unit", draws=20)
+    text = capsys.readouterr().out
+    head = text[: text.index("predicted ratio (10 to 90 %")]
+    assert "left out, needs scikit-fem" in head
+    assert "One bit decides for certain between two rivals that are equally probable." in head
+    assert "Predictions of the first 4; all ratios stand in experiments.json of -o FOLDER." in text
+    assert "0.00 ±" not in text
+    experiments("paper", draws=20)
+    text = capsys.readouterr().out
+    assert "Nothing here tells these rivals apart" in text
+    assert "Measure first" not in text
+    assert "predicted ratio" not in text
 
 
 def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:

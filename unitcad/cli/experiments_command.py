@@ -59,32 +59,41 @@ def experiments(
     if as_json:
         print_json(data)
         return
-    _print(data, loaded)
+    _print(data, loaded, folder is not None)
     if folder:
         typer.echo(str(folder))
 
 
-def _print(data: dict[str, Any], lab: Lab) -> None:
-    from unitcad.experiments.study_files import draws_text, shown
+def _print(data: dict[str, Any], lab: Lab, saved: bool) -> None:
+    from unitcad.experiments.study import BELOW
+    from unitcad.experiments.study_files import A_BIT, draws_text, left_out, shown, telling
 
     screen = console()
     names = [rival["name"] for rival in data["rivals"]]
     found = shown(data)
     screen.print(
         f"{lab.name}: {len(data['experiments'])} ratios of {len(lab.conditions)} readings, {len(names)} rivals, "
-        f"{data['most_bits']:.2f} bits to know"
+        f"{data['most_bits']:.2f} bits to know",
+        soft_wrap=True,
     )
-    screen.print(_best(found))
-    screen.print(_ranges(found, names))
-    screen.print(_sets(data))
+    for line in left_out(data):
+        screen.print(f"  left out, {line}", soft_wrap=True)
+    screen.print(A_BIT, soft_wrap=True)
+    if found:
+        screen.print(_best(found))
+        screen.print(_ranges(found, names))
+        if len(found) > _COLUMNS:
+            where = "experiments.json" if saved else "experiments.json of -o FOLDER"
+            screen.print(f"  Predictions of the first {_COLUMNS}; all ratios stand in {where}.", soft_wrap=True)
+    if sets := telling(data["sets"]):
+        screen.print(_sets(sets))
     for rival in data["rivals"]:
         known = f" (probability {rival['probability']:.2f})" if data["measured"] else ""
         screen.print(f"  {rival['name']}{known}: {rival['says']}", soft_wrap=True)
-    for name, reason in data["left_out"].items():
-        screen.print(f"  left out: {name}: {reason}", soft_wrap=True)
     screen.print(
         f"  A reading scatters by {100 * data['noise']:g} %, a rival that holds misses a ratio by "
-        f"{100 * data['discrepancy']:g} %. Ranges: 10 to 90 % of {draws_text(data)}, without that scatter.",
+        f"{100 * data['discrepancy']:g} %. Ranges: 10 to 90 % of {draws_text(data)}, without that scatter; "
+        f"{BELOW}: so for half of the draws or more. ±: the error of the bits.",
         soft_wrap=True,
     )
     screen.print(data["settles"], soft_wrap=True)
@@ -104,7 +113,7 @@ def _ranges(found: list[dict[str, Any]], names: list[str]) -> Table:
 
     from unitcad.experiments.study import span_text
 
-    table = Table(title="predicted ratio")
+    table = Table(title="predicted ratio (10 to 90 % of the draws)")
     table.add_column("rival", no_wrap=True)
     for number, _ in enumerate(found[:_COLUMNS], 1):
         table.add_column(str(number))
@@ -113,11 +122,11 @@ def _ranges(found: list[dict[str, Any]], names: list[str]) -> Table:
     return table
 
 
-def _sets(data: dict[str, Any]) -> Table:
+def _sets(sets: list[dict[str, Any]]) -> Table:
     from rich.table import Table
 
     table = Table("measured together", "bits", "not told apart")
-    for one in data["sets"]:
+    for one in sets:
         pairs = "\n".join(" and ".join(pair["rivals"]) for pair in one["not_told_apart"]) or "none"
         table.add_row("\n".join(one["experiments"]), f"{one['bits']:.2f} ± {one['error']:.2f}", pairs)
     return table

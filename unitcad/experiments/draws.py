@@ -68,10 +68,12 @@ class Draws:
 class Rival:
     """An account of the level: its name, what it says, and `levels`, draws of a variant's reading, shape (draws,).
 
-    `costly`: a draw is not a matter of microseconds.
+    `costly`: a draw is not a matter of microseconds. `unread` tells in which draws an instrument shows its own noise
+    instead of a reading, shape (draws,); None where nothing limits the readings.
     """
 
     name: str
     says: str
     levels: Callable[[EstimateInput, Draws], np.ndarray]
     costly: bool = False
+    unread: Callable[[EstimateInput, Draws], np.ndarray] | None = None

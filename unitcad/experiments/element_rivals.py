@@ -45,7 +45,13 @@ def installed() -> bool:
 def element_rivals(store: Store, smallest: float = SMALLEST) -> tuple[Rival, ...]:
     """Return the four rivals, whose solutions are kept in `store`; `smallest`: see `SMALLEST`."""
     return tuple(
-        Rival(name, says, partial(_levels, store, smallest, *name.split("-")[1:]), costly=True)
+        Rival(
+            name,
+            says,
+            partial(_levels, store, smallest, *name.split("-")[1:]),
+            costly=True,
+            unread=partial(_unread, store, smallest, *name.split("-")[1:]),
+        )
         for name, says in NAMES.items()
     )
 
@@ -53,16 +59,24 @@ def element_rivals(store: Store, smallest: float = SMALLEST) -> tuple[Rival, ...
 def _levels(
     store: Store, smallest: float, drive: Drive, reading: str, variant: EstimateInput, draws: Draws
 ) -> np.ndarray:
+    read, motor = (np.maximum(moved, smallest) for moved in _amplitudes(store, drive, reading, variant, draws))
+    return read / motor
+
+
+def _unread(
+    store: Store, smallest: float, drive: Drive, reading: str, variant: EstimateInput, draws: Draws
+) -> np.ndarray:
+    return np.min(_amplitudes(store, drive, reading, variant, draws), axis=0) < smallest
+
+
+def _amplitudes(store: Store, drive: Drive, reading: str, variant: EstimateInput, draws: Draws) -> list[np.ndarray]:
+    """Return the amplitudes at the reading and of the motor, m under one newton, each (draws,)."""
     starts = range(0, draws.count, BLOCK)
     blocks = [
         store.data(_key(variant, drive, draws.seed, start), partial(_solve, variant, drive, draws.seed, start))
         for start in starts
     ]
-    read, motor = (
-        np.maximum(np.concatenate([block[at] for block in blocks])[: draws.count], smallest)
-        for at in (reading, "motor")
-    )
-    return read / motor
+    return [np.concatenate([block[at] for block in blocks])[: draws.count] for at in (reading, "motor")]
 
 
 def _solve(variant: EstimateInput, drive: Drive, seed: int, start: int) -> dict[str, list[float]]:

@@ -26,6 +26,7 @@ class Predictions:
     weights      prior probability of each rival, (rivals,)
     shares       of each draw within its rival, (draws,) each, summing to 1
     noise        standard deviation of the log of a reading when it is repeated
+    unread       where an instrument shows its own noise instead of a reading, (draws, conditions) each
     discrepancy  of the log of a rival's reading from the truth though the rival holds: see `errors`
     """
 
@@ -37,12 +38,16 @@ class Predictions:
     seed: int
     weights: np.ndarray = field(default_factory=lambda: np.empty(0))
     shares: tuple[np.ndarray, ...] = ()
+    unread: tuple[np.ndarray, ...] = ()
 
     def __post_init__(self) -> None:
         if not len(self.weights):
             object.__setattr__(self, "weights", np.full(len(self.rivals), 1.0 / len(self.rivals)))
         if not self.shares:
             object.__setattr__(self, "shares", tuple(np.full(len(log), 1.0 / len(log)) for log in self.logs))
+
+        if not self.unread:
+            object.__setattr__(self, "unread", tuple(np.zeros(log.shape, dtype=bool) for log in self.logs))
 
     @property
     def most_bits(self) -> float:
@@ -88,6 +93,7 @@ class Predictions:
             rivals=tuple(rivals),
             logs=tuple(self.logs[i] for i in at),
             shares=tuple(self.shares[i] for i in at),
+            unread=tuple(self.unread[i] for i in at),
             weights=np.full(len(at), 1.0 / len(at)),
         )
 

@@ -19,6 +19,9 @@ LARGEST_SET = 3
 SIGNIFICANT_DIGITS = 6
 RANGE = (0.1, 0.5, 0.9)
 """Parts of the draws that lie below the low end, the middle and the high end of what a rival predicts."""
+LEAST_BITS = 0.005
+"""What is shown as 0.00 bits lies below."""
+BELOW = "below what can be read"
 Step = Callable[[str], None]
 
 
@@ -69,7 +72,7 @@ def predictions(lab: Lab, rivals: Sequence[Rival], step: Step = lambda stage: No
     Conditions are left out for which a rival has no finite answer. Raises Refusal where fewer than two conditions
     remain.
     """
-    settings, logs = lab.settings, []
+    settings, logs, unread = lab.settings, [], []
     for rival in rivals:
         draws = Draws(settings.element_draws if rival.costly else settings.draws, settings.seed, rival.name)
         columns = []
@@ -77,6 +80,9 @@ def predictions(lab: Lab, rivals: Sequence[Rival], step: Step = lambda stage: No
             step(f"{rival.name}: {condition} ({i + 1} of {len(lab.variants)})")
             columns.append(rival.levels(variant, draws))
         logs.append(np.log(np.stack(columns, axis=-1)))
+        read_all = np.zeros(draws.count, dtype=bool)
+        below = [rival.unread(variant, draws) if rival.unread else read_all for variant in lab.variants.values()]
+        unread.append(np.stack(below, axis=-1))
     finite = np.all([np.isfinite(log).all(axis=0) for log in logs], axis=0)
     if finite.sum() < 2:
         raise Refusal("units", list(settings.units), "the rivals have an answer for fewer than two readings")
@@ -87,6 +93,7 @@ def predictions(lab: Lab, rivals: Sequence[Rival], step: Step = lambda stage: No
         settings.noise,
         settings.discrepancy,
         settings.seed,
+        unread=tuple(one[:, finite] for one in unread),
     )
 
 
@@ -114,17 +121,24 @@ def _rivals(asked: Available, predicted: Predictions) -> list[dict[str, Any]]:
 
 
 def range_of(ratio: Ratio, predicted: Predictions, rival: str) -> dict[str, float]:
-    """Return {low, middle, high} of a ratio: 10, 50 and 90 % of a rival's draws, without a reading's errors."""
+    """Return {low, middle, high, unread} of a ratio: 10, 50 and 90 % of a rival's draws, without a reading's errors.
+
+    unread: the share of the draws in which one of the two readings is below what the lab can read.
+    """
     at = predicted.rivals.index(rival)
     log, share = predicted.log_ratios([ratio])[0][at][:, 0], predicted.shares[at]
     order = np.argsort(log)
     below = np.cumsum(share[order]) - share[order] / 2.0
     ends = np.exp(np.interp(RANGE, below, log[order]))
-    return dict(zip(("low", "middle", "high"), map(_number, ends), strict=True))
+    ends_of = [predicted.conditions.index(end) for end in (ratio.above, ratio.below)]
+    unread = float(share @ predicted.unread[at][:, ends_of].any(axis=1))
+    return dict(zip(("low", "middle", "high", "unread"), map(_number, (*ends, unread)), strict=True))
 
 
 def span_text(span: Mapping[str, float]) -> str:
-    """Return a predicted ratio with its range."""
+    """Return a predicted ratio with its range; in words where half of the draws or more can't be read."""
+    if span["unread"] >= 0.5:
+        return BELOW
     low, middle, high = (f"{span[end]:.3g}" for end in ("low", "middle", "high"))
     return middle if low == high else f"{middle} ({low} to {high})"
 
@@ -162,10 +176,21 @@ def _bits(one: Ranked) -> dict[str, float]:
     }
 
 
+def tells(bits: float, error: float) -> bool:
+    """Tell whether a figure of bits says anything: it is above its error, and not shown as 0.00."""
+    return bits > error and bits >= LEAST_BITS
+
+
 def settles(sets: Sequence[Ranked], predicted: Predictions) -> str:
     """Say in a sentence or two what to measure and what is still open after it."""
     first, last = sets[0], sets[-1]
     most = predicted.most_bits
+    if not any(tells(one.information.bits, one.information.error) for one in sets):
+        found = last.information
+        return (
+            f"Nothing here tells these rivals apart: the best measurements say {found.bits:.2f} ± {found.error:.2f} of "
+            f"{most:.2f} bits."
+        )
     text = f"Measure first {first.ratios[0]}: {first.information.bits:.2f} of {most:.2f} bits."
     if len(sets) > 1:
         rest = "; then ".join(str(ratio) for ratio in last.ratios[1:])

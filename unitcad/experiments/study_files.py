@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.experiments.range_plot import svg
-from unitcad.experiments.study import span_text
+from unitcad.experiments.study import BELOW, span_text, tells
 from unitcad.files import write
 
 SHOWN = 8
 """Experiments in the tables and in the plot; experiments.json has all."""
+A_BIT = "One bit decides for certain between two rivals that are equally probable."
 
 
 def write_study(data: Mapping[str, Any], folder: Path) -> Path:
@@ -20,15 +21,27 @@ def write_study(data: Mapping[str, Any], folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     write(folder / "experiments.json", (json.dumps(data, indent=2, ensure_ascii=False) + "\n").encode())
     rivals = [rival["name"] for rival in data["rivals"]]
-    write(folder / "experiments.svg", svg(shown(data), rivals).encode())
+    plot = folder / "experiments.svg"
+    if found := shown(data):
+        write(plot, svg(found, rivals).encode())
+    else:
+        plot.unlink(missing_ok=True)  # of an earlier study
     write(folder / "experiments.md", page(data).encode())
     return folder
 
 
+def telling(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return the experiments or sets that say anything."""
+    return [dict(one) for one in entries if tells(one["bits"], one["error"])]
+
+
 def shown(data: Mapping[str, Any], count: int = SHOWN) -> list[dict[str, Any]]:
-    """Return the best experiments, of each comparison (two units, one unit at frequencies or on bodies) the best."""
+    """Return the best experiments, of each comparison (two units, one unit at frequencies or on bodies) the best.
+
+    Those that say nothing are left out.
+    """
     best: dict[tuple[str, ...], dict[str, Any]] = {}
-    for one in data["experiments"]:
+    for one in telling(data["experiments"]):
         best.setdefault((one["changed"], one["above"]["unit"], one["below"]["unit"]), one)
     return list(best.values())[:count]
 
@@ -39,32 +52,43 @@ def page(data: Mapping[str, Any]) -> str:
     lines = [
         f"# What to measure next: {data['lab']}",
         "",
+        *(f"Left out, {line}.\n" for line in left_out(data)),
         data["settles"],
         "",
-        f"There are {data['most_bits']:.2f} bits to know. A reading scatters by {100 * data['noise']:g} %; a rival "
-        f"that holds misses a ratio by {100 * data['discrepancy']:g} %. {draws_text(data)}, seed {data['seed']}.",
+        f"There are {data['most_bits']:.2f} bits to know. {A_BIT} A reading scatters by "
+        f"{100 * data['noise']:g} %; a rival that holds misses a ratio by {100 * data['discrepancy']:g} %. "
+        f"{draws_text(data)}, seed {data['seed']}.",
         "",
-        "![what each rival predicts](experiments.svg)",
-        "",
-        "## Single ratios",
-        "",
-        "Of each comparison the best one; all stand in experiments.json. In brackets 10 to 90 % of a rival's draws, "
-        "without the scatter of readings.",
-        "",
-        *experiment_rows(shown(data), names),
-        "",
-        "## Together",
-        "",
-        "| measure | bits | not told apart |",
-        "| --- | --- | --- |",
     ]
-    for one in data["sets"]:
-        pairs = "; ".join(" and ".join(pair["rivals"]) for pair in one["not_told_apart"]) or "none"
-        lines.append(f"| {'; '.join(one['experiments'])} | {one['bits']:.2f} ± {one['error']:.2f} | {pairs} |")
-    lines += ["", "## Rivals", "", "| rival | what it says | probability |", "| --- | --- | --- |"]
+    if found := shown(data):
+        lines += [
+            "![what each rival predicts](experiments.svg)",
+            "",
+            "## Single ratios",
+            "",
+            "Of each comparison the best one; all stand in experiments.json. In brackets 10 to 90 % of a rival's "
+            f"draws, without the scatter of readings; {BELOW!r} where that holds for half of them or more.",
+            "",
+            *experiment_rows(found, names),
+            "",
+        ]
+    if sets := telling(data["sets"]):
+        lines += ["## Together", "", "| measure | bits | not told apart |", "| --- | --- | --- |"]
+        for one in sets:
+            pairs = "; ".join(" and ".join(pair["rivals"]) for pair in one["not_told_apart"]) or "none"
+            lines.append(f"| {'; '.join(one['experiments'])} | {one['bits']:.2f} ± {one['error']:.2f} | {pairs} |")
+        lines.append("")
+    lines += ["## Rivals", "", "| rival | what it says | probability |", "| --- | --- | --- |"]
     lines += [f"| {rival['name']} | {rival['says']} | {rival['probability']:.2f} |" for rival in data["rivals"]]
-    lines += [f"\nLeft out: {name}: {reason}." for name, reason in data["left_out"].items()]
     return "\n".join([*lines, ""])
+
+
+def left_out(data: Mapping[str, Any]) -> list[str]:
+    """Return a line for each reason why rivals are left out, with their names."""
+    reasons: dict[str, list[str]] = {}
+    for name, reason in data["left_out"].items():
+        reasons.setdefault(reason, []).append(name)
+    return [f"{reason}: {', '.join(names)}" for reason, names in reasons.items()]
 
 
 def draws_text(data: Mapping[str, Any]) -> str:
