@@ -11,6 +11,7 @@ import pytest
 
 from unitcad import catalogue
 from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.lab.declared_columns import declared
 from unitcad.lab.tensile_curve import Specimen, read_curve
 from unitcad.lab.tensile_result import TensileResult, evaluate
 from unitcad.validation import load
@@ -33,7 +34,8 @@ PROTOTYPE = {
 @pytest.fixture(scope="module")
 def results() -> dict[str, TensileResult]:
     known = catalogue.materials()
-    return {n: evaluate([read_curve(FILES[n], {}, Specimen())], (0.12, 0.24), known[n]) for n in NAMES}
+    bare = declared(["strain=Engineering Strain:1"])  # the files give no unit
+    return {n: evaluate([read_curve(FILES[n], bare, Specimen())], (0.12, 0.24), known[n]) for n in NAMES}
 
 
 @pytest.mark.parametrize("method", PROTOTYPE)

@@ -65,6 +65,10 @@ def material(
 
     if not curves and dma is None:
         raise Refusal("FILES", None, "name one tensile curve or more, or --dma with a file")
+    if deformation and dma is None:
+        raise Refusal("--deformation", deformation, "says how --dma was measured, which is not given")
+    if cell_n is not None and not curves:
+        raise Refusal("--cell-n", cell_n, "belongs to tensile curves, of which none is given")
     shipped = catalogue.materials()
     named = name or _slug((curves or [dma])[0])  # type: ignore[arg-type]
     base = like or named
@@ -81,12 +85,16 @@ def material(
             for path in curves:
                 stage(path.name)
                 read.append(read_curve(path, given, specimen, layout))
+                if cell_n is not None and read[-1].specimen.area is None:
+                    limit = f"needs the cross-section, which {path.name} does not give: --width-mm and --thickness-mm"
+                    raise Refusal("--cell-n", cell_n, limit)
             tensile = evaluate(read, used, shipped[base])
         if dma is not None:
             stage(dma.name)
             ratio = float(shipped[base].poisson_ratio)
             dynamic = evaluate_dynamic(read_dynamic(dma, given, deformation, layout), frequency_hz, ratio)
     entry = written.table(tensile, dynamic, base, frequency_hz)
+    written.expect_loadable(named, entry)
     text = written.material_toml(named, entry, _comments(entry, shipped[base]))
     found = written.data(named, entry, tensile, dynamic, frequency_hz)
     if out is not None:
@@ -200,3 +208,5 @@ def _print_dynamic(result: DynamicResult) -> None:
             tested = f"the lower half of the span predicts the upper one within {100 * result.held_out_error:.2g} %"
         low, high = result.curve.frequency[0], result.curve.frequency[-1]
         warn(f"warning: extrapolated: measured from {low:g} to {high:g} Hz; {tested}")
+    for one in result.warnings:
+        warn(f"warning: {one.code}: {one.message}")

@@ -46,10 +46,8 @@ _NAMES = {
     "tan_delta": r"tan ?\(?(?:delta|δ)\)?|loss factor",
 }
 """What an instrument calls a quantity, without its unit."""
-_BARE = ("strain", "true_strain", "tan_delta")
-"""Quantities that may stand without a unit: plain numbers."""
-MOST_PLAIN_STRAIN = 25.0
-"""No rubber stretches to 26 times its length: a larger strain without a unit is a percentage."""
+_BARE = ("tan_delta",)
+"""Quantities that may stand without a unit; a strain may not, since a percentage looks like a ratio."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ def declared(texts: Iterable[str], field: str = "--column") -> dict[str, Declare
     for text in texts:
         quantity, equals, rest = (part.strip() for part in text.partition("="))
         if not equals or not rest:
-            raise Refusal(field, text, "needs the form QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT", "stress=3:kPa")
+            raise Refusal(field, text, "needs the form QUANTITY=COLUMN or QUANTITY=COLUMN:UNIT, such as stress=3:kPa")
         if quantity not in UNITS:
             raise unknown_name(field, quantity, UNITS)
         column, colon, unit = rest.rpartition(":")
@@ -92,33 +90,32 @@ def column_of(recording: Recording, quantity: str, given: Mapping[str, Declared]
             return None
         if len(fitting) > 1:
             names = ", ".join(f"{i + 1} {channels[i].name!r}" for i in fitting)
-            limit = f"{recording.path.name} has several columns for {quantity}: {names}; declare one"
-            raise Refusal("--column", None, limit, f"{quantity}={fitting[0] + 1}")
+            limit = f"{recording.path.name} has several columns for {quantity}: {names}; declare {quantity}=COLUMN:UNIT"
+            raise Refusal("--column", None, limit)
         at = fitting[0]
     unit = given[quantity].unit if quantity in given else ""
     unit = unit or channels[at].unit
     factor = _unit(unit, quantity) if unit else 1.0 if quantity in _BARE else None
     if factor is None:
         said = f"has the unit {unit!r}" if unit else "has no unit"
-        limit = f"{recording.path.name}: column {at + 1} ({channels[at].name}) {said}; declare one of "
-        nearest = f"{quantity}={at + 1}:{next(iter(UNITS[quantity]))}"
-        raise Refusal("--column", None, limit + ", ".join(UNITS[quantity]), nearest)
+        limit = f"{recording.path.name}: column {at + 1} ({channels[at].name}) {said}; declare {quantity}={at + 1}:UNIT"
+        units = ", ".join(UNITS[quantity])
+        raise Refusal("--column", None, f"{limit} with the unit that it is in, of {units}; {columns_of(recording)}")
     return at, factor
 
 
-def columns(recording: Recording, wanted: Mapping[str, tuple[int, float]]) -> dict[str, np.ndarray]:
-    """Return the columns (n,) in SI, without the rows that lack a number."""
+def columns_of(recording: Recording) -> str:
+    """Say which columns a file has."""
+    return "its columns: " + ", ".join(f"{i} {channel.name}" for i, channel in enumerate(recording.channels, 1))
+
+
+def columns(recording: Recording, wanted: Mapping[str, tuple[int, float]]) -> tuple[dict[str, np.ndarray], int]:
+    """Return the columns (n,) in SI without the rows that lack a number, and how many rows those were."""
     indices = tuple(at for at, _ in wanted.values())
     rows = np.concatenate([np.asarray(block, float) for block in recording.read(indices)])
-    rows = rows[np.isfinite(rows).all(axis=1)]
-    return {name: rows[:, i] * factor for i, (name, (_, factor)) in enumerate(wanted.items())}
-
-
-def expect_no_percentage(recording: Recording, strain: np.ndarray, at: int) -> None:
-    """Refuse a strain without a unit that only makes sense as a percentage."""
-    if np.max(np.abs(strain)) > MOST_PLAIN_STRAIN:
-        limit = f"{recording.path.name}: column {at + 1} has no unit and reaches {np.max(np.abs(strain)):.4g}"
-        raise Refusal("--column", None, limit, f"strain={at + 1}:%")
+    whole = np.isfinite(rows).all(axis=1)
+    found = {name: rows[whole, i] * factor for i, (name, (_, factor)) in enumerate(wanted.items())}
+    return found, int((~whole).sum())
 
 
 def _unit(text: str, quantity: str) -> float | None:

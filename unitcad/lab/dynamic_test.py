@@ -16,19 +16,29 @@ import numpy as np
 
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.lab.declared_columns import Declared, column_of, columns
+from unitcad.lab.declared_columns import Declared, column_of, columns, columns_of
 from unitcad.lab.readers.formats import open_recording
 from unitcad.lab.readers.recording_layout import Layout
+from unitcad.lab.tensile_result import Warned
 
 Deformation = Literal["shear", "tension"]
 LEAST_POINTS = 5
+GEOMETRY_ERROR = 0.05
+"""Relative error of the modulus by the specimen's size and its clamping (assumed); the loss factor has none of it."""
+FLOOR_PER_DECADE, UNTESTED_PER_DECADE = 0.1, 0.3
+"""Least error of an extrapolation, in logarithms per decade (assumed): a tested one, and one of too few points."""
+MOST_MISFIT, NO_LAW = 0.1, 0.5
+"""Misfit, in logarithms, that is warned of, and that is refused."""
 HELD_OUT = 0.5
 """The part of the span, in logarithms of frequency, that is predicted from the rest to judge an extrapolation."""
 
 
 @dataclass(frozen=True)
 class DynamicCurve:
-    """Storage and loss (Pa, (n,)) over frequency (Hz, rising), of Young's modulus ("tension") or of shear."""
+    """Storage and loss (Pa, (n,)) over frequency (Hz, rising), of Young's modulus ("tension") or of shear.
+
+    `lost`: rows left out since a number was missing.
+    """
 
     name: str
     frequency: np.ndarray = field(repr=False)
@@ -36,6 +46,7 @@ class DynamicCurve:
     loss: np.ndarray = field(repr=False)
     deformation: Deformation
     sha256: str
+    lost: int = 0
 
 
 @dataclass(frozen=True)
@@ -43,7 +54,8 @@ class DynamicResult:
     """The law (Young's modulus at rest in Pa, tau in s, n) and what it says at the motor's frequency.
 
     `storage`, `loss_factor`: at `frequency_hz`, Pa and tan delta. `error`, `loss_error`: half-widths (95 %) of their
-    logarithms: the fit's and, outside the measured span, what was off when the upper half was predicted by the lower.
+    logarithms: the fit's (`fit_error` is that alone, of the storage), the specimen's geometry, and outside the measured
+    span what was off when the upper half was predicted by the lower, or `FLOOR_PER_DECADE` where that is more.
     """
 
     static: float
@@ -55,9 +67,11 @@ class DynamicResult:
     loss_factor: float
     error: float
     loss_error: float
+    fit_error: float
     held_out_error: float | None
     extrapolated: bool
     curve: DynamicCurve
+    warnings: tuple[Warned, ...] = ()
 
 
 def read_dynamic(
@@ -71,17 +85,14 @@ def read_dynamic(
     wanted = {q: found for q in ("frequency", "storage", "loss") if (found := column_of(recording, q, given))}
     if "loss" not in wanted and (found := column_of(recording, "tan_delta", given)):
         wanted["tan_delta"] = found
-    names = ", ".join(f"{i + 1} {c.name}" for i, c in enumerate(recording.channels))
     for quantity in ("frequency", "storage"):
         if quantity not in wanted:
-            raise Refusal(
-                "--column", None, f"{path.name} has no column of {quantity}; its columns: {names}", f"{quantity}=1"
-            )
+            limit = f"{path.name} has no column of {quantity}; declare {quantity}=COLUMN:UNIT"
+            raise Refusal("--column", None, f"{limit}; {columns_of(recording)}")
     if len(wanted) < 3:
-        raise Refusal(
-            "--column", None, f"{path.name} has neither loss nor tan_delta; its columns: {names}", "loss=3:kPa"
-        )
-    data = columns(recording, wanted)
+        limit = f"{path.name} has neither loss nor tan_delta; declare loss=COLUMN:UNIT or tan_delta=COLUMN"
+        raise Refusal("--column", None, f"{limit}; {columns_of(recording)}")
+    data, lost = columns(recording, wanted)
     loss = data["loss"] if "loss" in data else data["tan_delta"] * data["storage"]
     order = np.argsort(data["frequency"], kind="stable")
     frequency, storage, loss = data["frequency"][order], data["storage"][order], loss[order]
@@ -93,16 +104,24 @@ def read_dynamic(
     if not deformation:
         deformation = {"e": "tension", "g": "shear"}.get(name[0], "") if name[1:2] in ("'", "′") else ""
     if deformation not in ("shear", "tension"):
-        raise Refusal("--deformation", deformation or None, "must be shear or tension: the file does not say", "shear")
+        raise Refusal("--deformation", deformation or None, "must be shear or tension: the file does not say")
     content = hashlib.sha256(path.read_bytes()).hexdigest()
-    return DynamicCurve(path.name, frequency, storage, loss, deformation, content)  # type: ignore[arg-type]
+    return DynamicCurve(path.name, frequency, storage, loss, deformation, content, lost)  # type: ignore[arg-type]
 
 
 def evaluate_dynamic(curve: DynamicCurve, frequency_hz: float, poisson_ratio: float = 0.5) -> DynamicResult:
-    """Fit the law and evaluate it at a frequency, in terms of Young's modulus: 2 (1 + nu) times that of shear."""
+    """Fit the law and evaluate it at a frequency, in terms of Young's modulus: 2 (1 + nu) times that of shear.
+
+    Raises Refusal where the law does not describe the data at all.
+    """
     factor = 2.0 * (1.0 + poisson_ratio) if curve.deformation == "shear" else 1.0
     omega, storage, loss = 2.0 * np.pi * curve.frequency, factor * curve.storage, factor * curve.loss
     constants, covariance, residual = _fit(omega, storage, loss)
+    over = bool(np.median(loss / storage) > 1.0)
+    if residual > NO_LAW:
+        hint = ": the loss is above the storage modulus; are the columns swapped?" if over else ""
+        limit = f"{curve.name}: no fractional Kelvin-Voigt law comes nearer than {100 * residual:.3g} %{hint}"
+        raise Refusal("--dma", None, limit)
     at = 2.0 * np.pi * frequency_hz
     value, gradient = _logs(constants, np.array([at])), _jacobian(constants, np.array([at]))
     from scipy.stats import t
@@ -114,16 +133,29 @@ def evaluate_dynamic(curve: DynamicCurve, frequency_hz: float, poisson_ratio: fl
     low, high = float(curve.frequency[0]), float(curve.frequency[-1])
     outside = not low <= frequency_hz <= high
     held_out = _held_out(omega, storage, loss)
-    error = float(errors[0])
-    if outside and held_out is not None:
+    fit_error = float(errors[0])
+    error = math.hypot(fit_error, GEOMETRY_ERROR)
+    if outside:
         span = math.log(high / low) * HELD_OUT
         beyond = math.log(frequency_hz / high) if frequency_hz > high else math.log(low / frequency_hz)
-        grown = held_out * max(1.0, beyond / span)
+        grown = (FLOOR_PER_DECADE if held_out is not None else UNTESTED_PER_DECADE) * beyond / math.log(10.0)
+        if held_out is not None:
+            grown = max(grown, held_out * max(1.0, beyond / span))
         error, loss_error = math.hypot(error, grown), math.hypot(loss_error, grown)
+    message = "one dynamic test: the scatter of specimens is not in the range"
+    warnings = [Warned("specimens", f"{curve.name}: {message}")]
+    if residual > MOST_MISFIT:
+        message = f"the law misses the points by {100 * residual:.2g} % (rms of the logarithms)"
+        warnings.append(Warned("misfit", f"{curve.name}: {message}"))
+    if over:
+        message = "the loss is above the storage modulus, which a cured silicone's is not; are the columns swapped?"
+        warnings.append(Warned("loss", f"{curve.name}: {message}"))
+    if curve.lost:
+        warnings.append(Warned("gaps", f"{curve.name}: {curve.lost} rows lack a number and are left out"))
     static, tau, n = _constants(constants)
     return DynamicResult(
         static, tau, n, residual, frequency_hz, float(np.exp(value[0])), float(np.exp(value[1] - value[0])),
-        error, loss_error, held_out, outside, curve,
+        error, loss_error, fit_error, held_out, outside, curve, tuple(warnings),
     )  # fmt: skip
 
 

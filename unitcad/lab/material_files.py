@@ -11,6 +11,7 @@ import numpy as np
 
 from unitcad import files
 from unitcad.attenuation.edge.estimates import rounded
+from unitcad.catalogue import MaterialEntry, materials
 from unitcad.errors import UnitcadError
 from unitcad.export.chart import Series, chart
 from unitcad.lab.dynamic_test import DynamicResult
@@ -40,6 +41,13 @@ def table(tensile: TensileResult | None, dynamic: DynamicResult | None, like: st
     if dynamic:
         entry.update(_dynamic(dynamic))
     return entry
+
+
+def expect_loadable(name: str, entry: Mapping[str, Any]) -> None:
+    """Hold the entry to the catalogue's own types and limits, as a spec would. Raises Refusal."""
+    from unitcad.spec import convert
+
+    materials({name: convert(dict(entry), MaterialEntry, f"materials.{name}")})
 
 
 def material_toml(name: str, entry: Mapping[str, Any], comments: tuple[str, ...]) -> str:
@@ -103,8 +111,10 @@ def data(
             "loss_factor": dynamic.loss_factor,
             "error": dynamic.error,
             "loss_factor_error": dynamic.loss_error,
+            "fit_error": dynamic.fit_error,
             "extrapolated": dynamic.extrapolated,
             "upper_half_predicted_error": dynamic.held_out_error,
+            "warnings": [{"code": one.code, "message": one.message} for one in dynamic.warnings],
             "files": [{"name": dynamic.curve.name, "sha256": dynamic.curve.sha256}],
         }
     return rounded(found)

@@ -21,6 +21,8 @@ LAWS: tuple[tuple[Law, float], ...] = (
 """Each law with the strain up to which it is fitted."""
 MOST_LAW_STRAIN = 1.0
 """A law that is fitted beyond this is shown, but it is no statement about small strain."""
+WIDEST_GAP = 0.5
+"""Between two points of a curve, as a part of the strain of use, or of a secant's strain: nothing is made up beyond."""
 _GRID = 41
 _PASSES = 3
 
@@ -94,8 +96,11 @@ def fit_start(strain: np.ndarray, stress: np.ndarray, high: float) -> Toe | None
 
 
 def secant(strain: np.ndarray, stress: np.ndarray, at: float) -> float | None:
-    """Return stress over strain at a strain, Pa, interpolated; None where the curve does not span it."""
+    """Return stress over strain at a strain, Pa, interpolated; None where no points of the curve are near it."""
     if not strain[0] <= at <= strain[-1]:
+        return None
+    after = int(np.searchsorted(strain, at))
+    if strain[after] > at and strain[after] - strain[after - 1] > WIDEST_GAP * at:
         return None
     return float(np.interp(at, strain, stress)) / at
 
@@ -127,7 +132,18 @@ def _default(strain: np.ndarray, stress: np.ndarray, low: float, high: float) ->
     toe = fit_start(strain, stress, high)
     if toe is None:
         return Modulus(name, None, f"too few points below {100 * high:.3g} %, or no rising stress there")
+    begin, end = _widest_gap(strain - toe.origin, low, high)
+    if end - begin > WIDEST_GAP * (high - low):
+        ends = f"{100 * (begin + toe.origin):.3g} and {100 * (end + toe.origin):.3g} %"
+        return Modulus(name, None, f"the curve has no point between {ends} strain")
     return Modulus(name, toe.secant(low, high))
+
+
+def _widest_gap(strain: np.ndarray, low: float, high: float) -> tuple[float, float]:
+    """Return the ends of the widest gap between `low`, the points within, and `high`."""
+    points = np.concatenate([[low], strain[(strain > low) & (strain < high)], [high]])
+    at = int(np.argmax(np.diff(points)))
+    return float(points[at]), float(points[at + 1])
 
 
 def _secants(strain: np.ndarray, stress: np.ndarray) -> list[Modulus]:
@@ -135,7 +151,9 @@ def _secants(strain: np.ndarray, stress: np.ndarray) -> list[Modulus]:
     for at in SECANTS:
         standard = " (ISO 37, ASTM D412)" if at == 1.0 else ""
         value = secant(strain, stress, at)
-        reason = "" if value is not None else f"the curve spans {100 * strain[0]:.3g} to {100 * strain[-1]:.3g} %"
+        spans = strain[0] <= at <= strain[-1]
+        missing = "no points near it" if spans else f"the curve spans {100 * strain[0]:.3g} to {100 * strain[-1]:.3g} %"
+        reason = "" if value is not None else missing
         made.append(Modulus(f"secant at {100 * at:g} %{standard}", value, reason))
     return made
 

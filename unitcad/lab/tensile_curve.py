@@ -12,7 +12,7 @@ import numpy as np
 
 from unitcad import files
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.lab.declared_columns import Declared, column_of, columns, expect_no_percentage
+from unitcad.lab.declared_columns import Declared, column_of, columns, columns_of
 from unitcad.lab.readers.formats import open_recording
 from unitcad.lab.readers.recording_layout import Layout
 
@@ -54,7 +54,7 @@ class TensileCurve:
     """One specimen's curve up to its largest stress: engineering strain rises, engineering stress in Pa; both (n,).
 
     `rate`: strain per second at the start, None without a time. `skipped`: points left out since the strain had been
-    passed before. `sha256`: of the file.
+    passed before; `lost`: rows left out since a number was missing. `sha256`: of the file; `path`: where it was read.
     """
 
     name: str
@@ -64,6 +64,8 @@ class TensileCurve:
     sha256: str
     rate: float | None = None
     skipped: int = 0
+    lost: int = 0
+    path: Path | None = field(default=None, repr=False)
 
 
 def read_curve(
@@ -83,17 +85,14 @@ def read_curve(
         wanted["true_strain"] = found
     if "stress" not in wanted and "force" not in wanted and (found := column_of(recording, "true_stress", given)):
         wanted["true_stress"] = found
-    names = ", ".join(f"{i + 1} {c.name}" for i, c in enumerate(recording.channels))
     for pair in (("strain", "travel", "true_strain"), ("stress", "force", "true_stress")):
         if not any(q in wanted for q in pair):
-            limit = f"{path.name} has no column of {pair[0]} or {pair[1]} that is known by name; its columns: {names}"
-            raise Refusal("--column", None, limit, f"{pair[0]}=1:{'kPa' if pair[0] == 'stress' else '%'}")
-    data = columns(recording, wanted)
-    if "strain" in wanted and wanted["strain"][1] == 1.0:
-        expect_no_percentage(recording, data["strain"], wanted["strain"][0])
+            limit = f"{path.name} has no column of {pair[0]} or {pair[1]} that is known by name"
+            raise Refusal("--column", None, f"{limit}; declare {pair[0]}=COLUMN:UNIT; {columns_of(recording)}")
+    data, lost = columns(recording, wanted)
     strain, specimen = _strain(data, specimen, path)
     stress = _stress(data, strain, specimen, path)
-    return _trimmed(path, strain, stress, data.get("time"), specimen)
+    return replace(_trimmed(path, strain, stress, data.get("time"), specimen), lost=lost, path=path)
 
 
 def header_of(path: Path) -> Specimen:

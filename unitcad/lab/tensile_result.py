@@ -21,6 +21,8 @@ CALLIPER_MM = 0.05
 """Error of a specimen's width and thickness (assumed: a calliper on soft rubber)."""
 AREA_ERROR = 0.02
 """Relative error of a cross-section of which no lengths are known (assumed)."""
+MOST_SCATTER, OTHER_MATERIAL, MOST_OF_SHEET = 1.25, 3.0, 5.0
+"""Largest over least specimen that is warned of, and that is no longer one silicone; modulus over the sheet's."""
 LEAST_OF_CELL, LATEST_START, MOST_BREAK, MOST_TOE = 1e-3, 0.02, 1.25, 0.02
 """Limits: force over full scale, strain of the first point, break over the sheet's, strain of the toe."""
 
@@ -71,16 +73,29 @@ class TensileResult:
 def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: Material | None = None) -> TensileResult:
     """Evaluate the specimens of one material at a strain of use (low, high); `sheet` is compared with the break.
 
-    Raises Refusal where no curve spans the strain of use.
+    Raises Refusal where no curve spans the strain of use, where a file is given twice, and for specimens that differ so
+    much that they are not one silicone's.
     """
+    _expect_different(curves)
     by_curve = tuple(moduli(curve.strain, curve.stress, *used) for curve in curves)
     rows = tuple(_row([methods[i] for methods in by_curve]) for i in range(len(by_curve[0])))
     name = default_method(*used)
     chosen = next(row for row in rows if row.method == name)
     if chosen.value is None:
         reach = math.floor(1000 * min(float(curve.strain[-1]) for curve in curves)) / 10
-        nearest = f"{100 * used[0]:g}:{reach:g}" if reach > 100 * used[0] else None
+        nearest = f"{100 * used[0]:g}:{reach:g}" if 100 * used[0] < reach < 100 * used[1] else None
         raise Refusal("--strain", f"{100 * used[0]:g}:{100 * used[1]:g}", chosen.reason, nearest)
+    ratio = _ratio(chosen)
+    if ratio > OTHER_MATERIAL:
+        shown = ", ".join(
+            f"{curve.name} {one / 1e3:.3g} kPa"
+            for curve, one in zip(curves, chosen.by_specimen, strict=True)
+            if one is not None
+        )
+        limit = (
+            f"differ by a factor of {ratio:.3g} ({shown}): these are not specimens of one silicone, or a unit is wrong"
+        )
+        raise Refusal("FILES", None, limit)
     values = [row.value for row in rows if row.value is not None and row.defensible]
     scatter = _scatter([v for v in chosen.by_specimen if v is not None])
     geometry = max(_area_error(curve) for curve in curves)
@@ -89,6 +104,13 @@ def evaluate(curves: Sequence[TensileCurve], used: tuple[float, float], sheet: M
     toes = tuple(fit_start(curve.strain, curve.stress, used[1]) for curve in curves)
     spread = max(values) / min(values)
     warnings = [*_curve_warnings(curves, used, toes, sheet), *_warnings(by_curve, len(curves))]
+    if ratio > MOST_SCATTER:
+        warnings.append(Warned("scatter", f"the specimens differ by a factor of {ratio:.3g}: look for an odd one"))
+    if sheet:
+        off = chosen.value / 1e3 / float(sheet.modulus_100pct_kpa)
+        if not 1 / MOST_OF_SHEET <= off <= MOST_OF_SHEET:
+            message = f"{off:.3g} times the 100 % modulus of {sheet.name}, {float(sheet.modulus_100pct_kpa):g} kPa"
+            warnings.append(Warned("sheet", f"{message}: check the units and --like"))
     low, high = min(values) / widened, max(values) * widened
     rate = float(np.median(rates)) if rates else None
     return TensileResult(
@@ -135,6 +157,21 @@ def _row(methods: Sequence[Modulus]) -> MethodRow:
     return MethodRow(methods[0].method, mean, values, defensible, "; ".join(reasons[:2]))
 
 
+def _expect_different(curves: Sequence[TensileCurve]) -> None:
+    known: dict[str, TensileCurve] = {}
+    for curve in curves:
+        if before := known.get(curve.sha256):
+            limit = "is given twice" if before.path == curve.path else f"has the same content as {before.name}"
+            raise Refusal("FILES", curve.name, f"{limit}: one specimen counts once")
+        known[curve.sha256] = curve
+
+
+def _ratio(row: MethodRow) -> float:
+    """Return the largest over the least specimen."""
+    values = [one for one in row.by_specimen if one is not None]
+    return max(values) / min(values)
+
+
 def _scatter(values: Sequence[float]) -> float | None:
     """Return the half-width of the mean logarithm's 95 % interval by Student's t; None for one specimen."""
     if len(values) < 2:
@@ -173,6 +210,8 @@ def _curve_warnings(
                     "toe", f"{curve.name}: the fitted curve begins at {100 * toe.origin:.3g} % strain (slack or offset)"
                 )
             )
+        if curve.lost:
+            found.append(Warned("gaps", f"{curve.name}: {curve.lost} rows lack a number and are left out"))
         if curve.skipped > 0.01 * len(curve.strain):
             message = f"{curve.skipped} points left out: the strain goes back, as in cycles; the first pull counts"
             found.append(Warned("cycles", f"{curve.name}: {message}"))
