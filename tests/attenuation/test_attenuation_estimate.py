@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from unitcad.accuracy.result import Plot, Result, markdown
 from unitcad.attenuation.curve import NO_RATIO
 from unitcad.attenuation.edge.closed_form import Section, Units
+from unitcad.attenuation.edge.estimates import SIDEWAYS_FORM, summary
 from unitcad.attenuation.edge.fitted_models import edge_levels
 from unitcad.attenuation.edge.level import corners
 from unitcad.cli import app
@@ -94,6 +95,45 @@ def test_measured_in_both_prints_and_one_unit_without_a_figure():
     assert estimate_spec(load("three-layer"))["measured"] is None
     thick = estimate_spec(load("encapsulating", ["layers.0.wall_mm=1.5"]))["measured"]
     assert thick["same_size"] is False
+
+
+@pytest.mark.parametrize(
+    ("template", "change", "differs"),
+    [
+        ("motor-10mm", (), ["motor", "diameter", "frequency"]),
+        ("encapsulating", ("diameter_mm=20",), ["diameter"]),
+        ("encapsulating", ("motor.drive=axial",), ["drive"]),
+        ("encapsulating", ("layers.1.cap_mm=0.8",), ["caps"]),
+        ("encapsulating", ("layers.0.wall_mm=1.0",), ["walls"]),
+        ("encapsulating", ("estimate.tissue=rigid-plate",), ["body"]),
+        ("encapsulating", ("estimate.frequency_hz=60",), ["frequency"]),
+    ],
+)
+def test_measured_is_said_of_the_same_unit_only(template, change, differs):
+    found = estimate_spec(load(template, list(change)))
+    assert found["measured"]["same_size"] is False
+    assert set(differs) <= set(found["measured"]["differs_in"])
+    assert summary(found)["measured"] is None
+    asked = [argument for one in change for argument in ("--set", one)]
+    shown = run(template, *asked).stdout
+    assert not any("measured" in line and "5.17" in line and "│" in line for line in shown.splitlines())
+    assert "measured at 14 mm and 125 Hz: 5.17 and 4.58 %; this unit differs in" in shown
+
+
+def test_the_measured_units_are_themselves():
+    for template in ("encapsulating", "embedded", "single-embedded"):
+        found = estimate_spec(load(template))
+        assert found["measured"]["same_size"] is True
+        assert summary(found)["measured"] == found["measured"]["level"]
+
+
+def test_bush_is_a_sideways_form_of_an_axial_motor():
+    found = estimate_spec(load("encapsulating", ["motor.drive=axial"]))
+    assert found["models"]["bush"]["not_of_this_drive"] == found["assumptions"][0] == SIDEWAYS_FORM
+    assert run("encapsulating", "--set", "motor.drive=axial").stdout.count(SIDEWAYS_FORM) == 1
+    assert SIDEWAYS_FORM not in run("encapsulating").stdout
+    table = frequency_table_of_spec(load("encapsulating", ["motor.drive=axial"]), [100.0])
+    assert table["assumptions"][0] == SIDEWAYS_FORM
 
 
 def test_single_layer_is_its_own_control():

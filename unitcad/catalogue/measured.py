@@ -29,13 +29,14 @@ Length = Annotated[float, Meta(gt=0)]
 
 
 class MeasuredUnit(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the measured units share: motor, diameter, wall of each of two layers, circuit, frequency."""
+    """What the measured units share: motor, diameter, wall of each of two layers, circuit, frequency, body."""
 
     motor: str
     diameter_mm: Length
     wall_mm: Length
     circuit_mm: Length
     frequency_hz: Length
+    tissue: str
 
 
 class Measurements(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

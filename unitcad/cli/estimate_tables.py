@@ -21,6 +21,8 @@ def print_estimate(data: dict[str, Any]) -> None:
         screen.print(_models(data))
         if "fit" in data:
             screen.print(_fit_line(data["fit"]), soft_wrap=True)
+        for line in _besides(data):
+            screen.print(f"  {line}", soft_wrap=True)
     if "mechanics" in data:
         if data["mechanics"]["levels"]:
             screen.print(_mechanics(data["mechanics"]))
@@ -45,7 +47,8 @@ def print_estimate(data: dict[str, Any]) -> None:
         soft_wrap=True,
     )
     for line in data["assumptions"]:
-        screen.print(f"  {line}", soft_wrap=True)
+        if line not in _besides(data):
+            screen.print(f"  {line}", soft_wrap=True)
 
 
 def print_frequencies(data: dict[str, Any]) -> None:
@@ -115,6 +118,7 @@ def print_neighbours(data: dict[str, Any]) -> None:
 def _models(data: dict[str, Any]) -> Table:
     """Tabulate the edge level and, against the control of each of the unit's materials, hierarchical / control."""
     blocks, measured = data["models"], data["measured"] or {}
+    measured = measured if measured.get("same_size") else {}
     controls = [one["control"] for one in next(iter(blocks.values()))["hierarchical_over_control"] or []]
     fitted = data.get("fit")
     ranges = ["P10 to P90"] if fitted else []
@@ -129,7 +133,7 @@ def _models(data: dict[str, Any]) -> Table:
     if measured:
         levels = [measured[key] for key in ("level", "also_printed") if measured.get(key) is not None]
         ratios = {one["control"]: f"{one['value']:.3g}" for one in measured.get("hierarchical_over_control") or []}
-        text = " and ".join(f"{100 * value:.4g}" for value in levels) or "-"
+        text = " and ".join(f"{100 * value:.4g}" for value in levels)
         table.add_row(
             "measured, paper" if fitted else "measured",
             text,
@@ -137,6 +141,18 @@ def _models(data: dict[str, Any]) -> Table:
             *[ratios.get(name, "-") for name in controls],
         )
     return table
+
+
+def _besides(data: dict[str, Any]) -> list[str]:
+    """Say what belongs to the levels: models of another drive, and a measurement of a unit that differs."""
+    lines = [block["not_of_this_drive"] for block in data["models"].values() if "not_of_this_drive" in block]
+    measured = data["measured"] or {}
+    if measured.get("differs_in"):
+        levels = [measured[key] for key in ("level", "also_printed") if measured.get(key) is not None]
+        text = " and ".join(f"{100 * value:.4g}" for value in levels)
+        at = f"{measured['diameter_mm']:g} mm and {measured['frequency_hz']:g} Hz"
+        lines.append(f"measured at {at}: {text} %; this unit differs in {', '.join(measured['differs_in'])}.")
+    return lines
 
 
 def _errors(data: dict[str, Any]) -> Table:

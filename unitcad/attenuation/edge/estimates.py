@@ -14,6 +14,7 @@ from unitcad.attenuation.edge.scores import RANGE_PERCENT, Assessment
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 
 SIGNIFICANT_DIGITS = 9
+SIDEWAYS_FORM = "bush is a form of sideways motion, but this motor drives along its axis (motor.drive = axial)."
 ASSUMPTIONS = [
     "A flat ERM's sideways force turns in the skin's plane. The layered curve takes it so (`layered.drives`), and bush "
     "its motion; the other models of the edge level know no direction of the force.",
@@ -64,6 +65,8 @@ def estimate(
     for model in sorted(models, key=errors["order"].index):
         block = model_block(variant, model, fit)
         block["table_error"] = errors[model]
+        if noted := not_of_this_drive(variant, [model]):
+            block["not_of_this_drive"] = noted[0]
         blocks[model] = block
     notes = ranged(variant)
     data = {
@@ -73,6 +76,7 @@ def estimate(
         "measured": measured_block(variant),
         "table_error": errors,
         "assumptions": [
+            *not_of_this_drive(variant, models),
             *ASSUMPTIONS,
             *(f"A range, not a value: {note}" for note in notes),
             *dict.fromkeys(_noted(variant)),
@@ -81,6 +85,11 @@ def estimate(
     if fit:
         data |= {"fit": fit_block(fit, models), "own_measured": own_block(fit, variant)}
     return rounded(data)
+
+
+def not_of_this_drive(variant: EstimateInput, models: Sequence[str]) -> list[str]:
+    """Return what is to be said of models that describe another drive than the motor's."""
+    return [SIDEWAYS_FORM] if variant.drive == "axial" and "bush" in models else []
 
 
 def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
@@ -99,7 +108,11 @@ def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
 
 
 def summary(estimated: dict[str, Any]) -> dict[str, Any]:
-    """Return an estimate for a table or a manifest: edge level and its geometric-mean error by model, measured."""
+    """Return an estimate for a table or a manifest: edge level and its geometric-mean error by model, measured.
+
+    `measured` is that of this very unit.
+    """
+    measured = estimated["measured"] or {}
     models = {
         name: {
             "edge": block["edge_level"].get("value"),
@@ -109,7 +122,7 @@ def summary(estimated: dict[str, Any]) -> dict[str, Any]:
     }
     return {
         "models": models,
-        "measured": (estimated["measured"] or {}).get("level"),
+        "measured": measured.get("level") if measured.get("same_size") else None,
         "frequency_hz": estimated["variant"]["frequency_hz"]["value"],
     }
 
@@ -139,7 +152,9 @@ def frequency_table(
     block = variant_block(variant)
     value = frequencies[0] if len(frequencies) == 1 else None
     block["frequency_hz"] = {"value": value, "low": min(frequencies), "high": max(frequencies)}
-    return rounded({"variant": block, "frequencies": rows, "assumptions": ASSUMPTIONS})
+    return rounded(
+        {"variant": block, "frequencies": rows, "assumptions": [*not_of_this_drive(variant, models), *ASSUMPTIONS]}
+    )
 
 
 def variant_block(variant: EstimateInput) -> dict[str, Any]:

@@ -16,9 +16,11 @@ from unitcad.attenuation.edge.lab_fit import LabFit, predictive_block
 from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
 from unitcad.attenuation.edge.variant_units import FIELDS, nominal, stacked
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
-from unitcad.catalogue import measurements
+from unitcad.catalogue import measurements, motors
 
 _MOST_CORNERS = 12
+_SAME = 1e-6
+"""Lengths that differ by less are the same, m."""
 _NOT_FINITE = "no finite answer at Poisson's ratio 1/2: the pressure wave's speed is infinite"
 _WAVES: tuple[cf.Wave, ...] = ("s", "p")
 KINDS = {
@@ -289,7 +291,10 @@ def _number(value: Any) -> float | None:
 
 
 def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
-    """Return the paper's measurement of this unit's design and materials, in both prints; None if there is none."""
+    """Return the paper's measurement of a unit of this design and materials, in both prints; None if there is none.
+
+    `same_size`: whether it is this unit; else `differs_in` names what is another one.
+    """
     table, layers = measured_table(), tuple(layer.material for layer in variant.layers)
     design = CONTROL if len(layers) == 1 else variant.design
     rows = [i for i in range(len(table.names)) if table.designs[i] == design and table.layers[i] == layers]
@@ -297,9 +302,7 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
     if not rows:
         return extra and {"level": None, **extra}
     index = rows[0]
-    wall = sum(layer.thickness for layer in variant.layers)
-    shared = measurements().unit
-    same = abs(wall - 2e-3 * shared.wall_mm) < 1e-6 and abs(variant.diameter - 1e-3 * shared.diameter_mm) < 1e-6
+    differs, shared = _differs_in(variant, table.inputs[index].section), measurements().unit
     return {
         "level": float(table.levels[index]),
         **(extra or {}),
@@ -309,11 +312,40 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
             if i == index
         ]
         or None,
-        "same_size": same,
+        "same_size": not differs,
+        **({"differs_in": differs} if differs else {}),
+        "diameter_mm": shared.diameter_mm,
+        "frequency_hz": shared.frequency_hz,
         "note": "measured at 0 mm by laser vibrometer on a skin phantom; axis and phantom are not given"
-        + ("" if same else "; this variant has another size than the measured unit")
+        + (f"; not this unit, which differs in {', '.join(differs)}" if differs else "")
         + ("; the paper does not say which shape its controls had" if design == CONTROL else ""),
     }
+
+
+def _differs_in(variant: EstimateInput, shapes: cf.Section) -> list[str]:
+    """Return what of a unit is not as in the measured ones, against the nearest of their possible shapes."""
+    shared, own = measurements().unit, sections([variant.geometry])
+    motor = motors()[shared.motor]
+    of_all = {
+        "motor": not np.isclose(variant.geometry.motor_height, 1e-3 * float(motor.thickness_mm), atol=_SAME)
+        or not np.isclose(variant.geometry.motor_radius, 5e-4 * float(motor.diameter_mm), atol=_SAME),
+        "diameter": not np.isclose(variant.diameter, 1e-3 * shared.diameter_mm, atol=_SAME),
+        "drive": motor.drive is not None and variant.drive != motor.drive.value,
+        "body": variant.tissue_name != shared.tissue,
+        "frequency": not np.isclose(variant.frequency.middle, shared.frequency_hz),
+    }
+    by_shape = []
+    for i in range(len(np.atleast_1d(shapes.cavity_radius))):
+        radii, measured = (
+            np.diff(np.append(one.cavity_radius[k], one.outer_radii[k])) for one, k in ((own, 0), (shapes, i))
+        )
+        of_shape = {
+            "walls": not np.allclose(radii, measured, rtol=0.0, atol=_SAME),
+            "caps": not np.allclose(own.caps[0], shapes.caps[i], rtol=0.0, atol=_SAME),
+            "height of the cavity": abs(own.core_height[0] - shapes.core_height[i]) > _SAME,
+        }
+        by_shape.append([name for name, other in {**of_all, **of_shape}.items() if other])
+    return min(by_shape, key=len)
 
 
 def printed_besides(design: str, layers: tuple[str, ...]) -> dict[str, Any] | None:

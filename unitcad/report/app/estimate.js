@@ -63,15 +63,16 @@
 
   function levels(data) {
     const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: block.edge_level || {}, colour: COLOURS[model] || "series-4" }));
-    const measured = data.measured || {};
+    const found = data.measured || {};
+    const measured = found.same_size ? found : {};
     const marks = [{ name: "Measured", value: measured.level }, { name: "Also printed", value: measured.also_printed, dashed: true }, ...(data.own_measured || []).map((own) => ({ name: `Measured here (${own.unit})`, value: own.value }))].filter(({ value }) => known(value));
     const fit = data.fit;
     const reasons = [...new Set(rows.map(({ entry }) => entry.reason).filter(Boolean))];
     return [
       rangeChart(rows, marks, "Level at the unit's edge, of the motor's amplitude; a bar is the spread from the inputs' ranges."),
-      reasons.map((reason) => el("p", { className: "note" }, reason)),
+      [...reasons, ...Object.values(data.models || {}).map((block) => block.not_of_this_drive).filter(Boolean)].map((reason) => el("p", { className: "note" }, reason)),
       fit && predicted(data, fit),
-      measured.note ? el("p", { className: "note" }, measured.note, measured.same_size === false ? " It was measured at another size." : "") : el("p", { className: "note" }, "The paper measured no such unit."),
+      known(found.level) ? el("p", { className: "note" }, found.same_size ? "" : `${number(found.level)}: `, found.note) : el("p", { className: "note" }, "The paper measured no such unit."),
     ];
   }
 
@@ -104,7 +105,7 @@
     const controls = [...new Set(Object.values(data.models || {}).flatMap((block) => (block.hierarchical_over_control || []).map((entry) => entry.control)))];
     return controls.map((control) => {
       const rows = Object.entries(data.models).flatMap(([model, block]) => (block.hierarchical_over_control || []).filter((entry) => entry.control === control).map((entry) => ({ name: nameOf(model), entry, colour: COLOURS[model] || "series-4" })));
-      const marks = ((data.measured || {}).hierarchical_over_control || []).filter((entry) => entry.control === control && known(entry.value)).map((entry) => ({ name: "Measured", value: entry.value }));
+      const marks = (((data.measured || {}).same_size && data.measured.hierarchical_over_control) || []).filter((entry) => entry.control === control && known(entry.value)).map((entry) => ({ name: "Measured", value: entry.value }));
       return rangeChart(rows, marks, `Unit over a control all of ${control}: below 1 it attenuates.`);
     });
   }
