@@ -195,9 +195,11 @@ def _quasistatic(material: Material) -> Quantity:
 
 
 def _no_modulus(material: Material) -> str:
+    static = material.modulus_100pct_kpa
+    whose = "the data sheet's 100 % modulus" if static.status == "datasheet" else "the 100 % modulus"
+    source = "" if static.status == "datasheet" else f"; {static.status}: {static.source}"
     return (
-        "no small-strain modulus at the motor's frequency is known; the data sheet's 100 % modulus is static "
-        f"({float(material.modulus_100pct_kpa):g} kPa)"
+        f"no small-strain modulus at the motor's frequency is known; {whose} is static ({float(static):g} kPa{source})"
     )
 
 

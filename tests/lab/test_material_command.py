@@ -231,6 +231,14 @@ def _invoke(*words: str | Path, fails: bool = False):
     return done
 
 
+PASTED = {
+    "name": "ours",
+    "design": "embedded",
+    "diameter_mm": 14.0,
+    "layers": [{"material": "our blend", "wall_mm": 2.5}],
+}
+
+
 def test_the_table_goes_into_a_spec_and_the_folder_holds_everything(tmp_path: Path) -> None:
     curves = [
         _table(tmp_path / f"{i}.csv", "Strain (%),Stress (kPa)", [100 * x, y / 1e3])
@@ -245,16 +253,16 @@ def test_the_table_goes_into_a_spec_and_the_folder_holds_everything(tmp_path: Pa
     entry = tomllib.loads(text)["materials"]["our blend"]
     spec = load(
         {
-            "name": "ours",
-            "design": "embedded",
-            "diameter_mm": 14.0,
-            "layers": [{"material": "our blend", "wall_mm": 2.5}],
+            **PASTED,
             "materials": {"our blend": entry},
             "estimate": {"moduli": "quasi-static"},
         }
     )
     value = entry["quasistatic_modulus_kpa"]
     assert estimate_input(spec).layers[0].youngs_modulus.value == pytest.approx(1e3 * value["value"])
+    reason = estimate_input(load({**PASTED, "materials": {"our blend": entry}})).layers[0].youngs_modulus.note
+    assert "data sheet" not in reason
+    assert f"{entry['modulus_100pct_kpa']['value']:g} kPa; measured: 0.csv" in reason
     assert value["low"] < value["value"] < value["high"]
     assert "youngs_modulus_kpa" not in entry
     found = json.loads((tmp_path / "out" / "material.json").read_text("utf-8"))

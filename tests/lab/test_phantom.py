@@ -70,6 +70,21 @@ def test_the_walls_and_the_response_are_those_of_another_program() -> None:
     assert abs(made.expected.sensitivity["muscle"]) < 0.01
 
 
+def test_the_range_has_what_the_frequency_may_bring_and_every_page_says_quasi_static() -> None:
+    made = _skin()
+    factor = abs(1 + (2j * math.pi * 125 * 260e-6) ** 0.27)  # the catalogue's law, from rest to 125 Hz
+    assert factor == pytest.approx(1.62, abs=0.005)
+    for one, layer in zip(made.recipes, made.table.layers, strict=True):
+        slow = recipe(layer.silicone, layer.thinner_pct, "layers.0")
+        assert one.high_kpa == pytest.approx(factor * slow.high_kpa)
+        assert (one.modulus_kpa, one.low_kpa) == (slow.modulus_kpa, slow.low_kpa)
+    words = bench.casting_markdown(made)
+    assert "They are quasi-static" in words
+    assert "1.62 times higher, unless a dynamic test" in words
+    assert "from quasi-static compression" in words.split("## What to expect")[1]
+    assert phantom_files.tissue_toml(made).count("quasi-static compression; high: also times 1.62") == 3
+
+
 def test_the_response_is_the_layered_solver_s() -> None:
     made = _skin()
     layers = [

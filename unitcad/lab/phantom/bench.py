@@ -10,6 +10,7 @@ from unitcad.casting.bill import Item
 from unitcad.casting.figures import DATASHEET_C, MIXING_MIN, POURING_MIN, at_room, bubble_rise_s
 from unitcad.lab.phantom.phantom_response import THINNER_MM
 from unitcad.lab.phantom.phantom_set import PhantomSet, printed
+from unitcad.lab.phantom.recipe import stiffening
 from unitcad.lab.phantom.screed_box import bolts
 from unitcad.text import markdown
 
@@ -100,7 +101,9 @@ def casting_markdown(phantom: PhantomSet) -> str:
         )
     lines += [
         "",
-        f"Moduli in compression: {phantom.recipes[0].source}. The range is two standard deviations of that table.",
+        f"Moduli: {phantom.recipes[0].source}. They are quasi-static. The range is two standard deviations of that "
+        f"table; its upper end has a factor of {stiffening(table.frequency_hz):.3g} for {table.frequency_hz:g} Hz, by "
+        "the catalogue's fractional law (assumed to hold with thinner).",
         "",
     ]
     number = iter(range(1, 1000))
@@ -295,7 +298,9 @@ def _release(phantom: PhantomSet) -> Iterator[str]:
     yield (
         f"Keep what is measured {EDGE_MM:g} mm or more from the walls. Cut nothing off the skin. Pull the coupons "
         "with the same machine each time, and read them with unitcad material: their modulus, not the table's, "
-        "belongs into tissue.toml."
+        "belongs into tissue.toml. That one is quasi-static too: keep its upper end "
+        f"{stiffening(phantom.table.frequency_hz):.3g} times higher, unless a dynamic test gives the modulus at "
+        f"{phantom.table.frequency_hz:g} Hz (unitcad material --dma)."
     )
 
 
@@ -303,8 +308,9 @@ def _expectations(phantom: PhantomSet) -> Iterator[str]:
     table, e = phantom.table, phantom.expected
     yield (
         f"|u_z| of the skin at {table.frequency_hz:g} Hz over its value at the unit's edge, the motor's disc "
-        "pressing evenly, by the layered solver. The range takes loss factors (half to one and a half times), "
-        "moduli and thicknesses each by itself."
+        "pressing evenly, by the layered solver with moduli from quasi-static compression. "
+        "The range takes loss factors (half to one and a half times), "
+        "moduli (up to what the frequency may bring) and thicknesses each by itself."
     )
     yield ""
     yield "| mm from the edge | expected | low | high | the forearm template |"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from unitcad.catalogue import Printer, choose, printers, tissue
 from unitcad.errors import Refusal
@@ -13,7 +13,7 @@ from unitcad.kernels.mesh import bounds, realise
 from unitcad.lab.phantom import tensile_coupons
 from unitcad.lab.phantom.description import PhantomTable
 from unitcad.lab.phantom.phantom_response import ACRYLIC, POISSON, Expected, echo_pct, expected, wall_distance
-from unitcad.lab.phantom.recipe import Recipe, recipe
+from unitcad.lab.phantom.recipe import Recipe, recipe, stiffening
 from unitcad.lab.phantom.screed_box import BoxLengths, cast, lengths, pieces
 from unitcad.shape.body import Body
 
@@ -23,7 +23,11 @@ _STEP_MM = 5.0
 
 @dataclass(frozen=True)
 class PhantomSet:
-    """A phantom ready to be written. `volumes_mm3` and `coupon_mm3`: of each layer, skin first, and of its coupons."""
+    """A phantom ready to be written.
+
+    The recipes' `high_kpa` has what the motor's frequency may bring over a slow test.
+    `volumes_mm3` and `coupon_mm3`: of each layer, skin first, and of its coupons.
+    """
 
     table: PhantomTable
     recipes: tuple[Recipe, ...]
@@ -42,7 +46,9 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
 
     Raises Refusal for walls that echo too much, for layers that nobody tested, and for pieces beyond the bed.
     """
-    recipes = tuple(recipe(one.silicone, one.thinner_pct, f"layers.{i}") for i, one in enumerate(table.layers))
+    slow = tuple(recipe(one.silicone, one.thinner_pct, f"layers.{i}") for i, one in enumerate(table.layers))
+    factor = stiffening(table.frequency_hz)
+    recipes = tuple(replace(one, high_kpa=factor * one.high_kpa) for one in slow)
     if len({layer.name for layer in table.layers}) < len(table.layers):
         raise Refusal("layers", ", ".join(layer.name for layer in table.layers), "each layer needs a name of its own")
     printer = choose("printer", table.printer, printers())
@@ -67,7 +73,8 @@ def tissue_table(phantom: PhantomSet) -> dict[str, dict[str, object]]:
         loss = layer.loss_factor
         found[layer.name] = {
             "status": "secondary",
-            "source": f"{one.silicone.name} + {one.thinner_pct:g} % thinner, {one.source}",
+            "source": f"{one.silicone.name} + {one.thinner_pct:g} % thinner, {one.source}; high: also times "
+            f"{stiffening(phantom.table.frequency_hz):.3g}, what {phantom.table.frequency_hz:g} Hz may bring (assumed)",
             "thickness_mm": layer.thickness_mm,
             "density_kg_m3": _four(1e3 * one.density_g_cm3),
             "youngs_modulus_kpa": modulus,

@@ -10,6 +10,7 @@ from importlib.resources import files
 
 import numpy as np
 
+from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.catalogue import Material, materials
 from unitcad.errors import Refusal, unknown_name
 
@@ -51,6 +52,18 @@ def recipe(silicone: str, thinner_pct: float, field: str) -> Recipe:
     volume = 100.0 / float(material.density_g_cm3) + thinner_pct / THINNER_DENSITY
     density = (100.0 + thinner_pct) / volume
     return Recipe(material, thinner_pct, modulus, modulus * (1 - spread), modulus * (1 + spread), density, _source())
+
+
+def stiffening(frequency_hz: float) -> float:
+    """Return how much stiffer silicone may be at a frequency than at rest: the catalogue's fractional law of Ecoflex.
+
+    That the law holds with thinner is assumed; the moduli of the table were measured slowly.
+    """
+    material = materials()["ecoflex-00-30"]
+    assert material.fractional_tau_us
+    assert material.fractional_n
+    law = FractionalKelvinVoigt(float(material.fractional_tau_us) * 1e-6, float(material.fractional_n))
+    return abs(law.complex_shear(1.0, 2.0 * math.pi * frequency_hz))
 
 
 @cache
