@@ -73,6 +73,37 @@ def test_console_examples_run(text: str, tmp_path: Path) -> None:
         assert "Traceback" not in done.stderr
 
 
+LINK = re.compile(r"\]\(([^)\s#]*)(?:#([^)\s]+))?\)")
+
+
+def _anchors(page: Path) -> set[str]:
+    """The headings of a page as GitHub writes them in links."""
+    headings = re.findall(r"^#+ +(.+?) *$", re.sub(BLOCK, "", page.read_text("utf-8")), re.MULTILINE)
+    plain = [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower() for heading in headings]
+    return {re.sub(r"[^\w\- ]", "", heading).replace(" ", "-") for heading in plain}
+
+
+def _lost(page: Path, text: str) -> list[str]:
+    """The links of a page's text to files or headings that are not there."""
+    lost = []
+    for match in LINK.finditer(BLOCK.sub("", text)):
+        target, anchor = match.groups()
+        if ":" in target:  # of the web
+            continue
+        file = page if not target else page.parent / target
+        if not file.exists() or (anchor and file.suffix == ".md" and anchor not in _anchors(file)):
+            lost.append(match[0])
+    return lost
+
+
+def test_links_within_the_pages_lead_to_a_file_and_a_heading() -> None:
+    pages = [*ROOT.glob("*.md"), *sorted((ROOT / "docs").glob("**/*.md"))]
+    assert {str(page): lost for page in pages if (lost := _lost(page, page.read_text("utf-8")))} == {}
+    python = ROOT / "docs" / "python.md"
+    assert _lost(python, "[a](batch.md#custom-designs) [b](https://a.b/#c)") == []
+    assert _lost(python, "[a](batch.md#of-ones-own) [b](nowhere.md)") == ["](batch.md#of-ones-own)", "](nowhere.md)"]
+
+
 def test_no_page_waits_for_a_figure() -> None:
     waiting = re.compile(r"\b(?:TODO|TBD|FIXME|XXX|ESTIMATES|MEASURED_[A-Z]+)\b")
     for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]:
