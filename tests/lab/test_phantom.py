@@ -85,6 +85,13 @@ def test_the_range_has_what_the_frequency_may_bring_and_every_page_says_quasi_st
     assert phantom_files.tissue_toml(made).count("quasi-static compression; high: also times 1.62") == 3
 
 
+def test_the_procedure_warns_of_what_spoils_a_phantom() -> None:
+    words = bench.casting_markdown(_skin())
+    for part in ("on acrylic does not bond", "nothing may lie on the rim", "latex", "Thinner migrates", "grips"):
+        assert part in words
+    assert {"scale", "level", "calliper", "release agent"} < {one.item for one in bench.bill(_skin())}
+
+
 def test_the_response_is_the_layered_solver_s() -> None:
     made = _skin()
     layers = [

@@ -181,6 +181,15 @@ def bill(phantom: PhantomSet) -> list[Item]:
         items.append(Item(f"{name} part A", sum(p.part_a_g for p in own), "g", "bought", f"{len(own)} pours"))
         items.append(Item(f"{name} part B", sum(p.part_b_g for p in own), "g", "bought", f"{len(own)} pours"))
     items.append(Item("silicone thinner", sum(p.thinner_g for p in found), "g", "bought", "of the silicones' maker"))
+    for tool, note in (
+        ("scale", f"reads {table.scale_resolution_g:g} g"),
+        ("level", "0.2 mm over the box's side"),
+        ("calliper", "0.02 mm"),
+    ):
+        items.append(Item(tool, 1, "piece", "at hand", note))
+    items.append(Item("mixing cup and stick", len(found), "piece", "bought", "a set for each pour"))
+    for stuff in ("release agent", "petroleum jelly", "talc", "nitrile gloves"):
+        items.append(Item(stuff, 1, "piece", "bought", "for all pours"))
     items.append(Item("bolt", 4, "piece", "bought", f"M{table.stage_bolt_mm:g}, for the holder"))
     return items
 
@@ -188,7 +197,9 @@ def bill(phantom: PhantomSet) -> list[Item]:
 def _preparation(phantom: PhantomSet, found: Sequence[PhantomPour]) -> Iterator[str]:
     table, size = phantom.table, phantom.size
     yield (
-        "Print the pieces as they lie in their files: the blade upside down, the rest as drawn, the lid's lettering up."
+        "Print the pieces as they lie in their files; the blade already lies edge up there, the lid its lettering up. "
+        "Uncured resin and latex keep silicone from curing: wash and post-cure resin prints fully, cast a small trial "
+        "on each, and wear nitrile gloves."
     )
     for p in found:
         if p.off_grid:
@@ -209,8 +220,10 @@ def _preparation(phantom: PhantomSet, found: Sequence[PhantomPour]) -> Iterator[
         "stay free."
     )
     yield (
-        "Release agent sparingly on the inner walls of tray and frames, none on the plate: the muscle must stick to "
-        "it, or the stack slides. Level the tray to 0.2 mm over its side."
+        "Release agent sparingly on the inner walls of tray and frames and in the coupon moulds, none on the plate. "
+        f"Silicone that cures on acrylic does not bond to it: the {found[0].name} only clings. Roughen it, or use a "
+        "silicone primer on it or a perforated plate. Check before measuring: pushed sideways with a finger, the slab "
+        "must not slip, and through the plate from below no air shows. Level the tray to 0.2 mm over its side."
     )
 
 
@@ -247,8 +260,9 @@ def _pour(phantom: PhantomSet, p: PhantomPour) -> Iterator[str]:
     if p.index > 1:
         yield (
             f"When the layer before is firm: trim the film off the rim below, put {frame} on the pegs and press it "
-            "down all round; tape it or weigh it down. A thin line of petroleum jelly between the rims keeps it "
-            "tight. No release agent on the silicone: the layers must bond."
+            "down all round. Hold it with tape on the outside or clips at the ears: nothing may lie on the rim that "
+            "the blade runs on. A thin line of petroleum jelly between the rims keeps it tight; wipe off what comes "
+            "out inside. No release agent on the silicone: the layers must bond."
         )
     yield "Weigh the box with what is in it, and write that down."
     yield (
@@ -296,7 +310,13 @@ def _release(phantom: PhantomSet) -> Iterator[str]:
         "carried on its plate."
     )
     yield (
-        f"Keep what is measured {EDGE_MM:g} mm or more from the walls. Cut nothing off the skin. Pull the coupons "
+        "Thinner migrates between layers and out of the skin, so the moduli change with age: write down the age at "
+        "each measurement, and compare labs at the same age, such as 7 days (assumed)."
+    )
+    yield (
+        f"Keep what is measured {EDGE_MM:g} mm or more from the walls. Cut nothing off the skin. Demould coupons by "
+        "lifting one tab, and pull them at the phantom's own age, at one speed that is written down, with wide grips "
+        "faced with fine emery paper, just tight enough not to slip, "
         "with the same machine each time, and read them with unitcad material: their modulus, not the table's, "
         "belongs into tissue.toml. That one is quasi-static too: keep its upper end "
         f"{stiffening(phantom.table.frequency_hz):.3g} times higher, unless a dynamic test gives the modulus at "
