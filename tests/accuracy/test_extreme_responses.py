@@ -112,7 +112,12 @@ def test_the_front_page_has_the_response_that_is_closest_to_its_bound():
     media = [Row("b 7", "x", rtol, 0.1 * rtol, rtol, 1e-13, 0.1, 100, 2.0) for rtol in TOLERANCES]
     media[1] = replace(media[1], over_bound=0.5, bound=1.0)
     picks, worst = summary(media)
-    assert worst == "b 7 at rtol 0.001: error 0.5 of its bound; no bounds broken in 5 responses of 1 media"
+    assert worst == (
+        "a medium of x (seed 7) at rtol 0.001: error 0.5 of its bound; no bounds broken in 5 responses of 1 media"
+    )
+    assert all(what == "displacement of 1 extreme random media, with a bound" for what, _, _ in picks)
+    ordinary = summary([replace(row, kind="ordinary", case="ordinary 202611220000") for row in media])[1]
+    assert ordinary.startswith("an ordinary medium (seed 202611220000) at rtol 0.001: error 0.5 of its bound")
     assert [error for _, error, _ in picks] == ["0.1", "1e-05", "1e-09"]
     assert picks[0][2] == "`response(rtol=0.1)`: 100 % within rtol, at most 2 s"
     assert "; 1 bounds broken" in summary([*media, replace(media[0], over_bound=math.nan)])[1]

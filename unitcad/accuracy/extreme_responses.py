@@ -205,23 +205,40 @@ def plot(surveyed: Sequence[Row]) -> Plot:
 def summary(surveyed: Sequence[Row]) -> tuple[tuple[tuple[str, str, str], ...], str]:
     """Return rows of (for what, error, what to pick), and the response that comes closest to its bound."""
     picks = []
+    media = len({row.case for row in surveyed})
     for rtol in TOLERANCES:
         group = [row for row in surveyed if row.rtol == rtol]
         met = sum(row.met for row in group) / len(group)
         slowest = max(row.seconds for row in group)
         picks.append(
             (
-                "displacement of extreme random media, with a bound",
+                f"displacement of {media} extreme random media, with a bound",
                 f"{rtol:g}",
                 f"`response(rtol={rtol:g})`: {100 * met:.3g} % within rtol, at most {shown(slowest)} s",
             )
         )
     worst = max(surveyed, key=lambda row: row.over_bound)
-    media, broken = len({row.case for row in surveyed}), sum(not row.over_bound <= 1 for row in surveyed)
+    broken = sum(not row.over_bound <= 1 for row in surveyed)
     return tuple(picks[::2]), (
-        f"{worst.case} at rtol {worst.rtol:g}: error {shown(worst.over_bound)} of its bound; {broken or 'no'} bounds "
-        f"broken in {len(surveyed)} responses of {media} media"
+        f"{_in_words(worst)} at rtol {worst.rtol:g}: error {shown(worst.over_bound)} of its bound; "
+        f"{broken or 'no'} bounds broken in {len(surveyed)} responses of {media} media"
     )
+
+
+_WORDS = {
+    "ordinary": "an ordinary medium",
+    "film on the forearm": "a film on the forearm",
+    "nearly fluid film": "a nearly fluid film",
+    "inverted": "a medium of stiff layers over soft ones",
+    "zero thickness": "a medium with a layer of no thickness",
+    "large k a": "a load that is large to the wavelength",
+    "undamped": "an undamped medium",
+}
+
+
+def _in_words(row: Row) -> str:
+    """Return a random medium's class and seed in words."""
+    return f"{_WORDS.get(row.kind, f'a medium of {row.kind}')} (seed {row.case.split()[-1]})"
 
 
 def promises(extreme: Sequence[Row], surveyed: Sequence[Row]) -> tuple[Promise, ...]:

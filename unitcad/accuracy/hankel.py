@@ -148,6 +148,13 @@ def run(quick: bool, say: Say) -> Result:
     tables.append(Table("What to pick: the fastest method for an error", ("error", *ends), picks))
     loads = hankel_cost.every_load(cases()[0].medium, RADII[::4] if quick else RADII, quick, say)
     counts = [] if quick else hankel_cost.counted(cases()[0].medium, say)
+    closest += [
+        (
+            cost.over_bound,
+            f"{cost.load}, depth {1e3 * cost.z:g} mm: error {cost.over_bound:.2f} of its bound",
+        )
+        for cost in (*loads, *counts)
+    ]
     return Result(
         suite="hankel",
         title="The Hankel integral: error against time",

@@ -15,7 +15,7 @@ HEAD = """# Accuracy
 Errors against exact or independent references, beside what they cost. `unitcad accuracy` computes all of it and writes
 these pages; `accuracy.json` holds the same numbers. Run times are medians, taken in turn in one run: compare them
 within a table only, since seconds differ between machines. A star in a table marks the frontier: nothing in it is both
-faster and more exact.
+faster and more exact. A plus after a commit: the code that ran had changes that this commit does not hold.
 """
 
 
