@@ -68,7 +68,7 @@ def unexplained(
         "little to be the reason (as drawn: its table is below). Of the inputs only the circuit was varied, and its "
         f"stiffness is assumed: without it a level becomes up to {moved[most]:.2g} times what it was ({most}). "
         "Without the circuit Layer 1 fills the space between motor and cap; when that space was left empty, "
-        "encapsulating E10/D10 had 0.573. Not "
+        "the closed E10/D10 had 0.573. Not "
         "varied: the motor's axis and the sideways force of a flat ERM, the contact (bonded here), the phantom, what "
         "the measured amplitudes were divided by, the small-strain moduli and damping of the silicones, the air gap "
         "beside the motor, the rigid motor, the tail and its slot (the finite elements are axisymmetric). Any could be "
