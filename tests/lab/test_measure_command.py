@@ -159,7 +159,10 @@ def test_a_faulty_record_is_a_finding(code: str, tmp_path: Path, monkeypatch: py
     motor = repeats(tmp_path, "m", 300, 122)
     chain = '[chain]\nuse = ["line", "paper"]\n' if code == "L106" else ""
     edges = '["e0.wav", "e1.wav", "e2.wav"]'
-    motor = edges if code in ("L101", "L102", "L105", "L106", "L111") else motor
+    if code in ("L101", "L102", "L105", "L106", "L111"):
+        for i in range(3):
+            write(tmp_path / f"n{i}.wav", x + 1e-4 * (i + 3), rate=rate)
+        motor = edges.replace("e", "n")
     (tmp_path / "c.toml").write_text(
         f'name = "t"\n{head}{chain}[[unit]]\nname = "a"\nreference = {motor}\nedge = {edges}\n'
     )
@@ -174,8 +177,8 @@ def test_a_faulty_record_is_a_finding(code: str, tmp_path: Path, monkeypatch: py
 
 def test_an_uneven_time_axis_and_disagreeing_repeats(tmp_path: Path) -> None:
     time = np.arange(4000) / RATE
-    for i in range(6):
-        x = (300.0 if i < 3 else 100.0 * 1.4**i) * np.cos(2 * np.pi * 120 * time)
+    for i in range(7):
+        x = (300.0 + 0.1 * i if i < 3 or i == 6 else 100.0 * 1.4**i) * np.cos(2 * np.pi * 120 * time)
         stamps = np.where(time > 1, time + 0.003, time) if i == 0 else time
         rows = "\n".join(f"{t:.4f}\t{v:.5f}" for t, v in zip(stamps, x, strict=True))
         (tmp_path / f"{i}.txt").write_text(f"t (s)\tu (um)\n{rows}\n")
@@ -184,7 +187,7 @@ def test_an_uneven_time_axis_and_disagreeing_repeats(tmp_path: Path) -> None:
     codes = {(one.code, one.where) for one in campaign(tmp_path, text, head).findings}
     assert ("L103", "0.txt") in codes
     assert ("L112", "a, edge") in codes
-    text = text.replace('"0.txt", ', '"1.txt", ')
+    text = text.replace('"0.txt", ', '"6.txt", ')
     codes = {one.code for one in campaign(tmp_path, text, head).findings}
     assert codes == {"L109"}
 
@@ -195,19 +198,20 @@ def test_an_uneven_time_axis_and_disagreeing_repeats(tmp_path: Path) -> None:
         ('[[unit]]\nname = "a"\nedge = ["x.csv"]\n', "unit.0.reference"),
         ('[[unit]]\nname = "a"\nreference = ["x.csv"]\n', "unit.0.edge"),
         ('[[unit]]\nname = "a"\nreference = ["y.csv"]\nedge = ["x.csv"]\n', "unit.0.reference.0"),
-        ('[[unit]]\nname = "a"\nreference = ["x.csv"]\nedge = ["x.csv"]\nspecs = "e"\n', "unit.0.specs"),
-        ('[[unit]]\nname = "a"\nreference = ["x.csv"]\nedge = ["x.csv"]\n', "recording.rate_hz"),
+        ('[[unit]]\nname = "a"\nreference = ["w.csv"]\nedge = ["x.csv"]\nspecs = "e"\n', "unit.0.specs"),
+        ('[[unit]]\nname = "a"\nreference = ["w.csv"]\nedge = ["x.csv"]\n', "recording.rate_hz"),
         ('[recording]\nrate_hz = 2000.0\n[[unit]]\nname = "a"\nreference = ["t.csv"]\nedge = ["x.csv"]\n',
          "recording.channel"),
         ('[recording]\ntime_column = 1\n[[unit]]\nname = "a"\nreference = ["n.csv"]\nedge = ["x.csv"]\n',
          "recording.time_unit"),
         ('[recording]\nrate_hz = 2000.0\n[[unit]]\nname = "a"\nreference = ["v.csv"]\nedge = ["x.csv"]\n',
          "sensor.unit"),
-        ('[chain]\nband_hz = [200.0, 100.0]\n[[unit]]\nname = "a"\nreference = ["x.csv"]\nedge = ["x.csv"]\n',
+        ('[chain]\nband_hz = [200.0, 100.0]\n[[unit]]\nname = "a"\nreference = ["w.csv"]\nedge = ["x.csv"]\n',
          "chain.band_hz"),
     ],
 )  # fmt: skip
 def test_what_is_not_known_is_asked_for(text: str, field: str, tmp_path: Path) -> None:
+    (tmp_path / "w.csv").write_text("u\n" + "1.5\n0.5\n" * 50)
     (tmp_path / "x.csv").write_text("u\n" + "0.5\n1.5\n" * 50)
     (tmp_path / "t.csv").write_text("u,v\n" + "0.5,2.5\n1.5,1.5\n" * 50)
     (tmp_path / "n.csv").write_text("n,v\n" + "\n".join(f"{i}.5,{i % 7}.5" for i in range(99)) + "\n")

@@ -9,7 +9,7 @@ import msgspec
 from msgspec import Meta
 
 from unitcad.errors import Refusal
-from unitcad.lab.quantities import Quantity
+from unitcad.lab.quantities import Quantity, to_si
 from unitcad.spec.asked import Table
 from unitcad.spec.convert import convert
 from unitcad.spec.toml import read_toml
@@ -99,6 +99,12 @@ def read_campaign(path: Path) -> Campaign:
     campaign = convert(read_toml(path), Campaign)
     if campaign.chain.band_hz[0] >= campaign.chain.band_hz[1]:
         raise Refusal("chain.band_hz", list(campaign.chain.band_hz), "must rise", [60.0, 250.0])
+    use = campaign.chain.use
+    if len(set(use)) < len(use):
+        raise Refusal("chain.use", list(use), "has a chain twice", list(dict.fromkeys(use)))
+    to_si(campaign.sensor.unit, campaign.sensor.quantity, "sensor.unit")
+    if campaign.motor_sensor is not None:
+        to_si(campaign.motor_sensor.unit, campaign.motor_sensor.quantity, "motor_sensor.unit")
     names = [unit.name for unit in campaign.unit]
     for i, unit in enumerate(campaign.unit):
         field = f"unit.{i}"

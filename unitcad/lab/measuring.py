@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from unitcad import files
-from unitcad.errors import Refusal
 from unitcad.lab.campaign import Campaign, UnitTable
+from unitcad.lab.campaign_files import check_files, file_of, source_files
 from unitcad.lab.chains.line import Mains
 from unitcad.lab.chains.paper import ASSUMED
 from unitcad.lab.lab_rules import LabFinding, found
@@ -59,7 +58,8 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
 
     Raises Refusal for a file that is not there or can't be read without a guess.
     """
-    blanks = [_file(folder, name, "blank.records") for name in (campaign.blank.records if campaign.blank else ())]
+    check_files(campaign, folder)
+    blanks = [file_of(folder, name, "blank.records") for name in (campaign.blank.records if campaign.blank else ())]
     blank = mains_of(blanks, campaign) if blanks else ()
     mains = Mains(campaign.chain.mains_hz, blank)
     paired = campaign.recording.motor_channel is not None
@@ -68,10 +68,8 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     findings: list[LabFinding] = []
     specs = {}
     for i, unit in enumerate(campaign.unit):
-        for key in ("spec", "cast"):
-            name = getattr(unit, key)
-            if name is not None and (Path(name).suffix or key == "cast"):
-                specs[name] = sha256(_file(folder, name, f"unit.{i}.{key}"))
+        for key, name in source_files(unit):
+            specs[name] = sha256(file_of(folder, name, f"unit.{i}.{key}"))
         one = _unit(unit, f"unit.{i}", campaign, folder, mains, say)
         records[unit.name] = tuple(one)
         findings += [finding for record in one for finding in record.findings]
@@ -87,12 +85,13 @@ def _unit(
     """Measure a unit's records: the motor's first, whose frequency the others' lines are looked for near."""
     motor_sensor = campaign.motor_sensor or campaign.sensor
     paired = campaign.recording.motor_channel is not None
+    own = mains if motor_sensor == campaign.sensor else Mains(campaign.chain.mains_hz)
     band = campaign.chain.band_hz
     out = []
     for i, name in enumerate(unit.reference):
         say(name)
-        path = _file(folder, name, f"{field}.reference.{i}")
-        out.append(measure_record(path, "reference", campaign, (motor_sensor,), mains, band, name))
+        path = file_of(folder, name, f"{field}.reference.{i}")
+        out.append(measure_record(path, "reference", campaign, (motor_sensor,), own, band, name))
     hertz = [record.frequency_hz for record in out if record.usable]
     if hertz:
         middle = float(np.median(hertz))
@@ -103,7 +102,7 @@ def _unit(
     for role, where, names in places:
         for i, name in enumerate(names):
             say(name)
-            path = _file(folder, name, f"{where}.{i}")
+            path = file_of(folder, name, f"{where}.{i}")
             out.append(measure_record(path, role, campaign, sensors, mains, band, name))
     return out
 
@@ -134,10 +133,3 @@ def _levels(
             if result.scatter > MOST_DISAGREEMENT:
                 findings.append(found("L109", where, f"by {chain}: logarithms scatter by {result.scatter:.2f}"))
     return levels, findings
-
-
-def _file(folder: Path, name: str, field: str) -> Path:
-    path = folder / name
-    if not path.is_file():
-        raise Refusal(field, name, f"no such file beside the campaign's ({files.seen_from(folder)})")
-    return path

@@ -91,38 +91,49 @@ def measure_record(
     """Return a record's figures by every chain of the campaign. Raises Refusal for what can't be read."""
     signal = open_signal(path, campaign.recording, sensors, shown)
     sections: list[_Section] = []
-    clipped, findings = float("inf"), []
-    silent: list[float] = []
+    findings: list[LabFinding] = []
+    clipped = [float("inf")] * len(sensors)
+    silent: list[tuple[float, str]] = []
     at_s = 0.0
     picture: Any = None
     for samples in signal.sections():
-        limit = None if sensors[0].full_scale is None else sensors[0].full_scale
-        one = _section(samples, signal, campaign, mains, band, limit)
+        one = _section(samples, signal, campaign, mains, band, sensors, shown)
         if picture is None:
             picture = _picture(samples[:, 0], signal.rate)
-        if one is not None:
+        if isinstance(one, _Section):
             sections.append(one)
-            clipped = min(clipped, one.fit.clipped, one.motor.clipped if one.motor else clipped)
+            parts = [one.fit.clipped, *([one.motor.clipped] if one.motor else [])]
         else:
-            clipped = min(clipped, _clipped(samples[:, 0]))
-            silent.append(at_s)
+            parts = [_clipped(channel) for channel in samples.T]
+            silent.append((at_s, one))
+        clipped = [min(pair) for pair in zip(clipped, parts, strict=True)]
         at_s += len(samples) / signal.rate
     if picture is None:
         picture = (np.empty(0),) * 4
     shared = (shown, sha256(path), role, signal.raw_rate, signal.count)
     if signal.off_grid > IRREGULAR:
         findings.append(found("L103", shown, f"a time lies {signal.off_grid:.2g} steps off an even grid"))
-    if clipped < np.inf:
-        severity = "error" if clipped < LOWEST else "warning"
-        findings.append(found("L101", shown, f"at about {clipped:.2f} of the amplitude", severity))
+    for part, where in zip(clipped, (shown, f"{shown}, motor"), strict=False):
+        if part < np.inf:
+            severity = "error" if part < LOWEST else "warning"
+            findings.append(found("L101", where, f"at about {part:.2f} of the amplitude", severity))
     if not sections:
-        findings.append(found("L111", shown, f"nothing between {band[0]:g} and {band[1]:g} Hz"))
+        where = silent[0][1] if silent else shown
+        findings.append(found("L111", where, f"nothing between {band[0]:g} and {band[1]:g} Hz"))
         return _without_line(shared, tuple(findings), picture)
-    fit = _together(sections)
-    findings += _line_findings(fit, signal, shown, campaign)
+    fit = _together([one.fit for one in sections], [one.count for one in sections])
+    findings += _line_findings(fit, signal, shown, mains)
+    motors = [one.motor for one in sections if one.motor]
+    shared_u = fit.u_mains / fit.amplitude
+    if motors:
+        motor = _together(motors, [one.count for one in sections])
+        unlike = ("L102", "L108")  # of the rate and the span, which are the same
+        judged = _line_findings(motor, signal, f"{shown}, motor", Mains(campaign.chain.mains_hz))
+        findings += [one for one in judged if one.code not in unlike]
+        shared_u = float(np.hypot(shared_u, motor.u_mains / motor.amplitude))
     if silent:
         count = len(sections) + len(silent)
-        message = f"{len(silent)} of {count} sections, the first from {silent[0]:.0f} s of {at_s:.0f} s"
+        message = f"{len(silent)} of {count} sections, the first from {silent[0][0]:.0f} s of {at_s:.0f} s"
         findings.append(found("L113", shown, message))
     factor = _displacement(sensors[0], fit.frequency_hz) / signal.gain(fit.frequency_hz)
     ratio, lag = _ratio(sections, sensors, fit.frequency_hz)
@@ -138,7 +149,7 @@ def measure_record(
         *shared,
         amplitude_um=fit.amplitude * factor,
         u_um=fit.u * factor,
-        shared=fit.u_mains / fit.amplitude,
+        shared=shared_u,
         frequency_hz=fit.frequency_hz,
         drift=fit.drift,
         snr=fit.snr,
@@ -173,18 +184,27 @@ def mains_of(paths: list[Path], campaign: Campaign) -> tuple[tuple[int, float], 
 
 
 def _section(
-    samples: Floats, signal: Signal, campaign: Campaign, mains: Mains, band: tuple[float, float], limit: float | None
-) -> _Section | None:
-    """Fit one section: the motor's channel first, where there is one, whose phase the other channel then has."""
+    samples: Floats,
+    signal: Signal,
+    campaign: Campaign,
+    mains: Mains,
+    band: tuple[float, float],
+    sensors: tuple[SensorTable, ...],
+    shown: str,
+) -> _Section | str:
+    """Fit one section: the motor's channel first, where there is one, whose phase the other channel then has.
+
+    Returns the channel that has no line, where one has none.
+    """
     motor = None
     if samples.shape[1] > 1:
-        motor = fit_line(samples[:, 1], signal.rate, band, Mains(campaign.chain.mains_hz))
-        if motor is None or motor.phase is None:
-            return None
+        motor = fit_line(samples[:, 1], signal.rate, band, Mains(campaign.chain.mains_hz), sensors[1].full_scale)
+        if motor is None or motor.phase is None or not motor.amplitude > 0:
+            return f"{shown}, motor"
     span = (motor.start_s, motor.end_s) if motor else None
-    fit = fit_line(samples[:, 0], signal.rate, band, mains, limit, motor.phase if motor else None, span)
+    fit = fit_line(samples[:, 0], signal.rate, band, mains, sensors[0].full_scale, motor.phase if motor else None, span)
     if fit is None or not fit.amplitude > 0:
-        return None
+        return shown
     paper: dict[str, float] = {}
     if "paper" in campaign.chain.use:
         found_here = _paper(campaign).amplitude(samples[:, 0], signal.rate)
@@ -211,12 +231,11 @@ def _over_motor(campaign: Campaign, frequency_hz: float) -> float:
     return _displacement(campaign.sensor, frequency_hz) / _displacement(motor, frequency_hz)
 
 
-def _together(sections: list[_Section]) -> LineFit:
-    """Return one fit for all sections: mean amplitude and frequency, the worst of what warns."""
-    fits = [section.fit for section in sections]
+def _together(fits: list[LineFit], counts: list[int]) -> LineFit:
+    """Return one fit for all sections of `counts` samples: mean amplitude and frequency, the worst of what warns."""
     if len(fits) == 1:
         return fits[0]
-    weights = np.array([section.count for section in sections], float)
+    weights = np.array(counts, float)
     weights /= weights.sum()
     amplitudes = np.array([fit.amplitude for fit in fits])
     hertz = np.array([fit.frequency_hz for fit in fits])
@@ -253,29 +272,29 @@ def _ratio(
     return abs(ratio), float(np.degrees(np.angle(ratio)))
 
 
-def _line_findings(fit: LineFit, signal: Signal, shown: str, campaign: Campaign) -> list[LabFinding]:
+def _line_findings(fit: LineFit, signal: Signal, where: str, mains: Mains) -> list[LabFinding]:
     """Return what is wrong with a line, in the order of the codes."""
     out = []
     hertz = fit.frequency_hz
     if signal.raw_rate < 4 * hertz:
-        out.append(found("L102", shown, f"{signal.raw_rate:g} Hz for a line at {hertz:.1f} Hz"))
+        out.append(found("L102", where, f"{signal.raw_rate:g} Hz for a line at {hertz:.1f} Hz"))
     if fit.lines:
         listed = ", ".join(f"{one.frequency_hz:.2f} Hz ({one.amplitude / fit.amplitude:.2f})" for one in fit.lines)
-        out.append(found("L104", shown, f"{len(fit.lines)} lines: {listed}"))
+        out.append(found("L104", where, f"{len(fit.lines)} lines: {listed}"))
     if fit.mains_hz:
-        known = "its part is in the uncertainty" if campaign.blank else "without a [blank] its part is not known"
-        out.append(found("L105", shown, f"{hertz:.2f} Hz beside {fit.mains_hz:g} Hz: {known}"))
+        known = "its part is in the uncertainty" if mains.blank else "without a [blank] its part is not known"
+        out.append(found("L105", where, f"{hertz:.2f} Hz beside {fit.mains_hz:g} Hz: {known}"))
     noise = np.sqrt(2 / max(0.2 * signal.rate, 1)) / fit.snr
     scatter = float(np.sqrt(max(fit.scatter**2 - noise**2, 0.0)))
     if not fit.lines and (scatter > MOST_SCATTER or fit.drift > MOST_DRIFT):
-        out.append(found("L107", shown, f"amplitude varies by {scatter:.1%}, frequency by {fit.drift:.1%}"))
+        out.append(found("L107", where, f"amplitude varies by {scatter:.1%}, frequency by {fit.drift:.1%}"))
     periods = (fit.end_s - fit.start_s) * hertz
     if periods < LEAST_PERIODS:
-        out.append(found("L108", shown, f"{periods:.0f} periods in the steady part"))
+        out.append(found("L108", where, f"{periods:.0f} periods in the steady part"))
     if fit.masked > MOST_MASKED:
-        out.append(found("L110", shown, f"{fit.masked:.0%} of the samples were left out"))
+        out.append(found("L110", where, f"{fit.masked:.0%} of the samples were left out"))
     if fit.amplitude < LEAST_OVER_U * fit.u:
-        out.append(found("L111", shown, f"the strongest has {fit.amplitude / fit.u:.1f} times its uncertainty"))
+        out.append(found("L111", where, f"the strongest has {fit.amplitude / fit.u:.1f} times its uncertainty"))
     return out
 
 

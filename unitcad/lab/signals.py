@@ -22,6 +22,8 @@ SECTION = 2**18
 """Samples that are fitted at a time: a longer record is fitted in sections."""
 IRREGULAR = 0.3
 """Steps by which a time may lie off an even grid."""
+SAME_RATE = 1e-3
+"""Part by which the campaign's rate may differ from the file's own."""
 HIGHEST_RATE = 5_000.0
 """Hz; records of more than twice this rate are averaged down to it."""
 
@@ -106,8 +108,6 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
     """
     recording = open_recording(path, Layout(table.delimiter, table.decimal, table.skip_lines))
     time = recording.time if table.time_column is None else recording.index(table.time_column, "recording.time_column")
-    if table.rate_hz is not None:
-        time = None
     wanted = [table.channel, table.motor_channel][: len(sensors)]
     columns = []
     for key, name in zip(("channel", "motor_channel"), wanted, strict=False):
@@ -120,6 +120,8 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
             raise Refusal(f"recording.{key}", None, f"is needed: {shown} has {len(others)} channels: {names}")
         columns.append(others[0])
     rate, scale = _rate(recording, table, time, columns[0], shown)
+    if table.rate_hz is not None:
+        time = None
     for column, sensor in zip(columns, sensors, strict=True):
         _expect_unit(recording, column, sensor, shown)
     scales = tuple(sensor.scale for sensor in sensors)
@@ -141,9 +143,27 @@ def sha256(path: Path) -> str:
 def _rate(
     recording: Recording, table: RecordingTable, time: int | None, column: int, shown: str
 ) -> tuple[float, float]:
-    """Return the rate in Hz, and the factor from the time column's unit to s."""
-    if table.rate_hz is not None:
+    """Return the rate in Hz, and the factor from the time column's unit to s.
+
+    Raises Refusal where the file says another rate than the campaign does.
+    """
+    if table.rate_hz is None:
+        return _own_rate(recording, table, time, column, shown)
+    try:
+        own, _ = _own_rate(recording, table, time, column, shown)
+    except Refusal:  # it says none that could be compared
         return table.rate_hz, 1.0
+    if abs(table.rate_hz / own - 1) > SAME_RATE:
+        says = "its header" if time is None else f"its column {recording.channels[time].name!r}"
+        limit = f"differs from {shown}, which has {own:.6g} Hz by {says}"
+        raise Refusal("recording.rate_hz", table.rate_hz, limit, float(f"{own:.9g}"))
+    return table.rate_hz, 1.0
+
+
+def _own_rate(
+    recording: Recording, table: RecordingTable, time: int | None, column: int, shown: str
+) -> tuple[float, float]:
+    """Return what the file says of its rate in Hz, and the factor from the time column's unit to s."""
     step = recording.channels[column].step_s
     if time is None:
         if step is None:

@@ -43,11 +43,7 @@ def open_recording(path: Path, layout: Layout | None = None) -> Recording:
     Raises Unreadable (a Refusal) for a file that can't be read without a guess, Missing without the library of its
     format, UnitcadError for a file that isn't there or is no regular one.
     """
-    ending = path.suffix.lower()
-    if ending in VENDOR:
-        raise Unreadable(str(path), ending, "Polytec's own format is read by Polytec's library alone: export UFF")
-    if ending not in by_ending():
-        raise Unreadable(str(path), ending, f"no reader; known endings: {', '.join((*by_ending(), *VENDOR))}", ".csv")
+    ending = expect_ending(path, str(path))
     first = _first_bytes(path)
     module = by_ending()[ending]
     if module == "matlab" and first.startswith((HDF5_MARK, b"MATLAB 7.3")):
@@ -56,6 +52,16 @@ def open_recording(path: Path, layout: Layout | None = None) -> Recording:
     with _refusing(path):
         recording = reader(path, layout or Layout())
     return replace(recording, read=lambda indices: _plausible(recording, indices))
+
+
+def expect_ending(path: Path, field: str) -> str:
+    """Return the ending of a file's name, in small letters. Raises Unreadable for one that no reader has."""
+    ending = path.suffix.lower()
+    if ending in VENDOR:
+        raise Unreadable(field, ending, "Polytec's own format is read by Polytec's library alone: export UFF")
+    if ending not in by_ending():
+        raise Unreadable(field, ending, f"no reader; known endings: {', '.join((*by_ending(), *VENDOR))}", ".csv")
+    return ending
 
 
 def _plausible(recording: Recording, indices: tuple[int, ...]) -> Iterator[Floats]:

@@ -1,0 +1,77 @@
+"""What a campaign names, checked before the first measurement: files, their endings, repeats, specs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from unitcad import files
+from unitcad.errors import Refusal, unknown_name
+from unitcad.lab.campaign import Campaign, UnitTable
+from unitcad.lab.readers.formats import expect_ending
+from unitcad.lab.signals import sha256
+
+
+def check_files(campaign: Campaign, folder: Path) -> None:
+    """Check every name of a campaign whose files lie in or below `folder`, and read no record for it.
+
+    Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice.
+    """
+    for i, name in enumerate(campaign.blank.records if campaign.blank else ()):
+        expect_ending(file_of(folder, name, f"blank.records.{i}"), f"blank.records.{i}")
+    for i, unit in enumerate(campaign.unit):
+        field = f"unit.{i}"
+        for key, name in source_files(unit):
+            file_of(folder, name, f"{field}.{key}")
+        if unit.spec is not None and not Path(unit.spec).suffix:
+            _expect_template(unit.spec, f"{field}.spec")
+        _expect_different(folder, list(_records(unit, field)))
+
+
+def source_files(unit: UnitTable) -> Iterator[tuple[str, str]]:
+    """Yield key and name of the files that tell what a unit is; a template is none."""
+    if unit.spec is not None and Path(unit.spec).suffix:
+        yield "spec", unit.spec
+    if unit.cast is not None:
+        yield "cast", unit.cast
+
+
+def file_of(folder: Path, name: str, field: str) -> Path:
+    """Return the path of a file that a campaign names. Raises Refusal where there is none."""
+    path = folder / name
+    if not path.is_file():
+        raise Refusal(field, name, f"no such file beside the campaign's ({files.seen_from(folder)})")
+    return path
+
+
+def _records(unit: UnitTable, field: str) -> Iterator[tuple[str, str]]:
+    places = [(f"{field}.reference", unit.reference), (f"{field}.edge", unit.edge)]
+    places += [(f"{field}.point.{k}.records", point.records) for k, point in enumerate(unit.point)]
+    for where, names in places:
+        for i, name in enumerate(names):
+            yield f"{where}.{i}", name
+
+
+def _expect_different(folder: Path, records: list[tuple[str, str]]) -> None:
+    """Refuse a record that stands twice in one unit: by its path, or by its bytes where the sizes are the same."""
+    paths = [(field, name, file_of(folder, name, field)) for field, name in records]
+    for field, _, path in paths:
+        expect_ending(path, field)
+    sizes = [path.stat().st_size for _, _, path in paths]
+    seen: dict[str, str] = {}
+    for (field, name, path), size in zip(paths, sizes, strict=True):
+        keys = [str(path.resolve())]
+        if sizes.count(size) > 1:
+            keys.append(sha256(path))
+        for key in keys:
+            if key in seen:
+                raise Refusal(field, name, f"is the record of {seen[key]} again; a repeat is a recording of its own")
+            seen[key] = field
+
+
+def _expect_template(name: str, field: str) -> None:
+    from unitcad.validation import custom_templates, templates
+
+    known = templates() | custom_templates()
+    if name not in known:
+        raise unknown_name(field, name, known)
