@@ -1,6 +1,6 @@
 """Writes docs/mechanics.json: the nine units by finite elements, at nominal values and over seeded draws.
 
-python docs/make_mechanics.py [DRAWS]    about two seconds a draw; then run make_model.py for the tables
+python docs/make_mechanics.py [DRAWS]    some three seconds a draw, 24 levels; then run make_model.py for the tables
 """
 
 from __future__ import annotations

@@ -101,7 +101,7 @@ def _error_against_time(finenesses: tuple[float, ...], say: Say) -> tuple[Table,
                 series.setdefault(name, []).append((times[n].median, float(errors.max())))
     table = Table(
         "Levels by fineness of the mesh",
-        ("unit, drive", "fineness", "unknowns", "time", "skin", "own edge", "error", "error"),
+        ("unit, drive", "fineness", "unknowns", "time", "skin", "own edge", "error, skin", "error, own edge"),
         tuple(rows),
         "Bonded, nominal values, the circuit as drawn. A level is the amplitude along the drive over the motor's. Both "
         "readings come from one solution. Errors are against the two finest meshes, extrapolated at first order, which "
