@@ -53,7 +53,7 @@ def test_the_tables_of_an_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
         terminal.truncate()
         print_estimate(estimate_spec(spec))
         assert f"{name}\x1b[0m: encapsulating, {name} / " in terminal.getvalue()
-        assert f"over {name}" in terminal.getvalue()
+        assert f"all-{name} unit" in terminal.getvalue()
         print_frequencies(frequency_table_of_spec(spec, [100.0, 125.0]))
         assert f"{name}: edge level" in terminal.getvalue()
 

@@ -87,8 +87,7 @@ def neighbours_of_specs(specs: Sequence[Spec], pitch_mm: float, frequencies_hz: 
     At the first unit's frequency where none are given. Raises `Refusal` as `attenuation.receivers.neighbours_block`.
     """
     variants = [estimate_input(spec) for spec in specs]
-    frequencies = frequencies_hz or [variants[0].frequency.middle]
-    return rounded(neighbours_block(variants, pitch_mm * 1e-3, frequencies))
+    return rounded(neighbours_block(variants, pitch_mm * 1e-3, frequencies_hz))
 
 
 def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInput:

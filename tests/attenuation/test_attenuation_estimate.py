@@ -262,7 +262,33 @@ def test_command_for_a_person():
         assert word in shown
     assert "validated" not in shown
     assert "30 mm" in run("encapsulating", "--frequency", "100:150:50").stdout
-    assert "null" in run("embedded", "--set", "layers.0.material=ecoflex-00-50").stdout
+    assert "not known" in run("embedded", "--set", "layers.0.material=ecoflex-00-50").stdout
+
+
+def test_the_tables_of_a_person(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    shown = run("encapsulating", "embedded").stdout
+    assert shown.count("error against the table") == 1
+    assert shown.index("chosen among") > shown.index("embedded: embedded")
+    assert shown.index("|u| of the skin") < shown.index("changes the edge level by")
+    for word in ("equation 6", "eta read as"):
+        assert word not in shown
+        for asked in (("--details",), ("--model", "paper"), ("--model", "all")):
+            assert word.split()[0] in run("encapsulating", *asked).stdout
+    table = run("encapsulating", "--frequency", "100:150:50").stdout
+    for word in ("consistent", "flat", "axial", "mm from the edge", "edge level, %"):
+        assert word in " ".join(table.split())
+    assert "…" not in table + shown
+
+
+def test_a_table_over_frequencies_has_both_drives():
+    for drive in ("flat", "axial"):
+        row = frequency_table_of_spec(load("encapsulating", [f"motor.drive={drive}"]), [125.0])["frequencies"][0]
+        assert row["u_over_edge"] == row[f"{drive}_over_edge"]
+        curve = estimate_spec(load("encapsulating"), ("fitted",), 125.0)["layered"]
+        at = curve["r_mm"].index(10.0)
+        expected = curve["drives"][drive]["u"]["value"][at]
+        assert row[f"{drive}_over_edge"]["at_10_mm"] == pytest.approx(expected, rel=5e-3)
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,14 @@
 """Units side by side: reciprocity, power, closed forms, an independent solve, and figures that were once measured."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from unitcad.attenuation import HalfSpace, LayeredMedium, Point, UniformDisc
-from unitcad.attenuation.inputs import body
+from unitcad.attenuation.inputs import Quantity, body
 from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, neighbours_block, unit_mass
 from unitcad.cli import app
 from unitcad.designs import unit_bodies
@@ -149,6 +150,18 @@ def test_neighbours_refuse_what_can_not_stand_side_by_side() -> None:
     assert (refused.value.field, refused.value.nearest) == ("estimate.tissue", "forearm")
 
 
+def test_the_range_holds_a_softer_body_and_another_frequency() -> None:
+    """The ends of one kind, computed as nominal values of another unit."""
+    row = neighbours_block([UNIT, UNIT], 0.016)["transfer"][0]["with_masses"]
+    soft = tuple(replace(layer, shear_modulus=Quantity(layer.shear_modulus.ends[0])) for layer in UNIT.tissue)
+    for other in (replace(UNIT, tissue=soft), replace(UNIT, frequency=Quantity(UNIT.frequency.ends[1]))):
+        value = neighbours_block([other, other], 0.016)["transfer"][0]["with_masses"]["value"]
+        assert row["low"] * 0.998 <= value <= row["high"] * 1.002
+    fixed = neighbours_block([UNIT, UNIT], 0.016, [UNIT.frequency.middle])["transfer"][0]["with_masses"]
+    assert fixed["value"] == row["value"]
+    assert row["high"] - row["low"] > fixed["high"] - fixed["low"]
+
+
 def test_command_gives_the_neighbours() -> None:
     pair = ["estimate", "encapsulating", "encapsulating", "--model", "fitted"]
     done = CliRunner().invoke(app, [*pair, "--pitch", "16", "--frequency", "100:300:200", "--json"])
@@ -158,8 +171,9 @@ def test_command_gives_the_neighbours() -> None:
         assert row["masses_change_it_by"] == pytest.approx(row["with_masses"]["value"] / row["on_bare_skin"], rel=1e-6)
         assert row["with_masses"]["low"] <= row["with_masses"]["value"] <= row["with_masses"]["high"]
     shown = CliRunner().invoke(app, [*pair, "--pitch", "16"]).stdout
-    assert "on bare skin" in shown
-    for pitch, nearest in (("10", 14), ("1000", 200)):
+    assert shown.index("on bare skin") < shown.index("edge level")
+    assert "one kind at a time" in shown
+    for pitch, nearest in (("10", 14), ("1000", 200), ("nan", 14), ("-inf", 14)):
         refused = CliRunner().invoke(app, [*pair, "--pitch", pitch, "--json"])
         assert isinstance(refused.exception, Refusal)
         assert refused.exception.nearest == nearest

@@ -87,15 +87,15 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
 
 
 def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float, ...]) -> dict[str, list[float]]:
-    """Return `u`, |u| under the motor's drive, and `u_z`, |u_z| under an axial one, each over its value at the edge.
+    """Return |u| under a `flat` and an `axial` drive and, `u`, the motor's; `u_z`: |u_z| under an axial one.
 
-    At distances (mm) from the edge and one frequency (Hz), nominal body.
+    Each over its value at the edge, at distances (mm) from the edge and one frequency (Hz), nominal body.
     """
     r = variant.diameter / 2.0 + 1e-3 * np.array([0.0, *distances_mm])
     at = replace(variant, frequency=Quantity(frequency))
     axial = _response(at, "axial", r, {}, _SPREAD_RTOL)
-    own = axial if variant.drive == "axial" else _response(at, variant.drive, r, {}, _SPREAD_RTOL)
-    parts = {"u": _size(own), "u_z": np.abs(axial.u_z)}
+    sizes = {"flat": _size(_response(at, "flat", r, {}, _SPREAD_RTOL)), "axial": _size(axial)}
+    parts = {"u": sizes[variant.drive], **sizes, "u_z": np.abs(axial.u_z)}
     return {name: [float(v) for v in part[1:] / part[0]] for name, part in parts.items()}
 
 

@@ -24,6 +24,10 @@ from unitcad.errors import Refusal
 FORCES: dict[Drive, tuple[complex, complex, complex]] = {"flat": (1.0, -1.0j, 0.0), "axial": (0.0, 0.0, 1.0)}
 """A newton along x, y and z: one that turns in the plane of the skin, and one along the axis."""
 MOST_PITCH_MM = 200.0
+RANGE = (
+    "least and largest as masses, the body's moduli, damping and thicknesses and, unless it is asked for, the frequency "
+    "go to either end of their ranges, one kind at a time"
+)
 ASSUMPTIONS = [
     "Each unit is a mass on the disc of skin under it, which it loads by a uniform traction; it does not turn or bend.",
     "A unit's mass is its silicone's and its motor's, the motor's assumed where its entry gives none; the circuit's is "
@@ -99,33 +103,40 @@ def unit_mass(variant: EstimateInput) -> Quantity:
     return Quantity(silicone + motor.middle, silicone + low, silicone + high, motor.note)
 
 
-def neighbours_block(variants: Sequence[EstimateInput], pitch: float, frequencies: Sequence[float]) -> dict[str, Any]:
+def neighbours_block(
+    variants: Sequence[EstimateInput], pitch: float, frequencies: Sequence[float] = ()
+) -> dict[str, Any]:
     """Return the estimate's `neighbours`: units in a row, `pitch` (m) apart, and how far the first moves the others.
 
-    For each frequency (Hz) and each other unit: |u| over that of the first, on bare skin and with the units' masses.
+    For each frequency (Hz; none: the first unit's, with its range) and each other unit: |u| over that of the first, on
+    bare skin and with the units' masses. low and high: `RANGE`.
     Raises `Refusal` for fewer than two units, for units that overlap and for units on different bodies.
     """
     _check(variants, pitch)
     first = variants[0]
     masses = [unit_mass(variant) for variant in variants]
-    medium = body(first.tissue)
     radii = [variant.diameter / 2.0 for variant in variants]
     forces = np.zeros((len(variants), 3), dtype=np.complex128)
     forces[0] = FORCES[first.drive]
     rows = []
-    for hertz in frequencies:
+    patches = [Patch(i * pitch, 0.0, radius, 0.0) for i, radius in enumerate(radii)]
+    middle, *mass_ends = [[m.middle for m in masses], *([m.ends[end] for m in masses] for end in (0, 1))]
+
+    def transfer(hertz: float, end: dict[str, int], *cases: list[float]) -> list[np.ndarray]:
         omega = 2.0 * np.pi * hertz
-        g = influence(medium, [Patch(i * pitch, 0.0, radius, 0.0) for i, radius in enumerate(radii)], omega)
-        cases = (
-            [0.0] * len(masses),
-            [m.middle for m in masses],
-            [m.ends[0] for m in masses],
-            [m.ends[1] for m in masses],
-        )
+        g = influence(body(first.tissue, end), patches, omega, 1e-3 if end else 1e-4)
         sizes = [np.linalg.norm(motion(g, case, forces, omega), axis=1) for case in cases]
-        bare, *loaded = [size / size[0] for size in sizes]
+        return [size / size[0] for size in sizes]
+
+    varied = [{kind: end} for kind in ("moduli", "damping", "thicknesses") for end in (0, 1)]
+    none = [0.0] * len(masses)
+    for frequency in [Quantity(hertz) for hertz in frequencies] or [first.frequency]:
+        hertz = frequency.middle
+        bare, loaded, *others = transfer(hertz, {}, none, middle, *mass_ends)
+        others += [transfer(hertz, end, middle)[0] for end in varied]
+        others += [transfer(end, {}, middle)[0] for end in set(frequency.ends) - {hertz}]
         for i in range(1, len(variants)):
-            value, *ends = [float(one[i]) for one in loaded]
+            value, *ends = [float(one[i]) for one in (loaded, *others)]
             rows.append(
                 {
                     "frequency_hz": hertz,
@@ -138,6 +149,7 @@ def neighbours_block(variants: Sequence[EstimateInput], pitch: float, frequencie
             )
     return {
         "what": "|u| of a unit over that of the first, which drives; |u| as in `layered.u_is`",
+        "range": RANGE,
         "pitch_mm": pitch * 1e3,
         "drive": first.drive,
         "tissue": first.tissue_name,
@@ -159,8 +171,11 @@ def _check(variants: Sequence[EstimateInput], pitch: float) -> None:
         raise Refusal("--pitch", mm, "needs two units or more; a spec may be named twice")
     least = max(a.diameter + b.diameter for a, b in pairwise(variants)) * 500.0
     if not least * (1.0 - 1e-9) <= mm <= MOST_PITCH_MM:
-        nearest = least if mm < least else MOST_PITCH_MM
-        raise Refusal("--pitch", mm, f"must be from {least:g} mm, where units touch, to {MOST_PITCH_MM:g} mm", nearest)
+        nearest = MOST_PITCH_MM if mm > MOST_PITCH_MM else least
+        value = mm if np.isfinite(mm) else str(mm)
+        raise Refusal(
+            "--pitch", value, f"must be from {least:g} mm, where units touch, to {MOST_PITCH_MM:g} mm", nearest
+        )
     for variant in variants:
         if variant.tissue != variants[0].tissue:
             limit = f"units side by side are on one body, {variants[0].tissue_name}"

@@ -33,6 +33,9 @@ def estimate(
     ] = None,
     fit: Fit = None,
     sets: Sets = None,
+    details: Annotated[
+        bool, typer.Option("--details", help="the paper's constraints and its readings of eta too")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Estimate the vibration at the unit's edge.
@@ -62,12 +65,17 @@ def estimate(
     if as_json:
         print_json(estimates[0] if len(estimates) == 1 else {"estimates": estimates, **beside})
         return
-    from unitcad.cli.estimate_tables import print_estimate, print_frequencies, print_neighbours
+    from unitcad.cli.estimate_tables import print_errors, print_estimate, print_frequencies, print_neighbours
 
-    for one in estimates:
-        (print_frequencies if ":" in frequency else print_estimate)(one)
     for block in beside.values():
         print_neighbours(block)
+    if ":" in frequency:
+        for one in estimates:
+            print_frequencies(one)
+        return
+    for one in estimates:
+        print_estimate(one, details or model in ("paper", "all"))
+    print_errors(estimates[0]["table_error"])
 
 
 def _warn_of_moulds(spec: Spec) -> None:

@@ -10,19 +10,25 @@ from rich.text import Text
 from unitcad.cli.output import console
 
 
-def print_estimate(data: dict[str, Any]) -> None:
-    """Print the models side by side, the paper's constraints, the layered curve, what is assumed."""
+def print_estimate(data: dict[str, Any], details: bool = False) -> None:
+    """Print the models side by side, the layered curve, the inputs that count, what is assumed.
+
+    `details`: the paper's constraints and readings too.
+    """
     screen = console()
     variant = data["variant"]
     layers = " / ".join(layer["material"] for layer in variant["layers"])
     rest = f": {variant['design']}, {layers}, {level(variant['frequency_hz'], digits=4)} Hz"
     screen.print(Text.assemble((variant["name"], "bold"), rest))
+    besides = _besides(data)
     if data["models"]:
         screen.print(_models(data))
         if "fit" in data:
-            screen.print(_fit_line(data["fit"]), soft_wrap=True)
-        for line in _besides(data):
-            screen.print(f"  {line}", soft_wrap=True)
+            besides = [_fit_line(data["fit"]).strip(), *besides]
+    for line in [*besides, *_reasons(data)]:
+        screen.print(f"  {line}", soft_wrap=True)
+    screen.print(_curve(data["layered"]))
+    screen.print(f"  {data['layered']['u_is']}", soft_wrap=True)
     if "mechanics" in data:
         if data["mechanics"]["levels"]:
             screen.print(_mechanics(data["mechanics"]))
@@ -31,42 +37,50 @@ def print_estimate(data: dict[str, Any]) -> None:
     inputs = _inputs(data)
     if inputs:
         screen.print(inputs)
-    screen.print(_errors(data))
-    screen.print(_choice(data["table_error"]["chosen_without"]), soft_wrap=True)
-    for reason in _reasons(data):
-        screen.print(f"  {reason}", soft_wrap=True)
-    paper = data["models"].get("paper", {})
+    paper = data["models"].get("paper", {}) if details else {}
     if paper.get("constraints"):
         screen.print(_constraints(paper["constraints"]))
     if paper.get("readings") and paper["readings"][0]["hierarchical_over_control"]:
         screen.print(_readings(paper["readings"]))
-    screen.print(_curve(data["layered"]))
-    screen.print(f"  {data['layered']['u_is']}", soft_wrap=True)
-    screen.print(
-        f"  no hierarchical / control from the layers: {data['layered']['hierarchical_over_control_reason']}",
-        soft_wrap=True,
-    )
-    for line in data["assumptions"]:
-        if line not in _besides(data):
+    no_ratio = data["layered"]["hierarchical_over_control_reason"]
+    for line in [f"no hierarchical / control from the layers: {no_ratio}", *data["assumptions"]]:
+        if line not in besides:
             screen.print(f"  {line}", soft_wrap=True)
 
 
+def print_errors(errors: dict[str, Any]) -> None:
+    """Print what is the same for every spec: the models' errors against the measured table."""
+    screen = console()
+    screen.print(_errors(errors))
+    screen.print(_choice(errors["chosen_without"]), soft_wrap=True)
+
+
 def print_frequencies(data: dict[str, Any]) -> None:
-    """Print a row per frequency: edge level by model, decay of the skin's motion by distance."""
-    rows = data["frequencies"]
-    decay = f"|u| over its value at the edge, {data['variant']['motor_drive']} drive"
-    table = Table("Hz", title=f"{data['variant']['name']}: edge level (motor = 1); {decay}")
+    """Print a row per frequency: edge level by model; decay of the skin's motion by drive and distance."""
+    rows, screen, name = data["frequencies"], console(), data["variant"]["name"]
+    levels = Table("Hz", title=f"{name}: edge level, % of the motor's amplitude")
     for model in rows[0]["edge_level"]:
-        table.add_column(model)
-    for name in rows[0]["u_over_edge"]:
-        table.add_column(name.removeprefix("at_").replace("_", " "))
+        levels.add_column(model)
     for row in rows:
-        decay = [f"{value:.3g}" for value in row["u_over_edge"].values()]
-        table.add_row(f"{row['frequency_hz']:g}", *[level(one) for one in row["edge_level"].values()], *decay)
-    console().print(table)
+        levels.add_row(f"{row['frequency_hz']:g}", *[level(one, 100) for one in row["edge_level"].values()])
+    own = data["variant"]["motor_drive"]
+    drives = (own, "axial" if own == "flat" else "flat")
+    title = f"{name}: |u| of the skin, % of that at the edge, by mm from the edge; the motor's drive ({own}) first"
+    decay = Table("Hz", title=title)
+    for drive in drives:
+        for place in rows[0][f"{drive}_over_edge"]:
+            decay.add_column(f"{drive}\n{place.removeprefix('at_').replace('_', ' ')}")
+    for row in rows:
+        shown = [f"{100 * one:.3g}" for drive in drives for one in row[f"{drive}_over_edge"].values()]
+        decay.add_row(f"{row['frequency_hz']:g}", *shown)
+    if rows[0]["edge_level"]:
+        screen.print(levels)
     if "fit" in data:
         fit = data["fit"]
-        console().print(f"  fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]})", soft_wrap=True)
+        screen.print(f"  fit {fit['name']} ({fit['file']}, SHA-256 {fit['sha256'][:12]})", soft_wrap=True)
+    screen.print(decay)
+    if data["assumptions"][0].startswith("bush"):
+        screen.print(f"  {data['assumptions'][0]}", soft_wrap=True)
 
 
 def _mechanics(block: dict[str, Any]) -> Table:
@@ -111,6 +125,7 @@ def print_neighbours(data: dict[str, Any]) -> None:
     screen = console()
     screen.print(table)
     screen.print(f"  masses: {masses}", soft_wrap=True)
+    screen.print(f"  range: {data['range']}", soft_wrap=True)
     for line in data["assumptions"]:
         screen.print(f"  {line}", soft_wrap=True)
 
@@ -122,7 +137,7 @@ def _models(data: dict[str, Any]) -> Table:
     controls = [one["control"] for one in next(iter(blocks.values()))["hierarchical_over_control"] or []]
     fitted = data.get("fit")
     ranges = ["P10 to P90"] if fitted else []
-    table = Table("model", "edge level %", *ranges, *[f"over {name}" for name in controls])
+    table = Table("model", "edge level %", *ranges, *[f"level over that of an all-{name} unit" for name in controls])
     for name, block in blocks.items():
         ratios = [level(one) for one in block["hierarchical_over_control"] or []]
         spread = [_predicted(block["predictive"])] if fitted else []
@@ -155,9 +170,8 @@ def _besides(data: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _errors(data: dict[str, Any]) -> Table:
+def _errors(errors: dict[str, Any]) -> Table:
     """Tabulate each model's error against the measured values, the best one with a unit left out first."""
-    errors = data["table_error"]
     best = errors["order"][0]
     table = Table("model", "levels", "unit left out", f"p ({best})", "ratios", "directions", title=_ERRORS)
     for name in errors["order"]:
@@ -228,7 +242,7 @@ def _constraints(rows: list[dict[str, Any]]) -> Table:
     table.add_column("holds")
     for row in rows:
         numbers = [_ranged(row, key) for key in ("left", "right", "margin")]
-        holds = {True: "yes", False: "no", None: row.get("reason", "null")}[row["holds"]]
+        holds = {True: "yes", False: "no", None: row.get("reason", "not known")}[row["holds"]]
         what = row["text"].replace("control", row["control"] or "")
         table.add_row(row["equation"][-1], what, numbers[0], row["relation"], *numbers[1:], row["unit"], holds)
     return table
@@ -237,7 +251,12 @@ def _constraints(rows: list[dict[str, Any]]) -> Table:
 def _readings(rows: list[dict[str, Any]]) -> Table:
     """Tabulate every reading of the paper's eta: the exponents along the walls, and the ratio that it leads to."""
     controls = [one["control"] for one in rows[0]["hierarchical_over_control"]]
-    table = Table("eta read as", "exponents, S wave", "their unit", *[f"over {name}" for name in controls])
+    table = Table(
+        "eta read as",
+        "exponents, S wave",
+        "their unit",
+        *[f"level over that of an all-{name} unit" for name in controls],
+    )
     table.title = "the paper's model by reading of eta"
     for row in rows:
         key = "exponents_s_wave"
@@ -253,7 +272,7 @@ def _ranged(row: dict[str, Any], key: str) -> str:
     low, high = row.get(f"{key}_low"), row.get(f"{key}_high")
     if row[key] is not None:
         return f"{row[key]:.3g}"
-    return "null" if low is None or high is None else f"{low:.3g} to {high:.3g}"
+    return "not known" if low is None or high is None else f"{low:.3g} to {high:.3g}"
 
 
 def _curve(layered: dict[str, Any]) -> Table:
@@ -281,7 +300,7 @@ def level(quantity: dict[str, Any] | None, factor: float = 1.0, digits: int = 3)
     spread = f"{low} to {high}" if low and high and low != high else ""
     if value:
         return f"{value} ({spread})" if spread else value
-    return spread or "null"
+    return spread or "not known"
 
 
 _PARTS = ("value", "low", "high")

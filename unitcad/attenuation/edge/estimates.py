@@ -135,7 +135,8 @@ def frequency_table(
 ) -> dict[str, Any]:
     """Return {variant, frequencies}: per frequency (Hz) each model's edge level and the decay at `DECAY_AT_MM`.
 
-    `u_over_edge`: of |u| under the motor's drive; `u_z_over_edge`: of |u_z| under an axial one.
+    `flat_over_edge`, `axial_over_edge`: of |u| under either drive; `u_over_edge`: under the motor's;
+    `u_z_over_edge`: of |u_z| under an axial one.
     """
     rows, places = [], [f"at_{d:g}_mm" for d in DECAY_AT_MM]
     models = sorted(models, key=in_order(assessments()).index)
