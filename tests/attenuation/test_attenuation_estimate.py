@@ -310,6 +310,14 @@ def test_refusals_exit_2_in_one_line(arguments):
     assert len(done.stderr.splitlines()) == 1
 
 
+@pytest.mark.parametrize("model", ["crossings", "layered", "null"])
+def test_a_model_that_gives_no_estimate_is_refused_with_those_that_do(model):
+    refused = run("encapsulating", "--model", model).exception
+    assert isinstance(refused, Refusal)
+    for name in ("bush", "fitted", "paper", "consistent", "mechanics", "all"):
+        assert name in refused.limit
+
+
 def test_estimate_loads_no_cad_and_no_optimiser():
     code = (
         "import sys; from unitcad.validation import load; from unitcad.estimating import estimate_spec; "

@@ -25,8 +25,8 @@ FORCES: dict[Drive, tuple[complex, complex, complex]] = {"flat": (1.0, -1.0j, 0.
 """A newton along x, y and z: one that turns in the plane of the skin, and one along the axis."""
 MOST_PITCH_MM = 200.0
 RANGE = (
-    "least and largest as masses, the body's moduli, damping and thicknesses and, unless it is asked for, the frequency "
-    "go to either end of their ranges, one kind at a time"
+    "least and largest as masses, the body's moduli, damping and thicknesses and, unless it is asked for, the "
+    "frequency go to either end of their ranges, one kind at a time"
 )
 ASSUMPTIONS = [
     "Each unit is a mass on the disc of skin under it, which it loads by a uniform traction; it does not turn or bend.",

@@ -9,7 +9,7 @@ import typer
 
 from unitcad.cli.output import print_json, progress, warn
 from unitcad.cli.shared_options import AsJson, Fit, Sets, with_fit
-from unitcad.errors import Refusal, unknown_name
+from unitcad.errors import Refusal
 
 if TYPE_CHECKING:
     from unitcad.spec import Spec
@@ -48,7 +48,7 @@ def estimate(
     from unitcad.validation import load
 
     if model not in ("", "all", *MODELS, MECHANICS):
-        raise unknown_name("--model", model, (*MODELS, MECHANICS, "all"))
+        raise Refusal("--model", model, f"is none of {', '.join((*MODELS, MECHANICS, 'all'))}", MODELS[0])
     if ":" in frequency and model == MECHANICS:
         raise Refusal("--frequency", frequency, "must be one frequency for mechanics, whose draws cost seconds each")
     models = None if not model else MODELS if model == "all" else (model,)

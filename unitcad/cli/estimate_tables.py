@@ -36,7 +36,9 @@ def print_estimate(data: dict[str, Any], details: bool = False) -> None:
             screen.print(f"  {line}", soft_wrap=True)
     inputs = _inputs(data)
     if inputs:
-        screen.print(inputs)
+        screen.print(inputs[0])
+        if inputs[1]:
+            screen.print(f"  {inputs[1]}", soft_wrap=True)
     paper = data["models"].get("paper", {}) if details else {}
     if paper.get("constraints"):
         screen.print(_constraints(paper["constraints"]))
@@ -213,8 +215,8 @@ def _choice(chosen: dict[str, Any]) -> str:
     )
 
 
-def _inputs(data: dict[str, Any]) -> Table | None:
-    """Tabulate the percent by which a level grows with 1 % more of an input; inputs that no model reads stand below."""
+def _inputs(data: dict[str, Any]) -> tuple[Table, str] | None:
+    """Tabulate the percent by which a level grows with 1 % more of an input, and name inputs that no model reads."""
     found = {name: block["inputs_seen"] for name, block in data["models"].items()}
     for one in data.get("mechanics", {}).get("inputs_seen", ()):
         found[f"mechanics, {one['reading']}"] = one
@@ -228,8 +230,7 @@ def _inputs(data: dict[str, Any]) -> Table | None:
         if any(name in by for by in seen.values()):
             table.add_row(name, *[f"{by[name]:+.2f}" if name in by else "not seen" for by in seen.values()])
     unread = [name for name in names if not any(name in by for by in seen.values())]
-    table.caption = f"seen by none: {', '.join(unread)}" if unread else None
-    return table
+    return table, f"seen by none: {', '.join(unread)}" if unread else ""
 
 
 def _reasons(data: dict[str, Any]) -> list[str]:

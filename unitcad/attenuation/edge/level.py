@@ -322,7 +322,7 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
     }
 
 
-def _differs_in(variant: EstimateInput, shapes: cf.Section) -> list[str]:
+def _differs_in(variant: EstimateInput, shapes: cf.Section | None) -> list[str]:
     """Return what of a unit is not as in the measured ones, against the nearest of their possible shapes."""
     shared, own = measurements().unit, sections([variant.geometry])
     motor = motors()[shared.motor]
@@ -335,6 +335,7 @@ def _differs_in(variant: EstimateInput, shapes: cf.Section) -> list[str]:
         "frequency": not np.isclose(variant.frequency.middle, shared.frequency_hz),
     }
     by_shape = []
+    assert shapes is not None  # every unit of the catalogue's table has a section
     for i in range(len(np.atleast_1d(shapes.cavity_radius))):
         radii, measured = (
             np.diff(np.append(one.cavity_radius[k], one.outer_radii[k])) for one, k in ((own, 0), (shapes, i))
