@@ -51,3 +51,51 @@ def test_the_motors_range_is_its_sensors(tmp_path: Path) -> None:
     sensor = '[motor_sensor]\nquantity = "displacement"\nunit = "um"\nscale = 500.0\nfull_scale = 300.0\n'
     result = paired(tmp_path, MOTOR, sensor)
     assert {(one.code, one.where) for one in result.findings} == {("L101", f"{i}.wav, motor") for i in range(3)}
+
+
+def apart(folder: Path, edge: np.ndarray, motor: np.ndarray, limit: float = np.inf) -> Measured:
+    for i in range(3):
+        for name, x in (("m", motor), ("e", edge)):
+            noise = np.random.default_rng([i, ord(name)]).standard_normal(len(x))
+            x_i = x * (1 + 0.005 * i) + noise
+            x_i = np.clip(x_i, -limit, limit) if name == "e" else x_i
+            wavfile.write(folder / f"{name}{i}.wav", RATE, (x_i / 500).astype("<f4"))
+    (folder / "c.toml").write_text(
+        HEAD + '[chain]\nuse = ["line", "paper"]\n[[unit]]\nname = "a"\n'
+        'reference = ["m0.wav", "m1.wav", "m2.wav"]\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
+    )
+    return measure(read_campaign(folder / "c.toml"), folder)
+
+
+def test_each_line_has_its_own_level(tmp_path: Path) -> None:
+    """The strongest line of the unit is not the motor's strongest one."""
+    one, two = (np.cos(2 * np.pi * hz * TIME) for hz in (118.0, 126.0))
+    result = apart(tmp_path, 60 * one + 90 * two, 300 * one + 150 * two)
+    found = {round(one.frequency_hz): one.level.value for one in result.levels}
+    assert found == pytest.approx({118: 0.2, 126: 0.6}, rel=0.01)
+    assert {one.chain for one in result.levels} == {"line"}
+
+
+def test_a_unit_at_another_frequency_than_its_motor_has_no_level(tmp_path: Path) -> None:
+    result = apart(tmp_path, 90 * np.cos(2 * np.pi * 137.0 * TIME), MOTOR)
+    assert result.levels == ()
+    assert "L116" in {one.code for one in result.findings}
+
+
+@pytest.mark.parametrize("fault", ["spikes", "clipped", "null", "short"])
+def test_a_chain_without_a_robust_step_gives_no_level_of_faulty_records(tmp_path: Path, fault: str) -> None:
+    hertz = 100.2 if fault == "null" else 121.3
+    edge, motor = (size * np.cos(2 * np.pi * hertz * TIME) for size in (90, 300))
+    if fault == "spikes":
+        edge[::200] += 900
+    elif fault == "short":
+        edge = edge[:600]
+    result = apart(tmp_path, edge, motor, 75.0 if fault == "clipped" else np.inf)
+    assert [one.chain for one in result.levels] == ["line"]
+    assert ("L106" if fault == "null" else "L114") in {one.code for one in result.findings}
+
+
+def test_fewer_than_five_periods_are_an_error(tmp_path: Path) -> None:
+    result = apart(tmp_path, 90 * np.cos(2 * np.pi * 121.3 * TIME[:70]), MOTOR)
+    assert result.levels == ()
+    assert all(one.severity == "error" for one in result.findings if one.code in ("L108", "L111", "L112"))

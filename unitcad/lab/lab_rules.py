@@ -55,6 +55,15 @@ RULES = {
             A section of a long record has no line where others have one; the amplitude is that of the
             others. Example: The motor stopped. Fix: Cut the record where the motor stopped, or
             repeat.""",
+            """L114 warning: not fit for a chain
+            The chain gives no amplitude of this record: of drop-outs, clipped samples, several lines,
+            or one that is too short. Example: The chain paper and a spike. Fix: Use the chain line.""",
+            """L115 warning: chains disagree
+            The intervals of two chains do not overlap. Example: Hum that one chain does not remove.
+            Fix: Look at the spectra of the records.""",
+            """L116 error: motor and unit at different frequencies
+            No line of the unit lies within a tenth of the motor's frequency: no level is given.
+            Example: The reference of another motor. Fix: Record the motor at the same voltage.""",
         ),
     )
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,9 @@ MOST_DISAGREEMENT = 0.15
 """Standard deviation of the repeats' logarithms: three times the usual one."""
 NEAR_MOTOR = 0.2
 """Part of the motor's frequency, to either side, in which a unit's line is looked for."""
+
+MOST_APART = 0.1
+"""Part of the motor's frequency by which the unit's may differ: beyond, it is another motor's."""
 
 
 @dataclass(frozen=True)
@@ -122,14 +126,56 @@ def _levels(
             findings.append(found("L112", where, f"{few[0]} usable records; a level needs {LEAST_REPEATS}"))
             continue
         shared = max(record.shared for record in (*there, *motor))
+        here: list[PlaceLevel] = []
         for chain in campaign.chain.use:
-            values = [record.by_chain[chain] for record in there]
-            if paired:
-                result = paired_level(values, shared)
-            else:
-                result = level(values, [record.by_chain[chain] for record in motor], shared)
-            hertz = float(np.median([record.frequency_hz for record in there]))
-            levels.append(PlaceLevel(unit.name, distance, chain, result, hertz))
-            if result.scatter > MOST_DISAGREEMENT:
-                findings.append(found("L109", where, f"by {chain}: logarithms scatter by {result.scatter:.2f}"))
+            for hertz, values, below in _sides(chain, there, there if paired else motor):
+                at = f"{where}, {hertz:.2f} Hz, by {chain}"
+                if not values:
+                    findings.append(found("L116", where, f"nothing near the motor's {hertz:.2f} Hz"))
+                elif min(len(values), len(below)) < LEAST_REPEATS:
+                    count = min(len(values), len(below))
+                    findings.append(found("L112", at, f"{count} usable records; a level needs {LEAST_REPEATS}"))
+                else:
+                    result = paired_level(values, shared) if paired else level(values, below, shared)
+                    here.append(PlaceLevel(unit.name, distance, chain, result, hertz))
+                    if result.scatter > MOST_DISAGREEMENT:
+                        findings.append(found("L109", where, f"by {chain}: logarithms scatter by {result.scatter:.2f}"))
+        levels += here
+        if len({one.chain for one in here}) == len(here) == 2:
+            one, other = here
+            if one.level.high < other.level.low or other.level.high < one.level.low:
+                said = f"{one.chain} {one.level.value:.3g}, {other.chain} {other.level.value:.3g}"
+                findings.append(found("L115", where, said))
     return levels, findings
+
+
+def _sides(
+    chain: str, there: list[RecordResult], motor: list[RecordResult]
+) -> list[tuple[float, list[float], list[float]]]:
+    """Return frequency, the records' values and the motor's, of each line that the motor's records have.
+
+    The chain `paper` tells no lines apart and has one entry. No values at all: no record has a line near the motor's.
+    """
+    lines = sorted(hertz for hertz, _ in max(motor, key=lambda one: len(one.by_line)).by_line)
+    if chain == "line" and len(lines) > 1:
+        gap = min(b - a for a, b in pairwise(lines))
+        return [(hertz, _near(there, hertz, gap / 2), _near(motor, hertz, gap / 2)) for hertz in lines]
+    middle = float(np.median([one.frequency_hz for one in motor]))
+    values = _near(there, middle, MOST_APART * middle)
+    if not values or chain == "line":
+        nearest = [min((hz for hz, _ in one.by_line), key=lambda hz: abs(hz - middle), default=middle) for one in there]
+        hertz = float(np.median(nearest)) if values else middle
+        return [(hertz, values, _near(motor, middle, MOST_APART * middle))]
+    values, below = ([one.by_chain[chain] for one in side if chain in one.by_chain] for side in (there, motor))
+    hertz = float(np.median([one.frequency_hz for one in there]))
+    return [(hertz, values, below)] if values else []
+
+
+def _near(records: list[RecordResult], hertz: float, most: float) -> list[float]:
+    """Return of each record the value of the line nearest to a frequency, of records that have one close enough."""
+    out = []
+    for record in records:
+        at, value = min(record.by_line, key=lambda one: abs(one[0] - hertz), default=(np.inf, 0.0))
+        if abs(at - hertz) < most:
+            out.append(value)
+    return out

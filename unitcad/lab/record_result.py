@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from unitcad.errors import Refusal
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.campaign import Campaign, SensorTable
 from unitcad.lab.chains import least_squares
@@ -21,10 +22,13 @@ from unitcad.lab.quantities import to_si
 from unitcad.lab.signals import IRREGULAR, Signal, open_signal, sha256
 
 MOST_SCATTER = MOST_DRIFT = 0.05
-LEAST_PERIODS = 20
+LEAST_PERIODS, NO_PERIODS = 20, 5
 MOST_MASKED = 0.1
 LEAST_GAIN = 0.9
+SAME_LINE_HZ = 0.5
 LEAST_OVER_U = 4
+PAPER_MASKED = 2e-4
+"""Part of the samples that may be left out of a record whose amplitude by `paper` counts: it has no robust step."""
 MICRO = 1e6
 _ORDER = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
@@ -33,8 +37,9 @@ _ORDER = {"displacement": 0, "velocity": 1, "acceleration": 2}
 class RecordResult:
     """A record's figures; amplitudes (peak) and standard uncertainties in um. `ratio` is to the motor's own channel.
 
-    `usable`: it counts for levels. `by_chain` has each chain's amplitude over which a level is taken, `picture` the
-    samples and the spectrum of its first section, in the sensor's unit.
+    `usable`: it counts for levels. `by_chain` has each chain's amplitude over which a level is taken, without the
+    chains that the record is not fit for; `by_line` the same of each line in the band by the chain `line`, with its
+    frequency; `picture` the samples and the spectrum of its first section, in the sensor's unit.
     """
 
     file: str
@@ -54,6 +59,7 @@ class RecordResult:
     ratio: float | None
     lag_deg: float | None
     by_chain: dict[str, float]
+    by_line: tuple[tuple[float, float], ...]
     paper_gain: float | None
     findings: tuple[LabFinding, ...]
     usable: bool
@@ -75,7 +81,7 @@ class RecordResult:
 class _Section:
     fit: LineFit
     motor: LineFit | None
-    paper: dict[str, float]
+    paper: float | str
     count: int
 
 
@@ -142,9 +148,13 @@ def measure_record(
     if gain is not None and gain < LEAST_GAIN:
         findings.append(found("L106", shown, f"the filters pass {gain:.2g} of {fit.frequency_hz:.2f} Hz"))
     by_chain = {"line": fit.amplitude * factor if ratio is None else ratio}
-    for name in sections[0].paper:
-        values = [s.paper[name] for s in sections]
-        by_chain[name] = float(np.mean(values)) * (factor if ratio is None else 1.0)
+    if gain is not None:
+        reason = _unfit_for_paper(sections)
+        if reason:
+            findings.append(found("L114", shown, f"paper: {reason}"))
+        elif gain >= LEAST_GAIN:
+            values = [s.paper for s in sections if not isinstance(s.paper, str)]
+            by_chain["paper"] = float(np.mean(values)) * (factor if ratio is None else 1.0)
     return RecordResult(
         *shared,
         amplitude_um=fit.amplitude * factor,
@@ -159,6 +169,7 @@ def measure_record(
         ratio=ratio,
         lag_deg=lag,
         by_chain=by_chain,
+        by_line=_by_line(sections, campaign, factor, by_chain["line"], fit),
         paper_gain=gain,
         findings=tuple(findings),
         usable=not any(one.severity == "error" for one in findings),
@@ -205,14 +216,51 @@ def _section(
     fit = fit_line(samples[:, 0], signal.rate, band, mains, sensors[0].full_scale, motor.phase if motor else None, span)
     if fit is None or not fit.amplitude > 0:
         return shown
-    paper: dict[str, float] = {}
+    paper: float | str = ""
     if "paper" in campaign.chain.use:
-        found_here = _paper(campaign).amplitude(samples[:, 0], signal.rate)
-        if motor is not None:
-            found_here /= _paper(campaign).amplitude(samples[:, 1], signal.rate)
-            found_here *= _over_motor(campaign, fit.frequency_hz)
-        paper["paper"] = found_here
+        try:
+            paper = _paper(campaign).amplitude(samples[:, 0], signal.rate)
+            if motor is not None:
+                paper /= _paper(campaign).amplitude(samples[:, 1], signal.rate)
+                paper *= _over_motor(campaign, fit.frequency_hz)
+        except Refusal as refusal:
+            paper = refusal.limit
     return _Section(fit, motor, paper, len(samples))
+
+
+def _unfit_for_paper(sections: list[_Section]) -> str:
+    """Return why the chain `paper`, which has no robust step, gives no amplitude of a record; empty where it does."""
+    fits = [fit for one in sections for fit in (one.fit, one.motor) if fit is not None]
+    masked = max(fit.masked for fit in fits)
+    if masked > PAPER_MASKED:
+        return f"{masked:.2%} of the samples are drop-outs, which it does not leave out"
+    if min(fit.clipped for fit in fits) < np.inf:
+        return "samples are clipped, which it does not allow for"
+    if any(fit.lines for fit in fits):
+        return "it can't tell several lines apart"
+    return next((one.paper for one in sections if isinstance(one.paper, str)), "")
+
+
+def _by_line(
+    sections: list[_Section], campaign: Campaign, factor: float, whole: float, fit: LineFit
+) -> tuple[tuple[float, float], ...]:
+    """Return frequency and amplitude, or ratio to the motor's line of the same frequency, of each line in the band."""
+    most = max(sections, key=lambda one: len(one.fit.lines))
+    motor = most.motor
+    if not most.fit.lines and not (motor and motor.lines):
+        return ((fit.frequency_hz, whole),)
+    out = []
+    for line in most.fit.lines or (Line(fit.frequency_hz, fit.amplitude, fit.u),):
+        hertz, size = line.frequency_hz, line.amplitude * factor
+        if motor is not None:
+            there = motor.lines or (Line(motor.frequency_hz, motor.amplitude, motor.u),)
+            near = min(there, key=lambda one: abs(one.frequency_hz - hertz))
+            if abs(near.frequency_hz - hertz) > SAME_LINE_HZ:
+                continue
+            size = line.amplitude / near.amplitude * _over_motor(campaign, hertz)
+        if campaign.chain.band_hz[0] <= hertz <= campaign.chain.band_hz[1]:
+            out.append((hertz, size))
+    return tuple(out)
 
 
 def _paper(campaign: Campaign) -> PaperChain:
@@ -290,7 +338,8 @@ def _line_findings(fit: LineFit, signal: Signal, where: str, mains: Mains) -> li
         out.append(found("L107", where, f"amplitude varies by {scatter:.1%}, frequency by {fit.drift:.1%}"))
     periods = (fit.end_s - fit.start_s) * hertz
     if periods < LEAST_PERIODS:
-        out.append(found("L108", where, f"{periods:.0f} periods in the steady part"))
+        severity = "error" if periods < NO_PERIODS else "warning"
+        out.append(found("L108", where, f"{periods:.0f} periods in the steady part", severity))
     if fit.masked > MOST_MASKED:
         out.append(found("L110", where, f"{fit.masked:.0%} of the samples were left out"))
     if fit.amplitude < LEAST_OVER_U * fit.u:
@@ -318,7 +367,7 @@ def _without_line(
 ) -> RecordResult:
     return RecordResult(
         *shared, amplitude_um=0.0, u_um=0.0, shared=0.0, frequency_hz=0.0, drift=0.0, snr=0.0, steady_s=0.0, masked=0.0,
-        lines=(), ratio=None, lag_deg=None, by_chain={}, paper_gain=None, findings=findings, usable=False,
+        lines=(), ratio=None, lag_deg=None, by_chain={}, by_line=(), paper_gain=None, findings=findings, usable=False,
         picture=picture,
     )  # fmt: skip
 
