@@ -198,7 +198,14 @@ def test_links_lead_to_files_that_are_there(visit: Visit, built: Path) -> None:
 
 def test_the_estimate_shows_models_and_the_measured_value(visit: Visit) -> None:
     text = visit.page.inner_text("#estimate")
-    for words in ("Paper, as printed", "Fitted divider", "Measured: 0.0517", "Also printed: 0.0458", "12 of 12"):
+    for words in (
+        "Paper, as printed",
+        "Fitted divider",
+        "(fitted)",
+        "Measured: 0.0517",
+        "Also printed: 0.0458",
+        "12 of 12",
+    ):
         assert words in text
     plot = visit.page.locator("#estimate .plot canvas")
     image = np.asarray(Image.open(io.BytesIO(plot.screenshot())).convert("RGB")).astype(int)

@@ -3,7 +3,7 @@
   "use strict";
   const { el, number, section, table, facts, theme, curvePlot } = window.unitcad;
   const NAMES = { bush: "Rubber bushes", paper: "Paper, as printed", consistent: "Paper's path, corrected", fitted: "Fitted divider", crossings: "Interfaces alone", null: "Null: two constants" };
-  const nameOf = (model) => NAMES[model] || model;
+  const nameOf = (model) => (NAMES[model] ? `${NAMES[model]} (${model})` : model);
   const known = (value) => typeof value === "number" && Number.isFinite(value);
 
   // Where a value lies on a logarithmic rule, in percent.
@@ -120,7 +120,7 @@
       name: `${FORCES[drive] || drive}${drive === layered.drive ? " (this motor)" : ""}`, x, y: block.u.value, low: block.u.low, high: block.u.high, colour: i === 0 ? 0 : 2,
     }));
     const columns = [...series];
-    if (layered.flat_over_axial_per_newton) columns.push({ name: "flat over axial, per newton", y: layered.flat_over_axial_per_newton.value });
+    if (layered.flat_over_axial_per_newton) columns.push({ name: "Flat over axial, per newton", y: layered.flat_over_axial_per_newton.value });
     for (const [drive, block] of drives) {
       for (const key of ["u_r", "u_theta", "u_z"]) if (block[key]) columns.push({ name: `${drive}: |${key}|`, y: block[key].value });
     }
@@ -142,9 +142,9 @@
   function margins(models) {
     const rows = (models.paper && models.paper.constraints) || [];
     if (!rows.length) return null;
-    return [el("h3", {}, "The paper's constraints"), table(["Equation", "Says", "Control", "Left", "", "Right", "Margin", ""], rows.map((row) => ({
+    return [el("h3", {}, "The paper's constraints"), table(["Equation", "Says", "Control", "Left", "", "Right", "Margin", "Unit", "Holds"], rows.map((row) => ({
       className: row.holds === false ? "bad" : undefined,
-      cells: [row.equation, row.text, row.control || "", row.left, row.relation, row.right, row.margin, row.holds === true ? "holds" : row.holds === false ? "fails" : row.reason || "not known"],
+      cells: [row.equation, row.text, row.control || "", row.left, row.relation, row.right, row.margin, row.unit || "", row.holds === true ? "holds" : row.holds === false ? "fails" : row.reason || "not known"],
     })), { label: "The paper's constraints" })];
   }
 
@@ -156,11 +156,11 @@
     compared.sort(([a], [b]) => order.indexOf(a) - order.indexOf(b));
     const chosen = all.chosen_without;
     const ends = (range) => (range ? `${number(range.low, 3)} to ${number(range.high, 3)}` : "–");
-    const test = ({ against_best: against }) => (against && known(against.p) ? against.p : "–");
+    const test = ({ against_best: against }) => (against && known(against.p) ? number(against.p, 2) : "–");
     const factor = (entry) => (entry ? entry.geometric_mean : "–");
     const out = (entry, key) => factor((entry.leave_one_unit_out || {})[key]);
     return [el("h3", {}, "Error against the measured table"),
-      table(["Model", "Nine levels", "left out", "5 to 95 %", "p to the best", "worst", "Twelve ratios", "left out", "Directions"], compared.map(([model, entry]) => [
+      table(["Model", "Nine levels", "Left out", "5 to 95 %", "p to the best", "Worst", "Twelve ratios", "Left out", "Directions"], compared.map(([model, entry]) => [
         nameOf(model), factor(entry.levels), out(entry, "levels"), ends(((entry.leave_one_unit_out || {}).levels || {}).range), test(entry), entry.levels.worst, factor(entry.ratios), out(entry, "ratios"),
         entry.directions ? `${entry.directions.right} of ${entry.directions.of}` : "–"]), { label: "Error against the measured table" }),
       el("p", { className: "note" }, `Factors; 1 is exact. ${all.what || ""}`),
