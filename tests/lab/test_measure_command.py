@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import tomllib
@@ -80,6 +81,8 @@ def test_the_files_of_a_campaign(folder: Path, monkeypatch: pytest.MonkeyPatch) 
     assert {level["status"] for level in measured["level"]} == {"measured"}
     assert measured["assumed"] == {"order": 4, "q": 30.0, "zero_phase": True, "measure": "rms", "trim_s": 0.25}
     assert len({record["sha256"] for record in measured["record"]}) == 9
+    hashes = {one["file"]: one["sha256"] for one in measured["source"]}
+    assert hashes == {name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in ("c.toml", "off.wav")}
     assert {"measure.json", "measure.html", "record-01-time.svg", "record-01-spectrum.svg", "decay-01.svg"} <= set(
         files
     )

@@ -99,3 +99,12 @@ def test_fewer_than_five_periods_are_an_error(tmp_path: Path) -> None:
     result = apart(tmp_path, 90 * np.cos(2 * np.pi * 121.3 * TIME[:70]), MOTOR)
     assert result.levels == ()
     assert all(one.severity == "error" for one in result.findings if one.code in ("L108", "L111", "L112"))
+
+
+def test_a_motor_below_the_band_is_not_measured_by_its_harmonic(tmp_path: Path) -> None:
+    x = np.cos(2 * np.pi * 44.0 * TIME) + 0.3 * np.cos(2 * np.pi * 88.0 * TIME)
+    result = apart(tmp_path, 90 * x, 300 * x)
+    assert result.levels == ()
+    outside = [one for one in result.findings if one.code == "L117"]
+    assert len(outside) == 6
+    assert "about 44 Hz" in outside[0].message

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -27,11 +28,13 @@ def measure(
     from unitcad.cli.output import print_json, progress, warn
     from unitcad.lab import measured_files, measuring
     from unitcad.lab.campaign import read_campaign
+    from unitcad.lab.signals import sha256
 
     asked = read_campaign(campaign)
     folder = out or Path("out") / f"measure-{campaign.stem}"
     with progress(asked.name) as say:
         result = measuring.measure(asked, campaign.parent, say)
+        result = replace(result, specs={campaign.name: sha256(campaign), **result.specs})
         say("files")
         measured_files.write(result, folder)
     for finding in result.findings:

@@ -64,6 +64,9 @@ RULES = {
             """L116 error: motor and unit at different frequencies
             No line of the unit lies within a tenth of the motor's frequency: no level is given.
             Example: The reference of another motor. Fix: Record the motor at the same voltage.""",
+            """L117 error: stronger line outside the band
+            A line outside chain.band_hz is stronger than the one in it, which may be its harmonic.
+            Example: A motor at 45 Hz and a band from 60 Hz. Fix: Widen chain.band_hz.""",
         ),
     )
 }

@@ -41,7 +41,7 @@ class PlaceLevel:
 
 @dataclass(frozen=True)
 class Measured:
-    """A campaign's result: levels, records by unit, findings, hashes of specs, the mains of the motor-off records."""
+    """A campaign's result: levels, records by unit, findings, hashes of its other files, mains of motor-off records."""
 
     campaign: Campaign
     levels: tuple[PlaceLevel, ...]
@@ -70,7 +70,7 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     levels: list[PlaceLevel] = []
     records: dict[str, tuple[RecordResult, ...]] = {}
     findings: list[LabFinding] = []
-    specs = {}
+    specs = {name: sha256(folder / name) for name in (campaign.blank.records if campaign.blank else ())}
     for i, unit in enumerate(campaign.unit):
         for key, name in source_files(unit):
             specs[name] = sha256(file_of(folder, name, f"unit.{i}.{key}"))

@@ -26,6 +26,7 @@ LEAST_PERIODS, NO_PERIODS = 20, 5
 MOST_MASKED = 0.1
 LEAST_GAIN = 0.9
 SAME_LINE_HZ = 0.5
+TREMOR_HZ = 20
 LEAST_OVER_U = 4
 PAPER_MASKED = 2e-4
 """Part of the samples that may be left out of a record whose amplitude by `paper` counts: it has no robust step."""
@@ -142,6 +143,9 @@ def measure_record(
         message = f"{len(silent)} of {count} sections, the first from {silent[0][0]:.0f} s of {at_s:.0f} s"
         findings.append(found("L113", shown, message))
     factor = _displacement(sensors[0], fit.frequency_hz) / signal.gain(fit.frequency_hz)
+    outside = _stronger_outside(picture, fit.frequency_hz, campaign.chain.band_hz, campaign.chain.mains_hz)
+    if outside is not None:
+        findings.append(found("L117", shown, f"a stronger line lies at about {outside:.0f} Hz, outside chain.band_hz"))
     ratio, lag = _ratio(sections, sensors, fit.frequency_hz)
     chain = _paper(campaign)
     gain = chain.gain(fit.frequency_hz) if "paper" in campaign.chain.use else None
@@ -324,6 +328,10 @@ def _line_findings(fit: LineFit, signal: Signal, where: str, mains: Mains) -> li
     """Return what is wrong with a line, in the order of the codes."""
     out = []
     hertz = fit.frequency_hz
+    if fit.masked > MOST_MASKED:
+        out.append(found("L110", where, f"{fit.masked:.0%} of the samples were left out"))
+    if fit.amplitude < LEAST_OVER_U * fit.u:  # nothing else can be said of a line that is not there
+        return [*out, found("L111", where, f"the strongest has {fit.amplitude / fit.u:.1f} times its uncertainty")]
     if signal.raw_rate < 4 * hertz:
         out.append(found("L102", where, f"{signal.raw_rate:g} Hz for a line at {hertz:.1f} Hz"))
     if fit.lines:
@@ -340,11 +348,24 @@ def _line_findings(fit: LineFit, signal: Signal, where: str, mains: Mains) -> li
     if periods < LEAST_PERIODS:
         severity = "error" if periods < NO_PERIODS else "warning"
         out.append(found("L108", where, f"{periods:.0f} periods in the steady part", severity))
-    if fit.masked > MOST_MASKED:
-        out.append(found("L110", where, f"{fit.masked:.0%} of the samples were left out"))
-    if fit.amplitude < LEAST_OVER_U * fit.u:
-        out.append(found("L111", where, f"the strongest has {fit.amplitude / fit.u:.1f} times its uncertainty"))
-    return out
+    return sorted(out, key=lambda one: one.code)
+
+
+def _stronger_outside(
+    picture: tuple[Floats, ...], hertz: float, band: tuple[float, float], mains_hz: float
+) -> float | None:
+    """Return the frequency of a line outside the band above the one in it; the mains and its own harmonics are none."""
+    frequency, size = picture[2:]
+    near = max(1.0, 3 * float(frequency[1] - frequency[0])) if len(frequency) > 1 else 1.0
+    own = np.abs(frequency - hertz) <= near
+    outside = (frequency > TREMOR_HZ) & ((frequency < band[0] - near) | (frequency > band[1] + near))
+    outside &= np.abs(frequency - mains_hz * np.round(frequency / mains_hz)) > near
+    outside &= (frequency < 1.5 * hertz) | (np.abs(frequency - hertz * np.round(frequency / hertz)) > near)
+    if not own.any() or not outside.any():
+        return None
+    at = int(np.argmax(np.where(outside, size, 0.0)))
+    strong = size[at] > max(float(size[own].max()), 8 * float(np.median(size[outside])))
+    return float(frequency[at]) if strong else None
 
 
 def _clipped(samples: Floats) -> float:
