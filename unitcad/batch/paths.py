@@ -58,5 +58,6 @@ def _walk(kind: Any, prefix: str, node: Any) -> Iterator[str]:
 
 def _unknown(path: str, base: dict[str, Any], where: str) -> Refusal:
     known = known_paths(base)
-    close = difflib.get_close_matches(path, known, n=1, cutoff=0.0)
+    begun = sorted((name for name in known if path and name.startswith(path)), key=len)
+    close = begun or difflib.get_close_matches(path, known, n=1, cutoff=0.0)
     return Refusal(f"{where}.{path}", path, "there is no such path in a spec", close[0] if close else None)
