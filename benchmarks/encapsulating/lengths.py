@@ -13,6 +13,7 @@ from typing import Any
 
 from unitcad.designs.limits import filament_groove
 from unitcad.moulds.blade import BLADE_EDGE, BLADE_THICKNESS
+from unitcad.moulds.cup import window_section
 from unitcad.moulds.filament import FLARE, STUB_TAIL
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
@@ -56,6 +57,7 @@ def lengths() -> dict:
         "groove": [moulds.groove_width_mm, moulds.groove_depth_mm],
         "least_wall": moulds.least_wall_mm,
         "window": moulds.window_clearance_mm,
+        "windows": [window_section(spec, dims.exit, rim) for rim in dims.heights],
         "hole": moulds.filament_hole_mm / 2,
         "filament": moulds.filament_mm / 2,
         "filament_groove": filament_groove(spec),

@@ -106,7 +106,7 @@ def cup(n: dict, i: int) -> cq.Workplane:
     inner, depth = radius + n["land"], min(n["groove"][1], rim / 2)
     outer = inner + n["groove"][0]
     groove = cylinder(outer, rim - depth, rim + 1).cut(cylinder(inner, rim - depth, rim + 1))
-    half, low, high = n["slot_width"] / 2 + n["window"], n["slot_z"][0] - n["window"], n["slot_z"][1] + n["window"]
+    half, low, high = n["windows"][i]
     if rim - depth - high < n["least_wall"]:
         groove = groove.cut(box(0, outer + 1, -half - n["least_wall"], half + n["least_wall"], 0, rim + 2))
     body = body.cut(groove).cut(box(0, n["cup"] + 1, -half, half, low, high))
