@@ -25,11 +25,12 @@ from msgspec import Meta, Struct, field, structs
 
 from unitcad.batch.paths import check_path
 from unitcad.cache import digest
-from unitcad.errors import Refusal, WrongArgument, unknown_name
+from unitcad.errors import Refusal, WrongArgument
 from unitcad.files import names_device
 from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.fields import fields_of
-from unitcad.validation import from_data, override, put, read, templates
+from unitcad.validation import from_data, override, put, read
+from unitcad.validation.shipped_files import is_path, named_file, shipped_files
 
 T = TypeVar("T", bound=Struct)
 Mode = Literal["product", "zip", "cases"]
@@ -181,8 +182,7 @@ class Sweep:
 
 def shipped() -> dict[str, Path]:
     """Return the shipped sweeps by name."""
-    folder = next(iter(templates().values())).parent / "sweeps"
-    return {file.stem: file for file in sorted(folder.glob("*.toml"))}
+    return shipped_files("sweeps")
 
 
 def load_sweep(source: str | os.PathLike[str]) -> Sweep:
@@ -190,14 +190,7 @@ def load_sweep(source: str | os.PathLike[str]) -> Sweep:
 
     Raises Refusal or UnitcadError for an unknown base or path, lists of unequal lengths in a zip, an empty sweep.
     """
-    text = os.fspath(source)
-    if os.sep in text or "/" in text or text.endswith(".toml"):
-        path = Path(text)
-    else:
-        known = shipped()
-        if text not in known:
-            raise unknown_name("sweep", text, known, WrongArgument)
-        path = known[text]
+    path = named_file(os.fspath(source), shipped(), "sweep", WrongArgument)
     return from_file(read_toml(path), path.parent, path.stem)
 
 
@@ -235,7 +228,7 @@ def _parted(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[st
 
 
 def _read_base(base: str, folder: Path) -> dict[str, Any]:
-    if os.sep in base or "/" in base or base.endswith(".toml"):
+    if is_path(base):
         data = read(folder / base)
     else:
         try:

@@ -16,7 +16,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -30,6 +29,7 @@ from unitcad.estimating import estimate_input
 from unitcad.experiments.protocol import Condition, Factor, Ratio
 from unitcad.spec import Spec, check_plain, convert, read_toml, to_data
 from unitcad.validation import from_data, put, read
+from unitcad.validation.shipped_files import is_path, named_file, shipped_files
 
 Name = Annotated[str, Meta(min_length=1, max_length=60)]
 _MOST_CONDITIONS = 200
@@ -86,9 +86,7 @@ class Lab:
 
 def shipped() -> dict[str, Path]:
     """Return the shipped labs by name."""
-    package = Path(str(files("unitcad")))
-    folders = (package / "templates" / "experiments", package.parent / "templates" / "experiments")
-    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.toml"))}
+    return shipped_files("experiments")
 
 
 def load_lab(source: str | os.PathLike[str], changes: Mapping[str, Any] | None = None) -> Lab:
@@ -96,14 +94,7 @@ def load_lab(source: str | os.PathLike[str], changes: Mapping[str, Any] | None =
 
     `changes` stand in for keys of the file. Raises Refusal or UnitcadError for the first value that is not valid.
     """
-    text = os.fspath(source)
-    if os.sep in text or "/" in text or text.endswith(".toml"):
-        path = Path(text)
-    else:
-        known = shipped()
-        if text not in known:
-            raise unknown_name("LAB", text, known)
-        path = known[text]
+    path = named_file(os.fspath(source), shipped(), "LAB")
     return lab_of_data({**read_toml(path), **(changes or {})}, path.parent, path.stem)
 
 
@@ -174,7 +165,7 @@ def spec_with(
     where = f"{field}.{base_key}"
     if not isinstance(base, str):
         raise Refusal(where, base, "must name a template or a spec file")
-    named = base if not (os.sep in base or "/" in base or base.endswith(".toml")) else folder / base
+    named = folder / base if is_path(base) else base
     try:
         data = read(named)
     except WrongArgument as refusal:

@@ -17,10 +17,8 @@ measured = "campaign/measured.toml"      # what `unitcad measure` wrote: level a
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.resources import files as package_files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -35,6 +33,7 @@ from unitcad.errors import Refusal, unknown_name
 from unitcad.experiments.lab_file import spec_with
 from unitcad.spec import Spec, convert, read_toml
 from unitcad.spec.asked import Table
+from unitcad.validation.shipped_files import named_file, shipped_files
 
 Name = Annotated[str, Meta(min_length=1, max_length=100)]
 LevelValue = Annotated[float, Meta(ge=1e-6, le=1e3, description="amplitude at the edge over the motor's")]
@@ -117,9 +116,7 @@ class FitLab:
 
 def shipped_fits() -> dict[str, Path]:
     """Return the shipped labs by name."""
-    package = Path(str(package_files("unitcad")))
-    folders = (package / "templates" / "fits", package.parent / "templates" / "fits")
-    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.toml"))}
+    return shipped_files("fits")
 
 
 def load_fit_lab(source: str) -> FitLab:
@@ -127,13 +124,7 @@ def load_fit_lab(source: str) -> FitLab:
 
     Raises Refusal or UnitcadError for the first value that is not valid.
     """
-    if os.sep in source or "/" in source or source.endswith(".toml"):
-        path = Path(source)
-    else:
-        known = shipped_fits()
-        if source not in known:
-            raise unknown_name("LAB", source, known)
-        path = known[source]
+    path = named_file(source, shipped_fits(), "LAB")
     data = read_toml(path)
     settings = convert(data, FitLabFile)
     names = [unit.name for unit in settings.unit]

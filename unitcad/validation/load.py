@@ -6,17 +6,17 @@ import copy
 import os
 import tomllib
 from collections.abc import Iterable, Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from unitcad.designs import default_design
-from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument
 from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.fields import index_in
 from unitcad.validation.defaults import effective
+from unitcad.validation.shipped_files import named_file, shipped_files
 from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
 
 _MOST_LIMITS = 5
@@ -25,17 +25,12 @@ _MOST_LIMITS = 5
 
 def templates() -> dict[str, Path]:
     """Return the shipped templates by name."""
-    return {file.stem: file for file in sorted(_folder().glob("*.toml"))}
+    return shipped_files()
 
 
 def custom_templates() -> dict[str, Path]:
     """Return the shipped specs of custom designs by name, such as custom/strap-lugs."""
-    return {f"custom/{file.stem}": file for file in sorted((_folder() / "custom").glob("*.toml"))}
-
-
-def _folder() -> Path:
-    package = Path(str(files("unitcad")))
-    return next((f for f in (package / "templates", package.parent / "templates") if f.is_dir()), package)
+    return {f"custom/{name}": file for name, file in shipped_files("custom").items()}
 
 
 def default_template() -> str:
@@ -88,14 +83,7 @@ def read(source: str | os.PathLike[str]) -> dict[str, Any]:
 
     The code of a design that the file names may run from now on: see `unitcad.spec.custom_code`.
     """
-    text = os.fspath(source)
-    known = templates() | custom_templates()
-    if text in known:
-        path = known[text]
-    elif os.sep in text or "/" in text or text.endswith(".toml"):
-        path = Path(text)
-    else:
-        raise unknown_name("spec", text, known, WrongArgument)
+    path = named_file(os.fspath(source), templates() | custom_templates(), "spec", WrongArgument)
     return with_source(read_toml(path), path.parent)
 
 

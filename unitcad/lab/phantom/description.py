@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta, Struct
 
 from unitcad.catalogue import entries as kinds
-from unitcad.errors import WrongArgument, unknown_name
+from unitcad.errors import WrongArgument
 from unitcad.spec import convert, read_toml
+from unitcad.validation.shipped_files import named_file, shipped_files
 
 LEAST_LAYER, MOST_DEPTH = 0.5, 100.0
 
@@ -59,18 +59,9 @@ class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 def phantoms() -> dict[str, Path]:
     """Return the shipped phantoms by name."""
-    package = Path(str(files("unitcad")))
-    folders = (package / "templates" / "phantoms", package.parent / "templates" / "phantoms")
-    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.toml"))}
+    return shipped_files("phantoms")
 
 
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
     """Return the phantom of a shipped name or of a file. Raises Refusal or UnitcadError for what is not valid."""
-    text, known = os.fspath(source), phantoms()
-    if text in known:
-        path = known[text]
-    elif os.sep in text or "/" in text or text.endswith(".toml"):
-        path = Path(text)
-    else:
-        raise unknown_name("phantom", text, known, WrongArgument)
-    return convert(read_toml(path), PhantomTable)
+    return convert(read_toml(named_file(os.fspath(source), phantoms(), "phantom", WrongArgument)), PhantomTable)
