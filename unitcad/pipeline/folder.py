@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import os
 import re
 import shutil
@@ -13,13 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from msgspec import structs
-
 from unitcad import cache, files
 from unitcad.cache import digest
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.manifest_records import Manifest
-from unitcad.spec import Spec, read_toml, to_json, with_formats
+from unitcad.spec import Spec, read_toml, spec_hash
 
 UNCHECKED = "--no-check"
 LOCK = re.compile(r"\.[a-z0-9-]+-[0-9a-f]{12}\.lock")
@@ -31,11 +28,6 @@ def folder_name(spec: Spec) -> str:
     """Return <slug>-<hash12>, at most 63 characters; the hash covers the effective spec without name and formats."""
     slug = re.sub(r"[^a-z0-9]+", "-", spec.name.lower()).strip("-")[:50].rstrip("-") or "unit"
     return f"{slug}-{spec_hash(spec)[:12]}"
-
-
-def spec_hash(spec: Spec) -> str:
-    """Return the SHA-256 of the effective spec without name and formats."""
-    return hashlib.sha256(to_json(structs.replace(with_formats(spec), name="")).encode()).hexdigest()
 
 
 def earlier_formats(folder: Path, spec: Spec, *, ours: bool = False) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import EstimateSummary, FileRecord, LeftOut, Manifest, PartRecord
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.versions import kernel_versions
-from unitcad.spec import Spec
+from unitcad.spec import Spec, spec_hash
 from unitcad.validation import warnings
 
 NO_MOULDS = "no moulds were asked for: only C200 ran, on the unit"
@@ -63,7 +63,7 @@ def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Sta
         name=spec.name,
         design=spec.design,
         printer=spec.moulds.printer,
-        hash=folders.spec_hash(spec)[:12],
+        hash=spec_hash(spec)[:12],
         outputs=list(possible),
         label=shape["label"],
         warnings=warnings(spec),

@@ -3,7 +3,7 @@
 from unitcad.spec.convert import check_plain, convert
 from unitcad.spec.effective import Spec, with_formats
 from unitcad.spec.printer import printer_of
-from unitcad.spec.toml import from_json, read_toml, to_data, to_json, to_toml
+from unitcad.spec.toml import from_json, read_toml, spec_hash, to_data, to_json, to_toml
 
 __all__ = [
     "Spec",
@@ -12,6 +12,7 @@ __all__ = [
     "from_json",
     "printer_of",
     "read_toml",
+    "spec_hash",
     "to_data",
     "to_json",
     "to_toml",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,10 +10,11 @@ from typing import Any
 
 import msgspec
 import tomli_w
+from msgspec import structs
 
 from unitcad.errors import UnitcadError
 from unitcad.files import read_text
-from unitcad.spec.effective import Spec
+from unitcad.spec.effective import Spec, with_formats
 
 
 def read_toml(path: Path, links: bool = True) -> dict[str, Any]:
@@ -49,6 +51,11 @@ def to_json(spec: Spec) -> str:
 def from_json(text: str) -> Spec:
     """Return the spec of a text by `to_json`."""
     return msgspec.json.decode(text, type=Spec)
+
+
+def spec_hash(spec: Spec) -> str:
+    """Return the SHA-256 of the effective spec without name and formats; a result's folder ends in 12 digits of it."""
+    return hashlib.sha256(to_json(structs.replace(with_formats(spec), name="")).encode()).hexdigest()
 
 
 def to_toml(spec: Spec) -> str:

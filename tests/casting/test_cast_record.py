@@ -1,0 +1,113 @@
+"""The cast record: what is accepted comes back the same; what is not is refused by its field."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from unitcad.casting.cast_record import FORMAT, cast_record, read_cast_record, spec_of, to_json
+from unitcad.cli import app
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.spec import spec_hash, to_data
+from unitcad.validation import load
+
+
+def data() -> dict[str, Any]:
+    spec = load("encapsulating")
+    return {
+        "format": FORMAT,
+        "version": 1,
+        "spec_name": spec.name,
+        "spec_hash": spec_hash(spec)[:12],
+        "spec": to_data(spec),
+        "cast_on": "2026-03-14",
+        "pours": [
+            {"index": 1, "part_a_g": 10.0, "part_b_g": 10, "mixed_at": "2026-03-14T09:30:00+01:00", "cure_h": 4.5},
+            {"index": 2, "pot_life_min": 12.0, "notes": ["cup 2 lifted a little"]},
+        ],
+        "units": [
+            {"cavity": 1, "height_mm": 3.95, "mass_g": 0.61, "walls": [{"layer": 1, "places_mm": [1.2, 1.3]}]},
+            {"cavity": 2, "usable": False, "notes": ["bubble"]},
+        ],
+    }
+
+
+def test_a_record_comes_back_the_same(tmp_path: Path) -> None:
+    record = cast_record(data())
+    (tmp_path / "a.cast.json").write_text(to_json(record), encoding="utf-8")
+    assert read_cast_record(tmp_path / "a.cast.json") == record
+    assert spec_hash(spec_of(record))[:12] == record.spec_hash
+    first = record.unit(1)
+    assert first is not None
+    assert (first.wall_mm(1), first.wall_mm(2), record.unit(3)) == ((1.2, 1.3), (), None)
+
+
+Change = Callable[[dict[str, Any]], Any]
+FAULTS: dict[str, tuple[Change, str]] = {
+    "version": (lambda d: d.update(version=2), "version"),
+    "unknown key": (lambda d: d.update(spec_nme="x"), "spec_nme"),
+    "hash": (lambda d: d.update(spec_hash="XYZ"), "spec_hash"),
+    "day": (lambda d: d.update(cast_on="14.3.2026"), "cast_on"),
+    "day that is none": (lambda d: d.update(cast_on="2026-02-30"), "cast_on"),
+    "time": (lambda d: d["pours"][0].update(mixed_at="half past nine"), "pours.0.mixed_at"),
+    "time without zone": (lambda d: d["pours"][0].update(mixed_at="2026-03-14T09:30:00"), "pours.0.mixed_at"),
+    "grams": (lambda d: d["pours"][0].update(part_a_g=-1.0), "pours.0.part_a_g"),
+    "grams as text": (lambda d: d["pours"][0].update(part_a_g="10 g"), "pours.0.part_a_g"),
+    "pour twice": (lambda d: d["pours"][1].update(index=1), "pours.1.index"),
+    "cavity twice": (lambda d: d["units"][1].update(cavity=1), "units.1.cavity"),
+    "wall": (lambda d: d["units"][0]["walls"][0].update(places_mm=[1.2, 0.0]), "units.0.walls.0.places_mm.1"),
+    "no place": (lambda d: d["units"][0]["walls"][0].update(places_mm=[]), "units.0.walls.0.places_mm"),
+    "layer twice": (lambda d: d["units"][0].update(walls=d["units"][0]["walls"] * 2), "units.0.walls.1.layer"),
+    "infinite": (lambda d: d["units"][0].update(mass_g=float("inf")), "units.0.mass_g"),
+}
+
+
+@pytest.mark.parametrize(("change", "field"), FAULTS.values(), ids=FAULTS)
+def test_a_fault_is_refused_by_its_field(change: Change, field: str) -> None:
+    faulty = data()
+    change(faulty)
+    with pytest.raises(Refusal) as refused:
+        cast_record(faulty)
+    assert refused.value.field == field
+
+
+def test_the_nearest_time_is_accepted() -> None:
+    faulty = data()
+    faulty["pours"][0]["mixed_at"] = "2026-03-14T09:30"
+    with pytest.raises(Refusal) as refused:
+        cast_record(faulty)
+    faulty["pours"][0]["mixed_at"] = refused.value.nearest
+    cast_record(faulty)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "7", '{"format": "other"}', '{"a": NaN}', "[" * 5000])
+def test_another_file_is_no_record(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text(text, encoding="utf-8")
+    with pytest.raises(UnitcadError, match=r"a\.json"):
+        read_cast_record(tmp_path / "a.json")
+
+
+def test_a_large_file_and_a_link_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "large.json").write_text(" " * 1_000_001, encoding="utf-8")
+    with pytest.raises(UnitcadError, match="larger than 1 MB"):
+        read_cast_record(tmp_path / "large.json")
+    (tmp_path / "link.json").symlink_to("large.json")
+    with pytest.raises(UnitcadError, match="link"):
+        read_cast_record(tmp_path / "link.json", links=False)
+
+
+def test_a_record_without_its_spec_says_so() -> None:
+    with pytest.raises(Refusal, match="spec"):
+        spec_of(cast_record({key: value for key, value in data().items() if key != "spec"}))
+
+
+def test_the_schema_is_offered() -> None:
+    done = CliRunner().invoke(app, ["schema", "cast-record"])
+    schema = json.loads(done.stdout)
+    assert schema["title"] == "unitcad cast record"
+    assert {"part_a_g", "pot_life_min", "cure_h"} <= schema["$defs"]["CastPour"]["properties"].keys()

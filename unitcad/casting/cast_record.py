@@ -1,0 +1,171 @@
+"""The cast record: what was weighed, timed and measured when a spec was cast, as the bench page saves it.
+
+A JSON file, its keys ending in their units. A list may be empty and a number null where nobody looked.
+
+    {"format": "unitcad cast record", "version": 1, "spec_name": "demo", "spec_hash": "0f3a91c27b5e",
+     "cast_on": "2026-03-14",
+     "pours": [{"index": 1, "material": "ecoflex-00-10", "part_a_g": 10.0, "part_b_g": 10.1, "cure_h": 4.5}],
+     "units": [{"cavity": 1, "height_mm": 3.95, "mass_g": 0.61, "walls": [{"layer": 1, "places_mm": [1.2, 1.3]}]}]}
+"""
+
+from __future__ import annotations
+
+import datetime
+import re
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from unitcad import files
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.spec import Spec, convert
+from unitcad.spec.asked import Table
+from unitcad.validation import from_data
+
+FORMAT = "unitcad cast record"
+ENDING = ".cast.json"
+"""How the bench page names the file: <spec name>-<date> and this."""
+LARGEST = 1_000_000
+"""Bytes that a record may have."""
+HASH_DIGITS = 12
+
+Text = Annotated[str, Meta(max_length=200)]
+Line = Annotated[str, Meta(max_length=1000)]
+Grams = Annotated[float, Meta(ge=1e-4, le=1e5)]
+Millimetres = Annotated[float, Meta(ge=0.01, le=1000)]
+Resolution = Annotated[float, Meta(ge=1e-4, le=10)]
+Index = Annotated[int, Meta(ge=1, le=99)]
+Cavity = Annotated[int, Meta(ge=1, le=999)]
+
+
+class CastPour(Table, frozen=True, kw_only=True):
+    """One pour as it was: the parts weighed in, and the times taken.
+
+    `pot_life_min`: from the first stir to the last strike. `cure_h`: from that strike to the cup's removal.
+    """
+
+    index: Annotated[Index, Meta(description="1 is the first pour, which casts layer 1")]
+    material: Text | None = None
+    lot: Annotated[Text | None, Meta(description="what the bottles say")] = None
+    part_a_g: Grams | None = None
+    part_b_g: Grams | None = None
+    mixed_at: Annotated[Text | None, Meta(description="ISO 8601, with the zone: 2026-03-14T09:30:00+01:00")] = None
+    pot_life_min: Annotated[float, Meta(ge=0.1, le=10000)] | None = None
+    cure_h: Annotated[float, Meta(ge=0.01, le=1000)] | None = None
+    notes: Annotated[tuple[Line, ...], Meta(max_length=200)] = ()
+
+
+class WallPlaces(Table, frozen=True, kw_only=True):
+    """One layer's wall of one unit, measured at the skin at several places round it."""
+
+    layer: Annotated[Index, Meta(description="1 is the innermost layer")]
+    places_mm: Annotated[tuple[Millimetres, ...], Meta(min_length=1, max_length=100)]
+
+
+class CastUnit(Table, frozen=True, kw_only=True):
+    """One unit out of the mould. `mass_g` is its silicone, trimmed, without motor, circuit and wires."""
+
+    cavity: Annotated[Cavity, Meta(description="the number engraved beside it; 1 where there is one cavity")] = 1
+    usable: bool = True
+    height_mm: Millimetres | None = None
+    diameters_mm: Annotated[tuple[Millimetres, ...], Meta(max_length=100)] = ()
+    mass_g: Grams | None = None
+    walls: Annotated[tuple[WallPlaces, ...], Meta(max_length=99)] = ()
+    notes: Annotated[tuple[Line, ...], Meta(max_length=200)] = ()
+
+    def wall_mm(self, layer: int) -> tuple[float, ...]:
+        """Return what was measured of a layer's wall (from 1), mm; () where nothing was."""
+        return next((wall.places_mm for wall in self.walls if wall.layer == layer), ())
+
+
+class CastRecord(Table, frozen=True, kw_only=True):
+    """One casting of one mould set.
+
+    `spec` is the whole effective spec as plain data, so that the record tells what was cast without any other file.
+    """
+
+    format: Literal["unitcad cast record"]
+    version: Annotated[int, Meta(ge=1, le=1)]
+    spec_name: Text
+    spec_hash: Annotated[Text, Meta(description="the twelve digits that the result's folder ends in")]
+    cast_on: Annotated[Text, Meta(description="the day of the first pour: 2026-03-14")]
+    label: Annotated[Text | None, Meta(description="four characters, as engraved on the moulds")] = None
+    spec: dict[str, Any] | None = None
+    room_c: Annotated[float, Meta(ge=-20, le=80)] | None = None
+    scale_resolution_g: Resolution | None = None
+    caliper_resolution_mm: Resolution | None = None
+    pours: Annotated[tuple[CastPour, ...], Meta(max_length=99)] = ()
+    units: Annotated[tuple[CastUnit, ...], Meta(max_length=999)] = ()
+    notes: Annotated[tuple[Line, ...], Meta(max_length=200)] = ()
+
+    def unit(self, cavity: int) -> CastUnit | None:
+        """Return the unit of a cavity; None where the record has none."""
+        return next((unit for unit in self.units if unit.cavity == cavity), None)
+
+
+def read_cast_record(path: Path, *, links: bool = True) -> CastRecord:
+    """Return the record in a JSON file; without `links` a symbolic link is refused.
+
+    Raises UnitcadError where the file can't be read, Refusal for the first value that is not valid.
+    """
+    data = files.read_json(path, largest=LARGEST, links=links)
+    if not isinstance(data, dict):
+        raise UnitcadError(f"{path}: is not a cast record: it holds no table")
+    if data.get("format") != FORMAT:
+        raise UnitcadError(f"{path}: is not a cast record: its key format is not {FORMAT!r}")
+    return cast_record(data)
+
+
+def cast_record(data: dict[str, Any]) -> CastRecord:
+    """Return the record of plain data. Raises Refusal for the first value that is not valid."""
+    record = convert(data, CastRecord)
+    if not re.fullmatch(f"[0-9a-f]{{{HASH_DIGITS}}}", record.spec_hash):
+        raise Refusal("spec_hash", record.spec_hash, f"must be {HASH_DIGITS} digits of 0-9 and a-f")
+    _expect_day(record.cast_on)
+    for i, pour in enumerate(record.pours):
+        if pour.mixed_at is not None:
+            _expect_time(pour.mixed_at, f"pours.{i}.mixed_at")
+    _expect_once([pour.index for pour in record.pours], "pours.{}.index", "pour")
+    _expect_once([unit.cavity for unit in record.units], "units.{}.cavity", "cavity")
+    for i, unit in enumerate(record.units):
+        _expect_once([wall.layer for wall in unit.walls], f"units.{i}.walls.{{}}.layer", "layer")
+    return record
+
+
+def spec_of(record: CastRecord) -> Spec:
+    """Return the spec that was cast. Raises Refusal where the record has none, or one that this version refuses."""
+    if record.spec is None:
+        raise Refusal("spec", None, "is required here: the effective spec as a table")
+    return from_data(record.spec)
+
+
+def to_json(record: CastRecord) -> str:
+    """Write a record as JSON, every key there."""
+    return msgspec.json.format(msgspec.json.encode(record), indent=1).decode() + "\n"
+
+
+def _expect_day(text: str) -> None:
+    try:
+        day = datetime.date.fromisoformat(text)
+    except ValueError:
+        raise Refusal("cast_on", text, "must be a day such as 2026-03-14") from None
+    if day.isoformat() != text:
+        raise Refusal("cast_on", text, "must be a day such as 2026-03-14", day.isoformat())
+
+
+def _expect_time(text: str, field: str) -> None:
+    limit = "must be a time with its zone, such as 2026-03-14T09:30:00+01:00"
+    try:
+        time = datetime.datetime.fromisoformat(text)
+    except ValueError:
+        raise Refusal(field, text, limit) from None
+    if time.tzinfo is None:
+        raise Refusal(field, text, limit, time.replace(tzinfo=datetime.UTC).isoformat())
+
+
+def _expect_once(numbers: list[int], field: str, thing: str) -> None:
+    for i, number in enumerate(numbers):
+        if number in numbers[:i]:
+            raise Refusal(field.format(i), number, f"is a {thing} that the record has already")
