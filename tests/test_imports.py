@@ -18,9 +18,9 @@ from unitcad.validation import default_template, templates
 PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
     {"cli"},
-    {"api"},
+    {"api", "accuracy"},
     {"batch"},
-    {"report", "accuracy"},
+    {"report"},
     {"pipeline"},
     {"lab"},
     {"casting", "mould_checks"},

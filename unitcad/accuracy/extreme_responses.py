@@ -34,7 +34,7 @@ _LEAST = 1e-15
 STALL = 60.0
 """Processor seconds after which a response counts as stalled."""
 PATIENCE = 1200.0
-"""Seconds after which a medium counts as hung: the reference and the responses at all tolerances."""
+"""Processor seconds after which a medium counts as hung: the reference and the responses at all tolerances."""
 _SERIAL = 60
 
 Job = tuple[str, int]

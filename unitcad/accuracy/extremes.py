@@ -17,7 +17,7 @@ from unitcad.designs import shipped
 from unitcad.validation import default_template, override, read
 
 PATIENCE = 1800.0
-"""Seconds after which a spec counts as hung."""
+"""Processor seconds after which a spec counts as hung."""
 LEAST_BUILT = 0.6
 """Share of the documented ranges that builds, at least."""
 _DOCUMENTED = 0.97
@@ -111,7 +111,7 @@ def _outcomes(jobs: Sequence[Job]) -> Iterator[tuple[str, Outcome]]:
     """Yield the outcomes in order. Many jobs go to worker processes: one that hangs is a fault of its spec."""
 
     def hung(job: Job) -> tuple[str, Outcome]:
-        return job[0], Outcome(HANG, f"no answer within {PATIENCE:g} s")
+        return job[0], Outcome(HANG, f"no answer within {PATIENCE:g} s of processor time")
 
     return in_order(run_job, jobs, PATIENCE, hung, _SERIAL)
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import faulthandler
 import hashlib
 import json
-import multiprocessing
 import os
+import signal
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, TypeVar
 
+from unitcad.batch.executors import WorkerDied, Workers
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.versions import code_version
 
@@ -18,6 +21,7 @@ J = TypeVar("J")
 T = TypeVar("T")
 
 _AHEAD = 16  # jobs handed to each worker, so that none waits for a slow one
+_WAITING = 20  # times its processor time that a job may take by the clock
 
 
 def in_order(
@@ -25,28 +29,41 @@ def in_order(
 ) -> Iterator[T]:
     """Yield call(job) of every job, in order, from worker processes; up to `serial` jobs run in this one.
 
-    A worker that dies, or has no answer within `patience` seconds, gives late(job), and the others go on.
+    A worker that dies, or takes more than `patience` seconds of processor time, gives late(job), and the others go on.
     """
     if len(jobs) <= serial:
         yield from map(call, jobs)
         return
-    workers = _cores()
-    context = multiprocessing.get_context("spawn")
     waiting = deque(jobs)
-    while waiting:
-        with context.Pool(workers, maxtasksperchild=100) as pool:
-            running: deque[tuple[J, Any]] = deque()
-            while waiting or running:
-                while waiting and len(running) < _AHEAD * workers:
-                    job = waiting.popleft()
-                    running.append((job, pool.apply_async(call, (job,))))
-                job, answer = running.popleft()
-                try:
-                    yield answer.get(patience)
-                except multiprocessing.TimeoutError:
-                    yield late(job)
-                    waiting.extendleft(reversed([other for other, _ in running]))
-                    break
+    running: deque[tuple[J, Future[T]]] = deque()
+    with Workers().executor() as (executor, workers):
+        while waiting or running:
+            while waiting and len(running) < _AHEAD * workers:
+                job = waiting.popleft()
+                running.append((job, executor.submit(_within, patience, call, job)))
+            job, answer = running.popleft()
+            try:
+                yield answer.result()
+            except WorkerDied:
+                yield late(job)
+
+
+def _within(patience: float, call: Callable[[J], T], job: J) -> T:
+    """Return call(job), in a worker; the system ends this process after `patience` seconds of its processor time.
+
+    A loaded machine changes nothing of that. What waits, and takes no processor time, ends by the clock, later.
+    """
+    counted = hasattr(signal, "setitimer")  # not on Windows: there the clock has to do
+    faulthandler.dump_traceback_later(patience * (_WAITING if counted else 1), exit=True)
+    if counted:
+        signal.signal(signal.SIGPROF, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_PROF, patience)
+    try:
+        return call(job)
+    finally:
+        if counted:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+        faulthandler.cancel_dump_traceback_later()
 
 
 def journalled(jobs: Sequence[J], compute: Callable[[Sequence[J]], Iterator[Any]], journal: Path) -> Iterator[Any]:
@@ -76,11 +93,3 @@ def journalled(jobs: Sequence[J], compute: Callable[[Sequence[J]], Iterator[Any]
                 file.write(json.dumps([name, known[name]]).encode() + b"\n")
                 file.flush()
             yield known[name]
-
-
-def _cores() -> int:
-    """Return how many cores this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:
-        return os.cpu_count() or 1

@@ -106,6 +106,7 @@ class ProcessExecutor(Executor):
                 future.set_exception(error)
                 continue
             if child.poll() is not None and not self._closing:
+                log.close()
                 child, log = self._start(slot)
             try:
                 tasks, answers = _pipes(child)
