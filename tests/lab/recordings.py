@@ -21,10 +21,10 @@ def columns(count: int = COUNT) -> NDArray[np.float64]:
     return np.round(np.column_stack([c + 50 * w for c, w in zip(CENTRES.values(), waves, strict=True)]) * 64) / 64
 
 
-def write_text(path: Path, delimiter: str = ",", decimal: str = ".", end: str = "") -> None:
+def write_text(path: Path, delimiter: str = ",", decimal: str = ".", end: str = "", quote: str = "") -> None:
     rows = np.column_stack([np.arange(COUNT) / RATE, columns()])
     lines = ["Device;X 1", "Comment: made up", delimiter.join(["Time (s)", *(f"{name} (um)" for name in CENTRES)])]
-    lines += [delimiter.join(f"{v:.6f}".replace(".", decimal) for v in row) + end for row in rows]
+    lines += [delimiter.join(f"{quote}{v:.6f}{quote}".replace(".", decimal) for v in row) + end for row in rows]
     path.write_text("\n".join(lines) + "\n")
 
 
@@ -89,6 +89,7 @@ FORMATS = {
     "semicolon.csv": lambda path: write_text(path, ";", ","),
     "tab.txt": lambda path: write_text(path, "\t"),
     "trailing.csv": lambda path: write_text(path, ",", end=","),
+    "quoted.csv": lambda path: write_text(path, ",", ",", quote='"'),
     "binary.uff": write_universal,
     "ascii.unv": lambda path: write_universal(path, 0),
     "logger.tdms": write_tdms,

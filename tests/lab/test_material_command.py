@@ -68,7 +68,36 @@ def _layouts() -> dict[str, Callable[[Path], tuple[Path, dict[str, str], Specime
         path = _table(folder / "e.txt", "a\tb\tc", [strain / 0.2, stress / 6894.757293168, 100 * strain], sign="\t")
         return path, {"stress": "2:psi", "strain": "c:%"}, Specimen()
 
-    return {f.__name__: f for f in (plain, true_values, force_and_travel, given_lengths, declared_columns)}
+    def quoted(folder: Path, decimal: str = ".", sign: str = ",", units: tuple[str, ...] = ("(s)", "(mm)", "(N)")):
+        head = ['"Specimen","a, b"', '"Specimen Width","6{0}0","mm"', '"Specimen Thickness (mm)","3{0}0"']
+        rows = [("Time", "Extension", "Force"), units]
+        rows += [
+            tuple(f"{value:.7f}".replace(".", decimal) for value in row)
+            for row in zip(strain / 0.2, strain * gauge, stress * area, strict=True)
+        ]
+        lines = [line.format(decimal) for line in head] + [sign.join(f'"{cell}"' for cell in row) for row in rows]
+        path = folder / "f.csv"
+        path.write_text("\n".join(lines) + "\n")
+        return path, {}, Specimen(gauge_mm=gauge)
+
+    def quoted_commas(folder: Path):
+        return quoted(folder, ",")
+
+    def quoted_semicolons(folder: Path):
+        return quoted(folder, ",", ";", ("[s]", "[mm]", "[N]"))
+
+    def quoted_tabs(folder: Path):
+        return quoted(folder, ".", "\t", ("s", "mm", "N"))
+
+    def row_of_units(folder: Path):
+        rows = [f"{a:.7f},{b:.7f}" for a, b in zip(strain, stress / 6894.757293168, strict=True)]
+        path = folder / "g.csv"
+        path.write_text("\n".join(["Strain,Stress", "(mm/mm),(psi)", "", *rows]) + "\n")
+        return path, {}, Specimen()
+
+    made = (plain, true_values, force_and_travel, given_lengths, declared_columns)
+    made = (*made, quoted, quoted_commas, quoted_semicolons, quoted_tabs, row_of_units)
+    return {f.__name__: f for f in made}
 
 
 @pytest.mark.parametrize("layout", _layouts())
@@ -79,6 +108,50 @@ def test_one_curve_in_every_layout_is_the_same_curve(layout: str, tmp_path: Path
     result = evaluate([curve], (0.12, 0.24))
     law = next(row for row in result.rows if row.method == "neo-Hooke up to 50 %")
     assert law.value == pytest.approx(6 * C10, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("lines", "field"),
+    [
+        (['"1,000","2,000"', '"2,000","3,000"', '"3,000","4,000"'], "decimal"),  # 1 and 2, or thousands
+        (['"0,1","0,2"', '"0,2","0,3"', '"0,3"x,"0,4"'], None),  # a quote that is closed too early
+        (['"0,1","0,2"', '"0,2","0,3"', '"0,3","0,4'], None),
+        (['"0,1","0,2"', '"0,2","0,3"', '0,3,"0,4"'], None),
+        (['"0.1","0.2"', '"0.2","0.3"', '"1,000.3","0.4"'], None),
+    ],
+)
+def test_quoted_numbers_are_not_guessed(lines: list[str], field: str | None, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["Strain (%),Stress (kPa)", *lines]) + "\n")
+    with pytest.raises(Refusal) as refused:
+        read_curve(path, {}, Specimen())
+    assert refused.value.field == (field or str(path))
+
+
+def test_names_that_their_spaces_have_split_are_no_columns(tmp_path: Path) -> None:
+    """Four words over four columns, though they name two: Force would be the fourth."""
+    path = tmp_path / "a.txt"
+    path.write_text("Extension (mm) Force (N)\n" + "".join(f"{i}.5 {i}.25 {i} {i}\n" for i in range(1, 9)))
+    with pytest.raises(Refusal, match="declare strain=COLUMN:UNIT; its columns: 1 column 1, 2 column 2"):
+        read_curve(path, {}, Specimen(6.0, 3.0, 33.0))
+
+
+@pytest.mark.parametrize(
+    ("line", "width"),
+    [
+        ("Specimen Width (mm);6,5", 6.5),
+        ('"Specimen Width (mm)","6,5"', 6.5),
+        ('"Width","6.5","mm"', 6.5),
+        ("Width (mm): 6,5", 6.5),
+        ("Width (mm),6.5", 6.5),
+        ("Width (mm),6,5", None),  # 6, or 6.5
+        ("Width (mm);6,500", None),  # 6.5, or thousands
+        ("Width [cm]\t0.65", 6.5),
+    ],
+)
+def test_a_width_of_the_header_is_read_whole_or_not(line: str, width: float | None, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(f"{line}\n")
+    assert header_of(tmp_path / "a.csv").width_mm == (None if width is None else pytest.approx(width))
 
 
 def test_a_header_says_what_the_machine_is(tmp_path: Path) -> None:

@@ -19,7 +19,10 @@ UNITS: dict[str, dict[str, float]] = {
     "acceleration": {**{f"{name}/s2": factor for name, factor in LENGTHS.items()}, "g": GRAVITY},
 }
 """Factors to m, m/s and m/s2, by quantity and unit."""
-OTHER_UNITS = ("V", "mV", "Pa", "kPa", "MPa", "N", "mN", "kN", "%", "A", "mA", "Hz", "deg", "rad")
+OTHER_UNITS = (
+    "V", "mV", "Pa", "kPa", "MPa", "GPa", "N/mm2", "psi", "N", "mN", "kN", "lbf", "gf", "kgf", "%", "mm/mm", "m/m",
+    "in/in", "-", "A", "mA", "Hz", "rad/s", "deg", "rad", "min", "mm/min", "degC", "°C",
+)  # fmt: skip
 _WORDS = {"volt": "V", "volts": "V", "sec": "s", "second": "s", "seconds": "s", "metre": "m", "meter": "m"}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import re
 from collections.abc import Iterator, Mapping
@@ -99,7 +100,7 @@ def header_of(path: Path) -> Specimen:
     """Return what the lines "name;value" before the numbers say of specimen and machine."""
     found: dict[str, float | bool] = {}
     for name, value in _pairs(path):
-        number = re.match(r"\s*([\d.]+(?:e-?\d+)?)\s*([a-zA-Z]*)", value)
+        number = _NUMBER.match(value)
         for pattern, key in _HEADER:
             if not number or not (match := re.search(pattern, name, re.IGNORECASE)):
                 continue
@@ -107,8 +108,9 @@ def header_of(path: Path) -> Specimen:
             factor = {"cm": 10.0, "in": 25.4, "cm^2": 100.0, "cm2": 100.0}.get(unit, 1.0)
             if key == "cell_n":
                 factor = _FORCES.get(number[2], 0.0)
-            if factor and float(number[1]) > 0:
-                found.setdefault(key, float(number[1]) * factor)
+            amount = float(number[1].replace(",", "."))
+            if factor and amount > 0 and not _MAYBE_THOUSANDS.fullmatch(number[1]):
+                found.setdefault(key, amount * factor)
         if re.search("strain|elongation", name, re.IGNORECASE):
             if re.search("crosshead|cross-head|grip|traverse", value, re.IGNORECASE):
                 found["crosshead"] = True
@@ -127,13 +129,33 @@ _HEADER = (
 )
 
 
+_NUMBER = re.compile(r"\s*(\d+(?:[.,]\d*)?(?:e-?\d+)?)\s*([a-zA-Z]*)")
+_MAYBE_THOUSANDS = re.compile(r"[1-9]\d{0,2},\d{3}")
+_UNIT = re.compile(r"\s*[\[(]?(mm|cm|in|mm2|mm\^2|cm2|cm\^2|mm/min)[\])]?\s*")
+
+
 def _pairs(path: Path) -> Iterator[tuple[str, str]]:
+    """Yield name and value of the header's lines; a third cell with a unit counts to the name."""
     with open(path, "rb", opener=files.regular()) as file:
         text = file.read(100_000).decode("utf-8", "replace")
     for line in text.splitlines()[:_HEADER_LINES]:
-        cells = [cell.strip(" \"'") for cell in re.split(r"[;,\t]|:\s", line)]
+        cells = [cell.strip(" \"'") for cell in _cells(line)]
         if len(cells) > 1 and cells[0] and not re.match(r"[\d.+-]", cells[0]):
-            yield cells[0], cells[1]
+            unit = _UNIT.fullmatch(cells[2]) if len(cells) > 2 else None
+            yield (f"{cells[0]} ({unit[1]})" if unit else cells[0]), cells[1]
+
+
+def _cells(line: str) -> list[str]:
+    """Return a header line's cells: at semicolons or tabs, else at a colon, else at commas that no quotes enclose."""
+    if ";" in line or "\t" in line:
+        return re.split(r"[;\t]", line)
+    if '"' not in line and re.search(r":\s", line):
+        return re.split(r":\s", line, maxsplit=1)
+    try:
+        cells = next(csv.reader([line], strict=True, skipinitialspace=True), [])
+    except csv.Error:
+        return []
+    return [] if '"' not in line and re.fullmatch(r"\s*\d+\s*", "".join(cells[2:3])) else cells  # 6,5: one or two?
 
 
 def _strain(data: Mapping[str, np.ndarray], specimen: Specimen, path: Path) -> tuple[np.ndarray, Specimen]:

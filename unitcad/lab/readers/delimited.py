@@ -25,7 +25,10 @@ HEAD = 1_000_000
 PIECE = 4_000_000
 """Bytes that are read at a time."""
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[nN][aA][nN]", re.ASCII)
-_DIALECTS = (("\t", "."), (";", "."), (",", "."), (" ", "."), ("\t", ","), (";", ","), (" ", ","))
+_DIALECTS = (("\t", "."), (";", "."), (",", "."), (" ", "."), ("\t", ","), (";", ","), (" ", ","), (",", ","))
+"""Delimiter and decimal sign; the same sign for both only where quotes tell them apart."""
+_MAYBE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+", re.ASCII)
+_UNIT_ALONE = re.compile(r"[\[(][^\[\]()]*[\])]")
 _NAMED_UNIT = re.compile(r"(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*")
 
 
@@ -80,12 +83,25 @@ def _lines(text: str) -> list[str]:
 
 
 def _split(line: str, delimiter: str, decimal: str) -> list[str]:
-    """Return the fields of a line; one delimiter at its end separates nothing."""
-    if decimal == ",":
-        line = line.replace(".", "?").replace(",", ".")
+    """Return the fields of a line; one delimiter at its end separates nothing. Quotes stay where one is not closed."""
     if delimiter == " ":
-        return line.split()
-    return [field.strip() for field in line.strip(" ").removesuffix(delimiter).split(delimiter)]
+        fields = [field[1:-1] if _enclosed(field) else field for field in line.split()]
+    else:
+        line = line.strip(" ").removesuffix(delimiter)
+        fields = (_quoted(line, delimiter) if '"' in line else None) or line.split(delimiter)
+        fields = [field.strip() for field in fields]
+    return [field.replace(".", "?").replace(",", ".") for field in fields] if decimal == "," else fields
+
+
+def _enclosed(field: str) -> bool:
+    return len(field) > 1 and field[0] == field[-1] == '"'
+
+
+def _quoted(line: str, delimiter: str) -> list[str] | None:
+    try:
+        return next(csv.reader([line], delimiter=delimiter, strict=True, skipinitialspace=True))
+    except (csv.Error, StopIteration):
+        return None
 
 
 def _block(path: Path, lines: list[str], layout: Layout) -> Block:
@@ -94,7 +110,9 @@ def _block(path: Path, lines: list[str], layout: Layout) -> Block:
     for delimiter, decimal in _DIALECTS:
         if layout.delimiter not in ("", delimiter) or layout.decimal not in ("", decimal):
             continue
-        runs.append(_longest_run(lines, Block(delimiter, decimal, 0, 0, 0), layout.skip_lines))
+        run = _longest_run(lines, Block(delimiter, decimal, 0, 0, 0), layout.skip_lines)
+        if delimiter != decimal or any('"' in line for line in lines[run.start : run.start + run.lines]):
+            runs.append(run)
     best = max(runs, key=lambda run: run.lines, default=None)
     if best is None or best.lines < 2:
         raise Unreadable(str(path), None, "holds no block of lines with the same count of numbers")
@@ -103,7 +121,17 @@ def _block(path: Path, lines: list[str], layout: Layout) -> Block:
     if any(o.fields(lines[best.start]) != best.fields(lines[best.start]) for o in others):
         limit = f"line {best.start + 1} ({shown[:40]!r}) may be read in two ways; declare delimiter and decimal"
         raise Unreadable("delimiter", None, f"{path.name}: {limit}")
+    if best.delimiter == best.decimal and not layout.decimal:
+        _expect_decimals(path, lines[best.start : best.start + best.lines])
     return best
+
+
+def _expect_decimals(path: Path, lines: list[str]) -> None:
+    """Refuse quoted numbers whose commas may all separate thousands."""
+    fields = [field.strip() for line in lines for field in _quoted(line.strip(" "), ",") or () if "," in field]
+    if fields and all(map(_MAYBE_THOUSANDS.fullmatch, fields)):
+        limit = f"{path.name}: the comma in {fields[0]!r} may be a decimal sign or part thousands; declare decimal"
+        raise Unreadable("decimal", None, limit)
 
 
 def _longest_run(lines: list[str], dialect: Block, skip: int) -> Block:
@@ -125,7 +153,7 @@ def _refuse_broken(path: Path, lines: list[str], block: Block, skip: int) -> Non
     """Refuse a file with lines like those of the block before it, which would be lost without a word."""
     for i, line in enumerate(lines[skip : block.start], skip):
         fields = _split(line, block.delimiter, block.decimal)
-        numbers = [bool(_NUMBER.fullmatch(field)) for field in fields]
+        numbers = [bool(_NUMBER.fullmatch(field.strip('"'))) for field in fields]
         if numbers and numbers[0] and (len(fields) == block.width or (all(numbers) and len(fields) > 1)):
             limit = f"{path.name}: line {i + 1} ({line.strip()[:40]!r}) looks like data, but the block begins at line "
             raise Unreadable("skip_lines", None, f"{limit}{block.start + 1}; correct the file, or skip that line")
@@ -163,6 +191,20 @@ def _whole_lines(data: bytes) -> tuple[bytes, bytes]:
 
 def _numbers(lines: list[str], block: Block) -> tuple[Floats, int]:
     """Return the numbers of the lines up to the first that doesn't fit, and how many lines those are."""
+    rows = None if any('"' in line for line in lines) else _plain_numbers(lines, block)
+    if rows is not None:
+        return rows, len(lines)
+    fields = [block.fields(line) if line.strip() else [] for line in lines]
+    misfits = (i for i, found in enumerate(fields) if found is None or len(found) not in (0, block.width))
+    used = next(misfits, len(lines))
+    numbers = [[float(number) for number in found] for found in fields[:used] if found]
+    return np.array(numbers, float).reshape(-1, block.width), used
+
+
+def _plain_numbers(lines: list[str], block: Block) -> Floats | None:
+    """Return the numbers of lines without quotes, fast; None where a line doesn't fit."""
+    if block.delimiter == block.decimal:
+        return None
     clean = lines
     if block.delimiter not in (" ", "\t"):
         clean = [line.rstrip(" ").removesuffix(block.delimiter) for line in lines]
@@ -173,20 +215,16 @@ def _numbers(lines: list[str], block: Block) -> tuple[Floats, int]:
     try:
         rows = np.loadtxt(clean, delimiter=None if block.delimiter == " " else block.delimiter, comments=None, ndmin=2)
         if rows.shape[1] == block.width and not np.isinf(rows).any():
-            return rows, len(lines)
+            return rows
     except (ValueError, OverflowError):
         pass
-    fields = [block.fields(line) if line.strip() else [] for line in lines]
-    misfits = (i for i, found in enumerate(fields) if found is None or len(found) not in (0, block.width))
-    used = next(misfits, len(lines))
-    rows = [[float(number) for number in found] for found in fields[:used] if found]
-    return np.array(rows, float).reshape(-1, block.width), used
+    return None
 
 
 def _expect_footer(path: Path, lines: list[str], block: Block, number: int) -> None:
     """Refuse further numbers behind the block's end: words alone may follow it."""
     for i, line in enumerate(lines):
-        fields = _split(line, block.delimiter, block.decimal)
+        fields = [field.strip('"') for field in _split(line, block.delimiter, block.decimal)]
         if line.strip() and (_NUMBER.fullmatch(fields[0]) or any(map(_NUMBER.fullmatch, fields[1:]))):
             limit = f"line {number + i + 1} ({line.strip()[:40]!r}) does not have {block.width} numbers as those above"
             raise Unreadable(str(path), None, limit)
@@ -202,9 +240,12 @@ def _channels(header: list[str], block: Block) -> tuple[list[Channel], float | N
     if not rows:
         return [Channel(name) for name in names], None
     last = rows[-1][: block.width]
-    if len(rows) == 2 and (step is not None or all(known(word) for word in last if word)):
-        names, units = rows[0][: block.width], [word if known(word) else "" for word in last]
-    else:
+    alone = [bool(_UNIT_ALONE.fullmatch(word)) for word in last]
+    units_row = any(last) and all(known(word) or a for word, a in zip(last, alone, strict=True) if word)
+    if (len(rows) == 2 and (step is not None or units_row)) or all(alone):
+        names = rows[0][: block.width] if len(rows) == 2 else names
+        units = [word.strip("[]() ") if known(word) or a else "" for word, a in zip(last, alone, strict=True)]
+    elif not any(alone):  # a unit by itself among names: its spaces have split them
         for i, word in enumerate(last):
             parts = _NAMED_UNIT.fullmatch(word)
             names[i], units[i] = (parts[1] or word, parts[2]) if parts else (word, "")
