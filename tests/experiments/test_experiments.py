@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.integrate import quad
+from scipy.stats import multivariate_normal, norm
 
 from unitcad.attenuation.edge.fitted_models import path_of
 from unitcad.attenuation.edge.level import nominal
@@ -19,7 +20,7 @@ from unitcad.cli.experiments_command import experiments
 from unitcad.errors import Refusal
 from unitcad.experiments.draws import Draws
 from unitcad.experiments.lab_file import Lab, lab_of_data, load_lab
-from unitcad.experiments.most_telling import most_telling
+from unitcad.experiments.most_telling import _about_order, decision_between, most_telling
 from unitcad.experiments.protocol import Condition, Ratio, ratios
 from unitcad.experiments.ranking import Predictions, best_sets, singles
 from unitcad.experiments.rivals import available
@@ -294,3 +295,59 @@ def test_the_most_telling_experiment_is_the_first_of_a_study_of_the_two() -> Non
     assert telling.information.bits == pytest.approx(first["bits"], rel=1e-5)
     for words in (first["experiment"], "crossings", "fitted", "of the one bit between them."):
         assert words in telling.sentence
+
+
+def _entropy(p: float) -> float:
+    return float(-sum(x * np.log2(x) for x in (p, 1 - p) if x > 0))
+
+
+@pytest.mark.parametrize("middle", [0.0, 0.2, -0.5])
+def test_what_a_measurement_says_about_the_order_of_two_candidates(middle: float) -> None:
+    """Gaussian rivals, for which the information about the sign of the true log ratio is one integral."""
+    conditions, spread = (Condition("A", 125.0, "gel"), Condition("B", 125.0, "gel")), 0.3
+    evenly = middle + spread * norm.ppf((np.arange(600) + 0.5) / 600)
+    logs = [np.stack([np.random.default_rng(m).permutation(evenly), np.zeros(600)], axis=-1) for m in range(2)]
+    predicted = Predictions(("a", "b"), conditions, tuple(logs), noise=0.1, discrepancy=0.15, seed=1)
+    found, higher = _about_order(predicted, Ratio(*conditions))
+    true, noise = np.hypot(spread, 0.15), np.hypot(0.1, 0.1)
+    assert higher == pytest.approx(norm.cdf(middle / true), abs=1e-3)
+
+    def left(y: float) -> float:
+        gain = true**2 / (true**2 + noise**2)
+        p = norm.cdf((middle + gain * (y - middle)) / (true * np.sqrt(1 - gain)))
+        return float(norm.pdf(y, middle, np.hypot(true, noise))) * _entropy(float(p))
+
+    exact = _entropy(float(norm.cdf(middle / true))) - quad(left, middle - 3, middle + 3, limit=200)[0]
+    assert found.bits == pytest.approx(exact, abs=max(found.error, 0.02))
+    assert found.error < 0.06
+
+
+def test_a_decision_between_two_candidates() -> None:
+    stiff = {"layers.0.material": "dragon-skin-10-medium", "layers.1.material": "ecoflex-00-10"}
+    soft = {"layers.0.material": "ecoflex-00-10", "layers.1.material": "dragon-skin-10-medium"}
+    known = decision_between({"stiff inside": load("embedded", stiff), "soft inside": load("embedded", soft)})
+    assert known.first_higher > 0.99
+    assert known.sentence.startswith("No measurement is needed to order the two: stiff inside has the higher level")
+    asked = {"flat": load("encapsulating"), "three layers": load("three-layer")}
+    found = decision_between(asked)
+    assert found.sentence.startswith("Measure flat over three layers, at 125 Hz on forearm: crossings ")
+    assert found.sentence.count(".\n") == 0
+    assert 0.1 < found.order.bits < found.open_bits <= 1
+    assert found.open_bits == pytest.approx(_entropy(found.first_higher))
+    assert found.predicted["bush"]["low"] > 2 > 1 > found.predicted["crossings"]["low"]
+    assert found == decision_between(asked)
+    turned = decision_between({"three layers": asked["three layers"], "flat": asked["flat"]})
+    assert turned.first_higher == pytest.approx(1 - found.first_higher, abs=0.05)
+    # Each at its own frequency: the small motor turns faster.
+    small = decision_between({"small": load("motor-10mm"), "flat": load("encapsulating")})
+    assert [end.frequency_hz for end in (small.ratio.above, small.ratio.below)] == [225.0, 125.0]
+
+
+def test_candidates_that_cannot_be_compared_are_refused() -> None:
+    one = {"one": load("embedded")}
+    with pytest.raises(Refusal, match="two candidates are compared"):
+        decision_between(one)
+    with pytest.raises(Refusal, match=r"units\.other\.layers\.0"):
+        decision_between({**one, "other": load("embedded", {"layers.0.material": "ecoflex-00-50"})})
+    with pytest.raises(Refusal, match=r"rivals\.0"):
+        decision_between({**one, "other": load("encapsulating")}, rivals=["crosings"])

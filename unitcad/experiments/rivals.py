@@ -110,3 +110,5 @@ def available(
 
 DEFAULT = ("crossings", "fitted", "bush", "mechanics-axial-edge", "mechanics-flat-edge", "mechanics-flat-skin")
 """The rivals of a lab that names none."""
+CLOSED_FORMS = tuple(name for name in DEFAULT if not name.startswith("mechanics"))
+"""Those of them that are formulas: a draw is a matter of microseconds."""
