@@ -51,9 +51,9 @@ def test_the_tables_of_an_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
         spec = from_data(data)
         terminal.seek(0)
         terminal.truncate()
-        print_estimate(estimate_spec(spec))
+        print_estimate(estimate_spec(spec), details=True)
         assert f"{name}\x1b[0m: encapsulating, {name} / " in terminal.getvalue()
-        assert f"all-{name} unit" in terminal.getvalue()
+        assert f"all-{name} unit's" in terminal.getvalue()
         print_frequencies(frequency_table_of_spec(spec, [100.0, 125.0]))
         assert f"{name}: edge level" in terminal.getvalue()
 

@@ -103,10 +103,12 @@ def test_builds_follow_the_fit(fit_file: Path, text: str, tmp_path: Path) -> Non
 
 
 def test_the_terminal_shows_fit_range_and_own_measurement(fit_file: Path) -> None:
-    done = CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file)])
+    done = CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file), "--details"])
     assert done.exit_code == 0
     for words in ("P10 to P90", "measured here", "synthetic-bench", "null x 1.51"):
         assert words in done.output
+    assert "9.8 %" in done.output.splitlines()[1]
+    assert "8 of 10 such units" in done.output.splitlines()[1]
     shown = json.loads(CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file), "--json"]).output)
     assert len(shown["fit"]["sha256"]) == 64
 

@@ -197,13 +197,17 @@ def test_links_lead_to_files_that_are_there(visit: Visit, built: Path) -> None:
 
 
 def test_the_estimate_shows_models_and_the_measured_value(visit: Visit) -> None:
+    lead = visit.page.inner_text("#estimate .lead")
+    assert lead.startswith("5.17 % of the motor's amplitude at the edge, measured in the paper")
+    assert "does not read" in visit.page.inner_text("#estimate .lead-notes")
+    visit.page.click("#estimate summary:has-text('Tables')")
     text = visit.page.inner_text("#estimate")
     for words in (
         "Paper, as printed",
         "Fitted divider",
         "(fitted)",
-        "Measured: 0.0517",
-        "Also printed: 0.0458",
+        "Measured: 5.17",
+        "Also printed: 4.58",
         "12 of 12",
     ):
         assert words in text
@@ -225,7 +229,7 @@ def test_measured_and_also_printed_are_told_apart(visit: Visit) -> None:
         "(nodes) => nodes.map((node) => [node.style.left, getComputedStyle(node).backgroundImage])"
     )
     assert [look for _, look in lines] == looks
-    # The dashed one is the smaller value: 0.0458 of 0.0517.
+    # The dashed one is the smaller value: 4.58 of 5.17 %.
     assert float(lines[1][0].removesuffix("%")) < float(lines[0][0].removesuffix("%"))
 
 

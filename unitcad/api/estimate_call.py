@@ -25,6 +25,11 @@ class EdgeEstimate:
     data: dict[str, Any]
 
     @property
+    def answer(self) -> str:
+        """The sentence that leads the estimate: what was measured, the best model's level in per cent, its error."""
+        return summary(self.data)["answer"]
+
+    @property
     def edge(self) -> dict[str, float | None]:
         """The amplitude at the edge over the motor's, by model; None where no number can be given."""
         return {model: row["edge"] for model, row in summary(self.data)["models"].items()}

@@ -73,6 +73,8 @@ def build(
             _print_result(result.manifest)
             if prints:
                 typer.echo(f"{result.manifest['name']}: {prints}")
+            if level := result.manifest["estimate"]:
+                typer.echo(f"{result.manifest['name']}: {level['answer']}")
             typer.echo(str(result.folder))
     if not all(result.ok for result in results):
         sys.exit(1)

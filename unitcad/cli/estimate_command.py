@@ -34,14 +34,14 @@ def estimate(
     fit: Fit = None,
     sets: Sets = None,
     details: Annotated[
-        bool, typer.Option("--details", help="the paper's constraints and its readings of eta too")
+        bool, typer.Option("--details", help="every model, the skin's curve, the inputs, errors, assumptions")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Estimate the vibration at the unit's edge.
 
-    Each model gives the part of the motor's amplitude that reaches the edge, and the decay on the skin beyond it, with
-    the model's error.
+    The first line is the answer: which part of the motor's amplitude reaches the edge, in per cent, by the model with
+    the least error, and what was measured.
     """
     from unitcad.attenuation.edge.fitted_models import MODELS
     from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec, neighbours_of_specs
@@ -74,8 +74,11 @@ def estimate(
             print_frequencies(one)
         return
     for one in estimates:
-        print_estimate(one, details or model in ("paper", "all"))
-    print_errors(estimates[0]["table_error"])
+        print_estimate(one, details)
+    if details:
+        print_errors(estimates[0]["table_error"])
+    else:
+        typer.echo("--details prints every model, the skin's curve, the inputs that count, errors and assumptions")
 
 
 def _warn_of_moulds(spec: Spec) -> None:

@@ -2,49 +2,58 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from unitcad.cli.output import console
 
+if TYPE_CHECKING:
+    from rich.console import Console
+
 
 def print_estimate(data: dict[str, Any], details: bool = False) -> None:
-    """Print the models side by side, the layered curve, the inputs that count, what is assumed.
+    """Print the answer in a few lines; with `details` every model, the layered curve, the inputs, what is assumed.
 
-    `details`: the paper's constraints and readings too.
+    The range by finite elements, which is only made when it is asked for, is always shown.
     """
     screen = console()
     variant = data["variant"]
     layers = " / ".join(layer["material"] for layer in variant["layers"])
     rest = f": {variant['design']}, {layers}, {level(variant['frequency_hz'], digits=4)} Hz"
     screen.print(Text.assemble((variant["name"], "bold"), rest))
-    besides = _besides(data)
-    if data["models"]:
-        screen.print(_models(data))
-        if "fit" in data:
-            besides = [_fit_line(data["fit"]).strip(), *besides]
-    for line in [*besides, *_reasons(data)]:
+    for line in [*data["answer"]["lines"], *_besides(data)]:
         screen.print(f"  {line}", soft_wrap=True)
-    screen.print(_curve(data["layered"]))
-    screen.print(f"  {data['layered']['u_is']}", soft_wrap=True)
     if "mechanics" in data:
         if data["mechanics"]["levels"]:
             screen.print(_mechanics(data["mechanics"]))
         for line in _mechanics_lines(data["mechanics"]):
             screen.print(f"  {line}", soft_wrap=True)
+    if details:
+        _print_details(screen, data)
+
+
+def _print_details(screen: Console, data: dict[str, Any]) -> None:
+    """Print the models side by side, the layered curve, the inputs that count, the paper's constraints and readings."""
+    if data["models"]:
+        screen.print(_models(data))
+        if "fit" in data:
+            screen.print(_fit_line(data["fit"]), soft_wrap=True)
+    screen.print(_curve(data["layered"]))
+    screen.print(f"  {data['layered']['u_is']}", soft_wrap=True)
     inputs = _inputs(data)
     if inputs:
         screen.print(inputs[0])
         if inputs[1]:
             screen.print(f"  {inputs[1]}", soft_wrap=True)
-    paper = data["models"].get("paper", {}) if details else {}
+    paper = data["models"].get("paper", {})
     if paper.get("constraints"):
         screen.print(_constraints(paper["constraints"]))
     if paper.get("readings") and paper["readings"][0]["hierarchical_over_control"]:
         screen.print(_readings(paper["readings"]))
     no_ratio = data["layered"]["hierarchical_over_control_reason"]
+    besides = _besides(data)
     for line in [f"no hierarchical / control from the layers: {no_ratio}", *data["assumptions"]]:
         if line not in besides:
             screen.print(f"  {line}", soft_wrap=True)
@@ -118,12 +127,12 @@ def print_neighbours(data: dict[str, Any]) -> None:
     first, *_ = data["units"]
     masses = ", ".join(f"{unit['name']} {level(unit['mass_g'])} g" for unit in data["units"])
     row_of = f"units in a row, {data['pitch_mm']:g} mm apart"
-    title = f"|u| over that of {first['name']}, which drives ({data['drive']}): {row_of}"
+    title = f"|u|, % of that of {first['name']}, which drives ({data['drive']}): {row_of}"
     table = Table("unit", "mm away", "Hz", "on bare skin", "with masses", "masses change it by", title=title)
     for row in data["transfer"]:
-        bare, change = f"{row['on_bare_skin']:.3g}", f"x {row['masses_change_it_by']:.2f}"
+        bare, change = f"{100 * row['on_bare_skin']:.3g}", f"x {row['masses_change_it_by']:.2f}"
         place = f"{row['at_mm']:g}", f"{row['frequency_hz']:g}"
-        table.add_row(row["unit"], *place, bare, level(row["with_masses"]), change)
+        table.add_row(row["unit"], *place, bare, level(row["with_masses"], 100), change)
     screen = console()
     screen.print(table)
     screen.print(f"  masses: {masses}", soft_wrap=True)
@@ -133,15 +142,15 @@ def print_neighbours(data: dict[str, Any]) -> None:
 
 
 def _models(data: dict[str, Any]) -> Table:
-    """Tabulate the edge level and, against the control of each of the unit's materials, hierarchical / control."""
+    """Tabulate the edge level and, over that of the control of each of the unit's materials, hierarchical / control."""
     blocks, measured = data["models"], data["measured"] or {}
     measured = measured if measured.get("same_size") else {}
     controls = [one["control"] for one in next(iter(blocks.values()))["hierarchical_over_control"] or []]
     fitted = data.get("fit")
     ranges = ["P10 to P90"] if fitted else []
-    table = Table("model", "edge level %", *ranges, *[f"level over that of an all-{name} unit" for name in controls])
+    table = Table("model", "edge level %", *ranges, *[f"% of an all-{name} unit's" for name in controls])
     for name, block in blocks.items():
-        ratios = [level(one) for one in block["hierarchical_over_control"] or []]
+        ratios = [level(one, 100) for one in block["hierarchical_over_control"] or []]
         spread = [_predicted(block["predictive"])] if fitted else []
         table.add_row(name, level(block["edge_level"], 100), *spread, *ratios)
     for own in data.get("own_measured", ()):
@@ -149,7 +158,7 @@ def _models(data: dict[str, Any]) -> Table:
         table.add_row("measured here", *shown, *["-"] * len(controls))
     if measured:
         levels = [measured[key] for key in ("level", "also_printed") if measured.get(key) is not None]
-        ratios = {one["control"]: f"{one['value']:.3g}" for one in measured.get("hierarchical_over_control") or []}
+        ratios = {one["control"]: level(one, 100) for one in measured.get("hierarchical_over_control") or []}
         text = " and ".join(f"{100 * value:.4g}" for value in levels)
         table.add_row(
             "measured, paper" if fitted else "measured",
@@ -161,15 +170,9 @@ def _models(data: dict[str, Any]) -> Table:
 
 
 def _besides(data: dict[str, Any]) -> list[str]:
-    """Say what belongs to the levels: models of another drive, and a measurement of a unit that differs."""
-    lines = [block["not_of_this_drive"] for block in data["models"].values() if "not_of_this_drive" in block]
-    measured = data["measured"] or {}
-    if measured.get("differs_in"):
-        levels = [measured[key] for key in ("level", "also_printed") if measured.get(key) is not None]
-        text = " and ".join(f"{100 * value:.4g}" for value in levels)
-        at = f"{measured['diameter_mm']:g} mm and {measured['frequency_hz']:g} Hz"
-        lines.append(f"measured at {at}: {text} %; this unit differs in {', '.join(measured['differs_in'])}.")
-    return lines
+    """Say what belongs to the levels: models of another drive, and why one gives no number."""
+    drives = [block["not_of_this_drive"] for block in data["models"].values() if "not_of_this_drive" in block]
+    return [*drives, *(reason for reason in _reasons(data) if data["answer"]["model"])]
 
 
 def _errors(errors: dict[str, Any]) -> Table:
@@ -256,40 +259,38 @@ def _readings(rows: list[dict[str, Any]]) -> Table:
         "eta read as",
         "exponents, S wave",
         "their unit",
-        *[f"level over that of an all-{name} unit" for name in controls],
+        *[Column(f"% of an all-{name} unit's level", min_width=min(17, len(name) + 4)) for name in controls],
     )
     table.title = "the paper's model by reading of eta"
     for row in rows:
         key = "exponents_s_wave"
         ends = zip(row[key], row.get(f"{key}_low", row[key]), row.get(f"{key}_high", row[key]), strict=True)
         exponents = [_ranged({"e": value, "e_low": low, "e_high": high}, "e") for value, low, high in ends]
-        ratios = [_ranged(one, "s") for one in row["hierarchical_over_control"]]
+        ratios = [_ranged(one, "s", 100) for one in row["hierarchical_over_control"]]
         table.add_row(row["eta"].replace("_", " "), ", ".join(exponents), row["unit_of_exponent"], *ratios)
     return table
 
 
-def _ranged(row: dict[str, Any], key: str) -> str:
+def _ranged(row: dict[str, Any], key: str, factor: float = 1.0) -> str:
     """Format a value to three digits, or its range where it has no nominal one."""
     low, high = row.get(f"{key}_low"), row.get(f"{key}_high")
     if row[key] is not None:
-        return f"{row[key]:.3g}"
-    return "not known" if low is None or high is None else f"{low:.3g} to {high:.3g}"
+        return f"{factor * row[key]:.3g}"
+    return "not known" if low is None or high is None else f"{factor * low:.3g} to {factor * high:.3g}"
 
 
 def _curve(layered: dict[str, Any]) -> Table:
     """Tabulate the decay under either drive, the motor's own first, and one drive over the other per newton."""
-    title = (
-        f"|u| of the skin over its value at the edge, {layered['tissue']}, the motor's drive ({layered['drive']}) first"
-    )
+    title = f"|u| of the skin, % of that at the edge, {layered['tissue']}, the motor's drive ({layered['drive']}) first"
     table = Table("mm from the edge", title=title)
     picked = [i for i, r in enumerate(layered["r_mm"]) if r in (0, 2, 5, 10, 15, 20, 30)]
     for i in picked:
         table.add_column(f"{layered['r_mm'][i]:g}")
     for drive, block in layered["drives"].items():
         for name, key in ((drive, "value"), ("low", "low"), ("high", "high")):
-            table.add_row(name, *[f"{block['u'][key][i]:.3g}" for i in picked])
+            table.add_row(name, *[f"{100 * block['u'][key][i]:.3g}" for i in picked])
     ratio = layered["flat_over_axial_per_newton"]["value"]
-    table.add_row("flat over axial, per newton", *[f"{ratio[i]:.3g}" for i in picked])
+    table.add_row("flat over axial, per newton", *[f"x {ratio[i]:.3g}" for i in picked])
     return table
 
 

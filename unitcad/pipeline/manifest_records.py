@@ -64,9 +64,14 @@ class ModelLevel(TypedDict):
 
 
 class EstimateSummary(TypedDict):
-    """The estimate in short; `measured` is the paper's level of this unit, None where there is none."""
+    """The estimate in short; `measured` is the paper's level of this unit, None where there is none.
+
+    `answer` leads the estimate; `model` has the least error of those that give a level.
+    """
 
     models: dict[str, ModelLevel]
+    model: str | None
+    answer: str
     measured: float | None
     frequency_hz: float | None
 

@@ -7,9 +7,11 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from unitcad.attenuation.curve import decay_at, layered_block
+from unitcad.attenuation.edge.answer import answer
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments, choice, forms, in_order, pairwise
 from unitcad.attenuation.edge.lab_fit import LabFit, own_block
 from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown
+from unitcad.attenuation.edge.predictive import STACKED, predictive_of
 from unitcad.attenuation.edge.scores import RANGE_PERCENT, Assessment
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 
@@ -54,7 +56,7 @@ def estimate(
     layered: Layered = layered_block,
     fit: LabFit | None = None,
 ) -> dict[str, Any]:
-    """Return {variant, models, layered, measured, table_error, assumptions}; numbers to nine significant digits.
+    """Return {variant, answer, models, layered, measured, table_error, assumptions}; numbers to nine digits.
 
     With a lab's `fit` the constants are its own, each model has a predictive range, and the data have `fit` and
     `own_measured`. `layered` gives the layered solver's block, which reads no silicone: variants on one body share it.
@@ -84,7 +86,11 @@ def estimate(
     }
     if fit:
         data |= {"fit": fit_block(fit, models), "own_measured": own_block(fit, variant)}
-    return rounded(data)
+    # Where no model is singled out `crossings`, which gives no estimate of its own, is stacked too.
+    names = STACKED if fit is None and set(models) == set(MODELS) else models
+    of_this_drive = [name for name in names if not not_of_this_drive(variant, [name])] or names
+    expected = predictive_of([variant], of_this_drive, fit) if names else None
+    return rounded({"variant": data.pop("variant"), "answer": answer(data, expected), **data})
 
 
 def not_of_this_drive(variant: EstimateInput, models: Sequence[str]) -> list[str]:
@@ -110,7 +116,7 @@ def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
 def summary(estimated: dict[str, Any]) -> dict[str, Any]:
     """Return an estimate for a table or a manifest: edge level and its geometric-mean error by model, measured.
 
-    `measured` is that of this very unit.
+    `measured` is that of this very unit. `model` is the one to go by, `answer` the sentence that leads the estimate.
     """
     measured = estimated["measured"] or {}
     models = {
@@ -122,6 +128,8 @@ def summary(estimated: dict[str, Any]) -> dict[str, Any]:
     }
     return {
         "models": models,
+        "model": estimated["answer"]["model"],
+        "answer": estimated["answer"]["lines"][0],
         "measured": measured.get("level") if measured.get("same_size") else None,
         "frequency_hz": estimated["variant"]["frequency_hz"]["value"],
     }

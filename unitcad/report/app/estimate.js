@@ -21,6 +21,11 @@
     return { at, ticks };
   }
 
+  // Levels are fractions in the data and per cent on the page.
+  const percent = (value) => (known(value) ? 100 * value : value);
+  const percents = ({ value, low, high }) => ({ value: percent(value), low: percent(low), high: percent(high) });
+  const list = (values) => values.map(percent);
+
   const spoken = (entry) => {
     const spread = known(entry.low) && known(entry.high) && entry.low !== entry.high ? `${number(entry.low, 3)} to ${number(entry.high, 3)}` : "";
     if (known(entry.value)) return spread ? `${number(entry.value, 3)} (${spread})` : number(entry.value, 3);
@@ -61,27 +66,28 @@
 
   const COLOURS = { paper: "series-1", consistent: "series-3", fitted: "series-2", bush: "series-5" };
 
+  const ownMarks = (data) => (data.own_measured || []).map((own) => ({ name: `Measured here (${own.unit})`, value: percent(own.value) }));
+
   function levels(data) {
-    const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: block.edge_level || {}, colour: COLOURS[model] || "series-4" }));
+    const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: percents(block.edge_level || {}), reason: (block.edge_level || {}).reason, colour: COLOURS[model] || "series-4" }));
     const found = data.measured || {};
     const measured = found.same_size ? found : {};
-    const marks = [{ name: "Measured", value: measured.level }, { name: "Also printed", value: measured.also_printed, dashed: true }, ...(data.own_measured || []).map((own) => ({ name: `Measured here (${own.unit})`, value: own.value }))].filter(({ value }) => known(value));
+    const marks = [{ name: "Measured", value: percent(measured.level) }, { name: "Also printed", value: percent(measured.also_printed), dashed: true }, ...ownMarks(data)].filter(({ value }) => known(value));
     const fit = data.fit;
-    const reasons = [...new Set(rows.map(({ entry }) => entry.reason).filter(Boolean))];
+    const reasons = [...new Set(rows.map(({ reason }) => reason).filter(Boolean))];
     return [
-      rangeChart(rows, marks, "Level at the unit's edge, of the motor's amplitude; a bar is the spread from the inputs' ranges."),
+      rangeChart(rows, marks, "Level at the unit's edge, % of the motor's amplitude; a bar is the spread from the inputs' ranges, not the model's error."),
       [...reasons, ...Object.values(data.models || {}).map((block) => block.not_of_this_drive).filter(Boolean)].map((reason) => el("p", { className: "note" }, reason)),
       fit && predicted(data, fit),
-      known(found.level) ? el("p", { className: "note" }, found.same_size ? "" : `${number(found.level)}: `, found.note) : el("p", { className: "note" }, "The paper measured no such unit."),
+      known(found.level) ? el("p", { className: "note" }, found.same_size ? "" : `${number(percent(found.level), 3)} %: `, found.note) : el("p", { className: "note" }, "The paper measured no such unit."),
     ];
   }
 
   // What a lab's own fit expects of a new unit: 80 % ranges, and which fit it is.
   function predicted(data, fit) {
-    const rows = Object.entries(data.models || {}).filter(([, block]) => block.predictive).map(([model, block]) => ({ name: nameOf(model), entry: { value: block.edge_level.value, low: block.predictive.p10, high: block.predictive.p90 }, colour: COLOURS[model] || "series-4" }));
+    const rows = Object.entries(data.models || {}).filter(([, block]) => block.predictive).map(([model, block]) => ({ name: nameOf(model), entry: percents({ value: block.edge_level.value, low: block.predictive.p10, high: block.predictive.p90 }), colour: COLOURS[model] || "series-4" }));
     const scores = Object.entries(fit.left_out).map(([model, one]) => `${nameOf(model)} ${number(one.geometric_mean)}`).join(", ");
-    const marks = (data.own_measured || []).map((own) => ({ name: `Measured here (${own.unit})`, value: own.value }));
-    return [rangeChart(rows, marks, `Where a new unit is expected in the lab ${fit.name}: 10 to 90 %.`),
+    return [rangeChart(rows, ownMarks(data), `Where a new unit is expected in the lab ${fit.name}, % of the motor's amplitude: 8 of 10 units.`),
       el("p", { className: "note" }, `Constants: ${fit.file}, SHA-256 ${fit.sha256.slice(0, 12)}, ${fit.own_units} units of the lab's own. Factor with a unit left out: ${scores}.`)];
   }
 
@@ -89,24 +95,24 @@
   function mechanics(block) {
     if (!block) return null;
     const place = { skin: "skin at D/2", edge: "the unit's own edge" };
-    const row = (name, one, colour) => ({ name, entry: { value: one.median, low: one.low, high: one.high }, colour });
+    const row = (name, one, colour) => ({ name, entry: percents({ value: one.median, low: one.low, high: one.high }), colour });
     const rows = (block.levels || []).flatMap((one) => {
       const name = `${one.drive}, ${place[one.reading] || one.reading}`;
       return [row(name, one, "series-4"), ...Object.entries(one.by_contact || {}).map(([contact, group]) => row(`${name}: ${contact}`, group, "series-2"))];
     });
-    const numbers = (block.levels || []).map((one) => [one.drive, place[one.reading] || one.reading, one.median, one.median_error === null ? "–" : one.median_error, one.drawn_as]);
+    const numbers = (block.levels || []).map((one) => [one.drive, place[one.reading] || one.reading, percent(one.median), one.median_error === null ? "–" : one.median_error, percent(one.drawn_as)]);
     return [el("h3", {}, "By finite elements (mechanics)"),
-      rangeChart(rows, [], `Amplitude along the drive over the motor's: median and ${(block.percent || [])[0]} to ${(block.percent || [])[2]} % of ${block.draws} draws, then those with bonded and with resting skin apart.`),
-      numbers.length > 0 && table(["Drive", "Read on", "Median", "Its error, times or divided by", "Unit as drawn"], numbers, { label: "Medians by finite elements" }),
+      rangeChart(rows, [], `Amplitude along the drive, % of the motor's: median and ${(block.percent || [])[0]} to ${(block.percent || [])[2]} % of ${block.draws} draws, then those with bonded and with resting skin apart.`),
+      numbers.length > 0 && table(["Drive", "Read on", "Median, %", "Its error, times or divided by", "Unit as drawn, %"], numbers, { label: "Medians by finite elements" }),
       el("p", { className: "note" }, block.reason || `Not known, and drawn: ${block.not_known}.`)];
   }
 
   function ratios(data) {
     const controls = [...new Set(Object.values(data.models || {}).flatMap((block) => (block.hierarchical_over_control || []).map((entry) => entry.control)))];
     return controls.map((control) => {
-      const rows = Object.entries(data.models).flatMap(([model, block]) => (block.hierarchical_over_control || []).filter((entry) => entry.control === control).map((entry) => ({ name: nameOf(model), entry, colour: COLOURS[model] || "series-4" })));
-      const marks = (((data.measured || {}).same_size && data.measured.hierarchical_over_control) || []).filter((entry) => entry.control === control && known(entry.value)).map((entry) => ({ name: "Measured", value: entry.value }));
-      return rangeChart(rows, marks, `Unit over a control all of ${control}: below 1 it attenuates.`);
+      const rows = Object.entries(data.models).flatMap(([model, block]) => (block.hierarchical_over_control || []).filter((entry) => entry.control === control).map((entry) => ({ name: nameOf(model), entry: percents(entry), colour: COLOURS[model] || "series-4" })));
+      const marks = (((data.measured || {}).same_size && data.measured.hierarchical_over_control) || []).filter((entry) => entry.control === control && known(entry.value)).map((entry) => ({ name: "Measured", value: percent(entry.value) }));
+      return rangeChart(rows, marks, `Level over that of a control all of ${control}, %: below 100 it attenuates.`);
     });
   }
 
@@ -117,25 +123,25 @@
     const x = layered.r_mm;
     const drives = Object.entries(layered.drives || { axial: { u: layered.u_z } });
     const series = drives.map(([drive, block], i) => ({
-      name: `${FORCES[drive] || drive}${drive === layered.drive ? " (this motor)" : ""}`, x, y: block.u.value, low: block.u.low, high: block.u.high, colour: i === 0 ? 0 : 2,
+      name: `${FORCES[drive] || drive}${drive === layered.drive ? " (this motor)" : ""}`, x, y: list(block.u.value), low: list(block.u.low), high: list(block.u.high), colour: i === 0 ? 0 : 2,
     }));
     const columns = [...series];
-    if (layered.flat_over_axial_per_newton) columns.push({ name: "Flat over axial, per newton", y: layered.flat_over_axial_per_newton.value });
+    if (layered.flat_over_axial_per_newton) columns.push({ name: "Flat over axial, per newton", y: list(layered.flat_over_axial_per_newton.value) });
     for (const [drive, block] of drives) {
-      for (const key of ["u_r", "u_theta", "u_z"]) if (block[key]) columns.push({ name: `${drive}: |${key}|`, y: block[key].value });
+      for (const key of ["u_r", "u_theta", "u_z"]) if (block[key]) columns.push({ name: `${drive}: |${key}|`, y: list(block[key].value) });
     }
     const print = layered.paper_beside;
     if (print) {
-      if (print.j0) series.push({ name: "Paper: |J0(kr)|", x, y: print.j0.map(Math.abs), dash: true, colour: 1 });
-      for (const [reading, values] of Object.entries(print.exponential || {})) series.push({ name: `Paper: exp, eta as ${reading.replace("_", " ")}`, x, y: values, dash: true, colour: reading === "loss_modulus" ? 3 : 4 });
+      if (print.j0) series.push({ name: "Paper: |J0(kr)|", x, y: list(print.j0.map(Math.abs)), dash: true, colour: 1 });
+      for (const [reading, values] of Object.entries(print.exponential || {})) series.push({ name: `Paper: exp, eta as ${reading.replace("_", " ")}`, x, y: list(values), dash: true, colour: reading === "loss_modulus" ? 3 : 4 });
     }
     columns.push(...series.slice(drives.length));
     const every = Math.max(1, Math.floor(x.length / 7));
     const rows = x.map((r, i) => [r, ...columns.map((curve) => curve.y[i])]).filter((row, i) => i % every === 0);
     return [
-      curvePlot(series, { xLabel: "distance from the edge (mm)", yLabel: "of |u| at the edge", log: true, label: "Decay from the unit's edge outwards" }),
+      curvePlot(series, { xLabel: "distance from the edge (mm)", yLabel: "% of |u| at the edge", log: true, label: "Decay from the unit's edge outwards" }),
       el("p", { className: "note" }, `At ${number(layered.frequency_hz)} Hz on ${layered.tissue}. ${layered.u_is ? `Each curve over its own value at the edge; ${layered.u_is}. ` : ""}The band is the spread: ${layered.spread}. No ratio to a control: ${layered.hierarchical_over_control_reason}.`),
-      el("details", {}, el("summary", {}, "The curve as numbers"), table(["r (mm)", ...columns.map((curve) => curve.name)], rows, { label: "The curve as numbers" })),
+      el("details", {}, el("summary", {}, "The curve as numbers, % of |u| at the edge"), table(["r (mm)", ...columns.map((curve) => curve.name)], rows, { label: "The curve as numbers" })),
     ];
   }
 
@@ -190,6 +196,12 @@
       own, layered.length > 0 && [el("h4", {}, "Layered skin"), el("ul", {}, layered.map((text) => el("li", {}, text)))]);
   }
 
+  // The answer in the words of the command line; a result of an earlier version has none.
+  function lead(answer) {
+    const [first, ...rest] = (answer && answer.lines) || ["How much of the motor's amplitude reaches the skin at the unit's edge, by each model, and how it decays from there."];
+    return [el("p", { className: "lead" }, first), rest.length > 0 && el("ul", { className: "lead-notes" }, rest.map((line) => el("li", {}, line)))];
+  }
+
   function estimate(variant) {
     const data = variant.estimate;
     if (!data) {
@@ -198,9 +210,8 @@
       return section("estimate", "Attenuation estimate", el("p", { className: "absent" },
         ask ? ["No estimate here. Ask for it with ", el("code", {}, "unitcad build SPEC --only estimate")] : `No estimate: ${left.why}.`));
     }
-    return section("estimate", "Attenuation estimate",
-      el("p", {}, "An estimate, not a measurement: how much of the motor's amplitude reaches the skin at the unit's edge, by each model, and how it decays from there."),
-      levels(data), mechanics(data.mechanics), ratios(data), inputs(data), el("h3", {}, "Outwards from the edge"), curves(data.layered), margins(data.models || {}), errors(data), assumptions(data),
+    return section("estimate", "Attenuation estimate", lead(data.answer), levels(data), mechanics(data.mechanics), el("h3", {}, "Outwards from the edge"), curves(data.layered),
+      el("details", {}, el("summary", {}, "Tables: against controls, inputs, the paper's constraints, errors"), ratios(data), inputs(data), margins(data.models || {}), errors(data)), assumptions(data),
       el("details", {}, el("summary", {}, "All numbers"), facts(data)));
   }
 
