@@ -234,7 +234,16 @@ def test_the_box_taken_apart_is_a_picture() -> None:
         ({"layers": [{**LAYERS[0], "thickness_mm": 0.1}]}, "layers.0.thickness_mm", "0.5"),
         ({"most_echo_pct": 0.1}, "most_echo_pct", "0.5"),
         ({"depth_mm": 3.0}, "depth_mm", "unknown key"),
-        ({"name": "Our Phantom"}, "name", ""),
+        (
+            {"name": "Our Phantom"},
+            "name",
+            "a to z, digits and -, the first a letter or digit; nearest accepted: 'our-phantom'",
+        ),
+        ({"name": "../a"}, "name", "must be small letters a to z, digits and -"),
+        ({"name": "a" * 61}, "name", "must have at most 60 characters"),
+        ({"name": ""}, "name", "must not be empty: needs small letters a to z"),
+        ({"layers": [{**LAYERS[0], "name": "2nd"}]}, "layers.0.name", "the first a letter"),
+        ({"points_mm": [5.0]}, "points_mm", "must have at least 2 entries"),
     ],
 )
 def test_what_can_not_be_is_refused(changed: dict, field: str, part: str) -> None:

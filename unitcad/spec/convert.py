@@ -123,11 +123,19 @@ def _refusal(value: Any, kind: Any, field: str) -> Refusal:
     tuples = [typing.get_args(k) for k in alternatives(kind) if typing.get_origin(k) is tuple]
     fixed = [len(entries) for entries in tuples if Ellipsis not in entries]
     most = [note.max_length for note in notes(kind) if note.max_length is not None]
+    least = [note.min_length for note in notes(kind) if note.min_length is not None]
     if not value and not fixed:
         return Refusal(field, value, _needs(kind))
-    if most:
-        return Refusal(field, value, f"must have at most {most[0]} {'characters' if given is str else 'entries'}")
-    return Refusal(field, value, f"must have {fixed[0]} entries")
+    things = "characters" if given is str else "entries"
+    if least and len(value) < least[0]:
+        return Refusal(field, value, f"must have at least {least[0]} {things}")
+    if most and len(value) > most[0]:
+        return Refusal(field, value, f"must have at most {most[0]} {things}")
+    if fixed:
+        return Refusal(field, value, f"must have {fixed[0]} entries")
+    pattern = next(note.pattern for note in notes(kind) if note.pattern is not None)
+    written = re.sub(r"[^a-z0-9]+", "-", value.lower()).strip("-")
+    return Refusal(field, value, f"must be {meaning(kind) or pattern}", written if _fits(written, kind) else None)
 
 
 def _out_of_range(value: float, kind: Any, field: str) -> Iterator[Refusal]:

@@ -14,6 +14,8 @@ from unitcad.spec import convert, read_toml
 from unitcad.validation.shipped_files import named_file, shipped_files
 
 LEAST_LAYER, MOST_DEPTH = 0.5, 100.0
+_LAYER_NAME = "small letters a to z, digits and -, the first a letter"
+_NAME = "small letters a to z, digits and -, the first a letter or digit"
 
 
 class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -22,7 +24,7 @@ class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     `loss_factor`: tan delta, assumed where nobody measured it.
     """
 
-    name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[a-z][a-z0-9-]*$")]
+    name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[a-z][a-z0-9-]*$", description=_LAYER_NAME)]
     silicone: str
     thinner_pct: Annotated[float, Meta(ge=0, le=100)]
     thickness_mm: Annotated[float, Meta(ge=LEAST_LAYER, le=60)]
@@ -32,7 +34,7 @@ class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A phantom; `inside_mm` is the box's inside, None for the least that keeps the echo below `most_echo_pct`."""
 
-    name: Annotated[str, Meta(min_length=1, max_length=60, pattern=r"^[a-z0-9][a-z0-9-]*$")]
+    name: Annotated[str, Meta(min_length=1, max_length=60, pattern=r"^[a-z0-9][a-z0-9-]*$", description=_NAME)]
     layers: Annotated[tuple[PhantomLayer, ...], Meta(min_length=1, max_length=6)]
     unit_diameter_mm: Annotated[float, Meta(ge=4, le=40)] = 14.0
     motor_diameter_mm: Annotated[float, Meta(ge=2, le=40)] = 7.0
