@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import json
 import math
 import os
@@ -26,6 +27,7 @@ LARGEST = 16_000_000
 """Bytes that a spec, a sweep, a manifest or another file of one variant may have."""
 LARGEST_TABLE = 256_000_000
 """Bytes that a batch's table may have."""
+_PIECE = 1 << 20
 TEMPORARY = ".tmp-"
 MARK, LOCK = "unitcad-scratch", "unitcad-lock"
 """The files in every scratch folder: the mark holds FORMAT, the folder's token, a name; the lock is held while its
@@ -75,6 +77,18 @@ def read_json(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bo
         return json.loads(text, parse_constant=_no_number, parse_float=_finite)
     except (ValueError, RecursionError) as error:
         raise UnitcadError(f"{path}: not JSON: {error}") from None
+
+
+def sha256(path: str | os.PathLike[str]) -> str:
+    """Return the SHA-256 of a file of any size, read in pieces. Raises UnitcadError where it can't be read."""
+    found = hashlib.sha256()
+    try:
+        with open(path, "rb", opener=regular()) as file:
+            while piece := file.read(_PIECE):
+                found.update(piece)
+    except OSError as error:
+        raise UnitcadError(f"{path}: {(error.strerror or 'unreadable').lower()}") from None
+    return found.hexdigest()
 
 
 def regular(links: bool = True) -> Callable[[str, int], int]:

@@ -65,7 +65,7 @@ def test_constants_lie_between_the_stored_and_the_lab_s_own(tmp_path: Path) -> N
 def test_levels_come_from_a_file_of_measure(tmp_path: Path) -> None:
     level = {"distance_mm": 0.0, "value": 0.2, "low": 0.18, "high": 0.22, "frequency_hz": 131.5}
     rows = [
-        {"unit": "b", "chain": "line", **level},
+        {"unit": "b", "spec": "campaign/u.toml", "chain": "line", **level},
         {"unit": "b", "chain": "paper", **level, "value": 0.3},
         {"unit": "b", "chain": "line", **level, "distance_mm": 5.0, "value": 0.1},
     ]
@@ -75,7 +75,7 @@ def test_levels_come_from_a_file_of_measure(tmp_path: Path) -> None:
         "status": "measured",
         "chain": "line",
         "level": rows,
-        "source": [{"file": "u.toml", "sha256": sha}],
+        "source": [{"file": "campaign/u.toml", "sha256": sha}],  # as the campaign's file names it
     }
     (tmp_path / "measured.toml").write_text(tomli_w.dumps(measured))
     units = [UNITS[0], {"name": "b", "spec": "u.toml", "measured": "measured.toml"}]
@@ -86,7 +86,12 @@ def test_levels_come_from_a_file_of_measure(tmp_path: Path) -> None:
     (tmp_path / "u.toml").write_text((tmp_path / "u.toml").read_text() + "# changed\n")
     with pytest.raises(Refusal, match="SHA-256 differs"):
         load_fit_lab(_written(tmp_path, unit=units))
-    (tmp_path / "u.toml").write_bytes(b"")
+    units[1] = {**units[1], "spec": "encapsulating"}
+    measured["level"][0]["spec"] = "embedded"
+    (tmp_path / "measured.toml").write_text(tomli_w.dumps(measured))
+    with pytest.raises(Refusal, match="measured of the template embedded, not encapsulating"):
+        load_fit_lab(_written(tmp_path, unit=units))
+    (tmp_path / "measured.toml").write_bytes(b"")
     units[1] = {**units[1], "name": "c"}
     with pytest.raises(UnitcadError):
         load_fit_lab(_written(tmp_path, unit=units))

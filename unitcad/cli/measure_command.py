@@ -26,9 +26,9 @@ def measure(
     Exit 1 when a finding says that a record or a level is in doubt. The last line printed is the folder.
     """
     from unitcad.cli.output import print_json, progress, warn
+    from unitcad.files import sha256
     from unitcad.lab import measured_files, measuring
     from unitcad.lab.campaign import read_campaign
-    from unitcad.lab.signals import sha256
 
     asked = read_campaign(campaign)
     folder = out or Path("out") / f"measure-{campaign.stem}"

@@ -10,6 +10,7 @@ from msgspec import Meta
 
 from unitcad.errors import Refusal
 from unitcad.lab.quantities import Quantity, to_si
+from unitcad.lab.unit_files import Cavity
 from unitcad.spec.asked import Table
 from unitcad.spec.convert import convert
 from unitcad.spec.toml import read_toml
@@ -63,6 +64,7 @@ class UnitTable(Table, frozen=True, kw_only=True):
     name: Name
     spec: Name | None = None
     cast: Name | None = None
+    cavity: Cavity | None = None
     reference: Annotated[Records, Meta(description="the motor alone, where no channel has it")] = ()
     edge: Records = ()
     point: tuple[PointTable, ...] = ()
@@ -110,8 +112,6 @@ def read_campaign(path: Path) -> Campaign:
         field = f"unit.{i}"
         if names.index(unit.name) != i:
             raise Refusal(f"{field}.name", unit.name, "is the name of two units")
-        if unit.spec and unit.cast:
-            raise Refusal(f"{field}.cast", unit.cast, "stands beside spec; leave one out")
         if not unit.edge and not unit.point:
             raise Refusal(f"{field}.edge", None, "is required, or a [[unit.point]]")
         distances = [point.distance_mm for point in unit.point]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from unitcad import files
-from unitcad.errors import Refusal, unknown_name
+from unitcad.errors import Refusal
+from unitcad.files import sha256
 from unitcad.lab.campaign import Campaign, UnitTable
 from unitcad.lab.readers.formats import expect_ending
-from unitcad.lab.signals import sha256
+from unitcad.lab.unit_files import file_of, source_file
 
 
 def check_files(campaign: Campaign, folder: Path) -> None:
@@ -21,27 +21,8 @@ def check_files(campaign: Campaign, folder: Path) -> None:
         expect_ending(file_of(folder, name, f"blank.records.{i}"), f"blank.records.{i}")
     for i, unit in enumerate(campaign.unit):
         field = f"unit.{i}"
-        for key, name in source_files(unit):
-            file_of(folder, name, f"{field}.{key}")
-        if unit.spec is not None and not Path(unit.spec).suffix:
-            _expect_template(unit.spec, f"{field}.spec")
+        source_file(unit, folder, field)
         _expect_different(folder, list(_records(unit, field)))
-
-
-def source_files(unit: UnitTable) -> Iterator[tuple[str, str]]:
-    """Yield key and name of the files that tell what a unit is; a template is none."""
-    if unit.spec is not None and Path(unit.spec).suffix:
-        yield "spec", unit.spec
-    if unit.cast is not None:
-        yield "cast", unit.cast
-
-
-def file_of(folder: Path, name: str, field: str) -> Path:
-    """Return the path of a file that a campaign names. Raises Refusal where there is none."""
-    path = folder / name
-    if not path.is_file():
-        raise Refusal(field, name, f"no such file beside the campaign's ({files.seen_from(folder)})")
-    return path
 
 
 def _records(unit: UnitTable, field: str) -> Iterator[tuple[str, str]]:
@@ -67,11 +48,3 @@ def _expect_different(folder: Path, records: list[tuple[str, str]]) -> None:
             if key in seen:
                 raise Refusal(field, name, f"is the record of {seen[key]} again; a repeat is a recording of its own")
             seen[key] = field
-
-
-def _expect_template(name: str, field: str) -> None:
-    from unitcad.validation import custom_templates, templates
-
-    known = templates() | custom_templates()
-    if name not in known:
-        raise unknown_name(field, name, known)

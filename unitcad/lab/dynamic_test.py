@@ -5,7 +5,6 @@ E*(w) = E0 (1 + (i w tau)^n), fitted in the logarithms of storage and loss, so t
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from unitcad import files
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.lab.declared_columns import Declared, column_of, columns, columns_of
@@ -105,8 +105,7 @@ def read_dynamic(
         deformation = {"e": "tension", "g": "shear"}.get(name[0], "") if name[1:2] in ("'", "′") else ""
     if deformation not in ("shear", "tension"):
         raise Refusal("--deformation", deformation or None, "must be shear or tension: the file does not say")
-    content = hashlib.sha256(path.read_bytes()).hexdigest()
-    return DynamicCurve(path.name, frequency, storage, loss, deformation, content, lost)  # type: ignore[arg-type]
+    return DynamicCurve(path.name, frequency, storage, loss, deformation, files.sha256(path), lost)  # type: ignore[arg-type]
 
 
 def evaluate_dynamic(curve: DynamicCurve, frequency_hz: float, poisson_ratio: float = 0.5) -> DynamicResult:

@@ -10,13 +10,13 @@ frequency_hz = 130
 level = { value = 0.41, low = 0.36, high = 0.47 }   # edge over motor, 95 %
 [[unit]]
 name = "u07"
-spec = "u07.toml"
+cast = "u07.cast.json"                   # in place of spec: the record of its casting, with the walls as measured
+cavity = 2                               # which unit of it, where it has several
 measured = "campaign/measured.toml"      # what `unitcad measure` wrote: level and frequency of the unit u07
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +30,7 @@ from unitcad.attenuation.edge.lab_fit import InputFile, OwnLevel
 from unitcad.attenuation.edge.shrunk_fit import BETWEEN_LABS
 from unitcad.catalogue.entries import Frequency, MaterialEntry
 from unitcad.errors import Refusal, unknown_name
-from unitcad.experiments.lab_file import spec_with
+from unitcad.lab.unit_files import Cavity, file_of, measured_walls, source_file, specs_of
 from unitcad.spec import Spec, convert, read_toml
 from unitcad.spec.asked import Table
 from unitcad.validation.shipped_files import named_file, shipped_files
@@ -50,10 +50,12 @@ class LevelTable(Table, frozen=True, kw_only=True):
 
 
 class FitUnitTable(Table, frozen=True, kw_only=True):
-    """A measured unit: its spec, changes in it, and its level or the file that has it."""
+    """A measured unit: its spec with changes, or the record of its casting; its level, or the file that has it."""
 
     name: Name
-    spec: str
+    spec: str | None = None
+    cast: str | None = None
+    cavity: Cavity | None = None
     set: dict[str, Any] = field(default_factory=dict)
     frequency_hz: Frequency | None = None
     level: LevelTable | None = None
@@ -76,10 +78,11 @@ class FitLabFile(Table, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class OwnUnit:
-    """A measured unit of the lab: its spec, frequency (Hz, None: the spec's), level and standard error of its ln."""
+    """A measured unit of the lab: its spec as asked and as built, frequency (Hz, None: the spec's), and level."""
 
     name: str
     spec: Spec
+    built: Spec
     frequency_hz: float | None
     level: LevelTable
     source: str
@@ -128,7 +131,7 @@ def load_fit_lab(source: str) -> FitLab:
     data = read_toml(path)
     settings = convert(data, FitLabFile)
     names = [unit.name for unit in settings.unit]
-    inputs = {path.name: _sha256(path)}
+    inputs = {path.name: files.sha256(path)}
     entries = {f"materials.{name}": entry for name, entry in data.get("materials", {}).items()}
     units = []
     for i, table in enumerate(settings.unit):
@@ -141,24 +144,29 @@ def load_fit_lab(source: str) -> FitLab:
 def _unit(where: str, table: FitUnitTable, folder: Path, entries: Mapping[str, Any], inputs: dict[str, str]) -> OwnUnit:
     if (table.level is None) == (table.measured is None):
         raise Refusal(f"{where}.level", None, "is required, or measured; not both")
-    spec = spec_with(where, table.spec, table.set, folder, entries, "spec")
-    if table.spec.endswith(".toml"):
-        inputs[table.spec] = _sha256(folder / table.spec)
+    if table.spec is None and table.cast is None:
+        raise Refusal(f"{where}.spec", None, "is required, or cast")
+    source = source_file(table, folder, where)
+    asked, built = specs_of(table, folder, where, table.set, entries)
+    if source:
+        inputs[source] = files.sha256(folder / source)
+    walls = measured_walls(asked, built)
     if table.level is not None:
         _check(f"{where}.level", table.level)
-        return OwnUnit(table.name, spec, table.frequency_hz, table.level, "as typed")
+        said = ", ".join(filter(None, ("as typed", walls)))
+        return OwnUnit(table.name, asked, built, table.frequency_hz, table.level, said)
     assert table.measured is not None
-    level, hertz, chain = _measured(f"{where}.measured", table, folder)
-    inputs[table.measured] = _sha256(folder / table.measured)
-    return OwnUnit(table.name, spec, table.frequency_hz or hertz, level, f"{table.measured}, chain {chain}")
+    path = file_of(folder, table.measured, f"{where}.measured")
+    level, hertz, chain = _measured(f"{where}.measured", table, path, inputs.get(source or ""))
+    inputs[table.measured] = files.sha256(path)
+    said = ", ".join(filter(None, (f"{table.measured}, chain {chain}", walls)))
+    return OwnUnit(table.name, asked, built, table.frequency_hz or hertz, level, said)
 
 
-def _measured(where: str, table: FitUnitTable, folder: Path) -> tuple[LevelTable, float, str]:
+def _measured(where: str, table: FitUnitTable, path: Path, source_sha256: str | None) -> tuple[LevelTable, float, str]:
     """Return level, frequency and chain of a unit's edge in a file of `unitcad measure`, by the file's first chain."""
     named = str(table.measured)
-    if not (folder / named).is_file():
-        raise Refusal(where, named, f"no such file in {files.seen_from(folder)}")
-    data = read_toml(folder / named)
+    data = read_toml(path)
     chain, rows = data.get("chain"), data.get("level")
     if data.get("status") != "measured" or not isinstance(rows, list):
         raise Refusal(where, named, "is no file of unitcad measure")
@@ -172,10 +180,28 @@ def _measured(where: str, table: FitUnitTable, folder: Path) -> tuple[LevelTable
     hertz = row.get("frequency_hz")
     if not isinstance(hertz, int | float):
         raise Refusal(f"{where}.frequency_hz", hertz, "must be a number")
-    for source in data.get("source", ()):
-        if source.get("file") == table.spec and source.get("sha256") != _sha256(folder / table.spec):
-            raise Refusal(where, named, f"was measured with another {table.spec}: its SHA-256 differs")
+    _expect_same_unit(where, table, row, data, source_sha256)
     return level, float(hertz), str(chain)
+
+
+def _expect_same_unit(
+    where: str, table: FitUnitTable, row: Mapping[str, Any], data: Mapping[str, Any], source_sha256: str | None
+) -> None:
+    """Refuse a level that was measured of another template, spec file, cast record or cavity.
+
+    A campaign may name a spec where the fit names the record of its casting; then nothing is compared.
+    """
+    key = "cast" if table.cast is not None else "spec"
+    there, here = row.get(key), getattr(table, key)
+    if there is None:
+        return
+    hashes = {str(one.get("file")): one.get("sha256") for one in data.get("source", ())}
+    if there in hashes and source_sha256 is not None and hashes[there] != source_sha256:
+        raise Refusal(where, table.measured, f"was measured with another {here}: its SHA-256 differs")
+    if there not in hashes and source_sha256 is None and there != here:
+        raise Refusal(where, table.measured, f"was measured of the template {there}, not {here}")
+    if row.get("cavity", table.cavity) != table.cavity:
+        raise Refusal(where, table.measured, f"was measured of cavity {row['cavity']}, not {table.cavity}")
 
 
 def _check(where: str, level: LevelTable) -> None:
@@ -183,7 +209,3 @@ def _check(where: str, level: LevelTable) -> None:
         raise Refusal(f"{where}.{'low' if level.low is None else 'high'}", None, "is required beside the other end")
     if level.low is not None and level.high is not None and not level.low <= level.value <= level.high:
         raise Refusal(f"{where}.value", level.value, f"must lie from low {level.low:g} to high {level.high:g}")
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(files.read(path)).hexdigest()

@@ -74,7 +74,7 @@ def fit_lab(lab: FitLab, say: Callable[[str], None] = lambda stage: None) -> Fit
         raise Refusal("moduli", settings.moduli, chosen.reason)
     measured = []
     for unit in lab.units:
-        variant = _input(unit, settings.moduli)
+        variant = estimate_input(unit.spec, unit.frequency_hz)
         measured.append(unit.stored(unit_key(variant), variant.frequency.middle))
     made = models()
     entries = {name: _entry(made[name], name, chosen) for name in made}
@@ -126,12 +126,12 @@ def campaigns_of(lab: FitLab, inputs: list[EstimateInput], moduli: Moduli) -> Ca
 
 def _input(unit: OwnUnit, moduli: Moduli) -> EstimateInput:
     """Return a unit's input by one source of moduli."""
-    data = to_data(unit.spec)
+    data = to_data(unit.built)
     data["estimate"]["moduli"] = "dynamic" if moduli == "data sheet" else moduli
     variant = estimate_input(from_data(data), unit.frequency_hz)
     if moduli != "data sheet":
         return variant
-    known = materials(unit.spec.materials)
+    known = materials(unit.built.materials)
     return replace(
         variant,
         layers=tuple(

@@ -43,6 +43,7 @@ def measured_table(result: Measured) -> dict[str, Any]:
     for one in result.levels:
         unit = units[one.unit]
         source = {"spec": unit.spec} if unit.spec else {"cast": unit.cast} if unit.cast else {}
+        source |= {"cavity": unit.cavity} if unit.cavity else {}
         levels.append(
             {
                 "unit": one.unit,

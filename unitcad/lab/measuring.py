@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from unitcad.files import sha256
 from unitcad.lab.campaign import Campaign, UnitTable
-from unitcad.lab.campaign_files import check_files, file_of, source_files
+from unitcad.lab.campaign_files import check_files
 from unitcad.lab.chains.line import Mains
 from unitcad.lab.chains.paper import ASSUMED
 from unitcad.lab.lab_rules import LabFinding, found
 from unitcad.lab.levels import LEAST_REPEATS, Level, level, paired_level
 from unitcad.lab.record_result import RecordResult, mains_of, measure_record
-from unitcad.lab.signals import sha256
+from unitcad.lab.unit_files import file_of, source_file
 
 MOST_DISAGREEMENT = 0.15
 """Standard deviation of the repeats' logarithms: three times the usual one."""
@@ -72,8 +73,8 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     findings: list[LabFinding] = []
     specs = {name: sha256(folder / name) for name in (campaign.blank.records if campaign.blank else ())}
     for i, unit in enumerate(campaign.unit):
-        for key, name in source_files(unit):
-            specs[name] = sha256(file_of(folder, name, f"unit.{i}.{key}"))
+        if name := source_file(unit, folder, f"unit.{i}"):
+            specs[name] = sha256(folder / name)
         one = _unit(unit, f"unit.{i}", campaign, folder, mains, say)
         records[unit.name] = tuple(one)
         findings += [finding for record in one for finding in record.findings]

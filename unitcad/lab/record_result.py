@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from unitcad import files
 from unitcad.errors import Refusal
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.campaign import Campaign, SensorTable
@@ -19,7 +20,7 @@ from unitcad.lab.chains.line_fit import Line, LineFit
 from unitcad.lab.chains.paper import PaperChain
 from unitcad.lab.lab_rules import LabFinding, found
 from unitcad.lab.quantities import to_si
-from unitcad.lab.signals import IRREGULAR, Signal, open_signal, sha256
+from unitcad.lab.signals import IRREGULAR, Signal, open_signal
 
 MOST_SCATTER = MOST_DRIFT = 0.05
 LEAST_PERIODS, NO_PERIODS = 20, 5
@@ -117,7 +118,7 @@ def measure_record(
         at_s += len(samples) / signal.rate
     if picture is None:
         picture = (np.empty(0),) * 4
-    shared = (shown, sha256(path), role, signal.raw_rate, signal.count)
+    shared = (shown, files.sha256(path), role, signal.raw_rate, signal.count)
     if signal.off_grid > IRREGULAR:
         findings.append(found("L103", shown, f"a time lies {signal.off_grid:.2g} steps off an even grid"))
     for part, where in zip(clipped, (shown, f"{shown}, motor"), strict=False):

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from unitcad import files
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import Refusal
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.campaign import RecordingTable, SensorTable
 from unitcad.lab.quantities import UNITS, plain, seconds
@@ -126,18 +124,6 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
         _expect_unit(recording, column, sensor, shown)
     scales = tuple(sensor.scale for sensor in sensors)
     return Signal(path, recording, tuple(columns), scales, rate, time, scale)
-
-
-def sha256(path: Path) -> str:
-    """Return the SHA-256 of a file, read in pieces."""
-    found = hashlib.sha256()
-    try:
-        with open(path, "rb", opener=files.regular()) as file:
-            while piece := file.read(1 << 20):
-                found.update(piece)
-    except OSError as error:
-        raise UnitcadError(f"{path}: {(error.strerror or 'unreadable').lower()}") from None
-    return found.hexdigest()
 
 
 def _rate(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -200,5 +199,4 @@ def _trimmed(
         raise UnitcadError(f"{path}: {len(strain)} points before the largest stress; a curve needs {LEAST_POINTS}")
     if strain[0] <= -1.0:
         raise UnitcadError(f"{path}: the strain begins at {strain[0]:.3g}: no body is shorter than nothing")
-    content = hashlib.sha256(path.read_bytes()).hexdigest()
-    return TensileCurve(path.name, strain, stress, specimen, content, rate, skipped)
+    return TensileCurve(path.name, strain, stress, specimen, files.sha256(path), rate, skipped)

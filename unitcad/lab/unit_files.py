@@ -1,0 +1,139 @@
+"""What a unit of a lab is: a template, a spec file, or the record of its casting; each found, checked and hashed."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Protocol
+
+import numpy as np
+from msgspec import Meta
+
+from unitcad import files
+from unitcad.casting.cast_record import CastRecord, CastUnit, read_cast_record
+from unitcad.catalogue import materials
+from unitcad.errors import Refusal, UnitcadError, unknown_name
+from unitcad.experiments.lab_file import spec_with
+from unitcad.spec import Spec
+from unitcad.validation import custom_templates, from_data, put, templates
+from unitcad.validation.shipped_files import is_path
+
+Cavity = Annotated[int, Meta(ge=1, le=999, description="the unit of a cast record: the number engraved beside it")]
+
+
+class UnitNames(Protocol):
+    """A table that names what a unit is: a template or spec file, or a cast record and a cavity of it."""
+
+    @property
+    def spec(self) -> str | None: ...
+
+    @property
+    def cast(self) -> str | None: ...
+
+    @property
+    def cavity(self) -> int | None: ...
+
+
+def file_of(folder: Path, name: str, field: str) -> Path:
+    """Return the path of a file that a lab's file in `folder` names. Raises Refusal where there is none."""
+    path = folder / name
+    if not path.is_file():
+        raise Refusal(field, name, f"no such file in {files.seen_from(folder)}")
+    return path
+
+
+def source_file(unit: UnitNames, folder: Path, field: str) -> str | None:
+    """Return the name of the file that tells what a unit is; None for a template, or where nothing tells it.
+
+    Raises Refusal for a template that is not known, a file that is not there, and a cast record that is not valid or
+    has no such unit.
+    """
+    if unit.spec is not None and unit.cast is not None:
+        raise Refusal(f"{field}.cast", unit.cast, "stands beside spec; leave one out")
+    if unit.cavity is not None and unit.cast is None:
+        raise Refusal(f"{field}.cavity", unit.cavity, "is of a cast record, but there is no cast")
+    if unit.cast is not None:
+        _cast(unit, folder, field)
+        return unit.cast
+    known = templates() | custom_templates()
+    if unit.spec is None or unit.spec in known:
+        return None
+    if not is_path(unit.spec):
+        raise unknown_name(f"{field}.spec", unit.spec, known)
+    file_of(folder, unit.spec, f"{field}.spec")
+    return unit.spec
+
+
+def specs_of(
+    unit: UnitNames, folder: Path, field: str, changes: Mapping[str, Any], entries: Mapping[str, Any]
+) -> tuple[Spec, Spec]:
+    """Return a unit's spec as asked, and as built: with the walls that its cast record measured, the mean of places.
+
+    `changes` are values by path, `entries` tables of the lab's own such as materials.NAME. Raises Refusal.
+    """
+    if unit.cast is None:
+        asked = spec_with(field, unit.spec, changes, folder, entries, "spec")
+        return asked, asked
+    if changes:
+        raise Refusal(f"{field}.set", dict(changes), "stands beside cast: the record says what was cast")
+    record, built = _cast(unit, folder, field)
+    where = f"{field}.cast"
+    if record.spec is None:
+        raise Refusal(where, unit.cast, "spec: is required here: the effective spec as a table")
+    data = copy.deepcopy(record.spec)
+    try:
+        for path, entry in entries.items():
+            put(data, path, entry)
+        asked = from_data(data)
+        _expect_layers(record, built, asked)
+        for wall in built.walls if built else ():
+            put(data, f"layers.{wall.layer - 1}.wall_mm", float(np.mean(wall.places_mm)))
+        return asked, from_data(data)
+    except Refusal as refusal:
+        raise Refusal(where, unit.cast, str(refusal)) from None
+
+
+def measured_walls(asked: Spec, built: Spec) -> str:
+    """Say which walls were measured, inside out; "" where none differs from what was asked."""
+    if asked.layers == built.layers:
+        return ""
+    return "walls as measured, " + ", ".join(f"{layer.wall_mm:.3g}" for layer in built.layers) + " mm"
+
+
+def _cast(unit: UnitNames, folder: Path, field: str) -> tuple[CastRecord, CastUnit | None]:
+    """Return a cast record and the unit that is meant; None where nobody looked at any."""
+    where, name = f"{field}.cast", str(unit.cast)
+    path = file_of(folder, name, where)
+    try:
+        record = read_cast_record(path)
+    except UnitcadError as error:
+        raise Refusal(where, name, str(error)) from None
+    cavities = [one.cavity for one in record.units]
+    usable = [one for one in record.units if one.usable]
+    if unit.cavity is None:
+        if len(cavities) > 1 and len(usable) != 1:
+            limit = f"is required: {name} has the cavities {', '.join(map(str, cavities))}"
+            raise Refusal(f"{field}.cavity", None, limit)
+        found = (usable or [*record.units, None])[0]
+    else:
+        found = record.unit(unit.cavity)
+        if found is None and cavities:
+            limit = f"{name} has no such unit; it has {', '.join(map(str, cavities))}"
+            nearest = min(cavities, key=lambda cavity: abs(cavity - unit.cavity))  # type: ignore[operator]
+            raise Refusal(f"{field}.cavity", unit.cavity, limit, nearest)
+    if found is not None and not found.usable:
+        raise Refusal(f"{field}.cavity", found.cavity, f"{name} says that this unit is not usable")
+    return record, found
+
+
+def _expect_layers(record: CastRecord, built: CastUnit | None, asked: Spec) -> None:
+    """Refuse walls of layers that the spec does not have, and another silicone in a pour than the spec's."""
+    count, known = len(asked.layers), materials(asked.materials)
+    for wall in built.walls if built else ():
+        if wall.layer > count:
+            raise Refusal("units.walls.layer", wall.layer, f"the spec has {count} layers", count)
+    for i, pour in enumerate(record.pours):
+        if pour.material in known and pour.index <= count and pour.material != asked.layers[pour.index - 1].material:
+            of = asked.layers[pour.index - 1].material
+            raise Refusal(f"pours.{i}.material", pour.material, f"the record's own spec has {of} in layer {pour.index}")
