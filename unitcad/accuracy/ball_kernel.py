@@ -1,4 +1,4 @@
-"""k C(k) of a layered medium by the global matrix method in ball arithmetic (python-flint), of 320 bits or more.
+"""k C(k) of a layered medium by the global matrix method in ball arithmetic (python-flint), of 128 bits or more.
 
 Nothing here is shared with `unitcad.attenuation` but the description of the medium. The amplitudes of the waves of all
 layers solve one linear system, so that neither growing exponentials nor P and S alike cost a digit.
@@ -17,8 +17,8 @@ from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt, KelvinVoigt, LossFactor
 from unitcad.errors import Missing
 
-BITS = 320
-"""The least precision; it is doubled where the balls of the result are too wide."""
+BITS = 128
+"""The least precision; it is doubled where the balls of the result are too wide, which hold whatever it is."""
 _MOST_BITS = 5120
 _ENOUGH = 2.0**-56  # radius of a ball over the largest of the results
 
@@ -45,6 +45,7 @@ class Kernel:
         layers = [layer for layer in medium.layers if layer.thickness > 0]
         self.medium = (*layers, medium.half_space)
         self._describe()
+        self.sizes = [(abs(complex(mu)), abs(complex(ks2)) ** 0.5) for mu, _, ks2, _ in self.bodies]
         mass = sum(layer.density * layer.thickness for layer in layers)
         for body, (mu, _, ks2, _) in zip(self.medium, self.bodies, strict=True):
             if body.youngs_modulus == 0.0:
@@ -110,10 +111,15 @@ class Kernel:
             self.bits *= 2
             self._describe()
 
+    def _scales(self, k: complex) -> list[Any]:
+        """Return over what the traction at each interface goes, so that no equation is large beside another."""
+        most = [stiffness * max(abs(k), rate) for stiffness, rate in self.sizes]
+        return [self.flint.arb(1.0 / max(pair)) for pair in zip([0.0, *most], [*most, 0.0], strict=True) if any(pair)]
+
     def _shear(self, k: complex) -> Any:
         """Return k times u_theta at the depth per traction, by a wave down (1, mu g) and one up (1, -mu g) a layer."""
         acb, mat = self.flint.acb, self.flint.acb_mat
-        at, last, scale = acb(k), len(self.bodies) - 1, abs(complex(self.bodies[0][0]))
+        at, last, scales = acb(k), len(self.bodies) - 1, self._scales(k)
         free = complex(self.bodies[last][0]) == 0
         size = 2 * last + (0 if free else 1)
         rows, seen = [[acb(0)] * size for _ in range(size)], [acb(0)] * size
@@ -122,13 +128,13 @@ class Kernel:
             underside = free and interface == last
             if interface > 0 and not underside:
                 rows[2 * interface - 1][column] = u
-            rows[2 * interface - (1 if underside else 0)][column] = t
+            rows[2 * interface - (1 if underside else 0)][column] = t * scales[interface]
 
         top, depth = self.flint.arb(0), self.flint.arb(self.z)
         for i, (mu, _, ks2, h) in enumerate(self.bodies[: last if free else last + 1]):
             inside = bool(depth >= top) and (h is None or bool(depth < top + h) or (free and i == last - 1))
             rate = _root(at * at - ks2)
-            stiffness = mu / scale * rate
+            stiffness = mu * rate
             place(i, 2 * i, acb(1), stiffness)
             if inside:
                 seen[2 * i] = (-rate * (depth - top)).exp()
@@ -141,78 +147,82 @@ class Kernel:
             if inside:
                 seen[2 * i + 1] = (-rate * (top + h - depth)).exp()
             top = top + h
-        right = [[acb(1) / scale]] + [[acb(0)] for _ in range(size - 1)]
-        return at * (mat([seen]) * mat(_even(rows, right)).solve(mat(right)))[0, 0]
+        right = [[acb(scales[0])]] + [[acb(0)] for _ in range(size - 1)]
+        return at * (mat([seen]) * mat(rows).solve(mat(right), algorithm="lu"))[0, 0]
 
     def _one(self, k: complex) -> list[Any]:
         """Return k times (u_r, u_z) at the depth per traction."""
         acb, mat = self.flint.acb, self.flint.acb_mat
-        at, last, scale = acb(k), len(self.bodies) - 1, abs(complex(self.bodies[0][0]))
+        at, last, scales = acb(k), len(self.bodies) - 1, self._scales(k)
         free = complex(self.bodies[last][0]) == 0
         size = 4 * last + (0 if free else 2)
-        rows = [[acb(0)] * size for _ in range(size)]
-        seen = [[acb(0)] * size for _ in range(2)]
+        zero = acb(0)
+        rows = [[zero] * size for _ in range(size)]
+        seen = [[zero] * size for _ in range(2)]
 
-        def place(interface: int, column: int, state: list[Any]) -> None:
+        def place(interface: int, column: int, r: Any, z: Any, t_r: Any, t_z: Any) -> None:
             """Enter tractions at the surface and at a free underside, all four components at an interface."""
             underside = free and interface == last
             first = 4 * interface - (4 if underside else 2)
-            for c in range(2 if interface == 0 or underside else 0, 4):
-                rows[first + c][column] = state[c]
+            if interface > 0 and not underside:
+                rows[first][column], rows[first + 1][column] = r, z
+            scale = scales[interface]
+            rows[first + 2][column], rows[first + 3][column] = t_r * scale, t_z * scale
 
         top, depth = self.flint.arb(0), self.flint.arb(self.z)
         for i, (mu, eps, ks2, h) in enumerate(self.bodies[: last if free else last + 1]):
             inside = bool(depth >= top) and (h is None or bool(depth < top + h) or (free and i == last - 1))
-            for j, (shape, rate) in enumerate(self._waves(mu / scale, eps, ks2, at)):
-                column = 4 * i + j
-                place(i, column, shape(acb(0)))
+            waves = self._waves(mu, eps, ks2, at, self.flint.arb(1.0 / max(abs(k), self.sizes[i][1])))
+            for column, (shape, rate) in enumerate(waves, 4 * i):
+                start = shape(zero)
+                place(i, column, *start)
                 if inside:
-                    here, fall = shape(acb(depth - top)), (-rate * (depth - top)).exp()
-                    seen[0][column], seen[1][column] = here[0] * fall, here[1] * fall
+                    r, z, _, _ = shape(acb(depth - top))
+                    fall = (-rate * (depth - top)).exp()
+                    seen[0][column], seen[1][column] = r * fall, z * fall
                 if h is None:
                     continue
-                fall, end = (-rate * h).exp(), shape(acb(h))
-                place(i + 1, column, [-value * fall for value in end])
+                fall = (-rate * h).exp()
+                r, z, t_r, t_z = (value * fall for value in shape(acb(h)))
+                place(i + 1, column, -r, -z, -t_r, -t_z)
                 # The wave that goes up from the bottom is the mirror image.
-                place(i, column + 2, [value * sign * fall for value, sign in zip(end, _MIRROR, strict=True)])
-                start = shape(acb(0))
-                place(i + 1, column + 2, [-value * sign for value, sign in zip(start, _MIRROR, strict=True)])
+                place(i, column + 2, r, -z, -t_r, t_z)
+                r, z, t_r, t_z = start
+                place(i + 1, column + 2, -r, z, t_r, -t_z)
                 if inside:
                     up = top + h - depth
-                    here, fall = shape(acb(up)), (-rate * up).exp()
-                    seen[0][column + 2], seen[1][column + 2] = here[0] * fall, -here[1] * fall
+                    r, z, _, _ = shape(acb(up))
+                    fall = (-rate * up).exp()
+                    seen[0][column + 2], seen[1][column + 2] = r * fall, -z * fall
             top = top + h if h is not None else top
-        right = [[acb(0), acb(0)] for _ in range(size)]
-        right[0][0] = right[1][1] = acb(1) / scale
-        solved = mat(seen) * mat(_even(rows, right)).solve(mat(right))
-        return [at * solved[a, self.column] for a in range(2)]
+        right = [[zero] for _ in range(size)]
+        right[self.column][0] = acb(scales[0])
+        solved = mat(seen) * mat(rows).solve(mat(right), algorithm="lu")
+        return [at * solved[a, 0] for a in range(2)]
 
-    def _waves(self, mu: Any, eps: Any, ks2: Any, k: Any) -> list[tuple[Callable[[Any], list[Any]], Any]]:
-        """Return the two waves that go down: (u_r, u_z, t_r, t_z) at a depth less its exponential, and its rate."""
+    def _waves(
+        self, mu: Any, eps: Any, ks2: Any, k: Any, factor: Any
+    ) -> list[tuple[Callable[[Any], tuple[Any, ...]], Any]]:
+        """Return the two waves that go down: (u_r, u_z, t_r, t_z) at a depth less its exponential, and its rate.
+
+        Each times a factor (m).
+        """
         if self.omega == 0.0:
             turn = -(1 + eps) / (1 - eps)
+            shear, even = 2 * mu * k, factor * k
 
-            def linear(z: Any) -> list[Any]:
+            def linear(z: Any) -> tuple[Any, ...]:
                 u, w = turn + k * z, k * z
-                shear = mu * (k - k * turn - k * k * z - k * w)
-                normal = -2 * mu * k * (1 - 2 * eps) / (1 - eps) + 2 * mu * (k - k * k * z)
-                return [u, w, -shear, -normal]
+                across = shear * (turn + 2 * k * z - 1) / 2
+                normal = shear * ((1 - 2 * eps) / (1 - eps) - 1 + k * z)
+                return u, w, across, normal
 
-            return [(lambda z: [k, k, 2 * mu * k * k, 2 * mu * k * k], k), (linear, k)]
-        gp, gs, q = _root(k * k - eps * ks2), _root(k * k - ks2), mu * (2 * k * k - ks2)
-        pressure, shear = [k, gp, 2 * mu * k * gp, q], [gs, k, q, 2 * mu * k * gs]
+            return [(lambda z: (even, even, shear * even, shear * even), k), (linear, k)]
+        gp, gs, q = _root(k * k - eps * ks2), _root(k * k - ks2), factor * mu * (2 * k * k - ks2)
+        k = k * factor
+        twice = 2 * mu * k
+        pressure, shear = (k, gp * factor, twice * gp, q), (gs * factor, k, q, twice * gs)
         return [(lambda z: pressure, gp), (lambda z: shear, gs)]
-
-
-def _even(rows: list[list[Any]], right: list[list[Any]]) -> list[list[Any]]:
-    """Scale each equation, in place, so that its largest coefficient is 1; return the rows."""
-    for one, given in zip(rows, right, strict=True):
-        most = max(abs(complex(value)) for value in one)
-        one[:], given[:] = [value / most for value in one], [value / most for value in given]
-    return rows
-
-
-_MIRROR = (1, -1, -1, 1)
 
 
 def _root(squared: Any) -> Any:

@@ -21,10 +21,11 @@ from unitcad.attenuation.layered.loads import Load, Point
 from unitcad.attenuation.layered.medium import LayeredMedium
 from unitcad.attenuation.layered.rheology import LossFactor
 
-_DEGREE = 16
+_DEGREE = 24
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_DEGREE)
 _TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_NODES, _DEGREE - 1))
 _DENSE, _DENSE_WEIGHTS = np.polynomial.legendre.leggauss(32)
+_PIECE = 24.0  # phase over those: their error is J of order 64 - _DEGREE at half of it, 1e-18
 _DEEPEST = 60  # halvings of a panel
 _MOST_POINTS = 3_000_000
 _FINE = 1e-12
@@ -160,7 +161,7 @@ def _panels(
 
 def _dense(kernel: Kernel, load: Load, r: np.ndarray, a: float, b: float, coefficients: np.ndarray) -> np.ndarray:
     """Integrate the kernel's polynomial times transform and Bessel functions from a to b."""
-    pieces = max(1, math.ceil(abs(b - a) * (float(r.max()) + load.reach) / 12.0))
+    pieces = max(1, math.ceil(abs(b - a) * (float(r.max()) + load.reach) / _PIECE))
     out: np.ndarray = np.zeros((coefficients.shape[1], r.size), dtype=complex)
     step = max(1, 2_000_000 // (32 * r.size))
     for first in range(0, pieces, step):

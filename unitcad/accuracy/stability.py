@@ -116,7 +116,7 @@ def study(media: int, say: Say, seed: int = 0, journal: Path | None = None, ever
             "for nu from 0 to 1/2 exactly, contrast 1e-8 to 1e8, thickness 1e-9 to 0.1 m, omega from 0 to 6e3 rad/s, "
             f"k h up to {max(case.kh for case in known):.0e}, any damping or none; the response's error below "
             "`error_r` and `error_z` at each radius, whether or not rtol was reached. The responses below are compared "
-            "with a reference that shares no code with the solver: the global matrix in balls of 320 bits and more "
+            "with a reference that shares no code with the solver: the global matrix in balls of 128 bits and more "
             "(python-flint), its own panels, its own closed forms. A film thinner than some micrometres, or one that "
             "is nearly fluid, needs more wavenumbers than are spent: there a small rtol is often not met, and the "
             "errors stay at what was reached."
