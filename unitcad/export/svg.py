@@ -27,6 +27,8 @@ TAIL_MM = 2.5
 """The length of a tail that is drawn."""
 WIDTH_PX = 520.0
 ROW_PX, COLUMN_PX = 26.0, 54.0
+LABEL_GAP_PX, EDGE_PX = 14.0, 6.0
+"""Between two labels of a row; between a label and the page's edge."""
 _UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0]])
 """Turns (x, y, z) to (x, z, -y): the plane of the section becomes the one that manifold3d slices in."""
 _STYLE = (
@@ -99,11 +101,11 @@ def section(
 ) -> str:
     """Draw `regions`: every one named (by `labels`, else its own name), with its measures.
 
-    `ground` is what the line z = 0 is called. The same arguments give the same text.
+    `ground` is what the line z = 0 is called, "" for no name. The same arguments give the same text.
     """
-    page = _Page(regions, measures)
     texts = [(labels or {}).get(region.name, region.name) for region in regions]
     named = [*notes, *map(Note, texts, _anchors(regions, [drawing.text_width(text) for text in texts]))]
+    page = _Page(regions, measures, named)
     marks = [
         drawing.outline([[page.at(point) for point in loop] for loop in region.loops], colour_hex(region.colour), text)
         for region, text in zip(regions, texts, strict=True)
@@ -201,7 +203,7 @@ def _unit_measures(dims: Dimensions) -> list[Measure]:
 class _Page:
     """The sheet: from mm in the plane to px, and the drawing round the regions."""
 
-    def __init__(self, regions: Sequence[Region], measures: Sequence[Measure]) -> None:
+    def __init__(self, regions: Sequence[Region], measures: Sequence[Measure], notes: Sequence[Note]) -> None:
         points = np.array([p for region in regions for loop in region.loops for p in loop])
         self.low, self.high = points.min(axis=0), points.max(axis=0)
         self.scale = WIDTH_PX / max(self.high[0] - self.low[0], 1e-9)
@@ -209,7 +211,8 @@ class _Page:
         right = max((drawing.text_width(m.text) for m in measures if m.side == "right"), default=0.0)
         self.left = 24 + COLUMN_PX * rows["left"]
         self.top = 84.0
-        self.width = self.left + WIDTH_PX + 24 + (ROW_PX + right if rows["right"] else 0.0)
+        row = sum(drawing.text_width(note.text) + LABEL_GAP_PX for note in notes) - LABEL_GAP_PX + 2 * EDGE_PX
+        self.width = max(self.left + WIDTH_PX + 24 + (ROW_PX + right if rows["right"] else 0.0), row)
         self.height = self.top + (self.high[1] - self.low[1]) * self.scale + 30 + ROW_PX * rows["below"]
 
     def at(self, point: Point) -> Point:
@@ -223,7 +226,7 @@ class _Page:
         top, bottom = self.at((0.0, self.high[1])), self.at((0.0, self.low[1]))
         return [
             drawing.line(skin[0], skin[1], "skin"),
-            drawing.text(ground, (skin[1][0], skin[1][1] + drawing.TEXT_PX * 0.8), "end"),
+            *([drawing.text(ground, (skin[1][0], skin[1][1] + drawing.TEXT_PX * 0.8), "end")] if ground else []),
             drawing.line((top[0], top[1] - 12), (bottom[0], bottom[1] + 12), "axis"),
         ]
 
@@ -244,17 +247,27 @@ class _Page:
         """Draw names in a row above the drawing, each with a leader to its point."""
         anchors = [self.at(note.at) for note in notes]
         widths = [drawing.text_width(note.text) for note in notes]
-        middles = drawing.spread([x for x, _ in anchors], widths, 14.0)
-        # A row wider than the page is moved back onto it.
-        over = max((m + w / 2 for m, w in zip(middles, widths, strict=True)), default=0.0) - self.width + 6
-        under = 6 - min((m - w / 2 for m, w in zip(middles, widths, strict=True)), default=6.0)
-        shift = max(under, 0.0) - max(over, 0.0)
+        middles = self._on_page(drawing.spread([x for x, _ in anchors], widths, LABEL_GAP_PX), widths)
         row = self.top - 38
         marks = []
         for note, anchor, middle in zip(notes, anchors, middles, strict=True):
-            marks.append(drawing.line((middle + shift, row + drawing.TEXT_PX * 0.7), anchor, "leader"))
-            marks += [drawing.dot(anchor), drawing.text(note.text, (middle + shift, row))]
+            marks.append(drawing.line((middle, row + drawing.TEXT_PX * 0.7), anchor, "leader"))
+            marks += [drawing.dot(anchor), drawing.text(note.text, (middle, row))]
         return marks
+
+    def _on_page(self, middles: Sequence[float], widths: Sequence[float]) -> list[float]:
+        """Return the middles of a row's labels moved onto the page, each no farther than it must be."""
+        found = list(middles)
+        order = sorted(range(len(found)), key=lambda i: found[i])
+        end = self.width - EDGE_PX
+        for i in reversed(order):
+            found[i] = min(found[i], end - widths[i] / 2)
+            end = found[i] - widths[i] / 2 - LABEL_GAP_PX
+        start = EDGE_PX
+        for i in order:
+            found[i] = max(found[i], start + widths[i] / 2)
+            start = found[i] + widths[i] / 2 + LABEL_GAP_PX
+        return found
 
     def _ends(self, measure: Measure) -> tuple[Point, Point]:
         """Return where a dimension line runs (px)."""

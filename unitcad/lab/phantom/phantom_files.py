@@ -142,7 +142,7 @@ def _section(phantom: PhantomSet) -> str:
     """Draw the box filled, cut through the pegs of one side and, of the lid, nothing: frames, layers and plate."""
     shown = [body for body in phantom.tools if body.kind in ("base", "frame") or body.made == "cut"]
     regions = svg.cut([*shown, *phantom.layers], SEGMENTS)
-    return svg.section(regions, title=f"Phantom {phantom.table.name}: box and layers", ground="z = 0")
+    return svg.section(regions, title=f"Phantom {phantom.table.name}: box and layers", ground="")
 
 
 def _response_chart(phantom: PhantomSet) -> str:

@@ -12,6 +12,7 @@ from unitcad.estimating import tissue_layer
 from unitcad.kernels.mesh import bounds, realise
 from unitcad.lab.phantom import tensile_coupons
 from unitcad.lab.phantom.description import PhantomTable
+from unitcad.lab.phantom.marked_lid import expect_apart
 from unitcad.lab.phantom.phantom_response import ACRYLIC, POISSON, Expected, echo_pct, expected, wall_distance
 from unitcad.lab.phantom.recipe import Recipe, recipe, stiffening
 from unitcad.lab.phantom.screed_box import BoxLengths, cast, lengths, pieces
@@ -51,6 +52,7 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
     recipes = tuple(replace(one, high_kpa=factor * one.high_kpa) for one in slow)
     if len({layer.name for layer in table.layers}) < len(table.layers):
         raise Refusal("layers", ", ".join(layer.name for layer in table.layers), "each layer needs a name of its own")
+    expect_apart(table.points_mm)
     printer = choose("printer", table.printer, printers())
     wall = wall_distance(table, recipes)
     inside = _inside(table, recipes, wall)

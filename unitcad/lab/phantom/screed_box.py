@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from unitcad.catalogue import Printer
 from unitcad.designs import layer_colour
 from unitcad.lab.phantom.description import PhantomTable
+from unitcad.lab.phantom.marked_lid import marks
 from unitcad.moulds.blade import bar
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rectangle, turned, union
 from unitcad.shape.body import Body
@@ -36,7 +37,6 @@ PEG_RADIUS, PEG_FROM_WALL = 3.0, 8.0
 PUSH_RADIUS = 8.0
 PLATE_PLAY = 0.3
 """Of the plate in the tray, per side, mm."""
-POINT_RADIUS = 1.25
 FENCE, FENCE_LONG, FENCE_HIGH = 4.0, 12.0, 10.0
 _COLOURS = {
     "base": (0.76, 0.76, 0.76),
@@ -113,7 +113,7 @@ def pieces(phantom: PhantomTable, size: BoxLengths, printer: Printer) -> list[Bo
             f"frame{len(size.tops) - i}",
             "tool",
             "frame",
-            _frame(size, size.tops[i + 1], size.tops[i]),
+            _frame(size, size.tops[i + 1], size.tops[i], str(len(size.tops) - i), stroke, depth),
             _COLOURS["frame"],
             step=len(size.tops) - i,
         )
@@ -153,10 +153,14 @@ def _tray(size: BoxLengths) -> Shape:
     return union((cut(body, [cavity, pocket, *holes]), *pegs))
 
 
-def _frame(size: BoxLengths, low: float, high: float) -> Shape:
-    return cut(
-        _outline(size, low, high), [Extrude(_square(size.rim), low - 1.0, high + 1.0), *_peg_holes(size, low, high)]
-    )
+def _frame(size: BoxLengths, low: float, high: float, number: str, stroke: float, depth: float) -> Shape:
+    """Draw a frame; its pour's number is engraved on an ear, beyond the peg, where the blade does not run."""
+    free = size.hole, EAR_HALF  # along y, from the peg's middle
+    y = size.ear_y + (free[0] + free[1] - HEIGHT * stroke) / 2
+    depth = min(depth, (high - low) / 2)
+    figure = moved(engraving(number, stroke, high - depth, high + 1.0), size.peg_x - text_width(number, stroke) / 2, y)
+    opening = Extrude(_square(size.rim), low - 1.0, high + 1.0)
+    return cut(_outline(size, low, high), [opening, figure, *_peg_holes(size, low, high)])
 
 
 def _outline(size: BoxLengths, low: float, high: float) -> Shape:
@@ -185,18 +189,9 @@ def _peg_holes(size: BoxLengths, low: float, high: float) -> list[Shape]:
 
 
 def _lid(phantom: PhantomTable, size: BoxLengths, stroke: float, depth: float) -> Shape:
-    """Draw the lid: the unit's seat as a hole of its size, a hole a point along +x, each with its number."""
     low, high = size.tops[0], size.tops[0] + LID
-    radius = phantom.unit_diameter_mm / 2
-    tools: list[Shape] = [cylinder(radius, low - 1.0, high + 1.0), *_peg_holes(size, low, high)]
-    for i, distance in enumerate(sorted(phantom.points_mm)):
-        x = radius + distance
-        tools.append(moved(cylinder(POINT_RADIUS, low - 1.0, high + 1.0), x, 0.0))
-        text = f"{distance:g}".replace(".", "")
-        above = i % 2 == 0
-        y = POINT_RADIUS + 2.0 if above else -POINT_RADIUS - 2.0 - HEIGHT * stroke
-        tools.append(moved(engraving(text, stroke, high - depth, high + 1.0), x - text_width(text, stroke) / 2, y))
-    return cut(_outline(size, low, high), tools)
+    tools = marks(phantom.points_mm, phantom.unit_diameter_mm / 2, stroke, depth, low, high)
+    return cut(_outline(size, low, high), [*tools, *_peg_holes(size, low, high)])
 
 
 def _holder(phantom: PhantomTable, size: BoxLengths) -> Shape:
