@@ -17,7 +17,7 @@ import re
 import secrets
 import shutil
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -138,6 +138,26 @@ def writing(path: Path, *, sync: bool = False) -> Iterator[IO[bytes]]:
         fresh.replace(path)
     if sync:
         sync_folder(path.parent)
+
+
+def replace_all(folder: Path, contents: Mapping[str, bytes], last: str, former: re.Pattern[str]) -> None:
+    """Write files into a folder in place of those of a former run: of names that match `former`, none other is left.
+
+    All are written under another name first. The file `last` is removed before anything is changed and put in place
+    at the end: it stands for a whole result. Raises OSError.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with scratch(folder) as fresh:
+        inside = fresh / NEW
+        inside.mkdir()
+        for name, content in contents.items():
+            write_new(inside / name, content)
+        (folder / last).unlink(missing_ok=True)
+        for path in sorted(folder.iterdir()):
+            if former.fullmatch(path.name) and path.name not in contents and not path.is_dir():
+                path.unlink()
+        for name in sorted(contents, key=lambda name: name == last):
+            (inside / name).replace(folder / name)
 
 
 def write_new(path: Path, content: bytes, *, sync: bool = False) -> None:

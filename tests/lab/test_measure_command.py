@@ -65,7 +65,7 @@ def test_a_campaign_has_the_levels_of_its_truth(folder: Path) -> None:
     assert len(result.levels) == 4
     for record in result.records["a"]:
         assert record.u_um < 0.02 * record.amplitude_um
-        assert record.paper_gain == pytest.approx(1.0, abs=0.01)
+        assert record.gains["paper"] == pytest.approx(1.0, abs=0.01)
     assert dict(result.mains)[1] == pytest.approx(3.0, rel=1e-3)
 
 

@@ -12,7 +12,7 @@ import pytest
 from unitcad.lab import signals
 from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, UnitTable
 from unitcad.lab.chains.line import Mains
-from unitcad.lab.record_result import measure_record
+from unitcad.lab.measured_record import measure_record
 from unitcad.lab.signals import SECTION, open_signal
 
 SENSOR = SensorTable(quantity="displacement", unit="um", scale=500.0)
@@ -21,11 +21,11 @@ import resource, sys
 from pathlib import Path
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable
 from unitcad.lab.chains.line import Mains
-from unitcad.lab.record_result import measure_record
+from unitcad.lab.measured_record import measure_record
 sensor = SensorTable(quantity="displacement", unit="um", scale=500.0)
 campaign = Campaign(name="long", sensor=sensor, unit=(UnitTable(name="a"),))
 path = Path(sys.argv[1])
-found = measure_record(path, "edge", campaign, (sensor,), Mains(), (60.0, 250.0), path.name)
+found = measure_record(path, "edge", campaign, (sensor,), (Mains(),), (60.0, 250.0), path.name)
 print(found.samples, found.amplitude_um, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)
 """
 
@@ -79,7 +79,7 @@ def test_a_section_without_a_line_is_said(
     x = np.where(np.arange(12_000) < stops, 0.5 * np.cos(2 * np.pi * 123.4 * time), 0.0)
     wavfile.write(tmp_path / "a.wav", 2000, np.round(x * 32768).astype("<i2"))
     campaign = Campaign(name="long", sensor=SENSOR, unit=(UnitTable(name="a"),))
-    result = measure_record(tmp_path / "a.wav", "edge", campaign, (SENSOR,), Mains(), (60.0, 250.0), "a.wav")
+    result = measure_record(tmp_path / "a.wav", "edge", campaign, (SENSOR,), (Mains(),), (60.0, 250.0), "a.wav")
     assert [one.code for one in result.findings] == codes
     assert result.amplitude_um == pytest.approx(250.0, rel=1e-3)
     if codes:

@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from unitcad.geometry.arrays import Floats
+from unitcad.lab.chains.chain import Chain, ChainTable
 from unitcad.lab.chains.line import fit_line
 from unitcad.lab.chains.paper import PaperChain
+from unitcad.lab.chains.signal_chains import CHAINS as SHIPPED
 
 BAND_HZ = (60.0, 250.0)
 
@@ -41,10 +43,14 @@ def lock_in(x: Floats, rate: float) -> float:
     return float(2 * abs(np.sum(turned * window)) / window.sum())
 
 
-def line(x: Floats, rate: float) -> float:
-    """Return the amplitude by the chain `line`."""
-    fit = fit_line(x, rate)
-    return fit.amplitude if fit else 0.0
+def _of(chain: Chain) -> Callable[[Floats, float], float]:
+    """Return a chain's amplitude of a record; 0 where there is no line."""
+
+    def amplitude(x: Floats, rate: float) -> float:
+        fit = fit_line(x, rate)
+        return chain.amplitude(x, rate, fit) if fit else 0.0
+
+    return amplitude
 
 
 CHAINS: dict[str, Callable[[Floats, float], float]] = {
@@ -55,5 +61,5 @@ CHAINS: dict[str, Callable[[Floats, float], float]] = {
     "FFT peak, rectangular window": fft_peak,
     "FFT, flat-top window": flat_top,
     "lock-in, fixed frequency": lock_in,
-    "line": line,
+    **{name: _of(make(ChainTable())) for name, make in SHIPPED.items() if name != "paper"},
 }

@@ -9,6 +9,8 @@ import msgspec
 from msgspec import Meta
 
 from unitcad.errors import Refusal
+from unitcad.lab.chains.chain import ChainTable
+from unitcad.lab.chains.signal_chains import chains_of
 from unitcad.lab.quantities import Quantity, to_si
 from unitcad.lab.unit_files import Cavity
 from unitcad.spec.asked import Table
@@ -20,7 +22,6 @@ Record = Annotated[str, Meta(min_length=1, max_length=1000)]
 Records = Annotated[tuple[Record, ...], Meta(max_length=1000)]
 Positive = Annotated[float, Meta(ge=1e-12, le=1e12)]
 Column = Annotated[int, Meta(ge=1, le=4096)] | Name
-Hertz = Annotated[float, Meta(ge=1, le=500)]
 
 
 class SensorTable(Table, frozen=True, kw_only=True):
@@ -46,9 +47,10 @@ class RecordingTable(Table, frozen=True, kw_only=True):
 
 
 class BlankTable(Table, frozen=True, kw_only=True):
-    """Records with the motor off: they tell the mains."""
+    """Records with the motor off: they tell the mains. Where they have a motor's channel, they tell its mains too."""
 
     records: Records
+    motor_records: Annotated[Records, Meta(description="motor off, by the motor_sensor where it records alone")] = ()
 
 
 class PointTable(Table, frozen=True, kw_only=True):
@@ -70,19 +72,6 @@ class UnitTable(Table, frozen=True, kw_only=True):
     point: tuple[PointTable, ...] = ()
 
 
-class ChainTable(Table, frozen=True, kw_only=True):
-    """The chains and their parameters; the first one's levels are the result. The paper's are assumed ones."""
-
-    use: Annotated[tuple[Literal["line", "paper"], ...], Meta(min_length=1, max_length=2)] = ("line",)
-    mains_hz: Annotated[float, Meta(ge=40, le=400)] = 50.0
-    band_hz: tuple[Hertz, Hertz] = (60.0, 250.0)
-    order: Annotated[int, Meta(ge=1, le=10)] = 4
-    q: Annotated[float, Meta(ge=1, le=1000)] = 30.0
-    zero_phase: bool = True
-    measure: Literal["rms", "peak"] = "rms"
-    trim_s: Annotated[float, Meta(ge=0, le=1000)] = 0.25
-
-
 class Campaign(Table, frozen=True, kw_only=True):
     """A campaign: one sensor, units with their records."""
 
@@ -101,12 +90,12 @@ def read_campaign(path: Path) -> Campaign:
     campaign = convert(read_toml(path), Campaign)
     if campaign.chain.band_hz[0] >= campaign.chain.band_hz[1]:
         raise Refusal("chain.band_hz", list(campaign.chain.band_hz), "must rise", [60.0, 250.0])
-    use = campaign.chain.use
-    if len(set(use)) < len(use):
-        raise Refusal("chain.use", list(use), "has a chain twice", list(dict.fromkeys(use)))
+    chains_of(campaign.chain)
     to_si(campaign.sensor.unit, campaign.sensor.quantity, "sensor.unit")
     if campaign.motor_sensor is not None:
         to_si(campaign.motor_sensor.unit, campaign.motor_sensor.quantity, "motor_sensor.unit")
+    if campaign.blank is not None and campaign.blank.motor_records:
+        _expect_own_sensor(campaign, campaign.blank.motor_records)
     names = [unit.name for unit in campaign.unit]
     for i, unit in enumerate(campaign.unit):
         field = f"unit.{i}"
@@ -122,6 +111,16 @@ def read_campaign(path: Path) -> Campaign:
         if not unit.reference and campaign.recording.motor_channel is None:
             raise Refusal(f"{field}.reference", None, "is required, or recording.motor_channel")
     return campaign
+
+
+def _expect_own_sensor(campaign: Campaign, records: tuple[str, ...]) -> None:
+    """Refuse motor-off records of a motor's sensor where none records alone."""
+    if campaign.recording.motor_channel is not None:
+        limit = "stands beside recording.motor_channel: the channel of blank.records tells the motor's mains"
+        raise Refusal("blank.motor_records", list(records), limit)
+    if campaign.motor_sensor is None:
+        limit = "stands without [motor_sensor]: blank.records tells the mains of the one sensor"
+        raise Refusal("blank.motor_records", list(records), limit)
 
 
 def plain_data(campaign: Campaign) -> dict[str, object]:

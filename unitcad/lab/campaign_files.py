@@ -17,12 +17,20 @@ def check_files(campaign: Campaign, folder: Path) -> None:
 
     Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice.
     """
-    for i, name in enumerate(campaign.blank.records if campaign.blank else ()):
-        expect_ending(file_of(folder, name, f"blank.records.{i}"), f"blank.records.{i}")
+    for field, name in blank_files(campaign):
+        expect_ending(file_of(folder, name, field), field)
     for i, unit in enumerate(campaign.unit):
         field = f"unit.{i}"
         source_file(unit, folder, field)
         _expect_different(folder, list(_records(unit, field)))
+
+
+def blank_files(campaign: Campaign) -> Iterator[tuple[str, str]]:
+    """Yield key and name of the motor-off records."""
+    if campaign.blank is not None:
+        for key in ("records", "motor_records"):
+            for i, name in enumerate(getattr(campaign.blank, key)):
+                yield f"blank.{key}.{i}", name
 
 
 def _records(unit: UnitTable, field: str) -> Iterator[tuple[str, str]]:

@@ -30,12 +30,12 @@ RULES = {
             100.2 Hz over 2 s. Fix: Change the drive's voltage, record longer, or add a motor-off record
             as [blank].""",
             """L106 warning: line in the comb's null
-            The paper's filters pass less than 0.9 of the line. Example: A motor at 100 Hz and a comb at
-            50 Hz. Fix: Use the chain line, or another drive voltage.""",
+            A chain's filters pass less than 0.9 of the line. Example: A motor at 100 Hz and the paper's
+            comb at 50 Hz. Fix: Use the chain line, or another drive voltage.""",
             """L107 warning: unsteady
-            The amplitude varies by more than 5 %, or the frequency by more than 5 %, beyond the spin-
-            up. Example: A battery that runs down. Fix: Use a regulated supply and let the motor warm
-            up.""",
+            The amplitude varies by more than 5 %, slowly or up and down, or the frequency by more than
+            5 %, beyond the spin-up. Example: A battery that runs down. Fix: Use a regulated supply and
+            let the motor warm up.""",
             """L108 warning: fewer than 20 periods
             The steady part is too short for the noise beside the line to be known. Example: 0.1 s at
             125 Hz. Fix: Record 2 s.""",
@@ -46,7 +46,7 @@ RULES = {
             More than a tenth of the samples were left out: more than a robust fit bears. Example: A
             vibrometer on bare skin. Fix: Put retroreflective tape on the point.""",
             """L111 error: no line
-            The band holds no line above four times its uncertainty. Example: The motor did not run.
+            The band holds no line above five times its uncertainty. Example: The motor did not run.
             Fix: Repeat.""",
             """L112 error: too few repeats
             Fewer than three usable records are left: no level is given. Example: One of three is
@@ -67,6 +67,10 @@ RULES = {
             """L117 error: stronger line outside the band
             A line outside chain.band_hz is stronger than the one in it, which may be its harmonic.
             Example: A motor at 45 Hz and a band from 60 Hz. Fix: Widen chain.band_hz.""",
+            """L118 warning: low signal to noise
+            The amplitude is less than ten times the standard deviation of what the fit leaves; where
+            twice its uncertainty exceeds it, it is an error. Example: A point far from the unit. Fix:
+            Record longer, average more, or a sensor of a smaller range.""",
         ),
     )
 }

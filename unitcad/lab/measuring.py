@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,15 @@ import numpy as np
 
 from unitcad.files import sha256
 from unitcad.lab.campaign import Campaign, UnitTable
-from unitcad.lab.campaign_files import check_files
+from unitcad.lab.campaign_files import blank_files, check_files
+from unitcad.lab.chains.chain import Chain
 from unitcad.lab.chains.line import Mains
-from unitcad.lab.chains.paper import ASSUMED
+from unitcad.lab.chains.signal_chains import chains_of
 from unitcad.lab.lab_rules import LabFinding, found
 from unitcad.lab.levels import LEAST_REPEATS, Level, level, paired_level
-from unitcad.lab.record_result import RecordResult, mains_of, measure_record
+from unitcad.lab.measured_record import measure_record
+from unitcad.lab.motor_off import mains_of_blanks
+from unitcad.lab.record_result import RecordResult
 from unitcad.lab.unit_files import file_of, source_file
 
 MOST_DISAGREEMENT = 0.15
@@ -42,7 +45,11 @@ class PlaceLevel:
 
 @dataclass(frozen=True)
 class Measured:
-    """A campaign's result: levels, records by unit, findings, hashes of its other files, mains of motor-off records."""
+    """A campaign's result: levels, records by unit, findings, hashes of its other files.
+
+    `mains` and `motor_mains` are the mains' amplitudes by multiple in motor-off records of the unit's sensor and of the
+    motor's, in its unit.
+    """
 
     campaign: Campaign
     levels: tuple[PlaceLevel, ...]
@@ -50,12 +57,17 @@ class Measured:
     findings: tuple[LabFinding, ...]
     specs: dict[str, str]
     mains: tuple[tuple[int, float], ...]
+    motor_mains: tuple[tuple[int, float], ...]
+
+    @property
+    def chains(self) -> tuple[Chain, ...]:
+        """The chains of the campaign."""
+        return chains_of(self.campaign.chain)
 
     @property
     def assumed(self) -> dict[str, Any]:
-        """The parameters of the paper's chain that the paper does not state; none where it was not used."""
-        table = self.campaign.chain
-        return {name: getattr(table, name) for name in ASSUMED} if "paper" in table.use else {}
+        """The parameters of the chains that their sources do not state; none where no such chain was used."""
+        return {name: value for chain in self.chains for name, value in chain.assumed.items()}
 
 
 def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambda stage: None) -> Measured:
@@ -64,14 +76,12 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
     Raises Refusal for a file that is not there or can't be read without a guess.
     """
     check_files(campaign, folder)
-    blanks = [file_of(folder, name, "blank.records") for name in (campaign.blank.records if campaign.blank else ())]
-    blank = mains_of(blanks, campaign) if blanks else ()
-    mains = Mains(campaign.chain.mains_hz, blank)
+    mains = mains_of_blanks(campaign, folder)
     paired = campaign.recording.motor_channel is not None
     levels: list[PlaceLevel] = []
     records: dict[str, tuple[RecordResult, ...]] = {}
     findings: list[LabFinding] = []
-    specs = {name: sha256(folder / name) for name in (campaign.blank.records if campaign.blank else ())}
+    specs = {name: sha256(folder / name) for _, name in blank_files(campaign)}
     for i, unit in enumerate(campaign.unit):
         if name := source_file(unit, folder, f"unit.{i}"):
             specs[name] = sha256(folder / name)
@@ -81,22 +91,26 @@ def measure(campaign: Campaign, folder: Path, say: Callable[[str], None] = lambd
         found_levels, more = _levels(unit, one, campaign, paired)
         levels += found_levels
         findings += more
-    return Measured(campaign, tuple(levels), records, tuple(findings), specs, blank)
+    return Measured(campaign, tuple(levels), records, tuple(findings), specs, mains[0].blank, mains[1].blank)
 
 
 def _unit(
-    unit: UnitTable, field: str, campaign: Campaign, folder: Path, mains: Mains, say: Callable[[str], None]
+    unit: UnitTable,
+    field: str,
+    campaign: Campaign,
+    folder: Path,
+    mains: tuple[Mains, Mains],
+    say: Callable[[str], None],
 ) -> list[RecordResult]:
     """Measure a unit's records: the motor's first, whose frequency the others' lines are looked for near."""
     motor_sensor = campaign.motor_sensor or campaign.sensor
     paired = campaign.recording.motor_channel is not None
-    own = mains if motor_sensor == campaign.sensor else Mains(campaign.chain.mains_hz)
     band = campaign.chain.band_hz
     out = []
     for i, name in enumerate(unit.reference):
         say(name)
         path = file_of(folder, name, f"{field}.reference.{i}")
-        out.append(measure_record(path, "reference", campaign, (motor_sensor,), own, band, name))
+        out.append(measure_record(path, "reference", campaign, (motor_sensor,), mains[1:], band, name))
     hertz = [record.frequency_hz for record in out if record.usable]
     if hertz:
         middle = float(np.median(hertz))
@@ -128,9 +142,9 @@ def _levels(
             continue
         shared = max(record.shared for record in (*there, *motor))
         here: list[PlaceLevel] = []
-        for chain in campaign.chain.use:
+        for chain in chains_of(campaign.chain):
             for hertz, values, below in _sides(chain, there, there if paired else motor):
-                at = f"{where}, {hertz:.2f} Hz, by {chain}"
+                at = f"{where}, {hertz:.2f} Hz, by {chain.name}"
                 if not values:
                     findings.append(found("L116", where, f"nothing near the motor's {hertz:.2f} Hz"))
                 elif min(len(values), len(below)) < LEAST_REPEATS:
@@ -138,36 +152,40 @@ def _levels(
                     findings.append(found("L112", at, f"{count} usable records; a level needs {LEAST_REPEATS}"))
                 else:
                     result = paired_level(values, shared) if paired else level(values, below, shared)
-                    here.append(PlaceLevel(unit.name, distance, chain, result, hertz))
+                    here.append(PlaceLevel(unit.name, distance, chain.name, result, hertz))
                     if result.scatter > MOST_DISAGREEMENT:
-                        findings.append(found("L109", where, f"by {chain}: logarithms scatter by {result.scatter:.2f}"))
+                        findings.append(
+                            found("L109", where, f"by {chain.name}: logarithms scatter by {result.scatter:.2f}")
+                        )
         levels += here
-        if len({one.chain for one in here}) == len(here) == 2:
-            one, other = here
-            if one.level.high < other.level.low or other.level.high < one.level.low:
-                said = f"{one.chain} {one.level.value:.3g}, {other.chain} {other.level.value:.3g}"
-                findings.append(found("L115", where, said))
+        if len({one.chain for one in here}) == len(here):
+            for one, other in combinations(here, 2):
+                if one.level.high < other.level.low or other.level.high < one.level.low:
+                    said = f"{one.chain} {one.level.value:.3g}, {other.chain} {other.level.value:.3g}"
+                    findings.append(found("L115", where, said))
     return levels, findings
 
 
 def _sides(
-    chain: str, there: list[RecordResult], motor: list[RecordResult]
+    chain: Chain, there: list[RecordResult], motor: list[RecordResult]
 ) -> list[tuple[float, list[float], list[float]]]:
     """Return frequency, the records' values and the motor's, of each line that the motor's records have.
 
-    The chain `paper` tells no lines apart and has one entry. No values at all: no record has a line near the motor's.
+    A chain that tells no lines apart has one entry. No values at all: no record has a line near the motor's.
     """
     lines = sorted(hertz for hertz, _ in max(motor, key=lambda one: len(one.by_line)).by_line)
-    if chain == "line" and len(lines) > 1:
+    if chain.each_line and len(lines) > 1:
         gap = min(b - a for a, b in pairwise(lines))
         return [(hertz, _near(there, hertz, gap / 2), _near(motor, hertz, gap / 2)) for hertz in lines]
     middle = float(np.median([one.frequency_hz for one in motor]))
     values = _near(there, middle, MOST_APART * middle)
-    if not values or chain == "line":
+    if not values or chain.each_line:
         nearest = [min((hz for hz, _ in one.by_line), key=lambda hz: abs(hz - middle), default=middle) for one in there]
         hertz = float(np.median(nearest)) if values else middle
         return [(hertz, values, _near(motor, middle, MOST_APART * middle))]
-    values, below = ([one.by_chain[chain] for one in side if chain in one.by_chain] for side in (there, motor))
+    values, below = (
+        [one.by_chain[chain.name] for one in side if chain.name in one.by_chain] for side in (there, motor)
+    )
     hertz = float(np.median([one.frequency_hz for one in there]))
     return [(hertz, values, below)] if values else []
 

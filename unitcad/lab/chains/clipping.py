@@ -12,26 +12,36 @@ LOWEST = 0.7
 """Part of the amplitude down to which a cut-off sine can be fitted by the rest."""
 CROWD = 0.13
 """Part of the samples within NEAR of a peak beyond which it is a plateau: twice what a sine has there."""
+LEAST_VALUES = 8
+"""Different values below which a channel shows its converter's steps and no motion that a limit could cut off."""
 
 
 def clip_mask(x: Floats, good: Bools, full_scale: tuple[float, float] | None = None) -> tuple[Bools, float, float]:
     """Return the samples of a record about zero that lie on a plateau, the lowest plateau's height, and its part.
 
-    The part is of the amplitude that a sine would have which is cut off as often; without a plateau both are infinite.
+    One plateau is enough. The part is of the amplitude that a sine would have which is cut off as often, 0 where that
+    is half of the time or more; without a plateau both are infinite.
     `full_scale` is the height of the positive and the negative limit, where they are known.
     """
     cut, level, part = np.zeros(len(x), bool), float("inf"), float("inf")
+    low, high = np.quantile(x[good], [0.05, 0.95])
+    fine = len(np.unique(x[good])) >= LEAST_VALUES
     for sign, limit in zip((1.0, -1.0), full_scale or (None, None), strict=True):
         signed = sign * x
         peak = float(signed[good].max())
-        if peak <= 0:
+        below = NEAR * peak
+        if 4 * peak <= high - low:  # cut off near the middle: the median is on the plateau, the band one of the range
+            if high <= low:
+                continue
+            below = NEAR * (high - low) / 2
+        elif peak <= 0:
             continue
-        near = good & (signed >= (1 - NEAR) * peak)
+        near = good & (signed >= peak - below)
         at_limit = limit is not None and peak >= 0.999 * limit
-        if near.sum() > CROWD * good.sum() or _repeats(signed[good], peak) or at_limit:
+        if at_limit or (fine and (near.sum() > CROWD * good.sum() or (peak > 0 and _repeats(signed[good], peak)))):
             cut |= near
             level = min(level, peak)
-            part = min(part, float(np.cos(np.pi * min(near.sum() / good.sum(), 0.5))) / (1 - NEAR))
+            part = min(part, max(float(np.cos(np.pi * near.sum() / good.sum())) / (1 - NEAR), 0.0))
     return cut, level, part
 
 

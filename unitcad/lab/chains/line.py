@@ -16,6 +16,7 @@ import numpy as np
 from unitcad.geometry.arrays import Bools, Floats
 from unitcad.lab.chains import demodulation, least_squares, uncertainty
 from unitcad.lab.chains.censored import solve_censored
+from unitcad.lab.chains.chain import Chain, ChainTable
 from unitcad.lab.chains.clipping import LOWEST, NEAR, clip_mask
 from unitcad.lab.chains.demodulation import Phase
 from unitcad.lab.chains.line_fit import LineFit
@@ -52,6 +53,11 @@ class _Solution:
     """How much wider the line's amplitude is than if all columns were orthogonal and no sample left out."""
 
 
+def chain(table: ChainTable) -> Chain:
+    """Return the chain, whose amplitude is that of the fit that every record has."""
+    return Chain("line", lambda x, rate, fit: fit.amplitude, each_line=True)
+
+
 def fit_line(
     x: Floats,
     rate: float,
@@ -76,7 +82,9 @@ def fit_line(
     if part < LOWEST:  # nothing is left that says how high the line went
         cut = np.zeros(len(x), bool)
     deviation = 1.4826 * np.median(np.abs(x[good]))
-    known = good & ~cut & (np.abs(x) < 6 * deviation if deviation > 0 else True)
+    known = good & ~cut
+    if deviation > 0 and part >= LOWEST:
+        known &= np.abs(x) < 6 * deviation
     time = np.arange(len(x)) / rate
     if phase is not None and span is not None:
         frequency = _frequency(phase, span)[0]
@@ -96,7 +104,8 @@ def fit_line(
         clipped=part,
     )
     inside = (time >= span[0]) & (time <= span[1])
-    return several_lines(x - solution.mains, solution.residual, time, inside & solution.good, fit, rate) or fit
+    use = inside & solution.good
+    return several_lines(x - solution.mains, solution.residual, time, use, fit, rate, mains.frequency_hz) or fit
 
 
 def _twice(
@@ -235,6 +244,7 @@ def _summary(
     return LineFit(
         amplitude=amplitude,
         u=float(np.sqrt(noise**2 + wander**2 + share**2)),
+        u_noise=float(noise),
         u_mains=float(share),
         value=solution.value,
         frequency_hz=frequency,

@@ -20,15 +20,17 @@ class Line:
 class LineFit:
     """A record's line: amplitude (peak) with its standard uncertainty, in the signal's unit.
 
-    `u_mains` is the part of `u` that every repeat shares. `value` is the complex amplitude against `phase`. `drift` is
-    the range of the frequency over its mean, `snr` the amplitude over the residual's standard deviation, `scatter` the
-    standard deviation of the amplitude of blocks over their mean. `masked` is the part of the samples left out as
-    drop-outs, `clipped` the level at which the signal is cut off over its true amplitude (infinite where it isn't).
-    `lines` are all lines where several were fitted together, the strongest first.
+    `u_noise` is the part of `u` that the noise beside the line gives, `u_mains` the part that every repeat shares.
+    `value` is the complex amplitude against `phase`. `drift` is the range of the frequency over its mean, `snr` the
+    amplitude over the residual's standard deviation, `scatter` the standard deviation of the amplitude of blocks over
+    their mean. `masked` is the part of the samples left out as drop-outs, `clipped` the level at which the signal is
+    cut off over its true amplitude (infinite where it isn't). `lines` are all lines where several were fitted
+    together, the strongest first.
     """
 
     amplitude: float
     u: float
+    u_noise: float
     u_mains: float
     value: complex
     frequency_hz: float

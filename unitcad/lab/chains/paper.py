@@ -14,11 +14,15 @@ import numpy as np
 
 from unitcad.errors import Refusal
 from unitcad.geometry.arrays import Floats
+from unitcad.lab.chains.chain import Chain, ChainTable
+from unitcad.lab.chains.line_fit import LineFit
 
 RATE_HZ = 2000.0
 LOW_HZ, HIGH_HZ, COMB_HZ = 40.0, 200.0, 50.0
 ASSUMED = ("order", "q", "zero_phase", "measure", "trim_s")
 """Parameters of the chain that the paper does not state."""
+MOST_MASKED = 2e-4
+"""Part of the samples that may be drop-outs in a record that the chain takes: it has no robust step."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,32 @@ class PaperChain:
             x = np.asarray(lfilter(*comb, sosfilt(band, x)))
         x = x[trim : len(x) - trim]
         return float(np.sqrt(2) * np.std(x)) if self.measure == "rms" else float(np.ptp(x) / 2)
+
+
+def chain(table: ChainTable) -> Chain:
+    """Return the chain with a campaign's parameters."""
+    filters = PaperChain(table.order, table.q, table.zero_phase, table.measure, table.trim_s)
+    return Chain(
+        "paper",
+        lambda x, rate, fit: filters.amplitude(x, rate),
+        unfit=_unfit,
+        gain=filters.gain,
+        zeros_hz=COMB_HZ,
+        pass_hz=(LOW_HZ, HIGH_HZ),
+        assumed={name: getattr(filters, name) for name in ASSUMED},
+    )
+
+
+def _unfit(fits: list[LineFit]) -> str:
+    """Return why the filters, which have no robust step, give no amplitude; empty where they do."""
+    masked = max(fit.masked for fit in fits)
+    if masked > MOST_MASKED:
+        return f"{masked:.2%} of the samples are drop-outs, which it does not leave out"
+    if min(fit.clipped for fit in fits) < np.inf:
+        return "samples are clipped, which it does not allow for"
+    if any(fit.lines for fit in fits):
+        return "it can't tell several lines apart"
+    return ""
 
 
 def resampled(x: Floats, rate: float) -> Floats:

@@ -1,0 +1,93 @@
+"""The page of a campaign: levels, findings, records, charts. It has no script and contacts nothing."""
+
+from __future__ import annotations
+
+import re
+from html import escape
+
+from unitcad.lab.measuring import Measured
+from unitcad.lab.record_result import RecordResult
+
+_STYLE = """:root{color-scheme:light dark;--text:#222;--back:#fff;--edge:#ccc;--error:#a11;--warning:#850}
+@media(prefers-color-scheme:dark){:root{--text:#ddd;--back:#181a1b;--edge:#555;--error:#f99;--warning:#eb6}}
+body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;padding:0 1rem;color:var(--text);
+background:var(--back);overflow-wrap:anywhere}
+.wide{overflow-x:auto;overflow-wrap:normal}table{border-collapse:collapse}td{white-space:nowrap}
+td,th{border:1px solid var(--edge);padding:.2rem .5rem;text-align:left}tr.out td{color:var(--error)}
+figure{display:inline-block;margin:.5rem 0;max-width:100%}svg{max-width:100%;height:auto}
+.error{color:var(--error)}.warning{color:var(--warning)}@media(max-width:500px){h1{font-size:1.4rem}}"""
+
+
+def page(result: Measured, charts: dict[str, str]) -> str:
+    """Return the page as HTML; `charts` are SVG documents by file name."""
+    found = "".join(
+        f'<li class="{one.severity}"><b>{one.code}</b> {escape(one.where)}: {escape(one.message)}. '
+        f"{escape(one.as_dict()['fix'])}</li>"
+        for one in result.findings
+    )
+    assumed = "".join(
+        f"<p>Chain {escape(chain.name)}, assumed: "
+        + escape(", ".join(f"{key} {value}" for key, value in chain.assumed.items()))
+        + ".</p>"
+        for chain in result.chains
+        if chain.assumed
+    )
+    decay = "".join(_figure(svg) for name, svg in charts.items() if name.startswith("decay"))
+    figures = "".join(_figure(svg) for name, svg in charts.items() if not name.startswith("decay"))
+    name = escape(result.campaign.name)
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width">'
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
+        f"<title>{name}</title><style>{_STYLE}</style></head><body><h1>{name}</h1>"
+        f"<p>{escape(result.campaign.note)}</p><h2>Levels</h2>{_levels(result)}{assumed}{decay}"
+        f"<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
+        f"<h2>Records</h2>{_records(result)}<h2>Charts of the records</h2>{figures}</body></html>\n"
+    )
+
+
+def _figure(svg: str) -> str:
+    return f"<figure>{re.sub(r'<[?!][^>]*>', '', svg)}</figure>"
+
+
+def _levels(result: Measured) -> str:
+    rows = [
+        (
+            one.unit, "edge" if one.distance_mm == 0 else f"{one.distance_mm:g} mm", one.chain,
+            f"{one.level.value:.3f}", f"{one.level.low:.3f} to {one.level.high:.3f}",
+            " + ".join(map(str, one.level.repeats)), f"{one.frequency_hz:.2f}",
+        )
+        for one in result.levels
+    ]  # fmt: skip
+    if not rows:
+        return "<p>None: see the findings.</p>"
+    return _table(("unit", "place", "chain", "level", "95 %", "repeats", "Hz"), [(row, "") for row in rows])
+
+
+def _records(result: Measured) -> str:
+    gains = [chain.name for chain in result.chains if chain.gain]
+    head = ("unit", "place", "file", "used", "um", "2 u, um", "Hz", "drift", "signal to noise")
+    head += (*(f"gain of {name}" for name in gains), "SHA-256")
+    rows = [
+        (_record(unit, record, gains), "" if record.usable else "out")
+        for unit, several in result.records.items()
+        for record in several
+    ]
+    return _table(head, rows)
+
+
+def _record(unit: str, r: RecordResult, gains: list[str]) -> tuple[str, ...]:
+    figures = (
+        f"{r.amplitude_um:.4g}", f"{2 * r.u_um:.2g}" if r.usable else "", f"{r.frequency_hz:.2f}", f"{r.drift:.2%}",
+        f"{r.snr:.3g}", *(f"{r.gains[name]:.3f}" for name in gains if name in r.gains),
+    )  # fmt: skip
+    figures = figures if r.frequency_hz else ("",) * (5 + len(gains))
+    return (unit, r.role, r.file, "yes" if r.usable else "no", *figures, r.sha256[:12])
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[tuple[str, ...], str]]) -> str:
+    cells = "".join(f"<th>{escape(word)}</th>" for word in head)
+    body = "".join(
+        f'<tr class="{kind}">' + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row, kind in rows
+    )
+    return f'<div class="wide"><table><tr>{cells}</tr>{body}</table></div>'
