@@ -28,8 +28,13 @@ class Refusal(UnitcadError):
     """A value that is refused: its field, the value, the limit that it breaks and the nearest accepted value.
 
     `nearest` is a value that may be typed in `field`'s place and that meets this limit (it may then meet another one).
-    `value` is None for a field that is missing.
+    `value` is None for a field that is missing. `file` and `line` are where the value stands, `others` are further
+    faults of the same data; `unitcad.validation.load` fills them in.
     """
+
+    file: str | None = None
+    line: int | None = None
+    others: tuple[Refusal, ...] = ()
 
     def __init__(self, field: str, value: object, limit: str, nearest: object = None) -> None:
         self.field, self.value, self.limit, self.nearest = field, value, limit, nearest
@@ -45,7 +50,15 @@ class Refusal(UnitcadError):
             "value": _plain(self.value),
             "limit": self.limit,
             "nearest": _plain(self.nearest),
+            **({} if self.file is None else {"file": self.file, "line": self.line}),
+            **({"others": [other.as_dict() for other in self.others]} if self.others else {}),
         }
+
+    @property
+    def located(self) -> str:
+        """The message after the file and the line of the value."""
+        place = "" if self.file is None else f"{self.file}: " if self.line is None else f"{self.file}:{self.line}: "
+        return f"{place}{self}"
 
 
 class WrongArgument(Refusal):
@@ -59,7 +72,7 @@ class UnknownKey(Refusal):
 def unknown_name(field: str, value: str, known: Iterable[str], kind: type[Refusal] = Refusal) -> Refusal:
     """Return a refusal, of class `kind`, of a name that is not in `known`, with the closest names that are."""
     known = sorted(known)
-    close = difflib.get_close_matches(value, known, n=3, cutoff=0.4)
+    close = difflib.get_close_matches(value, known, n=3, cutoff=0.6)
     more = f" and {len(known) - _MOST_NAMES} more" if len(known) > _MOST_NAMES else ""
     names = f"closest: {', '.join(close)}" if close else f"known: {', '.join(known[:_MOST_NAMES])}{more}"
     return kind(field, value, f"not known; {names}", close[0] if close else None)

@@ -18,11 +18,14 @@ def init(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Write a commented spec to start from. The last line printed is the file."""
+    """Write a commented spec to start from. The last line printed is the file.
+
+    Its first line names the schema that an editor checks it with; `unitcad schema -o FILE` writes that.
+    """
     from unitcad.cli.output import print_json
     from unitcad.errors import Refusal, UnitcadError
     from unitcad.files import names_device, write_new
-    from unitcad.validation.starter import starter
+    from unitcad.validation.starter import SCHEMA, starter
 
     stem = name.removesuffix(".toml")
     if not re.fullmatch(r"[A-Za-z0-9]([A-Za-z0-9._-]{0,58}[A-Za-z0-9_-])?", stem):
@@ -42,4 +45,6 @@ def init(
         print_json({"spec": str(path)})
     else:
         typer.echo(f"build it with: unitcad build {path}")
+        if not Path(SCHEMA).exists():
+            typer.echo(f"an editor checks it as you type after: unitcad schema -o {SCHEMA}")
         typer.echo(str(path))

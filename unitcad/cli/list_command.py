@@ -8,7 +8,7 @@ import typer
 
 from unitcad.cli.shared_options import AsJson
 
-KINDS = ("templates", "designs", "materials", "motors", "printers", "experiments", "phantoms", "rules")
+KINDS = ("templates", "designs", "materials", "motors", "printers", "experiments", "phantoms", "sweeps", "rules")
 
 
 def list_(
@@ -60,6 +60,10 @@ def _entries(kind: str) -> dict[str, Any]:
         from unitcad.lab.phantom.description import phantoms
 
         return {name: _first_comment(path.read_text("utf-8")) for name, path in phantoms().items()}
+    if kind == "sweeps":
+        from unitcad.batch.sweep import shipped as sweeps
+
+        return {name: _first_comment(path.read_text("utf-8")) for name, path in sweeps().items()}
     if kind == "rules":
         from unitcad.check.rules.registry import rules
 

@@ -33,10 +33,16 @@ def _unicode(stream: Any) -> bool:
 
 
 def say_error(error: UnitcadError, as_json: bool) -> None:
-    """Print an error: a line on standard error and, with `--json`, an object on standard output."""
+    """Print an error: a line for each fault on standard error and, with `--json`, an object on standard output."""
     if isinstance(error, WrongArgument):
         error = Refusal(_ARGUMENTS.get(error.field, f"--{error.field}"), error.value, error.limit, error.nearest)
-    sys.stderr.write(f"error: {printable(str(error))}\n")
+    if isinstance(error, Refusal):
+        every = sorted((error, *error.others), key=lambda one: one.line or sys.maxsize)
+        lines = [one.located for one in every]
+    else:
+        lines = [str(error)]
+    for line in lines:
+        sys.stderr.write(f"error: {printable(line)}\n")
     if as_json:
         print_json({"error": error.as_dict()})
 

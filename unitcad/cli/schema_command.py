@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -11,11 +12,20 @@ KINDS = ("spec", "sweep", "cast-record")
 
 def schema(
     kind: Annotated[str, typer.Argument(help="spec, sweep or cast-record.")] = "spec",
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write it there, for an editor; else print it.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The schema is JSON in any case.")] = False,
 ) -> None:
-    """Print the JSON Schema of a spec file, a sweep file or a cast record."""
+    """Print a JSON Schema: of a spec, a sweep or a cast record.
+
+    An editor checks a TOML file against it whose first line is `#:schema FILE`, as `unitcad init` writes it.
+    """
+    import json
+
     import msgspec
 
+    from unitcad import files
     from unitcad.batch.sweep import SweepFile
     from unitcad.casting.cast_record import CastRecord
     from unitcad.cli.output import print_json
@@ -27,4 +37,8 @@ def schema(
     model = {"spec": AskedSpec, "sweep": SweepFile, "cast-record": CastRecord}[kind]
     document = {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(model)}
     document["title"] = f"unitcad {kind.replace('-', ' ')}"
-    print_json(document)
+    if out is None:
+        print_json(document)
+        return
+    files.write(out, (json.dumps(document, indent=2) + "\n").encode())
+    print_json({"schema": str(out)}) if as_json else typer.echo(str(out))

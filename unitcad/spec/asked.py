@@ -79,7 +79,7 @@ class LayerTable(Table, frozen=True, kw_only=True):
 
 
 class MouldsTable(Table, frozen=True, kw_only=True):
-    """The tooling. Whatever the printer's catalogue entry gives can be overridden; None takes the printer's value."""
+    """The tooling. Whatever the printer's catalogue entry gives can be given here instead."""
 
     printer: str = "fdm-0.4"
     cavities: tuple[Cavities, Cavities] | Literal["fill"] = (1, 1)
@@ -104,7 +104,7 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     pour: Literal["open", "injected"] = "open"
     sprue_mm: Annotated[float, Meta(ge=3.0, le=50, description="3 by syringe, 4 by gravity")] = 3.0
     vents: Annotated[
-        Vents | None, Meta(description="of each cavity under a lid; None takes as many as clear the air")
+        Vents | None, Meta(description="of each cavity under a lid; left out, as many as clear the air")
     ] = None
     filament_mm: Annotated[float, Meta(ge=0.2, le=20)] = 1.75
     plinth_height_mm: Annotated[float, Meta(ge=0.6, le=100)] = 2.0
@@ -127,7 +127,7 @@ class CastingTable(Table, frozen=True, kw_only=True):
 
 
 class EstimateTable(Table, frozen=True, kw_only=True):
-    """Inputs of the attenuation estimate; None takes the motor's value."""
+    """Inputs of the attenuation estimate; what is left out is the motor's."""
 
     frequency_hz: kinds.Frequency | None = None
     amplitude_um: kinds.Amplitude | None = None

@@ -1,6 +1,7 @@
 """Validation: from a TOML file, a template or plain data to an effective spec, or one refusal that names the field."""
 
 from unitcad.validation.advice import warnings
+from unitcad.validation.dotted import put
 from unitcad.validation.load import (
     custom_templates,
     default_template,
@@ -8,7 +9,6 @@ from unitcad.validation.load import (
     from_tables,
     load,
     override,
-    put,
     read,
     templates,
 )

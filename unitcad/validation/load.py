@@ -11,16 +11,15 @@ from typing import Any
 
 from unitcad.designs import default_design
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument
+from unitcad.files import read_text
 from unitcad.spec import Spec, check_plain, convert, read_toml
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
-from unitcad.spec.fields import index_in
 from unitcad.validation.defaults import effective
-from unitcad.validation.shipped_files import named_file, shipped_files
+from unitcad.validation.dotted import ABSENT, at, put
+from unitcad.validation.faults import faults, line_of, settled
+from unitcad.validation.shipped_files import is_path, named_file, shipped_files
 from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
-
-_MOST_LIMITS = 5
-"""Limits of one field that are tried out in turn for a value to offer."""
 
 
 def templates() -> dict[str, Path]:
@@ -46,7 +45,7 @@ def load(source: Source, set: Changes = ()) -> Spec:
     a dict by dotted path ({"layers.0.wall_mm": 1.2}), or texts "path=value" with a value in TOML syntax (a bare word
     counts as a string). Lengths in mm. Values that follow from others follow the changed ones. A custom design's
     path starts at the file's folder, else at the working directory. Raises Refusal or UnitcadError, naming the
-    field, for an invalid value.
+    field, for an invalid value; the refusal's `others` are the spec's further faults, each with `file` and `line`.
     """
     changes = list(changes_of(set))
     if isinstance(source, str | os.PathLike):
@@ -67,7 +66,10 @@ def load(source: Source, set: Changes = ()) -> Spec:
         else:
             data = override(data, ())
             put(data, *change)
-    return from_data(data, Path())
+    try:
+        return from_data(data, Path())
+    except Refusal as refusal:
+        raise _explained(refusal, data, source) from None
 
 
 def from_tables(keys: Mapping[str, object]) -> Spec:
@@ -99,26 +101,6 @@ def override(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any
     return result
 
 
-def put(data: dict[str, Any], path: str, value: Any) -> None:
-    """Set `value` at a dotted path ("layers.0.wall_mm"), making tables on the way but no list entries."""
-    *way, last = path.split(".")
-    node: Any = data
-    for step in way:
-        if isinstance(node, list):
-            node = node[_index(node, step, path)]
-        elif isinstance(node, dict):
-            node = node.setdefault(step, {})
-        else:
-            break
-    if isinstance(node, list):
-        node[_index(node, last, path)] = value
-    elif isinstance(node, dict):
-        node[last] = value
-        node.pop(f"{last}_source", None)  # the text of the file that stood there before
-    else:
-        raise Refusal(path, value, "the path runs through a value, not a table")
-
-
 def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
     """Return the validated, effective `Spec` of plain data.
 
@@ -131,25 +113,42 @@ def from_data(data: Mapping[str, Any], folder: Path | None = None) -> Spec:
     except UnknownKey:
         raise
     except Refusal as refusal:
-        raise _settled(refusal, plain) from None
+        raise settled(refusal, plain, _judge, _sound(plain)) from None
 
 
-def _settled(refusal: Refusal, data: dict[str, Any]) -> Refusal:
-    """Return the refusal, offering a value that passes every check of its field: one limit may lie beyond another."""
-    nearest = refusal.nearest
-    for _ in range(_MOST_LIMITS):
-        if nearest is None:
-            break
-        tried = copy.deepcopy(data)
-        try:
-            put(tried, refusal.field, nearest)
-            effective(convert(tried, AskedSpec))
-        except Refusal as other:
-            if other.field == refusal.field:
-                nearest = other.nearest
-                continue
-        return Refusal(refusal.field, refusal.value, refusal.limit, nearest)
-    return Refusal(refusal.field, refusal.value, refusal.limit)
+def _judge(data: dict[str, Any]) -> None:
+    effective(convert(data, AskedSpec))
+
+
+def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the data of the template of a spec's design, or of the default one."""
+    design, known = data.get("design"), templates()
+    return read_toml(known[design if isinstance(design, str) and design in known else default_template()])
+
+
+def _explained(first: Refusal, data: dict[str, Any], source: Source) -> Refusal:
+    """Return the refusal with the spec's other faults, each with its file and line where it stands in one."""
+    try:
+        every = faults(with_source(dict(data), Path()), _judge, _sound(data))
+    except RecursionError:  # nested too deeply to be looked through again
+        return first
+    if not any(str(one) == str(first) for one in every):
+        every = [first, *(one for one in every if one.field != first.field)]
+    path = _file(source)
+    if path is not None:
+        text = read_text(path)
+        written = tomllib.loads(text)
+        for one in every:
+            # What an option or a caller changed, or validation worked out, stands on no line.
+            if one.value is None or at(written, one.field) == at(data, one.field) is not ABSENT:
+                one.file, one.line = os.fspath(path), line_of(text, one.field)
+    every[0].others = tuple(every[1:])
+    return every[0]
+
+
+def _file(source: Source) -> Path | None:
+    """Return the file that a text names by its path."""
+    return Path(source) if isinstance(source, str | os.PathLike) and is_path(os.fspath(source)) else None
 
 
 def _parsed(raw: str) -> Any:
@@ -161,10 +160,3 @@ def _parsed(raw: str) -> Any:
         return float(raw)
     except ValueError:
         return raw
-
-
-def _index(node: list[Any], step: str, path: str) -> int:
-    index = index_in(step, len(node))
-    if index is None:
-        raise Refusal(path, step, f"needs an index from 0 to {len(node) - 1} here", len(node) - 1 if node else None)
-    return index

@@ -15,7 +15,9 @@ from unitcad.spec.fields import entry_in, fields_of, meaning, table_in
 from unitcad.spec.toml import read_toml
 from unitcad.validation.load import default_template, templates
 
-_NOT_OFFERED = ("design_source",)
+SCHEMA = "unitcad.schema.json"
+"""The file beside the spec that its first line names: taplo, and with it most editors, read `#:schema`."""
+_NOT_OFFERED = ("design_source", "fit_source")
 
 
 def starter(name: str, template: str | None = None) -> str:
@@ -36,7 +38,7 @@ def starter(name: str, template: str | None = None) -> str:
     )
     sections = re.split(r"\n(?=\[)", text)
     tables = [section.rstrip() + "\n" + _further_keys(section, there) for section in sections]
-    return "\n".join([*tables, _further_tables(there)])
+    return "\n".join([f"#:schema ./{SCHEMA}", *tables, _further_tables(there)])
 
 
 def _further_keys(section: str, there: dict[str, Any]) -> str:
@@ -65,7 +67,7 @@ def _keys(table: type[Struct], given: set[str]) -> list[str]:
     return [
         f"# {key} = {'...' if field.required else _shown(field)}{_note(field)}"
         for key, field in fields_of(table).items()
-        if key not in given
+        if key not in given and key not in _NOT_OFFERED
     ]
 
 

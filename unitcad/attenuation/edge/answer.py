@@ -127,19 +127,16 @@ def _measured(estimated: dict[str, Any]) -> list[dict[str, Any]]:
 
 def _unread(block: dict[str, Any] | None) -> list[str]:
     """Name what a model does not read, in words: what it reads of no layer in one word, the body in one."""
-    seen = (block or {}).get("inputs_seen") or {}
+    seen: dict[str, Any] = (block or {}).get("inputs_seen") or {}
     if not seen.get("not_seen"):
         return []
-    names: dict[str, None] = {}
+    names: list[str] = []
     for name in seen["not_seen"]:
         layer = _LAYER.fullmatch(name)
-        if layer and any(other.endswith(f".{layer[1]}") for other in seen["by"] if _LAYER.fullmatch(other)):
-            names[name] = None
-        elif layer:
-            names[_WORDS.get(str(layer[1]), name)] = None
-        else:
-            names["body" if name.startswith("tissue ") else _WORDS.get(name, name)] = None
-    return list(names)
+        key = layer[1] if layer else name
+        read = layer and any(other.endswith(f".{key}") for other in seen["by"] if _LAYER.fullmatch(other))
+        names.append("body" if name.startswith("tissue ") else name if read or key not in _WORDS else _WORDS[key])
+    return list(dict.fromkeys(names))
 
 
 def _lines(

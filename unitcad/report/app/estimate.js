@@ -70,13 +70,15 @@
 
   function levels(data) {
     const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: percents(block.edge_level || {}), reason: (block.edge_level || {}).reason, colour: COLOURS[model] || "series-4" }));
+    const { p10, p50, p90 } = data.answer || {};
+    if (known(p10)) rows.unshift({ name: "8 of 10 such units", entry: percents({ value: p50, low: p10, high: p90 }), colour: "series-6" });
     const found = data.measured || {};
     const measured = found.same_size ? found : {};
     const marks = [{ name: "Measured", value: percent(measured.level) }, { name: "Also printed", value: percent(measured.also_printed), dashed: true }, ...ownMarks(data)].filter(({ value }) => known(value));
     const fit = data.fit;
     const reasons = [...new Set(rows.map(({ reason }) => reason).filter(Boolean))];
     return [
-      rangeChart(rows, marks, "Level at the unit's edge, % of the motor's amplitude; a bar is the spread from the inputs' ranges, not the model's error."),
+      rangeChart(rows, marks, "Level at the unit's edge, % of the motor's amplitude; a model's bar is the spread from the inputs' ranges, not its error."),
       [...reasons, ...Object.values(data.models || {}).map((block) => block.not_of_this_drive).filter(Boolean)].map((reason) => el("p", { className: "note" }, reason)),
       fit && predicted(data, fit),
       known(found.level) ? el("p", { className: "note" }, found.same_size ? "" : `${number(percent(found.level), 3)} %: `, found.note) : el("p", { className: "note" }, "The paper measured no such unit."),

@@ -1,0 +1,216 @@
+"""Every fault of a spec at once, each with its line; a value that is offered is accepted."""
+
+from __future__ import annotations
+
+import copy
+import json
+import random
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from unitcad.cli import app
+from unitcad.errors import Refusal
+from unitcad.validation import load, put, read, templates
+from unitcad.validation.dotted import ABSENT, at
+from unitcad.validation.faults import line_of
+
+BAD = """\
+name = "bad"
+design = "encapsulating"
+diameter_mm = -3
+colour = "red"
+
+[[layers]]
+material = "ecoflex-00-10"
+wall_mm = 1.25
+cap_mm = 1.25
+
+[[layers]]      # the outer one
+material = "butter"
+wall_mm = "thick"
+cap_mm = 1.25
+
+[moulds]
+printer = "prusa"
+cavities = [
+  1,
+  0,
+]
+
+[estimate]
+models = ["fem"]
+"""
+FAULTS = {
+    "diameter_mm": 3,
+    "colour": 4,
+    "layers.1.material": 12,
+    "layers.1.wall_mm": 13,
+    "moulds.printer": 17,
+    "moulds.cavities.1": 18,
+    "estimate.models.0": 24,
+}
+
+
+@pytest.fixture
+def bad(tmp_path: Path) -> Path:
+    file = tmp_path / "bad.toml"
+    file.write_text(BAD)
+    return file
+
+
+def refusal(source: object, changes: object = ()) -> Refusal:
+    with pytest.raises(Refusal) as refused:
+        load(source, changes)  # type: ignore[arg-type]
+    return refused.value
+
+
+def test_all_faults_are_listed_with_their_lines(bad: Path) -> None:
+    first = refusal(bad)
+    found = [first, *first.others]
+    assert {one.field: one.line for one in found} == FAULTS
+    assert {one.file for one in found} == {str(bad)}
+
+
+def test_the_command_prints_a_line_a_fault_in_the_order_of_the_file(bad: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "unitcad", "build", str(bad), "--json"], capture_output=True, text=True, cwd=bad.parent
+    )
+    assert done.returncode == 2
+    lines = done.stderr.splitlines()
+    assert [line.removeprefix(f"error: {bad}:").split(":")[0] for line in lines] == [str(n) for n in FAULTS.values()]
+    error = json.loads(done.stdout)["error"]
+    assert {one["field"]: one["line"] for one in (error, *error["others"])} == FAULTS
+    assert [path.name for path in bad.parent.iterdir()] == ["bad.toml"]
+
+
+def test_names_are_refused_with_those_that_there_are(bad: Path) -> None:
+    told = {one.field: str(one) for one in (refusal(bad), *refusal(bad).others)}
+    for name in ("fdm-0.25", "fdm-0.4", "sla"):
+        assert name in told["moulds.printer"]
+    for name in ("bush", "consistent", "fitted", "mechanics", "paper"):
+        assert name in told["estimate.models.0"]
+    assert "nearest" not in told["moulds.printer"] + told["estimate.models.0"]
+
+
+def test_what_is_offered_beside_other_faults_is_accepted_once_they_are_gone(bad: Path) -> None:
+    nearest = {one.field: one.nearest for one in (refusal(bad), *refusal(bad).others)}["diameter_mm"]
+    data = tomllib.loads(BAD)
+    del data["colour"], data["moulds"], data["estimate"]
+    data["layers"][1] |= {"material": "dragon-skin-30", "wall_mm": 1.25}
+    load(data | {"diameter_mm": nearest})
+    assert refusal(data | {"diameter_mm": nearest - 0.01}).field == "diameter_mm"  # type: ignore[operator]
+
+
+def test_a_fault_that_only_follows_from_another_is_not_listed(tmp_path: Path) -> None:
+    """A diameter of 12.2 mm, the least that is accepted, has no room for this tail; one of 14 mm has."""
+    data = read("encapsulating")
+    data["diameter_mm"] = -3
+    assert [one.field for one in (refusal(data), *refusal(data).others)] == ["diameter_mm"]
+
+
+def test_a_value_from_an_option_has_no_line(bad: Path, tmp_path: Path) -> None:
+    good = tmp_path / "good.toml"
+    good.write_text(templates()["encapsulating"].read_text())
+    refused = refusal(good, ["diameter_mm=-3"])
+    assert (refused.file, refused.line) == (None, None)
+    assert refused.located == str(refused)
+
+
+def test_a_key_that_is_missing_is_on_the_line_of_its_table(tmp_path: Path) -> None:
+    file = tmp_path / "x.toml"
+    file.write_text(
+        BAD.replace('material = "butter"\n', "").replace("diameter_mm = -3\n", "").replace('"thick"', "1.2")
+    )
+    found = [refused := refusal(file), *refused.others]
+    lines = {one.field: one.line for one in found}
+    assert lines["layers.1.material"] == 10
+    assert lines["diameter_mm"] is None
+
+
+@pytest.mark.parametrize("name", templates())
+def test_several_planted_faults_are_all_found(name: str, tmp_path: Path) -> None:
+    """Three values out of range, drawn at random: each is listed, and nothing else."""
+    planted = {
+        "layers.0.wall_mm": -1.0,
+        "casting.waste": -2.0,
+        "moulds.sprue_mm": 1e6,
+        "motor.drive": "up",
+        "estimate.tissue": "elbow",
+        "casting.room_c": "warm",
+        "layers.0.material": "butter",
+        "output.tolerance_mm": 0.0,
+    }
+    chosen = random.Random(name).sample(sorted(planted), 3)
+    data = read(name)
+    for path in chosen:
+        put(data, path, planted[path])
+    refused = refusal(data)
+    assert sorted(one.field for one in (refused, *refused.others)) == sorted(chosen)
+
+
+def test_lines_of_every_value_of_a_file_in_all_its_forms() -> None:
+    """Against a count by hand of each statement: strings over lines, dotted keys, inline tables, arrays of tables."""
+    text = '''# a comment
+a.b = 1
+text = """
+[not.a.table]
+x = 1
+"""
+
+list = [ # over lines
+  { p = 1 },
+  { p = 2 },
+]
+[t]
+"odd key" = 1
+[t.deep]
+x = [1,
+ 2]
+[[rows]]
+k = 1
+[[rows]]
+k = 2
+  [rows.sub]
+  z = """a
+b"""
+'''
+    lines = {"a.b": 2, "text": 3, "list": 8, "list.1.p": 8, "t.odd key": 13, "t.deep.x": 15, "t.deep.x.1": 15}
+    lines |= {"rows.0.k": 18, "rows.1": 19, "rows.1.k": 20, "rows.1.sub.z": 22, "t.missing": 12, "rows.1.missing": 19}
+    for path, line in lines.items():
+        assert line_of(text, path) == line, path
+    assert line_of(text, "nothing") is None
+    assert line_of(text.replace("\n", "\r\n"), "rows.1.sub.z") == 22
+
+
+def test_at_follows_no_index_beyond_a_list() -> None:
+    data = {"a": [1, {"b": 2}]}
+    before = copy.deepcopy(data)
+    assert at(data, "a.1.b") == 2
+    assert [at(data, path) for path in ("a.2", "a.x", "a.1.c", "a.0.b", "b")] == [ABSENT] * 5
+    assert data == before
+
+
+def test_init_writes_no_python_and_names_the_schema_that_schema_writes(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = CliRunner().invoke
+    assert run(app, ["init", "mine"]).exit_code == 0
+    text = Path("mine.toml").read_text()
+    assert "None" not in text
+    assert "fit_source" not in text
+    named = text.splitlines()[0].removeprefix("#:schema ./")
+    done = run(app, ["schema", "-o", named])
+    assert done.output.strip() == named
+    assert json.loads(Path(named).read_text()) == json.loads(run(app, ["schema"]).output)
+    assert "None" not in Path(named).read_text()
+    assert load("./mine.toml") == load("encapsulating", ["name=mine"])
+
+
+def test_the_shipped_sweeps_are_listed() -> None:
+    done = CliRunner().invoke(app, ["list", "sweeps"])
+    assert [line.split("\t")[0] for line in done.output.splitlines()] == ["all-materials", "paper", "thickness"]
+    assert all(len(line.split("\t")[1]) > 20 for line in done.output.splitlines())
