@@ -14,7 +14,7 @@ from faulty_sets import set_of
 
 from unitcad.casting import figures, instructions, release_agent, written
 from unitcad.casting import procedure as casting_procedure
-from unitcad.casting.layer_grid import off_grid
+from unitcad.casting.layer_grid import off_grid, unit_heights
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.release_agent import Face
 from unitcad.casting.rules import broken_rules
@@ -97,7 +97,7 @@ def test_nothing_of_a_vacuum_is_said_without_one() -> None:
         assert "egas" not in text
 
 
-@pytest.mark.parametrize(("name", "grams"), [("embedded", (0.086, 0.107)), ("encapsulating", (0.227, 0.384))])
+@pytest.mark.parametrize(("name", "grams"), [("embedded", (0.086, 0.107)), ("encapsulating", (0.228, 0.384))])
 def test_grams_of_the_paper_units(name: str, grams: tuple[float, float]) -> None:
     """At 1.07 g/cm3; the volumes in closed form, less the slot where there is one."""
     same = [f"layers.{i}.material=dragon-skin-10-medium" for i in range(2)]
@@ -126,8 +126,8 @@ def test_mix_covers_waste_and_least_batch() -> None:
 
 def test_play_moves_walls() -> None:
     spec = set_of("encapsulating").spec
-    assert figures.wall_range(spec, 0) == pytest.approx((1.10, 1.40))
-    assert figures.wall_range(spec, 1) == pytest.approx((0.95, 1.55))
+    assert figures.wall_range(spec, 0, 0.15) == pytest.approx((1.10, 1.40))
+    assert figures.wall_range(spec, 1, 0.15) == pytest.approx((0.95, 1.55))
 
 
 def test_weep_goes_with_the_cube_of_the_clearance() -> None:
@@ -205,20 +205,53 @@ def test_bill_counts_pieces() -> None:
 
 
 def test_edges_off_the_layer_grid() -> None:
-    """What the unit itself asks for stays; a window's edges end layers."""
-    moulds = set_of("encapsulating")
+    """A height that is asked for stays where it is, and is listed."""
+    moulds = set_of("encapsulating", "moulds.slot_height_mm=0.5", "moulds.plate_mm=4.07")
     edges = {(e.piece, e.edge): e for e in off_grid(moulds)}
-    assert edges["cup1", "seat"].height_mm == pytest.approx(3.36)
-    assert edges["cup1", "seat"].moved_mm == pytest.approx(0.04)
-    assert ("base", "seat") not in edges
+    assert edges["base", "seat"].height_mm == pytest.approx(6.07)
+    assert edges["base", "seat"].moved_mm == pytest.approx(-0.07)
+    assert edges["tongue", "thickness"].height_mm == pytest.approx(0.5)
+    assert ("base", "ledge") not in edges
     assert off_grid(set_of("encapsulating", "moulds.layer_mm=0.005")) == []
+
+
+def test_the_unit_is_as_asked_for_and_its_heights_in_layers_are_said() -> None:
+    """Cavity 2.11 and two caps of 1.25 on layers of 0.2: 8.11 and 6.0 above the bed, rims of 3.36 and 4.61."""
+    moulds = set_of("encapsulating")
+    assert moulds.dimensions.heights == pytest.approx((3.36, 4.61))
+    heights = {each.what: (each.asked_mm, each.printed_mm) for each in unit_heights(moulds)}
+    assert heights == {
+        "cavity": (2.11, 2.2),
+        "layer 1's cap": (1.25, 1.2),
+        "layer 2's cap": (1.25, 1.2),
+        "height over all": (4.61, 4.6),
+    }
+    assert unit_heights(set_of("embedded")) == []
+    assert "| layer 1's cap | 1.25 | 1.2 |" in written.to_markdown(procedure("encapsulating"))
 
 
 @pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25", "sla"])
 @pytest.mark.parametrize("name", sorted(templates()))
-def test_no_window_of_a_template_is_off_the_grid(name: str, printer: str) -> None:
-    edges = off_grid(set_of(name, f"moulds.printer={printer}"))
-    assert [e for e in edges if "window" in e.edge] == []
+@pytest.mark.parametrize("more", [[], ["moulds.pour=injected"]], ids=["", "lids"])
+def test_no_tool_of_a_template_is_off_the_grid(name: str, printer: str, more: list[str]) -> None:
+    assert off_grid(set_of(name, f"moulds.printer={printer}", *more)) == []
+
+
+@pytest.mark.parametrize("thickness", [1.83, 2.0, 2.65, 3.37])
+@pytest.mark.parametrize("wires", [False, True])
+@pytest.mark.parametrize("layer", [0.1, 0.15, 0.2])
+def test_a_slot_on_the_grid_still_takes_what_leaves(thickness: float, wires: bool, layer: float) -> None:
+    """Tail or wires lie inside the slot, which is no lower than printer and clearance ask for."""
+    leaves = ["wires={diameter_mm=0.4}"] if wires else ["fpcb={thickness_mm=0.11}"]
+    moulds = set_of("no-fpcb", f"motor.thickness_mm={thickness}", f"moulds.layer_mm={layer}", *leaves)
+    exit, dims = moulds.dimensions.exit, moulds.dimensions
+    assert exit is not None
+    low, high = (dims.core_height - 0.5, dims.core_height - 0.1) if wires else (thickness, thickness + 0.11)
+    assert exit.low <= low + 1e-9
+    assert exit.high >= high - 1e-9
+    assert exit.height >= (0.8 if wires else 0.4) - 1e-9
+    # A window's upper edge keeps the cup's wall first.
+    assert [edge for edge in off_grid(moulds) if edge.piece in ("base", "tongue")] == []
 
 
 def as_printed(moulds: MouldSet, windows: Callable[..., tuple[float, float, float]]) -> list[float]:
@@ -283,7 +316,7 @@ def test_pot_life_is_spent_on_mixing_degassing_and_pouring() -> None:
 def test_a_unit_weighs_what_one_trimmed_unit_weighs(more: list[str]) -> None:
     """Ecoflex 00-10 1.04, Dragon Skin 30 1.08 g/cm3: neither the gang's grams nor what stands in sprue and vents."""
     weigh = procedure("encapsulating", *more).measure[-1]
-    assert "0.221 + 0.387 = 0.608 g" in weigh
+    assert "0.221 + 0.388 = 0.609 g" in weigh
     assert ("strike" in weigh) == ("moulds.pour=injected" not in more)
 
 
@@ -339,9 +372,33 @@ def words(*source: str) -> str:
 
 
 def test_each_layer_but_the_first_lies_between_two_cup_positions() -> None:
-    said = [re.findall(r"Layer (\d) lies between", " ".join(pour.steps)) for pour in procedure("three-layer").pours]
+    """Where no ribs centre the cups; where they do, none is pushed aside."""
+    pushed = procedure("three-layer", "moulds.rib_interference_mm=0")
+    said = [re.findall(r"Layer (\d) lies between", " ".join(pour.steps)) for pour in pushed.pours]
     assert said == [[], ["2"], ["3"]]
     assert "lies between" not in words("custom/strap-lugs") + words("single-encapsulating")
+    for source in (("three-layer",), ("custom/strap-lugs",), ("embedded", "moulds.cavities=[2,2]")):
+        assert "push it to no side" in words(*source)
+        assert "towards the cut corner" not in words(*source)
+    assert "towards the cut corner" in words("encapsulating", "moulds.printer=sla")
+
+
+def test_walls_vary_by_what_the_ribs_leave() -> None:
+    """Eight ribs, each 30 % off: 0.3 x 0.1 mm along x and y; 0.3 x 0.25 where the gap is printed 0.15 narrower."""
+    casting = procedure("encapsulating")
+    assert casting.eccentricity.as_drawn_mm == pytest.approx(0.03 * math.sqrt(2))
+    assert casting.eccentricity.at_worst_mm == pytest.approx(0.075 * math.sqrt(2))
+    assert casting.without_ribs.as_drawn_mm == pytest.approx(0.15 * math.sqrt(2))
+    walls = {figure.name: figure.value for figure in casting.walls}
+    assert walls["layer 1 wall, thinnest"] == pytest.approx(1.25 - 0.075 * math.sqrt(2))
+    assert walls["layer 2 wall, thickest"] == pytest.approx(1.25 + 0.15 * math.sqrt(2))
+    record = json.loads(written.to_json(casting))
+    assert record["eccentricity"] == {
+        "ribs": 8,
+        "as_drawn_mm": 0.0424264069,
+        "at_worst_mm": 0.106066017,
+        "off_mm": 0.15,
+    }
 
 
 def test_a_lid_set_speaks_of_lids_alone() -> None:

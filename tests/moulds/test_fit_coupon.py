@@ -39,17 +39,33 @@ def test_stations_have_the_clearances_they_say(name: str) -> None:
     _, plug, tongue = (body.shape for body in coupon.bodies(printer))
     for i in range(5):
         # The plug, turned over, its handle on the plate: below the plate's face only its sides are near.
-        inside = moved(turned(plug, "x", 2), station_x(i), coupon._ROWS["recess"], coupon.PLATE + 4)
+        inside = moved(turned(plug, "x", 2), station_x(i), coupon.row(printer, "recess"), coupon.PLATE + 4)
         mesh = realise(inside, SEGMENTS)
         assert (mesh ^ plate).volume() < 1e-6
         below = mesh.trim_by_plane((0, 0, -1), 0.3 - coupon.PLATE)
         assert below.min_gap(plate, 1) == pytest.approx(values["recess"][i], abs=2 * GRID)
+        if "ribs" in values:
+            pressed = realise(
+                moved(turned(plug, "x", 2), station_x(i), coupon.row(printer, "ribs"), coupon.PLATE + coupon.BOSS + 4),
+                SEGMENTS,
+            )
+            level = coupon.PLATE + coupon.BOSS - coupon.PLUG_HEIGHT / 2
+            patches = (pressed.slice(level) ^ plate.slice(level)).decompose()
+            sizes = [(x1 - x0, y1 - y0) for x0, y0, x1, y1 in (patch.bounds() for patch in patches)]
+            assert len(sizes) == 8
+            assert [min(size) for size in sizes] == pytest.approx([values["ribs"][i]] * 8, abs=2 * GRID)
+            # Handle and boss are of one size: what a caliper reads across both is the shift.
+            x0, y0, x1, y1 = pressed.slice(coupon.PLATE + coupon.BOSS + 1).bounds()
+            around = Manifold.cube((x1 - x0, y1 - y0, 1.0)).translate((x0, y0, coupon.PLATE + 1))
+            outside = Manifold.cube((x1 - x0 + 2, y1 - y0 + 2, 1.0)).translate((x0 - 1, y0 - 1, coupon.PLATE + 1))
+            assert ((outside - around) ^ plate).volume() < 1e-9
+            assert (around ^ plate).volume() > 0.4 * around.volume()
         strip = realise(moved(turned(tongue, "z", 2), station_x(i), 5, coupon.WINDOW_Z), SEGMENTS)
         assert strip.min_gap(plate, 1) == pytest.approx(values["window"][i], abs=GRID)
         hole = plate.slice(1.0).to_polygons()
-        radii = [max(math.dist(p, (station_x(i), coupon._ROWS["hole"])) for p in loop) for loop in hole]
+        radii = [max(math.dist(p, (station_x(i), coupon.row(printer, "hole"))) for p in loop) for loop in hole]
         assert 2 * min(radii) / area_true(SEGMENTS) == pytest.approx(values["hole"][i], abs=2 * GRID)
-        wall = plate.slice(coupon.PLATE + 2).decompose()[i].bounds()
+        wall = plate.slice(coupon.PLATE + 4).decompose()[i].bounds()
         assert min(wall[2] - wall[0], wall[3] - wall[1]) in [pytest.approx(v, abs=GRID) for v in values["wall"]]
 
 
@@ -84,12 +100,17 @@ def test_resin_coupon_prints_no_tongue(tmp_path: Path) -> None:
     assert not (write(printers()["sla"], tmp_path) / "coupon-tongue.stl").exists()
 
 
-def test_windows_are_as_high_as_the_slicer_makes_them() -> None:
-    """Layers counted in PrusaSlicer's G-code, where each is cut at its middle."""
-    heights = {name: coupon.window_heights_as_printed(printers()[name]) for name in ("fdm-0.4", "fdm-0.25")}
-    assert heights["fdm-0.4"] == pytest.approx([0.6, 0.6, 0.6, 0.8, 0.8])
-    assert heights["fdm-0.25"] == pytest.approx([0.4, 0.6, 0.6, 0.6, 0.6])
-    assert "differ in width only" in coupon.to_markdown(printers()["fdm-0.4"])
+@pytest.mark.parametrize("name", sorted(printers()))
+def test_windows_end_whole_layers_and_keep_the_clearance(name: str) -> None:
+    printer = printers()[name]
+    layer, thick = float(printer.layer_mm), float(printer.slot_height_mm)
+    around = next(fit.values_mm for fit in coupon.fits(printer) if fit.feature == "window")
+    for (low, high), clearance in zip(coupon._windows(printer), around, strict=True):
+        assert low / layer == pytest.approx(round(low / layer))
+        assert high / layer == pytest.approx(round(high / layer))
+        assert coupon.WINDOW_Z - low >= clearance - 1e-9
+        assert high - coupon.WINDOW_Z - thick >= clearance - 1e-9
+    assert "differ in width only" in coupon.to_markdown(printer)
 
 
 def test_resin_coupon_says_how_to_cut_the_tongue() -> None:

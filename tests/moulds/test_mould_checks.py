@@ -84,7 +84,7 @@ def shifted(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Callable[[Shape],
     return lambda shape: moved(shape, x, y, z)
 
 
-# The encapsulating template: core of radius 4.5 up to 2.11, bores 5.75 and 7, rims 3.36 and 4.61, slot 1.805 to 2.305.
+# The encapsulating template: core of radius 4.5 up to 2.11, bores 5.75 and 7, rims 3.36 and 4.61, slot 1.8 to 2.2.
 FAULTS: list[Fault] = [
     ("C000", "cup1", "empty", lambda shape: Common((box(0, 1, 0, 1, 0, 1), box(2, 3, 2, 3, 2, 3)))),
     ("C000", "cup1", "in two pieces", less(box(-99, 99, 9, 9.5, -99, 99))),
@@ -105,6 +105,11 @@ FAULTS: list[Fault] = [
     ("C200", "base", "plinth too wide", more(box(-9.9, 9.9, -5, 5, -2, -0.5))),
     ("C210", "base", "plinth 0.1 too wide", more(box(-9.6, 9.6, -5, 5, -2, -0.5))),
     ("C210", "tongue", "0.08 too thick", more(box(6, 15, -1, 1, 1.7, 1.8))),
+    ("C220", "cup1", "no ribs at -x", less(box(-9.82, -9.0, -8, 8, -1.6, -0.3))),
+    ("C220", "cup1", "no ribs at -x and -y", less(box(-9.82, 8, -9.82, 8, -1.6, -0.3))),
+    ("C220", "cup2", "a rib of 0.05 more", more(box(-9.9, -9.45, 3.5, 3.7, -1.3, -0.6))),
+    ("C220", "base", "plinth 0.05 narrower at +x", less(box(9.45, 10.5, -99, 99, -1.9, 1))),
+    ("C220", "cup1", "a rib up to the seat", more(box(9.45, 9.9, 3.4, 3.8, -0.9, 0))),
     ("C300", "cup1", "a lip of 0.05 in the bore", more(ring(5.7, 5.8, 1.0, 1.2))),
     ("C300", "cup1", "a lip of 0.01 in the bore", more(ring(5.74, 5.8, 1.0, 1.2))),
     ("C300", "cup2", "a bore that narrows upwards", more(Revolve(polygon((7.1, 0.2), (7.1, 4), (6.95, 4))))),
@@ -175,12 +180,12 @@ def test_strain_within_the_margin_is_kept() -> None:
 
 
 @pytest.mark.parametrize("name", ["encapsulating", "chain"])
-def test_chain_pad_through_the_slot_needs_118_percent(name: str) -> None:
-    """The circuit's pad of 8.4 through the slot of 3.4 by 0.5: 2 (8.4 + 0.11) over 2 (3.4 + 0.5), less one."""
+def test_chain_pad_through_the_slot_needs_124_percent(name: str) -> None:
+    """The circuit's pad of 8.4 through the slot of 3.4 by 0.4: 2 (8.4 + 0.11) over 2 (3.4 + 0.4), less one."""
     findings = check_moulds(set_of(name, "fpcb.tail_end_width_mm=8.4"))
     value = next(f.value for f in findings if f.where == "tail through the slot")
-    assert value == pytest.approx(100 * (2 * 8.51 / 7.8 - 1))
-    assert round(value) == 118
+    assert value == pytest.approx(100 * (2 * 8.51 / 7.6 - 1))
+    assert round(value) == 124
 
 
 def test_air_under_a_tongue_is_the_formulas() -> None:

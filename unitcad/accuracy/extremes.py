@@ -152,7 +152,7 @@ def _sweeps(values: int | None) -> Iterator[Job]:
                     lambda c: [f"moulds.window_clearance_mm={c}"], 0.001, 0.01, 0.05, 0.2, 0.24, 0.3, 0.6)
     yield from each("caps at the floor and below", base,
                     lambda c: [f"layers.0.cap_mm={c}", f"layers.1.cap_mm={c}"],
-                    0.49, 0.5, 0.8, 1.09, 1.094, 1.095, 1.1, 1.25)
+                    0.49, 0.5, 0.8, 0.98, 0.989, 0.99, 1.1, 1.25)
     yield from each("second cap at the floor and below", base,
                     lambda c: [f"layers.1.cap_mm={c}"], 0.4, 0.5, 0.51, 0.6, 0.8)
     # fmt: on

@@ -1,12 +1,14 @@
 """A fit coupon: printed first, it shows the clearances that the printer needs.
 
 Five stations at 0.5 to 1.5 times the catalogue's value. At each: a recess for the plug (the plinth's fit), a window for
-the tongue, a hole for the filament, a wall, and the station's own number, engraved.
+the tongue, a recess with ribs as a cup's, a hole for the filament, a wall, and the station's own number, engraved. A
+printer without ribs has no such row.
 
       y
       |  [1]  [2]  [3]  [4]  [5]   engraving
       |   |    |    |    |    |    walls, standing
       |   o    o    o    o    o    filament holes
+      | <[ ]><[ ]><[ ]><[ ]><[ ]>  ribbed recesses, each in a boss of the size of the plug's handle
       |  [ ]  [ ]  [ ]  [ ]  [ ]   recesses
       '==  ==   ==   ==   ==  ==   windows, in the front face
 """
@@ -16,9 +18,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from unitcad.casting.layer_grid import NEAR
 from unitcad.catalogue import Printer
 from unitcad.moulds.layout import PLINTH_DRAFT_DEG
+from unitcad.moulds.ribs import drawn, placed
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, turned, union
 from unitcad.shape.body import Body
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
@@ -34,7 +36,11 @@ PLATE, PITCH, MARGIN = 6.0, 16.0, 4.0
 WINDOW_DEPTH, WINDOW_Z = 6.0, 2.0
 TAIL_WIDTH, WALL_LENGTH, WALL_HEIGHT, FILAMENT = 3.0, 8.0, 5.0, 1.75
 _COLOUR, _PLUG_COLOUR, _TONGUE_COLOUR = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.90, 0.30, 0.30)
-_ROWS = {"recess": 13.0, "hole": 22.0, "wall": 28.0, "number": 35.0}
+HANDLE, BOSS = 6.0, 3.0
+"""Half side of the plug's handle, and of the boss round a ribbed recess; that boss's height, mm."""
+_ROWS = {"recess": 13.0, "ribs": 30.0, "hole": 22.0, "wall": 28.0, "number": 35.0}
+RIBBED_ROW = 18.0
+"""How much farther back the rows behind the ribbed recesses lie, mm."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +61,13 @@ def fits(printer: Printer) -> tuple[Fit, ...]:
     """Return what the coupon settles, with the five values of each."""
 
     def fit(feature: str, key: str, choose: str, least: float = 0.0) -> Fit:
-        nominal = float(getattr(printer, key))
+        nominal = float(getattr(printer, key) or 0.0)
         return Fit(feature, key, choose, tuple(round(least + (nominal - least) * share, 4) for share in SHARES))
 
+    ribs = fit("ribs", "rib_interference_mm", "most that the plug is pressed through by hand until it sits")
     return (
         fit("recess", "plinth_clearance_mm", "least where the plug drops in"),
+        *([ribs] if _ribbed(printer) else []),
         fit("window", "window_clearance_mm", "least where the greased tongue slides"),
         fit("hole", "filament_hole_mm", "least that takes the filament by hand", FILAMENT),
         fit("wall", "least_wall_mm", "thinnest that stands closed and stiff"),
@@ -110,36 +118,35 @@ def to_markdown(printer: Printer) -> str:
     for fit in fits(printer):
         cells = " | ".join(f"`{fit.toml(i)}`" for i in range(len(SHARES)))
         lines.append(f"| {fit.feature} | {fit.choose} | {cells} |")
-    layer, made = float(printer.layer_mm), window_heights_as_printed(printer)
-    drawn = [high - low for low, high in _windows(printer)]
-    if any(abs(a - b) > NEAR * layer for a, b in zip(drawn, made, strict=True)):
+    if _ribbed(printer):
+        play = number(float(printer.plinth_clearance_mm), 3)
         lines += [
             "",
-            f"A window's edges fall between layers of {number(layer, 3)} mm, as they do in a cup, and the slicer moves",
-            "them:",
-            "",
-            "| height of the window, mm | 1 | 2 | 3 | 4 | 5 |",
-            "| --- | --- | --- | --- | --- | --- |",
-            "| as drawn | " + " | ".join(f"{number(height, 3)}" for height in drawn) + " |",
-            "| in whole layers | " + " | ".join(f"{number(height, 3)}" for height in made) + " |",
-            "",
-            "Stations of one height differ in width only.",
-            f"The tongue of {number(thick, 3)} mm is moved too: measure it.",
+            "Ribs: press the plug into each station until its handle lies on the boss; a rib is crushed once only.",
+            "Then measure across handle and boss together, along x and along y. What exceeds the handle alone is how",
+            f"far the plug stands off the middle; without ribs up to {play} mm.",
         ]
+    heights = [number(high - low, 3) for low, high in _windows(printer)]
+    every = f"{heights[0]} mm at every station" if len(set(heights)) == 1 else f"{', '.join(heights)} mm from 1 to 5"
+    lines += [
+        "",
+        f"A window's lower and upper edge end whole layers of {number(float(printer.layer_mm), 3)} mm, as they do in a",
+        f"cup: its height is {every}. Stations of one height differ in width only.",
+    ]
     return "\n".join(lines) + "\n"
 
 
-def window_heights_as_printed(printer: Printer) -> list[float]:
-    """Return the height that layers leave of each station's window, mm: a slicer cuts each layer at its middle."""
-    layer = float(printer.layer_mm)
-    middles = [layer * (k + 0.5) for k in range(math.ceil(PLATE / layer))]
-    return [layer * sum(low + 1e-6 < middle < high - 1e-6 for middle in middles) for low, high in _windows(printer)]
-
-
 def _windows(printer: Printer) -> list[tuple[float, float]]:
-    """Return lower and upper edge of each station's window, mm above the bed."""
+    """Return lower and upper edge of each station's window, mm above the bed: whole layers, outwards."""
     around = next(fit.values_mm for fit in fits(printer) if fit.feature == "window")
-    return [(WINDOW_Z - each, WINDOW_Z + float(printer.slot_height_mm) + each) for each in around]
+    layer, thick = float(printer.layer_mm), float(printer.slot_height_mm)
+    return [
+        (
+            math.floor((WINDOW_Z - each) / layer + 1e-6) * layer,
+            math.ceil((WINDOW_Z + thick + each) / layer - 1e-6) * layer,
+        )
+        for each in around
+    ]
 
 
 def _resin(printer: Printer) -> bool:
@@ -149,22 +156,28 @@ def _resin(printer: Printer) -> bool:
 def _plate(printer: Printer) -> Shape:
     stroke = float(printer.engraving_stroke_mm)
     length = PITCH * len(SHARES) + 2 * MARGIN
-    depth = _ROWS["number"] + HEIGHT * stroke * SHARES[-1] / 2 + MARGIN
+    depth = row(printer, "number") + HEIGHT * stroke * SHARES[-1] / 2 + MARGIN
     solids: list[Shape] = [box(0, length, 0, depth, 0, PLATE)]
     tools: list[Shape] = []
     by_feature, windows = {fit.feature: fit.values_mm for fit in fits(printer)}, _windows(printer)
     for i in range(len(SHARES)):
         x = MARGIN + PITCH * (i + 0.5)
-        tools.append(moved(_taper(by_feature["recess"][i], RELIEF, 0.25), x, _ROWS["recess"], PLATE - PLUG_HEIGHT))
-        tools.append(moved(cylinder(by_feature["hole"][i] / 2, -1, PLATE + 1), x, _ROWS["hole"]))
+        tools.append(
+            moved(_taper(by_feature["recess"][i], RELIEF, 0.25), x, row(printer, "recess"), PLATE - PLUG_HEIGHT)
+        )
+        tools.append(moved(cylinder(by_feature["hole"][i] / 2, -1, PLATE + 1), x, row(printer, "hole")))
+        if "ribs" in by_feature:
+            y = row(printer, "ribs")
+            solids.append(box(x - HANDLE, x + HANDLE, y - HANDLE, y + HANDLE, PLATE - 1, PLATE + BOSS))
+            tools.append(moved(_ribbed_recess(printer, by_feature["ribs"][i]), x, y, PLATE + BOSS - PLUG_HEIGHT))
         half = _tongue_width(printer) / 2 + by_feature["window"][i]
         tools.append(box(x - half, x + half, -1, WINDOW_DEPTH, *windows[i]))
         wall = by_feature["wall"][i] / 2
-        y = _ROWS["wall"]
+        y = row(printer, "wall")
         solids.append(box(x - WALL_LENGTH / 2, x + WALL_LENGTH / 2, y - wall, y + wall, PLATE - 1, PLATE + WALL_HEIGHT))
         own, text = by_feature["number"][i], str(i + 1)
         number = engraving(text, own, PLATE - float(printer.engraving_depth_mm), PLATE + 1)
-        tools.append(moved(number, x - text_width(text, own) / 2, _ROWS["number"] - HEIGHT * own / 2))
+        tools.append(moved(number, x - text_width(text, own) / 2, row(printer, "number") - HEIGHT * own / 2))
     return cut(union(solids), tools)
 
 
@@ -180,9 +193,29 @@ def _taper(clearance: float, relief: float = 0.0, beyond: float = 0.0) -> Shape:
     return Extrude(section(-relief), -relief, high, top=section(high))
 
 
+def _ribbed_recess(printer: Printer, interference: float) -> Shape:
+    """Draw a recess of the catalogue's clearance less its ribs, its mouth at z = `PLUG_HEIGHT`."""
+    clearance, crest = float(printer.plinth_clearance_mm), float(printer.least_feature_mm)
+    standing = placed((PLUG, PLUG), CORNER, -PLUG_HEIGHT, clearance, interference, crest)
+    # As in a cup the ribs are drawn mouth downwards.
+    return cut(
+        _taper(clearance, RELIEF, 0.25), [turned(s, "x", 2) for s in drawn(standing, clearance, interference, crest)]
+    )
+
+
+def row(printer: Printer, feature: str) -> float:
+    """Return where the stations of a feature lie along y, mm."""
+    behind = _ribbed(printer) and feature not in ("recess", "ribs")
+    return _ROWS[feature] + (RIBBED_ROW if behind else 0.0)
+
+
+def _ribbed(printer: Printer) -> bool:
+    return float(printer.rib_interference_mm or 0.0) > 0
+
+
 def _plug() -> Shape:
     """Draw a plinth on a handle, printed plinth up, as the base's is."""
-    handle = box(-6, 6, -6, 6, 0, 4)
+    handle = box(-HANDLE, HANDLE, -HANDLE, HANDLE, 0, 4)
     return union((handle, moved(turned(_taper(0.0), "x", 2), 0, 0, 4 + PLUG_HEIGHT)))
 
 

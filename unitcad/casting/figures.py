@@ -110,11 +110,11 @@ def window_length(moulds: MouldSet, step: Step) -> float:
     return lay.cup[0] - max(abs(cell.x) for cell in lay.cells) - moulds.plan.dimensions.radii[step.index - 1]
 
 
-def wall_range(spec: Spec, layer: int) -> tuple[float, float]:
-    """Return the thinnest and thickest wall of a layer (from 0) that the cups' play on the plinth allows, mm.
+def wall_range(spec: Spec, layer: int, off_axis_mm: float) -> tuple[float, float]:
+    """Return the thinnest and thickest wall of a layer (from 0) whose cups stand up to `off_axis_mm` off the axis, mm.
 
     Layer 1 lies between the core and one cup position, each further layer between two.
     """
-    play = spec.moulds.plinth_clearance_mm * (1 if layer == 0 else 2)
+    off = off_axis_mm * (1 if layer == 0 else 2)
     wall = spec.layers[layer].wall_mm
-    return max(wall - play, 0.0), wall + play
+    return max(wall - off, 0.0), wall + off

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from unitcad.casting.eccentricity import eccentricity
 from unitcad.casting.figures import MIXING_MIN, MOST_ERROR_PCT, Mix, at_room, window_length
 from unitcad.casting.release_agent import agent_faces
 from unitcad.catalogue import Material
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
+from unitcad.moulds.ribs import ribs
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
 from unitcad.spec import printer_of
 from unitcad.text import listed, number, spaced
@@ -42,8 +44,15 @@ def preparation(moulds: MouldSet) -> Iterator[str]:
     else:
         yield "Brush off strings and loose bits."
     lids = " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
+    on = "Put each cup on the plinth once, dry: its cut corner lets it on one way only. It must sit down"
+    if standing := ribs(moulds.spec, plan.layout):
+        on = (
+            "Press each cup onto the plinth once, dry: its cut corner lets it on one way only. Press evenly at all "
+            f"corners, in a vice between two boards where the hand is too weak: its {len(standing)} ribs are crushed "
+            "and centre it from then on. It must sit down"
+        )
     yield (
-        "Put each cup on the plinth once, dry: its cut corner lets it on one way only. It must sit down until seat and "
+        f"{on} until seat and "
         f"plinth touch; a slit of {number(lengths.seat_relief_mm, 3)} mm is then left between cup and plate, all "
         f"round.{lids}"
     )
@@ -111,10 +120,7 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
             f"Coat the {_lead(moulds)} thinly with petroleum jelly where the slot of cup {step.index} comes, outside "
             "the cavity only: it keeps silicone from weeping out."
         )
-    pushed = ", so that the play lies on one side." if first else ", as the cup before."
-    if not first and moulds.plan.concentric:
-        pushed = f", as the cup before: Layer {step.index} lies between two cup positions."
-    yield f"{_release_agent(moulds, step)} Put cup {step.index} on and push it towards the cut corner{pushed}"
+    yield f"{_release_agent(moulds, step)} {_put_on(moulds, step)}"
     if step.seals and not moulds.plan.concentric:
         yield "Grease the flanks of what stands on the base beside the cavity thinly, and wipe off the rest."
     if tongues:
@@ -182,6 +188,18 @@ def pour_steps(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdi
     )
 
 
+def _put_on(moulds: MouldSet, step: Step) -> str:
+    """Say how a cup comes to stand where it should: by its ribs, or pushed as the one before."""
+    if ribs(moulds.spec, moulds.plan.layout):
+        return (
+            f"Put cup {step.index} on and press it down evenly until it sits. Its ribs centre it: push it to no side."
+        )
+    pushed = ", so that the play lies on one side." if step.index == 1 else ", as the cup before."
+    if step.index > 1 and moulds.plan.concentric:
+        pushed = f", as the cup before: Layer {step.index} lies between two cup positions."
+    return f"Put cup {step.index} on and push it towards the cut corner{pushed}"
+
+
 def release(moulds: MouldSet, inner: Material) -> Iterator[str]:
     """Describe the way from the last cured layer to a unit in the hand; `inner` is Layer 1's silicone."""
     tear = float(inner.tensile_mpa) * math.pi * (moulds.spec.moulds.filament_mm / 2) ** 2
@@ -201,14 +219,15 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
     where it is the drawn one.
     """
     spec, dims = moulds.spec, moulds.plan.dimensions
-    play = spec.moulds.plinth_clearance_mm
+    off = eccentricity(moulds)
     yield f"Height over all: {_shown(dims.heights[-1], 2)} mm. A cup that did not seat shows here."
     if moulds.plan.concentric:
         yield f"Diameter at the skin: {_shown(2 * dims.outer_radius, 2)} mm, in two directions."
-        further = f", each further layer by {number(2 * play, 3)} mm unless both cups were pushed the same way"
+        pushed = "" if off.ribs else " unless both cups were pushed the same way"
+        further = f", each further layer by {number(2 * off.at_worst_mm, 2)} mm{pushed}"
         yield (
             "Walls at the skin, at four places: their spread is the cup's shift. Layer 1 may vary by "
-            f"{number(play, 3)} mm either way{further if len(masses_g) > 1 else ''}."
+            f"{number(off.at_worst_mm, 2)} mm either way{further if len(masses_g) > 1 else ''}."
         )
     else:
         yield f"Farthest corner from the motor's axis: {_shown(dims.outer_radius, 2)} mm."

@@ -1,10 +1,15 @@
-"""Heights of the tools that fall off the printer's layer grid: the slicer moves such an edge to a layer."""
+"""Heights that fall off the printer's layer grid: the slicer moves such an edge to a layer.
+
+The tooling's own heights snap to the grid where the spec leaves them free. The unit's heights are those asked for: a
+printer reaches a cap of 1.25 mm in layers of 0.2 mm by no drawing, so what comes out is said instead.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from unitcad.moulds.base import plate_bottom
+from unitcad.moulds.base import plate_bottom, plate_top
 from unitcad.moulds.cup import groove_depth_of, window_section
 from unitcad.moulds.mould_set import MouldSet
 
@@ -27,10 +32,19 @@ class OffGrid:
         return self.nearest_mm - self.height_mm
 
 
+@dataclass(frozen=True)
+class UnitHeight:
+    """A height of the unit: as asked for, and as whole layers of base and cups make it, mm."""
+
+    what: str
+    asked_mm: float
+    printed_mm: float
+
+
 def off_grid(moulds: MouldSet) -> list[OffGrid]:
-    """Return the edges that matter to a cavity and are off the grid."""
+    """Return the tooling's own edges that are off the grid."""
     layer = moulds.spec.moulds.layer_mm
-    nearest = [(*edge, round(edge[2] / layer) * layer) for edge in _edges(moulds)]
+    nearest = [(*edge, _whole(edge[2], layer)) for edge in _edges(moulds)]
     return [
         OffGrid(piece, edge, round(height, 4), round(near, 4))
         for piece, edge, height, near in nearest
@@ -38,16 +52,38 @@ def off_grid(moulds: MouldSet) -> list[OffGrid]:
     ]
 
 
+def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
+    """Return the cavity's depth and every layer's height over what it is cast on, where layers make another of them."""
+    spec, dims = moulds.spec, moulds.plan.dimensions
+    layer, seat = spec.moulds.layer_mm, -plate_bottom(spec)
+    core = dims.core_height, _whole(seat + dims.core_height, layer) - _whole(seat, layer)
+    rims = [(rim, _whole(rim, layer)) for rim in dims.heights]
+    heights = [UnitHeight("cavity", *core)] if moulds.plan.concentric and rims[0][0] > core[0] else []
+    below = core
+    for i, rim in enumerate(rims):
+        capped = moulds.plan.concentric and rim[0] > below[0]
+        asked, printed = (rim[0] - below[0], rim[1] - below[1]) if capped else rim
+        heights.append(UnitHeight(f"layer {i + 1}'s {'cap' if capped else 'height'}", asked, printed))
+        below = rim
+    heights.append(UnitHeight("height over all", *rims[-1]))
+    rounded = [UnitHeight(each.what, round(each.asked_mm, 4), round(each.printed_mm, 4)) for each in heights]
+    return [each for each in rounded if abs(each.asked_mm - each.printed_mm) > NEAR * layer]
+
+
+def _whole(height: float, layer: float) -> float:
+    """Return the height of the layers that a slicer makes of it, mm: it cuts each at its middle."""
+    return math.floor(height / layer + 0.5 + 1e-6) * layer
+
+
 def _edges(moulds: MouldSet) -> list[tuple[str, str, float]]:
     """Return piece, edge and height above the bed, mm. Cups lie upside down: theirs count from the rim."""
     spec, dims = moulds.spec, moulds.plan.dimensions
     bottom = plate_bottom(spec)
-    edges = [("base", "seat", -bottom), ("base", "core's top", dims.core_height - bottom)]
+    edges = [("base", "plate", plate_top(spec) - bottom), ("base", "seat", -bottom)]
     if dims.exit:
         edges += [("base", "ledge", dims.exit.low - bottom), ("tongue", "thickness", dims.exit.height)]
     for step, rim in zip(moulds.plan.steps, dims.heights, strict=True):
         cup = step.cup
-        edges += [(cup, "seat", rim)]
         edges += [(cup, "groove's floor", groove_depth_of(spec, rim))] if step.groove else []
         if dims.exit:
             _, low, high = window_section(spec, dims.exit, rim)

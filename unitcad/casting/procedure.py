@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from unitcad import catalogue
 from unitcad.casting import figures as fig
 from unitcad.casting.bill import Item, bill
+from unitcad.casting.eccentricity import UNEVEN, Eccentricity, eccentricity
 from unitcad.casting.figures import Figure, Mix, sourced
 from unitcad.casting.instructions import assembly, measurements, pour_steps, preparation, release, tunnels
-from unitcad.casting.layer_grid import OffGrid, off_grid
+from unitcad.casting.layer_grid import OffGrid, UnitHeight, off_grid, unit_heights
 from unitcad.casting.release_agent import BondFace, Face, agent_faces, bond_faces
 from unitcad.catalogue import Material
 from unitcad.moulds.mould_set import MouldSet
@@ -44,6 +45,7 @@ class Procedure:
 
     `bonds` are the tools' faces that must never get release agent.
     `tunnels`: the cups whose windows resin may cure shut.
+    `eccentricity` is that of the cups on the core, `without_ribs` what it would be without what centres them.
     `walls` is () where the tooling is not concentric: nothing tells which of its walls a cup's play changes.
     """
 
@@ -54,11 +56,14 @@ class Procedure:
     tunnels: tuple[str, ...]
     preparation: tuple[str, ...]
     off_grid: tuple[OffGrid, ...]
+    unit_heights: tuple[UnitHeight, ...]
     pours: tuple[Pour, ...]
     bonds: tuple[BondFace, ...]
     release: tuple[str, ...]
     assembly: tuple[str, ...]
     measure: tuple[str, ...]
+    eccentricity: Eccentricity
+    without_ribs: Eccentricity
     walls: tuple[Figure, ...]
     bill: tuple[Item, ...]
 
@@ -71,6 +76,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
     spec, plan = moulds.spec, moulds.plan
     known = catalogue.materials(spec.materials)
     edges = tuple(off_grid(moulds))
+    centred, free = eccentricity(moulds), eccentricity(moulds, with_ribs=False)
     pours, mixes, grams = [], [], []
     for step, volume in zip(plan.steps, layer_volumes_mm3, strict=True):
         silicone = known[step.material]
@@ -99,12 +105,15 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
         tunnels=tunnels(moulds),
         preparation=tuple(preparation(moulds)),
         off_grid=edges,
+        unit_heights=tuple(unit_heights(moulds)),
         pours=tuple(pours),
         bonds=bond_faces(moulds),
         release=tuple(release(moulds, mixes[0][0])),
         assembly=() if moulds.design.laid_in else assembly(moulds),
         measure=tuple(measurements(moulds, grams, _printed_slot_height(moulds, edges))),
-        walls=tuple(_walls(spec)) if plan.concentric else (),
+        eccentricity=centred,
+        without_ribs=free,
+        walls=tuple(_walls(spec, free, centred)) if plan.concentric else (),
         bill=bill(moulds, mixes),
     )
 
@@ -212,11 +221,23 @@ def _printed_slot_height(moulds: MouldSet, edges: Sequence[OffGrid]) -> float | 
     return next((edge.nearest_mm for edge in edges if edge.piece == "tongue"), None)
 
 
-def _walls(spec: Spec) -> list[Figure]:
+def _walls(spec: Spec, without: Eccentricity, made: Eccentricity) -> list[Figure]:
+    """Return how far the cups stand off the core's axis, and what that makes of the walls."""
+    off = number(made.off_mm, 3)
+
+    def at_most(what: str, each: Eccentricity, how: str) -> Figure:
+        worst = f"; {number(each.at_worst_mm, 2)} where the gap is printed {off} mm off, the printer's play"
+        return Figure(f"cups off the core's axis, {what}, at most", each.as_drawn_mm, "mm", f"computed: {how}{worst}")
+
+    clearance = number(spec.moulds.plinth_clearance_mm, 3)
+    figures = [at_most("without ribs", without, f"clearance of {clearance} mm a side x sqrt 2")]
+    if made.ribs:
+        how = f"balance of {made.ribs} ribs that are crushed by {number(spec.moulds.rib_interference_mm, 3)} mm, "
+        figures.append(at_most("with ribs", made, f"{how}each up to {UNEVEN:.0%} stronger or weaker (assumed)"))
     times = "1 x for Layer 1, 2 x beyond it" if len(spec.layers) > 1 else "1 x"
-    source = f"computed: play of {number(spec.moulds.plinth_clearance_mm, 3)} mm a side, {times}"
-    return [
+    source = f"computed: cups up to {number(made.at_worst_mm, 2)} mm off the axis, {times}"
+    return figures + [
         Figure(f"layer {i + 1} wall, {extreme}", wall, "mm", source)
         for i in range(len(spec.layers))
-        for extreme, wall in zip(("thinnest", "thickest"), fig.wall_range(spec, i), strict=True)
+        for extreme, wall in zip(("thinnest", "thickest"), fig.wall_range(spec, i, made.at_worst_mm), strict=True)
     ]

@@ -48,9 +48,12 @@ def to_markdown(procedure: Procedure) -> str:
     lines += ["## Before the first pour", "", *steps(procedure.preparation), ""]
     if procedure.off_grid:
         lines += ["These edges fall between two of the printer's layers; the slicer moves them to the nearest.", ""]
-        lines += ["Core's top and cups' seats are the unit's own heights, ledge and tongue those of its slot.", ""]
         rows = [(spaced(o.piece), o.edge, number(o.height_mm, 3), number(o.moved_mm, 2)) for o in procedure.off_grid]
         lines += [*_table(("piece", "edge", "height as printed, mm", "moved by, mm"), rows), ""]
+    if procedure.unit_heights:
+        lines += ["The unit's own heights are drawn as asked for; whole layers make them:", ""]
+        made = [(each.what, number(each.asked_mm, 3), number(each.printed_mm, 3)) for each in procedure.unit_heights]
+        lines += [*_table(("height", "asked for, mm", "in whole layers, mm"), made), ""]
     for pour in procedure.pours:
         lines += [f"## Pour {pour.index}: {spaced(pour.layer)}, {markdown(pour.material)}", ""]
         lines += [f"![pour {pour.index}]({pour.drawing})", "", *_figures(pour.figures), "", *steps(pour.steps), ""]
@@ -59,7 +62,12 @@ def to_markdown(procedure: Procedure) -> str:
         lines += ["## Motor in", "", *steps(procedure.assembly), ""]
     lines += ["## Measure on the first part", "", *(f"- {markdown(text)}" for text in procedure.measure), ""]
     if procedure.walls:
-        lines += ["The cups' play on the plinth is the largest error of all:", "", *_figures(procedure.walls), ""]
+        lines += [
+            "How far the cups stand off the core's axis is the largest error of all:",
+            "",
+            *_figures(procedure.walls),
+            "",
+        ]
     needed = [
         (
             markdown(spaced(i.item) if i.made.startswith("printed") else i.item),

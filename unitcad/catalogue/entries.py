@@ -57,6 +57,9 @@ Bed = Annotated[float, Meta(ge=20, le=LONGEST_MM, description="side of the space
 LayerHeight = Annotated[float, Meta(ge=0.005, le=2, description="height of a printed layer")]
 Play = Annotated[float, Meta(ge=0, le=2, description="how far the machine's axes miss, per side")]
 PlinthClearance = Annotated[float, Meta(ge=0.01, le=2, description="between a cup and its plinth, per side")]
+RibInterference = Annotated[
+    float, Meta(ge=0, le=2, description="by which a cup's ribs reach into its plinth, per side; 0: no ribs")
+]
 SeatRelief = Annotated[float, Meta(ge=0.01, le=20, description="how far a cup's foot stays above the plate")]
 SlotHeight = Annotated[float, Meta(ge=0.05, le=20, description="of the slot that a tail or wires leave through")]
 SlotClearance = Annotated[float, Meta(ge=0.01, le=20, description="what the slot is wider than the tail or the wires")]
@@ -163,6 +166,7 @@ class Printer(Struct, frozen=True, kw_only=True):
     engraving_stroke_mm: Value[EngravingStroke]
     overhang_deg: Value[Overhang]
     bridge_mm: Value[Bridge]
+    rib_interference_mm: Value[RibInterference] | None = None
 
 
 class Tissue(Struct, frozen=True, kw_only=True):

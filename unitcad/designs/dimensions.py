@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from unitcad.spec import Spec
 
@@ -10,6 +11,9 @@ MOTOR_CLEARANCE = 0.1
 """Least ring of air between the motor and Layer 1, mm, unless `motor.fill` closes it."""
 WIRE_GAP = 0.1
 """Between wires side by side, and between them and what is next to them, mm."""
+
+
+EPS = 1e-9
 
 
 @dataclass(frozen=True)
@@ -107,12 +111,45 @@ def concentric(spec: Spec, core_height: float, exit: Exit | None) -> Dimensions:
     )
 
 
-def wire_exit(spec: Spec, top: float) -> Exit | None:
-    """Return the exit of a spec's wires, side by side, whose passage ends at z = `top`; None without wires."""
+def whole_layers(spec: Spec, z: float) -> float:
+    """Return the height (mm over the skin) nearest to `z` at which a layer of the base ends."""
+    seat, layer = spec.moulds.plate_mm + spec.moulds.plinth_height_mm, spec.moulds.layer_mm
+    return math.floor((seat + z) / layer + 0.5 + EPS) * layer - seat
+
+
+def slot_exit(spec: Spec, low: float, inside: tuple[float, float], width: float) -> Exit:
+    """Return a slot with silicone over it, its floor moved from z = `low` to a whole layer of the base.
+
+    It stays where it is where `inside` (what it takes, from z to z, mm) would no longer fit, or the cups' wall under
+    the window would get thinner than the least wall.
+    """
+    snapped, height = whole_layers(spec, low), spec.moulds.slot_height_mm
+    if snapped <= inside[0] + EPS and snapped + height >= inside[1] - EPS and snapped >= _least_floor(spec):
+        low = snapped
+    return Exit(low, low + height, width)
+
+
+def _least_floor(spec: Spec) -> float:
+    """Return the least height of an exit over the skin: the cups have a wall under its window, mm."""
+    return spec.moulds.least_wall_mm + spec.moulds.window_clearance_mm - EPS
+
+
+def wire_exit(spec: Spec, top: float, core: float | None = None) -> Exit | None:
+    """Return the exit of a spec's wires, side by side, whose passage ends at z = `top`; None without wires.
+
+    Under a cap, `core` is the core's top (mm), and all of the slot moves to a whole layer. A notch keeps its open top:
+    its floor moves down to one, where the wall under it stays.
+    """
     wires = spec.wires
     if not wires:
         return None
     pitch = wires.diameter_mm + WIRE_GAP
     across = tuple((i - (wires.count - 1) / 2) * pitch for i in range(wires.count))
     width = spec.moulds.slot_width_clearance_mm + wires.count * pitch - WIRE_GAP
-    return Exit(top - spec.moulds.slot_height_mm, top, width, across)
+    low = top - spec.moulds.slot_height_mm
+    if core is not None:
+        upper = core - WIRE_GAP
+        return replace(slot_exit(spec, low, (upper - wires.diameter_mm, upper), width), wires_y=across)
+    snapped = whole_layers(spec, low)
+    snapped -= spec.moulds.layer_mm if snapped > low + EPS else 0.0
+    return Exit(snapped if snapped >= _least_floor(spec) else low, top, width, across)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from unitcad import catalogue
 from unitcad.designs import limits
 from unitcad.designs.design import Design
-from unitcad.designs.dimensions import MOTOR_CLEARANCE, Dimensions, Exit, concentric, wire_exit
+from unitcad.designs.dimensions import MOTOR_CLEARANCE, Dimensions, Exit, concentric, slot_exit, wire_exit
 from unitcad.designs.parts import motor_hold, slots
 from unitcad.designs.stretch import allowed_strain, pad_strain, tail_strain, widest_tail_end
 from unitcad.errors import Refusal
@@ -23,7 +23,7 @@ from unitcad.spec.asked import LEAST_TAIL
 from unitcad.spec.effective import Circuit
 
 TIP_PROUD = 0.2
-"""How far a tongue for wires stands proud of the core, mm, so that Layer 1 clears them; for a circuit it is as much."""
+"""How far a tongue for wires stands proud of the core, mm, so that Layer 1 clears them, before it moves to a layer."""
 
 
 def layers(spec: Spec, dims: Dimensions) -> dict[str, Shape]:
@@ -39,11 +39,11 @@ def dimensions(spec: Spec) -> Dimensions:
     """Return the dimensions: the core holds motor and circuit; tail or wires leave through a slot at its top."""
     fpcb, moulds = spec.fpcb, spec.moulds
     core = spec.motor.thickness_mm + (fpcb.thickness_mm if fpcb else 0.0)
-    exit = wire_exit(spec, core + TIP_PROUD)
+    exit = wire_exit(spec, core + TIP_PROUD, core)
     if fpcb and not exit:
-        middle = spec.motor.thickness_mm + fpcb.thickness_mm / 2
-        half = moulds.slot_height_mm / 2
-        exit = Exit(middle - half, middle + half, moulds.slot_width_clearance_mm + fpcb.tail_width_mm)
+        back = spec.motor.thickness_mm
+        low = back + fpcb.thickness_mm / 2 - moulds.slot_height_mm / 2
+        exit = slot_exit(spec, low, (back, core), moulds.slot_width_clearance_mm + fpcb.tail_width_mm)
     return concentric(spec, core, exit)
 
 

@@ -128,6 +128,17 @@ def check_seat(spec: Spec) -> None:
     )
 
 
+def check_ribs(spec: Spec) -> None:
+    """Raise Refusal for ribs that reach so far into the plinth that they would hold the cup off its seat."""
+    line = float(catalogue.printers(spec.printers)[spec.moulds.printer].least_feature_mm)
+    at_most(
+        "moulds.rib_interference_mm",
+        spec.moulds.rib_interference_mm,
+        line / 2,
+        f"a rib is as wide as a printed line of {line:g} mm and is crushed by half of that",
+    )
+
+
 def check_filament(spec: Spec, dims: Dimensions) -> None:
     """Raise Refusal where plate and core can't take the filament that lets air under a closed unit."""
     moulds = spec.moulds

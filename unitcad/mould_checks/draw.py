@@ -40,9 +40,9 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     layers = {step.index: moulds.meshes((*step.layer, *step.earlier)) for step in moulds.plan.steps}
     laid = {step.index: [(body.name, moulds.mesh(body)) for body in step.inserts] for step in moulds.plan.steps}
     for removal in removals(moulds.plan):
-        staying = [(name, moulds.solids[name]) for name in removal.stays]
+        staying = [(name, moulds.pressed[name]) for name in removal.stays]
         staying += [*(("layer", solid) for solid in layers[removal.step]), *laid[removal.step]]
-        piece, way = moulds.solids[removal.piece], removal.direction
+        piece, way = moulds.pressed[removal.piece], removal.direction
         areas = []
         for name, solid in staying:
             if overlapping and boxes_meet(piece, solid):

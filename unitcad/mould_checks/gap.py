@@ -1,8 +1,9 @@
 """C210: faces that must slide have the printer's clearance: skirt and plinth, tongue and window, lid and cup.
 
-The skirt is measured below the seat, where cup and plinth touch on purpose; the lid's below the rim. Round corners are
-polygons of as many sides a turn on both pieces: midway along a facet their gap is the clearance's cosine of pi / n.
-In moulds by complement the gap to what stands on the base is that of sections: above it the cup may touch its edge.
+The skirt is measured below the seat, where cup and plinth touch on purpose, and beside its ribs, which reach into the
+plinth; the lid's below the rim. Round corners are polygons of as many sides a turn on both pieces: midway along a facet
+their gap is the clearance's cosine of pi / n. In moulds by complement the gap to what stands on the base is that of
+sections: above it the cup may touch its edge.
 """
 
 from __future__ import annotations
@@ -34,10 +35,11 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     play = lengths.plinth_clearance_mm
     for step in moulds.plan.steps:
         cup = solids[step.cup]
-        gap = cup.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
+        beside = cup - moulds.rib_spaces
+        gap = beside.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
         yield at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm")
         if not moulds.plan.concentric:
-            gap = _sideways(cup, solids["base"], window + 1)
+            gap = _sideways(beside, solids["base"], window + 1)
             where = f"{step.cup} and what stands on the base"
             yield at_least("C210", where, gap, window * chord - GRID, "mm", KNIFE)
         for tongue in moulds.plan.standing(step, "tongue"):

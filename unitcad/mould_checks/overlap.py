@@ -1,4 +1,4 @@
-"""C200: no two solids of the unit, or of an assembled pour, share volume."""
+"""C200: no two solids of the unit, or of an assembled pour, share volume. Ribs count as crushed: C220 looks at them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _of_pours(moulds: MouldSet) -> Iterator[MouldFinding]:
         yield from _overlaps(f"pour {step.index}", [(f"{step.name}.{i + 1}", c) for i, c in enumerate(cells)], shared)
         cast.append((step.name, united(cells)))
         laid = [(body.name, moulds.mesh(body)) for body in step.inserts]
-        standing = [(name, moulds.solids[name]) for name in step.tools] + cast + laid
+        standing = [(name, moulds.pressed[name]) for name in step.tools] + cast + laid
         yield from _overlaps(f"pour {step.index}", standing, shared)
 
 

@@ -9,7 +9,8 @@ from unitcad.designs.dimensions import Exit
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.moulds.base import outline, plate_bottom, plate_top, tapered
-from unitcad.moulds.layout import MARK, PLINTH_DRAFT_DEG
+from unitcad.moulds.layout import MARK
+from unitcad.moulds.ribs import SQUARE, rib_shapes
 from unitcad.shape import Extrude, Shape, box, cut, cylinder, moved, ring
 from unitcad.spec import Spec, printer_of
 
@@ -37,9 +38,10 @@ def skirt_end(spec: Spec) -> float:
 
 
 def recess(spec: Spec, lay: Layout) -> Shape:
-    """Draw the cup's recess: the plinth's taper, wider by the printer's clearance measured square to its sides."""
-    clearance = spec.moulds.plinth_clearance_mm / math.cos(math.radians(PLINTH_DRAFT_DEG))
-    return tapered(lay, clearance, skirt_end(spec))
+    """Draw the cup's recess: the plinth's taper, wider by the printer's clearance measured square to its sides, less
+    the ribs that centre the cup.
+    """
+    return cut(tapered(lay, spec.moulds.plinth_clearance_mm * SQUARE, skirt_end(spec)), rib_shapes(spec, lay))
 
 
 def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
@@ -62,8 +64,9 @@ def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:
 
 
 def groove_depth_of(spec: Spec, rim: float) -> float:
-    """Return the depth of an overflow groove: the printer's, or half a low rim's height."""
-    return min(spec.moulds.groove_depth_mm, rim / 2)
+    """Return the depth of an overflow groove: the printer's, or half a low rim's height, down to a whole layer."""
+    depth, layer = min(spec.moulds.groove_depth_mm, rim / 2), spec.moulds.layer_mm
+    return math.floor(depth / layer + EPS) * layer if depth >= layer else depth
 
 
 def windows(spec: Spec, dims: Dimensions, lay: Layout, rim: float) -> list[Shape]:

@@ -11,6 +11,7 @@ from msgspec import structs
 
 from unitcad.designs import Design, Dimensions, design_of, unit_bodies
 from unitcad.moulds.plan import Plan, plan
+from unitcad.moulds.ribs import rib_spaces
 from unitcad.shape import Shape
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, from_json, to_json, with_formats
@@ -123,6 +124,22 @@ class MouldSet:
     def solids(self) -> dict[str, Manifold]:
         """The mesh of every body of unit and tooling by name."""
         return {body.name: self.mesh(body) for body in (*self.unit, *self.plan.tools)}
+
+    @cached_property
+    def rib_spaces(self) -> Manifold:
+        """The boxes round the ribs that centre the cups; empty without ribs."""
+        from unitcad.moulds.cavities import united
+
+        return united(self.meshes(rib_spaces(self.spec, self.plan.layout)))
+
+    @cached_property
+    def pressed(self) -> dict[str, Manifold]:
+        """The tools by name as they stand in a pour: where a cup's rib reaches into the base, it is crushed."""
+        tools = {tool.name: self.solids[tool.name] for tool in self.plan.tools}
+        if not self.rib_spaces.is_empty():
+            taken = tools["base"] ^ self.rib_spaces
+            tools |= {step.cup: tools[step.cup] - taken for step in self.plan.steps}
+        return tools
 
     @cached_property
     def cavities(self) -> tuple[Cavity, ...]:

@@ -89,6 +89,7 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     layer_mm: kinds.LayerHeight | None = None
     xy_play_mm: kinds.Play | None = None
     plinth_clearance_mm: kinds.PlinthClearance | None = None
+    rib_interference_mm: kinds.RibInterference | None = None
     seat_relief_mm: kinds.SeatRelief | None = None
     slot_height_mm: kinds.SlotHeight | None = None
     slot_width_clearance_mm: kinds.SlotClearance | None = None
@@ -107,8 +108,12 @@ class MouldsTable(Table, frozen=True, kw_only=True):
         Vents | None, Meta(description="of each cavity under a lid; left out, as many as clear the air")
     ] = None
     filament_mm: Annotated[float, Meta(ge=0.2, le=20)] = 1.75
-    plinth_height_mm: Annotated[float, Meta(ge=0.6, le=100)] = 2.0
-    plate_mm: Annotated[float, Meta(ge=0.5, le=100)] = 4.0
+    plinth_height_mm: Annotated[
+        Annotated[float, Meta(ge=0.6, le=100)] | None, Meta(description="None takes 2 mm in whole layers")
+    ] = None
+    plate_mm: Annotated[
+        Annotated[float, Meta(ge=0.5, le=100)] | None, Meta(description="None takes 4 mm in whole layers")
+    ] = None
     ledge_mm: Annotated[float, Meta(ge=0.1, le=100)] = 0.6
 
 

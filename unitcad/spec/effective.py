@@ -79,6 +79,7 @@ class Moulds(Table, frozen=True, kw_only=True):
     layer_mm: float
     xy_play_mm: float
     plinth_clearance_mm: float
+    rib_interference_mm: float
     seat_relief_mm: float
     slot_height_mm: float
     slot_width_clearance_mm: float

@@ -14,6 +14,6 @@ def printer_of(spec: Spec) -> catalogue.Printer:
     overridden = {
         name: catalogue.Value(value, "spec", "moulds")
         for name, value in structs.asdict(spec.moulds).items()
-        if hasattr(printer, name) and float(getattr(printer, name)) != value
+        if hasattr(printer, name) and float(getattr(printer, name) or 0.0) != value
     }
     return structs.replace(printer, **overridden)

@@ -38,7 +38,7 @@ def _circuit_stock(spec: Spec) -> list[str]:
 
 def _play(spec: Spec) -> list[str]:
     play, thinnest = spec.moulds.plinth_clearance_mm, min(layer.wall_mm for layer in spec.layers)
-    if (2 if len(spec.layers) > 1 else 1) * play <= thinnest / 2:
+    if spec.moulds.rib_interference_mm or (2 if len(spec.layers) > 1 else 1) * play <= thinnest / 2:
         return []
     return [f"moulds.plinth_clearance_mm = {play:g} mm lets cups move by more than half of a wall of {thinnest:g} mm"]
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 from msgspec import structs
 
 from unitcad import catalogue
 from unitcad.catalogue.entries import Drive
 from unitcad.designs import Design, design_of
-from unitcad.designs.limits import least_slot
+from unitcad.designs.limits import check_ribs, least_slot
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
 from unitcad.spec.asked import DEFAULT_MOTOR, AskedSpec
@@ -19,6 +21,8 @@ UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
 """What is assumed of a motor whose entry does not say: the paper's motor."""
 UNKNOWN_DRIVE: Drive = "flat"
 """A coin ERM's, as the paper's motor is."""
+_BASE = {"plinth_height_mm": 2.0, "plate_mm": 4.0}
+"""The base's heights, before they end whole layers, mm."""
 _PRINTER_LENGTHS = tuple(f for f in Moulds.__struct_fields__ if f in catalogue.Printer.__struct_fields__)
 
 
@@ -36,6 +40,7 @@ def effective(asked: AskedSpec) -> Spec:
     design = design_of(asked)
     spec = _with_defaults(asked, design)
     design.limits(spec, design.dimensions(spec))
+    check_ribs(spec)
     return spec
 
 
@@ -90,13 +95,20 @@ def _motor(asked: AskedSpec) -> tuple[catalogue.Motor | None, MotorSize]:
 
 
 def _moulds(asked: AskedSpec, design: Design) -> Moulds:
-    """Return the tooling's lengths: the printer's where the spec gives none, the slot as high as what it takes."""
+    """Return the tooling's lengths: the printer's where the spec gives none, the slot as high as what it takes.
+
+    Heights that the spec does not give end whole layers of the printer.
+    """
     printer = catalogue.choose("moulds.printer", asked.moulds.printer, catalogue.printers(asked.printers))
     given = structs.asdict(asked.moulds)
-    lengths = {name: float(getattr(printer, name)) for name in _PRINTER_LENGTHS if given[name] is None}
+    lengths = {name: float(getattr(printer, name) or 0.0) for name in _PRINTER_LENGTHS if given[name] is None}
     if "slot_height_mm" in lengths:
         least = least_slot(asked.fpcb, asked.wires, design.wire_sides)
         lengths["slot_height_mm"] = max(lengths["slot_height_mm"], least)
+    layer = asked.moulds.layer_mm or lengths["layer_mm"]
+    lengths |= {name: least for name, least in _BASE.items() if given[name] is None}
+    for name in {"slot_height_mm", *_BASE} & lengths.keys():
+        lengths[name] = round(math.ceil(lengths[name] / layer - 1e-6) * layer, 9)
     return Moulds(**{**given, **lengths})
 
 

@@ -1,0 +1,123 @@
+"""The ribs that centre a cup: where they stand, and what they do to its eccentricity."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from faulty_sets import broken, set_of
+
+from unitcad.casting.eccentricity import UNEVEN, eccentricity, shift_per_depth
+from unitcad.catalogue import printers
+from unitcad.errors import Refusal
+from unitcad.mould_checks import check_moulds
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.ribs import rib_shapes, ribs
+from unitcad.validation import templates
+
+SETS = [
+    ("encapsulating",),
+    ("embedded", "moulds.printer=fdm-0.25"),
+    ("encapsulating", "moulds.cavities=[2,3]"),
+    ("encapsulating", "moulds.pour=injected"),
+    ("custom/strap-lugs",),
+    ("custom/film-closed",),
+]
+
+
+@pytest.mark.parametrize("source", SETS, ids=" ".join)
+def test_ribs_stay_clear_of_cavity_windows_tongues_and_pry_slots(source: tuple[str, ...]) -> None:
+    """Measured between meshes: half a millimetre to whatever else the cup touches or lets through."""
+    moulds = set_of(*source)
+    (standing,) = [moulds.meshes(rib_shapes(moulds.spec, moulds.plan.layout))]
+    assert len(ribs(moulds.spec, moulds.plan.layout)) == 8
+    for step in moulds.plan.steps:
+        others = moulds.meshes((*step.layer, *step.earlier, *step.seals))
+        others += [moulds.solids[tongue.name] for tongue in moulds.plan.standing(step, "tongue")]
+        assert min(rib.min_gap(other, 2.0) for rib in standing for other in others) > 0.5
+    plate = -moulds.spec.moulds.plinth_height_mm
+    assert min(rib.bounding_box()[2] for rib in standing) > plate + 0.2
+
+
+@pytest.mark.parametrize("source", SETS, ids=" ".join)
+def test_the_crushed_volume_is_that_of_the_crests(source: tuple[str, ...]) -> None:
+    """What base and cup share, by the trapezium of a crest: its height x depth x (line + depth), and its two ramps."""
+    moulds = set_of(*source)
+    line, depth = float(printers()[moulds.spec.moulds.printer].least_feature_mm), moulds.spec.moulds.rib_interference_mm
+    (first, *_) = standing = ribs(moulds.spec, moulds.plan.layout)
+    least = len(standing) * (first.top - first.bottom) * depth * (line + depth)
+    ramps = len(standing) * (first.head - first.foot - first.top + first.bottom) * depth * (line + depth)
+    for step in moulds.plan.steps:
+        shared = (moulds.solids[step.cup] ^ moulds.solids["base"]).volume()
+        assert 0.98 * least < shared < least + ramps
+        assert (moulds.pressed[step.cup] ^ moulds.solids["base"]).volume() < 1e-9
+
+
+def test_the_shift_of_unequal_ribs_is_that_of_a_simulated_press() -> None:
+    """The cup is let go at its place and moved by each rib's force until nothing moves it: no algebra in common."""
+    moulds = set_of("embedded", "moulds.cavities=[2,2]")
+    standing, depth = ribs(moulds.spec, moulds.plan.layout), 0.1
+    rng, worst = np.random.default_rng(3), 0.0
+    for strengths in rng.choice((1 - UNEVEN, 1 + UNEVEN), (40, len(standing))):
+        x = y = turn = 0.0
+        for _ in range(4000):
+            fx = fy = moment = 0.0
+            for rib, strength in zip(standing, strengths, strict=True):
+                nx, ny = rib.inwards
+                crushed = depth + nx * (x - turn * rib.y) + ny * (y + turn * rib.x)
+                # The plinth pushes the rib back the way that it came from.
+                px, py = -nx * strength * crushed, -ny * strength * crushed
+                fx, fy, moment = fx + px, fy + py, moment + rib.x * py - rib.y * px
+            x, y, turn = x + 0.05 * fx, y + 0.05 * fy, turn + 2e-4 * moment
+        assert math.hypot(fx, fy) < 1e-9
+        worst = max(worst, *(math.hypot(x - turn * c.y, y + turn * c.x) for c in moulds.plan.layout.cells))
+    bound = depth * shift_per_depth(standing, [(c.x, c.y) for c in moulds.plan.layout.cells])
+    assert worst <= bound + 1e-9
+    assert bound < 1.5 * depth * UNEVEN * math.sqrt(2)
+    assert worst > 0.3 * bound
+
+
+@pytest.mark.parametrize("name", sorted(templates()))
+@pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25"])
+def test_ribs_leave_a_fifth_of_the_eccentricity(name: str, printer: str) -> None:
+    moulds = set_of(name, f"moulds.printer={printer}")
+    without, made = eccentricity(moulds, with_ribs=False), eccentricity(moulds)
+    assert without.as_drawn_mm == pytest.approx(math.sqrt(2) * moulds.spec.moulds.plinth_clearance_mm)
+    assert made.as_drawn_mm < 0.25 * without.as_drawn_mm
+    assert made.at_worst_mm < 0.3 * without.at_worst_mm
+
+
+def test_ribs_too_low_for_the_play_leave_the_rest_of_it() -> None:
+    made = eccentricity(set_of("encapsulating", "moulds.rib_interference_mm=0.02"))
+    assert made.at_worst_mm == pytest.approx(math.sqrt(2) * 0.13)
+
+
+def test_no_ribs_in_resin_or_where_none_are_asked_for() -> None:
+    for more in ("moulds.printer=sla", "moulds.rib_interference_mm=0"):
+        moulds = set_of("encapsulating", more)
+        assert rib_shapes(moulds.spec, moulds.plan.layout) == []
+        assert broken(moulds) == set()
+        assert all("play" in f.where for f in check_moulds(moulds) if f.code == "C220")
+        assert eccentricity(moulds).ribs == 0
+
+
+def test_a_rib_wider_into_the_plinth_than_half_a_line_is_refused() -> None:
+    with pytest.raises(Refusal) as refused:
+        set_of("encapsulating", "moulds.rib_interference_mm=0.25")
+    assert (refused.value.field, refused.value.nearest) == ("moulds.rib_interference_mm", 0.2)
+    assert broken(set_of("encapsulating", "moulds.rib_interference_mm=0.2")) == set()
+
+
+def test_a_printer_of_ones_own_without_the_key_has_none() -> None:
+    from unitcad.validation import from_data, read
+
+    entry = {
+        name: float(value) if not isinstance(value.value, str) else value.value
+        for name in printers()["fdm-0.4"].__struct_fields__
+        if name not in ("name", "rib_interference_mm") and (value := getattr(printers()["fdm-0.4"], name)) is not None
+    }
+    data = {**read("no-fpcb"), "moulds": {"printer": "ours"}, "printers": {"ours": entry}}
+    moulds = MouldSet(from_data(data))
+    assert moulds.spec.moulds.rib_interference_mm == 0
+    assert broken(moulds) == set()

@@ -1,0 +1,124 @@
+r"""Crush ribs: what centres a cup on its plinth. Two stand on each face of its recess, level with those opposite.
+
+      plan, from above                  section of a rib
+    .--v-----------v--.                      seat
+    |  .---------.    |              |  .-----------     z = 0
+    |> | plinth   \  <|              | |
+    |  |           |  |              |  \    <- 45 degrees
+    |> |           | <|              |   |
+    |  '-----------'  |              |   |   <- crest: reaches into the plinth by the interference
+    '--^-----------^--'              |  /    <- lead-in, down to the skirt's end
+
+The plinth is tapered, so a rib meets it only when the cup is nearly down, along its whole crest at once. Opposite ribs
+are crushed alike, which leaves the cup in the middle; pairs hold it against turning too. They stand as far from the
+axes as the cut corner lets them: for leverage, and clear of tails, which leave along x.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from unitcad.designs.tooling import Layout
+from unitcad.moulds.layout import CORNER_RADIUS, PLINTH_DRAFT_DEG
+from unitcad.shape import Extrude, Profile, Shape, box, polygon
+from unitcad.spec import Spec, printer_of
+
+ROOT = 0.5
+"""How deep a rib's drawing reaches into the wall behind it, mm; half a thinner wall."""
+AROUND = 0.05
+"""How far the box round a rib stands off it, mm."""
+SLOPE = math.tan(math.radians(PLINTH_DRAFT_DEG))
+SQUARE = 1 / math.cos(math.radians(PLINTH_DRAFT_DEG))
+"""A length square to the plinth's faces, measured level, over itself."""
+
+
+@dataclass(frozen=True)
+class Rib:
+    """A rib: where it stands on the plinth's upper edge (x, y, mm), and the way it points, inwards.
+
+    `bottom` and `top` are those of the crest, `foot` and `head` of the whole rib (z, mm).
+    """
+
+    x: float
+    y: float
+    inwards: tuple[int, int]
+    foot: float
+    bottom: float
+    top: float
+    head: float
+
+
+def ribs(spec: Spec, lay: Layout) -> tuple[Rib, ...]:
+    """Return the ribs of every cup of a set; () where the spec asks for none, or the plinth's faces are too short."""
+    moulds = spec.moulds
+    crest = float(printer_of(spec).least_feature_mm)
+    end = -moulds.plinth_height_mm + moulds.seat_relief_mm
+    corner = max(lay.key, CORNER_RADIUS)
+    return placed(lay.plinth, corner, end, moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest)
+
+
+def placed(
+    half: tuple[float, float], corner: float, end: float, clearance: float, interference: float, crest: float
+) -> tuple[Rib, ...]:
+    """Return the ribs round a plinth of half sizes `half` at z = 0 whose cup's skirt ends at z = `end`, mm.
+
+    `corner` is how much of a face a corner takes; () where the corners leave no room.
+    """
+    proud, skirt = (clearance + interference) * SQUARE, -end
+    beside = crest / 2 + proud + ROOT
+    ramp, head = min(proud, skirt / 4), -skirt / 5
+    x, y = (size - corner - beside for size in half)
+    if not interference or min(x, y) <= beside:
+        return ()
+    places = [((side * half[0], at), (-side, 0)) for side in (1, -1) for at in (y, -y)]
+    places += [((at, side * half[1]), (0, -side)) for side in (1, -1) for at in (x, -x)]
+    return tuple(Rib(*at, inwards, end, end + ramp, head - ramp, head) for at, inwards in places)
+
+
+def drawn(
+    standing: tuple[Rib, ...], clearance: float, interference: float, crest: float, root: float = ROOT
+) -> list[Shape]:
+    """Draw ribs: a crest as wide as a printed line, flanks of 45 degrees, and a ramp at either end."""
+    tip, back = interference * SQUARE, -clearance * SQUARE - root
+    shapes: list[Shape] = []
+    for rib in standing:
+        heights = (rib.foot, rib.bottom, rib.top, rib.head)
+        # At foot and head the tip lies within the wall.
+        tips = (back + root / 2, tip, tip, back + root / 2)
+        sections = [
+            _section(rib, at, back, crest / 2, crest / 2 + tip - back, z) for at, z in zip(tips, heights, strict=True)
+        ]
+        shapes += [Extrude(sections[i], heights[i], heights[i + 1], top=sections[i + 1]) for i in range(3)]
+    return shapes
+
+
+def _section(rib: Rib, tip: float, back: float, narrow: float, wide: float, z: float) -> Profile:
+    """Draw a rib's section at z: its tip and its back lie so far inwards of the plinth's face there."""
+    (nx, ny), face = rib.inwards, z * SLOPE
+    corners = ((tip, -narrow), (tip, narrow), (back, wide), (back, -wide))
+    return polygon(*((rib.x + nx * (d + face) - ny * t, rib.y + ny * (d + face) + nx * t) for d, t in corners))
+
+
+def rib_shapes(spec: Spec, lay: Layout) -> list[Shape]:
+    """Draw the ribs of every cup of a set, reaching into plinth and wall."""
+    moulds = spec.moulds
+    root = min(ROOT, moulds.skirt_wall_mm / 2)
+    crest = float(printer_of(spec).least_feature_mm)
+    return drawn(ribs(spec, lay), moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest, root)
+
+
+def rib_spaces(spec: Spec, lay: Layout) -> list[Shape]:
+    """Draw a box round each rib, from behind its wall to before its tip: what a check of other faces leaves out."""
+    moulds = spec.moulds
+    before = moulds.rib_interference_mm * SQUARE + AROUND
+    behind = moulds.plinth_clearance_mm * SQUARE + AROUND
+    half = float(printer_of(spec).least_feature_mm) / 2 + before + behind
+    boxes = []
+    for rib in ribs(spec, lay):
+        (nx, ny), near, far = rib.inwards, rib.head * SLOPE + before, rib.foot * SLOPE - behind
+        x, y = zip(
+            *((rib.x + nx * d - ny * t, rib.y + ny * d + nx * t) for d, t in ((near, half), (far, -half))), strict=True
+        )
+        boxes.append(box(min(x), max(x), min(y), max(y), rib.foot - AROUND, rib.head + AROUND))
+    return boxes
