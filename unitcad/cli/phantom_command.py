@@ -71,7 +71,8 @@ def _print(made: PhantomSet) -> None:
     layers = Table("layer", "silicone", "thinner", "kPa", "mm", "0.1 mm thinner")
     for layer, one in zip(made.table.layers, made.recipes, strict=True):
         change = f"{100 * e.sensitivity[layer.name]:+.2g} %"
-        modulus, thinner = f"{one.modulus_kpa:.3g}", f"{one.thinner_pct:g} %"
+        modulus = f"{one.modulus_kpa:.3g}{' measured' if one.measured else ''}"
+        thinner = f"{one.thinner_pct:g} %"
         layers.add_row(layer.name, one.silicone.name, thinner, modulus, f"{layer.thickness_mm:g}", change)
     screen.print(layers)
     response = Table("mm", *(f"{d:g}" for d in e.distances_mm))

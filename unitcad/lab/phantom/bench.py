@@ -101,9 +101,7 @@ def casting_markdown(phantom: PhantomSet) -> str:
         )
     lines += [
         "",
-        f"Moduli: {phantom.recipes[0].source}. They are quasi-static. The range is two standard deviations of that "
-        f"table; its upper end has a factor of {stiffening(table.frequency_hz):.3g} for {table.frequency_hz:g} Hz, by "
-        "the catalogue's fractional law (assumed to hold with thinner).",
+        *_moduli(phantom),
         "",
     ]
     number = iter(range(1, 1000))
@@ -192,6 +190,25 @@ def bill(phantom: PhantomSet) -> list[Item]:
         items.append(Item(stuff, 1, "piece", "bought", "for all pours"))
     items.append(Item("bolt", 4, "piece", "bought", f"M{table.stage_bolt_mm:g}, for the holder"))
     return items
+
+
+def _moduli(phantom: PhantomSet) -> Iterator[str]:
+    """Say where the moduli come from: the table of thinned silicones, and the files of layers that were measured."""
+    hertz = phantom.table.frequency_hz
+    by_table = [one for one in phantom.recipes if one.measured is None]
+    slow = [one for one in phantom.recipes if one.measured is None or not one.measured.dynamic]
+    if by_table:
+        yield f"Moduli: {by_table[0].source}. They are quasi-static."
+        yield "The range is two standard deviations of that table."
+    for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True):
+        if one.measured:
+            kind = f"at {hertz:g} Hz" if one.measured.dynamic else "quasi-static"
+            yield f"Modulus of the {layer.name}: measured, {kind}, {markdown(one.source)}."
+    if slow:
+        yield (
+            f"The upper end of a quasi-static range has a factor of {stiffening(hertz):.3g} for {hertz:g} Hz, by the "
+            "catalogue's fractional law (assumed to hold with thinner)."
+        )
 
 
 def _preparation(phantom: PhantomSet, found: Sequence[PhantomPour]) -> Iterator[str]:
@@ -317,20 +334,21 @@ def _release(phantom: PhantomSet) -> Iterator[str]:
         f"Keep what is measured {EDGE_MM:g} mm or more from the walls. Cut nothing off the skin. Demould coupons by "
         "lifting one tab, and pull them at the phantom's own age, at one speed that is written down, with wide grips "
         "faced with fine emery paper, just tight enough not to slip, "
-        "with the same machine each time, and read them with unitcad material: their modulus, not the table's, "
-        "belongs into tissue.toml. That one is quasi-static too: keep its upper end "
-        f"{stiffening(phantom.table.frequency_hz):.3g} times higher, unless a dynamic test gives the modulus at "
+        "with the same machine each time, and read them with unitcad material. Name its material.toml as the layer's "
+        "measured in the phantom's file and run unitcad phantom again: tissue.toml and the response then have that "
+        "modulus, not the table's. A pull is quasi-static too; a dynamic test gives the modulus at "
         f"{phantom.table.frequency_hz:g} Hz (unitcad material --dma)."
     )
 
 
 def _expectations(phantom: PhantomSet) -> Iterator[str]:
     table, e = phantom.table, phantom.expected
+    measured = any(one.measured for one in phantom.recipes)
+    moduli = "the moduli of the recipe" if measured else "moduli from quasi-static compression"
     yield (
         f"|u_z| of the skin at {table.frequency_hz:g} Hz over its value at the unit's edge, the motor's disc "
-        "pressing evenly, by the layered solver with moduli from quasi-static compression. "
-        "The range takes loss factors (half to one and a half times), "
-        "moduli (up to what the frequency may bring) and thicknesses each by itself."
+        f"pressing evenly, by the layered solver with {moduli}. The range takes loss factors (half to one and a half "
+        "times where they are assumed), moduli (up to what the frequency may bring) and thicknesses each by itself."
     )
     yield ""
     yield "| mm from the edge | expected | low | high | the forearm template |"
@@ -349,5 +367,5 @@ def _expectations(phantom: PhantomSet) -> Iterator[str]:
     yield (
         f"A wall sends back {e.echo_pct:.2g} % at {e.distances_mm[-1]:g} mm at most: {phantom.inside_mm / 2:g} mm "
         f"from the unit's centre, where {e.wall_mm:g} mm would give {table.most_echo_pct:g} % (a mirror's estimate). "
-        f"With half the loss factor it is {e.soft_echo_pct:.2g} %."
+        f"With the least loss factors it is {e.soft_echo_pct:.2g} %."
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta, Struct
+from msgspec.structs import replace
 
 from unitcad.catalogue import entries as kinds
 from unitcad.errors import WrongArgument
@@ -21,7 +22,8 @@ _NAME = "small letters a to z, digits and -, the first a letter or digit"
 class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One layer: a silicone of the table of thinned ones, its thinner in parts to 100 of A and B, and its thickness.
 
-    `loss_factor`: tan delta, assumed where nobody measured it.
+    `loss_factor`: tan delta, assumed where nobody measured it. `measured`: what `unitcad material` wrote of the layer's
+    coupons; its modulus goes before the table's, and so does its loss factor.
     """
 
     name: Annotated[str, Meta(min_length=1, max_length=40, pattern=r"^[a-z][a-z0-9-]*$", description=_LAYER_NAME)]
@@ -29,6 +31,7 @@ class PhantomLayer(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     thinner_pct: Annotated[float, Meta(ge=0, le=100)]
     thickness_mm: Annotated[float, Meta(ge=LEAST_LAYER, le=60)]
     loss_factor: Annotated[float, Meta(ge=0.01, le=1)] = 0.2
+    measured: Annotated[str, Meta(min_length=1, max_length=1000)] | None = None
 
 
 class PhantomTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -65,5 +68,14 @@ def phantoms() -> dict[str, Path]:
 
 
 def load_phantom(source: str | os.PathLike[str]) -> PhantomTable:
-    """Return the phantom of a shipped name or of a file. Raises Refusal or UnitcadError for what is not valid."""
-    return convert(read_toml(named_file(os.fspath(source), phantoms(), "phantom", WrongArgument)), PhantomTable)
+    """Return the phantom of a shipped name or of a file, from whose folder its `measured` files are seen.
+
+    Raises Refusal or UnitcadError for what is not valid.
+    """
+    path = named_file(os.fspath(source), phantoms(), "phantom", WrongArgument)
+    table = convert(read_toml(path), PhantomTable)
+    layers = (
+        replace(layer, measured=str(path.parent / layer.measured)) if layer.measured else layer
+        for layer in table.layers
+    )
+    return replace(table, layers=tuple(layers))

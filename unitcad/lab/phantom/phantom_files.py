@@ -105,6 +105,8 @@ def casting_data(phantom: PhantomSet) -> dict[str, Any]:
                 "high_kpa": one.high_kpa,
                 "density_g_cm3": one.density_g_cm3,
                 "source": one.source,
+                "loss_factor": list(one.loss),
+                "measured": {"file": one.measured.file, "sha256": one.measured.sha256} if one.measured else None,
             }
             for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True)
         ],

@@ -23,8 +23,6 @@ from unitcad.lab.phantom.recipe import Recipe
 ACRYLIC = {"density_kg_m3": 1190.0, "youngs_modulus_kpa": 3e6, "poisson_ratio": 0.37, "loss_factor": 0.05}
 """Cast acrylic at room temperature (secondary: data sheets)."""
 POISSON = 0.4999
-LOSS_RANGE = (0.5, 1.5)
-"""Range of an assumed loss factor, as factors: 0.1 to 0.3 where it is 0.2."""
 THINNER_MM = 0.1
 FARTHEST_MM = 125.0
 """Walls farther from the unit are not looked at: no shipped printer makes such a box."""
@@ -37,7 +35,7 @@ class Expected:
 
     `low`, `high`: each kind of input by itself at both ends. `sensitivity`: relative change at the farthest point for a
     layer thinner by `THINNER_MM`. `wall_mm`: least distance of a wall from the unit's centre for the asked echo;
-    `echo_pct`: at the wall as it is, `soft_echo_pct`: there with half the loss factor. `forearm`: the body template's
+    `echo_pct`: at the wall as it is, `soft_echo_pct`: there with the least loss factors. `forearm`: the body template's
     curve, `factor` the mean factor between the two.
     """
 
@@ -59,7 +57,7 @@ def medium(phantom: PhantomTable, recipes: Sequence[Recipe], **changed: Sequence
     rows = zip(
         changed.get("thickness", [layer.thickness_mm for layer in phantom.layers]),
         changed.get("modulus", [one.modulus_kpa for one in recipes]),
-        changed.get("loss", [layer.loss_factor for layer in phantom.layers]),
+        changed.get("loss", [one.loss[0] for one in recipes]),
         recipes,
         strict=True,
     )
@@ -121,7 +119,7 @@ def expected(
     nominal = medium(phantom, recipes)
     u, error = _size(phantom, nominal, r)
     value = u[1:] / u[0]
-    losses = [[factor * layer.loss_factor for layer in phantom.layers] for factor in LOSS_RANGE]
+    losses = [[one.loss[end] for one in recipes] for end in (1, 2)]
     cases = [
         *(curve(medium(phantom, recipes, loss=loss)) for loss in losses),
         curve(medium(phantom, recipes, modulus=[one.low_kpa for one in recipes])),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from unitcad.catalogue import Printer, choose, printers, tissue
 from unitcad.errors import Refusal
@@ -20,13 +20,14 @@ from unitcad.shape.body import Body
 
 SEGMENTS = 96
 _STEP_MM = 5.0
+LONGEST_SOURCE = 500
+"""Characters of a source in a spec."""
 
 
 @dataclass(frozen=True)
 class PhantomSet:
     """A phantom ready to be written.
 
-    The recipes' `high_kpa` has what the motor's frequency may bring over a slow test.
     `volumes_mm3` and `coupon_mm3`: of each layer, skin first, and of its coupons.
     """
 
@@ -47,9 +48,7 @@ def phantom_set(table: PhantomTable) -> PhantomSet:
 
     Raises Refusal for walls that echo too much, for layers that nobody tested, and for pieces beyond the bed.
     """
-    slow = tuple(recipe(one.silicone, one.thinner_pct, f"layers.{i}") for i, one in enumerate(table.layers))
-    factor = stiffening(table.frequency_hz)
-    recipes = tuple(replace(one, high_kpa=factor * one.high_kpa) for one in slow)
+    recipes = tuple(recipe(one, table.frequency_hz, f"layers.{i}") for i, one in enumerate(table.layers))
     if len({layer.name for layer in table.layers}) < len(table.layers):
         raise Refusal("layers", ", ".join(layer.name for layer in table.layers), "each layer needs a name of its own")
     expect_apart(table.points_mm)
@@ -72,21 +71,24 @@ def tissue_table(phantom: PhantomSet) -> dict[str, dict[str, object]]:
     found: dict[str, dict[str, object]] = {}
     for layer, one in zip(phantom.table.layers, phantom.recipes, strict=True):
         modulus = {"value": _four(one.modulus_kpa), "low": _four(one.low_kpa), "high": _four(one.high_kpa)}
-        loss = layer.loss_factor
+        loss, low, high = one.loss
+        hertz = phantom.table.frequency_hz
+        also = f"; high: also times {stiffening(hertz):.3g}, what {hertz:g} Hz may bring (assumed)"
+        source = f"{one.silicone.name} + {one.thinner_pct:g} % thinner, {one.source}"
+        ended = "" if one.measured and one.measured.dynamic else also
         found[layer.name] = {
-            "status": "secondary",
-            "source": f"{one.silicone.name} + {one.thinner_pct:g} % thinner, {one.source}; high: also times "
-            f"{stiffening(phantom.table.frequency_hz):.3g}, what {phantom.table.frequency_hz:g} Hz may bring (assumed)",
+            "status": "measured" if one.measured else "secondary",
+            "source": source[: LONGEST_SOURCE - len(ended)] + ended,
             "thickness_mm": layer.thickness_mm,
             "density_kg_m3": _four(1e3 * one.density_g_cm3),
             "youngs_modulus_kpa": modulus,
             "poisson_ratio": {"value": POISSON, "status": "assumed", "source": "silicone hardly changes its volume"},
             "loss_factor": {
-                "value": loss,
-                "low": _four(loss * 0.5),
-                "high": _four(loss * 1.5),
-                "status": "assumed",
-                "source": "tan delta of soft silicones at 100 to 150 Hz",
+                "value": _four(loss),
+                "low": _four(low),
+                "high": _four(high),
+                "status": "measured" if one.loss_source else "assumed",
+                "source": one.loss_source[:LONGEST_SOURCE] or "tan delta of soft silicones at 100 to 150 Hz",
             },
         }
     found["plate"] = {"status": "secondary", "source": "cast acrylic, data sheets", **ACRYLIC}

@@ -7,20 +7,29 @@ import tomllib
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
 from unitcad.catalogue import Material, materials
 from unitcad.errors import Refusal, unknown_name
+from unitcad.lab.phantom.description import PhantomLayer
+from unitcad.lab.phantom.measured_layer import MeasuredLayer, measured_layer
 
 THINNER_DENSITY = 0.97
 """g/cm3 (assumed: a silicone oil)."""
+LOSS_RANGE = (0.5, 1.5)
+"""Range of an assumed loss factor, as factors: 0.1 to 0.3 where it is 0.2."""
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """A silicone with thinner: Young's modulus kPa with its range (two standard deviations), density g/cm3."""
+    """A silicone with thinner: Young's modulus kPa, tan delta and their ranges, density g/cm3.
+
+    `high_kpa` has what the phantom's frequency may bring over a slow test. `measured`: the file of the layer's own
+    coupons, else the modulus is the table's, with two standard deviations.
+    """
 
     silicone: Material
     thinner_pct: float
@@ -29,10 +38,41 @@ class Recipe:
     high_kpa: float
     density_g_cm3: float
     source: str
+    loss: tuple[float, float, float]
+    loss_source: str = ""
+    measured: MeasuredLayer | None = None
 
 
-def recipe(silicone: str, thinner_pct: float, field: str) -> Recipe:
-    """Return the recipe of a silicone with parts of thinner to 100 parts of A and B; `field` is for refusals.
+def recipe(layer: PhantomLayer, frequency_hz: float, field: str) -> Recipe:
+    """Return a layer's recipe for a phantom that moves at a frequency; `field` is for refusals.
+
+    A layer without measured modulus needs a tested silicone and share of thinner. Raises Refusal.
+    """
+    assumed = layer.loss_factor, LOSS_RANGE[0] * layer.loss_factor, LOSS_RANGE[1] * layer.loss_factor
+    factor = stiffening(frequency_hz)
+    if layer.measured is None:
+        value, low, high = modulus_by_table(layer.silicone, layer.thinner_pct, field)
+        material = materials()[layer.silicone]
+        density = _density(material, layer.thinner_pct)
+        return Recipe(material, layer.thinner_pct, value, low, factor * high, density, _source(), assumed)
+    known = materials()
+    if layer.silicone not in known:
+        raise unknown_name(f"{field}.silicone", layer.silicone, known)
+    found = measured_layer(Path(layer.measured), layer.silicone, frequency_hz, f"{field}.measured")
+    material, high = known[layer.silicone], found.high_kpa * (1.0 if found.dynamic else factor)
+    return Recipe(
+        material, layer.thinner_pct, found.modulus_kpa, found.low_kpa, high, _density(material, layer.thinner_pct),
+        found.source, found.loss or assumed, found.loss_source, found,
+    )  # fmt: skip
+
+
+def _density(material: Material, thinner_pct: float) -> float:
+    volume = 100.0 / float(material.density_g_cm3) + thinner_pct / THINNER_DENSITY
+    return (100.0 + thinner_pct) / volume
+
+
+def modulus_by_table(silicone: str, thinner_pct: float, field: str) -> tuple[float, float, float]:
+    """Return the modulus, kPa, of a silicone with parts of thinner to 100 of A and B, with two standard deviations.
 
     Between two tested shares the logarithm of the modulus is interpolated. Raises Refusal for a silicone that was not
     tested, and for a share outside the tested ones.
@@ -48,10 +88,7 @@ def recipe(silicone: str, thinner_pct: float, field: str) -> Recipe:
         raise Refusal(f"{field}.thinner_pct", thinner_pct, limit, float(np.clip(thinner_pct, shares[0], shares[-1])))
     modulus = math.exp(float(np.interp(thinner_pct, shares, np.log(moduli))))
     spread = 2.0 * float(np.interp(thinner_pct, shares, deviations / moduli))
-    material = materials()[silicone]
-    volume = 100.0 / float(material.density_g_cm3) + thinner_pct / THINNER_DENSITY
-    density = (100.0 + thinner_pct) / volume
-    return Recipe(material, thinner_pct, modulus, modulus * (1 - spread), modulus * (1 + spread), density, _source())
+    return modulus, modulus * (1 - spread), modulus * (1 + spread)
 
 
 def stiffening(frequency_hz: float) -> float:
