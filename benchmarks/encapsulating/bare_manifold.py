@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,11 @@ def base(n: dict) -> Manifold:
     return Manifold.batch_boolean([body, *tools], OpType.Subtract)
 
 
+def recess(n: dict) -> Manifold:
+    ribs = [Manifold.hull_points(np.array(below + above)) for rib in n["ribs"] for below, above in pairwise(rib)]
+    return Manifold.batch_boolean([plinth(n, n["recess"], n["skirt_end"]), *ribs], OpType.Subtract)
+
+
 def cup(n: dict, i: int) -> Manifold:
     rim, radius = n["heights"][i], n["radii"][i]
     inner, depth = radius + n["land"], min(n["groove"][1], rim / 2)
@@ -108,7 +114,7 @@ def cup(n: dict, i: int) -> Manifold:
     if rim - depth - high < n["least_wall"]:
         groove -= box(0, outer + 1, -half - n["least_wall"], half + n["least_wall"], 0, rim + 2)
     tools = [
-        plinth(n, n["recess"], n["skirt_end"]),
+        recess(n),
         cylinder(radius, -1, rim + 1),
         groove,
         box(0, n["cup"] + 1, -half, half, low, high),

@@ -16,10 +16,12 @@ from unitcad.moulds.blade import BLADE_EDGE, BLADE_THICKNESS
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.filament import FLARE, STUB_TAIL
 from unitcad.moulds.layout import CORNER_RADIUS, MARK, PLINTH_DRAFT_DEG, TEXT_MARGIN
+from unitcad.moulds.ribs import ROOT, ribs
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH
 from unitcad.pipeline import Variant
 from unitcad.shape import mm
 from unitcad.shape.lettering import HEIGHT, outlines, text_width
+from unitcad.spec import printer_of
 
 
 def lengths() -> dict:
@@ -49,6 +51,7 @@ def lengths() -> dict:
         "corner": CORNER_RADIUS,
         "mark": MARK,
         "recess": moulds.plinth_clearance_mm / math.cos(math.radians(PLINTH_DRAFT_DEG)),
+        "ribs": _ribs(spec, lay),
         "skirt_end": -moulds.plinth_height_mm + moulds.seat_relief_mm,
         "cup": lay.cup[0],
         "plate": lay.plate[0],
@@ -79,6 +82,25 @@ def lengths() -> dict:
             for i in (1, 2)
         ],
     }
+
+
+def _ribs(spec: Any, lay: Any) -> list[list[list[list[float]]]]:
+    """The corners (x, y, z) of the four sections of each rib, from the skirt's end upwards."""
+    moulds, draft = spec.moulds, math.radians(PLINTH_DRAFT_DEG)
+    line = float(printer_of(spec).least_feature_mm)
+    into, wall = moulds.rib_interference_mm / math.cos(draft), moulds.plinth_clearance_mm / math.cos(draft)
+    foot = line / 2 + into + wall + ROOT
+    drawn = []
+    for rib in ribs(spec, lay):
+        (nx, ny), sections = rib.inwards, []
+        for z, tip in ((rib.foot, -wall - ROOT / 2), (rib.bottom, into), (rib.top, into), (rib.head, -wall - ROOT / 2)):
+            face = z * math.tan(draft)
+            corners = ((tip, -line / 2), (tip, line / 2), (-wall - ROOT, foot), (-wall - ROOT, -foot))
+            sections.append(
+                [[rib.x + nx * (d + face) - ny * t, rib.y + ny * (d + face) + nx * t, z] for d, t in corners]
+            )
+        drawn.append(sections)
+    return drawn
 
 
 def on_grid(value: Any) -> Any:

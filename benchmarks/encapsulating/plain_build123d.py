@@ -130,9 +130,15 @@ def base(n: dict) -> Any:
     return body
 
 
+def recess(n: dict) -> Any:
+    """The plinth's room less its ribs, each lofted through its four sections."""
+    ribs = [loft([Face(Wire.make_polygon(ring)) for ring in rib], ruled=True) for rib in n["ribs"]]
+    return plinth(n, n["recess"], n["skirt_end"]) - ribs
+
+
 def cup(n: dict, i: int) -> Any:
     rim, radius = n["heights"][i], n["radii"][i]
-    body = block(n["cup"], n["corner"], n["mark"], n["skirt_end"], rim) - plinth(n, n["recess"], n["skirt_end"])
+    body = block(n["cup"], n["corner"], n["mark"], n["skirt_end"], rim) - recess(n)
     body -= cylinder(radius, -1, rim + 1)
     inner, depth = radius + n["land"], min(n["groove"][1], rim / 2)
     outer = inner + n["groove"][0]

@@ -98,11 +98,18 @@ def base(n: dict) -> cq.Workplane:
     return body
 
 
+def recess(n: dict) -> cq.Workplane:
+    """The plinth's room less its ribs, each lofted through its four sections."""
+    sections = [[cq.Wire.makePolygon([cq.Vector(*c) for c in ring], close=True) for ring in rib] for rib in n["ribs"]]
+    ribs = cq.Compound.makeCompound([cq.Solid.makeLoft(rings, True) for rings in sections])
+    return plinth(n, n["recess"], n["skirt_end"]).cut(cq.Workplane(ribs))
+
+
 def cup(n: dict, i: int) -> cq.Workplane:
     rim, radius, side = n["heights"][i], n["radii"][i], 2 * n["cup"]
     body = cq.Workplane().workplane(offset=n["skirt_end"]).rect(side, side).extrude(rim - n["skirt_end"])
     body = marked(n, body)
-    body = body.cut(plinth(n, n["recess"], n["skirt_end"])).cut(cylinder(radius, -1, rim + 1))
+    body = body.cut(recess(n)).cut(cylinder(radius, -1, rim + 1))
     inner, depth = radius + n["land"], min(n["groove"][1], rim / 2)
     outer = inner + n["groove"][0]
     groove = cylinder(outer, rim - depth, rim + 1).cut(cylinder(inner, rim - depth, rim + 1))
