@@ -56,6 +56,16 @@ def test_the_level_is_by_the_fit_s_constants_with_a_students_t_range(fit_file: P
         assert [block["predictive"]["p10"], block["predictive"]["p90"]] == pytest.approx(ends, rel=1e-7)
         made = predictive(fit_of(spec), model, estimate_input(spec))  # type: ignore[arg-type]
         assert made == pytest.approx((one["degrees_of_freedom"], centre, scale), rel=1e-7)
+        error = block["fit_error"]
+        assert error["left_out"]["geometric_mean"] == one["left_out"]
+        assert error["left_out"]["low"] < one["left_out"] < error["left_out"]["high"]
+        assert (error["own_left_out"], error["own_by_stored"]) == (one["own_left_out"], one["own_by_stored"])
+        assert error["held_80"] == one["held"]
+        assert error["null"] == fit["null"]["left_out"]
+        assert block["table_error"] == before["table_error"]  # of the stored constants, and said to be
+        assert "fit_error" not in before
+    assert data["table_error"]["constants"].startswith("the stored ones")
+    assert "constants" not in plain["table_error"]
     assert data["fit"]["name"] == "synthetic-bench"
     assert data["fit"]["left_out"]["null"]["geometric_mean"] == pytest.approx(1.51, abs=0.01)
     assert [own["value"] for own in data["own_measured"]] == [0.098]
@@ -105,8 +115,13 @@ def test_builds_follow_the_fit(fit_file: Path, text: str, tmp_path: Path) -> Non
 def test_the_terminal_shows_fit_range_and_own_measurement(fit_file: Path) -> None:
     done = CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file), "--details"])
     assert done.exit_code == 0
-    for words in ("P10 to P90", "measured here", "synthetic-bench", "null x 1.51"):
+    for words in ("P10 to P90", "measured here", "synthetic-bench", "null x 1.51", "error by the lab's fit"):
         assert words in done.output
+    own = fit_of(load("embedded", {"estimate.fit": str(fit_file)}))
+    assert own is not None
+    by_fit = done.output.split("error by the lab's fit")[1]
+    for name in ("bush", "fitted", "paper", "consistent"):
+        assert f"x {own.model[name].left_out:.2f}" in by_fit
     assert "9.8 %" in done.output.splitlines()[1]
     assert "8 of 10 such units" in done.output.splitlines()[1]
     shown = json.loads(CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file), "--json"]).output)

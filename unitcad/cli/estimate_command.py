@@ -76,7 +76,7 @@ def estimate(
     for one in estimates:
         print_estimate(one, details)
     if details:
-        print_errors(estimates[0]["table_error"])
+        print_errors(estimates[0]["table_error"], estimates[0]["models"])
     else:
         typer.echo("--details prints every model, the skin's curve, the inputs that count, errors and assumptions")
 

@@ -59,10 +59,12 @@ def _print_details(screen: Console, data: dict[str, Any]) -> None:
             screen.print(f"  {line}", soft_wrap=True)
 
 
-def print_errors(errors: dict[str, Any]) -> None:
-    """Print what is the same for every spec: the models' errors against the measured table."""
+def print_errors(errors: dict[str, Any], models: dict[str, Any]) -> None:
+    """Print the models' errors against the measured table, and by a lab's fit where the models' blocks have one."""
     screen = console()
     screen.print(_errors(errors))
+    if fitted := {name: block["fit_error"] for name, block in models.items() if "fit_error" in block}:
+        screen.print(_fit_errors(fitted))
     screen.print(_choice(errors["chosen_without"]), soft_wrap=True)
 
 
@@ -191,6 +193,19 @@ def _errors(errors: dict[str, Any]) -> Table:
             f"x {error['ratios']['geometric_mean']:.2f}",
             f"{error['directions']['right']} of {error['directions']['of']}",
         )
+    return table
+
+
+def _fit_errors(fitted: dict[str, Any]) -> Table:
+    """Tabulate each model's error by the lab's fit, the best one first, and the null's."""
+    names = ("model", "unit left out", "own units", "own, stored constants", "in 80 %")
+    table = Table(*names, title="error by the lab's fit; the table above is by the stored constants")
+    for name, error in sorted(fitted.items(), key=lambda pair: pair[1]["left_out"]["geometric_mean"]):
+        one = error["left_out"]
+        middle = f"x {one['geometric_mean']:.2f} ({one['low']:.2f} to {one['high']:.2f})"
+        own = ["-" if error[key] is None else f"x {error[key]:.2f}" for key in ("own_left_out", "own_by_stored")]
+        table.add_row(name, middle, *own, error["held_80"] or "-")
+    table.add_row("null", f"x {next(iter(fitted.values()))['null']:.2f}", "-", "-", "-")
     return table
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from unitcad.attenuation.curve import decay_at, layered_block
 from unitcad.attenuation.edge.answer import answer
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments, choice, forms, in_order, pairwise
-from unitcad.attenuation.edge.lab_fit import LabFit, own_block
+from unitcad.attenuation.edge.lab_fit import LabFit, error_block, own_block
 from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown
 from unitcad.attenuation.edge.predictive import STACKED, predictive_of
 from unitcad.attenuation.edge.scores import RANGE_PERCENT, Assessment
@@ -67,6 +67,8 @@ def estimate(
     for model in sorted(models, key=errors["order"].index):
         block = model_block(variant, model, fit)
         block["table_error"] = errors[model]
+        if fit:
+            block["fit_error"] = error_block(fit, model)
         if noted := not_of_this_drive(variant, [model]):
             block["not_of_this_drive"] = noted[0]
         blocks[model] = block
@@ -85,6 +87,7 @@ def estimate(
         ],
     }
     if fit:
+        data["table_error"] = errors | {"constants": "the stored ones, not this fit's; fit_error has the fit's own"}
         data |= {"fit": fit_block(fit, models), "own_measured": own_block(fit, variant)}
     # Where no model is singled out `crossings`, which gives no estimate of its own, is stacked too.
     names = STACKED if fit is None and set(models) == set(MODELS) else models

@@ -155,6 +155,21 @@ def predictive_block(fit: LabFit, model: str, variant: EstimateInput) -> dict[st
     }
 
 
+def error_block(fit: LabFit, model: str) -> dict[str, Any]:
+    """Return a model's error by a fit, as factors: each unit left out, then of the lab's own units alone.
+
+    `own_by_stored`: the own units' by the stored constants, without the fit. `null`: of the two levels, left out too.
+    """
+    one = fit.model[model]
+    return {
+        "left_out": {"geometric_mean": one.left_out, "low": one.left_out_low, "high": one.left_out_high},
+        "own_left_out": one.own_left_out,
+        "own_by_stored": one.own_by_stored,
+        "held_80": one.held,
+        "null": fit.null.left_out,
+    }
+
+
 def unit_key(variant: EstimateInput) -> str:
     """Return what tells one unit from another: a hash of design, silicones and lengths; not of body or frequency."""
     geometry = variant.geometry

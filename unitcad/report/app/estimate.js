@@ -88,9 +88,23 @@
   // What a lab's own fit expects of a new unit: 80 % ranges, and which fit it is.
   function predicted(data, fit) {
     const rows = Object.entries(data.models || {}).filter(([, block]) => block.predictive).map(([model, block]) => ({ name: nameOf(model), entry: percents({ value: block.edge_level.value, low: block.predictive.p10, high: block.predictive.p90 }), colour: COLOURS[model] || "series-4" }));
-    const scores = Object.entries(fit.left_out).map(([model, one]) => `${nameOf(model)} ${number(one.geometric_mean)}`).join(", ");
     return [rangeChart(rows, ownMarks(data), `Where a new unit is expected in the lab ${fit.name}, % of the motor's amplitude: 8 of 10 units.`),
-      el("p", { className: "note" }, `Constants: ${fit.file}, SHA-256 ${fit.sha256.slice(0, 12)}, ${fit.own_units} units of the lab's own. Factor with a unit left out: ${scores}.`)];
+      el("p", { className: "note" }, `Constants: ${fit.file}, SHA-256 ${fit.sha256.slice(0, 12)}, ${fit.own_units} units of the lab's own.`),
+      fitErrors(data)];
+  }
+
+  // How far a lab's fit is off, each unit left out; the table of errors beside it is by the stored constants.
+  function fitErrors(data) {
+    const rows = Object.entries(data.models || {}).filter(([, block]) => block.fit_error).map(([model, block]) => [model, block.fit_error]);
+    if (!rows.length) return null;
+    rows.sort(([, a], [, b]) => a.left_out.geometric_mean - b.left_out.geometric_mean);
+    const one = (value) => (known(value) ? number(value, 3) : "–");
+    const factor = (value) => (known(value) ? Number(value.toPrecision(3)) : "–");
+    const cells = rows.map(([model, error]) => [nameOf(model), factor(error.left_out.geometric_mean), `${one(error.left_out.low)} to ${one(error.left_out.high)}`, factor(error.own_left_out), factor(error.own_by_stored), error.held_80 || "–"]);
+    const title = `Error by the fit of ${data.fit.name}`;
+    return [el("h3", {}, title),
+      table(["Model", "Left out", "5 to 95 %", "Own units", "Own, stored constants", "In 80 %"], [...cells, ["Null", factor(rows[0][1].null), "–", "–", "–", "–"]], { label: title }),
+      el("p", { className: "note" }, "Factors; 1 is exact. Each unit is predicted by constants fitted without it. The error against the measured table, below, is by the stored constants.")];
   }
 
   // Finite elements: a range for each drive and reading, from draws of what is not known; the dot is the median.
