@@ -19,7 +19,7 @@ PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
     {"cli"},
     {"api", "accuracy"},
-    {"batch"},
+    {"batch", "inverse"},
     {"report"},
     {"pipeline"},
     {"lab"},

@@ -109,7 +109,7 @@ def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInp
         diameter=spec.diameter_mm * 1e-3,
         geometry=_geometry(spec, _motor_mass(spec, motor)),
         layers=tuple(
-            _silicone(
+            silicone_layer(
                 choose(f"layers.{i}.material", layer.material, silicones),
                 layer.wall_mm * 1e-3,
                 frequency,
@@ -154,7 +154,8 @@ def _quantity(value: Value, factor: float = 1.0) -> Quantity:
     return Quantity(float(value) * factor, low, high)
 
 
-def _silicone(material: Material, wall: float, frequency: Quantity, slow: bool) -> SiliconeLayer:
+def silicone_layer(material: Material, wall: float, frequency: Quantity, slow: bool) -> SiliconeLayer:
+    """Return a layer of a silicone, its wall in m, at a frequency in Hz; `slow`: by its quasi-static modulus."""
     return SiliconeLayer(
         material=material.name,
         thickness=wall,

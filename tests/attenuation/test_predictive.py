@@ -11,6 +11,7 @@ from scipy import integrate, optimize, stats
 from unitcad.attenuation.edge import predictive
 from unitcad.attenuation.edge.closed_form import divider, transmission_only
 from unitcad.attenuation.edge.lab_fit import LabFit, ModelFit
+from unitcad.attenuation.edge.lab_fit import predictive as of_one_model
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.edge.predictive import Predictive, lab_weights, left_out_residuals, predictive_of, stack
 from unitcad.errors import Refusal
@@ -151,6 +152,9 @@ def test_a_labs_fit_gives_its_own_distribution() -> None:
     expected = np.array([np.log(f) ** -13.0 for f in (1.3, 1.35, 1.9, 1.9)])
     assert list(weights.values()) == pytest.approx(expected / expected.sum(), abs=2e-3)
     found = predictive_of([_unit(*PAIRS[0])], fit=fit)
+    for k, model in enumerate(found.models):
+        alone = of_one_model(fit, model, _unit(*PAIRS[0]))
+        assert (found.degrees_of_freedom[k], found.centre[0, k], found.scale[0, k]) == pytest.approx(alone)
     assert found.models == ("bush", "fitted")
     assert found.degrees_of_freedom.tolist() == [12, 11]
     assert found.scale[0][0] == pytest.approx(0.3 * np.sqrt(1.1))

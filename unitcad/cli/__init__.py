@@ -19,6 +19,7 @@ from unitcad.cli.build_command import build
 from unitcad.cli.cache_command import cache
 from unitcad.cli.check_command import check
 from unitcad.cli.coupon_command import coupon
+from unitcad.cli.design_command import design
 from unitcad.cli.estimate_command import estimate
 from unitcad.cli.experiments_command import experiments
 from unitcad.cli.fit_command import fit
@@ -57,6 +58,7 @@ def _version(wanted: bool) -> None:
 app.command("build")(build)
 app.command("batch")(batch)
 app.command("check")(check)
+app.command("design")(design)
 app.command("estimate")(estimate)
 app.command("experiments")(experiments)
 app.command("accuracy")(accuracy)

@@ -10,20 +10,27 @@ import typer
 
 from unitcad.cli.shared_options import AsJson
 
+TARGET_SCHEMA = "unitcad-target.schema.json"
+"""The file that a new target's first line names for editors."""
+
 
 def init(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Of the variant and of the file, NAME.toml.")],
     template: Annotated[
         str | None, typer.Option(help="What to start from: see `unitcad list templates`; else the default design's.")
     ] = None,
+    target: Annotated[
+        str | None,
+        typer.Option(help="Write a target of `unitcad design` in its place, from one of `unitcad list targets`."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Write a commented spec to start from. The last line printed is the file.
+    """Write a commented spec, or target, to start from. The last line printed is the file.
 
     Its first line names the schema that an editor checks it with; `unitcad schema -o FILE` writes that.
     """
     from unitcad.cli.output import print_json
-    from unitcad.errors import Refusal, UnitcadError
+    from unitcad.errors import Refusal, UnitcadError, unknown_name
     from unitcad.files import names_device, write_new
     from unitcad.validation.starter import SCHEMA, starter
 
@@ -34,7 +41,16 @@ def init(
     if names_device(stem):
         raise Refusal("NAME", name, "is the name of a device on Windows", f"my-{stem}")
     path = Path(f"{stem}.toml")
-    text = starter(stem, template)
+    if target is None:
+        text = starter(stem, template)
+    else:
+        from unitcad.inverse.target_file import shipped
+
+        if template is not None:
+            raise Refusal("--target", target, "is for a target file, --template for a spec: leave one out")
+        if target not in shipped():
+            raise unknown_name("--target", target, shipped())
+        text = f"#:schema {TARGET_SCHEMA}\n{shipped()[target].read_text('utf-8')}"
     try:
         write_new(path, text.encode())
     except FileExistsError:
@@ -42,9 +58,10 @@ def init(
     except OSError as error:
         raise UnitcadError(f"{path}: {(error.strerror or 'unwritable').lower()}") from None
     if as_json:
-        print_json({"spec": str(path)})
+        print_json({"spec" if target is None else "target": str(path)})
     else:
-        typer.echo(f"build it with: unitcad build {path}")
-        if not Path(SCHEMA).exists():
-            typer.echo(f"an editor checks it as you type after: unitcad schema -o {SCHEMA}")
+        schema, kind = (SCHEMA, "") if target is None else (TARGET_SCHEMA, "target ")
+        typer.echo(f"build it with: unitcad build {path}" if target is None else f"then: unitcad design {path}")
+        if not Path(schema).exists():
+            typer.echo(f"an editor checks it as you type after: unitcad schema {kind}-o {schema}")
         typer.echo(str(path))

@@ -8,7 +8,9 @@ import typer
 
 from unitcad.cli.shared_options import AsJson
 
-KINDS = ("templates", "designs", "materials", "motors", "printers", "experiments", "phantoms", "sweeps", "rules")
+KINDS = (
+    "templates", "designs", "materials", "motors", "printers", "experiments", "phantoms", "sweeps", "targets", "rules",
+)  # fmt: skip
 
 
 def list_(
@@ -64,6 +66,10 @@ def _entries(kind: str) -> dict[str, Any]:
         from unitcad.batch.sweep import shipped as sweeps
 
         return {name: _first_comment(path.read_text("utf-8")) for name, path in sweeps().items()}
+    if kind == "targets":
+        from unitcad.inverse.target_file import shipped as targets
+
+        return {name: _first_comment(path.read_text("utf-8")) for name, path in targets().items()}
     if kind == "rules":
         from unitcad.check.rules.registry import rules
 

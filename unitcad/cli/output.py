@@ -47,7 +47,7 @@ def say_error(error: UnitcadError, as_json: bool) -> None:
         print_json({"error": error.as_dict()})
 
 
-_ARGUMENTS = {"spec": "SPEC", "sweep": "SWEEP", "phantom": "PHANTOM"}
+_ARGUMENTS = {"spec": "SPEC", "sweep": "SWEEP", "phantom": "PHANTOM", "target": "TARGET"}
 """What the help calls parameters that are no options."""
 
 

@@ -7,17 +7,17 @@ from typing import Annotated
 
 import typer
 
-KINDS = ("spec", "sweep", "cast-record")
+KINDS = ("spec", "sweep", "cast-record", "target")
 
 
 def schema(
-    kind: Annotated[str, typer.Argument(help="spec, sweep or cast-record.")] = "spec",
+    kind: Annotated[str, typer.Argument(help="spec, sweep, cast-record or target.")] = "spec",
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="FILE", help="Write it there, for an editor; else print it.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The schema is JSON in any case.")] = False,
 ) -> None:
-    """Print a JSON Schema: of a spec, a sweep or a cast record.
+    """Print a JSON Schema: of a spec, a sweep, a cast record or a target of `unitcad design`.
 
     An editor checks a TOML file against it whose first line is `#:schema FILE`, as `unitcad init` writes it.
     """
@@ -30,11 +30,12 @@ def schema(
     from unitcad.casting.cast_record import CastRecord
     from unitcad.cli.output import print_json
     from unitcad.errors import unknown_name
+    from unitcad.inverse.target_file import TargetFile
     from unitcad.spec.asked import AskedSpec
 
     if kind not in KINDS:
         raise unknown_name("schema", kind, KINDS)
-    model = {"spec": AskedSpec, "sweep": SweepFile, "cast-record": CastRecord}[kind]
+    model = {"spec": AskedSpec, "sweep": SweepFile, "cast-record": CastRecord, "target": TargetFile}[kind]
     document = {"$schema": "https://json-schema.org/draft/2020-12/schema", **msgspec.json.schema(model)}
     document["title"] = f"unitcad {kind.replace('-', ' ')}"
     if out is None:

@@ -16,8 +16,7 @@ import numpy as np
 
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import MODELS, compared, edge_levels
-from unitcad.attenuation.edge.lab_fit import PERCENT, LabFit
-from unitcad.attenuation.edge.lab_fit import predictive as lab_predictive
+from unitcad.attenuation.edge.lab_fit import PERCENT, LabFit, gradient
 from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
 from unitcad.attenuation.edge.scores import all_but_one
 from unitcad.attenuation.edge.shrunk_fit import models as fitted_forms
@@ -47,10 +46,14 @@ class Predictive:
 
     def at_most(self, level: float | np.ndarray) -> np.ndarray:
         """Return the probability that the level (motor = 1) is at most `level`, shape (...)."""
+        return self.each_at_most(level) @ self.weights
+
+    def each_at_most(self, level: float | np.ndarray) -> np.ndarray:
+        """Return the same by each model alone, shape (..., models)."""
         from scipy.special import stdtr
 
         t = (np.log(np.asarray(level, dtype=float))[..., None] - self.centre) / self.scale
-        return stdtr(self.degrees_of_freedom, t) @ self.weights
+        return stdtr(self.degrees_of_freedom, t)
 
     def quantile(self, share: float) -> np.ndarray:
         """Return the level that a share of the distribution lies below, shape (...), to 1e-9 of it."""
@@ -95,12 +98,42 @@ class Stack:
         )
 
 
+@dataclass(frozen=True)
+class LabStack:
+    """A lab's own models with their weights; what it was fitted to gives centre and scale of each unit."""
+
+    fit: LabFit
+    models: tuple[str, ...]
+    weights: np.ndarray
+
+    def predictive(self, units: Units) -> Predictive:
+        """Return the distribution of further units' ln level in the lab."""
+        centres, scales = [], []
+        for model in self.models:
+            one = self.fit.model[model]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                centres.append(np.log(edge_levels(units, model, one.constants)))
+            g = gradient(model, units, one.constants)
+            covariance = np.array(one.covariance)
+            scales.append(one.discrepancy * np.sqrt(1.0 + np.einsum("...i,ij,...j", g, covariance, g)))
+        df = np.array([self.fit.model[model].degrees_of_freedom for model in self.models])
+        return Predictive(self.models, self.weights, df, np.stack(centres, axis=-1), np.stack(scales, axis=-1))
+
+
+def stack_of(models: Sequence[str] | None = None, fit: LabFit | None = None) -> Stack | LabStack:
+    """Return the models of a lab's `fit`, without one those of the paper's nine levels. Raises Refusal as `stack`."""
+    if fit is None:
+        return stack(models or STACKED)
+    weights = {model: w for model, w in lab_weights(fit, models or MODELS).items() if w > 0}
+    return LabStack(fit, tuple(weights), np.array(list(weights.values())))
+
+
 def stack(models: Sequence[str] = STACKED, table: MeasuredTable | None = None) -> Stack:
     """Stack models over a measured table, the paper's nine levels where none is given.
 
     Raises Refusal for a name that is no closed form, for one that is there twice, and for an empty list.
     """
-    _check_models(models, STACKED)
+    check_models(models, STACKED)
     return _stacked_on_paper(tuple(models)) if table is None else _stacked(tuple(models), table)
 
 
@@ -110,7 +143,7 @@ def lab_weights(fit: LabFit, models: Sequence[str] = MODELS) -> dict[str, float]
     n is the number of units behind the fit. That is the weight by the left-out likelihood of errors of that mean size
     (pseudo-BMA in the source above). Raises Refusal for a model that the fit does not have.
     """
-    _check_models(models, fit.model)
+    check_models(models, fit.model)
     logs = []
     for model in models:
         one = fit.model[model]
@@ -128,11 +161,7 @@ def predictive_of(
 
     By a lab's `fit` its own constants and scales; without one by the paper's nine levels. Raises Refusal as `stack`.
     """
-    if fit is None:
-        return stack(models or STACKED).predictive(stacked(variants))
-    weights = {model: w for model, w in lab_weights(fit, models or MODELS).items() if w > 0}
-    found = np.array([[lab_predictive(fit, model, variant) for model in weights] for variant in variants])
-    return Predictive(tuple(weights), np.array(list(weights.values())), found[0, :, 0], found[:, :, 1], found[:, :, 2])
+    return stack_of(models, fit).predictive(stacked(variants))
 
 
 @cache
@@ -193,11 +222,12 @@ def _log_density(t: np.ndarray, df: np.ndarray) -> np.ndarray:
     return norm - (df + 1) / 2 * np.log1p(t**2 / df)
 
 
-def _check_models(models: Sequence[str], known: Sequence[str] | Mapping[str, object]) -> None:
+def check_models(models: Sequence[str], known: Sequence[str] | Mapping[str, object], field: str = "models") -> None:
+    """Raise Refusal for a name that is not known, for one that is there twice, and for an empty list."""
     if not models:
-        raise Refusal("models", [], "at least one model is needed", ", ".join(known))
+        raise Refusal(field, [], "at least one model is needed", next(iter(known)))
     for i, model in enumerate(models):
         if model not in known:
-            raise unknown_name(f"models.{i}", model, known)
+            raise unknown_name(f"{field}.{i}", model, known)
         if model in models[:i]:
-            raise Refusal(f"models.{i}", model, "is there twice")
+            raise Refusal(f"{field}.{i}", model, "is there twice")

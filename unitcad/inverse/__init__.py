@@ -1,0 +1,1 @@
+"""From a wish to designs: everything at hand is tried, judged by its probability, its limits and its moulds."""

@@ -1,0 +1,87 @@
+"""design.html: the wish, the proposals with their sections and reasons, the front, what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from unitcad.inverse import design_words as words
+from unitcad.report.plain_page import drawing, plain_page
+from unitcad.text import number
+
+_HEAD = ("", "unit", "measured", "probability", "10 to 90 % at the edge", "mass, g", "hours", "mm wide", "mm high")
+_NUMBER = ' class="number"'
+
+
+def design_page(data: Mapping[str, Any], fronts: tuple[str, str], sections: Sequence[str]) -> str:
+    """Return the page of a result; `fronts`: the plot (SVG), wide and narrow; `sections`: of each proposal."""
+    body = [
+        '<div class="top"><div>',
+        f"<h1>{escape(data['name'])}</h1>",
+        f'<p class="line">{escape(words.wish_line(data["wish"]))}</p>',
+        "</div></div>",
+        "<section><h2>Proposals</h2>",
+        _table(data["proposals"]),
+        f'<p class="note">{escape(words.models_line(data))}. The probability is that of meeting the level; '
+        "it counts what the models missed on measured units, not that a unit has never been made.</p>",
+        *([f"<p>{escape(data['decides'])}</p>"] if data["decides"] else []),
+        "</section>",
+        *(_proposal(one, section) for one, section in zip(data["proposals"], sections, strict=True)),
+        "<section><h2>What pulls apart</h2>",
+        drawing(fronts[0], "probability of the level over what pulls apart from it, with the front", fronts[1]),
+        "</section>",
+        "<section><h2>What was tried</h2>",
+        f"<p>{escape(words.tried_line(data))}. All of them stand in ranking.csv.</p>",
+        _list([*words.left_out_lines(data), *words.not_castable_lines(data), *_refused(data)]),
+        "</section>",
+    ]
+    return plain_page(f"{data['name']}: designs", "\n".join(body))
+
+
+def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
+    head = "".join(f"<th{_NUMBER if i > 1 else ''}>{escape(text)}</th>" for i, text in enumerate(_HEAD))
+    rows = []
+    for one in proposals:
+        edge, measured = one["edge"], one["measured"]
+        cells = [
+            words.percent(measured["level"]) if measured else "",
+            words.share(one["probability"]),
+            f"{words.percent(edge['p10'])} to {words.percent(edge['p90'])}",
+            number(one["mass_g"], 2),
+            number(one["cure_hours"], 3),
+            number(one["diameter_mm"], 3),
+            number(one["height_mm"], 3),
+        ]
+        link = f'<a href="#proposal-{one["rank"]}">{escape(one["label"])}</a>'
+        numbers = "".join(f"<td{_NUMBER}>{escape(cell)}</td>" for cell in cells)
+        rows.append(f"<tr><td>{one['rank']}</td><td>{link}</td>{numbers}</tr>")
+    return (
+        f'<div class="scroll" tabindex="0" role="region" aria-label="proposals"><table><thead><tr>{head}</tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table></div>"
+    )
+
+
+def _proposal(one: Mapping[str, Any], section: str) -> str:
+    return "\n".join(
+        [
+            f'<section id="proposal-{one["rank"]}"><h2>{one["rank"]}. {escape(one["label"])}</h2>',
+            f"<p><strong>{escape(words.level_line(one))}</strong></p>",
+            f"<p>{escape(words.size_line(one))}</p>",
+            _list(words.reasons(one)),
+            drawing(section, f"section of {one['label']}"),
+            f"<p>Build it: <code>unitcad build {escape(one['file'])}</code></p>",
+            "</section>",
+        ]
+    )
+
+
+def _refused(data: Mapping[str, Any]) -> list[str]:
+    return [
+        f"{one['what']}: {one['count']} sets of lengths refused, first {one['first']}"
+        for one in data["tried"]["refused"]
+    ]
+
+
+def _list(lines: Sequence[str]) -> str:
+    return f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>" if lines else ""

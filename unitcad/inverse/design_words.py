@@ -1,0 +1,125 @@
+"""A result in words, for the terminal, design.md and the page alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from unitcad.text import listed, number
+
+_APART = 0.1
+"""Models whose probabilities differ by more are named one by one."""
+_WISHES = {
+    "diameter_max_mm": "diameter at most {} mm",
+    "height_max_mm": "height at most {} mm",
+    "mass_max_g": "mass at most {} g",
+    "cure_hours_max": "cured within {} h",
+    "crosstalk_ratio_max": "crosstalk ratio at most {}",
+    "pitch_mm": "neighbours {} mm apart",
+    "frequency_hz": "at {} Hz",
+}
+
+
+def percent(level: float) -> str:
+    """Return a level as per cent of the motor's amplitude, two digits."""
+    return f"{number(100 * level, 2)} %"
+
+
+def share(probability: float) -> str:
+    """Return a probability with two decimals."""
+    return f"{probability:.2f}"
+
+
+def wish_line(wish: Mapping[str, Any]) -> str:
+    """Return what is wished for."""
+    parts = []
+    if "edge_max" in wish and "edge_min" in wish:
+        parts.append(f"between {percent(wish['edge_min'])} and {percent(wish['edge_max'])} at the edge")
+    elif "edge_max" in wish:
+        parts.append(f"at most {percent(wish['edge_max'])} at the edge")
+    else:
+        parts.append(f"at least {percent(wish['edge_min'])} at the edge")
+    return ", ".join([*parts, *(text.format(number(wish[key], 4)) for key, text in _WISHES.items() if key in wish)])
+
+
+def tried_line(data: Mapping[str, Any]) -> str:
+    """Return how much was tried."""
+    tried = data["tried"]
+    refused = sum(one["count"] for one in tried["refused"])
+    not_made = f"; {refused} sets of lengths that no design accepts" if refused else ""
+    return (
+        f"{tried['candidates']} candidates ({tried['geometries']} sets of lengths), {tried['within_limits']} within "
+        f"the limits{not_made}"
+    )
+
+
+def models_line(data: Mapping[str, Any]) -> str:
+    """Return which models count, and how much."""
+    models = data["models"]
+    weights = listed(f"{name} {share(weight)}" for name, weight in models["weights"].items())
+    none = f"; no weight: {listed(models['without_weight'])}" if models["without_weight"] else ""
+    return f"models by their left-out score, {models['by']}: {weights}{none}"
+
+
+def left_out_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return a line for each silicone that is left out."""
+    return [f"left out, {name}: {why}" for name, why in data["left_out"].items()]
+
+
+def not_castable_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return a line for each candidate that fell out by its moulds."""
+    return [f"can't be cast, {one['candidate']}: {'; '.join(one['failed'])}" for one in data["not_castable"]]
+
+
+def level_line(one: Mapping[str, Any]) -> str:
+    """Return a proposal's measurement, if there is one, then its probability and range."""
+    measured = one["measured"]
+    first = f"measured {percent(measured['level'])} ({measured['by']}); " if measured else ""
+    edge = one["edge"]
+    return (
+        f"{first}probability {share(one['probability'])}, {percent(edge['p10'])} to {percent(edge['p90'])} "
+        "at the edge (10 to 90 %)"
+    )
+
+
+def size_line(one: Mapping[str, Any]) -> str:
+    """Return a proposal's size, mass, time and moulds."""
+    checks = "moulds not checked" if one["checks"] is None else f"moulds pass at {one['checks']} places"
+    parts = [
+        f"{number(one['diameter_mm'], 3)} mm wide, {number(one['height_mm'], 3)} mm high",
+        f"{number(one['mass_g'], 2)} g",
+        f"cured in {number(one['cure_hours'], 3)} h",
+        checks,
+    ]
+    if crosstalk := one.get("crosstalk"):
+        value, low, high = (number(crosstalk[key], 2) for key in ("value", "low", "high"))
+        parts.append(f"crosstalk ratio {value} ({low} to {high}) at {number(crosstalk['pitch_mm'], 4)} mm")
+    return ", ".join(parts)
+
+
+def reasons(one: Mapping[str, Any]) -> list[str]:
+    """Return what speaks for a proposal, and what is not known of it."""
+    by_model = one["by_model"]
+    lines = []
+    if sibling := one.get("measured_sibling"):
+        lines.append(
+            f"the measured unit of this kind ({sibling['label']}) had {percent(sibling['level'])} ({sibling['by']}); "
+            f"its probability is {share(sibling['probability'])}"
+        )
+    lines += [f"not measured: {note}" for note in one["relies_on"]]
+    if max(by_model.values()) - min(by_model.values()) > _APART:
+        lines.append(f"the models differ: {listed(f'{name} {share(p)}' for name, p in by_model.items())}")
+    lines.append(one["lengths_gain"])
+    return [*lines, *one["remarks"]]
+
+
+def explanation_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return what `explain` found."""
+    head = data["name"]
+    if data["probability"] is not None:
+        place = f", place {data['rank']} of {data['of']}" if data["rank"] else ""
+        head += (
+            f": probability {share(data['probability'])}, {percent(data['edge']['p10'])} to "
+            f"{percent(data['edge']['p90'])} at the edge (10 to 90 %){place}"
+        )
+    return [head, *(f"  {reason}" for reason in data["reasons"] or ["it is among the proposals"])]

@@ -1,0 +1,253 @@
+"""The file that says what is wished for, what is at hand and what may vary.
+
+[target]
+edge_max = 0.06                     # of the motor's amplitude, at the unit's edge
+crosstalk_ratio_max = 0.3           # the skin's motion at a neighbour's middle over that at the unit's edge
+pitch_mm = 20
+[at_hand]
+materials = ["ecoflex-00-10", "dragon-skin-30"]
+[vary]
+wall_mm = [1.0, 2.0]
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from msgspec import Meta, Struct
+
+from unitcad import catalogue
+from unitcad.attenuation.edge.lab_fit import LabFit
+from unitcad.attenuation.edge.predictive import STACKED, check_models
+from unitcad.attenuation.receivers import MOST_PITCH_MM
+from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
+from unitcad.catalogue import entries as kinds
+from unitcad.designs import shipped as designs
+from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
+from unitcad.files import read_text
+from unitcad.spec import convert, read_toml
+from unitcad.spec.asked import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
+from unitcad.validation.fit_text import lab_fit
+from unitcad.validation.shipped_files import named_file, shipped_files
+
+Level = Annotated[float, Meta(ge=0.001, le=2, description="of the motor's amplitude, at the unit's edge")]
+Ratio = Annotated[
+    float, Meta(ge=1e-6, le=1, description="skin at a neighbour's middle, pitch_mm away, over that at the unit's edge")
+]
+Pitch = Annotated[float, Meta(ge=1, le=MOST_PITCH_MM, description="between the middles of two units")]
+CureHours = Annotated[
+    float, Meta(ge=0.01, le=1e5, description="from the first mixing to the earliest demoulding of the last pour")
+]
+Layers = Annotated[int, Meta(ge=1, le=5)]
+Wall = Annotated[float, Meta(ge=LEAST_LAYER, le=20)]
+Step = Annotated[float, Meta(ge=0.01, le=10)]
+Name = Annotated[str, Meta(min_length=1, max_length=60)]
+_SPEC_KEYS = ("motor", "fpcb", "wires", "moulds", "casting", "output")
+MOST_GEOMETRIES = 20_000
+"""Sets of lengths that are tried; each costs about half a millisecond."""
+
+
+class TargetTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is wished for: the level at the edge, at most or at least, and limits on everything else."""
+
+    edge_max: Level | None = None
+    edge_min: Level | None = None
+    probability_min: Annotated[float, Meta(ge=0.01, le=0.99, description="of meeting the level")] = 0.5
+    crosstalk_ratio_max: Ratio | None = None
+    pitch_mm: Pitch | None = None
+    diameter_max_mm: Annotated[float, Meta(ge=1, le=kinds.LONGEST_MM)] | None = None
+    height_max_mm: Annotated[float, Meta(ge=0.5, le=kinds.LONGEST_MM)] | None = None
+    mass_max_g: Annotated[float, Meta(ge=0.01, le=1e4, description="silicone and motor")] | None = None
+    cure_hours_max: CureHours | None = None
+    frequency_hz: kinds.Frequency | None = None
+
+
+class AtHandTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What there is to make a unit of; None: every shipped silicone and design."""
+
+    materials: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=20)] | None = None
+    designs: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=10)] | None = None
+    motors: Annotated[tuple[Name, ...], Meta(min_length=1, max_length=10)] = (DEFAULT_MOTOR,)
+    printer: Name = "fdm-0.4"
+    scale_g: Annotated[float, Meta(ge=1e-6, le=1000, description="the scale's last digit")] = 0.01
+    room_c: Annotated[float, Meta(ge=5, le=45)] = 23.0
+    vacuum: bool = True
+
+
+class VaryTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What may vary, each from its least to its largest value; caps are as thick as walls unless they are given."""
+
+    layers: Annotated[tuple[Layers, ...], Meta(min_length=1, max_length=5)] = (1, 2)
+    wall_mm: tuple[Wall, Wall] = (1.0, 2.0)
+    cap_mm: tuple[Wall, Wall] | None = None
+    diameter_mm: tuple[kinds.MotorDiameter, kinds.MotorDiameter] | None = None
+    step_mm: Annotated[Step, Meta(description="of walls and caps; the best are refined between the steps")] = 0.25
+    diameter_step_mm: Step = 1.0
+
+
+class ModelsTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What the levels are estimated by: closed forms to stack, or a lab's fit, the body and the moduli."""
+
+    models: Annotated[tuple[Name, ...] | None, Meta(description="closed forms, stacked by their left-out score")] = None
+    fit: Annotated[str | None, Meta(description="a lab-fit.toml of unitcad fit")] = None
+    tissue: Name = "forearm"
+    moduli: Moduli = "dynamic"
+
+
+class TargetFile(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A wish as typed. `spec`: tables that every proposal's spec has; further entries as in a spec."""
+
+    target: TargetTable
+    at_hand: AtHandTable = AtHandTable()
+    vary: VaryTable = VaryTable()
+    estimate: ModelsTable = ModelsTable()
+    spec: Annotated[dict[str, dict[str, Any]], Meta(description=f"tables of every spec: {', '.join(_SPEC_KEYS)}")] = {}
+    materials: dict[str, MaterialEntry] = {}
+    motors: dict[str, MotorEntry] = {}
+    printers: dict[str, PrinterEntry] = {}
+    tissue: dict[str, dict[str, TissueEntry]] = {}
+
+
+@dataclass(frozen=True)
+class Target:
+    """A validated wish.
+
+    `materials`: the silicones at hand, `designs` those to try; `entries`: the tables that a spec of it carries, its own
+    catalogue entries among them.
+    """
+
+    name: str
+    asked: TargetFile
+    materials: tuple[str, ...]
+    designs: tuple[str, ...]
+    models: tuple[str, ...]
+    entries: Mapping[str, Any]
+    fit: LabFit | None = None
+
+    @property
+    def wish(self) -> TargetTable:
+        """The table `target`."""
+        return self.asked.target
+
+    @property
+    def casting(self) -> CastingTable:
+        """The lab as a spec has it."""
+        return convert(self.entries["casting"], CastingTable, "spec.casting")
+
+
+def shipped() -> dict[str, Path]:
+    """Return the shipped targets by name."""
+    return shipped_files("targets")
+
+
+def load_target(source: str | os.PathLike[str]) -> Target:
+    """Return the target of a shipped name or of a file.
+
+    Raises Refusal or UnitcadError for the first value that is not valid.
+    """
+    path = named_file(os.fspath(source), shipped(), "target", WrongArgument)
+    return target_of(read_toml(path), path.stem, path.parent)
+
+
+def target_of(data: Mapping[str, Any], name: str = "target", folder: Path = Path()) -> Target:
+    """Return the target of a file's data; `folder` is where its relative paths start. Raises as `load_target`."""
+    _check_percent(data)
+    asked = convert(data, TargetFile)
+    _check_target(asked.target)
+    _check_ranges(asked.vary)
+    _check_spec(asked.spec)
+    known = catalogue.materials(asked.materials)
+    at_hand = asked.at_hand
+    names = _named("at_hand.materials", at_hand.materials, known)
+    chosen = _named("at_hand.designs", at_hand.designs, {n: d for n, d in designs().items() if d.passes is not None})
+    _named("at_hand.motors", at_hand.motors, catalogue.motors(asked.motors))
+    _named("at_hand.printer", [at_hand.printer], catalogue.printers(asked.printers))
+    catalogue.tissue(asked.estimate.tissue, asked.tissue)
+    text, fit = _fit(asked.estimate, folder)
+    models = tuple(asked.estimate.models or (fit.model if fit else STACKED))
+    check_models(models, fit.model if fit else STACKED, "estimate.models")
+    return Target(name, asked, names, chosen, models, _entries(asked, data, text), fit)
+
+
+def _named(field: str, given: Sequence[str] | None, known: Mapping[str, Any]) -> tuple[str, ...]:
+    names = tuple(known) if given is None else tuple(given)
+    for i, name in enumerate(names):
+        at = field if field.endswith("printer") else f"{field}.{i}"
+        if name not in known:
+            raise unknown_name(at, name, known)
+        if name in names[:i]:
+            raise Refusal(at, name, "is there twice")
+    return names
+
+
+def _fit(table: ModelsTable, folder: Path) -> tuple[str, LabFit | None]:
+    """Return the text of a lab's fit and the fit. Raises Refusal for one that can't be read or is by other moduli."""
+    if table.fit is None:
+        return "", None
+    try:
+        text = read_text(folder / table.fit)
+    except (UnitcadError, OSError) as error:
+        raise Refusal("estimate.fit", table.fit, str(error)) from None
+    fit = lab_fit(text)
+    if fit.moduli != table.moduli:
+        limit = f"{table.fit} has its constants by {fit.moduli} moduli"
+        raise Refusal("estimate.moduli", table.moduli, limit, fit.moduli)
+    return text, fit
+
+
+def _check_percent(data: Mapping[str, Any]) -> None:
+    """Raise Refusal for a level that can only be meant in per cent."""
+    table = data.get("target")
+    for key in ("edge_max", "edge_min"):
+        value = table.get(key) if isinstance(table, Mapping) else None
+        if isinstance(value, int | float) and not isinstance(value, bool) and 2 < value <= 200:
+            raise Refusal(f"target.{key}", value, "is a fraction of the motor's amplitude, at most 2", value / 100)
+
+
+def _check_target(wish: TargetTable) -> None:
+    if wish.edge_max is None and wish.edge_min is None:
+        raise Refusal("target.edge_max", None, "is required, or edge_min for a unit that amplifies")
+    if wish.edge_max is not None and wish.edge_min is not None and wish.edge_min >= wish.edge_max:
+        raise Refusal("target.edge_min", wish.edge_min, f"must be below edge_max, {wish.edge_max:g}", wish.edge_max / 2)
+    if wish.crosstalk_ratio_max is not None and wish.pitch_mm is None:
+        raise Refusal("target.pitch_mm", None, "is required with crosstalk_ratio_max")
+
+
+def _check_ranges(vary: VaryTable) -> None:
+    for key in ("wall_mm", "cap_mm", "diameter_mm"):
+        ends = getattr(vary, key)
+        if ends and ends[0] > ends[1]:
+            raise Refusal(f"vary.{key}", list(ends), "goes from the least to the largest value", [ends[1], ends[0]])
+    for i, count in enumerate(vary.layers):
+        if count in vary.layers[:i]:
+            raise Refusal(f"vary.layers.{i}", count, "is there twice")
+
+
+def _check_spec(tables: Mapping[str, Mapping[str, Any]]) -> None:
+    for key, table in tables.items():
+        if key not in _SPEC_KEYS:
+            raise unknown_name(f"spec.{key}", "...", _SPEC_KEYS)
+        for other, place in (("part", "at_hand.motors"), ("printer", "at_hand.printer")):
+            if other in table:
+                raise Refusal(f"spec.{key}.{other}", table[other], f"stands in {place}")
+
+
+def _entries(asked: TargetFile, data: Mapping[str, Any], fit_text: str) -> dict[str, Any]:
+    """Return the tables of every proposal's spec but name, design, diameter and layers, as plain data."""
+    tables: dict[str, Any] = {key: dict(table) for key, table in asked.spec.items()}
+    if "wires" not in tables:
+        tables.setdefault("fpcb", {})
+    tables["moulds"] = {"printer": asked.at_hand.printer, **tables.get("moulds", {})}
+    lab = {"scale_resolution_g": asked.at_hand.scale_g, "room_c": asked.at_hand.room_c, "vacuum": asked.at_hand.vacuum}
+    tables["casting"] = {**lab, **tables.get("casting", {})}
+    estimate: dict[str, Any] = {"tissue": asked.estimate.tissue, "moduli": asked.estimate.moduli}
+    if asked.target.frequency_hz is not None:
+        estimate["frequency_hz"] = asked.target.frequency_hz
+    if asked.estimate.fit is not None:
+        estimate |= {"fit": Path(asked.estimate.fit).name, "fit_source": fit_text}
+    tables["estimate"] = estimate
+    return tables | {key: data[key] for key in ("materials", "motors", "printers", "tissue") if data.get(key)}
