@@ -50,7 +50,7 @@ def init(
             raise Refusal("--target", target, "is for a target file, --template for a spec: leave one out")
         if target not in shipped():
             raise unknown_name("--target", target, shipped())
-        text = f"#:schema {TARGET_SCHEMA}\n{shipped()[target].read_text('utf-8')}"
+        text = f"#:schema ./{TARGET_SCHEMA}\n{shipped()[target].read_text('utf-8')}"
     try:
         write_new(path, text.encode())
     except FileExistsError:

@@ -17,7 +17,7 @@ def schema(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The schema is JSON in any case.")] = False,
 ) -> None:
-    """Print a JSON Schema: of a spec, a sweep, a cast record or a target of `unitcad design`.
+    """Print a JSON Schema: spec, sweep, cast record or target.
 
     An editor checks a TOML file against it whose first line is `#:schema FILE`, as `unitcad init` writes it.
     """
