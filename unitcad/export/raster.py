@@ -101,41 +101,57 @@ def look(
 def _fragments(
     points: np.ndarray, faces: np.ndarray, width: int, height: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield face, pixel and depth of every pixel's middle that lies in a face, in blocks."""
+    """Yield face, pixel and depth of every pixel's middle that lies in a face, in blocks: row by row of each face."""
     for begin in range(0, len(faces), _FACES):
         corners = points[faces[begin : begin + _FACES]]
-        low = np.ceil(corners[:, :, :2].min(axis=1) - 0.5)
-        high = np.floor(corners[:, :, :2].max(axis=1) - 0.5)
-        low, high = np.clip(low, 0, [width, height]).astype(int), np.clip(high, -1, [width - 1, height - 1]).astype(int)
-        span = np.maximum(high - low + 1, 0)
-        (x0, y0), (x1, y1), (x2, y2) = (corners[:, k, :2].T for k in range(3))
-        area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
-        count = np.where(np.abs(area) > 1e-12, span[:, 0] * span[:, 1], 0)
-        which = np.flatnonzero(count)
-        ends = np.cumsum(count[which])
-        full = np.arange(_FRAGMENTS, ends[-1] if len(ends) else 0, _FRAGMENTS)
-        for block in np.split(which, np.searchsorted(ends, full)):
-            if not len(block):
-                continue
-            number = count[block]
-            face = np.repeat(block, number)
-            local = np.arange(number.sum()) - np.repeat(np.cumsum(number) - number, number)
-            row, column = np.divmod(local, span[face, 0])
-            x, y = low[face, 0] + column, low[face, 1] + row
-            weights = _weights(corners[face], x + 0.5, y + 0.5)
-            inside = (weights >= 0).all(axis=1)
-            face, weights = face[inside], weights[inside]
-            depth = np.einsum("ij,ij->i", weights, corners[face, :, 2])
-            yield face + begin, (y * width + x)[inside], depth
+        one, two, three = (corners[:, k] for k in range(3))
+        first, second = two - one, three - one
+        area = first[:, 0] * second[:, 1] - second[:, 0] * first[:, 1]
+        low = np.clip(np.ceil(corners[:, :, 1].min(axis=1) - 0.5), 0, height).astype(int)
+        high = np.clip(np.floor(corners[:, :, 1].max(axis=1) - 0.5), -1, height - 1).astype(int)
+        across = (first[:, 2] * second[:, 1] - second[:, 2] * first[:, 1]) / np.where(area, area, 1.0)
+        down = (second[:, 2] * first[:, 0] - first[:, 2] * second[:, 0]) / np.where(area, area, 1.0)
+        which = np.flatnonzero((np.abs(area) > 1e-12) & (high >= low))
+        rows = (high - low + 1)[which]
+        for some in _blocks(rows):
+            face, row = np.repeat(which[some], rows[some]), _counted(low[which[some]], rows[some])
+            left, right = _span(corners, face, row + 0.5)
+            left = np.clip(np.ceil(left - 0.5), 0, width).astype(int)
+            right = np.clip(np.floor(right - 0.5), -1, width - 1).astype(int)
+            number = np.maximum(right - left + 1, 0)
+            for block in _blocks(number):
+                own = np.repeat(face[block], number[block])
+                x, y = _counted(left[block], number[block]), np.repeat(row[block], number[block])
+                depth = one[own, 2] + across[own] * (x + 0.5 - one[own, 0]) + down[own] * (y + 0.5 - one[own, 1])
+                yield own + begin, y * width + x, depth
 
 
-def _weights(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return barycentric coordinates (n, 3) of points in plan in triangles (n, 3, 3)."""
-    (x0, y0), (x1, y1), (x2, y2) = (corners[:, k, :2].T for k in range(3))
-    area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
-    one = ((x2 - x) * (y0 - y) - (x0 - x) * (y2 - y)) / area
-    two = ((x0 - x) * (y1 - y) - (x1 - x) * (y0 - y)) / area
-    return np.stack([1 - one - two, one, two], axis=1)
+def _blocks(count: np.ndarray) -> list[np.ndarray]:
+    """Return the numbers of the entries of `count` (n,) in blocks, of which each counts some _FRAGMENTS in all."""
+    ends = np.cumsum(count)
+    return (
+        np.split(np.arange(len(count)), np.searchsorted(ends, np.arange(_FRAGMENTS, ends[-1], _FRAGMENTS)))
+        if len(count)
+        else []
+    )
+
+
+def _counted(start: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Return, for each pair, the whole numbers from `start` on, `count` of them, one list behind the other."""
+    return np.arange(count.sum()) + np.repeat(start - (np.cumsum(count) - count), count)
+
+
+def _span(corners: np.ndarray, face: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return from where to where (px) the line y = `level` lies in faces of `corners` (n, 3, 3): (m,) each."""
+    left, right = np.full(len(face), np.inf), np.full(len(face), -np.inf)
+    for k in range(3):
+        x0, y0 = corners[face, k, 0], corners[face, k, 1]
+        x1, y1 = corners[face, k - 2, 0], corners[face, k - 2, 1]
+        crosses = (np.minimum(y0, y1) <= level) & (level <= np.maximum(y0, y1)) & (y0 != y1)
+        share = (level - y0) / np.where(y0 != y1, y1 - y0, 1.0)
+        x = np.clip(x0 + share * (x1 - x0), np.minimum(x0, x1), np.maximum(x0, x1))
+        left, right = np.where(crosses, np.minimum(left, x), left), np.where(crosses, np.maximum(right, x), right)
+    return left, right
 
 
 def shade(
@@ -207,9 +223,11 @@ def shrunk(picture: np.ndarray, times: int) -> np.ndarray:
 
 
 def png(picture: np.ndarray) -> bytes:
-    """Return a picture (height, width, 3), 0 to 1, as a PNG file (ISO/IEC 15948): same pixels, same bytes."""
+    """Return a picture (height, width, 3), 0 to 1 or bytes, as a PNG file (ISO/IEC 15948): same pixels, same bytes."""
     height, width, _ = picture.shape
-    pixels = np.clip(np.round(picture * 255), 0, 255).astype(np.uint8).reshape(height, width * 3)
+    if picture.dtype != np.uint8:
+        picture = np.clip(np.round(picture * 255), 0, 255).astype(np.uint8)
+    pixels = picture.reshape(height, width * 3)
     up = pixels.copy()
     up[1:] -= pixels[:-1]
     rows = np.concatenate([np.full((height, 1), 2, np.uint8), up], axis=1)
