@@ -222,7 +222,7 @@ def shrunk(picture: np.ndarray, times: int) -> np.ndarray:
     return picture.reshape(height // times, times, width // times, times, 3).mean(axis=(1, 3))
 
 
-def png(picture: np.ndarray) -> bytes:
+def png(picture: np.ndarray, effort: int = 9) -> bytes:
     """Return a picture (height, width, 3), 0 to 1 or bytes, as a PNG file (ISO/IEC 15948): same pixels, same bytes."""
     height, width, _ = picture.shape
     if picture.dtype != np.uint8:
@@ -232,7 +232,7 @@ def png(picture: np.ndarray) -> bytes:
     up[1:] -= pixels[:-1]
     rows = np.concatenate([np.full((height, 1), 2, np.uint8), up], axis=1)
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b""))
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), effort)), (b"IEND", b""))
     body = b"".join(
         struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
     )
