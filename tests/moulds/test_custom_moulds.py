@@ -275,7 +275,8 @@ unit = Design(
 
 
 def assembly_of(moulds: MouldSet) -> tuple[str, ...]:
-    return procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps]).assembly
+    casting = procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps], 0.0)
+    return tuple(step.text for step in casting.assembly[:-1])
 
 
 def test_motor_and_circuit_of_a_function_are_put_in() -> None:

@@ -86,7 +86,7 @@ def test_it_is_laid_in_between_the_pours(tmp_path: Path) -> None:
 def test_its_words_are_those_of_its_tools() -> None:
     """A groove only where the cup has one, no walls of rings, and what is laid in is not on the scale."""
     moulds = of_spec(load(FILM))
-    casting = procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps])
+    casting = procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps], 0.0)
     spec, lay = moulds.spec, moulds.plan.layout
     for step, pour in zip(moulds.plan.steps, casting.pours, strict=True):
         # Measured: a groove takes the cup's material beside the land, half its width further out, under the rim.
@@ -94,7 +94,7 @@ def test_its_words_are_those_of_its_tools() -> None:
         probe = moved(box(-0.1, 0.1, -0.1, 0.1, step.rim - 0.1, step.rim), lay.cells[0].x, lay.cells[0].y + radius)
         (there,) = moulds.meshes([probe])
         open_there = (moulds.solids[step.cup] ^ there).is_empty()
-        assert step.groove == open_there == any("into the groove" in text for text in pour.steps)
+        assert step.groove == open_there == any("into the groove" in each.text for each in pour.steps)
     assert [step.groove for step in moulds.plan.steps] == [False, True]
     assert ("cup1", "groove's floor") not in {(edge.piece, edge.edge) for edge in casting.off_grid}
     assert casting.walls == ()
@@ -102,8 +102,8 @@ def test_its_words_are_those_of_its_tools() -> None:
     for words in ("Walls at the skin", "cups' play on the plinth", "Its outside", "without motor and circuit"):
         assert words not in text
     assert "0.630 g. What was laid in comes on top" in casting.measure[-1]
-    coat = next(i for i, words in enumerate(casting.pours[1].steps) if "Coat the tail thinly" in words)
-    assert "Put cup 2 on" in casting.pours[1].steps[coat + 1]
+    coat = next(i for i, words in enumerate(casting.pours[1].steps) if "Coat the tail thinly" in words.text)
+    assert "Put cup 2 on" in casting.pours[1].steps[coat + 1].text
     assert "petroleum jelly" in {item.item for item in casting.bill}
 
 

@@ -300,7 +300,9 @@ def test_the_procedure_is_all_there(visit: Visit, built: Path) -> None:
     casting = json.loads((built / "casting.json").read_text("utf-8"))
     items = visit.page.locator("#procedure ol > li").all_inner_texts()
     pours = [step for pour in casting["pours"] for step in pour["steps"]]
-    assert items == [*casting["preparation"], *pours, *casting["release"], *casting["assembly"]]
+    steps = [*casting["preparation"], *pours, *casting["release"], *casting["assembly"]]
+    assert items == [f"{step['title']}. {step['text']}" for step in steps]
+    assert "of which" in visit.page.locator("#procedure").inner_text()
     starts = visit.page.locator("#procedure ol").evaluate_all("(lists) => lists.map((list) => list.start)")
     lengths = visit.page.locator("#procedure ol").evaluate_all("(lists) => lists.map((list) => list.children.length)")
     assert starts == [1 + sum(lengths[:i]) for i in range(len(lengths))]

@@ -128,7 +128,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
             Placed(tool.name, (seat * tool.removal[0], 0.0, 0.0)) for tool in tongues if tool.removal is not None
         )
         arrows = tuple(
-            _sideways(-side, cell.x, cell.y, lay.cup[0] + seat, exits.high + 3.0, seat)
+            _sideways(-side, side * (lay.cup[0] + seat), cell.y, exits.high + 3.0, seat)
             for cell in lay.cells
             for side in cell.sides
         )
@@ -184,14 +184,14 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
             "strike",
             View(
                 (*closed, poured, *blades),
-                (*held, _sideways(1, 0.0, 0.0, -0.2 * lay.cup[0], step.rim + 9.0, lay.cup[0])),
+                (*held, _sideways(1, -0.2 * lay.cup[0], 0.0, step.rim + 9.0, lay.cup[0])),
             ),
         )
         held = ()
     if tongues:
         out = tuple(Placed(t.name, (t.removal[0] * lay.cup[0], 0.0, 0.0)) for t in tongues if t.removal is not None)
         arrows = tuple(
-            _sideways(side, cell.x, cell.y, lay.cup[0] + 2.0, (exits.high if exits else 0.0) + 3.0, lay.cup[0] * 0.7)
+            _sideways(side, side * (lay.cup[0] + 2.0), cell.y, (exits.high if exits else 0.0) + 3.0, lay.cup[0] * 0.7)
             for cell in lay.cells
             for side in cell.sides
         )
@@ -225,9 +225,9 @@ def _downward(x: float, y: float, z: float, length: float) -> Extra:
     return Extra(moved(turned(_arrow(length), "x", 2), x, y, z), ARROW)
 
 
-def _sideways(side: int, x: float, y: float, away: float, z: float, length: float) -> Extra:
-    """Draw an arrow along x to the given side, beside a tongue that leaves to the side on which `away` lies."""
-    return Extra(moved(turned(_arrow(length), "y", 1 if side > 0 else 3), x + away, y, z), ARROW)
+def _sideways(side: int, x: float, y: float, z: float, length: float) -> Extra:
+    """Draw an arrow along x to the given side, its middle at (x, y, z)."""
+    return Extra(moved(turned(_arrow(length), "y", 1 if side > 0 else 3), x, y, z), ARROW)
 
 
 def _raised(moulds: MouldSet, up: float) -> Extra:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Mix
 from unitcad.catalogue import Material, motors
+from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
@@ -99,6 +100,15 @@ def _ratings(spec: Spec) -> Iterator[str]:
 def _consumables(moulds: MouldSet, mixes: list[Mix]) -> Iterator[Item]:
     pours, lengths = len(moulds.plan.steps), moulds.spec.moulds
     yield Item("mixing cups and sticks", pours, "set", "bought", "no latex, no sulphur clay: they inhibit")
+    yield Item("gloves", pours, "pair", "bought", "nitrile or vinyl; latex inhibits")
+    resolution = number(moulds.spec.casting.scale_resolution_g, 3)
+    yield Item("scale", 1, "piece", "tool", f"shows {resolution} g")
+    yield Item(
+        "flat screwdrivers", 2, "piece", "tool", f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide, for the pry slots"
+    )
+    yield Item(
+        "knife, small scissors, pin, cotton buds, caliper, level", 1, "set", "tool", "a phone shows the level too"
+    )
     if moulds.spec.casting.vacuum:
         size = f"at least {number(CONTAINER * max(mix.millilitres for mix in mixes), 2)} ml, since silicone foams up"
         yield Item(
@@ -115,4 +125,10 @@ def _consumables(moulds: MouldSet, mixes: list[Mix]) -> Iterator[Item]:
     if pours > 1:
         yield Item("isopropanol and lint-free wipes", 1, "set", "bought", "to wipe a cured layer before the next")
     if lengths.pour == "injected":
-        yield Item("syringe", pours, "piece", "bought", f"tip up to {number(lengths.sprue_mm, 3)} mm")
+        size = (
+            f"{number(max(mix.syringe_ml for mix in mixes), 2)} ml or more, tip up to {number(lengths.sprue_mm, 3)} mm"
+        )
+        yield Item("syringe", pours, "piece", "bought", size)
+        yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
+    else:
+        yield Item("adhesive tape", 2 * pours, "strip", "bought", "holds each cup down; 8 mm wide, 30 mm long")

@@ -18,6 +18,13 @@ CONTAINER = 4.0
 VACUUM_INHG, KPA_PER_INHG = 29.0, 3.386389
 MIXING_MIN, DEGASSING_MIN, POURING_MIN = 3.0, 3.0, 2.0
 """What the pot life is spent on before and after the bubbles (assumed: usual practice)."""
+WIPE_MIN, LAY_IN_MIN, GREASE_MIN, CUP_ON_MIN, TONGUE_MIN, HOLD_MIN, WEIGH_MIN = 2.0, 5.0, 1.0, 2.0, 1.5, 2.0, 5.0
+STRIKE_MIN, PULL_MIN, LIFT_MIN, PEEL_MIN = 1.0, 1.0, 2.0, 3.0
+"""A person's time for the other steps (assumed): what the time line adds up."""
+STRIKE_AGAIN_MIN = 10.0
+"""When what has wept or sunk is topped up and struck off again (assumed)."""
+HELD_BACK_ML = 0.5
+"""What a syringe's tip and plunger keep of the silicone drawn in (assumed: a 5 to 10 ml syringe, a wide tip)."""
 WITHOUT_VACUUM = 0.25
 """Share of the pot life in which bubbles must rise out by themselves (assumed): after it silicone is too thick."""
 MOST_ERROR_PCT = 5.0
@@ -44,7 +51,10 @@ def sourced(value: Value) -> str:
 
 @dataclass(frozen=True)
 class Mix:
-    """Grams of one pour: in all cavities (and channels), to weigh in, of each part, and what half a digit does."""
+    """Grams of one pour: in all cavities (and channels), to weigh in, of each part, and what half a digit does.
+
+    `millilitres` is all that is mixed, `syringe_ml` what has to be drawn in for an injected pour, 0 for an open one.
+    """
 
     net_g: float
     mix_g: float
@@ -53,21 +63,24 @@ class Mix:
     net_error_pct: float
     mix_error_pct: float
     millilitres: float
+    syringe_ml: float = 0.0
 
 
 def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
     """Return what to weigh for `volume_mm3` of silicone; errors are half the scale's digit over the smaller part."""
     casting, ratio = spec.casting, float(material.mix_ratio)
     net = volume_mm3 * float(material.density_g_cm3) / 1000
-    total = max(net * (1 + casting.waste), casting.minimum_mix_g)
+    density = float(material.density_g_cm3)
+    syringe = net / density + HELD_BACK_ML if spec.moulds.pour == "injected" else 0.0
+    # What stays in the mixing cup is the waste; what stays in the syringe comes on top.
+    total = max(net * (1 + casting.waste) + (HELD_BACK_ML * density if syringe else 0.0), casting.minimum_mix_g)
     share = ratio / (1 + ratio)
     smaller = min(share, 1 - share)
 
     def error(grams: float) -> float:
         return 100 * casting.scale_resolution_g / 2 / (grams * smaller)
 
-    millilitres = total / float(material.density_g_cm3)
-    return Mix(net, total, total * share, total * (1 - share), error(net), error(total), millilitres)
+    return Mix(net, total, total * share, total * (1 - share), error(net), error(total), total / density, syringe)
 
 
 def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE_MM) -> float:

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 
 from unitcad import catalogue
 from unitcad.casting import figures as fig
+from unitcad.casting.bench_step import BenchStep
+from unitcad.casting.bench_views import views
 from unitcad.casting.bill import Item, bill
 from unitcad.casting.eccentricity import UNEVEN, Eccentricity, eccentricity
 from unitcad.casting.figures import Figure, Mix, sourced
-from unitcad.casting.instructions import assembly, measurements, pour_steps, preparation, release, tunnels
+from unitcad.casting.finishing import measurements, motor_in, release
+from unitcad.casting.instructions import pour_steps
 from unitcad.casting.layer_grid import OffGrid, UnitHeight, off_grid, unit_heights
+from unitcad.casting.preparation import preparation, printing, tunnels
 from unitcad.casting.release_agent import BondFace, Face, agent_faces, bond_faces
+from unitcad.casting.time_line import Phase, phases
 from unitcad.catalogue import Material
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -26,6 +31,7 @@ class Pour:
     """One pour: its figures, the verdict on bubbles, what the person does, and the drawing of it assembled.
 
     `agent`: the faces that may get release agent before it. `degassing_min`: in the vacuum; 0 without one.
+    Times are those of the room. `drawing` is the section, each step's picture is in 3D.
     """
 
     index: int
@@ -35,13 +41,20 @@ class Pour:
     verdict: str
     agent: tuple[Face, ...]
     degassing_min: float
-    steps: tuple[str, ...]
+    part_a_g: float
+    part_b_g: float
+    pot_life_min: float
+    cure_h: float
+    steps: tuple[BenchStep, ...]
     drawing: str
 
 
 @dataclass(frozen=True)
 class Procedure:
     """A whole casting: numbered steps run on from `preparation` through the pours to `assembly`.
+
+    `earliest_finish_min`: from the first step of the first pour until the units are out of the mould, of which
+    `bench_min` with a person at the bench; `time_line` goes on until the motor is in. `printing` says what to print.
 
     `bonds` are the tools' faces that must never get release agent.
     `tunnels`: the cups whose windows resin may cure shut.
@@ -54,13 +67,17 @@ class Procedure:
     cells: int
     vacuum: bool
     tunnels: tuple[str, ...]
-    preparation: tuple[str, ...]
+    earliest_finish_min: float
+    bench_min: float
+    time_line: tuple[Phase, ...]
+    printing: tuple[str, ...]
+    preparation: tuple[BenchStep, ...]
     off_grid: tuple[OffGrid, ...]
     unit_heights: tuple[UnitHeight, ...]
     pours: tuple[Pour, ...]
     bonds: tuple[BondFace, ...]
-    release: tuple[str, ...]
-    assembly: tuple[str, ...]
+    release: tuple[BenchStep, ...]
+    assembly: tuple[BenchStep, ...]
     measure: tuple[str, ...]
     eccentricity: Eccentricity
     without_ribs: Eccentricity
@@ -68,14 +85,14 @@ class Procedure:
     bill: tuple[Item, ...]
 
 
-def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure:
+def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
     """Return the procedure of a mould set: nothing is meshed or drawn.
 
-    `layer_volumes_mm3`: of each layer of one unit, from the inside out.
+    `layer_volumes_mm3`: of each layer of one unit, from the inside out. `printed_mm3`: of all printed pieces.
     """
     spec, plan = moulds.spec, moulds.plan
     known = catalogue.materials(spec.materials)
-    edges = tuple(off_grid(moulds))
+    edges, shown = tuple(off_grid(moulds)), views(moulds)
     centred, free = eccentricity(moulds), eccentricity(moulds, with_ribs=False)
     pours, mixes, grams = [], [], []
     for step, volume in zip(plan.steps, layer_volumes_mm3, strict=True):
@@ -91,25 +108,39 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> Procedure
                 verdict,
                 agent_faces(moulds, step),
                 fig.DEGASSING_MIN if spec.casting.vacuum else 0.0,
-                tuple(pour_steps(moulds, step, silicone, mix, verdict)),
+                mix.part_a_g,
+                mix.part_b_g,
+                fig.at_room(float(silicone.pot_life_min), spec.casting.room_c),
+                fig.at_room(float(silicone.cure_h), spec.casting.room_c),
+                tuple(pour_steps(moulds, step, silicone, mix, verdict, shown)),
                 f"step{step.index}-section.svg",
             )
         )
         mixes.append((silicone, mix))
         grams.append(volume * float(silicone.density_g_cm3) / 1000)
+    out = tuple(release(moulds, mixes[0][0]))
+    motor = tuple(motor_in(moulds, [silicone for silicone, _ in mixes]))
+    until = phases([*((f"pour {pour.index}", pour.steps) for pour in pours), ("out of the mould", out)])
+    line = phases(
+        [*((f"pour {pour.index}", pour.steps) for pour in pours), ("out of the mould", out), ("motor in", motor)]
+    )
     return Procedure(
         name=spec.name,
         label=plan.label,
         cells=len(plan.layout.cells),
         vacuum=spec.casting.vacuum,
         tunnels=tunnels(moulds),
-        preparation=tuple(preparation(moulds)),
+        earliest_finish_min=until[-1].end_min,
+        bench_min=sum(phase.bench_min for phase in until),
+        time_line=line,
+        printing=printing(moulds, printed_mm3),
+        preparation=tuple(preparation(moulds, shown)),
         off_grid=edges,
         unit_heights=tuple(unit_heights(moulds)),
         pours=tuple(pours),
         bonds=bond_faces(moulds),
-        release=tuple(release(moulds, mixes[0][0])),
-        assembly=() if moulds.design.laid_in else assembly(moulds),
+        release=out,
+        assembly=motor,
         measure=tuple(measurements(moulds, grams, _printed_slot_height(moulds, edges))),
         eccentricity=centred,
         without_ribs=free,
@@ -135,6 +166,7 @@ def _figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, volume:
             "g",
             f"assumed: {casting.waste:.0%} more, at least {number(casting.minimum_mix_g, 3)} g",
         ),
+        *([_held_back(mix)] if mix.syringe_ml else []),
         Figure("part A", mix.part_a_g, "g", "mix ratio, " + sourced(silicone.mix_ratio)),
         Figure("part B", mix.part_b_g, "g", "mix ratio, " + sourced(silicone.mix_ratio)),
         Figure("scale's error on a part, net", mix.net_error_pct, "%", digit),
@@ -168,6 +200,11 @@ def _figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, volume:
         source = f"computed: flow in the clearance under the pour's own weight{pressure}"
         figures.append(Figure("weep by the windows, no grease", 100 * weep / volume, "% of a layer", source))
     return tuple(figures)
+
+
+def _held_back(mix: Mix) -> Figure:
+    source = f"net, and {number(fig.HELD_BACK_ML, 2)} ml that tip and plunger keep (assumed)"
+    return Figure("to draw into the syringe, at least", mix.syringe_ml, "ml", source)
 
 
 def _vacuum(mix: Mix) -> tuple[Figure, ...]:

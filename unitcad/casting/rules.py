@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
-from unitcad.casting.instructions import HOLD
+from unitcad.casting.bench_step import BenchStep
+from unitcad.casting.instructions import HOLD, TACK
 from unitcad.casting.procedure import Procedure
 from unitcad.text import spaced
 
 
 def broken_rules(procedure: Procedure) -> list[str]:
     """Return what a procedure does wrong, one sentence each; empty where it keeps every rule."""
-    return [fault for rule in (_agent, _degassing, _held, _cleared) for fault in rule(procedure)]
+    return [fault for rule in RULES for fault in rule(procedure)]
 
 
 def _agent(procedure: Procedure) -> Iterator[str]:
@@ -32,7 +34,7 @@ def _agent(procedure: Procedure) -> Iterator[str]:
 def _degassing(procedure: Procedure) -> Iterator[str]:
     """Degas every pour where there is a vacuum; ask for nothing that needs one where there is none."""
     for pour in procedure.pours:
-        says = any(step.startswith("Degas for") for step in pour.steps)
+        says = any(step.text.startswith("Degas for") for step in pour.steps)
         if procedure.vacuum and not (says and pour.degassing_min > 0):
             yield f"pour {pour.index}: not degassed, though there is a vacuum"
         needs = [figure.name for figure in pour.figures if "vacuum" in figure.name or "degassing" in figure.name]
@@ -58,10 +60,70 @@ def _cleared(procedure: Procedure) -> Iterator[str]:
     """Clear every window that resin may close, before the post-cure."""
     clear, cure = _first(procedure.preparation, "Clear the windows"), _first(procedure.preparation, "post-cure, bake")
     for cup in procedure.tunnels:
-        if clear is None or cure is None or clear > cure or spaced(cup) not in procedure.preparation[clear]:
+        if clear is None or cure is None or clear > cure or spaced(cup) not in procedure.preparation[clear].text:
             yield f"the window of {cup} is not cleared of resin before the post-cure"
 
 
-def _first(steps: tuple[str, ...], words: str) -> int | None:
+def _shown(procedure: Procedure) -> Iterator[str]:
+    """Show every step in which a piece of the mould is put on, moved or taken off."""
+    moving = re.compile(r"^(Cup \d+ (on|off)|Lid|Tongue|Filament|Hold|Pour$|Strike off|Inject|Peel)")
+    for step in _all(procedure):
+        if moving.match(step.title) and not step.picture:
+            yield f"{step.title}: has no picture"
+
+
+def _levelled(procedure: Procedure) -> Iterator[str]:
+    """Level the mould before the first pour, and say how to see it."""
+    if not any("level" in step.text and "paper under a corner" in step.text for step in procedure.preparation):
+        yield "nothing says how the mould is levelled"
+
+
+def _cured(procedure: Procedure) -> Iterator[str]:
+    """Cure before a mould is opened, for the silicone's whole time, and say how to tell that it is done."""
+    for pour in procedure.pours:
+        cures = [i for i, step in enumerate(pour.steps) if step.kind == "cure"]
+        opens = [i for i, step in enumerate(pour.steps) if step.title.endswith((" off", "out FIRST")) and i]
+        if len(cures) != 1 or any(i < cures[0] for i in opens if pour.steps[i].title != "Strike off"):
+            yield f"pour {pour.index}: the mould is opened before the cure"
+        elif pour.steps[cures[0]].wait_min < 60 * pour.cure_h - 1e-6:
+            yield f"pour {pour.index}: cures for less than the silicone takes"
+        elif TACK not in pour.steps[cures[0]].text:
+            yield f"pour {pour.index}: nothing says how to tell cured silicone from tacky"
+    smeared = any("smear" in step.text for step in procedure.assembly)
+    if smeared and procedure.assembly[-1].kind != "cure":
+        yield "the smear that holds the motor is not cured"
+
+
+def _enough(procedure: Procedure) -> Iterator[str]:
+    """Mix what the cavities, and a syringe, take."""
+    for pour in procedure.pours:
+        values = {figure.name: figure.value for figure in pour.figures}
+        density = values["density"]
+        needed = values.get("to draw into the syringe, at least", 0.0) * density or values["in the cavities, net"]
+        if pour.part_a_g + pour.part_b_g < needed:
+            yield f"pour {pour.index}: mixes less than it takes"
+        injected = any(step.title == "Inject" for step in pour.steps)
+        if injected and "to draw into the syringe, at least" not in values:
+            yield f"pour {pour.index}: nothing says what the syringe holds back"
+
+
+def _gripped(procedure: Procedure) -> Iterator[str]:
+    """Give a cut tongue a grip."""
+    for step in procedure.preparation:
+        if step.title == "Cut the tongues" and "what you pull by" not in step.text:
+            yield "a cut tongue has nothing to pull it by"
+
+
+RULES = (_agent, _degassing, _held, _cleared, _shown, _levelled, _cured, _enough, _gripped)
+
+
+def _all(procedure: Procedure) -> Iterator[BenchStep]:
+    yield from procedure.preparation
+    for pour in procedure.pours:
+        yield from pour.steps
+    yield from (*procedure.release, *procedure.assembly)
+
+
+def _first(steps: tuple[BenchStep, ...], words: str) -> int | None:
     """Return the number of the first step (from 0) that says so."""
-    return next((i for i, step in enumerate(steps) if words in step), None)
+    return next((i for i, step in enumerate(steps) if words in step.text), None)

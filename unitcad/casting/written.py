@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from itertools import count
 
+from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bill import to_csv
 from unitcad.casting.figures import Figure
 from unitcad.casting.procedure import Procedure
+from unitcad.casting.time_line import duration
 from unitcad.designs import layer_colour
 from unitcad.export import svg
 from unitcad.moulds.mould_set import MouldSet
@@ -36,39 +38,52 @@ def to_json(procedure: Procedure) -> str:
 
 
 def to_markdown(procedure: Procedure) -> str:
-    """Write the procedure for the bench: numbered steps that run through, tables of figures with their sources."""
+    """Write the procedure for the bench: times, what is needed and printed, numbered steps, figures in an appendix."""
     numbers = count(1)
 
-    def steps(texts: tuple[str, ...]) -> list[str]:
-        return [f"{next(numbers)}. {markdown(text)}" for text in texts]
+    def steps(these: Sequence[BenchStep]) -> Iterator[str]:
+        for step in these:
+            yield f"{next(numbers)}. **{markdown(step.title)}.** {markdown(step.text)}"
+            if step.picture:
+                yield from ("", f"   ![{markdown(step.title)}]({step.picture})", "")
 
     cavities = f"{procedure.cells} cavit{'y' if procedure.cells == 1 else 'ies'}"
     lines = [f"# Casting {markdown(procedure.name)}", ""]
     lines += [f"Mould set {procedure.label}, {cavities}. {UNPRINTED}", ""]
+    lines += ["## Time", "", *_times(procedure), ""]
+    lines += ["## Needed", "", *_needed(procedure), ""]
+    lines += ["## Print", "", *(f"- {markdown(text)}" for text in procedure.printing), ""]
     lines += ["## Before the first pour", "", *steps(procedure.preparation), ""]
-    if procedure.off_grid:
-        lines += ["These edges fall between two of the printer's layers; the slicer moves them to the nearest.", ""]
-        rows = [(spaced(o.piece), o.edge, number(o.height_mm, 3), number(o.moved_mm, 2)) for o in procedure.off_grid]
-        lines += [*_table(("piece", "edge", "height as printed, mm", "moved by, mm"), rows), ""]
-    if procedure.unit_heights:
-        lines += ["The unit's own heights are drawn as asked for; whole layers make them:", ""]
-        made = [(each.what, number(each.asked_mm, 3), number(each.printed_mm, 3)) for each in procedure.unit_heights]
-        lines += [*_table(("height", "asked for, mm", "in whole layers, mm"), made), ""]
     for pour in procedure.pours:
-        lines += [f"## Pour {pour.index}: {spaced(pour.layer)}, {markdown(pour.material)}", ""]
-        lines += [f"![pour {pour.index}]({pour.drawing})", "", *_figures(pour.figures), "", *steps(pour.steps), ""]
+        lines += [f"## Pour {pour.index}: {spaced(pour.layer)}, {markdown(pour.material)}", "", *steps(pour.steps), ""]
     lines += ["## Out of the mould", "", *steps(procedure.release), ""]
     if procedure.assembly:
         lines += ["## Motor in", "", *steps(procedure.assembly), ""]
     lines += ["## Measure on the first part", "", *(f"- {markdown(text)}" for text in procedure.measure), ""]
-    if procedure.walls:
-        lines += [
-            "How far the cups stand off the core's axis is the largest error of all:",
-            "",
-            *_figures(procedure.walls),
-            "",
-        ]
-    needed = [
+    saves = "bench.html (unitcad report) takes down what was weighed and measured, and saves it as a cast record."
+    lines += [saves, ""]
+    return "\n".join([*lines, "## Appendix: figures and sources", "", *_appendix(procedure)]) + "\n"
+
+
+def _times(procedure: Procedure) -> Iterator[str]:
+    """Yield the earliest finish in a sentence, and the time line."""
+    total, bench = duration(procedure.earliest_finish_min), duration(procedure.bench_min)
+    yield f"**{total}** from the first pour's first step to the unit out of the mould, of which {bench} at the bench."
+    if procedure.assembly:
+        more = procedure.time_line[-1].end_min - procedure.earliest_finish_min
+        yield f"Motor in: {duration(more)} more at most, nearly all of it a smear's cure. Printing comes before."
+    yield ""
+    rows = [
+        (phase.name, duration(phase.start_min), duration(phase.bench_min), duration(phase.wait_min))
+        for phase in procedure.time_line
+    ]
+    yield from _table(("what", "begins after", "at the bench", "then wait"), rows)
+    yield ""
+    yield "Times at the bench are assumed; cures are the silicones' own, at the room's temperature."
+
+
+def _needed(procedure: Procedure) -> list[str]:
+    rows = [
         (
             markdown(spaced(i.item) if i.made.startswith("printed") else i.item),
             f"{number(i.quantity, 3)} {i.unit}",
@@ -77,8 +92,25 @@ def to_markdown(procedure: Procedure) -> str:
         )
         for i in procedure.bill
     ]
-    lines += ["## Needed", "", *_table(("item", "quantity", "made", "note"), needed)]
-    return "\n".join(lines) + "\n"
+    return _table(("item", "quantity", "made", "note"), rows)
+
+
+def _appendix(procedure: Procedure) -> Iterator[str]:
+    for pour in procedure.pours:
+        yield from (f"### Figures of pour {pour.index}: {spaced(pour.layer)}, {markdown(pour.material)}", "")
+        yield from (f"![pour {pour.index} in section]({pour.drawing})", "", *_figures(pour.figures), "")
+    if procedure.walls:
+        yield from ("### Walls", "", "How far the cups stand off the core's axis is the largest error of all:", "")
+        yield from (*_figures(procedure.walls), "")
+    if procedure.off_grid:
+        yield from ("### Edges between two layers", "")
+        yield from ("These edges fall between two of the printer's layers; the slicer moves them to the nearest.", "")
+        rows = [(spaced(o.piece), o.edge, number(o.height_mm, 3), number(o.moved_mm, 2)) for o in procedure.off_grid]
+        yield from (*_table(("piece", "edge", "height as printed, mm", "moved by, mm"), rows), "")
+    if procedure.unit_heights:
+        yield from ("### Heights of the unit", "", "They are drawn as asked for; whole layers make them:", "")
+        made = [(each.what, number(each.asked_mm, 3), number(each.printed_mm, 3)) for each in procedure.unit_heights]
+        yield from (*_table(("height", "asked for, mm", "in whole layers, mm"), made), "")
 
 
 def step_section(moulds: MouldSet, step: Step) -> str:

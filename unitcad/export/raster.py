@@ -92,9 +92,9 @@ def look(
             depth = depth + first[face] * (0.25 / view.scale)
         kept &= depth > nearest[pixel]
         face, pixel, depth = face[kept], pixel[kept], depth[kept]
-        order = np.argsort(depth, kind="stable")
-        nearest[pixel[order]] = depth[order]
-        shown[pixel[order]] = face[order]
+        np.maximum.at(nearest, pixel, depth)
+        seen = depth == nearest[pixel]
+        shown[pixel[seen]] = face[seen]
     return Seen(shown.reshape(height, width), nearest.reshape(height, width))
 
 

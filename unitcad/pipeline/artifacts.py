@@ -36,7 +36,7 @@ FORMATS = ("step", "stl", "3mf", "svg", "png", "glb")
 GEOMETRIC: tuple[Output, ...] = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
 CASTING = ("bom.csv", "casting.json", "casting.md")
-STAGES = ("meshes", "drawing", "step", "pictures")
+STAGES = ("meshes", "drawing", "step pictures", "step", "pictures")
 """In what order shared files are made."""
 
 
@@ -90,12 +90,18 @@ def _drawings(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
 
         yield Artifact("section.svg", "", "drawing", drawn, partial(geometry_key, moulds, "section"))
     if "casting" in only:
+        from unitcad.casting.bench_pictures import pictures
+        from unitcad.casting.bench_views import picture_path, views
         from unitcad.casting.written import step_section
 
         for step in moulds.plan.steps:
             key = partial(geometry_key, moulds, f"section of pour {step.index}")
             drawing = partial(step_section, moulds, step)
             yield Artifact(f"step{step.index}-section.svg", "", "drawing", lambda draw=drawing: draw().encode(), key)
+        together = cache(lambda: pictures(moulds))
+        for path in map(picture_path, views(moulds)):
+            key = partial(geometry_key, moulds, path)
+            yield Artifact(path, "", "step pictures", lambda path=path: together()[path], key)
 
 
 def _pictures(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
@@ -122,14 +128,21 @@ def _step_key(moulds: MouldSet, bodies: Sequence[Body], name: str) -> str:
     return joint_key(moulds, bodies, "step", name, os.environ.get("SOURCE_DATE_EPOCH"), kernels)
 
 
-def own(moulds: MouldSet, only: Sequence[str], layer_volumes_mm3: Sequence[float], store: Store) -> Iterator[Artifact]:
-    """Yield the variant's own files but for the manifest, which lists them all. `layer_volumes_mm3`: of one unit."""
+def own(
+    moulds: MouldSet, only: Sequence[str], layer_volumes_mm3: Sequence[float], printed_mm3: float, store: Store
+) -> Iterator[Artifact]:
+    """Yield the variant's own files but for the manifest, which lists them all.
+
+    `layer_volumes_mm3`: of one unit; `printed_mm3`: of all printed tools.
+    """
     yield Artifact("spec.toml", "", "spec", lambda: to_toml(moulds.spec).encode())
     if "estimate" in only:
         yield Artifact("estimate.json", "", "estimate", lambda: json_bytes(estimated(moulds, store)))
     if "casting" in only:
         for path in CASTING:
-            yield Artifact(path, "", "casting", lambda path=path: _casting(moulds, layer_volumes_mm3)[path])
+            yield Artifact(
+                path, "", "casting", lambda path=path: _casting(moulds, layer_volumes_mm3, printed_mm3)[path]
+            )
 
 
 def estimated(moulds: MouldSet, store: Store) -> dict[str, Any]:
@@ -147,12 +160,12 @@ def estimated(moulds: MouldSet, store: Store) -> dict[str, Any]:
     return moulds.once("estimate", lambda: estimate_spec(moulds.spec, layered=layered))
 
 
-def _casting(moulds: MouldSet, layer_volumes_mm3: Sequence[float]) -> dict[str, bytes]:
+def _casting(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> dict[str, bytes]:
     """Return the files of the casting procedure."""
     from unitcad.casting.procedure import procedure
     from unitcad.casting.written import files
 
     def written() -> dict[str, bytes]:
-        return {path: text.encode() for path, text in files(procedure(moulds, layer_volumes_mm3)).items()}
+        return {path: text.encode() for path, text in files(procedure(moulds, layer_volumes_mm3, printed_mm3)).items()}
 
     return moulds.once("casting", written)

@@ -54,7 +54,7 @@ def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Sta
     shared = {**shape["files"], **drawn}
     volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
     own: dict[str, bytes] = {}
-    for artifact in artifacts.own(moulds, possible, volumes, store):
+    for artifact in artifacts.own(moulds, possible, volumes, _printed_mm3(shape), store):
         with stages(artifact.stage):
             own[artifact.path] = artifact.make()
     listed = {path: FileRecord(bytes=len(content), sha256=digest(content)) for path, content in own.items()}
@@ -119,6 +119,11 @@ def _pictures(
             return pictures(moulds, only, store), []
     except NoPicture as error:
         return {}, [("pictures", str(error))]
+
+
+def _printed_mm3(shape: Geometry) -> float:
+    """Return the volume of all printed tools."""
+    return sum(part["volume_mm3"] for part in shape["parts"] if part["role"] == "tool" and part["made"] == "printed")
 
 
 def _mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:

@@ -29,13 +29,25 @@
     return [table(["Piece", "Print time (min)", "Filament (cm³)"], rows, { label: "Print time and filament" }), el("p", {}, `${sliced.slicer}, ${sliced.printer}, layers of ${sliced.layer_mm} mm: ${sliced.note}`)];
   }
 
+  function duration(minutes) {
+    const [hours, rest] = [Math.floor(Math.round(minutes) / 60), Math.round(minutes) % 60];
+    return hours && rest ? `${hours} h ${rest} min` : hours ? `${hours} h` : `${rest} min`;
+  }
+
+  function times(data) {
+    if (!data.time_line) return null;
+    const rows = data.time_line.map((phase) => [phase.name, duration(phase.start_min), duration(phase.bench_min), duration(phase.wait_min)]);
+    return [el("p", {}, el("strong", {}, duration(data.earliest_finish_min)), ` from the first pour's first step to the unit out of the mould, of which ${duration(data.bench_min)} at the bench.`),
+      table(["What", "Begins after", "At the bench", "Then wait"], rows, { label: "Time line" })];
+  }
+
   function procedure(variant) {
     const data = variant.casting;
     if (!data) return section("procedure", "Procedure", el("p", { className: "absent" }, "No procedure here. Ask for it with ", el("code", {}, "unitcad build SPEC --only casting")));
     let next = 1;
     const steps = (list) => {
       if (!list || !list.length) return null;
-      const node = el("ol", { start: String(next) }, list.map((text) => el("li", {}, text)));
+      const node = el("ol", { start: String(next) }, list.map((step) => el("li", {}, el("strong", {}, `${step.title}. `), step.text)));
       next += list.length;
       return node;
     };
@@ -51,6 +63,8 @@
     const print = el("button", { type: "button", className: "main", onclick: () => window.print() }, "Print the procedure");
     return section("procedure", "Procedure",
       el("div", { className: "tools" }, print, el("span", {}, `${data.label ? `mould set ${data.label}, ` : ""}${data.cells} ${data.cells === 1 ? "cavity" : "cavities"}`)),
+      times(data),
+      titled("Print", data.printing && el("ul", {}, data.printing.map((text) => el("li", {}, text)))),
       titled("Before the first pour", steps(data.preparation)),
       offGrid.length > 0 && el("details", {}, el("summary", {}, `${offGrid.length} edges fall between two of the printer's layers`),
         table(["Piece", "Edge", "Height as printed (mm)", "Moved by (mm)"], offGrid.map((row) => [partName(row.piece), row.edge, shown(row.height_mm), number(row.nearest_mm - row.height_mm, 2)]), { label: "Edges off the layer grid" })),

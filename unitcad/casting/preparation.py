@@ -1,0 +1,176 @@
+"""The steps from the printer to an empty mould."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from unitcad.casting.bench_step import BenchStep
+from unitcad.casting.bench_views import View, picture_path
+from unitcad.casting.figures import window_length
+from unitcad.moulds.cup import window_section
+from unitcad.moulds.dents import DENT, TILT_DEG
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.ribs import ribs
+from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
+from unitcad.spec import printer_of
+from unitcad.text import listed, number, spaced
+
+PERIMETERS = 3
+FOOT_MM = 0.2
+
+
+def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
+    """Say which file to print and how, a sentence or two each. `solid_mm3`: volume of all printed pieces, solid."""
+    spec, plan = moulds.spec, moulds.plan
+    printed = [tool for tool in plan.tools if tool.made == "printed"]
+    turned = listed(dict.fromkeys(f"{tool.kind}s" if tool.step else tool.kind for tool in printed if tool.upside_down))
+    count = "one piece" if len(printed) == 1 else f"{len(printed)} pieces"
+    lines = [
+        f"Plate: moulds/moulds.3mf ({count}; moulds/ has them singly as STL too). They lie in it as they are printed: "
+        f"{turned} upside down, the rest as drawn. Turn none of them.",
+        f"Printer {spec.moulds.printer}, layers of {number(spec.moulds.layer_mm, 3)} mm, no supports.",
+    ]
+    if in_resin(moulds):
+        lines.append(
+            f"At most {number(solid_mm3 / 1000, 2)} ml of resin (computed: the pieces' volume). Flat on the plate, no "
+            "tilt: seats and rims are then whole layers. Compensate the first layers' growth (bottom tolerance): what "
+            "grows there narrows a bore."
+        )
+    else:
+        lines.append(
+            f"{PERIMETERS} perimeters, 20 % infill (assumed). At most {number(solid_mm3 / 1000, 2)} cm3 of filament "
+            f"(computed: the pieces, solid). Elephant foot compensation {number(FOOT_MM, 3)} mm (assumed), for cups "
+            "lie on "
+            "their rims: a first layer that is squeezed out narrows the bore where the layer's edge is."
+        )
+    lines.append("slicer.json has PrusaSlicer's time and filament, piece by piece, where it is installed.")
+    lines.append(
+        f"First time on this printer: print the fit coupon (unitcad coupon {spec.moulds.printer}). It shows in half "
+        "an hour whether plinth, tongue and filament fit, and gives the line for the spec where they do not."
+    )
+    return tuple(lines)
+
+
+def preparation(moulds: MouldSet, views: dict[str, View]) -> Iterator[BenchStep]:
+    """Describe the way from the printer to an empty mould."""
+    plan, lengths = moulds.plan, moulds.spec.moulds
+    marked = listed(["base", "cups", *(["lids"] if plan.of_kind("lid") else [])])
+    yield BenchStep(
+        "Sort the pieces",
+        f"Print the pieces as they lie in their files, without supports. {marked.capitalize()} are engraved "
+        f"{plan.label}; "
+        "step1-cup.stl is cup 1, engraved C1, and so on.",
+        picture_path("pieces"),
+    )
+    yield from _cut_tongues(moulds)
+    if in_resin(moulds):
+        yield BenchStep(
+            "Wash",
+            "Wash the pieces in isopropanol until nothing of them feels slippery to a gloved finger, rinse holes and "
+            "corners, and let them dry until no spot is dark any more.",
+        )
+        if tunnels(moulds):
+            yield BenchStep("Clear the windows", _clear_tunnels(moulds))
+        yield BenchStep(
+            "Post-cure, test the cure",
+            "Resin keeps many platinum silicones from curing: post-cure, bake (60 degC for 8 h, assumed), then "
+            "cure a drop of each silicone on a spot of the base that is no cavity, for its whole cure. Lift it: if its "
+            "underside is tacky, coat (acrylic varnish, assumed) or print in another resin, and test again.",
+        )
+    else:
+        yield BenchStep(
+            "Clean",
+            "Brush off strings and loose bits. Run a fingernail round every bore and rim: cut off what catches.",
+        )
+    lids = " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
+    on = "Put each cup on the plinth once, dry: its cut corner lets it on one way only. It must sit down"
+    if standing := ribs(moulds.spec, plan.layout):
+        on = (
+            "Press each cup onto the plinth once, dry: its cut corner lets it on one way only. Press evenly at all "
+            f"corners, in a vice between two boards where the hand is too weak: its {len(standing)} ribs are crushed "
+            "and centre it from then on. It must sit down"
+        )
+    yield BenchStep(
+        "Try every cup, dry",
+        f"{on} until seat and plinth touch; a slit of {number(lengths.seat_relief_mm, 3)} mm is then left between cup and plate, all "
+        "round: the same strip of paper, folded to that thickness, goes in on all four sides. A cup that rocks or "
+        f"stands higher on one side: scrape plinth and seat clean, and try again.{lids}",
+        picture_path("pour1-cup-on"),
+    )
+    if plan.of_kind("stub"):
+        each = "the" if len(plan.layout.cells) == 1 else "each"
+        yield BenchStep(
+            "Filament in",
+            f"Push {each} straight piece of filament up through the core from below until its end is flush "
+            "with the core's top, and bend what stands out below by a right angle into the groove under the plate: it "
+            "lies on the bench and can't sink. Trim the upper end flush with a knife: 0.5 mm low shows.",
+            picture_path("filament"),
+        )
+    yield BenchStep("Level the bench", _level(moulds))
+
+
+def _level(moulds: MouldSet) -> str:
+    """Say how level the mould must lie, and how to see it."""
+    tilt = number(fall_deg(moulds), 2)
+    if moulds.spec.moulds.pour == "injected":
+        how = f"Lids clear their air up to a tilt of {number(TILT_DEG, 2)} degrees"
+    else:
+        across = number(2 * moulds.dimensions.outer_radius, 3)
+        how = (
+            f"Silicone stays level while it cures: at {tilt} degrees {number(DENT, 3)} mm more stand on the low side "
+            "of a "
+            f"cavity {across} mm wide (computed)"
+        )
+    return (
+        f"{how}. Lay a phone with its level, or a small spirit level, on the base's plate, along it and across, and "
+        "put "
+        "paper under a corner until it shows less. Leave the mould there: it is poured and cured on this spot."
+    )
+
+
+def fall_deg(moulds: MouldSet) -> float:
+    """Return the tilt at which an open cavity's silicone stands DENT higher on one side than on the other, degrees."""
+    return math.degrees(math.atan(DENT / (2 * moulds.dimensions.outer_radius)))
+
+
+def in_resin(moulds: MouldSet) -> bool:
+    """Tell whether the tools are printed in resin."""
+    return printer_of(moulds.spec).technology.value == "sla"
+
+
+def tunnels(moulds: MouldSet) -> tuple[str, ...]:
+    """Return the cups through whose wall a window runs that resin may cure shut."""
+    return tuple(step.cup for step in moulds.plan.steps if step.windows) if in_resin(moulds) else ()
+
+
+def _clear_tunnels(moulds: MouldSet) -> str:
+    """Say how the windows are cleared before the post-cure closes them for good."""
+    steps = [step for step in moulds.plan.steps if step.windows]
+    low, high = (number(pick(window_length(moulds, step) for step in steps), 2) for pick in (min, max))
+    exit = moulds.plan.dimensions.exit
+    windows = [window_section(moulds.spec, exit, step.rim) for step in steps] if exit else []
+    height = number(min(high - low for _, low, high in windows), 2)
+    return (
+        f"Clear the windows of {listed(spaced(step.cup) for step in steps)} now, before the post-cure: resin stays in "
+        f"a slot {height} mm high that runs {low if low == high else f'{low} to {high}'} mm through the wall. Rinse "
+        "each with a syringe of isopropanol, push a strip of the tongue's film through until it slides freely, and "
+        "look through it against the light. What is cured in it has to be scraped out, or the cup printed again."
+    )
+
+
+def _cut_tongues(moulds: MouldSet) -> Iterator[BenchStep]:
+    """Say how to cut the tongues that are not printed."""
+    dims, tongues = moulds.plan.dimensions, [t for t in moulds.plan.of_kind("tongue") if t.made == "cut"]
+    if tongues and dims.exit:
+        length = moulds.plan.layout.cup[0] - min(abs(c.x) for c in moulds.plan.layout.cells) + GRIP_GAP + GRIP_LENGTH
+        count = "one tongue" if len(tongues) == 1 else f"{len(tongues)} tongues"
+        yield BenchStep(
+            "Cut the tongues",
+            f"Cut {count} from film or steel {number(dims.exit.height, 3)} mm thick: a "
+            f"strip {number(dims.exit.width, 3)} mm wide and at least {number(length, 2)} mm long, one end cut hollow "
+            f"to a radius of {number(dims.ledge_radius, 3)} mm so that it fits the riser of the core's ledge: a hole "
+            "of that radius, punched or drilled at the strip's end and cut through its middle, makes it. No burr. Fold "
+            f"tape over the last {number(GRIP_LENGTH, 2)} mm of the other end: this tab is what you pull by, with "
+            "fingers or flat pliers.",
+        )
