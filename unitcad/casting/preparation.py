@@ -93,7 +93,8 @@ def preparation(moulds: MouldSet, views: dict[str, View]) -> Iterator[BenchStep]
         )
     yield BenchStep(
         "Try every cup, dry",
-        f"{on} until seat and plinth touch; a slit of {number(lengths.seat_relief_mm, 3)} mm is then left between cup and plate, all "
+        f"{on} until seat and plinth touch; a slit of {number(lengths.seat_relief_mm, 3)} mm is then left between "
+        "cup and plate, all "
         "round: the same strip of paper, folded to that thickness, goes in on all four sides. A cup that rocks or "
         f"stands higher on one side: scrape plinth and seat clean, and try again.{lids}",
         picture_path("pour1-cup-on"),
