@@ -82,7 +82,9 @@ def _spectrum_chart(record: RecordResult, chains: tuple[Chain, ...]) -> str:
             name = f"zeros of {chain.name}'s comb"
             series.append(Series(name, zeros, np.full(len(zeros), floor), points=True, bars=bars))
     band = next((chain.pass_hz for chain in chains if chain.pass_hz), None)
-    return chart(series, record.file, "frequency, Hz", f"amplitude, {record.unit}", log_y=True, shaded=band)
+    return chart(
+        series, f"{record.file}: spectrum", "frequency, Hz", f"amplitude, {record.unit}", log_y=True, shaded=band
+    )
 
 
 def _decay_chart(name: str, levels: list[PlaceLevel]) -> str:
@@ -97,7 +99,7 @@ def _decay_chart(name: str, levels: list[PlaceLevel]) -> str:
     series = []
     for i, (key, there) in enumerate(kinds.items()):
         there.sort(key=lambda one: one.distance_mm)
-        shift = APART * wide * (i - (len(kinds) - 1) / 2)
+        shift = APART * wide * i
         x = [one.distance_mm + shift for one in there]
         bars = [(one.level.low, one.level.high) for one in there]
         series.append(Series(f"{key}, 95 % interval", x, [one.level.value for one in there], points=True, bars=bars))

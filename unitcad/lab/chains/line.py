@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats
-from unitcad.lab.chains import demodulation, least_squares, uncertainty
+from unitcad.lab.chains import demodulation, hidden_mains, least_squares, uncertainty
 from unitcad.lab.chains.censored import solve_censored
 from unitcad.lab.chains.chain import Chain, ChainTable
 from unitcad.lab.chains.clipping import LOWEST, NEAR, clip_mask
@@ -86,18 +86,24 @@ def fit_line(
     if deviation > 0 and part >= LOWEST:
         known &= np.abs(x) < 6 * deviation
     time = np.arange(len(x)) / rate
-    if phase is not None and span is not None:
-        frequency = _frequency(phase, span)[0]
-        solution = _solve(x, time, rate, known, good & ~cut, cut, span, phase, frequency, mains)
-    else:
-        frequency = demodulation.coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
-        if frequency <= 0:
-            return None
-        found = _twice(x, time, rate, known, good & ~cut, cut, frequency, mains)
+    removed = 0.0
+    found: tuple[_Solution, Phase, tuple[float, float]] | None = None
+    for attempt in range(2):
+        if phase is not None and span is not None:
+            frequency = _frequency(phase, span)[0]
+            found = _solve(x, time, rate, known, good & ~cut, cut, span, phase, frequency, mains), phase, span
+        else:
+            frequency = demodulation.coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
+            found = _twice(x, time, rate, known, good & ~cut, cut, frequency, mains) if frequency > 0 else None
         if found is None:
             return None
-        solution, phase, span = found
-    fit = _summary(solution, time, rate, phase, span, mains)
+        hidden = None if attempt else _hidden(found[0], time, rate, found[2], found[1], mains, phase is None)
+        if hidden is None:
+            break
+        x, removed = x - hidden[0], hidden[1]
+    assert found is not None
+    solution, phase, span = found
+    fit = _summary(solution, time, rate, phase, span, mains, removed)
     fit = replace(
         fit,
         masked=float(np.mean(~solution.good[good & ~cut])),
@@ -106,6 +112,41 @@ def fit_line(
     inside = (time >= span[0]) & (time <= span[1])
     use = inside & solution.good
     return several_lines(x - solution.mains, solution.residual, time, use, fit, rate, mains.frequency_hz) or fit
+
+
+def _hidden(
+    solution: _Solution, time: Floats, rate: float, span: tuple[float, float], phase: Phase, mains: Mains, free: bool
+) -> tuple[Floats, float] | None:
+    """Return the mains that the record alone can't tell from the line, and what they leave in its amplitude's u.
+
+    None where there are none, or nothing is known of them. `free`: the phase was fitted to the line.
+    """
+    order = _hidden_order(phase, span, rate, mains)
+    amplitude = mains.amplitude(order) if order else None
+    if not amplitude:
+        return None
+    inside = (time >= span[0]) & (time <= span[1])
+    here, good = time[inside], solution.good[inside]
+    angle = phase.at(here)
+    residual = solution.residual[inside] * np.exp(-1j * angle)
+    deviation = uncertainty.noise(residual, good, rate) * np.sqrt(good.sum())
+    line, weight = uncertainty.blocks_of(solution.value, residual, good, rate, hidden_mains.BLOCK_S)
+    middle = uncertainty.blocks_of(0.0, here, np.ones(len(here), bool), rate, hidden_mains.BLOCK_S)[0] / 2
+    kept = weight > 0
+    turned = np.interp(middle, here, angle)
+    hertz = order * mains.frequency_hz
+    noise = deviation / np.sqrt(weight[kept])
+    found = hidden_mains.hidden_mains(line[kept], middle[kept], turned[kept], noise, hertz, amplitude, free)
+    wave = 2 * np.pi * hertz * time
+    return found.cosine * np.cos(wave) + found.sine * np.sin(wave), found.u
+
+
+def _hidden_order(phase: Phase, span: tuple[float, float], rate: float, mains: Mains) -> int:
+    """Return the multiple of the mains' frequency that a record can't tell from its line; 0 where there is none."""
+    frequency, spread = _frequency(phase, span)
+    order = round(frequency / mains.frequency_hz)
+    told = least_squares.mains_orders(mains.frequency_hz, rate, (frequency,), span[1] - span[0], spread)
+    return 0 if order in told else order
 
 
 def _twice(
@@ -221,9 +262,9 @@ def _solve(
 
 
 def _summary(
-    solution: _Solution, time: Floats, rate: float, phase: Phase, span: tuple[float, float], mains: Mains
+    solution: _Solution, time: Floats, rate: float, phase: Phase, span: tuple[float, float], mains: Mains, share: float
 ) -> LineFit:
-    """Return a solution's figures with their uncertainty."""
+    """Return a solution's figures with their uncertainty; `share` is the part by mains that can't be told apart."""
     inside = (time >= span[0]) & (time <= span[1])
     good = solution.good[inside]
     turn = np.exp(-1j * phase.at(time[inside]))
@@ -234,18 +275,13 @@ def _summary(
     towards = np.real(blocks * np.conj(solution.value)) / max(amplitude, 1e-300)
     wander, scatter = uncertainty.of_mean(towards, noise**2 * len(towards))
     frequency, spread = _frequency(phase, span)
-    order = round(frequency / mains.frequency_hz)
-    apart = order * mains.frequency_hz
-    hidden = order not in least_squares.mains_orders(
-        mains.frequency_hz, rate, (frequency,), np.ptp(time[inside]), spread
-    )
-    share = (mains.amplitude(order) or 0.0) / np.sqrt(2) if hidden and order else 0.0
+    order = _hidden_order(phase, span, rate, mains)
     deviation = float(np.sqrt(np.mean(solution.residual[inside][good] ** 2)))
     return LineFit(
         amplitude=amplitude,
         u=float(np.sqrt(noise**2 + wander**2 + share**2)),
         u_noise=float(noise),
-        u_mains=float(share),
+        u_mains=share,
         value=solution.value,
         frequency_hz=frequency,
         drift=spread / frequency,
@@ -253,7 +289,7 @@ def _summary(
         scatter=scatter / amplitude if amplitude > 0 else float("inf"),
         start_s=span[0],
         end_s=span[1],
-        mains_hz=apart if hidden and order else 0.0,
+        mains_hz=order * mains.frequency_hz,
         phase=phase,
         blocks=tuple(complex(b) for b in blocks),
     )

@@ -34,11 +34,16 @@ def noise(residual: Floats, good: Bools, rate: float) -> float:
 
 def blocks(value: complex, residual: Floats, good: Bools, rate: float) -> Floats:
     """Return the line's complex amplitude in equal blocks: the whole record's and the mean of what is left there."""
-    count = max(round(len(residual) / rate / BLOCK_S), LEAST_BLOCKS)
+    return blocks_of(value, residual, good, rate, BLOCK_S)[0]
+
+
+def blocks_of(value: complex, residual: Floats, good: Bools, rate: float, length_s: float) -> tuple[Floats, Floats]:
+    """Return the line's complex amplitude in blocks of about `length_s`, and how many good samples each has."""
+    count = max(round(len(residual) / rate / length_s), LEAST_BLOCKS)
     edges = np.linspace(0, len(residual), count + 1).astype(int)
     sums = np.add.reduceat(residual, edges[:-1])
     weight = np.add.reduceat(good.astype(float), edges[:-1])
-    return value + 2 * sums / np.maximum(weight, 1)
+    return value + 2 * sums / np.maximum(weight, 1), weight
 
 
 def of_mean(values: Floats, noise_variance: float) -> tuple[float, float]:
