@@ -23,6 +23,7 @@ MODULES = {
     "stability": "stability",
     "models": "edge_levels",
     "mechanics": "unit_elements",
+    "design": "proposal_reliability",
     "extremes": "extremes",
     "left-out": "left_out",
     "measure": "measure",
@@ -38,6 +39,7 @@ NEEDS = {
     "stability": _REFERENCE,
     "models": _ELEMENTS,
     "mechanics": _ELEMENTS,
+    "design": {"optuna": "test"},
 }
 """What a suite imports beyond the core: each module, and the extra that installs it."""
 

@@ -54,6 +54,17 @@ class MeasuredTable:
         """n E_outer/E_inner of every unit, the divider's variable."""
         return self.evaluate(lambda u: u.passes * u.youngs_modulus[..., -1] / u.youngs_modulus[..., 0])
 
+    def without(self, index: int) -> MeasuredTable:
+        """Return the table without one unit."""
+        kept = [i for i in range(len(self.names)) if i != index]
+        return MeasuredTable(
+            tuple(self.names[i] for i in kept),
+            tuple(self.designs[i] for i in kept),
+            tuple(self.layers[i] for i in kept),
+            self.levels[kept],
+            tuple(self.inputs[i] for i in kept),
+        )
+
     def units(self, index: int) -> Units:
         """Return the closed forms' input for one unit of the table."""
         return self.inputs[index]

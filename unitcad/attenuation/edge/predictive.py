@@ -92,7 +92,7 @@ class Stack:
         """Return the distribution of further units' ln level."""
         levels = [edge_levels(units, model, own) for model, own in zip(self.models, self.constants, strict=True)]
         with np.errstate(divide="ignore", invalid="ignore"):
-            centre = np.log(np.stack(levels, axis=-1))
+            centre = np.log(np.stack(np.broadcast_arrays(*levels), axis=-1))
         return Predictive(
             self.models, self.weights, self.degrees_of_freedom, centre, np.broadcast_to(self.scale, centre.shape)
         )

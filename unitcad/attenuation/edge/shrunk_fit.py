@@ -37,15 +37,7 @@ class Campaigns:
     def without(self, index: int) -> Campaigns:
         """Return the campaigns without one unit."""
         kept = np.arange(self.own.size) != index
-        table = replace(
-            self.table,
-            names=tuple(np.array(self.table.names)[kept].tolist()),
-            designs=tuple(np.array(self.table.designs)[kept].tolist()),
-            layers=tuple(layers for layers, keep in zip(self.table.layers, kept, strict=True) if keep),
-            levels=self.table.levels[kept],
-            inputs=tuple(units for units, keep in zip(self.table.inputs, kept, strict=True) if keep),
-        )
-        return replace(self, table=table, own=self.own[kept], error=self.error[kept])
+        return replace(self, table=self.table.without(index), own=self.own[kept], error=self.error[kept])
 
 
 @dataclass(frozen=True)
