@@ -85,3 +85,4 @@ class Preview(Struct, frozen=True, kw_only=True):
     linked_mb: float
     refused_count: int
     refused: list[RefusedVariant]
+    warnings: list[str] = []

@@ -27,6 +27,8 @@ from unitcad.batch.results import FIRST, write_results, write_timings
 from unitcad.batch.run import MOST_FAILURES, BatchOptions, batch_head, counted
 from unitcad.batch.sweep import Sweep
 from unitcad.batch.task import OK
+from unitcad.batch.unread_keys import swept_estimate
+from unitcad.batch.unread_keys import warnings as unread_warnings
 from unitcad.errors import UnitcadError
 from unitcad.estimating import closed_forms, estimate_input
 from unitcad.spec import Spec
@@ -83,7 +85,9 @@ def write_estimates(sweep: Sweep, out: Path, options: BatchOptions) -> Summary:
         models = list(dict.fromkeys(model for block in blocks for model in block.levels))
         paths = [path for path in sweep.paths if path != "name"]
         columns = list(dict.fromkeys([*FIRST, *paths, "name", "design", "diameter_mm", *(f"edge_{m}" for m in models)]))
-        write_results(out, columns, lambda: _entries(sweep, blocks), head)
+        found = swept_estimate(sweep, count)
+        summary.warnings += unread_warnings(found)
+        write_results(out, columns, lambda: _entries(sweep, blocks), head, found)
         _count(summary, blocks)
         summary.seconds = round(time.perf_counter() - start, 3)
         write_timings(out, summary, 1)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from unitcad.batch.batch_records import Preview, RefusedVariant
 from unitcad.batch.run import BatchOptions, counted
 from unitcad.batch.sweep import Sweep
+from unitcad.batch.unread_keys import swept_estimate
+from unitcad.batch.unread_keys import warnings as unread_warnings
 from unitcad.cache import MemoryStore
 from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
@@ -60,6 +62,7 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
         linked_mb=round((shared + own) * variants / 1e6, 3),
         refused_count=round(len(refused) * share),
         refused=refused[:MOST_REFUSED],
+        warnings=unread_warnings(swept_estimate(sweep, count)) if "estimate" in only else [],
     )
 
 

@@ -16,17 +16,23 @@ from unitcad import files
 from unitcad.batch.batch_records import BatchHead, JournalEntry, Summary, Values
 from unitcad.batch.journal import Journal
 from unitcad.batch.sweep import Sweep
+from unitcad.batch.unread_keys import SweptEstimate
 from unitcad.text import cell
 
 FIRST = ("index", "status", "reason", "folder")
 
 
 def write_results(
-    out: Path, columns: list[str], entries: Callable[[], Iterable[JournalEntry]], head: BatchHead
+    out: Path,
+    columns: list[str],
+    entries: Callable[[], Iterable[JournalEntry]],
+    head: BatchHead,
+    estimate: SweptEstimate | None,
 ) -> None:
     """Write both tables; `entries` gives the variants in the sweep's order, one at a time. Raises OSError."""
     _write_csv(out / "variants.csv", columns, entries())
-    _write_json(out / "batch.json", {**to_builtins(head), "columns": columns}, entries())
+    levels = {"estimate": to_builtins(estimate)} if estimate else {}
+    _write_json(out / "batch.json", {**to_builtins(head), **levels, "columns": columns}, entries())
 
 
 def write_timings(out: Path, summary: Summary, workers: int) -> None:

@@ -22,6 +22,8 @@ from unitcad.batch.remote import Receiver
 from unitcad.batch.results import columns_of, write_results, write_timings
 from unitcad.batch.sweep import MOST, Sweep
 from unitcad.batch.task import Job, Task, VariantOutcome
+from unitcad.batch.unread_keys import swept_estimate
+from unitcad.batch.unread_keys import warnings as unread_warnings
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.pipeline.artifacts import OUTPUTS
@@ -91,7 +93,9 @@ def run(
     try:
         clear_leftovers(out)
         batch.all()
-        write_results(out, columns_of(sweep, journal), journal.entries, head)
+        found = swept_estimate(sweep, summary.variants) if "estimate" in head.outputs else None
+        summary.warnings += unread_warnings(found)
+        write_results(out, columns_of(sweep, journal), journal.entries, head, found)
         summary.seconds = round(time.perf_counter() - start, 3)
         write_timings(out, summary, workers)
         watch(summary, None)

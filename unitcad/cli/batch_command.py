@@ -151,6 +151,8 @@ def _print_preview(size: Preview) -> None:
     typer.echo(f"{about}{counted(size.parts, 'distinct part')}")
     stored = f"{size.stored_mb:.1f} MB stored, {size.linked_mb:.1f} MB with every link counted"
     typer.echo(f"about {counted(size.files, 'file')}, {stored}")
+    for warning in size.warnings:
+        warn(f"warning: {warning}")
     for refused in size.refused:
         warn(f"variant {refused.index} is refused: {refused.reason}")
     if size.refused_count > len(size.refused):

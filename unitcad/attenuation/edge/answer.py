@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from unitcad.attenuation.edge.fitted_models import assessments
+from unitcad.attenuation.edge.lab_fit import LabFit
 from unitcad.attenuation.edge.predictive import Predictive
 from unitcad.text import listed, number
 
@@ -81,6 +83,13 @@ def _points(expected: Predictive | None) -> tuple[float | None, float | None, fl
         return None, None, None
     low, median, high = (float(one[0]) for one in expected.range)
     return low, median, high
+
+
+def typical_errors(fit: LabFit | None = None) -> dict[str, float]:
+    """Return each model's typical factor with the unit left out: on the lab's units, else on the paper's nine."""
+    if fit:
+        return {name: one.left_out for name, one in fit.model.items()}
+    return {name: one.left_out.geometric_mean for name, one in assessments().items()}
 
 
 def percent(level: float, digits: int = 2) -> str:
