@@ -20,7 +20,9 @@ def column(visit: Visit, name: str) -> list[str]:
     return visit.page.locator(f".variants tbody tr > :nth-child({at})").all_inner_texts()
 
 
-def table_page(folder: Path, columns: list[str], rows: list[list[Any]], **more: Any) -> Path:
+def table_page(
+    folder: Path, columns: list[str], rows: list[list[Any]], swept: list[str] | None = None, **more: Any
+) -> Path:
     """A page with a table of our own: each row the variant's folder and its cells."""
     data = {
         "title": "many",
@@ -33,5 +35,7 @@ def table_page(folder: Path, columns: list[str], rows: list[list[Any]], **more: 
         **more,
     }
     file = folder / "table.html"
-    file.write_text(pages.page({**data, "table": {"columns": columns, "rows": rows}}, "many"), "utf-8")
+    file.write_text(
+        pages.page({**data, "table": {"columns": columns, "rows": rows, "swept": swept or []}}, "many"), "utf-8"
+    )
     return file

@@ -34,7 +34,7 @@ from unitcad.spec import Spec
 VENDORED = ("three.min.js", "uplot.min.js")
 PROGRAMS = (
     "dom.js", "glb.js", "viewer.js", "controls.js", "plots.js", "estimate.js", "sections.js", "casting.js",
-    "filters.js", "table.js", "main.js",
+    "filters.js", "rows.js", "compare.js", "table.js", "main.js",
 )  # fmt: skip
 MOST_DAMAGED = 20
 """Damaged results that are named when a page is written; the page names all."""
@@ -100,6 +100,7 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
         "version": __version__,
         "variants": [[record.folder, pool.put(record.as_dict())] for record in records],
         "table": structs.asdict(table) if table else None,
+        "estimate": _of_all(batch, records),
         "batch": {key: value for key, value in batch.items() if key != "variants"} if batch else None,
         "damaged": sorted(damaged.items()),
         "pool": pool.entries,
@@ -107,6 +108,30 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
     }
     partly = {record.folder or folder.name: record.damaged for record in records if record.damaged}
     return data, title, damaged | {name: whys[0] for name, whys in partly.items()}
+
+
+def _of_all(batch: dict[str, Any] | None, records: list[VariantRecord]) -> dict[str, Any]:
+    """Return what holds for the levels of all variants: typical error by model, and swept keys that it does not read.
+
+    As batch.json has them; of a folder without one the errors are those of the first estimate.
+    """
+    if batch and isinstance(batch.get("estimate"), dict):
+        return batch["estimate"]
+    for record in records:
+        table = (record.estimate or {}).get("table_error")
+        if isinstance(table, dict):
+            found = {name: _typical(table.get(name)) for name in table}
+            return {"typical_error": {name: one for name, one in found.items() if one}, "not_read": {}}
+    return {"typical_error": {}, "not_read": {}}
+
+
+def _typical(scores: Any) -> float | None:
+    """Return a model's typical factor with the unit left out from its scores in an estimate; None for anything else."""
+    try:
+        typical = scores["leave_one_unit_out"]["levels"]["geometric_mean"]
+    except (KeyError, TypeError):
+        return None
+    return typical if isinstance(typical, float) else None
 
 
 def _models(records: list[VariantRecord], specs: Iterable[Spec | None]) -> dict[str, Any]:

@@ -133,24 +133,30 @@ def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], d
             for entry in entries
         ]
         columns = [*(name for name in ("status", "reason") if name not in columns), *columns]
-    columns = _in_order(columns)
+    swept = _swept(columns)
+    columns = _in_order(columns, swept)
     there = {each.folder for each in variants}
     rows = [
         [entry.get("folder") if entry.get("folder") in there else "", *(_cell(entry.get(c)) for c in columns)]
         for entry in entries
     ]
-    return ResultsTable(columns, rows)
+    return ResultsTable(columns, rows, [name for name in columns if name in swept])
 
 
-def _in_order(columns: list[str]) -> list[str]:
-    """Order columns: name, swept values (before `name` in a batch; else the spec's), the edge's levels, the rest."""
+def _swept(columns: list[str]) -> set[str]:
+    """Return the columns of chosen values: those before `name` in a batch; else the spec's."""
     before = columns[: columns.index("name")] if "name" in columns else []
-    swept = {name for name in before if name not in OF_EVERY_BATCH} | {"design", "diameter_mm"}
+    given = {name for name in columns if name in ("design", "diameter_mm") or name.startswith("layers.")}
+    return {name for name in before if name not in OF_EVERY_BATCH} | given
+
+
+def _in_order(columns: list[str], swept: set[str]) -> list[str]:
+    """Order columns: name, swept values, the edge's levels, the rest."""
 
     def place(name: str) -> int:
         if name == "name":
             return 0
-        if name in swept or name.startswith("layers."):
+        if name in swept:
             return 1
         return 2 if name.startswith("edge_") else 3
 

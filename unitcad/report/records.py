@@ -54,10 +54,14 @@ class VariantRecord(Struct, kw_only=True):
 
 
 class ResultsTable(Struct, frozen=True):
-    """Table of a batch on the page: each row begins with the folder of its variant, "" for one that failed."""
+    """Table of a batch on the page: each row begins with the folder of its variant, "" for one that failed.
+
+    `swept` are the columns that a person chose values for.
+    """
 
     columns: list[str]
     rows: list[list[Any]]
+    swept: list[str] = []
 
 
 def expect(data: Any, kind: Any, path: Path) -> None:

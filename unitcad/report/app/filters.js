@@ -11,15 +11,16 @@
 
   const isNumber = (value) => typeof value === "number";
   const isAbsent = (value) => value === null || value === undefined;
-  // What is shown as the same number is the same: cells are shown with six digits.
-  const equal = (value, limit) => value === limit || number(value, 6) === number(limit, 6);
   const SIGNS = {
     "<": (v, limit) => v < limit, "<=": (v, limit) => v <= limit, "≤": (v, limit) => v <= limit,
-    ">": (v, limit) => v > limit, ">=": (v, limit) => v >= limit, "≥": (v, limit) => v >= limit, "=": equal,
+    ">": (v, limit) => v > limit, ">=": (v, limit) => v >= limit, "≥": (v, limit) => v >= limit,
   };
 
-  // A test of a number, or null where the text is no number, no comparison and no range.
-  function ofNumbers(text) {
+  // A test of a number, or null where the text is no number, no comparison and no range. What a cell shows with so
+  // many digits as the same number is the same.
+  function ofNumbers(text, digits) {
+    const equal = (value, limit) => value === limit || number(value, digits) === number(limit, digits);
+    const holds = (sign, value, limit) => (sign === "=" ? equal(value, limit) : SIGNS[sign](value, limit));
     if (ONE.test(text)) return (value) => equal(value, Number(text));
     const range = text.match(RANGE);
     if (range && (range[1] || range[2])) {
@@ -29,7 +30,7 @@
     const found = text.match(COMPARISONS);
     if (!found) return null;
     const [, first, low, second, high] = found;
-    return (value) => SIGNS[first](value, Number(low)) && (!second || SIGNS[second](value, Number(high)));
+    return (value) => holds(first, value, Number(low)) && (!second || holds(second, value, Number(high)));
   }
 
   // A test of whether a cell holds a text; null for no text.
@@ -46,14 +47,14 @@
   }
 
   // {test} of a cell, {} for no filter, or {fault} where a filter is not understood.
-  function filterOf(text, { numbers, texts }) {
+  function filterOf(text, { numbers, texts, digits = 6 }) {
     const wanted = text.trim();
     if (!wanted) return {};
     if (wanted.startsWith("!")) {
-      const { test } = filterOf(wanted.slice(1), { numbers, texts });
+      const { test } = filterOf(wanted.slice(1), { numbers, texts, digits });
       return test ? { test: (value) => !test(value) } : { fault: numbers ? FORMS : "text, = text, !text" };
     }
-    const compared = ofNumbers(wanted);
+    const compared = ofNumbers(wanted, digits);
     if (!texts) return compared ? { test: (value) => isNumber(value) && compared(value) } : { fault: FORMS };
     const exact = wanted.match(/^=\s*(.*)$/);
     const begun = /^[<>≤≥=]=?\s*$/.test(wanted) || (!numbers && compared && /^[<>≤≥]/.test(wanted));

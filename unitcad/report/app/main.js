@@ -2,7 +2,7 @@
 (() => {
   "use strict";
   const U = window.unitcad;
-  const { el, clear, section, theme } = U;
+  const { el, clear, number, section, theme } = U;
   const page = document.getElementById("page");
   let leave = () => {};
 
@@ -86,22 +86,45 @@
     leave = () => view.ready.then((made) => made && made.free());
   }
 
+  // A variant's section, small; a picture that says nothing to who can't see it, since its row says all.
+  const thumbnail = (variant) => {
+    const svg = variant && variant.drawings && U.bodiesOf(variant.drawings["section.svg"]);
+    return svg && el("img", { className: "thumbnail", src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`, alt: "", loading: "lazy" });
+  };
+
   // Made once: who comes back from a variant finds filters, order and axes as they were left. Returns what shows it.
-  function batchPage(data, why) {
-    const { table, batch } = data;
+  function batchPage(data, why, variant) {
+    const { batch } = data;
+    const table = U.readable(data.table, data.estimate);
     const nameColumn = table.columns.includes("name") ? "name" : table.columns[0];
+    const varying = U.varyingIn(table);
+    const named = U.namer(table, nameColumn, varying);
     const plotHost = el("div");
     const selects = {};
     let rows = [];
     const at = (name) => table.columns.indexOf(name) + 1;
+    // A model's level is plotted against what it reads: a level that stays the same is no result of the sweep.
+    const { not_read: unread = {}, typical_error: errors = {} } = data.estimate || {};
+    const blind = (x, y) => {
+      const keys = unread[U.modelOf(y)] || [];
+      const reads = [...table.swept].some((name) => varying.includes(name) && !keys.includes(name));
+      return keys.includes(x) || (keys.length > 0 && !reads);
+    };
+    const notRead = el("p", { className: "unread", role: "status" });
     const plot = () => {
-      const [x, y, group] = ["x", "y", "group"].map((key) => selects[key].value);
-      const points = rows.map((row) => ({ x: row[at(x)], y: row[at(y)], group: group ? row[at(group)] : "", title: row[at(nameColumn)] ?? row[0], why: (column) => why(row[0], column) || row[at("reason")], open: row[0] && (() => { location.hash = encodeURIComponent(row[0]); }) }));
-      clear(plotHost, U.scatterPlot(points, { xLabel: x, yLabel: y, label: `${y} against ${x}, ${points.length} variants` }));
+      const x = selects.x.value;
+      const left = [...selects.y.options].filter((option) => (option.disabled = blind(x, option.value)));
+      if (selects.y.selectedOptions[0].disabled) selects.y.value = best(x);
+      const [y, group] = ["y", "group"].map((key) => selects[key].value);
+      notRead.textContent = left.length ? `Not offered: ${left.map((option) => option.value).join(", ")}, whose model does not read ${x}.` : "";
+      const points = rows.map((row) => ({ x: row[at(x)], y: row[at(y)], range: table.range(y, row[at(y)]), group: group ? row[at(group)] : "", title: named(row), why: (column) => why(row[0], column) || row[at("reason")], open: row[0] && (() => { location.hash = encodeURIComponent(row[0]); }) }));
+      clear(plotHost, U.scatterPlot(points, { xLabel: table.head(x), yLabel: table.head(y), columns: [x, y], label: `${y} against ${x}, ${points.length} variants` }),
+        points.some((point) => point.range) && el("p", { className: "note" }, `Bars: the level over and times ${number(errors[U.modelOf(y)], 3)}, the model's typical error with a unit left out.`));
     };
     let ready = false;
-    const made = U.createTable(table, { nameColumn, changed: (shown) => { rows = shown; if (ready) plot(); } });
-    const varying = made.varying();
+    const pins = U.createPins(table, { nameOf: named, variant, shown: table.shown, head: table.head });
+    const lead = (row) => [pins.pin(row), thumbnail(row[0] && variant(row[0]))];
+    const made = U.createTable(table, { nameColumn, named, lead, changed: (shown) => { rows = shown; if (ready) plot(); } });
     const filled = (name) => table.rows.filter((row) => typeof row[at(name)] === "number").length;
     const numeric = varying.filter((name) => filled(name) > 0).sort((a, b) => filled(b) - filled(a));
     const choice = (key, label, names, value) => {
@@ -110,15 +133,21 @@
     };
     const names = varying.length ? varying : table.columns;
     const texts = varying.filter((name) => !numeric.includes(name) && name !== nameColumn);
-    const preferred = (list, pattern) => list.find((name) => pattern.test(name) && (list !== numeric || filled(name) * 2 > table.rows.length));
+    const preferred = (list, pattern) => list.find((name) => pattern.test(name) && (list === texts || filled(name) * 2 > table.rows.length));
+    // The level of the best model that reads what goes across; else a volume, else anything.
+    const levels = Object.keys(errors).map((model) => `edge_${model}`);
+    const best = (x) => [...levels, ...numeric].find((name) => numeric.includes(name) && U.modelOf(name) && filled(name) * 2 > table.rows.length && !blind(x, name))
+      || preferred(numeric.filter((name) => !blind(x, name)), /volume|mm3/) || numeric.find((name) => name !== x && !blind(x, name)) || names[names.length - 1];
+    const across = preferred(numeric, /wall|thick|diameter/) || numeric[0] || names[0];
     const controls = el("div", { className: "tools" },
-      choice("x", "Across", names, preferred(numeric, /wall|thick|diameter/) || numeric[0] || names[0]),
-      choice("y", "Up", names, preferred(numeric, /fitted/) || preferred(numeric, /edge|volume|mm3/) || numeric[1] || numeric[0] || names[names.length - 1]),
+      choice("x", "Across", names, across),
+      choice("y", "Up", names, best(across)),
       choice("group", "Colour", ["", ...texts], preferred(texts, /design|material/) || ""));
     const geometries = Object.keys(data.models).length;
-    const failed = table.rows.filter((row) => !row[0]).length;
-    const chips = [el("span", { className: "chip" }, `${geometries} geometries`), failed > 0 && el("span", { className: "chip bad" }, `${failed} failed`)];
-    const sections = [section("variants", "Variants", made.node), section("plot", "Two columns against each other", controls, plotHost)];
+    // A batch of estimates alone has no folders.
+    const failed = table.rows.filter((row) => !row[0] && !(table.columns.includes("status") && row[at("status")] === "ok")).length;
+    const chips = [geometries > 0 && el("span", { className: "chip" }, `${geometries} ${geometries === 1 ? "geometry" : "geometries"}`), failed > 0 && el("span", { className: "chip bad" }, `${failed} failed`)];
+    const sections = [section("variants", "Variants", made.node), pins.node, section("plot", "Two columns against each other", controls, notRead, plotHost)];
     if (data.damaged.length) sections.push(section("damaged", "Damaged", U.table(["Result", "Why"], data.damaged, { label: "Damaged results" })));
     if (batch) sections.push(section("batch", "The batch", el("details", {}, el("summary", {}, "Properties of the batch"), U.facts(batch))));
     ready = true;
@@ -160,7 +189,8 @@
       const { models } = (model && resolve(variants.get(folder)).estimate) || {};
       return models && models[model] && models[model].edge_level && models[model].edge_level.reason;
     };
-    const showBatch = data.table && batchPage(data, why);
+    const variant = (folder) => (variants.has(folder) ? resolve(variants.get(folder)) : null);
+    const showBatch = data.table && batchPage(data, why, variant);
     const route = () => {
       leave();
       const wanted = variantAsked();

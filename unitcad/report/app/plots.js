@@ -121,23 +121,25 @@
     });
   }
 
-  // points: [{x, y, group, title, open, why(column)}]; a click or a tap opens the nearest one.
-  function scatterPlot(points, { xLabel, yLabel, label }) {
+  // points: [{x, y, range, group, title, open, why(column)}], `range` the ends of y's bar or null; a click or a tap opens the nearest one.
+  function scatterPlot(points, { xLabel, yLabel, columns: [xColumn, yColumn], label }) {
     const xs = scaleOf(points.map((p) => p.x));
     const ys = scaleOf(points.map((p) => p.y));
     const drawn = points.map((p) => ({ ...p, px: xs.of(p.x), py: ys.of(p.y) })).filter((p) => p.px !== null && p.py !== null);
-    const notes = [lacking(points.filter((p) => xs.of(p.x) === null), xLabel), xLabel !== yLabel && lacking(points.filter((p) => ys.of(p.y) === null), yLabel)];
+    const notes = [lacking(points.filter((p) => xs.of(p.x) === null), xColumn), xColumn !== yColumn && lacking(points.filter((p) => ys.of(p.y) === null), yColumn)];
     if (!drawn.length) return el("div", {}, el("p", { className: "tip" }, `0 of ${points.length} points.`), notes);
     const groups = [...new Set(points.map(groupOf))].sort();
     const tip = el("p", { className: "tip", "aria-live": "polite" });
     const { host } = hosted(360, (node, width, height) => {
       const tables = groups.map((group) => {
         const mine = drawn.filter((p) => groupOf(p) === group).sort((a, b) => a.px - b.px);
-        return [mine.map((p) => p.px), mine.map((p) => p.py)];
+        return [mine.map((p) => p.px), mine.map((p) => p.py), mine.map((p) => p.range)];
       });
       const names = (scale) => scale.names && ((u, splits) => splits.map((v) => (Number.isInteger(v) && scale.names[v] !== undefined ? short(scale.names[v]) : "")));
-      const range = (scale) => (u, low, high) => {
+      const bars = drawn.flatMap((p) => p.range || []);
+      const range = (scale) => (u, least, most) => {
         if (scale.names) return [-0.5, scale.names.length - 0.5];
+        const [low, high] = scale === ys ? [Math.min(least, ...bars), Math.max(most, ...bars)] : [least, most];
         const pad = (high - low) * 0.06 || Math.abs(high) * 0.1 || 1;
         return [low - pad, high + pad];
       };
@@ -160,6 +162,20 @@
         ctx.fillStyle = colour;
         ctx.strokeStyle = theme.colour("paper");
         ctx.lineWidth = devicePixelRatio;
+        u.data[index][2].forEach((ends, i) => {
+          if (!ends) return;
+          const [x, ...y] = [u.valToPos(u.data[index][0][i], "x", true), ...ends.map((end) => u.valToPos(end, "y", true))];
+          ctx.strokeStyle = colour;
+          ctx.globalAlpha = 0.5;
+          ctx.lineWidth = 2 * devicePixelRatio;
+          ctx.beginPath();
+          ctx.moveTo(x, y[0]);
+          ctx.lineTo(x, y[1]);
+          ctx.stroke();
+        });
+        ctx.globalAlpha = 1;
+        ctx.lineWidth = devicePixelRatio;
+        ctx.strokeStyle = theme.colour("paper");
         u.data[index][0].forEach((x, i) => {
           ctx.beginPath();
           ctx.arc(u.valToPos(x, "x", true), u.valToPos(u.data[index][1][i], "y", true), radius, 0, 2 * Math.PI);
@@ -178,7 +194,7 @@
           setCursor: [(u) => {
             const p = u.cursor.left >= 0 ? nearest(u) : null;
             u.over.classList.toggle("hit", Boolean(p));
-            if (p) tip.textContent = `${p.title}: ${xLabel} ${tick(p.x)}, ${yLabel} ${tick(p.y)}`;
+            if (p) tip.textContent = `${p.title}: ${xLabel} ${tick(p.x)}, ${yLabel} ${p.range ? `${number(p.y, 2)} (${p.range.map((end) => number(end, 2)).join(" to ")})` : tick(p.y)}`;
           }],
           ready: [(u) => u.over.addEventListener("click", () => { const p = nearest(u); if (p && p.open) p.open(); })],
         },

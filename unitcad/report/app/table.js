@@ -1,7 +1,7 @@
 // A sortable, filterable table of variants, a page at a time.
 (() => {
   "use strict";
-  const { el, clear, number, filterOf, containing, kindsOf } = window.unitcad;
+  const { el, clear, filterOf, containing, kindsOf } = window.unitcad;
   const PAGE = 100;
 
   // Numbers before texts, nothing last whichever way.
@@ -18,10 +18,11 @@
     return new Set(columns.filter((name, i) => rows.length > 1 && rows.every((row) => row[i + 1] === rows[0][i + 1])));
   }
 
-  // table: {columns, rows: [[folder, ...cells]]}; open(row); changed(rows) is called whenever other rows are shown.
-  function createTable(table, { open, changed, nameColumn }) {
+  // table: {columns, rows: [[folder, ...cells]]}; changed(rows) is called whenever other rows are shown.
+  // `table` is made `readable`; `lead(row)` stands before a row's name, `named(row)` is that name.
+  function createTable(table, { changed, nameColumn, lead, named }) {
     const same = constants(table.columns, table.rows);
-    const kinds = table.columns.map((name, i) => kindsOf(table.rows.map((row) => row[i + 1])));
+    const kinds = table.columns.map((name, i) => ({ ...kindsOf(table.rows.map((row) => row[i + 1])), digits: table.digits(name) }));
     const fault = el("p", { className: "fault", id: "filters-fault", role: "status" });
     const state = { sort: null, direction: 1, filters: new Map(), search: "", page: 0, all: false };
     const columns = () => table.columns.map((name, i) => ({ name, at: i + 1 })).filter(({ name }) => state.all || !same.has(name) || name === nameColumn);
@@ -66,7 +67,7 @@
     function layout() {
       grid.style.setProperty("--columns", columns().length);
       clear(heads, columns().map(({ name, at }) => el("th", { scope: "col", "data-at": at }, el("button", { type: "button", onclick: () => sortBy(at) },
-        name.split(/(?<=[._])/).flatMap((piece) => [piece, el("wbr")])))));
+        table.head(name).split(/(?<=[._])/).flatMap((piece) => [piece, el("wbr")])))));
       clear(filters, columns().map(({ name, at }) => {
         const input = el("input", { type: "text", name: `filter-${name}`, "data-at": at, placeholder: "filter", "aria-label": `Filter ${name}: text, > 1, > 1 < 2, 1..2, !1`, oninput: () => { state.filters.set(at, input.value); state.page = 0; update(); } });
         input.value = state.filters.get(at) || "";
@@ -85,8 +86,8 @@
       const first = state.page * PAGE;
       clear(body, rows.slice(first, first + PAGE).map((row) => el("tr", {}, columns().map(({ name, at }) => {
         const value = row[at];
-        if (name === nameColumn) return el("th", { scope: "row" }, row[0] ? el("a", { href: `#${encodeURIComponent(row[0])}` }, value ?? row[0]) : String(value ?? "–"));
-        return el("td", { className: typeof value === "number" ? "number" : undefined }, number(value, 6));
+        if (name === nameColumn) return el("th", { scope: "row" }, el("div", { className: "lead-in" }, lead(row), row[0] ? el("a", { href: `#${encodeURIComponent(row[0])}` }, named(row)) : named(row)));
+        return el("td", { className: typeof value === "number" ? "number" : undefined }, table.shown(name, value));
       }))));
       count.textContent = `${rows.length} of ${table.rows.length} variants`;
       const step = (by, text) => el("button", { type: "button", disabled: state.page + by < 0 || state.page + by >= pages, onclick: () => { state.page += by; update(); } }, text);
@@ -96,7 +97,7 @@
 
     const known = [...same].filter((name) => name !== nameColumn).map((name) => {
       const value = table.rows[0][table.columns.indexOf(name) + 1];
-      return value === null || value === undefined ? null : el("li", {}, `${name} = ${number(value, 6)}`);
+      return value === null || value === undefined ? null : el("li", {}, `${table.head(name)} = ${table.shown(name, value)}`);
     }).filter(Boolean);
     const node = el("div", { className: "variants" },
       el("div", { className: "tools" }, search, el("label", {}, all, "columns that don't vary, too"), count),
@@ -106,8 +107,10 @@
       pager);
     layout();
     update();
-    return { node, varying: () => table.columns.filter((name) => !same.has(name)) };
+    return { node };
   }
 
-  Object.assign(window.unitcad, { createTable });
+  const varyingIn = (table) => table.columns.filter((name) => !constants(table.columns, table.rows).has(name));
+
+  Object.assign(window.unitcad, { createTable, varyingIn });
 })();
