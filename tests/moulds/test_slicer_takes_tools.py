@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,7 @@ from unitcad.errors import UnitcadError
 from unitcad.export import slicer, stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
+from unitcad.moulds.ribs import SLOPE, ribs
 from unitcad.pipeline.build import build
 from unitcad.pipeline.slicing import slice_tools
 from unitcad.validation import load, templates
@@ -81,6 +84,38 @@ def test_print_time_and_filament(tmp_path: Path) -> None:
     # A skirt round the piece comes on top.
     assert 0.5 * solid < report["filament_cm3"] < 5 * solid
     assert slicer.report([tongue], printers()["sla"]) is None
+
+
+@pytest.mark.parametrize("name", ["fdm-0.4", "fdm-0.25"])
+def test_the_slicer_draws_a_cup_s_ribs(name: str, tmp_path: Path) -> None:
+    """The outer edge of the extruded lines, halfway up the crests, reaches into the plinth by the interference."""
+    moulds = set_of("encapsulating", f"moulds.printer={name}")
+    layer, (rib, *_) = moulds.spec.moulds.layer_mm, ribs(moulds.spec, moulds.plan.layout)
+    cup = moulds.plan.tool("cup1")
+    file, code = tmp_path / "cup.stl", tmp_path / "cup.gcode"
+    file.write_bytes(stl.content(*print_ready(*arrays(moulds.solids["cup1"]), cup.upside_down), "cup"))
+    nozzle = slicer.NOZZLES_MM.get(name, 0.4)
+    heights = ("--layer-height", f"{layer:g}", "--first-layer-height", f"{layer:g}")
+    slicer._run("--export-gcode", "--output", str(code), "--nozzle-diameter", f"{nozzle:g}", *heights, str(file))
+    middle = (rib.bottom + rib.top) / 2
+    height = math.ceil((moulds.dimensions.heights[0] - middle) / layer) * layer
+    edges, kind, width, z = [], "", 0.0, 0.0
+    for line in code.read_text().splitlines():
+        key, _, value = line.partition(":")
+        if key == ";TYPE":
+            kind = value
+        elif key == ";WIDTH":
+            width = float(value)
+        elif key == ";Z":
+            z = float(value)
+        elif kind == "External perimeter" and abs(z - height) < 1e-6:
+            edges += [(float(x), float(y), width) for x, y in re.findall(r"^G1 X([\d.]+) Y([\d.]+)", line)]
+    centre = [(min(e[i] for e in edges) + max(e[i] for e in edges)) / 2 for i in (0, 1)]
+    # Lines along the recess: nearer to the middle than its wall, farther than the bore.
+    face = abs(rib.x) - middle * SLOPE
+    near = [abs(x - centre[0]) - width / 2 for x, y, width in edges if abs(abs(y - centre[1]) - abs(rib.y)) < 0.4]
+    tips = [at for at in near if abs(at - face) < 0.5]
+    assert face - min(tips) == pytest.approx(moulds.spec.moulds.rib_interference_mm, abs=0.01)
 
 
 def test_durations() -> None:

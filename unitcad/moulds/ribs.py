@@ -4,7 +4,7 @@ r"""Crush ribs: what centres a cup on its plinth. Two stand on each face of its 
     .--v-----------v--.                      seat
     |  .---------.    |              |  .-----------     z = 0
     |> | plinth   \  <|              | |
-    |  |           |  |              |  \    <- 45 degrees
+    |  |           |  |              |  \    <- roof
     |> |           | <|              |   |
     |  '-----------'  |              |   |   <- crest: reaches into the plinth by the interference
     '--^-----------^--'              |  /    <- lead-in, down to the skirt's end
@@ -24,6 +24,8 @@ from unitcad.moulds.layout import CORNER_RADIUS, PLINTH_DRAFT_DEG
 from unitcad.shape import Extrude, Profile, Shape, box, polygon
 from unitcad.spec import Spec, printer_of
 
+ROOF = 1.5
+"""Height of a crest's upper ramp over what it juts out: steep enough to be printed, upside down, without support."""
 ROOT = 0.5
 """How deep a rib's drawing reaches into the wall behind it, mm; half a thinner wall."""
 AROUND = 0.05
@@ -67,13 +69,13 @@ def placed(
     """
     proud, skirt = (clearance + interference) * SQUARE, -end
     beside = crest / 2 + proud + ROOT
-    ramp, head = min(proud, skirt / 4), -skirt / 5
+    ramp, roof, head = min(proud, skirt / 4), min(ROOF * proud, skirt / 4), -skirt / 5
     x, y = (size - corner - beside for size in half)
     if not interference or min(x, y) <= beside:
         return ()
     places = [((side * half[0], at), (-side, 0)) for side in (1, -1) for at in (y, -y)]
     places += [((at, side * half[1]), (0, -side)) for side in (1, -1) for at in (x, -x)]
-    return tuple(Rib(*at, inwards, end, end + ramp, head - ramp, head) for at, inwards in places)
+    return tuple(Rib(*at, inwards, end, end + ramp, head - roof, head) for at, inwards in places)
 
 
 def drawn(
