@@ -69,7 +69,8 @@ class Problem:
 class Integrals:
     """A row an order of the load at each radius, shape (rows, n), and a bound of its error.
 
-    cut_short: most of it is the tail's beyond what can be afforded; exhausted: there were panels left to be halved.
+    cut_short: most of it is rounding's, or the tail's beyond what can be afforded; exhausted: there were panels left to
+    be halved.
     """
 
     total: np.ndarray
@@ -99,7 +100,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     problem = replace(bare, reference=tail.reference)
     known = problem.static_part()
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
-    count, done, exhausted = 0, 0, False
+    count, done, exhausted, gained = 0, 0, False, 0.0
     stop = tail.start(tail.scale, rtol)
     pending = _graded(_panels(end, stop, span), materials)
     for _ in range(_MAX_ROUNDS):
@@ -118,6 +119,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         bad = _worst(gains, bad, room)
         total = total + parts[~bad].sum(0)
         quadrature += errors[~bad].sum(0)
+        gained += float(gains[~bad].sum())
         size += absolute[~bad].sum(0)
         if np.any(bad):
             far_off = bad & (gains > 1e3 * limit)
@@ -130,11 +132,14 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         pending = _panels(0.0, wanted, span, start=stop)
         stop = wanted
     else:
-        parts, errors, absolute, _ = _evaluate(problem, pending)
+        parts, errors, absolute, gains = _evaluate(problem, pending)
+        gained += float(gains.sum())
         total, quadrature, size = total + parts.sum(0), quadrature + errors.sum(0), size + absolute.sum(0)
     rest = tail.bound(stop)
     error = quadrature + rest + 4e-15 * size + 4e-16 * np.abs(known)
-    return Integrals(known + total, error, count, least > 0.5 * float(np.max(error)), exhausted)
+    most = 0.5 * float(np.max(error))
+    cut_short = least > most or gained + float(rest.max()) - least < most
+    return Integrals(known + total, error, count, cut_short, exhausted)
 
 
 def _graded(panels: np.ndarray, materials: tuple[w.Material, ...]) -> np.ndarray:

@@ -30,6 +30,8 @@ from unitcad.errors import Refusal
 
 _MOST_PANELS = 2_500  # up to the last pole: a few seconds
 _MOST_ATTEMPTS = 3
+_MOST_WAVENUMBERS = 8_000_000
+"""Of one response: nothing is tried again that would take more of them, a quarter of a minute or so."""
 
 
 @dataclass(frozen=True)
@@ -128,38 +130,41 @@ def _solve_lossless(bare: Problem, end: float, rtol: float) -> Integrals:
     fall slowly, as (d5 / d4)^n. Waves decay little over the distance at these losses;
     next to a frequency at which a wave is cut off the displacement changes sooner, and smaller ones are tried. Where
     rounding next to the poles outweighs the polynomial's error, which it about does at the least of the first ones,
-    larger ones are tried.
+    larger ones are tried, unless the first of them leaves as much.
     """
     phase = max(1.0, end * (float(bare.r.max()) + bare.load.reach))
     by_rounding = (80.0 * ROUNDING * phase / 2.0) ** (1.0 / 6.0)
     loss = min(0.02, 2.0 * max((0.3 * rtol) ** 0.2, by_rounding) / phase)
-    best, count, before = None, 0, None
+    best, count, before, left = None, 0, None, np.inf
     for _ in range(_MOST_ATTEMPTS):
-        wanted = max(0.008 * rtol, 2.0 * ROUNDING / loss)
-        lossy = [
-            _solve(replace(bare, medium=bare.medium.with_loss(i * loss)), end, wanted)
-            for i in range(1, _LIMITS.shape[1] + 1)
-        ]
+        wanted, start = max(0.008 * rtol, 2.0 * ROUNDING / loss), count
+        lossy: list[Integrals] = []
+        for i in range(1, _LIMITS.shape[1] + 1):
+            problem = replace(bare, medium=bare.medium.with_loss(i * loss))
+            lossy.append(_solve(problem, end, wanted, _MOST_WAVENUMBERS - count))
+            count += lossy[-1].wavenumbers
+            if best is not None and before and np.max(lossy[0].error) > 0.9 * left:
+                return replace(best, wavenumbers=count)
         values, errors = np.array([one.total for one in lossy]), np.array([one.error for one in lossy])
         total, lower, lowest = np.tensordot(_LIMITS, values, 1)
         integrals, limit = np.tensordot(abs(_LIMITS[0]), errors, 1), np.abs(total - lower)
         rate = np.minimum(limit / np.maximum(np.abs(lower - lowest), 1e-300), _SLOWEST)
         limit = limit * np.maximum(1.0, rate / (1.0 - rate))
-        count += sum(one.wavenumbers for one in lossy)
         if best is None or np.max(integrals + limit) < np.max(best.error):
             best = replace(lossy[0], total=total, error=integrals + limit)
         if np.max(best.error) <= rtol * np.max(np.abs(best.total)):
             break
         rounded = np.max(integrals) > np.max(limit)
-        if before not in (None, rounded):
+        if before not in (None, rounded) or 2 * count - start > _MOST_WAVENUMBERS:
             break
-        before, loss = rounded, loss * (3.0 if rounded else 1.0 / 30.0)
+        left = np.max(errors[0])
+        before, loss = bool(rounded), loss * (3.0 if rounded else 1.0 / 30.0)
     assert best is not None
     return replace(best, wavenumbers=count)
 
 
-def _solve(bare: Problem, end: float, rtol: float) -> Integrals:
-    """Return the best that is reached, in a few attempts.
+def _solve(bare: Problem, end: float, rtol: float, most: int = _MOST_WAVENUMBERS) -> Integrals:
+    """Return the best that is reached, in a few attempts, which take `most` wavenumbers if the first one does not.
 
     What was integrated first may have been accepted beside a largest |u| that the rest then took away: again, beside
     the one that came out. Where the panels do not suffice for rtol, a larger one may spend them better.
@@ -172,7 +177,7 @@ def _solve(bare: Problem, end: float, rtol: float) -> Integrals:
             best = integrals
         before, size = size, float(np.max(np.abs(best.total))) or 1.0
         reached = float(np.max(best.error)) / size
-        if reached <= rtol or integrals.cut_short:
+        if reached <= rtol or integrals.cut_short or count + integrals.wavenumbers > most:
             break
         if integrals.exhausted:
             rtol = float(np.sqrt(rtol * min(reached, 0.1)))
