@@ -28,7 +28,7 @@ from unitcad.accuracy.result import (
     shown,
     stars,
 )
-from unitcad.accuracy.timing import interleaved, timing
+from unitcad.accuracy.timing import PROCESSOR, interleaved, timing
 from unitcad.cli.accuracy_command import accuracy
 from unitcad.errors import Refusal, UnitcadError
 
@@ -187,6 +187,8 @@ def test_timing_is_interleaved_and_shows_its_spread():
     times = interleaved({"a": lambda: order.append("a"), "b": lambda: (order.append("b"), time.sleep(0.002))}, 3)
     assert order == ["a", "b"] * 4
     assert times["b"].median >= 0.002
+    waited = interleaved({"b": lambda: time.sleep(0.02)}, 3, clock=PROCESSOR)
+    assert waited["b"].median < 0.01
     assert str(timing([1.0, 2.0, 3.0])) == "2 s (1.5 s to 2.5 s)"
     assert shown(1.23456e-7) == "1.2e-07"
 

@@ -13,7 +13,7 @@ from scipy import special
 from unitcad.accuracy import hankel_cost
 from unitcad.accuracy import hankel_peers as peers
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table, fastest, shown, stars
-from unitcad.accuracy.timing import Timing, interleaved, machine
+from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, Timing, interleaved, machine
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
@@ -130,7 +130,7 @@ def run(quick: bool, say: Say) -> Result:
         plots.append(
             Plot(
                 f"{case.name}: error against time",
-                "seconds for 13 radii",
+                "processor seconds for 13 radii",
                 "error over the largest |u_z|",
                 {n: tuple((r.time.median, max(r.error, 1e-17)) for r in rows if r.method == n) for n in names},
             )
@@ -158,7 +158,7 @@ def run(quick: bool, say: Say) -> Result:
     return Result(
         suite="hankel",
         title="The Hankel integral: error against time",
-        text=TEXT,
+        text=f"{TEXT}\n\n{PROCESSOR_NOTE}",
         tables=(tables[-1], *hankel_cost.tables(loads, counts), *tables[:-1]),
         plots=(*plots, *hankel_cost.plots(loads, counts)),
         promises=(*promises, *hankel_cost.promises([*loads, *counts])),
@@ -224,9 +224,11 @@ def _rows(case: Case, reference: np.ndarray, quick: bool) -> list[_Row]:
     scale = np.max(np.abs(reference))
     times: dict[tuple[str, str], Timing] = {}
     slow = {_LIFTED: 1 if quick else 3, _LEVEL: 1}
-    times |= interleaved({key: call for key, call in methods.items() if key[0] not in slow}, 1 if quick else 7)
+    quicker = {key: call for key, call in methods.items() if key[0] not in slow}
+    times |= interleaved(quicker, 1 if quick else 7, clock=PROCESSOR)
     for name, repeats in slow.items():
-        times |= interleaved({key: call for key, call in methods.items() if key[0] == name}, repeats, warm=False)
+        mine = {key: call for key, call in methods.items() if key[0] == name}
+        times |= interleaved(mine, repeats, warm=False, clock=PROCESSOR)
     rows = []
     for method, setting in methods:
         time = times[method, setting]

@@ -15,7 +15,7 @@ import numpy as np
 
 from unitcad.accuracy import ball_reference
 from unitcad.accuracy.result import Cell, Plot, Promise, Say, Table, shown
-from unitcad.accuracy.timing import Timing, interleaved
+from unitcad.accuracy.timing import PROCESSOR, Timing, interleaved
 from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
 from unitcad.attenuation.layered.medium import LayeredMedium
 from unitcad.attenuation.layered.response import Response
@@ -149,7 +149,9 @@ def plots(loads: Sequence[Cost], counts: Sequence[Cost]) -> list[Plot]:
     found = []
     if len({cost.rtol for cost in loads}) > 1:
         series = {name: _points([c for c in loads if c.load == name and c.z == 0.0]) for name in LOADS}
-        found.append(Plot("Every load at the surface: error against time", "seconds for 13 radii", _ERROR, series))
+        found.append(
+            Plot("Every load at the surface: error against time", "processor seconds for 13 radii", _ERROR, series)
+        )
     for of, numbers in _COUNTS.items():
         mine = [cost for cost in counts if cost.of == of]
         if mine:
@@ -158,7 +160,7 @@ def plots(loads: Sequence[Cost], counts: Sequence[Cost]) -> list[Plot]:
                 for name in _DRAWN
                 for count in numbers
             }
-            found.append(Plot(f"By number of {of}: error against time", "seconds", _ERROR, series))
+            found.append(Plot(f"By number of {of}: error against time", "processor seconds", _ERROR, series))
     return found
 
 
@@ -191,7 +193,7 @@ def _costs(
         for rtol in rtols
     }
     once = quick or omegas.size > 10
-    times = interleaved(calls, 1 if once else 3, warm=not once)
+    times = interleaved(calls, 1 if once else 3, warm=not once, clock=PROCESSOR)
     at = slice(0, _CHECKED)
     components: tuple[str, ...] = ("r", "theta", "z") if load.direction == "tangential" else ("r", "z")
     worst: dict[float, dict[str, float]] = {rtol: dict.fromkeys(components, 0.0) for rtol in rtols}

@@ -10,7 +10,7 @@ import numpy as np
 from unitcad.accuracy.edge_levels import unit_spec
 from unitcad.accuracy.mechanics_search import DRIVES, READINGS, drawn_levels, searches
 from unitcad.accuracy.result import Plot, Promise, Result, Say, Summary, Table
-from unitcad.accuracy.timing import interleaved, machine
+from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, interleaved, machine
 from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.mechanics.motor_level import Drive, Setting, amplitude, motion, pressed_skin
@@ -86,7 +86,7 @@ def _error_against_time(finenesses: tuple[float, ...], say: Say) -> tuple[Table,
         for drive in DRIVES:
             say(f"meshes of {design} {layers}, {drive}")
             calls = {n: partial(motion.__wrapped__, variant, drive, Setting(), n) for n in finenesses}
-            times = {n: interleaved({n: call}, 1, warm=False)[n] for n, call in calls.items()}
+            times = {n: interleaved({n: call}, 1, warm=False, clock=PROCESSOR)[n] for n, call in calls.items()}
             levels = {
                 n: [amplitude(at, drive, "along") / abs(t.value.motor) for at in (t.value.skin, t.value.edge)]
                 for n, t in times.items()
@@ -105,11 +105,11 @@ def _error_against_time(finenesses: tuple[float, ...], say: Say) -> tuple[Table,
         tuple(rows),
         "Bonded, nominal values, the circuit as drawn. A level is the amplitude along the drive over the motor's. Both "
         "readings come from one solution. Errors are against the two finest meshes, extrapolated at first order, which "
-        "is the slowest that the corners allow. One run each.",
+        f"is the slowest that the corners allow. One run each. {PROCESSOR_NOTE}",
     )
     title = "Error of a unit's level against time"
     points = {name: tuple(values) for name, values in series.items()}
-    return table, Plot(title, "seconds a level, both readings", "relative error", points, frontier=True), off
+    return table, Plot(title, "processor seconds a level, both readings", "relative error", points, frontier=True), off
 
 
 def _bare_skin() -> tuple[Table, float]:
