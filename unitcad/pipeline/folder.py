@@ -24,6 +24,10 @@ PAGE = "report.html"
 """The page of a folder, made on request and kept up by every later build into it."""
 
 
+BENCH = "bench.html"
+"""The bench page of a variant's procedure, made beside the page."""
+
+
 def folder_name(spec: Spec) -> str:
     """Return <slug>-<hash12>, at most 63 characters; the hash covers the effective spec without name and formats."""
     slug = re.sub(r"[^a-z0-9]+", "-", spec.name.lower()).strip("-")[:50].rstrip("-") or "unit"

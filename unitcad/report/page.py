@@ -1,20 +1,9 @@
-"""The page: one HTML file with its data, its programs and their licences; nothing outside it is ever contacted.
-
-All text from specs and results travels as compressed JSON in base 64 and is set as text, never as markup. A policy in
-the page's head forbids every connection, and every script but those whose hashes it names.
-"""
+"""The page of a variant or a batch: what it shows, collected, and its models."""
 
 from __future__ import annotations
 
-import base64
-import gzip
-import hashlib
-import html
-import json
 import tomllib
 from collections.abc import Callable, Iterable
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +13,10 @@ from unitcad import __version__
 from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
 from unitcad.files import write
-from unitcad.pipeline.folder import PAGE
+from unitcad.pipeline.folder import BENCH, PAGE
 from unitcad.report import read_results
+from unitcad.report.bench_page import write_bench
+from unitcad.report.html_page import asset, html_page
 from unitcad.report.pool import Pool
 from unitcad.report.records import VariantRecord
 from unitcad.report.viewer_models import model
@@ -46,6 +37,8 @@ def write_report(folder: Path, warn: Callable[[str], None] = lambda line: None) 
 
     `warn` gets lines that say which results are damaged, and why. Raises UnitcadError where the folder holds none.
     """
+    if folder.is_dir() and read_results.is_variant(folder):
+        _write_bench(folder, warn)
     data, title, damage = page_data(folder)
     target = folder / PAGE
     if damage:
@@ -57,6 +50,14 @@ def write_report(folder: Path, warn: Callable[[str], None] = lambda line: None) 
             warn(f"  and {len(damage) - MOST_DAMAGED} more: see the page")
     write(target, page(data, title).encode("utf-8", "replace"))
     return target
+
+
+def _write_bench(folder: Path, warn: Callable[[str], None]) -> None:
+    """Write the bench page; where its files are damaged there is none, and a line says why."""
+    try:
+        write_bench(folder)
+    except UnitcadError as error:
+        warn(f"warning: no {BENCH}: {error}")
 
 
 def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
@@ -149,57 +150,13 @@ def _models(records: list[VariantRecord], specs: Iterable[Spec | None]) -> dict[
 
 def page(data: dict[str, Any], title: str) -> str:
     """Return the HTML of a page with `data`."""
-    scripts = [*(_asset(f"vendor/{name}") for name in VENDORED), *(_asset(f"app/{name}") for name in PROGRAMS)]
-    styles = [_asset(name) for name in STYLES]
     licences = "\n\n".join(
-        f"{name} {entry['version']}\n{_asset(f'vendor/{name}.LICENSE.txt')}" for name, entry in vendored().items()
+        f"{name} {entry['version']}\n{asset(f'vendor/{name}.LICENSE.txt')}" for name, entry in vendored().items()
     )
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
-    packed = base64.b64encode(gzip.compress(text.encode("utf-8", "replace"), 9, mtime=0)).decode()
-    policy = "; ".join(
-        [
-            "default-src 'none'",
-            "script-src " + " ".join(_hash(script) for script in scripts),
-            "style-src " + " ".join(_hash(style) for style in styles),
-            "img-src data:",
-            "base-uri 'none'",
-            "form-action 'none'",
-        ]
-    )
-    lines = [
-        "<!doctype html>",
-        '<html lang="en">',
-        "<head>",
-        '<meta charset="utf-8">',
-        f'<meta http-equiv="Content-Security-Policy" content="{html.escape(policy)}">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f'<meta name="generator" content="unitcad {html.escape(__version__)}">',
-        f"<title>{html.escape(title)}</title>",
-        *(f"<style>{style}</style>" for style in styles),
-        "</head>",
-        "<body>",
-        '<main id="page"><p>Reading ...</p></main>',
-        "<noscript><p>A script draws this page. Without one, read casting.md and section.svg.</p></noscript>",
-        f'<script type="text/plain" id="data">{packed}</script>',
-        f'<script type="text/plain" id="licences">{html.escape(licences, quote=False)}</script>',
-        *(f"<script>{script}</script>" for script in scripts),
-        "</body>",
-        "</html>",
-    ]
-    return "\n".join([*lines, ""])
+    without = "Without one, read casting.md and section.svg."
+    return html_page(data, title, PROGRAMS, STYLES, VENDORED, without, licences)
 
 
 def vendored() -> dict[str, dict[str, Any]]:
     """Return the libraries that every page carries, by name: version, licence, files, how they were made."""
-    return tomllib.loads(_asset("vendor/versions.toml"))
-
-
-@cache
-def _asset(name: str) -> str:
-    """Read a shipped file. No own script or style holds the end tag of its element; a test checks it."""
-    return (files("unitcad") / "report" / name).read_text("utf-8")
-
-
-@cache
-def _hash(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+    return tomllib.loads(asset("vendor/versions.toml"))

@@ -12,8 +12,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
+from msgspec import structs
+
 from unitcad import files
-from unitcad.errors import UnitcadError
+from unitcad.casting.cast_record import ENDING, read_cast_record
+from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import TEMPORARY
 from unitcad.pipeline.folder import PAGE
 from unitcad.pipeline.manifest_records import Manifest
@@ -31,6 +35,8 @@ OF_EVERY_BATCH = ("index", "status", "reason", "folder")
 DAMAGED = "damaged"
 LARGEST_DRAWING = 4_000_000
 """Bytes of a drawing, at most."""
+MOST_CASTS = 200
+"""Cast records of a variant that the page shows, at most."""
 MOST_FILES = 2000
 """Files of a variant that the page lists, at most."""
 
@@ -59,11 +65,13 @@ def read_variant(folder: Path, root: Path) -> tuple[VariantRecord, Spec | None]:
     listed = list(_regular(folder, damage))
     drawings = [path for path in listed if path.endswith(".svg")]
     read = {path: _sound(lambda file=folder / path: _drawing(file), damage) for path in drawings}
+    casts = [_sound(lambda file=folder / path: _cast(file), damage) for path in _casts(listed)]
     record = VariantRecord(
         folder="" if where == "." else where,
         manifest=manifest,
         **tables,
         drawings={path: text for path, text in read.items() if text is not None},
+        casts=[cast for cast in casts if cast is not None],
         files=[(path, (folder / path).lstat().st_size) for path in listed if path not in (PAGE, TIMINGS)],
         damaged=damage,
     )
@@ -107,6 +115,19 @@ def _regular(folder: Path, damage: list[str]) -> Iterator[str]:
     if len(listed) >= MOST_FILES:
         damage.append(f"{folder}: has more than {MOST_FILES} files, the others are left out")
     return iter(sorted(listed)[:MOST_FILES])
+
+
+def _casts(listed: list[str]) -> list[str]:
+    return [path for path in listed if path.endswith(ENDING) and "/" not in path][:MOST_CASTS]
+
+
+def _cast(path: Path) -> dict[str, Any]:
+    """Read a cast record, without the spec in it: the page has the variant's own."""
+    try:
+        record = read_cast_record(path, links=False)
+    except Refusal as refused:
+        raise UnitcadError(f"{path}: {refused}") from None
+    return {"file": path.name, **msgspec.to_builtins(structs.replace(record, spec=None))}
 
 
 def _drawing(path: Path) -> str:

@@ -41,6 +41,23 @@
       table(["What", "Begins after", "At the bench", "Then wait"], rows, { label: "Time line" })];
   }
 
+  // What was weighed, timed and measured when this unit was cast; another spec's record is named as such.
+  function casts(variant) {
+    if (!variant.casts || !variant.casts.length) return null;
+    const list = (values) => (values.length ? values.map((value) => number(value, 3)).join(", ") : "–");
+    const cell = (value) => (value === null ? "–" : number(value, 3));
+    return el("div", { id: "casts" }, el("h3", {}, "Cast"), variant.casts.map((cast) => [
+      el("h4", {}, `${cast.cast_on} (${cast.file})`),
+      cast.spec_hash !== variant.manifest.hash && el("p", { className: "verdict bad" }, `Cast from another spec: ${cast.spec_name}, ${cast.spec_hash}.`),
+      cast.pours.length > 0 && table(["Pour", "Part A (g)", "Part B (g)", "Pot life used (min)", "Cure (h)", "Lot", "Notes"],
+        cast.pours.map((pour) => [String(pour.index), cell(pour.part_a_g), cell(pour.part_b_g), cell(pour.pot_life_min), cell(pour.cure_h), pour.lot || "–", pour.notes.join(" ")]), { label: `Pours cast on ${cast.cast_on}` }),
+      cast.units.length > 0 && table(["Unit", "Height (mm)", "Diameters (mm)", "Mass (g)", "Walls, layer by layer (mm)", "Notes"],
+        cast.units.map((unit) => [`${unit.cavity.toString(16).toUpperCase()}${unit.usable ? "" : ", spoiled"}`, cell(unit.height_mm), list(unit.diameters_mm), cell(unit.mass_g), unit.walls.map((wall) => `${wall.layer}: ${list(wall.places_mm)}`).join("; ") || "–", unit.notes.join(" ")]), { label: `Units cast on ${cast.cast_on}` }),
+      cast.notes.map((note) => el("p", {}, note))]));
+  }
+
+  const besides = (folder, name) => [folder, name].filter(Boolean).join("/").split("/").map(encodeURIComponent).join("/");
+
   function procedure(variant) {
     const data = variant.casting;
     if (!data) return section("procedure", "Procedure", el("p", { className: "absent" }, "No procedure here. Ask for it with ", el("code", {}, "unitcad build SPEC --only casting")));
@@ -63,6 +80,8 @@
     const print = el("button", { type: "button", className: "main", onclick: () => window.print() }, "Print the procedure");
     return section("procedure", "Procedure",
       el("div", { className: "tools" }, print, el("span", {}, `${data.label ? `mould set ${data.label}, ` : ""}${data.cells} ${data.cells === 1 ? "cavity" : "cavities"}`)),
+      casts(variant),
+      el("p", {}, "At the bench: ", el("a", { href: besides(variant.folder, "bench.html") }, "bench.html"), ", with timers, and fields for the cast record."),
       times(data),
       titled("Print", data.printing && el("ul", {}, data.printing.map((text) => el("li", {}, text)))),
       titled("Before the first pour", steps(data.preparation)),

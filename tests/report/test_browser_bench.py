@@ -1,0 +1,128 @@
+"""The bench page in a browser: two pages of paper, timers that survive a reload, a record that the report shows."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from chromium import Visit
+
+from unitcad.casting.cast_record import ENDING, read_cast_record, spec_of
+from unitcad.pipeline.build import build
+from unitcad.report import write_report
+from unitcad.spec import spec_hash
+from unitcad.validation import load
+
+SETS = {
+    "encapsulating": (),
+    "embedded": (),
+    "three-layer": ("moulds.printer=sla",),
+    "chain": ("moulds.pour=injected", "moulds.cavities=[1,2]"),
+}
+
+
+def bench(name: str, changes: tuple[str, ...], out: Path) -> Path:
+    spec = load(name, [*changes, "output.formats=[]"])
+    folder = build(spec, out, only=("moulds", "casting"), check=False).folder
+    write_report(folder)
+    return folder / "bench.html"
+
+
+@pytest.fixture(scope="module")
+def page_of_one(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return bench("encapsulating", (), tmp_path_factory.mktemp("bench"))
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_a_printed_sheet_fits_two_pages(name: str, running: Any, tmp_path: Path) -> None:
+    visit = Visit(running, bench(name, SETS[name], tmp_path))
+    pdf = visit.page.pdf(prefer_css_page_size=True)
+    visit.close()
+    assert 1 <= len(re.findall(rb"/Type\s*/Page[^s]", pdf)) <= 2
+
+
+@pytest.mark.parametrize(("width", "dark"), [(390, False), (390, True), (1280, False)])
+def test_it_contacts_nothing_and_fits_its_window(width: int, dark: bool, running: Any, page_of_one: Path) -> None:
+    visit = Visit(running, page_of_one, width=width, dark=dark)
+    assert (visit.errors, visit.console) == ([], [])
+    assert {url.partition(":")[0] for url in visit.requests} <= {"file", "data"}
+    assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
+    casting = json.loads((page_of_one.parent / "casting.json").read_text("utf-8"))
+    assert visit.page.locator("li.bench-step img").count() == sum(
+        bool(step["picture"])
+        for step in [
+            *casting["preparation"],
+            *(step for pour in casting["pours"] for step in pour["steps"]),
+            *casting["release"],
+            *casting["assembly"],
+        ]
+    )
+    visit.close()
+
+
+def test_a_timer_goes_on_through_a_reload(running: Any, page_of_one: Path) -> None:
+    visit = Visit(running, page_of_one)
+    page = visit.page
+    page.get_by_role("button", name="Start pot life").first.click()
+    began = page.evaluate("Object.values(JSON.parse(Object.values(localStorage)[0]).began)[0]")
+    page.evaluate(
+        """() => {
+          const key = Object.keys(localStorage)[0], state = JSON.parse(localStorage[key]);
+          for (const name of Object.keys(state.began)) state.began[name] -= 10 * 60000;
+          localStorage[key] = JSON.stringify(state);
+        }"""
+    )
+    page.reload()
+    page.wait_for_selector("html[data-ready=yes]")
+    shown = page.locator(".clock").first.inner_text()
+    hours, minutes, _ = (int(part) for part in shown.split(":"))
+    assert began > 0
+    assert 18 <= 60 * hours + minutes <= 20  # of 30 min
+    visit.close()
+
+
+def test_the_schedule_counts_back(running: Any, page_of_one: Path) -> None:
+    casting = json.loads((page_of_one.parent / "casting.json").read_text("utf-8"))
+    visit = Visit(running, page_of_one)
+    visit.page.locator("[name=ready]").fill("2101-03-14T12:00")
+    visit.page.locator("[name=ready]").dispatch_event("change")
+    begin = visit.page.locator("#plan .verdict").inner_text()
+    minutes = 12 * 60 - round(casting["earliest_finish_min"]) % (24 * 60)
+    assert f"{minutes // 60 % 24:02d}:{minutes % 60:02d}" in begin
+    visit.page.locator("[name=ready]").fill("2001-03-14T12:00")
+    visit.page.locator("[name=ready]").dispatch_event("change")
+    assert "Too late" in visit.page.locator("#plan .verdict").inner_text()
+    visit.close()
+
+
+def test_the_record_is_saved_and_shown(running: Any, page_of_one: Path) -> None:
+    visit = Visit(running, page_of_one)
+    page, folder = visit.page, page_of_one.parent
+    for name, text in {"p1.a": "1,02", "p1.b": "0.99", "u1.height": "4.6", "u1.w2.1": "1.3", "u1.w2.3": "1.2"}.items():
+        page.locator(f'[name="{name}"]').fill(text)
+    page.locator('[name="u1.mass"]').fill("much")
+    page.get_by_role("button", name="Save the cast record").click()
+    assert "Not saved" in page.locator("#save [role=status]").inner_text()
+    page.locator('[name="u1.mass"]').fill("0.61")
+    page.locator('textarea[name="notes"]').fill("first try\nwarm room")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save the cast record").click()
+    name = download.value.suggested_filename
+    assert name.endswith(ENDING)
+    download.value.save_as(folder / name)
+    visit.close()
+    record = read_cast_record(folder / name)
+    assert spec_hash(spec_of(record))[:12] == record.spec_hash == folder.name[-12:]
+    assert (record.pours[0].part_a_g, record.pours[0].part_b_g, record.pours[1].part_a_g) == (1.02, 0.99, None)
+    assert record.notes == ("first try", "warm room")
+    unit = record.unit(1)
+    assert unit is not None
+    assert (unit.height_mm, unit.mass_g, unit.wall_mm(1), unit.wall_mm(2)) == (4.6, 0.61, (), (1.3, 1.2))
+    shown = Visit(running, write_report(folder))
+    text = shown.page.locator("#casts").inner_text()
+    shown.close()
+    assert all(words in text for words in (record.cast_on, "1.02", "0.61", "2: 1.3, 1.2", "warm room"))
+    assert "another spec" not in text

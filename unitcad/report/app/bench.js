@@ -1,0 +1,314 @@
+// The bench page: a procedure's steps in large, timers by absolute times, fields, and the cast record that they make.
+(() => {
+  "use strict";
+  const { el, clear, number, section, table, theme } = window.unitcad;
+  const page = document.getElementById("page");
+  const MINUTE = 60000;
+  const LIMITS = { grams: [1e-4, 1e5], mm: [0.01, 1000] };
+  let data, key, state;
+
+  // What a person has entered, kept in the browser: a reload and a locked screen lose nothing, since every time is absolute.
+  const fresh = () => ({ done: {}, began: {}, fields: {}, ready: "", motor: false });
+  let keeps = true;
+  function restore() {
+    try {
+      return { ...fresh(), ...JSON.parse(localStorage.getItem(key) || "{}") };
+    } catch {
+      keeps = false;
+      return fresh();
+    }
+  }
+  function keep() {
+    try {
+      localStorage.setItem(key, JSON.stringify(state));
+    } catch {
+      keeps = false;
+    }
+  }
+
+  function duration(minutes) {
+    const all = Math.round(Math.abs(minutes));
+    const [hours, rest] = [Math.floor(all / 60), all % 60];
+    return hours && rest ? `${hours} h ${rest} min` : hours ? `${hours} h` : `${rest} min`;
+  }
+  const two = (value) => String(value).padStart(2, "0");
+  function remaining(ms) {
+    const seconds = Math.floor(Math.abs(ms) / 1000);
+    return `${Math.floor(seconds / 3600)}:${two(Math.floor(seconds / 60) % 60)}:${two(seconds % 60)}`;
+  }
+  const clock = (time) => new Date(time).toLocaleString("en-GB", { weekday: "short", day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
+  const day = (time) => { const at = new Date(time); return `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())}`; };
+  function iso(time) {
+    const at = new Date(time), off = -at.getTimezoneOffset(), size = Math.abs(off);
+    return `${day(time)}T${two(at.getHours())}:${two(at.getMinutes())}:${two(at.getSeconds())}${off < 0 ? "-" : "+"}${two(Math.floor(size / 60))}:${two(size % 60)}`;
+  }
+
+  // A decimal comma is a point. Nothing is null, what is no number within the limits undefined.
+  function value(name, kind) {
+    const text = (state.fields[name] || "").trim().replace(",", ".");
+    if (!text) return null;
+    const given = Number(text), [least, most] = LIMITS[kind];
+    return Number.isFinite(given) && given >= least && given <= most ? given : undefined;
+  }
+
+  function field(name, label, unit, kind) {
+    const input = el("input", { type: "text", inputmode: "decimal", name, autocomplete: "off", value: state.fields[name] || "", oninput: () => {
+      state.fields[name] = input.value;
+      input.setAttribute("aria-invalid", String(value(name, kind) === undefined));
+      keep();
+    } });
+    return el("label", { className: "field" }, el("span", {}, label), input, unit);
+  }
+
+  function words(name, label) {
+    const input = el("textarea", { name, rows: 2, oninput: () => { state.fields[name] = input.value; keep(); } });
+    input.value = state.fields[name] || "";
+    return el("label", { className: "field wide" }, el("span", {}, label), input);
+  }
+
+  const lines = (name) => (state.fields[name] || "").split(/[\r\n]+/).map((line) => line.replace(/[^\P{C}]/gu, " ").trim().slice(0, 1000)).filter(Boolean).slice(0, 200);
+
+  // Timers: each counts to an absolute time, and is painted anew every second and when the page is seen again.
+  const timers = [];
+  function timer(name, label, minutes) {
+    const shown = el("output", { className: "clock", "aria-live": "off" });
+    const ends = el("p", { className: "ends" });
+    const paint = () => {
+      const began = state.began[name];
+      shown.textContent = began ? `${Date.now() > began + minutes * MINUTE ? "over by " : ""}${remaining(began + minutes * MINUTE - Date.now())}` : duration(minutes);
+      shown.classList.toggle("over", Boolean(began) && Date.now() > began + minutes * MINUTE);
+      ends.textContent = began ? `Ends ${clock(began + minutes * MINUTE)}. Set the phone's own alarm for it: a page makes no sound under a locked screen.` : "";
+      start.textContent = began ? "Start again from now" : `Start ${label}`;
+    };
+    const start = el("button", { type: "button", onclick: () => { state.began[name] = Date.now(); keep(); paint(); } });
+    timers.push(paint);
+    return el("div", { className: "timer" }, el("span", {}, label), shown, start, ends);
+  }
+
+  const paintTimers = () => { for (const paint of timers) paint(); };
+
+  function card(step, at, pour) {
+    const own = [];
+    if (step.kind === "weigh") {
+      own.push(el("div", { className: "fields" }, field(`p${pour.index}.a`, `Part A weighed (${number(pour.part_a_g, 3)} g asked)`, "g", "grams"),
+        field(`p${pour.index}.b`, `Part B weighed (${number(pour.part_b_g, 3)} g asked)`, "g", "grams")));
+    }
+    if (step.kind === "mix") own.push(timer(`p${pour.index}.mix`, "pot life", pour.pot_life_min));
+    if (step.kind === "rest" && step.wait_min) own.push(timer(`s${at}`, "wait", step.minutes + step.wait_min));
+    if (step.kind === "cure") own.push(timer(pour ? `p${pour.index}.cure` : `s${at}`, "cure", step.wait_min));
+    const ticked = el("input", { type: "checkbox", checked: Boolean(state.done[at]), "aria-label": `Step ${at + 1} done`, onchange: () => {
+      if (ticked.checked) state.done[at] = Date.now();
+      else delete state.done[at];
+      // The next step's timer begins: pot life with the mixing, cure with the last strike.
+      const next = data.steps[at + 1];
+      if (ticked.checked && next && ["mix", "rest", "cure"].includes(next.step.kind)) {
+        const name = next.pour && next.step.kind !== "rest" ? `p${next.pour.index}.${next.step.kind}` : `s${at + 1}`;
+        if (!state.began[name]) state.began[name] = Date.now();
+      }
+      keep();
+      mark();
+      paintTimers();
+    } });
+    const picture = data.pictures[step.picture];
+    return el("li", { className: `bench-step${data.repeated.has(at) ? " repeated" : ""}`, value: at + 1, "data-step": String(at) },
+      el("h3", {}, el("label", {}, ticked, el("span", { className: "count" }, `${at + 1}`), ` ${step.title}`)),
+      picture && el("img", { src: picture, alt: step.title, width: "540", height: "360" }),
+      el("p", {}, step.text), data.repeated.has(at) && el("p", { className: "as" }, `As step ${data.repeated.get(at) + 1}.`), own);
+  }
+
+  // The first step that is not done is the one to do.
+  function mark() {
+    const cards = [...document.querySelectorAll("li.bench-step")];
+    const now = cards.find((node) => !state.done[node.dataset.step]);
+    for (const node of cards) {
+      node.classList.toggle("done", Boolean(state.done[node.dataset.step]));
+      if (node === now) node.setAttribute("aria-current", "step");
+      else node.removeAttribute("aria-current");
+    }
+  }
+
+  function plan() {
+    const { casting } = data;
+    const out = el("div");
+    const ready = el("input", { type: "datetime-local", name: "ready", value: state.ready });
+    const motor = el("input", { type: "checkbox", name: "motor", checked: state.motor });
+    const total = () => (state.motor ? casting.time_line[casting.time_line.length - 1] : null);
+    const draw = () => {
+      const phases = casting.time_line.filter((phase) => state.motor || phase.start_min < casting.earliest_finish_min - 1e-6);
+      const finish = total() ? total().start_min + total().bench_min + total().wait_min : casting.earliest_finish_min;
+      const end = state.ready ? new Date(state.ready).getTime() : NaN;
+      const start = end - finish * MINUTE;
+      const rows = phases.map((phase) => [phase.name, Number.isFinite(start) ? clock(start + phase.start_min * MINUTE) : `after ${duration(phase.start_min)}`, duration(phase.bench_min), duration(phase.wait_min)]);
+      const late = Number.isFinite(start) && start < Date.now();
+      clear(out, Number.isFinite(start) && el("p", { className: late ? "verdict bad" : "verdict good" }, late
+        ? `Too late by ${duration((Date.now() - start) / MINUTE)}: begun now, it is ready ${clock(Date.now() + finish * MINUTE)}.`
+        : `Begin pour 1 by ${clock(start)}.`),
+      table(["What", "Begin", "At the bench", "Then wait"], rows, { label: "Schedule" }));
+    };
+    for (const input of [ready, motor]) input.addEventListener("change", () => { state.ready = ready.value; state.motor = motor.checked; keep(); draw(); });
+    draw();
+    return section("plan", "Time",
+      el("p", {}, el("strong", {}, duration(casting.earliest_finish_min)), ` from the first pour's first step to the unit out of the mould, of which ${duration(casting.bench_min)} at the bench.`),
+      el("div", { className: "fields screen" }, el("label", { className: "field" }, el("span", {}, "Must be ready"), ready),
+        casting.assembly.length > 0 && el("label", { className: "field" }, motor, el("span", {}, "with the motor in"))), out);
+  }
+
+  function printing() {
+    const { casting, slicer } = data;
+    const sliced = slicer && `${slicer.slicer}: ${duration(slicer.print_s / 60)}, ${number(slicer.filament_cm3, 3)} cm³ of filament.`;
+    return section("print", "Print", el("ul", {}, casting.printing.map((text) => el("li", {}, text)), sliced && el("li", {}, sliced)));
+  }
+
+  function needed() {
+    const rows = data.casting.bill.map((item) => [item.item.replace(/^([a-z]+)(\d+)$/, "$1 $2"), `${number(item.quantity, 3)} ${item.unit}`, item.note]);
+    return section("needed", "Needed", table(["Item", "How much", "Note"], rows, { label: "What is needed" }));
+  }
+
+  const engraved = (cavity) => (data.casting.cells > 1 ? ` ${cavity.toString(16).toUpperCase()}` : "");
+
+  function measure() {
+    const { casting } = data;
+    const cavities = Array.from({ length: casting.cells }, (_, i) => i + 1);
+    const cells = cavities.map((cavity) => {
+      const name = `u${cavity}`;
+      const spoiled = el("input", { type: "checkbox", name: `${name}.spoiled`, checked: Boolean(state.fields[`${name}.spoiled`]), onchange: () => { state.fields[`${name}.spoiled`] = spoiled.checked ? "yes" : ""; keep(); } });
+      return el("fieldset", {}, el("legend", {}, `Unit${engraved(cavity)}`),
+        el("div", { className: "fields" }, field(`${name}.height`, "Height", "mm", "mm"), field(`${name}.mass`, "Mass of silicone, trimmed", "g", "grams"),
+          [1, 2].map((i) => field(`${name}.d${i}`, `Diameter ${i}`, "mm", "mm"))),
+        casting.pours.map((pour) => el("div", { className: "fields" }, [1, 2, 3, 4].map((i) => field(`${name}.w${pour.index}.${i}`, `Wall of layer ${pour.index}, place ${i}`, "mm", "mm")))),
+        el("label", { className: "field" }, spoiled, el("span", {}, "spoiled: not to be measured further")), words(`${name}.notes`, "Notes"));
+    });
+    return section("measure", "Measure", el("ul", {}, casting.measure.map((text) => el("li", {}, text))), el("div", { className: "screen" }, cells));
+  }
+
+  // The record of what is entered, and the names of fields that hold no number.
+  function record() {
+    const wrong = [];
+    const given = (name, kind) => {
+      const found = value(name, kind);
+      if (found === undefined) wrong.push(name);
+      return found ?? null;
+    };
+    const minutes = (from, to) => (from && to && to > from ? Number(((to - from) / MINUTE).toPrecision(4)) : null);
+    const pours = data.casting.pours.map((pour) => {
+      const own = data.steps.map((each, at) => ({ ...each, at })).filter((each) => each.pour === pour);
+      const cure = own.findIndex((each) => each.step.kind === "cure");
+      const began = state.began[`p${pour.index}.mix`], struck = state.began[`p${pour.index}.cure`];
+      const opened = own.slice(cure + 1).map((each) => state.done[each.at]).find(Boolean);
+      const [life, cured] = [minutes(began, struck), minutes(struck, opened)];
+      return { index: pour.index, material: pour.material.slice(0, 200), lot: (state.fields[`p${pour.index}.lot`] || "").trim().slice(0, 200) || null,
+        part_a_g: given(`p${pour.index}.a`, "grams"), part_b_g: given(`p${pour.index}.b`, "grams"), mixed_at: began ? iso(began) : null,
+        pot_life_min: life === null || life < 0.1 || life > 10000 ? null : life, cure_h: cured === null || cured < 0.6 || cured > 60000 ? null : Number((cured / 60).toPrecision(4)), notes: lines(`p${pour.index}.notes`) };
+    });
+    const units = Array.from({ length: data.casting.cells }, (_, i) => i + 1).map((cavity) => {
+      const name = `u${cavity}`;
+      const several = (names) => names.map((each) => given(each, "mm")).filter((each) => each !== null);
+      const walls = data.casting.pours.map((pour) => ({ layer: pour.index, places_mm: several([1, 2, 3, 4].map((i) => `${name}.w${pour.index}.${i}`)) }));
+      return { cavity, usable: !state.fields[`${name}.spoiled`], height_mm: given(`${name}.height`, "mm"), diameters_mm: several([`${name}.d1`, `${name}.d2`]),
+        mass_g: given(`${name}.mass`, "grams"), walls: walls.filter((wall) => wall.places_mm.length), notes: lines(`${name}.notes`) };
+    });
+    const first = Math.min(...Object.values(state.began), Date.now());
+    const made = { format: data.record.format, version: data.record.version, spec_name: data.casting.name.slice(0, 200), spec_hash: data.hash, cast_on: day(first), label: data.casting.label,
+      spec: data.spec, room_c: data.room_c, scale_resolution_g: data.scale_g, pours, units, notes: lines("notes") };
+    return { made, wrong };
+  }
+
+  function saving() {
+    const said = el("p", { role: "status" });
+    const save = () => {
+      const { made, wrong } = record();
+      if (wrong.length) {
+        const node = document.querySelector(`[name="${wrong[0]}"]`);
+        node.setAttribute("aria-invalid", "true");
+        node.focus();
+        said.textContent = `Not saved: ${wrong.length} field${wrong.length === 1 ? " holds" : "s hold"} no number within the limits; the first one is selected.`;
+        return;
+      }
+      const slug = made.spec_name.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-+|-+$/g, "").slice(0, 50) || "unit";
+      const name = `${slug}-${made.cast_on}${data.record.ending}`;
+      const url = URL.createObjectURL(new Blob([`${JSON.stringify(made, null, 1)}\n`], { type: "application/json" }));
+      const link = el("a", { href: url, download: name });
+      document.body.append(link);
+      link.click();
+      link.remove();
+      setTimeout(() => URL.revokeObjectURL(url), MINUTE);
+      said.textContent = `${name} is saved. Put it into this result's folder and run unitcad report: the page shows it.`;
+    };
+    const anew = () => {
+      if (!window.confirm("Forget all that is entered here and begin a new casting?")) return;
+      state = fresh();
+      keep();
+      draw();
+    };
+    return section("save", "Cast record",
+      el("p", {}, "Grams, times, walls and masses in one JSON file, for unitcad report, fit and measure."), words("notes", "Notes on this casting"),
+      el("div", { className: "tools" }, el("button", { type: "button", className: "main", onclick: save }, "Save the cast record"), el("button", { type: "button", onclick: anew }, "New casting")),
+      said, !keeps && el("p", { className: "verdict bad" }, "This browser keeps nothing: save before the page is closed."));
+  }
+
+  // What only paper has: lines to write on.
+  function written() {
+    const blank = "__________";
+    const rows = data.casting.pours.map((pour) => [`Pour ${pour.index}`, `A ${blank} of ${number(pour.part_a_g, 3)} g`, `B ${blank} of ${number(pour.part_b_g, 3)} g`, `mixed at ${blank}`, `struck at ${blank}`, `opened at ${blank}`]);
+    return el("div", { className: "paper" }, table(["", "", "", "", "", ""], rows, { label: "To write down" }), el("p", {}, `Date ${blank}   height ${blank} mm   mass ${blank} g   walls ${blank} ${blank} ${blank} ${blank} mm`));
+  }
+
+  function draw() {
+    const { casting } = data;
+    timers.length = 0;
+    let at = 0;
+    const list = (id, title, steps, pour, ...more) => steps.length > 0 && section(id, title, el("ol", {}, steps.map((step) => card(step, at++, pour))), more);
+    const cells = `${casting.cells} ${casting.cells === 1 ? "cavity" : "cavities"}`;
+    clear(page,
+      el("header", { className: "top" }, el("div", {}, el("h1", {}, casting.name), el("p", { className: "line" }, `Mould set ${casting.label}, ${cells} · ${data.hash}`)), el("div", { className: "chips" }, theme.button())),
+      plan(), needed(), printing(),
+      list("preparation", "Before the first pour", casting.preparation, null),
+      casting.pours.map((pour) => list(`pour${pour.index}`, `Pour ${pour.index}: layer ${pour.index}, ${pour.material}`, pour.steps, pour,
+        el("div", { className: "screen" }, el("label", { className: "field" }, el("span", {}, "Lot on the bottles"), lot(pour)), words(`p${pour.index}.notes`, "Notes on this pour")))),
+      list("release", "Out of the mould", casting.release, null),
+      list("assembly", "Motor in", casting.assembly, null),
+      measure(), written(), saving(),
+      el("footer", {}, el("p", {}, `Made by unitcad ${data.version}. This page contacts nothing; what you enter stays in this browser.`)));
+    mark();
+    paintTimers();
+  }
+
+  function lot(pour) {
+    const name = `p${pour.index}.lot`;
+    const input = el("input", { type: "text", name, value: state.fields[name] || "", oninput: () => { state.fields[name] = input.value; keep(); } });
+    return input;
+  }
+
+  // Letters decide how small a printed sheet is: two pages of A4, with room for the pictures.
+  function paperSize() {
+    const letters = data.steps.reduce((sum, each, at) => sum + each.step.title.length + (data.repeated.has(at) ? 14 : each.step.text.length), 0)
+      + [...data.casting.printing, ...data.casting.measure].join("").length + data.casting.bill.reduce((sum, item) => sum + item.item.length + item.note.length + 12, 0);
+    const pictures = data.steps.filter((each, at) => each.step.picture && !data.repeated.has(at)).length;
+    const area = 2 * 182 * 265 * 0.8 - pictures * 27 * 18 - 6000;
+    document.documentElement.style.setProperty("--paper-text", `${Math.max(4.5, Math.min(7.5, Math.sqrt(area / letters / 0.112))).toFixed(2)}pt`);
+  }
+
+  async function start() {
+    data = JSON.parse(new TextDecoder().decode(await window.unitcad.unpacked(document.getElementById("data").textContent)));
+    const { casting } = data;
+    const of = (steps, pour) => steps.map((step) => ({ step, pour }));
+    data.steps = [...of(casting.preparation, null), ...casting.pours.flatMap((pour) => of(pour.steps, pour)), ...of(casting.release, null), ...of(casting.assembly, null)];
+    // On paper a step whose words stood before only refers to them.
+    const before = new Map();
+    data.repeated = new Map();
+    data.steps.forEach(({ step }, at) => {
+      const words = `${step.title}\n${step.text}`;
+      if (before.has(words)) data.repeated.set(at, before.get(words));
+      else before.set(words, at);
+    });
+    key = `unitcad bench ${data.hash} ${casting.label}`;
+    state = restore();
+    paperSize();
+    draw();
+    setInterval(paintTimers, 1000);
+    document.addEventListener("visibilitychange", paintTimers);
+    document.documentElement.dataset.ready = "yes";
+  }
+
+  start().catch((error) => clear(page, el("p", { className: "absent" }, `The page can't be drawn: ${error.message}`)));
+})();

@@ -1,0 +1,153 @@
+"""The bench page of a variant: its casting procedure for a phone, with timers, fields and the cast record.
+
+One HTML file as the report is, made from casting.json, the pictures of the steps and the spec of the same folder.
+"""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from unitcad import __version__, files
+from unitcad.casting.cast_record import ENDING, FORMAT, HASH_DIGITS
+from unitcad.errors import UnitcadError
+from unitcad.pipeline.folder import BENCH
+from unitcad.pipeline.manifest_records import Manifest
+from unitcad.report.html_page import html_page
+from unitcad.report.records import expect
+from unitcad.report.viewer_models import spec_in
+from unitcad.spec import spec_hash, to_data
+
+PROGRAMS = ("dom.js", "glb.js", "bench.js")
+STYLES = ("app/page.css", "app/bench.css")
+LARGEST_PICTURE = 1_000_000
+"""Bytes of a step's picture, at most."""
+MOST_PICTURES = 500
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+class ListedStep(msgspec.Struct):
+    """A step of casting.json, as far as the page relies on it."""
+
+    title: str
+    text: str
+    picture: str
+    kind: str
+    minutes: float
+    wait_min: float
+
+
+class ListedPour(msgspec.Struct):
+    """A pour of casting.json."""
+
+    index: int
+    material: str
+    part_a_g: float
+    part_b_g: float
+    pot_life_min: float
+    cure_h: float
+    steps: list[ListedStep]
+
+
+class ListedPhase(msgspec.Struct):
+    """A phase of casting.json's time line."""
+
+    name: str
+    start_min: float
+    bench_min: float
+    wait_min: float
+
+
+class ListedItem(msgspec.Struct):
+    """A line of the bill."""
+
+    item: str
+    quantity: float
+    unit: str
+    note: str
+
+
+class CastingFile(msgspec.Struct):
+    """casting.json: what the page shows of it."""
+
+    name: str
+    label: str
+    cells: int
+    earliest_finish_min: float
+    bench_min: float
+    time_line: list[ListedPhase]
+    printing: list[str]
+    preparation: list[ListedStep]
+    pours: list[ListedPour]
+    release: list[ListedStep]
+    assembly: list[ListedStep]
+    measure: list[str]
+    bill: list[ListedItem]
+
+
+def write_bench(folder: Path) -> Path | None:
+    """Write `folder`/bench.html for the variant in `folder`; None where it has no procedure. Returns its path.
+
+    Raises UnitcadError where casting.json is damaged.
+    """
+    try:
+        data = files.read_json(folder / "casting.json", links=False)
+    except files.NotThere:
+        return None
+    expect(data, CastingFile, folder / "casting.json")
+    casting = msgspec.convert(data, CastingFile)
+    try:
+        spec = spec_in(folder)
+    except UnitcadError:  # such as one that runs code: the record then names it by its hash alone
+        spec = None
+    content: dict[str, Any] = {
+        "version": __version__,
+        "casting": msgspec.to_builtins(casting),
+        "spec": to_data(spec) if spec else None,
+        "hash": spec_hash(spec)[:HASH_DIGITS] if spec else _hash(folder),
+        "room_c": spec.casting.room_c if spec else None,
+        "scale_g": spec.casting.scale_resolution_g if spec else None,
+        "record": {"format": FORMAT, "version": 1, "ending": ENDING},
+        "pictures": _pictures(folder, casting),
+        "slicer": _slicer(folder),
+    }
+    target = folder / BENCH
+    text = html_page(content, f"{casting.name}: bench", PROGRAMS, STYLES, (), "Without a script, read casting.md.")
+    files.write(target, text.encode("utf-8", "replace"))
+    return target
+
+
+def _hash(folder: Path) -> str:
+    manifest = files.read_json(folder / "manifest.json", links=False)
+    expect(manifest, Manifest, folder / "manifest.json")
+    return str(manifest["hash"])
+
+
+def _pictures(folder: Path, casting: CastingFile) -> dict[str, str]:
+    """Return the pictures that steps name, as data; one that is not there, or no PNG in the folder, is left out."""
+    steps = [*casting.preparation, *(s for pour in casting.pours for s in pour.steps)]
+    steps += [*casting.release, *casting.assembly]
+    read: dict[str, str] = {}
+    for path in list(dict.fromkeys(step.picture for step in steps if step.picture))[:MOST_PICTURES]:
+        parts = Path(path).parts
+        if Path(path).is_absolute() or ".." in parts or any((folder / p).is_symlink() for p in Path(path).parents):
+            continue
+        try:
+            content = files.read(folder / path, largest=LARGEST_PICTURE, links=False)
+        except UnitcadError:
+            continue
+        if content.startswith(PNG):
+            read[path] = f"data:image/png;base64,{base64.b64encode(content).decode()}"
+    return read
+
+
+def _slicer(folder: Path) -> dict[str, Any] | None:
+    """Return print time and filament by the slicer, where they are known."""
+    try:
+        sliced = files.read_json(folder / "slicer.json", links=False)
+        return {"slicer": str(sliced["slicer"]), **{key: float(sliced[key]) for key in ("print_s", "filament_cm3")}}
+    except (UnitcadError, KeyError, TypeError, ValueError):
+        return None

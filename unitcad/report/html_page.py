@@ -1,0 +1,77 @@
+"""One offline HTML file: its data, its programs, and a policy that forbids every connection.
+
+All text from specs and results travels as compressed JSON in base 64 and is set as text, never as markup. A policy in
+the page's head forbids every connection, and every script but those whose hashes it names.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+import json
+from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from unitcad import __version__
+
+
+def html_page(
+    data: dict[str, Any],
+    title: str,
+    programs: Sequence[str],
+    styles: Sequence[str],
+    vendored: Sequence[str],
+    without_script: str,
+    licences: str = "",
+) -> str:
+    """Return the HTML of a page with `data`: `programs` of app/ run after the `vendored` ones, under `styles`."""
+    scripts = [*(asset(f"vendor/{name}") for name in vendored), *(asset(f"app/{name}") for name in programs)]
+    sheets = [asset(name) for name in styles]
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    packed = base64.b64encode(gzip.compress(text.encode("utf-8", "replace"), 9, mtime=0)).decode()
+    policy = "; ".join(
+        [
+            "default-src 'none'",
+            "script-src " + " ".join(_hash(script) for script in scripts),
+            "style-src " + " ".join(_hash(style) for style in sheets),
+            "img-src data:",
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
+    )
+    lines = [
+        "<!doctype html>",
+        '<html lang="en">',
+        "<head>",
+        '<meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{html.escape(policy)}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f'<meta name="generator" content="unitcad {html.escape(__version__)}">',
+        f"<title>{html.escape(title)}</title>",
+        *(f"<style>{style}</style>" for style in sheets),
+        "</head>",
+        "<body>",
+        '<main id="page"><p>Reading ...</p></main>',
+        f"<noscript><p>A script draws this page. {html.escape(without_script)}</p></noscript>",
+        f'<script type="text/plain" id="data">{packed}</script>',
+        f'<script type="text/plain" id="licences">{html.escape(licences, quote=False)}</script>',
+        *(f"<script>{script}</script>" for script in scripts),
+        "</body>",
+        "</html>",
+    ]
+    return "\n".join([*lines, ""])
+
+
+@cache
+def asset(name: str) -> str:
+    """Read a shipped file. No own script or style holds the end tag of its element; a test checks it."""
+    return (files("unitcad") / "report" / name).read_text("utf-8")
+
+
+@cache
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
