@@ -32,8 +32,8 @@ class BatchFile(Struct):
 class VariantRecord(Struct, kw_only=True):
     """A variant on the page; a file that its folder lacks, or that can't be read, is None.
 
-    `casts` are the cast records in it, `drawings` SVG by path, `files` (path, bytes); `damaged` says what can't be read;
-    `model` is the key of the geometry, and `no_model` says why there is none.
+    `casts` are the cast records in it, `drawings` SVG by path, `files` (path, bytes); `damaged` says what can't be
+    read; `model` is the key of the geometry, and `no_model` says why there is none.
     """
 
     folder: str
