@@ -18,7 +18,7 @@ DATA = json.loads((Path(__file__).parents[2] / "docs" / "mechanics.json").read_t
 @pytest.mark.parametrize("index", [None, 0])
 def test_a_row_is_made_again(index):
     unit = DATA["units"][4]
-    draw = None if index is None else Draw(DATA["seed"], index)
+    draw = None if index is None else Draw(DATA["seed"], index, len(DATA["draws"]))
     found = unit_levels(unit, draw, DATA["fineness"])
     stored = np.array(DATA["nominal"] if index is None else DATA["draws"][index])[4]
     assert stored[0] == pytest.approx(found[0, :, COMPONENTS.index("radial"), 0], rel=1e-3)

@@ -20,12 +20,11 @@ from unitcad.attenuation.inputs import body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.mechanics.motor_level import Setting, amplitude, motion, pressed_skin
 from unitcad.catalogue import measurements
-from unitcad.designs import shipped
 from unitcad.estimating import estimate_input
+from unitcad.experiments.measured_units import unit_spec
 from unitcad.spec import Spec
-from unitcad.validation import default_template, from_data, load
+from unitcad.validation import default_template, load
 
-_WALL = 1.25
 _TITLES = {"null": "null: soft inside or not", "crossings": "crossings (k_t once or twice)"}
 _DRAWN, _BARE = "finite elements, as drawn", "finite elements, without the circuit"
 _RADII = np.array([0, 2, 5, 7, 10, 15, 20, 30]) * 1e-3
@@ -139,16 +138,6 @@ def _summary(models: dict[str, _Model]) -> Summary:
 
 _SHOWN = ("E10/D30", "D10")
 """Units whose convergence is shown, in each measured design."""
-
-
-def unit_spec(design: str, unit: str) -> Spec:
-    """Return the spec of a unit of the paper, "E10/D30" or a control "D10": 14 mm, walls and caps of 2.5 in all."""
-    names = measurements().layers(unit)
-    wall = 2 * _WALL / len(names)
-    layers = [
-        {"material": name, "wall_mm": wall, **({"cap_mm": wall} if shipped()[design].caps else {})} for name in names
-    ]
-    return from_data({"name": unit, "design": design, "diameter_mm": 14.0, "fpcb": {}, "layers": layers})
 
 
 def edge_level(spec: Spec, fineness: float, pad: bool = True) -> tuple[float, int]:

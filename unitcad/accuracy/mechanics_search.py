@@ -14,12 +14,12 @@ from typing import Any, get_args
 
 import numpy as np
 
-from unitcad.accuracy.edge_levels import unit_spec
 from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
 from unitcad.attenuation.mechanics.motor_level import Drive, Reading, Setting, amplitude, motion
 from unitcad.attenuation.mechanics.unknowns import Draw, drawn
 from unitcad.catalogue import measurements
 from unitcad.estimating import estimate_input
+from unitcad.experiments.measured_units import unit_spec
 
 DRIVES: tuple[Drive, ...] = get_args(Drive)
 READINGS: tuple[Reading, ...] = get_args(Reading)
@@ -54,9 +54,9 @@ def _shape_levels(design: str, layers: str, draw: Draw | None, fineness: float) 
 
 
 def drawn_levels(seed: int, draws: int, fineness: float) -> Iterator[np.ndarray]:
-    """Yield the levels of one draw after another, (units, drives, readings, components, references)."""
+    """Yield the levels of one draw after another, spread evenly: (units, drives, readings, components, references)."""
     for index in range(draws):
-        yield np.array([unit_levels(unit, Draw(seed, index), fineness) for unit in measured_table().names])
+        yield np.array([unit_levels(unit, Draw(seed, index, draws), fineness) for unit in measured_table().names])
 
 
 @dataclass(frozen=True)

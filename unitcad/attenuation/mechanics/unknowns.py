@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass, replace
 
-import numpy as np
-
+from unitcad.attenuation.even_draws import position, positions
 from unitcad.attenuation.inputs import EstimateInput, Geometry, Quantity
 from unitcad.attenuation.mechanics.harmonic_response import Contact
 
@@ -28,8 +26,9 @@ class Draw:
 
     A value belongs to its name (a silicone, a tissue layer, "contact"), so that two units of one draw share it.
 
-    of   how many draws are spread evenly: each 16 of them have every combination of `CHOICES` once, and any other
-         value is a Latin hypercube over the bonded draws and over the resting ones. None: all draws are independent
+    of   how many draws are spread evenly (`even_draws`): each 16 of them have every combination of `CHOICES` once, and
+         any other value is a Latin hypercube over the bonded draws and over the resting ones. None: all draws are
+         independent
     """
 
     seed: int
@@ -38,14 +37,9 @@ class Draw:
 
     def position(self, name: str) -> float:
         """Return a uniform number between 0 and 1."""
-        key = zlib.crc32(name.encode())
-        within = float(np.random.default_rng([self.seed, self.index, key]).random())
         if self.of is None:
-            return within
-        group, rank = self.index % 2, self.index // 2
-        count = (self.of + 1 - group) // 2
-        strata = np.random.default_rng([self.seed, key, group, count]).permutation(count)
-        return (float(strata[rank]) + within) / count
+            return position(self.seed, name, self.index)
+        return float(positions(self.seed, name, self.of)[self.index])
 
     def between(self, name: str, low: float, high: float) -> float:
         """Return a number of log-uniform distribution between two above 0, or uniform from 0."""
