@@ -25,6 +25,7 @@
   const percent = (value) => (known(value) ? 100 * value : value);
   const percents = ({ value, low, high }) => ({ value: percent(value), low: percent(low), high: percent(high) });
   const list = (values) => values.map(percent);
+  const three = (value) => (known(value) ? Number(value.toPrecision(3)) : value);
 
   const spoken = (entry) => {
     const spread = known(entry.low) && known(entry.high) && entry.low !== entry.high ? `${number(entry.low, 3)} to ${number(entry.high, 3)}` : "";
@@ -116,7 +117,7 @@
       const name = `${one.drive}, ${place[one.reading] || one.reading}`;
       return [row(name, one, "series-4"), ...Object.entries(one.by_contact || {}).map(([contact, group]) => row(`${name}: ${contact}`, group, "series-2"))];
     });
-    const numbers = (block.levels || []).map((one) => [one.drive, place[one.reading] || one.reading, percent(one.median), one.median_error === null ? "–" : one.median_error, percent(one.drawn_as)]);
+    const numbers = (block.levels || []).map((one) => [one.drive, place[one.reading] || one.reading, three(percent(one.median)), one.median_error === null ? "–" : three(one.median_error), three(percent(one.drawn_as))]);
     return [el("h3", {}, "By finite elements (mechanics)"),
       rangeChart(rows, [], `Amplitude along the drive, % of the motor's: median and ${(block.percent || [])[0]} to ${(block.percent || [])[2]} % of ${block.draws} draws, then those with bonded and with resting skin apart.`),
       numbers.length > 0 && table(["Drive", "Read on", "Median, %", "Its error, times or divided by", "Unit as drawn, %"], numbers, { label: "Medians by finite elements" }),
@@ -201,7 +202,7 @@
     const [read, unread] = [names.filter((name) => most(name) > 0), names.filter((name) => most(name) === 0)];
     read.sort((a, b) => most(b) - most(a));
     return [el("h3", {}, "Inputs that a model sees"),
-      table(["1 % more of", ...reading.map(([model]) => model)], read.map((name) => [name, ...reading.map(([, seen]) => (name in seen.by ? seen.by[name] : "not seen"))]), { label: "Inputs that a model sees" }),
+      table(["1 % more of", ...reading.map(([model]) => model)], read.map((name) => [name, ...reading.map(([, seen]) => (name in seen.by ? three(seen.by[name]) : "not seen"))]), { label: "Inputs that a model sees" }),
       el("p", { className: "note" }, `Change of the level at the edge in percent, at the middle of the inputs' ranges.${unread.length ? ` Seen by none: ${unread.join(", ")}.` : ""}`)];
   }
 

@@ -1,0 +1,178 @@
+"""The estimate's blocks in Chromium: both drives' curves, ranges by finite elements, inputs seen; a study's picture."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from chromium import Visit
+
+from unitcad.experiments.lab_file import load_lab
+from unitcad.experiments.study import study
+from unitcad.experiments.study_files import shown, write_study
+from unitcad.pipeline.build import build
+from unitcad.report import write_report
+from unitcad.validation import load
+
+Image = pytest.importorskip("PIL.Image", reason="reading the screenshots needs Pillow")
+pytest.importorskip("skfem")
+DRAWS = 4
+OPEN = """() => document.querySelectorAll("#estimate details").forEach((node) => { node.open = true; })"""
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a unit estimated by closed forms and, with few draws, by finite elements."""
+    from unitcad.attenuation.mechanics import prior_range
+
+    models = 'estimate.models=["bush","fitted","paper","mechanics"]'
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(prior_range, "range_block", partial(prior_range.range_block, draws=DRAWS))
+        patch.setattr(prior_range, "FINENESS", 0.5)
+        spec = load("encapsulating", ["output.formats=[]", models])
+        folder = build(spec, tmp_path_factory.mktemp("solved"), only=["estimate"], check=False).folder
+    write_report(folder)
+    return folder
+
+
+@pytest.fixture
+def estimate(solved: Path) -> dict[str, Any]:
+    return json.loads((solved / "estimate.json").read_text("utf-8"))
+
+
+@pytest.fixture
+def visit(running: Any, solved: Path) -> Iterator[Visit]:
+    seen = Visit(running, solved / "report.html")
+    seen.page.evaluate(OPEN)
+    yield seen
+    assert seen.errors == seen.console == []
+    seen.close()
+
+
+def cells(visit: Visit, label: str) -> list[list[str]]:
+    """The texts of a table, its head first."""
+    rows = visit.page.locator(f'#estimate table[aria-label="{label}"] tr, #estimate [aria-label="{label}"] table tr')
+    return rows.evaluate_all("(rows) => rows.map((row) => [...row.cells].map((cell) => cell.innerText.trim()))")
+
+
+def pixels(image: np.ndarray, colour: str) -> int:
+    rgb = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return int((np.abs(image - rgb).max(axis=2) < 30).sum())
+
+
+def test_both_drives_are_drawn_and_stand_in_the_table(visit: Visit, estimate: dict[str, Any]) -> None:
+    visit.page.wait_for_selector("#estimate .plot canvas")
+    legend = " ".join(visit.page.locator("#estimate ul.key").all_inner_texts())
+    assert "Force turning in the skin's plane (this motor)" in legend
+    assert "Force along the motor's axis" in legend
+    canvas = visit.page.locator("#estimate .plot canvas")
+    image = np.asarray(Image.open(io.BytesIO(canvas.screenshot())).convert("RGB")).astype(int)
+    colours = [visit.page.evaluate(f"() => window.unitcad.theme.colour('series-{n}')") for n in (1, 3)]
+    assert all(pixels(image, colour) > 150 for colour in colours), colours
+    head, *rows = cells(visit, "The curve as numbers")
+    layered = estimate["layered"]
+    at = [
+        head.index(name) for name in ("Force turning in the skin's plane (this motor)", "Force along the motor's axis")
+    ]
+    for row in rows:
+        i = layered["r_mm"].index(float(row[0]))
+        for column, drive in zip(at, ("flat", "axial"), strict=True):
+            assert float(row[column]) == pytest.approx(100 * layered["drives"][drive]["u"]["value"][i], rel=1e-3)
+    ratio = [float(row[head.index("Flat over axial, per newton")]) for row in rows]
+    assert ratio[-1] > 100  # far out a sideways force moves more skin
+
+
+def test_a_range_by_finite_elements_has_a_bar_from_low_to_high(visit: Visit, estimate: dict[str, Any]) -> None:
+    levels = estimate["mechanics"]["levels"]
+    chart = visit.page.locator("#estimate figure.ranges", has_text=f"of {DRAWS} draws")
+    bars = chart.locator(".row:not(.scale)").evaluate_all(
+        """(rows) => rows.map((row) => {
+          const box = (name) => {
+            const { left, right } = row.querySelector(name).getBoundingClientRect();
+            return [left, right];
+          };
+          const name = row.querySelector(".name").innerText;
+          return { name, track: box(".track"), bar: box(".bar"), dot: box(".dot") };
+        })"""
+    )
+    spans = [(name, one) for one in levels for name, one in ((None, one), *one["by_contact"].items())]
+    assert len(bars) == len(spans) == 12
+    low, high = (pick(one[end] for _, one in spans) for pick, end in ((min, "low"), (max, "high")))
+    left, width = bars[0]["track"][0], bars[0]["track"][1] - bars[0]["track"][0]
+    scale = np.log(high * 1.5 / (low / 1.5))
+    for bar, (contact, one) in zip(bars, spans, strict=True):
+        assert contact is None or bar["name"].endswith(f": {contact}")
+        wanted = [left + width * np.log(one[end] / (low / 1.5)) / scale for end in ("low", "median", "high")]
+        dot = sum(bar["dot"]) / 2
+        assert [bar["bar"][0], dot] == pytest.approx(wanted[:2], abs=8), bar
+        assert bar["bar"][1] == pytest.approx(wanted[2], abs=8), bar
+    head, *rows = cells(visit, "Medians by finite elements")
+    assert [row[:2] for row in rows] == [
+        [drive, read] for drive in ("flat", "axial") for read in ("skin at D/2", "the unit's own edge")
+    ]
+    for row, one in zip(rows, levels, strict=True):
+        assert float(row[head.index("Median, %")]) == pytest.approx(100 * one["median"], rel=5e-3)
+
+
+def test_the_inputs_that_a_model_sees(visit: Visit, estimate: dict[str, Any]) -> None:
+    head, *rows = cells(visit, "Inputs that a model sees")
+    blocks = [estimate["models"][name]["inputs_seen"] for name in ("bush", "fitted", "paper")]
+    blocks += estimate["mechanics"]["inputs_seen"]
+    assert len(head) == 1 + len(blocks)
+    largest = []
+    for name, *shown_cells in rows:
+        for cell, block in zip(shown_cells, blocks, strict=True):
+            assert (cell == "not seen") == (name not in block["by"])
+            if cell != "not seen":
+                assert float(cell.replace("−", "-")) == pytest.approx(block["by"][name], rel=6e-3)
+        largest.append(max(abs(block["by"].get(name, 0.0)) for block in blocks))
+    assert largest == sorted(largest, reverse=True)
+    assert {"layers.0.wall_mm", "tissue thickness", "motor mass"} <= {row[0] for row in rows}
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_nothing_of_it_overflows_at_390_pixels(running: Any, solved: Path, dark: bool) -> None:
+    seen = Visit(running, solved / "report.html", width=390, height=844, dark=dark)
+    seen.page.evaluate(OPEN)
+    assert seen.overflowing() == []
+    text = seen.page.eval_on_selector("#estimate .ranges .value", "(node) => getComputedStyle(node).color")
+    behind = seen.page.eval_on_selector("body", "(node) => getComputedStyle(node).backgroundColor")
+    bright = [sum(int(part) for part in rgb.removeprefix("rgb(").rstrip(")").split(",")) for rgb in (text, behind)]
+    assert (bright[0] > bright[1]) == dark
+    assert seen.errors == seen.console == []
+    seen.close()
+
+
+def test_a_studys_picture_keeps_its_words_apart(running: Any, tmp_path: Path) -> None:
+    """No word leaves the picture or lies on another or on a bar; what can't be read has words in place of a bar."""
+    lab = load_lab("paper", {"rivals": ["paper", "crossings", "bush"], "compare": ["unit"], "draws": 20})
+    data = study(lab)
+    best = shown(data)[0]["experiment"]
+    for one in data["experiments"]:
+        if one["experiment"] == best:
+            one["predicted"]["bush"]["unread"] = 0.7
+    write_study(data, tmp_path)
+    context = running.new_context(viewport={"width": 1280, "height": 900})
+    page = context.new_page()
+    page.goto((tmp_path / "experiments.svg").as_uri())
+    boxes = """(name) => [...document.querySelectorAll(name)].map((node) => {
+      const b = node.getBBox(); return [b.x, b.y, b.x + b.width, b.y + b.height, node.textContent];
+    })"""
+    words, bars = page.evaluate(boxes, "text"), page.evaluate(boxes, "rect[fill-opacity]")
+    width, height = page.evaluate(
+        "() => { const v = document.documentElement.viewBox.baseVal; return [v.width, v.height]; }"
+    )
+    assert all(x0 >= 0 and y0 >= 0 and x1 <= width and y1 <= height for x0, y0, x1, y1, _ in words)
+    assert len(bars) == 3 * len(shown(data)) - 1
+    assert [word[4] for word in words].count("below what can be read") == 1
+    for i, word in enumerate(words):
+        for other in [*words[:i], *bars]:
+            apart = word[2] <= other[0] or other[2] <= word[0] or word[3] <= other[1] + 3 or other[3] <= word[1] + 3
+            assert apart, (word, other)
+    context.close()
