@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from unitcad.cache import DiskStore, MemoryStore
 from unitcad.errors import Missing
@@ -41,18 +42,20 @@ def test_solutions_are_kept_and_shared_by_both_readings(tmp_path: Path) -> None:
     first = edge.levels(variant, Draws(BLOCK, 1, edge.name))
     assert store.counts["data built"] == 1
     other = skin.levels(variant, Draws(BLOCK, 1, skin.name))
-    again = edge.levels(variant, Draws(BLOCK + 1, 1, edge.name))
-    assert store.counts["data built"] == 2  # the second block of ten draws, for the eleventh
-    assert again[:BLOCK] == pytest.approx(first, rel=0)
-    assert len(again) == BLOCK + 1
+    again = edge.levels(variant, Draws(BLOCK, 1, edge.name, kept=(3, 8)))
+    assert store.counts["data built"] == 2  # those two together
+    assert again == pytest.approx(first[[3, 8]], rel=0)
+    assert len(edge.levels(variant, Draws(BLOCK + 1, 1, edge.name))) == BLOCK + 1
+    assert store.counts["data built"] == 4  # spread over eleven all are others, in two blocks
 
     from unitcad.attenuation.mechanics.motor_level import level
     from unitcad.attenuation.mechanics.unknowns import Draw
 
     (exact,) = available(["mechanics-axial-edge"], store, 1e-15).rivals
-    assert exact.levels(variant, Draws(BLOCK, 1))[3] == level(variant, 60.0, "axial", "edge", Draw(1, 3), FINENESS)
+    alone = level(variant, 60.0, "axial", "edge", Draw(1, 3, BLOCK), FINENESS)
+    assert exact.levels(variant, Draws(BLOCK, 1))[3] == alone
     # On a rigid plate the skin stands still, and so does a motor that lies on it: both read as the least amplitude.
-    assert store.counts["data built"] == 2
+    assert store.counts["data built"] == 4
     assert np.all(other <= 1.0)
     assert np.count_nonzero(other == 1.0) == np.count_nonzero(first == 1.0) > 0
 
@@ -94,6 +97,7 @@ def test_what_moves_less_than_the_instrument_shows_is_called_so(monkeypatch: pyt
 
     monkeypatch.setattr(motor_level, "motion", motion)
     lab = _part("encapsulating E10/D10", frequencies_hz=(60, 200), bodies=("rigid-plate", "gel-50kpa"))
+    lab = replace(lab, settings=structs.replace(lab.settings, held_to_levels=False))
     rivals = available(["crossings", "mechanics-flat-edge"], MemoryStore()).rivals
     predicted = predictions(lab, rivals)
     unread = {}

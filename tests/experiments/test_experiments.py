@@ -110,11 +110,16 @@ def test_a_set_holds_no_ratio_that_follows_from_the_others() -> None:
     assert sets[1].information.bits > sets[0].information.bits
 
 
-def test_draws_are_repeatable_and_a_longer_run_begins_with_the_shorter() -> None:
-    short, long = Draws(5, 1, "paper"), Draws(50, 1, "paper")
-    assert long.uniform("kappa")[:5] == pytest.approx(short.uniform("kappa"))
-    others = (Draws(5, 2, "paper").uniform("kappa"), Draws(5, 1, "x").uniform("kappa"), short.uniform("gap"))
-    assert all(np.abs(other - short.uniform("kappa")).min() > 1e-9 for other in others)
+def test_draws_are_repeatable_and_spread_evenly() -> None:
+    draws = Draws(50, 1, "paper")
+    found = draws.uniform("kappa")
+    assert found == pytest.approx(Draws(50, 1, "paper").uniform("kappa"), rel=0)
+    others = (Draws(50, 2, "paper").uniform("kappa"), Draws(50, 1, "x").uniform("kappa"), draws.uniform("gap"))
+    assert all(np.abs(other - found).min() > 1e-9 for other in others)
+    for group in (found[::2], found[1::2]):
+        assert sorted(np.floor(group * 25)) == list(range(25))
+    kept = Draws(50, 1, "paper", kept=(7, 3))
+    assert kept.uniform("kappa") == pytest.approx(found[[7, 3]], rel=0)
     found = Draws(2000, 1).between("E", 10.0, 40.0)
     assert (found.min(), np.median(found), found.max()) == pytest.approx((10, 20, 40), rel=0.03)
 

@@ -29,6 +29,10 @@ def experiments(
     ] = None,
     draws: Annotated[int | None, typer.Option(help="of what is not known, for each rival; else the file's")] = None,
     element_draws: Annotated[int | None, typer.Option(help="the same for finite elements, which cost more")] = None,
+    held: Annotated[
+        bool | None,
+        typer.Option("--held-to-levels/--prior", help="weigh the draws by the nine measured levels, or not"),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="of the draws; else the file's")] = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Write experiments.json, .md and .svg into this folder.")
@@ -50,6 +54,7 @@ def experiments(
         "compare": None if compare is None else listed(compare),
         "draws": draws,
         "element_draws": element_draws,
+        "held_to_levels": held,
         "seed": seed,
     }
     loaded = load_lab(lab, {key: value for key, value in asked.items() if value is not None})
@@ -65,7 +70,7 @@ def experiments(
 
 
 def _print(data: dict[str, Any], lab: Lab, saved: bool) -> None:
-    from unitcad.experiments.study import BELOW
+    from unitcad.experiments.range_plot import BELOW
     from unitcad.experiments.study_files import A_BIT, draws_text, left_out, shown, telling
 
     screen = console()
@@ -88,7 +93,10 @@ def _print(data: dict[str, Any], lab: Lab, saved: bool) -> None:
     if sets := telling(data["sets"]):
         screen.print(_sets(sets))
     for rival in data["rivals"]:
-        known = f" (probability {rival['probability']:.2f})" if data["measured"] else ""
+        facts = [f"probability {rival['probability']:.2f}"] if data["measured"] else []
+        if rival["held"]:
+            facts.append(f"misses the nine levels by a factor of {rival['held']['misses']:.2f}")
+        known = f" ({', '.join(facts)})" if facts else ""
         screen.print(f"  {rival['name']}{known}: {rival['says']}", soft_wrap=True)
     screen.print(
         f"  A reading scatters by {100 * data['noise']:g} %, a rival that holds misses a ratio by "
@@ -96,6 +104,8 @@ def _print(data: dict[str, Any], lab: Lab, saved: bool) -> None:
         f"{BELOW}: so for half of the draws or more. ±: the error of the bits.",
         soft_wrap=True,
     )
+    for line in data["few_draws"]:
+        screen.print(f"  {line}", soft_wrap=True)
     screen.print(data["settles"], soft_wrap=True)
 
 

@@ -3,13 +3,11 @@
 A rival predicts the amplitude at a unit's edge over the motor's. What multiplies all of its readings by one number
 cancels in the ratios that are compared.
 
-Every name has a stream of its own, so that a longer run begins with the draws of a shorter one and a new name changes
-no other.
+Draws are spread evenly (`attenuation.even_draws`). Every name has a stream of its own: a new name changes no other.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -17,21 +15,34 @@ import numpy as np
 
 from unitcad.attenuation.edge.bush import sections
 from unitcad.attenuation.edge.closed_form import Units
+from unitcad.attenuation.even_draws import positions
 from unitcad.attenuation.inputs import EstimateInput, Quantity, SiliconeLayer
 
 
 @dataclass(frozen=True)
 class Draws:
-    """`count` independent draws for one rival. Of one name all conditions of a draw share the value."""
+    """Draws for one rival. Of one name all conditions of a draw share the value.
+
+    count  how many are spread evenly
+    kept   indices of those that are there, all for None
+    held   they are, or will be, held to measured levels: a constant that is fitted to these has its prior instead
+    """
 
     count: int
     seed: int
     rival: str = ""
+    kept: tuple[int, ...] | None = None
+    held: bool = False
+
+    @property
+    def indices(self) -> tuple[int, ...]:
+        """Which of the `count` are there."""
+        return tuple(range(self.count)) if self.kept is None else self.kept
 
     def uniform(self, name: str) -> np.ndarray:
-        """Return the draws of that name between 0 and 1, shape (count,)."""
-        stream = hashlib.sha256(f"{self.rival}\n{name}".encode()).digest()[:8]
-        return np.random.default_rng([self.seed, int.from_bytes(stream, "big")]).random(self.count)
+        """Return the draws of that name between 0 and 1, shape (draws,)."""
+        found = positions(self.seed, f"{self.rival}\n{name}", self.count)
+        return found if self.kept is None else found[list(self.kept)]
 
     def between(self, name: str, low: float, high: float) -> np.ndarray:
         """Return draws from `low` to `high`, uniform in the logarithm if both are above 0."""
@@ -56,9 +67,9 @@ class Draws:
         columns = {field: np.stack([one[field] for one in drawn], axis=-1) for field in drawn[0]}
         return Units(
             **columns,
-            density=np.tile([layer.density for layer in variant.layers], (self.count, 1)),
-            thickness=np.tile([layer.thickness for layer in variant.layers], (self.count, 1)),
-            omega=np.full(self.count, 2.0 * np.pi * variant.frequency.middle),
+            density=np.tile([layer.density for layer in variant.layers], (len(self.indices), 1)),
+            thickness=np.tile([layer.thickness for layer in variant.layers], (len(self.indices), 1)),
+            omega=np.full(len(self.indices), 2.0 * np.pi * variant.frequency.middle),
             passes=variant.passes,
             section=sections([variant.geometry]),
         )

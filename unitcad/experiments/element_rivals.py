@@ -6,6 +6,7 @@ store, so that a second run, or one that was interrupted, solves nothing twice.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, partial
 from importlib.resources import files
@@ -71,22 +72,27 @@ def _unread(
 
 def _amplitudes(store: Store, drive: Drive, reading: str, variant: EstimateInput, draws: Draws) -> list[np.ndarray]:
     """Return the amplitudes at the reading and of the motor, m under one newton, each (draws,)."""
-    starts = range(0, draws.count, BLOCK)
+    parts = [draws.indices[start : start + BLOCK] for start in range(0, len(draws.indices), BLOCK)]
     blocks = [
-        store.data(_key(variant, drive, draws.seed, start), partial(_solve, variant, drive, draws.seed, start))
-        for start in starts
+        store.data(
+            _key(variant, drive, draws.seed, draws.count, part),
+            partial(_solve, variant, drive, draws.seed, draws.count, part),
+        )
+        for part in parts
     ]
-    return [np.concatenate([block[at] for block in blocks])[: draws.count] for at in (reading, "motor")]
+    return [np.concatenate([block[at] for block in blocks]) for at in (reading, "motor")]
 
 
-def _solve(variant: EstimateInput, drive: Drive, seed: int, start: int) -> dict[str, list[float]]:
+def _solve(
+    variant: EstimateInput, drive: Drive, seed: int, count: int, indices: Sequence[int]
+) -> dict[str, list[float]]:
     """Return amplitudes under one newton (m) of a block of draws: at both readings and of the motor."""
     from unitcad.attenuation.mechanics.motor_level import amplitude, motion
     from unitcad.attenuation.mechanics.unknowns import Draw, drawn
 
     found: dict[str, list[float]] = {"skin": [], "edge": [], "motor": []}
-    for index in range(start, start + BLOCK):
-        made, setting = drawn(variant, Draw(seed, index))
+    for index in indices:
+        made, setting = drawn(variant, Draw(seed, index, count))
         moved = motion(replace(made, frequency=variant.frequency), drive, setting, FINENESS)
         found["skin"].append(amplitude(moved.skin, drive, "along"))
         found["edge"].append(amplitude(moved.edge, drive, "along"))
@@ -94,13 +100,18 @@ def _solve(variant: EstimateInput, drive: Drive, seed: int, start: int) -> dict[
     return found
 
 
-def _key(variant: EstimateInput, drive: Drive, seed: int, start: int) -> str:
-    return digest(repr(("amplitudes", _solver(), FINENESS, BLOCK, variant, drive, seed, start)).encode())
+def _key(variant: EstimateInput, drive: Drive, seed: int, count: int, indices: Sequence[int]) -> str:
+    return digest(repr(("amplitudes", _solver(), FINENESS, variant, drive, seed, count, tuple(indices))).encode())
 
 
 @cache
 def _solver() -> str:
     """Return a digest of the code that solves: a changed line reuses nothing."""
     folder = Path(str(files("unitcad"))) / "attenuation"
-    code = [folder / "inputs.py", *sorted(folder.glob("layered/*.py")), *sorted(folder.glob("mechanics/*.py"))]
+    code = [
+        folder / "inputs.py",
+        folder / "even_draws.py",
+        *sorted(folder.glob("layered/*.py")),
+        *sorted(folder.glob("mechanics/*.py")),
+    ]
     return digest(b"".join(file.read_bytes() for file in code))

@@ -60,14 +60,16 @@ def expected_information(
     weights: np.ndarray,
     shares: Sequence[np.ndarray] | None = None,
     seed: int = 0,
+    indices: Sequence[np.ndarray] | None = None,
 ) -> Information:
     """Return the information of measuring d numbers about which rival holds.
 
     `predicted`: an array (draws, d) for each rival; `covariance` (d, d) of the measurement's errors; `weights`: prior
-    probability of each rival; `shares`: of each draw within its rival, summing to 1, else equal. Two dimensions and
-    more are integrated by Monte Carlo with that seed: its error is in the standard error. Draws of one index may
-    depend on each other over the rivals, those of different ones may not. Raises ValueError for a rival with fewer
-    than two draws, numpy's LinAlgError for a covariance that is not positive definite.
+    probability of each rival; `shares`: of each draw within its rival, summing to 1, else equal; `indices`: of each
+    draw, else its place. Two dimensions and more are integrated by Monte Carlo with that seed: its error is in the
+    standard error. Draws of one index may depend on each other over the rivals, those of different ones may not; such
+    as are spread more evenly than independent ones have a smaller error than the one stated. Raises ValueError for a
+    rival with fewer than two draws, numpy's LinAlgError for a covariance that is not positive definite.
     """
     counts = np.array([len(one) for one in predicted])
     if counts.min() < 2:
@@ -81,6 +83,7 @@ def expected_information(
         share=np.concatenate(shares) if shares is not None else 1.0 / counts[rival],
         counts=counts,
         weights=np.asarray(weights, dtype=float),
+        index=np.concatenate(indices if indices is not None else [np.arange(count) for count in counts]),
     )
     one_dimension = mixture.white.shape[1] == 1
     score = _by_quadrature(mixture) if one_dimension else _by_sampling(mixture, seed)
@@ -89,13 +92,14 @@ def expected_information(
 
 @dataclass(frozen=True)
 class _Mixture:
-    """Whitened draws of all rivals (N, d); of each its rival and share (N,); draws and weight of each rival (M,)."""
+    """Whitened draws of all rivals (N, d); of each its rival, share, index (N,); draws, weight of each rival (M,)."""
 
     white: np.ndarray
     rival: np.ndarray
     share: np.ndarray
     counts: np.ndarray
     weights: np.ndarray
+    index: np.ndarray
 
     @property
     def of_rival(self) -> np.ndarray:
@@ -116,11 +120,11 @@ def _bracket(mixture: _Mixture, score: Score) -> Information:
     most = entropy(mixture.weights)
     high, low = (float(np.clip(total @ scores, 0.0, most)) for scores in (with_itself, without))
     # Summed over rivals before it is squared: draws of one number may share what they drew, and then go together.
-    influence = np.zeros(mixture.counts.max())
+    influence = np.zeros(int(mixture.index.max()) + 1)
     for m, weight in enumerate(mixture.weights):
         mine = mixture.rival == m
         share = mixture.share[mine]
-        influence[: mixture.counts[m]] += weight * share * (without[mine] - share @ without[mine])
+        np.add.at(influence, mixture.index[mine], weight * share * (without[mine] - share @ without[mine]))
     return Information(min(low, high), max(low, high), float(np.sqrt(np.sum(influence**2))))
 
 

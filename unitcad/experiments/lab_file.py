@@ -66,6 +66,7 @@ class LabFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     draws: Annotated[int, Meta(ge=10, le=2000)] = 200
     element_draws: Annotated[int, Meta(ge=10, le=2000, description="of rivals by finite elements")] = 40
     seed: Annotated[int, Meta(ge=0, le=2**32 - 1)] = 1
+    held_to_levels: Annotated[bool, Meta(description="draws weigh by the nine measured levels")] = True
     tissue: dict[str, dict[str, TissueEntry]] = {}
     measured: list[MeasuredTable] = []
 
@@ -134,12 +135,12 @@ def lab_of_specs(specs: Mapping[str, Spec], settings: LabFile, name: str = "lab"
                 for at, layer in enumerate(variant.layers):
                     if not layer.youngs_modulus.known:
                         raise Refusal(f"units.{unit}.layers.{at}", layer.material, layer.youngs_modulus.note)
-                variants[Condition(unit, hertz, body)] = _with_ranges(variant, settings.modulus_factor)
+                variants[Condition(unit, hertz, body)] = with_ranges(variant, settings.modulus_factor)
     measured = tuple(_measured(one, variants, f"measured.{i}") for i, one in enumerate(settings.measured))
     return Lab(name, settings, variants, measured)
 
 
-def _with_ranges(variant: EstimateInput, factor: float) -> EstimateInput:
+def with_ranges(variant: EstimateInput, factor: float) -> EstimateInput:
     """Give every modulus of a silicone that has none a range: its value over and its value times a factor."""
 
     def ranged(modulus: Quantity) -> Quantity:

@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 
 from unitcad.cache import Store
 from unitcad.errors import Refusal
-from unitcad.experiments.draws import Draws
+from unitcad.experiments.draws import Draws, Rival
 from unitcad.experiments.information import Information, entropy, expected_information
 from unitcad.experiments.lab_file import Lab, LabFile, lab_of_specs
 from unitcad.experiments.protocol import Ratio
@@ -105,7 +105,7 @@ def decision_between(
     lab = _on_their_own(specs, settings)
     ratio = Ratio(*lab.conditions)
     asked = available(rivals, store, settings.smallest_um * 1e-6)
-    answered = [rival for rival in asked.rivals if _finite(lab, rival.name, store)]
+    answered = [rival for rival in asked.rivals if _answers(rival, lab)]
     if not answered:
         raise Refusal("rivals", list(rivals), f"none of them has an answer for {first} and {second}")
     predicted = predictions(lab, answered)
@@ -138,11 +138,10 @@ def _on_their_own(specs: Mapping[str, Spec], settings: LabFile) -> Lab:
     return Lab("candidates", settings, variants)
 
 
-def _finite(lab: Lab, rival: str, store: Store | None) -> bool:
-    """Tell whether a rival has an answer for every reading of a lab."""
-    found = available([rival], store, lab.settings.smallest_um * 1e-6).rivals[0]
-    draws = Draws(lab.settings.element_draws if found.costly else lab.settings.draws, lab.settings.seed, rival)
-    return all(bool(np.isfinite(np.log(found.levels(one, draws))).all()) for one in lab.variants.values())
+def _answers(rival: Rival, lab: Lab) -> bool:
+    """Tell whether a rival has an answer for every reading of a lab: two draws tell."""
+    two = Draws(2, lab.settings.seed, rival.name)
+    return all(bool(np.isfinite(np.log(rival.levels(variant, two))).all()) for variant in lab.variants.values())
 
 
 def _about_order(predicted: Predictions, ratio: Ratio) -> tuple[Information, float]:

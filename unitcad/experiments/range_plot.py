@@ -1,5 +1,7 @@
 """What each rival predicts for the best experiments, as SVG: a bar from 10 to 90 % of its draws, a mark at the middle.
 
+Where half of a rival's draws or more can't be read, words stand instead of the bar.
+
 The same data, the same bytes.
 """
 
@@ -15,13 +17,19 @@ WIDTH, LEFT, RIGHT, TOP, BOTTOM = 860, 300, 24, 64, 44
 BAR, GAP = 14, 18
 COLOURS = ("#1f6fb2", "#c8553d", "#3c8d5a", "#8059a8", "#b8860b", "#4d4d4d", "#d1478c", "#17868c")
 _LETTERS = 44
+BELOW = "below what can be read"
+
+
+def is_below(span: Mapping[str, float]) -> bool:
+    """Tell whether half of a prediction's draws or more are below what can be read."""
+    return span["unread"] >= 0.5
 
 
 def svg(experiments: Sequence[Mapping[str, Any]], rivals: Sequence[str]) -> str:
     """Return the plot of experiments, each as `study` gives it, one below the other over a logarithmic axis."""
-    spans = [span for one in experiments for span in one["predicted"].values()]
-    low = math.log10(min(span["low"] for span in spans)) - 0.05
-    high = math.log10(max(span["high"] for span in spans)) + 0.05
+    spans = [span for one in experiments for span in one["predicted"].values() if not is_below(span)]
+    low = math.log10(min((span["low"] for span in spans), default=1.0)) - 0.05
+    high = math.log10(max((span["high"] for span in spans), default=1.0)) + 0.05
     row = BAR * len(rivals) + GAP
     height = TOP + row * len(experiments) + BOTTOM
 
@@ -53,6 +61,9 @@ def svg(experiments: Sequence[Mapping[str, Any]], rivals: Sequence[str]) -> str:
         parts += [_text(12, y + 12 + 15 * n, line) for n, line in enumerate(lines)]
         for n, (name, colour) in enumerate(zip(rivals, _colours(rivals), strict=True)):
             span, middle = one["predicted"][name], y + BAR * n + BAR / 2
+            if is_below(span):
+                parts.append(_text(LEFT, middle + 4, BELOW, size=10, fill=colour))
+                continue
             x0, x1 = across(span["low"]), across(span["high"])
             parts += [
                 f'<rect x="{x0 - 1:.1f}" y="{middle - 4:.1f}" width="{x1 - x0 + 2:.1f}" height="8" fill="{colour}" '
@@ -74,5 +85,6 @@ def _ticks(low: float, high: float) -> list[float]:
     return [float(f"{ratio:.6g}") for ratio in every if low <= math.log10(ratio) <= high]
 
 
-def _text(x: float, y: float, text: str, anchor: str = "start", size: int = 12) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}">{escape(text)}</text>'
+def _text(x: float, y: float, text: str, anchor: str = "start", size: int = 12, fill: str = "") -> str:
+    style = f' fill="{fill}"' if fill else ""
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}"{style}>{escape(text)}</text>'

@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
+from unitcad.experiments.conditioning import Held
 from unitcad.experiments.information import Information, entropy, expected_information
 from unitcad.experiments.protocol import Condition, Ratio, contrasts
 
@@ -26,6 +27,8 @@ class Predictions:
     weights      prior probability of each rival, (rivals,)
     shares       of each draw within its rival, (draws,) each, summing to 1
     noise        standard deviation of the log of a reading when it is repeated
+    indices      of each draw, (draws,) each: those of one index may depend on each other over the rivals
+    held         the draws, and how well they give the measured levels
     unread       where an instrument shows its own noise instead of a reading, (draws, conditions) each
     discrepancy  of the log of a rival's reading from the truth though the rival holds: see `errors`
     """
@@ -39,13 +42,16 @@ class Predictions:
     weights: np.ndarray = field(default_factory=lambda: np.empty(0))
     shares: tuple[np.ndarray, ...] = ()
     unread: tuple[np.ndarray, ...] = ()
+    indices: tuple[np.ndarray, ...] = ()
+    held: tuple[Held, ...] = ()
 
     def __post_init__(self) -> None:
         if not len(self.weights):
             object.__setattr__(self, "weights", np.full(len(self.rivals), 1.0 / len(self.rivals)))
         if not self.shares:
             object.__setattr__(self, "shares", tuple(np.full(len(log), 1.0 / len(log)) for log in self.logs))
-
+        if not self.indices:
+            object.__setattr__(self, "indices", tuple(np.arange(len(log)) for log in self.logs))
         if not self.unread:
             object.__setattr__(self, "unread", tuple(np.zeros(log.shape, dtype=bool) for log in self.logs))
 
@@ -83,7 +89,7 @@ class Predictions:
     def information(self, chosen: Sequence[Ratio]) -> Information:
         """Return what measuring all of `chosen`, none of which follows from the others, says about the rivals."""
         predicted, covariance = self.log_ratios(chosen)
-        return expected_information(predicted, covariance, self.weights, self.shares, self.seed)
+        return expected_information(predicted, covariance, self.weights, self.shares, self.seed, self.indices)
 
     def of(self, rivals: Sequence[str]) -> Predictions:
         """Return the predictions of some rivals alone, which count as equally probable."""
@@ -94,6 +100,8 @@ class Predictions:
             logs=tuple(self.logs[i] for i in at),
             shares=tuple(self.shares[i] for i in at),
             unread=tuple(self.unread[i] for i in at),
+            indices=tuple(self.indices[i] for i in at),
+            held=tuple(self.held[i] for i in at) if self.held else (),
             weights=np.full(len(at), 1.0 / len(at)),
         )
 

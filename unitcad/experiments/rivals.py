@@ -25,7 +25,13 @@ def _closed_form(path: Callable[[Units], Any]) -> Callable[[EstimateInput, Draws
     return lambda variant, draws: np.asarray(path(draws.units(variant)))
 
 
+KAPPA = (0.02, 5.0)
+"""The divider's constant where the draws are held to the measured levels afterwards: far wider than these allow."""
+
+
 def _divider(variant: EstimateInput, draws: Draws) -> np.ndarray:
+    if draws.held:
+        return np.asarray(cf.divider(draws.units(variant), draws.between("kappa", *KAPPA)))
     kappas = _resampled_kappas()
     kappa = kappas[(draws.uniform("kappa") * len(kappas)).astype(int)]
     return np.asarray(cf.divider(draws.units(variant), kappa))

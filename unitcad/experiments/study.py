@@ -9,9 +9,11 @@ import numpy as np
 
 from unitcad.cache import Store
 from unitcad.errors import Missing, Refusal
-from unitcad.experiments.draws import Draws, Rival
+from unitcad.experiments.conditioning import FEW, Held, drawn
+from unitcad.experiments.draws import Rival
 from unitcad.experiments.lab_file import Lab
 from unitcad.experiments.protocol import Ratio, ratios
+from unitcad.experiments.range_plot import BELOW, is_below
 from unitcad.experiments.ranking import Predictions, Ranked, best_sets, singles
 from unitcad.experiments.rivals import Available, available
 
@@ -21,7 +23,6 @@ RANGE = (0.1, 0.5, 0.9)
 """Parts of the draws that lie below the low end, the middle and the high end of what a rival predicts."""
 LEAST_BITS = 0.005
 """What is shown as 0.00 bits lies below."""
-BELOW = "below what can be read"
 Step = Callable[[str], None]
 
 
@@ -45,8 +46,10 @@ def study(lab: Lab, step: Step = lambda stage: None, store: Store | None = None)
         "draws": lab.settings.draws,
         "element_draws": lab.settings.element_draws,
         "seed": lab.settings.seed,
+        "held_to_levels": lab.settings.held_to_levels,
         "rivals": _rivals(asked, predicted),
         "left_out": asked.left_out,
+        "few_draws": few_draws(predicted),
         "measured": [{"experiment": str(ratio), "ratio": value} for ratio, value in lab.measured],
         "most_bits_before": _number(prior),
         "most_bits": _number(predicted.most_bits),
@@ -69,18 +72,18 @@ def check_two(asked: Available) -> None:
 def predictions(lab: Lab, rivals: Sequence[Rival], step: Step = lambda stage: None) -> Predictions:
     """Return what each rival predicts for every condition of a lab.
 
-    Conditions are left out for which a rival has no finite answer. Raises Refusal where fewer than two conditions
-    remain.
+    Each rival's draws are held to the measured levels first, unless the lab's settings say otherwise. Conditions are
+    left out for which a rival has no finite answer. Raises Refusal where fewer than two conditions remain.
     """
     settings, logs, unread = lab.settings, [], []
-    for rival in rivals:
-        draws = Draws(settings.element_draws if rival.costly else settings.draws, settings.seed, rival.name)
+    held = tuple(drawn(rival, settings, step) for rival in rivals)
+    for rival, draws in zip(rivals, (one.draws for one in held), strict=True):
         columns = []
         for i, (condition, variant) in enumerate(lab.variants.items()):
             step(f"{rival.name}: {condition} ({i + 1} of {len(lab.variants)})")
             columns.append(rival.levels(variant, draws))
         logs.append(np.log(np.stack(columns, axis=-1)))
-        read_all = np.zeros(draws.count, dtype=bool)
+        read_all = np.zeros(len(draws.indices), dtype=bool)
         below = [rival.unread(variant, draws) if rival.unread else read_all for variant in lab.variants.values()]
         unread.append(np.stack(below, axis=-1))
     finite = np.all([np.isfinite(log).all(axis=0) for log in logs], axis=0)
@@ -93,7 +96,10 @@ def predictions(lab: Lab, rivals: Sequence[Rival], step: Step = lambda stage: No
         settings.noise,
         settings.discrepancy,
         settings.seed,
+        shares=tuple(one.shares for one in held),
         unread=tuple(one[:, finite] for one in unread),
+        indices=tuple(np.array(one.draws.indices) for one in held),
+        held=held,
     )
 
 
@@ -107,7 +113,7 @@ def candidates(lab: Lab, predicted: Predictions) -> list[Ratio]:
 
 
 def _rivals(asked: Available, predicted: Predictions) -> list[dict[str, Any]]:
-    rows = zip(asked.rivals, predicted.weights, predicted.effective_draws, strict=True)
+    rows = zip(asked.rivals, predicted.weights, predicted.effective_draws, predicted.held, strict=True)
     return [
         {
             "name": rival.name,
@@ -115,9 +121,36 @@ def _rivals(asked: Available, predicted: Predictions) -> list[dict[str, Any]]:
             "costly": rival.costly,
             "probability": _number(weight),
             "effective_draws": _number(draws),
+            "held": _held(held),
         }
-        for rival, weight, draws in rows
+        for rival, weight, draws, held in rows
     ]
+
+
+def _held(held: Held) -> dict[str, float] | None:
+    if held.effective is None or held.misses is None:
+        return None
+    return {
+        "pool": held.draws.count,
+        "effective_draws": _number(held.effective),
+        "kept": len(held.draws.indices),
+        "misses": _number(held.misses),
+    }
+
+
+def few_draws(predicted: Predictions) -> list[str]:
+    """Return a line for each rival whose predictions stand on too few draws, with what makes them few."""
+    lines = []
+    for name, left, weight, held in zip(
+        predicted.rivals, predicted.effective_draws, predicted.weights, predicted.held, strict=True
+    ):
+        pooled = left if held.effective is None else min(left, held.effective)
+        if pooled < FEW and weight > 0.01:
+            lines.append(
+                f"{name}: what is measured leaves {pooled:.1f} effective draws of {held.draws.count}, so that its "
+                "predictions are little known; more draws may help"
+            )
+    return lines
 
 
 def range_of(ratio: Ratio, predicted: Predictions, rival: str) -> dict[str, float]:
@@ -137,7 +170,7 @@ def range_of(ratio: Ratio, predicted: Predictions, rival: str) -> dict[str, floa
 
 def span_text(span: Mapping[str, float]) -> str:
     """Return a predicted ratio with its range; in words where half of the draws or more can't be read."""
-    if span["unread"] >= 0.5:
+    if is_below(span):
         return BELOW
     low, middle, high = (f"{span[end]:.3g}" for end in ("low", "middle", "high"))
     return middle if low == high else f"{middle} ({low} to {high})"

@@ -7,12 +7,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from unitcad.experiments.range_plot import svg
-from unitcad.experiments.study import BELOW, span_text, tells
+from unitcad.experiments.range_plot import BELOW, svg
+from unitcad.experiments.study import span_text, tells
 from unitcad.files import write
 
 SHOWN = 8
 """Experiments in the tables and in the plot; experiments.json has all."""
+HELD = (
+    "Each rival's draws are weighed by the nine measured levels, up to one factor. A rival that misses them by more "
+    "than its discrepancy is weighed as one whose discrepancy is larger."
+)
+FREE = "The draws are a rival's prior: nothing holds them to the nine measured levels."
 A_BIT = "One bit decides for certain between two rivals that are equally probable."
 
 
@@ -78,9 +83,23 @@ def page(data: Mapping[str, Any]) -> str:
             pairs = "; ".join(" and ".join(pair["rivals"]) for pair in one["not_told_apart"]) or "none"
             lines.append(f"| {'; '.join(one['experiments'])} | {one['bits']:.2f} ± {one['error']:.2f} | {pairs} |")
         lines.append("")
-    lines += ["## Rivals", "", "| rival | what it says | probability |", "| --- | --- | --- |"]
-    lines += [f"| {rival['name']} | {rival['says']} | {rival['probability']:.2f} |" for rival in data["rivals"]]
+    lines += [f"- {line}." for line in data["few_draws"]] + ([""] if data["few_draws"] else [])
+    lines += [f"## Rivals\n\n{HELD if data['held_to_levels'] else FREE}\n", *rival_rows(data["rivals"])]
     return "\n".join([*lines, ""])
+
+
+def rival_rows(rivals: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a Markdown table of the rivals: probability, and how well each gives the measured levels if it is held."""
+    rows = [
+        "| rival | what it says | probability | misses the nine levels by | effective draws |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for one in rivals:
+        misses = f"a factor of {one['held']['misses']:.2f}" if one["held"] else "-"
+        rows.append(
+            f"| {one['name']} | {one['says']} | {one['probability']:.2f} | {misses} | {one['effective_draws']:.0f} |"
+        )
+    return rows
 
 
 def left_out(data: Mapping[str, Any]) -> list[str]:
