@@ -109,10 +109,10 @@ class MouldsTable(Table, frozen=True, kw_only=True):
     ] = None
     filament_mm: Annotated[float, Meta(ge=0.2, le=20)] = 1.75
     plinth_height_mm: Annotated[
-        Annotated[float, Meta(ge=0.6, le=100)] | None, Meta(description="None takes 2 mm in whole layers")
+        Annotated[float, Meta(ge=0.6, le=100)] | None, Meta(description="left out, 2 mm in whole layers")
     ] = None
     plate_mm: Annotated[
-        Annotated[float, Meta(ge=0.5, le=100)] | None, Meta(description="None takes 4 mm in whole layers")
+        Annotated[float, Meta(ge=0.5, le=100)] | None, Meta(description="left out, 4 mm in whole layers")
     ] = None
     ledge_mm: Annotated[float, Meta(ge=0.1, le=100)] = 0.6
 
