@@ -106,6 +106,12 @@ def test_a_record_without_its_spec_says_so() -> None:
         spec_of(cast_record({key: value for key, value in data().items() if key != "spec"}))
 
 
+def test_the_example_of_the_docs_is_a_record() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "moulds.md").read_text("utf-8")
+    example = text.split("## The cast record")[1].split("```json\n")[1].split("```")[0]
+    assert cast_record(json.loads(example)).units[0].wall_mm(1) == (1.2, 1.3)
+
+
 def test_the_schema_is_offered() -> None:
     done = CliRunner().invoke(app, ["schema", "cast-record"])
     schema = json.loads(done.stdout)

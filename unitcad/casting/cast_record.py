@@ -67,7 +67,7 @@ class WallPlaces(Table, frozen=True, kw_only=True):
 class CastUnit(Table, frozen=True, kw_only=True):
     """One unit out of the mould. `mass_g` is its silicone, trimmed, without motor, circuit and wires."""
 
-    cavity: Annotated[Cavity, Meta(description="the number engraved beside it; 1 where there is one cavity")] = 1
+    cavity: Annotated[Cavity, Meta(description="from 1; engraved beside it in hexadecimal digits")] = 1
     usable: bool = True
     height_mm: Millimetres | None = None
     diameters_mm: Annotated[tuple[Millimetres, ...], Meta(max_length=100)] = ()
