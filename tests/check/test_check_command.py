@@ -72,6 +72,28 @@ def test_exit_codes(folder: Path) -> None:
         assert "Traceback" not in result.stderr
 
 
+def test_reports_are_written_beside_the_one_that_is_printed(folder: Path) -> None:
+    copies = ("--report", "json=new folder/all.json", "--report", "junit=all.xml")
+    result = run("sub", *copies, "--output-format", "github", cwd=folder)
+    assert result.returncode == 1
+    assert result.stdout.startswith("::error file=sub/hole.stl")
+    assert (folder / "new folder/all.json").read_text("utf-8") == run("sub", "--json", cwd=folder).stdout
+    assert (folder / "all.xml").read_text("utf-8").startswith("<?xml")
+
+
+@pytest.mark.parametrize(("given", "said"), [
+    ("all.json", "must be FORMAT=FILE"), ("json=", "must be FORMAT=FILE"), ("xml=a.xml", "--report = 'xml'"),
+    ("json=sub", "this is a folder"), ("json=good.stl/a.json", "--report: good.stl/a.json: "),
+])  # fmt: skip
+def test_a_wrong_report_is_one_sentence_and_nothing_is_written(folder: Path, given: str, said: str) -> None:
+    before = sorted(folder.rglob("*"))
+    result = run("good.stl", "--report", given, cwd=folder)
+    assert result.returncode == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+    assert sorted(folder.rglob("*")) == before
+
+
 def test_folders_and_globs(folder: Path) -> None:
     data = json.loads(run(".", "--json", cwd=folder).stdout)
     assert [entry["path"] for entry in data["files"]] == ["good.stl", "sub/hole.stl", "sub/warn.STL"]

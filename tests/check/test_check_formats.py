@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import json
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -125,6 +127,30 @@ def test_text_is_one_line_a_finding_and_holds_no_control_characters() -> None:
     assert render([FileReport("a.stl")], "text") == "1 file: 1 passed\n"
 
 
+def test_markdown_is_a_table_that_no_name_leaves(reports: list[FileReport]) -> None:
+    lines = render(reports, "markdown").splitlines()
+    assert lines[:3] == ["## unitcad check", "", "4 files: 2 failed, 1 warned, 1 passed."]
+    rows = [line for line in lines if line.startswith("| ")][2:]
+    assert len(rows) == sum(len(report.findings) for report in reports)
+    severities = [row.split(" ")[1] for row in rows]
+    assert severities == sorted(severities, key=("error", "warning", "info").index)
+    assert "hole &amp; &lt;b&gt;.stl" in rows[0]
+    evil = "a|b<img src=x>\r\n# [c](javascript:d) @me `e`.stl"
+    row = render([FileReport(evil, (Finding("T001", "error", "m" * 9000),))], "markdown").splitlines()[6]
+    assert row.count(" | ") == 3
+    assert "a\\|b&lt;img src=x&gt;" in row
+    assert "\\[c\\](javascript:d) \\@me \\`e\\`.stl" in row
+    assert len(row) < 800
+
+
+def test_markdown_of_many_findings_fits_a_summary() -> None:
+    many = [FileReport(f"{'x' * 400}{i}.stl", (Finding("T001", "error", "y" * 4000),)) for i in range(2000)]
+    many.append(FileReport("known.stl", (Finding("T001", "error", "z", known=True),)))
+    said = render(many, "markdown")
+    assert len(said.encode()) < 1024 * 1024
+    assert "1,501 more findings are in the log." in said
+
+
 def test_github_says_of_a_clean_run_that_it_ran() -> None:
     assert render([FileReport("::error::.stl")], "github") == "1 file: 1 passed\n"
 
@@ -152,6 +178,8 @@ def test_every_format_says_how_to_fix_what_was_found(reports: list[FileReport]) 
     for code in {found.code for report in reports for found in report.findings}:
         for format_ in FORMATS:
             strict = render(reports, format_, "warning")
+            if format_ == "markdown":
+                strict = html.unescape(re.sub(r"\\(.)", r"\1", strict))
             assert (
                 json.dumps(rules()[code].fix)[1:-1] if format_ in ("json", "sarif") else rules()[code].fix
             ) in strict

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -21,8 +21,14 @@ if TYPE_CHECKING:
 
 def check(
     files: Annotated[list[str] | None, typer.Argument(help="Files, folders or globs.", show_default=False)] = None,
-    output_format: Annotated[str, typer.Option(help="text, json, github, sarif or junit.")] = "text",
+    output_format: Annotated[str, typer.Option(help="text, json, github, sarif, junit or markdown.")] = "text",
     as_json: Annotated[bool, typer.Option("--json", help="Short for --output-format json.")] = False,
+    report: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FORMAT=FILE", help="Also write the report in a format to a file, such as sarif=out.sarif."
+        ),
+    ] = None,
     select: Annotated[
         list[str] | None,
         typer.Option(help="Only codes with these prefixes (comma or repeated); errors that ended a file's check stay."),
@@ -85,6 +91,7 @@ def check(
     output_format = "json" if as_json else output_format
     if output_format not in FORMATS:
         raise unknown_name("--output-format", output_format, FORMATS)
+    copies = [_copy(given, FORMATS) for given in report or []]
     configuration = check_settings.find(config, wanted=not no_config)
     settings = configuration.settings
     fail_on = fail_on or settings.fail_on or "error"
@@ -127,14 +134,39 @@ def check(
         reports = [baselines.apply(known, base, report) for report in reports]
     reports = [report.shortened(shown) for report in reports]
     table = as_text.statistics(reports) if statistics else ""
+    used = None if base is None else base.as_posix()
+    for format_, path in copies:
+        _save(path, render(reports, format_, fail_on, configuration.shown, used))
     if statistics and output_format == "text":
         sys.stdout.write(table)
     else:
-        used = None if base is None else base.as_posix()
-        report = render(reports, output_format, fail_on, configuration.shown, used)
-        _write(report, plain=output_format == "text")
+        written = render(reports, output_format, fail_on, configuration.shown, used)
+        _write(written, plain=output_format == "text")
         sys.stderr.write(table)
     raise typer.Exit(many_files.worst(reports, fail_on))
+
+
+def _copy(given: str, formats: Sequence[str]) -> tuple[str, Path]:
+    """Return format and path of `--report FORMAT=FILE`."""
+    name, equals, path = given.partition("=")
+    if not equals or not path:
+        raise Refusal("--report", given, "must be FORMAT=FILE", "sarif=report.sarif")
+    if name not in formats:
+        raise unknown_name("--report", name, formats)
+    if Path(path).is_dir():
+        raise Refusal("--report", given, "must name a file; this is a folder", f"{name}={path.rstrip('/')}/report")
+    return name, Path(path)
+
+
+def _save(path: Path, text: str) -> None:
+    """Write a report to a file, whole or not at all; its folder is made."""
+    from unitcad import files
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        files.write(path, text.encode("utf-8"))
+    except OSError as error:
+        raise UnitcadError(f"--report: {path}: {error.strerror}") from None
 
 
 def _write(text: str, *, plain: bool) -> None:

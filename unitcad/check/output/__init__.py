@@ -1,1 +1,1 @@
-"""Reports written out: text, JSON, GitHub annotations, SARIF and JUnit XML, a module each."""
+"""Reports written out: text, JSON, GitHub annotations, SARIF, JUnit XML and Markdown, a module each."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from unitcad.check.findings import FileReport
 
-FORMATS = ("text", "json", "github", "sarif", "junit")
+FORMATS = ("text", "json", "github", "sarif", "junit", "markdown")
 
 
 def render(
@@ -48,6 +48,10 @@ def _written(
         from unitcad.check.output.as_junit import junit
 
         return junit(reports, fail_on)
+    if format_ == "markdown":
+        from unitcad.check.output.as_markdown import markdown
+
+        return markdown(reports)
     from unitcad.check.output.as_text import text
 
     return text(reports)
