@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import re
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -81,17 +80,16 @@ def with_files(data: Mapping[str, Any], folder: str) -> dict[str, Any]:
 
 def write(folder: Path, found: Mapping[str, bytes]) -> None:
     """Put the files in place of an earlier result's, all or none; what else lies in the folder stays."""
+    folders.expect_folder(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folders.clear_leftovers(folder.parent)
     with folders.replacing(folder) as fresh:
         (fresh / SPECS).mkdir()
         for name, content in found.items():
             files.write_new(fresh / name, content)
-        _forget(folder)
-
-
-def _forget(folder: Path) -> None:
-    """Remove an earlier result's specs, which a new one may not have."""
-    if (folder / SPECS).is_dir() and not (folder / SPECS).is_symlink() and (folder / "design.json").is_file():
-        shutil.rmtree(folder / SPECS)
+    for spec in (folder / SPECS).glob("[1-9]-*.toml"):
+        if f"{SPECS}/{spec.name}" not in found:  # of an earlier result
+            spec.unlink()
 
 
 def ranking(made: Inversion) -> str:
