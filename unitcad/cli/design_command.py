@@ -36,6 +36,8 @@ def design(
     from unitcad.inverse.target_file import load_target
 
     wish = load_target(target)
+    if explain is None:
+        design_files.check_out(out)
     with progress("design") as stage:
         made = invert(wish, check=not no_check, say=stage)
         if explain is None:

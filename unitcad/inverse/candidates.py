@@ -15,9 +15,9 @@ from unitcad.attenuation.edge.bush import sections
 from unitcad.attenuation.edge.closed_form import Section, Units
 from unitcad.attenuation.edge.predictive import Predictive, stack_of
 from unitcad.attenuation.inputs import Quantity, SiliconeLayer
-from unitcad.casting.figures import DEGASSING_MIN, MIXING_MIN, POURING_MIN, at_room
 from unitcad.errors import Refusal
 from unitcad.estimating import silicone_layer
+from unitcad.inverse.finish_time import Work, bench_hours, cure_hours, finish_hours
 from unitcad.inverse.geometries import Geometry, Lengths, Refused, Say, geometries
 from unitcad.inverse.target_file import Target
 
@@ -36,8 +36,8 @@ class Silicones:
 class Candidates:
     """Candidates as columns, one row each: `geometry` and `sequence` are indices into the two lists.
 
-    mass in g, hours from the first mixing to the earliest demoulding, crosstalk NaN where it is not asked for.
-    `probability` is that of meeting the level.
+    mass in g, hours from the first weighing until it is out of the mould, crosstalk NaN where it is not asked for.
+    `probability` is that of meeting the level; `work`: see `finish_time`.
     """
 
     target: Target
@@ -54,6 +54,7 @@ class Candidates:
     height_mm: np.ndarray
     diameter_mm: np.ndarray
     crosstalk: np.ndarray
+    work: Work
 
     @property
     def count(self) -> int:
@@ -113,10 +114,11 @@ def tabulate(
     silicones: Silicones,
     say: Say = lambda stage: None,
     only: tuple[str, ...] | None = None,
+    work: Work | None = None,
 ) -> Candidates:
-    """Return the candidates of geometries with every sequence of silicones, or with `only` one.
+    """Return the candidates of geometries with every sequence of silicones, or with `only` one; `work` is added to.
 
-    Raises Refusal for too many, and where there is none.
+    Raises Refusal for too many, where there is none, and where no moulds can be made of any.
     """
     counts = [len(one.lengths.walls) for one in made]
     known = list(silicones.known)
@@ -147,7 +149,12 @@ def tabulate(
         centre=np.concatenate([part[2].centre for part in parts]),
         scale=np.concatenate([part[2].scale for part in parts]),
     )
-    hours = np.array([hours_of(target, one) for one in sequences])
+    say("hours")
+    entries, work = catalogue.materials(target.asked.materials), {} if work is None else work
+    cures = np.array([cure_hours(one, entries, target.casting.room_c) for one in sequences])
+    benches = np.array([bench_hours(one, work) for one in made])
+    if np.isnan(benches).all():
+        finish_hours(made[0].spec)  # says why no moulds can be made
     say("crosstalk")
     crosstalk = _crosstalk(target, made)
     return Candidates(
@@ -161,7 +168,8 @@ def tabulate(
         predictive=predictive,
         probability=probability_of(target, predictive),
         mass_g=np.concatenate([part[3] for part in parts]),
-        hours=hours[sequence],
+        hours=cures[sequence] + benches[geometry],
+        work=work,
         height_mm=np.array([one.height for one in made])[geometry],
         diameter_mm=np.array([one.lengths.diameter for one in made])[geometry],
         crosstalk=crosstalk[geometry],
@@ -178,13 +186,6 @@ def probability_by_model(target: Target, predictive: Predictive) -> np.ndarray:
     wish = target.wish
     below = predictive.each_at_most(wish.edge_max) if wish.edge_max is not None else np.ones(predictive.centre.shape)
     return below - predictive.each_at_most(wish.edge_min) if wish.edge_min is not None else below
-
-
-def hours_of(target: Target, materials: Sequence[str]) -> float:
-    """Return the hours from the first mixing to the last layer's earliest demoulding, one pour after the other."""
-    known, casting = catalogue.materials(target.asked.materials), target.casting
-    work = (MIXING_MIN + POURING_MIN + (DEGASSING_MIN if casting.vacuum else 0.0)) / 60
-    return sum(at_room(float(known[name].cure_h), casting.room_c) + work for name in materials)
 
 
 def _units(made: Sequence[Geometry], own: Sequence[Sequence[SiliconeLayer]]) -> tuple[Units, np.ndarray]:

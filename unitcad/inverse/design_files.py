@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from unitcad import files
+from unitcad.errors import UnitcadError
 from unitcad.inverse import design_words as words
 from unitcad.inverse.design_page import design_page
 from unitcad.inverse.front_plot import front_svg, quantities
@@ -39,12 +40,18 @@ def folder_of(name: str, out: Path) -> Path:
     return out / f"design-{slug}"
 
 
+def check_out(out: Path) -> None:
+    """Raise UnitcadError, before the work, for a file where the result's folder is to go."""
+    if out.exists() and not out.is_dir():
+        raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o")
+
+
 def contents(made: Inversion, folder: str, say: Say = lambda stage: None) -> dict[str, bytes]:
     """Return the files by name; `folder` is how they are seen from where the commands run."""
     say("files")
     data = with_files(made.data, folder)
     panels = quantities(made.found, made.rows)
-    names = {"mass, g": "mass_g", "hours until it is cured": "cure_hours", "height, mm": "height_mm"}
+    names = {"mass, g": "mass_g", "hours until it is out of the mould": "cure_hours", "height, mm": "height_mm"}
     names |= {"diameter, mm": "diameter_mm"}
 
     def value(one: Mapping[str, Any], quantity: str) -> float:

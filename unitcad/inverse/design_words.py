@@ -13,7 +13,7 @@ _WISHES = {
     "diameter_max_mm": "diameter at most {} mm",
     "height_max_mm": "height at most {} mm",
     "mass_max_g": "mass at most {} g",
-    "cure_hours_max": "cured within {} h",
+    "cure_hours_max": "out of the mould within {} h",
     "crosstalk_ratio_max": "crosstalk ratio at most {}",
     "pitch_mm": "neighbours {} mm apart",
     "frequency_hz": "at {} Hz",
@@ -88,7 +88,7 @@ def size_line(one: Mapping[str, Any]) -> str:
     parts = [
         f"{number(one['diameter_mm'], 3)} mm wide, {number(one['height_mm'], 3)} mm high",
         f"{number(one['mass_g'], 2)} g",
-        f"cured in {number(one['cure_hours'], 3)} h",
+        f"out of the mould in {number(one['cure_hours'], 3)} h",
         checks,
     ]
     if crosstalk := one.get("crosstalk"):

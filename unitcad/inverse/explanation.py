@@ -13,11 +13,11 @@ from unitcad.attenuation.edge.estimates import rounded
 from unitcad.attenuation.edge.predictive import stack_of
 from unitcad.attenuation.edge.variant_units import stacked
 from unitcad.attenuation.receivers import unit_mass
-from unitcad.catalogue import materials as silicones
-from unitcad.errors import unknown_name
+from unitcad.errors import Refusal, unknown_name
 from unitcad.estimating import estimate_input
-from unitcad.inverse.candidates import Candidates, hours_of, probability_of
+from unitcad.inverse.candidates import Candidates, probability_of
 from unitcad.inverse.castability import castability
+from unitcad.inverse.finish_time import finish_hours
 from unitcad.inverse.geometries import height_of
 from unitcad.inverse.proposals import Inversion, name_of
 from unitcad.inverse.ranking_order import ordered
@@ -104,7 +104,10 @@ def _of_spec(made: Inversion, spec: Spec) -> dict[str, Any]:
 def _over(found: Candidates, spec: Spec, mass: float) -> list[str]:
     """Return the limits that a spec is over; the crosstalk's is left to its diameter."""
     wish = found.target.wish
-    hours = hours_of(found.target, [layer.material for layer in spec.layers]) if _known(found, spec) else None
+    try:
+        hours = finish_hours(spec)
+    except Refusal:  # its moulds can't be made, which castability says
+        hours = None
     values = [
         ("diameter", " mm", spec.diameter_mm, wish.diameter_max_mm),
         ("height", " mm", height_of(spec), wish.height_max_mm),
@@ -117,11 +120,6 @@ def _over(found: Candidates, spec: Spec, mass: float) -> list[str]:
         for what, unit, value, most in values
         if value is not None and most is not None and value > most * (1 + 1e-9)
     ]
-
-
-def _known(found: Candidates, spec: Spec) -> bool:
-    known = silicones(found.target.asked.materials)
-    return all(layer.material in known for layer in spec.layers)
 
 
 def _not_at_hand(found: Candidates, spec: Spec) -> list[str]:

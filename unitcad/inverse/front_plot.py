@@ -35,7 +35,7 @@ def quantities(found: Candidates, rows: np.ndarray) -> list[Quantity]:
     wish = found.target.wish
     every = [
         Quantity("mass, g", found.mass_g, wish.mass_max_g),
-        Quantity("hours until it is cured", found.hours, wish.cure_hours_max),
+        Quantity("hours until it is out of the mould", found.hours, wish.cure_hours_max),
         Quantity("height, mm", found.height_mm, wish.height_max_mm),
         Quantity("diameter, mm", found.diameter_mm, wish.diameter_max_mm),
         Quantity("crosstalk ratio", found.crosstalk, wish.crosstalk_ratio_max),

@@ -38,9 +38,10 @@ class Lengths:
 
 @dataclass(frozen=True)
 class Geometry:
-    """Lengths that a design accepts: the estimate's input, with some silicone in every layer, and the height in mm."""
+    """Lengths that a design accepts: spec and estimate's input, with some silicone in every layer; height in mm."""
 
     lengths: Lengths
+    spec: Spec
     variant: EstimateInput
     height: float
 
@@ -72,7 +73,7 @@ def height_of(spec: Spec) -> float:
 def geometry_of(target: Target, lengths: Lengths) -> Geometry:
     """Return the geometry of lengths. Raises Refusal where the design does not accept them."""
     spec = from_data(spec_data(target, lengths, (target.materials[0],) * len(lengths.walls)))
-    return Geometry(lengths, estimate_input(spec), height_of(spec))
+    return Geometry(lengths, spec, estimate_input(spec), height_of(spec))
 
 
 @dataclass

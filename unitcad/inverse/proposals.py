@@ -21,7 +21,8 @@ from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
 from unitcad.experiments.most_telling import decision_between
 from unitcad.inverse.candidates import Candidates, candidates, probability_by_model
-from unitcad.inverse.castability import castability
+from unitcad.inverse.castability import Verdict, castability
+from unitcad.inverse.finish_time import finish_hours
 from unitcad.inverse.geometries import Lengths, Say, spec_data
 from unitcad.inverse.ranking_order import ALIKE, Kind, kinds
 from unitcad.inverse.refinement import alone, refined
@@ -111,14 +112,27 @@ def _chosen(found: Candidates, ranked: list[Kind], check: bool, say: Say) -> tup
             tried.insert(0, (better, 0))
         for table, row in tried:
             spec = from_data(spec_data(found.target, table.lengths(row), table.materials(row), name_of(table, row)))
-            verdict = castability(spec) if check else None
-            if verdict is None or verdict.castable:
-                checked = None if verdict is None else verdict.checked
+            verdict = _in_time(spec, table, castability(spec) if check else Verdict(0, ()))
+            if verdict.castable:
+                checked = verdict.checked if check else None
                 data = proposal(table, row, spec, kind, len(chosen) + 1, checked, refined=table is not found)
                 chosen.append(_Chosen(spec, data))
                 break
             out.append({"name": spec.name, "candidate": label(table, row), "failed": list(verdict.failed)})
     return chosen, out
+
+
+def _in_time(spec: Spec, found: Candidates, verdict: Verdict) -> Verdict:
+    """Return the verdict, failed where the spec has no procedure, or one that ends later than is wished for."""
+    if not verdict.castable:
+        return verdict
+    try:
+        most, hours = found.target.wish.cure_hours_max, finish_hours(spec)
+    except Refusal as refusal:
+        return Verdict(verdict.checked, (str(refusal),))
+    if most is None or hours <= most * (1 + 1e-9):
+        return verdict
+    return Verdict(verdict.checked, (f"its procedure ends after {number(hours, 3)} h, at most {number(most, 3)} h",))
 
 
 def proposal(
@@ -144,7 +158,7 @@ def proposal(
         "diameter_mm": float(found.diameter_mm[row]),
         "height_mm": float(found.height_mm[row]),
         "mass_g": float(found.mass_g[row]),
-        "cure_hours": float(found.hours[row]),
+        "cure_hours": finish_hours(spec),
         "refined": refined,
         "within": [limit.shown(row) for limit in limits(found)],
         "checks": checked,

@@ -23,7 +23,9 @@ _MOST_ROUNDED = 64
 
 def alone(found: Candidates, lengths: Lengths, materials: tuple[str, ...]) -> Candidates:
     """Return the one candidate of these lengths and silicones. Raises Refusal where the design does not accept it."""
-    return tabulate(found.target, [geometry_of(found.target, lengths)], {}, found.silicones, only=materials)
+    return tabulate(
+        found.target, [geometry_of(found.target, lengths)], {}, found.silicones, only=materials, work=found.work
+    )
 
 
 def refined(found: Candidates, row: int) -> Candidates | None:

@@ -40,7 +40,7 @@ Ratio = Annotated[
 ]
 Pitch = Annotated[float, Meta(ge=1, le=MOST_PITCH_MM, description="between the middles of two units")]
 CureHours = Annotated[
-    float, Meta(ge=0.01, le=1e5, description="from the first mixing to the earliest demoulding of the last pour")
+    float, Meta(ge=0.01, le=1e5, description="from the first weighing until the unit is out of the mould")
 ]
 Layers = Annotated[int, Meta(ge=1, le=5)]
 Wall = Annotated[float, Meta(ge=LEAST_LAYER, le=20)]

@@ -34,7 +34,7 @@ class Limit:
         """Return a row's value and the limit in words."""
         value, most = number(self.values[row], 3), number(self.most, 3)
         if np.isnan(self.values[row]):
-            return f"{self.what}: none, since the units would overlap (at most {most}{self.unit})"
+            return f"{self.what}: none, since units would overlap or moulds can't be made (at most {most}{self.unit})"
         return f"{self.what} {value} of at most {most}{self.unit}"
 
 
