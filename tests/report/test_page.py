@@ -153,6 +153,20 @@ def test_a_batch_is_listed_as_it_lists_itself(built: Path, tmp_path: Path) -> No
     assert "variants" not in data["batch"]
 
 
+@pytest.mark.parametrize(
+    "estimate", [{"typical_error": 3, "not_read": {}}, {"typical_error": {}}, {"not_read": None}, 7]
+)
+def test_a_batch_with_senseless_errors_is_damaged(sweep: Path, tmp_path: Path, estimate: object) -> None:
+    shutil.copytree(sweep, tmp_path / "s", ignore=shutil.ignore_patterns("report.html"))
+    file = tmp_path / "s" / "batch.json"
+    file.write_text(json.dumps({"columns": ["name"], "variants": [{"name": "u"}], "estimate": estimate}))
+    data, _, damaged = page.page_data(tmp_path / "s")
+    assert "is not a result of unitcad" in damaged["batch.json"]
+    assert data["estimate"]["not_read"] == {}
+    file.write_text(json.dumps({"columns": ["name"], "variants": [{"name": "u"}]}))
+    assert "batch.json" not in page.page_data(tmp_path / "s")[2]
+
+
 def test_what_was_swept_and_the_levels_come_first(sweep: Path) -> None:
     columns = ["index", "status", "reason", "folder", "motor", "moulds.land_mm", "name", "design", "diameter_mm",
                "layer1_volume_mm3", "layer1_mass_g", "laws", "edge_paper", "edge_fitted"]  # fmt: skip

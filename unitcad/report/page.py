@@ -116,7 +116,7 @@ def _of_all(batch: dict[str, Any] | None, records: list[VariantRecord]) -> dict[
 
     As batch.json has them; of a folder without one the errors are those of the first estimate.
     """
-    if batch and isinstance(batch.get("estimate"), dict):
+    if batch and batch.get("estimate"):
         return batch["estimate"]
     for record in records:
         table = (record.estimate or {}).get("table_error")

@@ -22,11 +22,19 @@ class ListedVariant(Struct):
     folder: str | None = None
 
 
+class SweptLevels(Struct):
+    """Each model's typical error in a batch, a factor, and the swept keys that it does not read."""
+
+    typical_error: dict[str, float]
+    not_read: dict[str, list[str]]
+
+
 class BatchFile(Struct):
     """batch.json."""
 
     columns: list[str]
     variants: list[ListedVariant]
+    estimate: SweptLevels | None = None
 
 
 class VariantRecord(Struct, kw_only=True):
