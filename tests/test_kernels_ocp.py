@@ -7,15 +7,16 @@ import pytest
 
 from unitcad.errors import UnitcadError
 from unitcad.kernels import ocp
+from unitcad.validation import load
 
 
 def test_nothing_installed():
     error = ModuleNotFoundError("No module named 'OCP'", name="OCP")
     assert ocp.advice("OCP", error, {}) == (
-        "OCP is not installed: pip install 'unitcad[build123d]', or build without STEP: --formats stl,3mf"
+        "OCP is not installed: in a clone, pip install '.[step]', or build without STEP: --formats stl,3mf"
     )
     error = ModuleNotFoundError("No module named 'cadquery'", name="cadquery")
-    assert ocp.advice("cadquery", error, {"cadquery-ocp-novtk": "7.9.3.1.1"}).endswith("'unitcad[cadquery]'")
+    assert ocp.advice("cadquery", error, {"cadquery-ocp-novtk": "7.9.3.1.1"}).endswith("'.[cadquery]'")
 
 
 def test_half_removed():
@@ -61,3 +62,12 @@ def test_loading_passes_other_errors_on():
         raise ZeroDivisionError
     with pytest.raises(UnitcadError), ocp.loading("OCP"):
         raise ImportError
+
+
+def test_a_default_build_leaves_step_out_where_no_kernel_is(monkeypatch):
+    """The formats asked for stay; only the default knows what is installed."""
+    monkeypatch.setattr("unitcad.validation.defaults.find_spec", lambda name: None)
+    assert load("embedded").output.formats == ("stl", "3mf")
+    assert load("embedded", ["output.formats=['step']"]).output.formats == ("step",)
+    monkeypatch.undo()
+    assert load("embedded").output.formats == ("step", "stl", "3mf")

@@ -17,7 +17,7 @@ def test_without_the_extra_the_message_says_what_to_install(tmp_path: Path, monk
     report = check_file(path)
     assert report.verdict == "error"
     assert report.has("F012")
-    assert "pip install 'unitcad[build123d]'" in report.findings[0].message
+    assert "pip install '.[step]'" in report.findings[0].message
 
 
 @pytest.mark.parametrize("there", [True, False])

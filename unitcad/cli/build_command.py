@@ -82,11 +82,15 @@ def build(
 
 def _print_result(manifest: Manifest) -> None:
     """Print warnings, failed mould checks, and findings in files."""
+    from unitcad.pipeline.product import NO_KERNEL
+
     for warning in manifest["warnings"]:
         warn(f"warning: {warning}")
     for entry in manifest["left_out"]:
         if entry["what"] == "pictures":
             typer.echo(f"warning: no pictures: {entry['why']}", err=True)
+        if entry["why"] == NO_KERNEL:
+            typer.echo(f"note: STEP left out: {entry['why']}", err=True)
     checks = manifest["laws"]
     for check in checks:
         if not check["ok"]:

@@ -1,6 +1,7 @@
 """Shape to boundary representation with OCCT directly, for STEP files.
 
-Either extra brings OCP, and OCP alone loads in a third of the time that build123d takes, half of cadquery's.
+The extra step brings OCP alone, build123d and cadquery bring it too. OCP loads in a third of the time that build123d
+takes, half of cadquery's.
 """
 
 from __future__ import annotations

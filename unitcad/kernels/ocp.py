@@ -1,6 +1,6 @@
 """Loading of OCP, the Python binding of OCCT: a failure becomes one error that tells how to fix it.
 
-Two wheels fill the same folder OCP: cadquery-ocp (with VTK, for cadquery) and cadquery-ocp-novtk (for build123d). The
+Two wheels fill the same folder OCP: cadquery-ocp (with VTK, for cadquery) and cadquery-ocp-novtk (for STEP and build123d). The
 one unpacked last overwrites the other, and removing either breaks both. Both of the version below, installed together,
 serve both libraries.
 """
@@ -38,10 +38,10 @@ def installed_wheels() -> dict[str, str]:
 def advice(library: str, error: Exception, wheels: dict[str, str]) -> str:
     """Say what to do when an import of `library` fails with `error`, given the installed OCP wheels."""
     missing = isinstance(error, ModuleNotFoundError) and (error.name or "").split(".")[0] == library
-    extra = "cadquery" if library == "cadquery" else "build123d"
+    extra = "step" if library == "OCP" else library
     if missing and (not wheels or library != "OCP"):
         without = ", or build without STEP: --formats stl,3mf" if library == "OCP" else ""
-        return f"{library} is not installed: pip install 'unitcad[{extra}]'{without}"
+        return f"{library} is not installed: in a clone, pip install '.[{extra}]'{without}"
     if ".so" in str(error) and "cannot open shared object" in str(error):
         return f"{library} lacks a library of the system: {error}. On Debian: apt-get install libgl1"
     have = ", ".join(f"{name} {version}" for name, version in sorted(wheels.items())) or "no wheel of it"

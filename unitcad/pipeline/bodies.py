@@ -93,7 +93,7 @@ def step_content(bodies: Sequence[Body], name: str) -> bytes:
     try:
         from unitcad.export import step
     except ImportError as error:
-        raise UnitcadError(f"STEP needs a B-rep kernel: pip install 'unitcad[build123d]' ({error})") from None
+        raise UnitcadError(f"STEP needs a B-rep kernel: {error}") from None
     with tempfile.TemporaryDirectory(prefix="unitcad-") as scratch:
         path = Path(scratch) / f"{name}.step"
         step.write(path, bodies, name)

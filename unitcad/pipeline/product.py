@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from unitcad import __version__, files
@@ -26,6 +27,7 @@ from unitcad.spec import Spec, spec_hash
 from unitcad.validation import warnings
 
 NO_MOULDS = "no moulds were asked for: only C200 ran, on the unit"
+NO_KERNEL = "no B-rep kernel is installed for STEP: in a clone, pip install '.[step]'"
 
 
 @dataclass(frozen=True)
@@ -164,4 +166,4 @@ def _left_out(spec: Spec, only: Sequence[str], check: bool) -> Iterator[Reason]:
             # The page offers the command for what was not asked for (report/app/estimate.js).
             yield name, no_estimate() if name == "estimate" and not design.passes else "not asked for (--only)"
     if "step" not in spec.output.formats:
-        yield "boundary representation", "no STEP asked for"
+        yield "boundary representation", "no STEP asked for" if find_spec("OCP") else NO_KERNEL

@@ -150,7 +150,9 @@ class EstimateTable(Table, frozen=True, kw_only=True):
 class OutputTable(Table, frozen=True, kw_only=True):
     """Formats, and the largest distance of a mesh from the true surface."""
 
-    formats: tuple[Format, ...] = ("step", "stl", "3mf")
+    formats: Annotated[
+        tuple[Format, ...] | None, Meta(description="by default step, stl, 3mf; without a B-rep kernel stl, 3mf")
+    ] = None
     tolerance_mm: Annotated[float, Meta(ge=0.0005, le=0.2)] = 0.01
 
 

@@ -33,7 +33,6 @@ from unitcad.spec.asked import (
 )
 
 Casting = CastingTable
-Output = OutputTable
 Wires = WiresTable
 _MOST_LAYERS = 3
 """Layers that a spec's summary lists."""
@@ -116,6 +115,13 @@ class Estimate(Table, frozen=True, kw_only=True):
     fit_source: str | None = None
 
 
+class Output(Table, frozen=True, kw_only=True):
+    """Formats, and the largest distance of a mesh from the true surface in mm."""
+
+    formats: tuple[Format, ...]
+    tolerance_mm: float
+
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -178,7 +184,7 @@ class Spec(Table, frozen=True, kw_only=True, metaclass=_Validated):
             moulds: MouldsTable | Moulds | _Keys = ...,
             casting: CastingTable | _Keys = ...,
             estimate: EstimateTable | Estimate | _Keys = ...,
-            output: OutputTable | _Keys = ...,
+            output: OutputTable | Output | _Keys = ...,
             materials: Mapping[str, MaterialEntry | _Keys] = ...,
             motors: Mapping[str, MotorEntry | _Keys] = ...,
             printers: Mapping[str, PrinterEntry | _Keys] = ...,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib.util import find_spec
 
 from msgspec import structs
 
@@ -12,9 +13,9 @@ from unitcad.designs import Design, design_of
 from unitcad.designs.limits import check_ribs, least_slot
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
-from unitcad.spec.asked import DEFAULT_MOTOR, AskedSpec
+from unitcad.spec.asked import DEFAULT_MOTOR, AskedSpec, Format
 from unitcad.spec.custom_code import is_body_file, is_custom
-from unitcad.spec.effective import CastLayer, Circuit, Estimate, MotorSize, Moulds
+from unitcad.spec.effective import CastLayer, Circuit, Estimate, MotorSize, Moulds, Output
 from unitcad.validation.fit_text import check_fit
 
 UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
@@ -68,7 +69,7 @@ def _with_defaults(asked: AskedSpec, design: Design) -> Spec:
         moulds=moulds,
         casting=asked.casting,
         estimate=estimate,
-        output=asked.output,
+        output=Output(formats=_formats(asked), tolerance_mm=asked.output.tolerance_mm),
         materials=asked.materials,
         motors=asked.motors,
         printers=asked.printers,
@@ -125,6 +126,13 @@ def _circuit(asked: AskedSpec, design: Design, motor: MotorSize) -> Circuit | No
         pad = round(2 * radius, 9) if radius > 0 else motor.diameter_mm
     end = fpcb.tail_width_mm if fpcb.tail_end_width_mm is None else fpcb.tail_end_width_mm
     return Circuit(**{**structs.asdict(fpcb), "pad_diameter_mm": pad, "tail_end_width_mm": end})
+
+
+def _formats(asked: AskedSpec) -> tuple[Format, ...]:
+    """Return the formats asked for; by default without STEP where no B-rep kernel is installed."""
+    if asked.output.formats is not None:
+        return asked.output.formats
+    return ("step", "stl", "3mf") if find_spec("OCP") else ("stl", "3mf")
 
 
 def _estimate(asked: AskedSpec, part: catalogue.Motor | None) -> Estimate:

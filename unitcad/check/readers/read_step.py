@@ -18,7 +18,7 @@ from unitcad.check.rules.f_limits import F011
 from unitcad.check.rules.g_crossing import G001
 from unitcad.check.rules.g_shells import G007, T008, expected
 
-NEEDS = "STEP needs the extra build123d or cadquery: pip install 'unitcad[build123d]'"
+NEEDS = "STEP needs the extra step: in a clone, pip install '.[step]'"
 
 
 def installed() -> bool:

@@ -95,7 +95,7 @@ F012 = Rule("""
     The path does not exist, is not a file, or may not be read; or it is STEP and no B-rep extra is installed (a warning
     where a folder was named).
     Example: `unitcad check prat.stl` where the file is part.stl.
-    Fix: Check the path and its permissions; for STEP pip install 'unitcad[build123d]'.
+    Fix: Check the path and its permissions; for STEP, in a clone, pip install '.[step]'.
 """)
 
 F013 = Rule("""
