@@ -13,6 +13,7 @@ import pytest
 from typer.main import get_command
 from typer.testing import CliRunner
 
+from unitcad.casting.time_line import duration
 from unitcad.cli import app
 
 
@@ -156,3 +157,24 @@ def test_a_refused_argument_is_called_as_in_the_help(words: list[str], field: st
     assert done.returncode == 2
     assert done.stderr.startswith(f"error: {field}: ")
     assert json.loads(done.stdout)["error"]["field"] == field.partition(" ")[0]
+
+
+def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_output(tmp_path: Path) -> None:
+    """Every figure is that of a file in the folder."""
+    done = _run("build", "embedded", "--formats", "stl", "--no-slice", "-o", str(tmp_path))
+    folder = Path(done.stdout.strip())
+    assert done.stdout.count("\n") == 1
+    assert folder.is_dir()
+    lines = [line.removeprefix("embedded: ") for line in done.stderr.splitlines()]
+    procedure = json.loads((folder / "casting.json").read_text())
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert lines[0].startswith("14 mm across")
+    assert duration(procedure["earliest_finish_min"]) in lines[1]
+    assert lines[2] == "to mix: 2 g of ecoflex-00-10, 2 g of dragon-skin-30"
+    assert f"{len(manifest['laws'])} of {len(manifest['laws'])} mould checks passed" in lines[3]
+    assert lines[4] == manifest["estimate"]["answer"]
+    assert lines[5] == f"open {folder / 'report.html'}"
+    assert (folder / "report.html").is_file()
+    without = _run("build", "embedded", "--formats", "stl", "--no-slice", "-o", str(tmp_path / "b"), "--no-report")
+    assert not (Path(without.stdout.strip()) / "report.html").exists()
+    assert "open " not in without.stderr

@@ -16,7 +16,6 @@ from unitcad.cli.shared_options import (
     Formats,
     NoCheck,
     Only,
-    Page,
     Sets,
     allow_code,
     outputs,
@@ -35,7 +34,13 @@ def build(
     sets: Sets = None,
     formats: Formats = None,
     only: Only = None,
-    page: Page = False,
+    page: Annotated[
+        bool | None,
+        typer.Option(
+            "--report/--no-report",
+            help="Write report.html, one offline page. By default without --only; a page that is there is kept up.",
+        ),
+    ] = None,
     no_check: NoCheck = False,
     no_slice: Annotated[
         bool, typer.Option("--no-slice", help="Leave out PrusaSlicer's print time and filament (slicer.json).")
@@ -44,6 +49,7 @@ def build(
     as_json: AsJson = False,
 ) -> None:
     """Make a unit and its casting moulds. The last line printed is the folder."""
+    from unitcad.cli.build_summary import summary
     from unitcad.cli.output import print_json, progress
     from unitcad.pipeline.build import build as run
     from unitcad.pipeline.folder import PAGE, held
@@ -60,7 +66,7 @@ def build(
         with progress(spec.name) as say:
             results.append(run(spec, out, only=chosen, check=not no_check, say=say))
             printing.append(slice_tools(results[-1].folder, results[-1].manifest, spec, say) if sliced else "")
-            if page or (results[-1].folder / PAGE).is_file():
+            if page or (page is None and only is None) or (results[-1].folder / PAGE).is_file():
                 from unitcad.report import write_report
 
                 say("page")
@@ -69,18 +75,17 @@ def build(
     if as_json:
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
     else:
-        for result, prints in zip(results, printing, strict=True):
-            _print_result(result.manifest)
-            if prints:
-                typer.echo(f"{result.manifest['name']}: {prints}")
-            if level := result.manifest["estimate"]:
-                typer.echo(f"{result.manifest['name']}: {level['answer']}")
+        for spec, result, prints in zip(wanted, results, printing, strict=True):
+            _print_faults(result.manifest)
+            # Standard output has the folder alone, for a script to take.
+            for line in (*summary(spec, result), *([prints] if prints else ())):
+                warn(f"{spec.name}: {line}")
             typer.echo(str(result.folder))
     if not all(result.ok for result in results):
         sys.exit(1)
 
 
-def _print_result(manifest: Manifest) -> None:
+def _print_faults(manifest: Manifest) -> None:
     """Print warnings, failed mould checks, and findings in files."""
     from unitcad.pipeline.product import NO_KERNEL
 
@@ -99,8 +104,3 @@ def _print_result(manifest: Manifest) -> None:
             typer.echo(f"{check['code']} {check['where']}: {measured}{advice}", err=True)
     for finding in manifest["check"]["findings"]:
         typer.echo(f"{finding['path']}: {finding['code']} {finding['message']}", err=True)
-    if checks:
-        passed = sum(check["ok"] for check in checks)
-        typer.echo(
-            f"{manifest['name']}: {len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed"
-        )

@@ -1,8 +1,8 @@
 """Loading of OCP, the Python binding of OCCT: a failure becomes one error that tells how to fix it.
 
-Two wheels fill the same folder OCP: cadquery-ocp (with VTK, for cadquery) and cadquery-ocp-novtk (for STEP and build123d). The
-one unpacked last overwrites the other, and removing either breaks both. Both of the version below, installed together,
-serve both libraries.
+Two wheels fill the same folder OCP: cadquery-ocp (with VTK, for cadquery) and cadquery-ocp-novtk (for STEP and
+build123d). The one unpacked last overwrites the other, and removing either breaks both. Both of the version below,
+installed together, serve both libraries.
 """
 
 from __future__ import annotations
