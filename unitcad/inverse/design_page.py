@@ -10,12 +10,13 @@ from unitcad.inverse import design_words as words
 from unitcad.report.plain_page import drawing, plain_page
 from unitcad.text import number
 
-_HEAD = ("", "unit", "measured", "probability", "10 to 90 % at the edge", "mass, g", "hours", "mm wide", "mm high")
+_HEAD = ("", "unit", "measured", "probability", "10 to 90 %", "g", "hours", "mm")
 _NUMBER = ' class="number"'
 
 
 def design_page(data: Mapping[str, Any], fronts: tuple[str, str], sections: Sequence[str]) -> str:
     """Return the page of a result; `fronts`: the plot (SVG), wide and narrow; `sections`: of each proposal."""
+    models = words.models_line(data)
     body = [
         '<div class="top"><div>',
         f"<h1>{escape(data['name'])}</h1>",
@@ -23,7 +24,8 @@ def design_page(data: Mapping[str, Any], fronts: tuple[str, str], sections: Sequ
         "</div></div>",
         "<section><h2>Proposals</h2>",
         _table(data["proposals"]),
-        f'<p class="note">{escape(words.models_line(data))}. The probability is that of meeting the level; '
+        '<p class="note">Levels in per cent of the motor; mm: diameter x height. '
+        f"{escape(models[0].upper() + models[1:])}. The probability is that of meeting the level; "
         "it counts what the models missed on measured units, not that a unit has never been made.</p>",
         *([f"<p>{escape(data['decides'])}</p>"] if data["decides"] else []),
         "</section>",
@@ -50,8 +52,7 @@ def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
             f"{words.percent(edge['p10'])} to {words.percent(edge['p90'])}",
             number(one["mass_g"], 2),
             number(one["cure_hours"], 3),
-            number(one["diameter_mm"], 3),
-            number(one["height_mm"], 3),
+            f"{number(one['diameter_mm'], 3)} x {number(one['height_mm'], 3)}",
         ]
         link = f'<a href="#proposal-{one["rank"]}">{escape(one["label"])}</a>'
         numbers = "".join(f"<td{_NUMBER}>{escape(cell)}</td>" for cell in cells)
