@@ -134,7 +134,7 @@ def _refusal(value: Any, kind: Any, field: str) -> Refusal:
     if fixed:
         return Refusal(field, value, f"must have {fixed[0]} entries")
     pattern = next(note.pattern for note in notes(kind) if note.pattern is not None)
-    written = re.sub(r"[^a-z0-9]+", "-", value.lower()).strip("-")
+    written = re.sub(r"[^a-z0-9]+", "-", str(value).lower()).strip("-")
     return Refusal(field, value, f"must be {meaning(kind) or pattern}", written if _fits(written, kind) else None)
 
 
