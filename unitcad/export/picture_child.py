@@ -16,21 +16,37 @@ from vtkmodules.vtkFiltersCore import vtkFeatureEdges, vtkPolyDataNormals
 from vtkmodules.vtkIOImage import vtkPNGWriter
 from vtkmodules.vtkRenderingCore import (
     vtkActor,
+    vtkActor2D,
     vtkLight,
     vtkPolyDataMapper,
+    vtkPolyDataMapper2D,
     vtkRenderer,
     vtkRenderWindow,
     vtkTextActor,
     vtkWindowToImageFilter,
 )
 
+from unitcad.export.labels import EDGE_PX, LEADER_PX, Label, place
+
 CREASE_DEG = 20.0
 """Edges sharper than this are drawn as lines and not shaded over."""
+FONT_PX = 26
+MOST_CHARACTERS = 28
+"""Of a name; the rest is left out."""
 INK = (0.13, 0.15, 0.18)
 
 
 def picture(size: tuple[int, int], towards_eye: tuple[float, float, float], parts: list[dict[str, Any]]) -> bytes:
     """Draw one PNG."""
+    window, _ = staged(size, towards_eye, parts)
+    window.Render()
+    return _png(window)
+
+
+def staged(
+    size: tuple[int, int], towards_eye: tuple[float, float, float], parts: list[dict[str, Any]]
+) -> tuple[vtkRenderWindow, dict[int, Label]]:
+    """Set a picture up; return its window, not yet drawn, and where the parts' names stand."""
     renderer = vtkRenderer()
     renderer.SetBackground(1, 1, 1)
     for part in parts:
@@ -48,12 +64,14 @@ def picture(size: tuple[int, int], towards_eye: tuple[float, float, float], part
     window.SetMultiSamples(8)
     window.SetSize(*size)
     window.AddRenderer(renderer)
-    _fit(renderer, parts, size)
-    names = [part for part in parts if part["label"]]
-    for part in names:
-        renderer.AddViewProp(_label(renderer, part, parts))
-    window.Render()
-    return _png(window)
+    texts = _texts(parts, size[1])
+    widest = max((_size(renderer, text)[0] for text in texts.values()), default=0.0)
+    _fit(renderer, parts, size, widest)
+    labels = placed(renderer, parts, texts) if texts else {}
+    for i, label in labels.items():
+        for mark in (*_leader(label), texts[i]):
+            renderer.AddViewProp(mark)
+    return window, labels
 
 
 def _mesh(vertices: np.ndarray, faces: np.ndarray) -> vtkPolyData:
@@ -111,14 +129,14 @@ def _light(renderer: vtkRenderer) -> None:
         renderer.AddLight(light)
 
 
-def _fit(renderer: vtkRenderer, parts: list[dict[str, Any]], size: tuple[int, int]) -> None:
+def _fit(renderer: vtkRenderer, parts: list[dict[str, Any]], size: tuple[int, int], widest: float) -> None:
     """Move the camera along its view so that every vertex is in the picture, with a margin, and the lot is centred."""
     camera = renderer.GetActiveCamera()
     renderer.ResetCamera()
     points = np.vstack([part["vertices"] for part in parts])
     aspect = size[0] / size[1]
-    # Names stand to the left: the drawing gets the right of the picture.
-    left = -0.60 if any(part["label"] for part in parts) else -0.94
+    # Names stand to the left, the widest of `widest` px: the drawing gets the right of the picture.
+    left = 2 * (widest + EDGE_PX + LEADER_PX) / size[0] - 1 if widest else -0.94
     for _ in range(4):
         seen = _projected(renderer, points, aspect)
         low, high = seen.min(axis=0), seen.max(axis=0)
@@ -134,26 +152,89 @@ def _fit(renderer: vtkRenderer, parts: list[dict[str, Any]], size: tuple[int, in
     renderer.ResetCameraClippingRange()
 
 
-def _label(renderer: vtkRenderer, part: dict[str, Any], parts: list[dict[str, Any]]) -> vtkTextActor:
-    """Write the part's name left of everything drawn, level with the part's middle."""
-    x, _ = _on_screen(renderer, np.vstack([p["vertices"] for p in parts])).min(axis=0)
-    spots = _on_screen(renderer, part["vertices"])
-    text = vtkTextActor()
-    text.SetInput(part["label"])
-    look = text.GetTextProperty()
-    look.SetFontSize(26)
-    look.SetColor(*INK)
-    look.SetVerticalJustificationToCentered()
-    look.SetJustificationToRight()
-    text.SetDisplayPosition(round(x) - 30, round((spots[:, 1].min() + spots[:, 1].max()) / 2))
-    return text
+def _texts(parts: list[dict[str, Any]], height: int) -> dict[int, vtkTextActor]:
+    """Return the names of the parts that have one, not yet in their places."""
+    named = [i for i, part in enumerate(parts) if part["label"]]
+    size = min(FONT_PX, int(height / 1.5 / max(len(named), 1)))
+    texts = {}
+    for i in named:
+        label = parts[i]["label"]
+        text = texts[i] = vtkTextActor()
+        text.SetInput(label if len(label) <= MOST_CHARACTERS else label[: MOST_CHARACTERS - 1] + "…")
+        look = text.GetTextProperty()
+        look.SetFontSize(size)
+        look.SetColor(*INK)
+        look.SetVerticalJustificationToCentered()
+        look.SetJustificationToCentered()
+    return texts
 
 
-def _on_screen(renderer: vtkRenderer, points: np.ndarray) -> np.ndarray:
-    """Return where points (n, 3) fall in the picture, (n, 2) pixels from its lower left corner."""
+def _size(renderer: vtkRenderer, text: vtkTextActor) -> tuple[float, float]:
+    """Return width and height (px) of a name. Letters without a tail get the room for one: names stand on one grid."""
+    box = [0.0] * 4
+    text.GetBoundingBox(renderer, box)
+    return box[1] - box[0] + 1, max(box[3] - box[2] + 1, 1.2 * text.GetTextProperty().GetFontSize())
+
+
+def placed(renderer: vtkRenderer, parts: list[dict[str, Any]], texts: dict[int, vtkTextActor]) -> dict[int, Label]:
+    """Put the names where they cover nothing; return where that is."""
+    found = place(owners(renderer, parts), {i: _size(renderer, text) for i, text in texts.items()})
+    for i, label in found.items():
+        left, right, bottom, top = label.box
+        texts[i].SetDisplayPosition(round((left + right) / 2), round((bottom + top) / 2))
+    return found
+
+
+def owners(renderer: vtkRenderer, parts: list[dict[str, Any]]) -> np.ndarray:
+    """Return which part each pixel (height, width) shows, -1 for none; row 0 is the lowest."""
+    flat = vtkRenderer()
+    flat.SetBackground(1, 1, 1)
+    for i, part in enumerate(parts):
+        actor = _surface(_mesh(part["vertices"], part["faces"]), (i % 200 / 255, i // 200 / 255, 0.0))
+        actor.GetProperty().LightingOff()
+        flat.AddActor(actor)
+    flat.SetActiveCamera(renderer.GetActiveCamera())
+    window = vtkRenderWindow()
+    window.SetOffScreenRendering(1)
+    window.SetMultiSamples(0)  # a mixed colour would be another part's number
     width, height = renderer.GetSize()
-    seen = _projected(renderer, points, width / height)
-    return (seen + 1) / 2 * (width, height)
+    window.SetSize(width, height)
+    window.AddRenderer(flat)
+    window.Render()
+    grab = vtkWindowToImageFilter()
+    grab.SetInput(window)
+    grab.ReadFrontBufferOff()
+    grab.Update()
+    colours = vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars()).reshape(height, width, 3).astype(int)
+    return np.where(colours[:, :, 2] > 0, -1, colours[:, :, 0] + 200 * colours[:, :, 1])
+
+
+def _leader(label: Label) -> list[vtkActor2D]:
+    """Return the line from a name to its part, and the dot there."""
+    if label.end is None:
+        return []
+    points = vtkPoints()
+    points.InsertNextPoint(*label.start, 0)
+    points.InsertNextPoint(*label.end, 0)
+    actors = []
+    for cells, set_cells in (((0, 1), vtkPolyData.SetLines), ((1,), vtkPolyData.SetVerts)):
+        table = vtkCellArray()
+        table.InsertNextCell(len(cells))
+        for cell in cells:
+            table.InsertCellPoint(cell)
+        line = vtkPolyData()
+        line.SetPoints(points)
+        set_cells(line, table)
+        mapper = vtkPolyDataMapper2D()
+        mapper.SetInputData(line)
+        actor = vtkActor2D()
+        actor.SetMapper(mapper)
+        look = actor.GetProperty()
+        look.SetColor(*INK)
+        look.SetLineWidth(1.4)
+        look.SetPointSize(7)
+        actors.append(actor)
+    return actors
 
 
 def _projected(renderer: vtkRenderer, points: np.ndarray, aspect: float) -> np.ndarray:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
     from unitcad.moulds.mould_set import MouldSet
+    from unitcad.shape.body import Body
 
 GAP = 7.0
 """Between two pieces taken apart, mm."""
@@ -139,8 +140,12 @@ def pictures(moulds: MouldSet, only: Sequence[str] = ("unit", "moulds")) -> dict
 
 def unit_cut_open(moulds: MouldSet) -> Scene:
     """Show the unit without its nearer half, seen from a little below: the skin's side is the open one."""
-    parts = [_drawn(_far_half(moulds.mesh(body)), body.colour) for body in moulds.unit]
+    parts = [_drawn(_far_half(moulds.mesh(body)), body.colour, _name(body)) for body in moulds.unit]
     return Scene(tuple(p for p in parts if p), (0.45, -1.0, -0.38), (1200, 640))
+
+
+def _name(body: Body) -> str:
+    return "circuit" if body.kind == "circuit" else spaced(body.name)
 
 
 def step_in_section(moulds: MouldSet, index: int) -> Scene:
@@ -159,10 +164,11 @@ def exploded(moulds: MouldSet) -> Scene:
     groups = [[tool.name for tool in moulds.plan.of_kind(kind)] for kind in ("tongue", "stub")]
     numbered = [name for group in groups if len(group) > 1 for name in group]
     unnamed = {name for group in groups for name in group[1:]}
-    parts = []
+    names, parts = {body.name: _name(body) for body in moulds.unit}, []
     for name, offset in offsets.items():
         for i, solid in enumerate(_solids(moulds, name)):
-            label = "" if i or name in unnamed else name.rstrip("1") if name in numbered else spaced(name)
+            shown = name.rstrip("1") if name in numbered else names.get(name, spaced(name))
+            label = "" if i or name in unnamed else shown
             parts.append(_drawn(solid.translate(offset), colours[name], label))
     return Scene(tuple(p for p in parts if p), (0.55, -1.0, 0.5), (1000, 1300))
 
