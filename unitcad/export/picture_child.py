@@ -26,7 +26,7 @@ from vtkmodules.vtkRenderingCore import (
     vtkWindowToImageFilter,
 )
 
-from unitcad.export.labels import EDGE_PX, LEADER_PX, Label, place
+from unitcad.export.name_places import EDGE_PX, LEADER_PX, Label, place
 
 CREASE_DEG = 20.0
 """Edges sharper than this are drawn as lines and not shaded over."""

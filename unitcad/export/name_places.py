@@ -72,7 +72,7 @@ def _seen(mask: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]] |
     if not len(rows):
         return None
     window = np.pad(mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], 1)
-    inside = distance_transform_edt(window)
+    inside = np.asarray(distance_transform_edt(window))
     y, x = np.nonzero(inside >= min(_WELL_INSIDE, inside.max()))
     y, x = y + rows[0] - 1, x + columns[0] - 1
     half = (rows[0] + rows[-1]) / 2

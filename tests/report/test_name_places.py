@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from unitcad.export.labels import EDGE_PX, Box, Label, overlap, place
+from unitcad.export.name_places import EDGE_PX, Box, Label, overlap, place
 from unitcad.pipeline.scenes import exploded, unit_cut_open
 from unitcad.pipeline.variant import Variant
 from unitcad.validation import templates
