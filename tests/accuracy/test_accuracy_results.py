@@ -111,6 +111,12 @@ def test_results_survive_the_file_and_suites_are_merged(tmp_path: Path):
         runner.read(tmp_path)
 
 
+def test_the_stored_results_are_read_and_a_cell_of_another_type_is_not_written(tmp_path: Path):
+    assert len(runner.read(Path(__file__).parents[2] / "docs")) > 5
+    with pytest.raises(TypeError, match="Table t"):
+        replace(RESULT, tables=(Table("t", ("a",), ((True,),)),)).as_dict()
+
+
 def test_the_front_page_has_picks_plots_and_a_line_for_every_suite():
     summary = Summary((("a response", "1e-6", "rtol 1e-5"),), "case y: 1e-3", 0)
     text = front(

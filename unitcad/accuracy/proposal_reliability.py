@@ -146,7 +146,7 @@ def _miss(own: Sequence[Judged]) -> float:
 
 def _units(name: str, own: Sequence[Judged]) -> Table:
     rows = tuple(
-        (one.unit, one.level, one.middle, f"{one.low:.3f} to {one.high:.3f}", one.held, one.share, one.met[1])
+        (one.unit, one.level, one.middle, f"{one.low:.3f} to {one.high:.3f}", _yes(one.held), one.share, one.met[1])
         for one in own
     )
     return Table(
@@ -154,6 +154,10 @@ def _units(name: str, own: Sequence[Judged]) -> Table:
         ("unit", "measured", "median", "10 to 90 %", "held", "P(level below the measured)", "P(at most 6 %)"),
         rows,
     )
+
+
+def _yes(held: bool) -> str:
+    return "yes" if held else "no"
 
 
 def _reliability(judged: dict[str, list[Judged]]) -> Table:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import msgspec
+import numpy as np
 
 Cell = str | float | int | None
 Say = Callable[[str], None]
@@ -94,7 +95,13 @@ class Result:
         return all(promise.ok for promise in self.promises)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return JSON-ready data; NaN and infinity become null, in a table their name."""
+        """Return JSON-ready data; NaN and infinity become null, in a table their name.
+
+        Raises TypeError for a cell that `from_dict` would not read: a truth value.
+        """
+        for table in self.tables:
+            if any(isinstance(cell, bool | np.bool_) for row in table.rows for cell in row):
+                raise TypeError(f"Table {table.title}: a cell is a truth value; write a word")
         tables = [replace(t, rows=tuple(tuple(map(_with_names, row)) for row in t.rows)) for t in self.tables]
         text = msgspec.json.encode(replace(self, tables=tuple(tables)), enc_hook=lambda number: number.item())
         data = msgspec.json.decode(text)  # JSON has no NaN and no infinity: both are null
