@@ -104,6 +104,11 @@ def test_links_within_the_pages_lead_to_a_file_and_a_heading() -> None:
     assert _lost(python, "[a](batch.md#of-ones-own) [b](nowhere.md)") == ["](batch.md#of-ones-own)", "](nowhere.md)"]
 
 
+def test_the_citation_names_this_version() -> None:
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
+
+
 def test_no_page_waits_for_a_figure() -> None:
     waiting = re.compile(r"\b(?:TODO|TBD|FIXME|XXX|ESTIMATES|MEASURED_[A-Z]+)\b")
     for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]:

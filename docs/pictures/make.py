@@ -49,11 +49,13 @@ def main() -> None:
 
 
 def pictures() -> dict[str, bytes]:
-    """Units cut open, two sets taken apart, and the second pour of one."""
+    """Units cut open (six are the README's gallery), two sets taken apart, and the second pour of one."""
     variants = {name: Variant.of(name) for name in ("encapsulating", "embedded")}
     custom = HERE.parents[1] / "templates" / "custom"
     dome, film, lugs = (Variant.of(str(custom / f"{name}.toml")) for name in ("dome", "film-closed", "strap-lugs"))
     scenes = {f"{name}-unit.png": unit_cut_open(variant) for name, variant in variants.items()}
+    scenes |= {f"{name}-unit.png": unit_cut_open(Variant.of(name)) for name in ("chain", "three-layer")}
+    scenes |= {"strap-lugs-unit.png": unit_cut_open(lugs), "film-closed-unit.png": unit_cut_open(film)}
     scenes["encapsulating-moulds.png"] = exploded(variants["encapsulating"])
     scenes["strap-lugs-moulds.png"] = exploded(lugs)
     scenes["strap-lugs-pour2.png"] = step_in_section(lugs, 2)

@@ -1,0 +1,68 @@
+"""The docs as a site: every link leads somewhere, and nothing is loaded from outside."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("material", reason="the site needs the extra docs")
+ROOT = Path(__file__).parent.parent
+LOADED = re.compile(
+    r"""<(?:script|img|iframe|source|object|embed)[^>]*\s(?:src|data)=["']?((?:https?:)?//[^"'\s>]+)"""
+    r"""|<link(?![^>]*rel=["']?canonical)[^>]*\shref=["']?((?:https?:)?//[^"'\s>]+)"""
+    r"""|@import\s+["']?((?:https?:)?//[^"'\s;]+)|url\(["']?((?:https?:)?//[^"')]+)"""
+)
+
+
+def build(source: Path, target: Path) -> subprocess.CompletedProcess[str]:
+    # Not --quiet: strict then counts no warnings.
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(source / "mkdocs.yml")]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    return subprocess.run(
+        [*command, "-d", str(target)], capture_output=True, text=True, env=environment, timeout=300, check=False
+    )
+
+
+def loaded(folder: Path) -> list[str]:
+    """What the pages and style sheets of a site load from outside."""
+    files = [path for path in folder.rglob("*") if path.suffix in (".html", ".css")]
+    return ["".join(found) for path in files for found in LOADED.findall(path.read_text("utf-8"))]
+
+
+def test_the_site_builds_strictly_and_loads_nothing_from_outside(tmp_path: Path) -> None:
+    done = build(ROOT, tmp_path / "site")
+    assert done.returncode == 0, done.stderr
+    assert loaded(tmp_path / "site") == []
+    for page in (ROOT / "docs").rglob("*.md"):
+        assert (tmp_path / "site" / page.relative_to(ROOT / "docs").with_suffix(".html")).is_file(), page
+        relative = page.relative_to(ROOT / "docs").as_posix()
+        assert (
+            relative.startswith("accuracy/")
+            or relative == "index.md"
+            or f"](docs/{relative})" in (ROOT / "README.md").read_text("utf-8")
+        ), f"the README's index lacks {relative}"
+
+
+def test_a_lost_link_fails_the_site(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "mkdocs.yml", tmp_path)
+    with (tmp_path / "docs/index.md").open("a") as page:
+        page.write("\n[x](nowhere.md) [y](model.md#nothing)\n")
+    done = build(tmp_path, tmp_path / "site")
+    assert done.returncode != 0
+    assert "nowhere.md" in done.stdout + done.stderr
+    assert "#nothing" in done.stdout + done.stderr
+
+
+def test_what_is_loaded_from_outside_is_seen(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(
+        '<script defer src="https://a.b/c.js"></script><link rel="stylesheet" href="//a.b/c.css"><a href="https://a.b">'
+    )
+    (tmp_path / "a.css").write_text('@import "https://a.b/d.css"; x { background: url(https://a.b/e.png) }')
+    assert sorted(loaded(tmp_path)) == ["//a.b/c.css", "https://a.b/c.js", "https://a.b/d.css", "https://a.b/e.png"]
