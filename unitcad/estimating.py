@@ -122,6 +122,7 @@ def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInp
         frequency=frequency,
         amplitude=spec.estimate.amplitude_um * 1e-6,
         drive=spec.motor.drive,
+        moduli=spec.estimate.moduli,
     )
 
 

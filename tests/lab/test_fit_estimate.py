@@ -101,7 +101,7 @@ def test_builds_follow_the_fit(fit_file: Path, text: str, tmp_path: Path) -> Non
         words = ["build", "embedded", "--only", "estimate", "-o", str(tmp_path / out), *options]
         done = CliRunner().invoke(app, words)
         assert done.exit_code == 0, done.output
-        return Path(done.output.strip().splitlines()[-1])
+        return Path(done.stdout.strip().splitlines()[-1])
 
     plain, fitted = built("a"), built("a", "--fit", str(fit_file))
     again = built("b", "--fit", str(fit_file))

@@ -123,7 +123,7 @@ class EstimateInput:
     """A unit on a body: lengths in m, frequency in Hz, the motor's amplitude in m (None: not known).
 
     `passes`: how often the wave from motor to skin passes the border between the layers; `drive`: how the motor's force
-    acts, turning in the skin's plane (flat) or along the motor's axis (axial).
+    acts, turning in the skin's plane (flat) or along the motor's axis (axial); `moduli`: which ones the layers have.
     """
 
     name: str
@@ -137,6 +137,7 @@ class EstimateInput:
     frequency: Quantity
     amplitude: float | None = None
     drive: Drive = "flat"
+    moduli: Literal["dynamic", "quasi-static"] = "dynamic"
 
     @property
     def motor_diameter(self) -> float:

@@ -12,13 +12,13 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from unitcad.attenuation.edge.bush import sections
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.fitted_models import edge_levels
+from unitcad.attenuation.edge.fitted_models import edge_levels, stored
 from unitcad.attenuation.inputs import Geometry
 from unitcad.batch import task as tasks
 from unitcad.batch.batch_records import Failure, JournalEntry, Summary
@@ -60,6 +60,7 @@ class _Known:
     silicones: np.ndarray
     models: tuple[str, ...]
     fit: str | None = None
+    moduli: Literal["dynamic", "quasi-static"] = "dynamic"
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,7 @@ def _known(spec: Spec) -> _Known:
         silicones=np.array([_silicone(layer) for layer in asked.layers]),
         models=closed_forms(spec.estimate.models),
         fit=spec.estimate.fit_source,
+        moduli=spec.estimate.moduli,
     )
 
 
@@ -201,10 +203,12 @@ def _block(
         unknown = np.isnan(silicones).any(axis=(1, 2))
         for model in dict.fromkeys(model for entry in there for model in entry.models):
             column = levels.setdefault(model, np.full(len(known), np.nan))
-            for fit in dict.fromkeys(entry.fit for entry in there):
-                asked = np.array([model in entry.models and entry.fit == fit for entry in there])
-                constants = lab_fit(fit).constants(model) if fit else None
-                column[chosen] = np.where(asked & ~unknown, edge_levels(units, model, constants), column[chosen])
+            for fit, moduli in dict.fromkeys((entry.fit, entry.moduli) for entry in there):
+                of_these = [model in one.models and (one.fit, one.moduli) == (fit, moduli) for one in there]
+                constants = lab_fit(fit).constants(model) if fit else stored(moduli)[model]
+                column[chosen] = np.where(
+                    np.array(of_these) & ~unknown, edge_levels(units, model, constants), column[chosen]
+                )
     return EstimateBlock(start, levels, known)
 
 

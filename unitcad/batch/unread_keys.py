@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Struct
 
 from unitcad.attenuation.edge.answer import typical_errors
-from unitcad.attenuation.edge.fitted_models import edge_levels
+from unitcad.attenuation.edge.fitted_models import edge_levels, stored
 from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.batch.sweep import Sweep
@@ -58,7 +58,7 @@ def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
             told = [group[model] for group in groups if len(group[model]) > 1]
             if told and all(np.ptp(np.log(levels)) < _SAME for levels in told):
                 unread[model].append(path)
-    errors = typical_errors(fit_of(starts[0][1]))
+    errors = typical_errors(fit_of(starts[0][1]), starts[0][1].estimate.moduli)
     ordered = sorted(models, key=lambda model: errors[model])
     return SweptEstimate(
         {model: float(f"{errors[model]:.6g}") for model in ordered}, {model: unread[model] for model in ordered}
@@ -112,7 +112,7 @@ def _levels(sweep: Sweep, index: int, path: str, models: Sequence[str]) -> dict[
         variant = _changed(data, path, value)
         for model in models if variant else ():
             assert variant is not None
-            level = float(edge_levels(nominal(variant), model)[0])
+            level = float(edge_levels(nominal(variant), model, stored(variant.moduli)[model])[0])
             if np.isfinite(level) and level > 0:
                 levels[model].append(level)
     return levels

@@ -132,7 +132,7 @@ def tabulate(
         raise Refusal("at_hand.materials", list(target.materials), limit)
     sequences = [one for n in by_count for one in by_count[n]]
     starts = dict(zip(by_count, np.cumsum([0, *map(len, by_count.values())]), strict=False))
-    stack, parts = stack_of(target.models, target.fit), []
+    stack, parts = stack_of(target.models, target.fit, target.asked.estimate.moduli), []
     for n, own in by_count.items():
         at = np.flatnonzero(np.equal(counts, n))
         if not own or not at.size:

@@ -88,7 +88,8 @@ def _of_spec(made: Inversion, spec: Spec) -> dict[str, Any]:
         names = listed(dict.fromkeys(layer.material for layer in without))
         reasons.append(f"{names}: {without[0].youngs_modulus.note}")
     else:
-        predictive = stack_of(found.target.models, found.target.fit).predictive(stacked([variant]))
+        stack = stack_of(found.target.models, found.target.fit, variant.moduli)
+        predictive = stack.predictive(stacked([variant]))
         p = float(probability_of(found.target, predictive)[0])
         low, middle, high = (float(end[0]) for end in predictive.range)
         better = int(np.sum(found.probability[made.rows] > p + 1e-6))

@@ -86,8 +86,9 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
 
 def models_block(target: Target) -> dict[str, Any]:
     """Return which models were stacked, with their weights, and by which units."""
-    stack = stack_of(target.models, target.fit)
-    by = "the paper's nine levels" if target.fit is None else f"the lab's fit {target.fit.name}"
+    stack = stack_of(target.models, target.fit, target.asked.estimate.moduli)
+    slow = ", by the moduli of a slow pull" if target.asked.estimate.moduli == "quasi-static" else ""
+    by = f"the paper's nine levels{slow}" if target.fit is None else f"the lab's fit {target.fit.name}"
     weights = {model: float(weight) for model, weight in zip(stack.models, stack.weights, strict=True)}
     left_out = list(stack.left_out) if isinstance(stack, Stack) else [m for m in target.models if m not in weights]
     return {"weights": weights, "without_weight": left_out, "by": by}

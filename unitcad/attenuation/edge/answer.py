@@ -14,6 +14,7 @@ import numpy as np
 
 from unitcad.attenuation.edge.fitted_models import assessments
 from unitcad.attenuation.edge.lab_fit import LabFit
+from unitcad.attenuation.edge.measured_levels import Moduli
 from unitcad.attenuation.edge.predictive import Predictive
 from unitcad.text import listed, number
 
@@ -36,6 +37,10 @@ _LAYER = re.compile(r"layers\.\d+\.(\w+)")
 NULL = "A null of two constants, the softer layer inside or not,"
 PAPER = "the paper"
 """Who measured the catalogue's levels."""
+QUASI_STATIC = (
+    "Moduli of a slow pull, not at the motor's frequency: the constants and all errors are those of the nine units "
+    "with such moduli."
+)
 SKIN_MM = (5, 10, 20)
 """Distances from the edge that the sentence on the skin names."""
 
@@ -85,11 +90,14 @@ def _points(expected: Predictive | None) -> tuple[float | None, float | None, fl
     return low, median, high
 
 
-def typical_errors(fit: LabFit | None = None) -> dict[str, float]:
-    """Return each model's typical factor with the unit left out: on the lab's units, else on the paper's nine."""
+def typical_errors(fit: LabFit | None = None, moduli: Moduli = "dynamic") -> dict[str, float]:
+    """Return each model's typical factor with the unit left out: on the lab's units, else on the paper's nine.
+
+    Without a fit by `moduli`.
+    """
     if fit:
         return {name: one.left_out for name, one in fit.model.items()}
-    return {name: one.left_out.geometric_mean for name, one in assessments().items()}
+    return {name: one.left_out.geometric_mean for name, one in assessments(moduli).items()}
 
 
 def percent(level: float, digits: int = 2) -> str:
@@ -108,6 +116,11 @@ def _errors(estimated: dict[str, Any]) -> dict[str, Error]:
     table = estimated["table_error"]
     scores = {name: table[name]["leave_one_unit_out"]["levels"] for name in table["order"]}
     return {name: (one["geometric_mean"], one["worst"], one["worst_at"]) for name, one in scores.items()}
+
+
+def _slow_pull(estimated: dict[str, Any]) -> bool:
+    """Return whether the errors are those of the paper's units by quasi-static moduli."""
+    return estimated["table_error"]["moduli"] == "quasi-static" and "fit" not in estimated
 
 
 def _order(estimated: dict[str, Any], errors: dict[str, Error]) -> list[str]:
@@ -158,6 +171,8 @@ def _lines(
         levels = listed(number(100 * level, 3) for level in printed)
         at = f"{number(found['diameter_mm'])} mm and {number(found['frequency_hz'])} Hz"
         yield f"Measured in the paper at {at}: {levels} %; this unit differs in {listed(found['differs_in'])}."
+    if _slow_pull(estimated):
+        yield QUASI_STATIC
     if data["not_seen"]:
         yield f"{data['model']} does not read: {', '.join(data['not_seen'])}."
     others = [name for name in order if name != data["model"]]
@@ -201,6 +216,7 @@ def _expected(estimated: dict[str, Any], data: dict[str, Any]) -> str:
     off = f"typically off by a factor of {number(data['typical_error'], 2)}"
     worst = f", at worst {number(data['worst_error'], 2)}" if data["worst_error"] else ""
     whose = f"units of the fit {estimated['fit']['name']}" if "fit" in estimated else "the nine measured units"
+    whose += " by moduli of a slow pull" if _slow_pull(estimated) else ""
     null = f" {NULL} does better: x {number(data['null_error'], 2)}." if model in data["better_null"] else ""
     return f"{at}{likely}; {off}{worst} ({whose}, each left out).{null}"
 

@@ -11,6 +11,7 @@ from unitcad.attenuation.edge.answer import answer
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments, choice, forms, in_order, pairwise
 from unitcad.attenuation.edge.lab_fit import LabFit, error_block, own_block
 from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown
+from unitcad.attenuation.edge.measured_levels import Moduli
 from unitcad.attenuation.edge.predictive import STACKED, predictive_of
 from unitcad.attenuation.edge.scores import RANGE_PERCENT, Assessment
 from unitcad.attenuation.inputs import EstimateInput, Quantity
@@ -62,7 +63,7 @@ def estimate(
     `own_measured`. `layered` gives the layered solver's block, which reads no silicone: variants on one body share it.
     A quantity that can't be given is null beside a `reason`. Raises `Refusal` for values that no body has.
     """
-    errors = table_error()
+    errors = table_error(variant.moduli)
     blocks = {}
     for model in sorted(models, key=errors["order"].index):
         block = model_block(variant, model, fit)
@@ -150,7 +151,7 @@ def frequency_table(
     `u_z_over_edge`: of |u_z| under an axial one.
     """
     rows, places = [], [f"at_{d:g}_mm" for d in DECAY_AT_MM]
-    models = sorted(models, key=in_order(assessments()).index)
+    models = sorted(models, key=in_order(assessments(variant.moduli)).index)
     for hertz in frequencies:
         at = replace(variant, frequency=Quantity(hertz))
         decays = decay_at(at, hertz, DECAY_AT_MM)
@@ -178,6 +179,7 @@ def variant_block(variant: EstimateInput) -> dict[str, Any]:
         "motor_diameter_mm": variant.motor_diameter * 1e3,
         "motor_drive": variant.drive,
         "frequency_hz": _quantity(variant.frequency, 1.0),
+        "moduli": variant.moduli,
         "amplitude_um": None if variant.amplitude is None else variant.amplitude * 1e6,
         "tissue": variant.tissue_name,
         "layers": [
@@ -195,23 +197,24 @@ def variant_block(variant: EstimateInput) -> dict[str, Any]:
     }
 
 
-def table_error() -> dict[str, Any]:
-    """Return every model's errors against the measured table, and the null model's.
+def table_error(moduli: Moduli = "dynamic") -> dict[str, Any]:
+    """Return every model's errors against the measured table by such moduli, and the null model's.
 
     `order`: by the score with a unit left out, the best first. `sign_flip`: p of each pair, the better one first.
     `chosen_without`: the score when the form is chosen without the unit too.
     """
-    found = assessments()
+    found = assessments(moduli)
     order = in_order(found)
     by_model: dict[str, Any] = {name: assessment_block(found[name]) for name in order}
     best = {worse: p for better, worse, p in pairwise(found) if better == order[0]}
     for name in order:
         p = best.get(name)
         by_model[name]["against_best"] = {"model": order[0], "p": p, "told_apart": p is not None and p <= SAME_P}
-    chosen = choice()
+    chosen = choice(moduli)
     return {
         **by_model,
-        "what": TABLE_NOTE,
+        "what": TABLE_NOTE + ("; by moduli of a slow pull" if moduli == "quasi-static" else ""),
+        "moduli": moduli,
         "range": RANGE_NOTE,
         "order": order,
         "sign_flip": {

@@ -17,7 +17,7 @@ import numpy as np
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.bush import CHOSEN, Form, bush
 from unitcad.attenuation.edge.closed_form import Units
-from unitcad.attenuation.edge.measured_levels import MeasuredTable, Predict, measured_table
+from unitcad.attenuation.edge.measured_levels import MeasuredTable, Moduli, Predict, measured_table
 from unitcad.attenuation.edge.scores import Assessment, Choice, Fit, assess, choose_without, sign_flip_p
 
 MODELS = ("bush", "fitted", "paper", "consistent")
@@ -125,9 +125,9 @@ _PATHS: dict[str, Predict] = {
 
 
 @cache
-def assessments() -> dict[str, Assessment]:
-    """Compare every model, the reading with k_t alone and the null with the catalogue's measured table."""
-    return assess_all(measured_table())
+def assessments(moduli: Moduli = "dynamic") -> dict[str, Assessment]:
+    """Compare every model, the reading with k_t alone and the null with the catalogue's table, by such moduli."""
+    return assess_all(measured_table(moduli))
 
 
 def assess_all(table: MeasuredTable) -> dict[str, Assessment]:
@@ -151,9 +151,9 @@ def pairwise(found: dict[str, Assessment]) -> list[tuple[str, str, float]]:
 
 
 @cache
-def choice() -> Choice:
-    """Choose among all `forms` without the unit, over the catalogue's measured table."""
-    return choose_without(forms(), measured_table())
+def choice(moduli: Moduli = "dynamic") -> Choice:
+    """Choose among all `forms` without the unit, over the catalogue's measured table, by such moduli."""
+    return choose_without(forms(), measured_table(moduli))
 
 
 def constants(table: MeasuredTable) -> dict[str, dict[str, float]]:
@@ -167,9 +167,9 @@ def constants(table: MeasuredTable) -> dict[str, dict[str, float]]:
 
 
 @cache
-def stored() -> dict[str, dict[str, float]]:
-    """Return the constants from the catalogue's measured table."""
-    return constants(measured_table())
+def stored(moduli: Moduli = "dynamic") -> dict[str, dict[str, float]]:
+    """Return the constants from the catalogue's measured table, by such moduli."""
+    return constants(measured_table(moduli))
 
 
 def path_of(model: str, constants: Mapping[str, float] | None = None) -> Predict:
@@ -183,5 +183,7 @@ def path_of(model: str, constants: Mapping[str, float] | None = None) -> Predict
 
 
 def edge_levels(units: Units, model: str, constants: Mapping[str, float] | None = None) -> Any:
-    """Return the edge level (motor amplitude = 1) by a model of `MODELS`, shape (...), by the stored constants."""
+    """Return the edge level (motor amplitude = 1) by a model of `MODELS`, shape (...), by the stored
+    constants of moduli at the motor's frequency where none are given.
+    """
     return (constants or stored()[model])["s"] * path_of(model, constants)(units)

@@ -149,7 +149,7 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
 
     With a lab's `fit` the constants are its own, and the level has a predictive range.
     """
-    constants = fit.constants(model) if fit else stored()[model]
+    constants = fit.constants(model) if fit else stored(variant.moduli)[model]
     path, scale = path_of(model, constants), constants["s"]
     block: dict[str, Any] = {
         "kind": KINDS[model],

@@ -17,7 +17,7 @@ import numpy as np
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import MODELS, compared, edge_levels
 from unitcad.attenuation.edge.lab_fit import PERCENT, LabFit, gradient
-from unitcad.attenuation.edge.measured_levels import MeasuredTable, measured_table
+from unitcad.attenuation.edge.measured_levels import MeasuredTable, Moduli, measured_table
 from unitcad.attenuation.edge.scores import all_but_one
 from unitcad.attenuation.edge.shrunk_fit import models as fitted_forms
 from unitcad.attenuation.edge.variant_units import stacked
@@ -120,21 +120,26 @@ class LabStack:
         return Predictive(self.models, self.weights, df, np.stack(centres, axis=-1), np.stack(scales, axis=-1))
 
 
-def stack_of(models: Sequence[str] | None = None, fit: LabFit | None = None) -> Stack | LabStack:
-    """Return the models of a lab's `fit`, without one those of the paper's nine levels. Raises Refusal as `stack`."""
+def stack_of(
+    models: Sequence[str] | None = None, fit: LabFit | None = None, moduli: Moduli = "dynamic"
+) -> Stack | LabStack:
+    """Return the models of a lab's `fit`, without one those of the paper's nine levels by such moduli.
+
+    Raises Refusal as `stack`.
+    """
     if fit is None:
-        return stack(models or STACKED)
+        return stack(models or STACKED, moduli=moduli)
     weights = {model: w for model, w in lab_weights(fit, models or MODELS).items() if w > 0}
     return LabStack(fit, tuple(weights), np.array(list(weights.values())))
 
 
-def stack(models: Sequence[str] = STACKED, table: MeasuredTable | None = None) -> Stack:
-    """Stack models over a measured table, the paper's nine levels where none is given.
+def stack(models: Sequence[str] = STACKED, table: MeasuredTable | None = None, moduli: Moduli = "dynamic") -> Stack:
+    """Stack models over a measured table, the paper's nine levels by such moduli where none is given.
 
     Raises Refusal for a name that is no closed form, for one that is there twice, and for an empty list.
     """
     check_models(models, STACKED)
-    return _stacked_on_paper(tuple(models)) if table is None else _stacked(tuple(models), table)
+    return _stacked_on_paper(tuple(models), moduli) if table is None else _stacked(tuple(models), table)
 
 
 def lab_weights(fit: LabFit, models: Sequence[str] = MODELS) -> dict[str, float]:
@@ -159,14 +164,15 @@ def predictive_of(
 ) -> Predictive:
     """Return the distribution of ln level of variants of one number of layers, at the middle of their inputs' ranges.
 
-    By a lab's `fit` its own constants and scales; without one by the paper's nine levels. Raises Refusal as `stack`.
+    By a lab's `fit` its own constants and scales; without one by the paper's nine levels and the moduli that the
+    variants have. Raises Refusal as `stack`.
     """
-    return stack_of(models, fit).predictive(stacked(variants))
+    return stack_of(models, fit, variants[0].moduli).predictive(stacked(variants))
 
 
 @cache
-def _stacked_on_paper(models: tuple[str, ...]) -> Stack:
-    return _stacked(models, measured_table())
+def _stacked_on_paper(models: tuple[str, ...], moduli: Moduli) -> Stack:
+    return _stacked(models, measured_table(moduli))
 
 
 def _stacked(models: tuple[str, ...], table: MeasuredTable) -> Stack:
