@@ -2,19 +2,22 @@
 
 import ast
 import doctest
+import math
 import subprocess
 import sys
 from collections.abc import Callable
 from graphlib import TopologicalSorter
+from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import unitcad
 from unitcad import attenuation
 from unitcad.attenuation.layered import medium
 from unitcad.attenuation.layered.stack import Stack
-from unitcad.errors import Refusal
+from unitcad.errors import Refusal, UnitcadError
 
 PACKAGE = Path(unitcad.__file__).parent
 
@@ -68,11 +71,58 @@ MEDIUM = attenuation.LayeredMedium([], BASE)
         (lambda: MEDIUM.response(DISC, 785.0, "x"), "^r = 'x': must be radii"),
         (lambda: MEDIUM.response(DISC, 785.0, []), "^r: needs a radius$"),
         (lambda: MEDIUM.compliance([1.0, -1.0], 785.0), r"^k = '\(-1\+0j\)': wavenumbers must be finite"),
+        (
+            lambda: MEDIUM.compliance(1e154, 785.0),
+            r"^k = '\(1e\+154\+0j\)': wavenumbers must be finite, at most 1e\+60",
+        ),
+        (
+            lambda: MEDIUM.response(DISC, 1e300, 7e-3),
+            r"^omega = 1e\+300: its magnitude must .*; nearest accepted: 1e\+60$",
+        ),
+        (
+            lambda: MEDIUM.response(DISC, np.complex128(785 + 1j), 7e-3),
+            r"^omega = '\(785\+1j\)': must be a real number$",
+        ),
+        (lambda: MEDIUM.response(DISC, 785.0, [1e-2 + 1e-3j]), r"^r = '\[\(0\.01\+0\.001j\)\]': must be radii: real"),
+        (lambda: MEDIUM.response(DISC, 785.0, [7e-3, 1e-300]), "^r = 1e-300: .*; nearest accepted: 1e-60$"),
+        (lambda: MEDIUM.response(DISC, 785.0, 7e-3, z=1e-300), "^z = 1e-300: its magnitude"),
+        (lambda: attenuation.Layer(1e-3, 1000, 1e300, 0.4), r"^layer\.youngs_modulus = 1e\+300: its magnitude"),
+        (lambda: attenuation.Layer(1e-300, 1000, 1e5, 0.4), r"^layer\.thickness = 1e-300: its magnitude"),
+        (lambda: attenuation.UniformDisc(1e-300), r"^load\.radius = 1e-300: its magnitude"),
+        (lambda: attenuation.Point().transform(math.nan), "^k = 'nan': wavenumbers must be finite"),
+        (lambda: DISC.transform([1.0, math.inf]), "^k = 'inf': wavenumbers must be finite"),
+        (lambda: attenuation.UniformDisc(3e-3, "radial").transform(math.nan), "^k = 'nan': wavenumbers"),
     ],
 )
 def test_what_is_of_another_kind_is_refused_in_one_sentence(call: Callable[[], object], words: str):
     with pytest.raises(Refusal, match=words):
         call()
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_discs_transform_has_its_limit_at_wavenumber_0():
+    k = np.array([0.0, 1e-320, 1e-30, 1e-3, 1.0])
+    for direction in ("normal", "tangential"):
+        disc = attenuation.UniformDisc(3e-3, direction)
+        assert disc.transform(0.0) == 4.5e-6
+        assert disc.transform(k) == pytest.approx(4.5e-6, rel=1.2e-6)
+        assert disc.transform(np.complex128(0.0)) == 4.5e-6
+    assert np.all(np.diff(attenuation.UniformDisc(3e-3, "radial").transform(k)) >= 0)
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("error")
+def test_magnitudes_at_the_ends_of_the_accepted_range_give_numbers_or_one_sentence():
+    ends = (1e-60, 1e60)
+    for thickness, density, modulus, omega in product(ends, ends, ends, ends):
+        layer = attenuation.Layer(thickness, density, modulus, 0.4, attenuation.LossFactor(0.1))
+        stack = attenuation.LayeredMedium([layer], BASE)
+        for r in (1e-60, 1.0):
+            try:
+                found = stack.response(DISC, omega, r, rtol=0.1)
+            except UnitcadError:
+                continue
+            assert np.isfinite([found.u_r, found.u_z, found.error]).all()
 
 
 def test_a_medium_is_shown_short():

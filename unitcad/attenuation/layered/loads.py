@@ -19,7 +19,7 @@ from typing import Any, get_args
 import numpy as np
 
 from unitcad.attenuation.layered.bessel import bessel, bessel_bound, moment
-from unitcad.attenuation.layered.rheology import finite
+from unitcad.attenuation.layered.rheology import MOST, finite
 from unitcad.attenuation.layered.statics import Direction, disc_integrals
 from unitcad.errors import Refusal, unknown_name
 
@@ -27,6 +27,13 @@ from unitcad.errors import Refusal, unknown_name
 def _check(direction: str) -> None:
     if direction not in get_args(Direction):
         raise unknown_name("load.direction", str(direction), get_args(Direction))
+
+
+def _check_wavenumbers(k: Any) -> None:
+    values = np.asarray(k)
+    wrong = values[~(np.abs(values) <= MOST)]
+    if wrong.size:
+        raise Refusal("k", str(wrong.flat[0]), f"wavenumbers must be finite, at most {MOST:g}")
 
 
 def _orders(direction: Direction) -> tuple[int, ...]:
@@ -61,7 +68,8 @@ class Point:
         return 1.0 / (2.0 * np.pi)
 
     def transform(self, k: Any) -> Any:
-        """Return q(k) per newton: 1 / (2 pi)."""
+        """Return q(k) per newton: 1 / (2 pi). Raises `Refusal` for a k that is not finite."""
+        _check_wavenumbers(k)
         return np.full(np.shape(k), 1.0 / (2.0 * np.pi))
 
     def envelope(self, k: Any) -> Any:
@@ -104,11 +112,16 @@ class UniformDisc:
         return self.radius**2 * (1.0 / np.pi if self.direction == "radial" else 0.5)
 
     def transform(self, k: Any) -> Any:
-        """Return q(k) in m2 per pascal: a J1(ka) / k, or the integral of J1(kr) r dr up to a of a radial load."""
+        """Return q(k) in m2 per pascal: a J1(ka) / k, or the integral of J1(kr) r dr up to a of a radial load.
+
+        Raises `Refusal` for a k that is not finite.
+        """
+        _check_wavenumbers(k)
         a = self.radius
         if self.direction == "radial":
             return a * a * moment(k * a)
-        return a * bessel(1, k * a) / k
+        at_zero = np.abs(k) * a < 1e-8  # the next term is (ka)^2 / 8 of the first
+        return np.where(at_zero, a * a / 2.0, a * bessel(1, k * a) / np.where(at_zero, 1.0, k))[()]
 
     def envelope(self, k: Any) -> Any:
         """Return a bound of |q(k)| for real k."""

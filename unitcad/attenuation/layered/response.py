@@ -24,7 +24,7 @@ import numpy as np
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.integral import PHASE, ROUNDING, Integrals, Problem, integrate, overflow
 from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.rheology import finite
+from unitcad.attenuation.layered.rheology import LEAST, MOST, finite, out_of_range
 from unitcad.attenuation.layered.stack import Stack
 from unitcad.errors import Refusal
 
@@ -100,6 +100,8 @@ def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rto
 
 def _radii(r: Any) -> w.Array:
     """Return radii as an array. Raises `Refusal` with the first that can't be."""
+    if np.iscomplexobj(r):
+        raise Refusal("r", str(r), "must be radii: real numbers")
     try:
         radii = np.asarray(r, dtype=float)
     except (TypeError, ValueError):
@@ -109,6 +111,9 @@ def _radii(r: Any) -> w.Array:
     wrong = radii[~(np.isfinite(radii) & (radii >= 0))]
     if wrong.size:
         raise Refusal("r", float(wrong[0]), "radii must be finite and not negative", 0.0)
+    wrong = radii[(radii != 0) & ~((radii >= LEAST) & (radii <= MOST))]
+    if wrong.size:
+        raise out_of_range("r", float(wrong[0]))
     return radii
 
 

@@ -8,12 +8,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Complex, Real
 
 from unitcad.errors import Refusal
 
+LEAST, MOST = 1e-60, 1e60
+"""Magnitudes of a quantity in SI units: products of a few of them stay finite."""
+
 
 def finite(field: str, value: object, least: float | None = 0.0, above: bool = False) -> float:
-    """Return `value` as a float that is finite and at least (or `above`) `least`. Raises `Refusal` otherwise."""
+    """Return `value` as a float that is finite and at least (or `above`) `least`. Raises `Refusal` otherwise.
+
+    With a `least` its magnitude is 0 or from LEAST to MOST.
+    """
+    if isinstance(value, Complex) and not isinstance(value, Real):
+        raise Refusal(field, str(value), "must be a real number")
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
@@ -22,7 +31,15 @@ def finite(field: str, value: object, least: float | None = 0.0, above: bool = F
         raise Refusal(field, value, "must be a finite number")
     if least is not None and (number < least or (above and number == least)):
         raise Refusal(field, value, f"must be {'above' if above else 'at least'} {least:g}")
+    if least is not None and number != 0.0 and not LEAST <= abs(number) <= MOST:
+        raise out_of_range(field, number)
     return number
+
+
+def out_of_range(field: str, number: float) -> Refusal:
+    """Return the refusal of a magnitude with which numbers would overflow on the way."""
+    nearest = math.copysign(MOST if abs(number) > 1.0 else LEAST, number)
+    return Refusal(field, number, f"its magnitude must be from {LEAST:g} to {MOST:g}", nearest)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,14 @@ import numpy as np
 from unitcad.attenuation.layered import shear_horizontal
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.propagation import Plane, parameter, raised, underside
-from unitcad.attenuation.layered.rheology import Damping, LossFactor, complex_shear_modulus, compressibility, finite
+from unitcad.attenuation.layered.rheology import (
+    MOST,
+    Damping,
+    LossFactor,
+    complex_shear_modulus,
+    compressibility,
+    finite,
+)
 from unitcad.errors import Refusal
 
 
@@ -96,9 +103,11 @@ class Stack:
         for k, for omega and for a body that nothing holds at omega = 0.
         """
         k = np.asarray(k, dtype=np.complex128)
-        wrong = k[~(np.isfinite(k) & (k.real > 0))]
+        wrong = k[~((np.abs(k) <= MOST) & (k.real > 0))]
         if wrong.size:
-            raise Refusal("k", str(wrong[0]), "wavenumbers must be finite, with a positive real part")
+            raise Refusal(
+                "k", str(wrong[0]), f"wavenumbers must be finite, at most {MOST:g}, with a positive real part"
+            )
         top = self.planes(k.ravel(), omega)[0]
         with np.errstate(divide="ignore", invalid="ignore"):  # infinite at an undamped mode
             block = w.product(top.u, w.adjugate(top.t)) / w.determinant(top.t)
