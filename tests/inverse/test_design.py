@@ -335,7 +335,7 @@ def test_the_command_writes_its_folder_and_explains(run: Any, tmp_path: Path) ->
     done = run("design", "paper", "--no-check", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "out/design-paper"
-    assert "measured 5.2 % (the paper); probability 0.79, 2.5 % to 7.4 %" in done.stdout
+    assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the wish; probability 0.79, 2.5 %" in done.stdout
     assert {p.name for p in (tmp_path / "out/design-paper").iterdir()} == set(design_files.OWN)
     as_json = json.loads(run("design", "paper", "--no-check", "--json", cwd=tmp_path).stdout)
     assert as_json["folder"] == "out/design-paper"

@@ -70,7 +70,10 @@ def _print(data: dict[str, Any]) -> None:
     screen.print(Text.assemble((data["name"], "bold"), f": {words.wish_line(data['wish'])}"), soft_wrap=True)
     screen.print(f"  {words.tried_line(data)}", soft_wrap=True)
     screen.print(f"  {words.models_line(data)}", soft_wrap=True)
+    other = words.first_other(data["proposals"])
     for one in data["proposals"]:
+        if one["rank"] == other:
+            screen.print(f"{words.OTHERS}:", soft_wrap=True)
         screen.print(Text(f"{one['rank']}. {one['label']}", style="bold"), soft_wrap=True)
         screen.print(f"   {words.level_line(one)}", soft_wrap=True)
         for line in [words.size_line(one), *words.reasons(one)]:

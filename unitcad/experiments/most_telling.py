@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import structs
 from scipy.special import ndtr, ndtri
 
+from unitcad.attenuation.edge.lab_fit import LabFit
 from unitcad.cache import Store
 from unitcad.errors import Refusal
 from unitcad.experiments.draws import Draws, Rival
@@ -16,7 +17,7 @@ from unitcad.experiments.information import Information, entropy, expected_infor
 from unitcad.experiments.lab_file import Lab, LabFile, lab_of_specs
 from unitcad.experiments.protocol import Ratio
 from unitcad.experiments.ranking import Predictions, singles
-from unitcad.experiments.rivals import CLOSED_FORMS, available
+from unitcad.experiments.rivals import CLOSED_FORMS, available, of_lab
 from unitcad.experiments.study import Step, candidates, check_two, predictions, range_of, span_text
 from unitcad.spec import Spec
 from unitcad.text import listed
@@ -88,27 +89,35 @@ class Decision:
 
 def decision_between(
     specs: Mapping[str, Spec],
-    rivals: Sequence[str] = CLOSED_FORMS,
+    rivals: Sequence[str] | Mapping[str, float] = CLOSED_FORMS,
     settings: LabFile = USUAL,
     store: Store | None = None,
+    fit: LabFit | None = None,
 ) -> Decision:
     """Return what measuring two candidate units, `specs` by name, would decide: which one has the higher level.
 
     Every candidate is read at the frequency and on the body of its own spec; of `settings` noise, discrepancy, draws,
-    seed and modulus_factor count. The rivals are taken as equally probable; one that has no answer for a candidate is
-    left out. The closed forms, which are the default, take some 20 ms. Raises Refusal where there are not two specs,
-    where a unit can't be estimated, and where no rival has an answer.
+    seed and modulus_factor count. The rivals are equally probable, or as probable as a mapping's weights say; one that
+    has no answer for a candidate is left out. With a lab's `fit` its constants stand in for the draws held to the
+    paper's levels. The closed forms, which are the default, take some 20 ms. Raises Refusal where there are not two
+    specs, where a unit can't be estimated, and where no rival has an answer.
     """
     if len(specs) != 2:
         raise Refusal("specs", list(specs), "two candidates are compared")
     first, second = specs
+    if fit:
+        settings = structs.replace(settings, held_to_levels=False)
     lab = _on_their_own(specs, settings)
     ratio = Ratio(*lab.conditions)
-    asked = available(rivals, store, settings.smallest_um * 1e-6)
-    answered = [rival for rival in asked.rivals if _answers(rival, lab)]
+    asked = available(tuple(rivals), store, settings.smallest_um * 1e-6).rivals
+    asked = of_lab(asked, fit) if fit else asked
+    answered = [rival for rival in asked if _answers(rival, lab)]
     if not answered:
         raise Refusal("rivals", list(rivals), f"none of them has an answer for {first} and {second}")
     predicted = predictions(lab, answered)
+    if isinstance(rivals, Mapping):
+        weights = np.array([rivals[name] for name in predicted.rivals])
+        predicted = replace(predicted, weights=weights / weights.sum())
     order, higher = _about_order(predicted, ratio)
     open_bits = entropy(np.array([higher, 1.0 - higher]))
     spans = {name: range_of(ratio, predicted, name) for name in predicted.rivals}

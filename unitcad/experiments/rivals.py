@@ -8,11 +8,13 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtri
 
 from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.bush import CHOSEN, bush
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import fit_divider
+from unitcad.attenuation.edge.lab_fit import LabFit
 from unitcad.attenuation.edge.measured_levels import measured_table
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.cache import MemoryStore, Store
@@ -112,6 +114,23 @@ def available(
         tuple(known[name] for name in dict.fromkeys(chosen) if name not in missing),
         dict.fromkeys(missing, element_rivals.MISSING),
     )
+
+
+def of_lab(rivals: Sequence[Rival], fit: LabFit) -> tuple[Rival, ...]:
+    """Return rivals with a lab's own constants: the divider's from its fit; a factor of all readings cancels."""
+    return tuple(_lab_divider(rival, fit) if rival.name == "fitted" else rival for rival in rivals)
+
+
+def _lab_divider(rival: Rival, fit: LabFit) -> Rival:
+    one = fit.model["fitted"]
+    at = list(one.constants).index("kappa")
+    spread = one.discrepancy * float(np.sqrt(one.covariance[at][at]))
+
+    def levels(variant: EstimateInput, draws: Draws) -> np.ndarray:
+        kappa = one.constants["kappa"] * np.exp(spread * ndtri(draws.uniform("kappa")))
+        return np.asarray(cf.divider(draws.units(variant), kappa))
+
+    return replace(rival, levels=levels)
 
 
 DEFAULT = ("crossings", "fitted", "bush", "mechanics-axial-edge", "mechanics-flat-edge", "mechanics-flat-skin")

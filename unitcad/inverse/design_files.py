@@ -132,7 +132,10 @@ def page(data: Mapping[str, Any]) -> str:
     """Return the result as Markdown."""
     lines = [f"# {markdown(data['name'])}: {words.wish_line(data['wish'])}", ""]
     lines += [f"{words.tried_line(data)}; {words.models_line(data)}.", ""]
+    other = words.first_other(data["proposals"])
     for one in data["proposals"]:
+        if one["rank"] == other:
+            lines += [f"*{words.OTHERS}.*", ""]
         lines += [f"## {one['rank']}. {markdown(one['label'])}", "", f"**{markdown(words.level_line(one))}**", ""]
         lines += [f"- {markdown(line)}" for line in [words.size_line(one), *words.reasons(one)]]
         lines += [f"- build it: `unitcad build {one['file']}`", ""]

@@ -43,17 +43,19 @@ def design_page(data: Mapping[str, Any], fronts: tuple[str, str], sections: Sequ
 
 def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
     head = "".join(f"<th{_NUMBER if i > 1 else ''}>{escape(text)}</th>" for i, text in enumerate(_HEAD))
-    rows = []
+    rows, other = [], words.first_other(proposals)
     for one in proposals:
         edge, measured = one["edge"], one["measured"]
         cells = [
-            words.percent(measured["level"]) if measured else "",
+            _measured(measured) if measured else "",
             words.share(one["probability"]),
             f"{words.percent(edge['p10'])} to {words.percent(edge['p90'])}",
             number(one["mass_g"], 2),
             number(one["cure_hours"], 3),
             f"{number(one['diameter_mm'], 3)} x {number(one['height_mm'], 3)}",
         ]
+        if one["rank"] == other:
+            rows.append(f'<tr><td></td><td colspan="{len(_HEAD) - 1}">{escape(words.OTHERS)}</td></tr>')
         link = f'<a href="#proposal-{one["rank"]}">{escape(one["label"])}</a>'
         numbers = "".join(f"<td{_NUMBER}>{escape(cell)}</td>" for cell in cells)
         rows.append(f"<tr><td>{one['rank']}</td><td>{link}</td>{numbers}</tr>")
@@ -61,6 +63,10 @@ def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
         f'<div class="scroll" tabindex="0" role="region" aria-label="proposals"><table><thead><tr>{head}</tr></thead>'
         f"<tbody>{''.join(rows)}</tbody></table></div>"
     )
+
+
+def _measured(measured: Mapping[str, Any]) -> str:
+    return words.percent(measured["level"]) + ("" if measured["meets"] else ", outside")
 
 
 def _proposal(one: Mapping[str, Any], section: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from unitcad.text import listed, number
@@ -73,13 +73,30 @@ def not_castable_lines(data: Mapping[str, Any]) -> list[str]:
 
 def level_line(one: Mapping[str, Any]) -> str:
     """Return a proposal's measurement, if there is one, then its probability and range."""
-    measured = one["measured"]
-    first = f"measured {percent(measured['level'])} ({measured['by']}); " if measured else ""
-    edge = one["edge"]
+    measured, first = one["measured"], ""
+    if measured:
+        also = f", also printed as {percent(measured['also'])}" if _differs(measured) else ""
+        verdict = "meets the wish" if measured["meets"] else "outside the wish"
+        first = f"measured {percent(measured['level'])} ({measured['by']}{also}): {verdict}; "
+    edge, least = one["edge"], one["probability_min"]
+    below = f", below your {100 * least:.3g} %" if one["probability"] < least else ""
     return (
-        f"{first}probability {share(one['probability'])}, {percent(edge['p10'])} to {percent(edge['p90'])} "
+        f"{first}probability {share(one['probability'])}{below}, {percent(edge['p10'])} to {percent(edge['p90'])} "
         "at the edge (10 to 90 %)"
     )
+
+
+def _differs(measured: Mapping[str, Any]) -> bool:
+    return bool(measured.get("also")) and percent(measured["also"]) != percent(measured["level"])
+
+
+OTHERS = "Nearest others: measured outside the wish, or below the probability that is asked for"
+"""The heading over the candidates that are no proposals."""
+
+
+def first_other(proposals: Sequence[Mapping[str, Any]]) -> int | None:
+    """Return the rank of the first candidate that stands under `OTHERS`; None where all are proposals."""
+    return next((one["rank"] for one in proposals if one["nearest_other"]), None)
 
 
 def size_line(one: Mapping[str, Any]) -> str:
@@ -103,7 +120,8 @@ def reasons(one: Mapping[str, Any]) -> list[str]:
     lines = []
     if sibling := one.get("measured_sibling"):
         lines.append(
-            f"the measured unit of this kind ({sibling['label']}) had {percent(sibling['level'])} ({sibling['by']}); "
+            f"the measured unit of this kind ({sibling['label']}) had {percent(sibling['level'])} ({sibling['by']}), "
+            f"{'within' if sibling['meets'] else 'outside'} the wish; "
             f"its probability is {share(sibling['probability'])}"
         )
     lines += [f"not measured: {note}" for note in one["relies_on"]]

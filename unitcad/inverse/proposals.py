@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,19 +12,18 @@ import numpy as np
 from unitcad.attenuation.crosstalk import RANGE as CROSSTALK_RANGE
 from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.attenuation.edge.estimates import rounded
-from unitcad.attenuation.edge.lab_fit import own_block
-from unitcad.attenuation.edge.level import measured_block
 from unitcad.attenuation.edge.predictive import Stack, stack_of
 from unitcad.casting.figures import MOST_ERROR_PCT, mix
 from unitcad.catalogue import materials as silicones
 from unitcad.catalogue import measurements
 from unitcad.errors import Refusal
 from unitcad.estimating import estimate_input
-from unitcad.experiments.most_telling import decision_between
+from unitcad.inverse.best_two import best_two
 from unitcad.inverse.candidates import Candidates, candidates, probability_by_model
 from unitcad.inverse.castability import Verdict, castability
 from unitcad.inverse.finish_time import finish_hours
 from unitcad.inverse.geometries import Lengths, Say, spec_data
+from unitcad.inverse.own_measurement import measured_rows, measurement
 from unitcad.inverse.ranking_order import ALIKE, Kind, kinds
 from unitcad.inverse.refinement import alone, refined
 from unitcad.inverse.reliance import reliance
@@ -58,12 +58,15 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
     """
     found = candidates(target, say)
     rows = within(found)
-    check_level(found, rows)
-    chosen, out = _chosen(found, kinds(found, rows), check, say)
+    measured = measured_rows(found, rows)
+    check_level(found, rows, any(one["meets"] for one in measured.values()))
+    chosen, out = _chosen(found, _ranked(found, rows, measured), check, say)
     if not chosen:
         limit = f"none of the best can be cast: {out[0]['candidate']}: {out[0]['failed'][0]}"
         raise Refusal("at_hand.printer", target.asked.at_hand.printer, limit)
     specs = tuple(one.spec for one in chosen)
+    say("what would decide between the best two")
+    decides, decision = best_two(target, specs, [one.data for one in chosen])
     data = {
         "name": target.name,
         "wish": {key: value for key, value in _wish(target).items() if value is not None},
@@ -79,7 +82,8 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
         "left_out": found.silicones.left_out,
         "proposals": [one.data for one in chosen],
         "not_castable": out,
-        "decides": _decides(specs, [one.data for one in chosen], say),
+        "decides": decides,
+        "decision": decision,
     }
     return Inversion(found, rows, specs, rounded(data))
 
@@ -120,7 +124,36 @@ def _chosen(found: Candidates, ranked: list[Kind], check: bool, say: Say) -> tup
                 chosen.append(_Chosen(spec, data))
                 break
             out.append({"name": spec.name, "candidate": label(table, row), "failed": list(verdict.failed)})
-    return chosen, out
+    chosen.sort(key=lambda one: one.data["nearest_other"])  # a refined one may have become a proposal
+    return [replace(one, data={**one.data, "rank": i}) for i, one in enumerate(chosen, 1)], out
+
+
+def _is_other(found: Candidates, probability: float, measured: Mapping[str, Any] | None) -> bool:
+    """Tell whether a candidate is no proposal but one of the nearest others.
+
+    It was measured outside the wish, or is less probable than is asked for and was not measured within it.
+    """
+    return not measured["meets"] if measured else probability < found.target.wish.probability_min
+
+
+def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[str, Any]]) -> list[Kind]:
+    """Return the kinds in their order, those measured within the wish first, the nearest others last.
+
+    A measured unit within the wish stands for its kind where the kind's best is less probable than is asked for.
+    """
+    least = found.target.wish.probability_min
+    made = []
+    for kind in kinds(found, rows):
+        inside = [int(row) for row in kind.rows if measured.get(int(row), {}).get("meets")]
+        if inside and found.probability[kind.best] < least:
+            kind = replace(kind, rows=np.array([*inside, *(row for row in kind.rows if row not in inside)]))
+        made.append(kind)
+
+    def group(kind: Kind) -> int:
+        own = measured.get(kind.best)
+        return 2 if _is_other(found, float(found.probability[kind.best]), own) else 0 if own else 1
+
+    return sorted(made, key=group)
 
 
 def _in_time(spec: Spec, found: Candidates, verdict: Verdict) -> Verdict:
@@ -143,6 +176,7 @@ def proposal(
     variant, lengths = estimate_input(spec), found.lengths(row)
     low, middle, high = (float(end[row]) for end in found.range)
     each, wish = probability_by_model(found.target, found.predictive), found.target.wish
+    measured = measurement(found.target, variant)
     data: dict[str, Any] = {
         "rank": rank,
         "name": spec.name,
@@ -152,7 +186,9 @@ def proposal(
         "walls_mm": list(lengths.walls),
         "caps_mm": list(lengths.caps),
         "motor": lengths.motor,
-        "measured": _measured(variant, found),
+        "measured": measured,
+        "nearest_other": _is_other(found, float(found.probability[row]), measured),
+        "probability_min": wish.probability_min,
         "probability": float(found.probability[row]),
         "by_model": dict(zip(found.predictive.models, map(float, each[row]), strict=True)),
         "edge": {"p10": low, "p50": middle, "p90": high},
@@ -205,17 +241,6 @@ def _wish(target: Target) -> dict[str, Any]:
     return {key: getattr(target.wish, key) for key in target.wish.__struct_fields__}
 
 
-def _measured(variant: Any, found: Candidates) -> dict[str, Any] | None:
-    """Return the level that was measured of this very unit, in the lab first, with whose it is."""
-    own = own_block(found.target.fit, variant) if found.target.fit else []
-    if own:
-        return {"level": own[0]["value"], "by": f"your lab ({own[0]['unit']})"}
-    block = measured_block(variant)
-    if block and block.get("same_size") and block["level"] is not None:
-        return {"level": block["level"], "by": "the paper"}
-    return None
-
-
 def _sibling(found: Candidates, row: int, measured: dict[str, Any] | None) -> dict[str, Any] | None:
     """Return the measured unit of a candidate's kind where the candidate is not it: its level and probability."""
     lengths, shared, names = found.lengths(row), measurements().unit, found.materials(row)
@@ -228,7 +253,7 @@ def _sibling(found: Candidates, row: int, measured: dict[str, Any] | None) -> di
         spec = from_data(spec_data(found.target, there, names, "measured"))
     except Refusal:
         return None
-    level = _measured(estimate_input(spec), found)
+    level = measurement(found.target, estimate_input(spec))
     return level and {**level, "label": label(table, 0), "probability": float(table.probability[0])}
 
 
@@ -255,20 +280,3 @@ def _scale(spec: Spec, found: Candidates, row: int) -> list[str]:
     digit = number(spec.casting.scale_resolution_g, 3)
     least = number(spec.casting.minimum_mix_g, 3)
     return [f"a scale of {digit} g is off by more than {MOST_ERROR_PCT:g} % on a part of {least} g of {listed(poor)}"]
-
-
-def _decides(specs: tuple[Spec, ...], data: list[dict[str, Any]], say: Say) -> str | None:
-    """Return the sentence on what would decide between the two best; None where there are not two."""
-    if len(specs) < 2:
-        return None
-    say("what would decide between the best two")
-    names = [one["name"] for one in data]
-    try:
-        sentence = decision_between(dict(zip(names[:2], specs[:2], strict=True))).sentence
-    except Refusal as refusal:
-        return f"No measurement is named between the best two: {refusal.limit}."
-    levels = [one["measured"] and one["measured"]["level"] for one in data[:2]]
-    if all(levels):
-        both = " and ".join(f"{number(100 * level, 2)} %" for level in levels)
-        return f"The two best were measured, {both}, each once. To tell them apart: {sentence}"
-    return sentence

@@ -78,11 +78,14 @@ def _none(found: Candidates, limit: Limit, rows: np.ndarray, how: str) -> Refusa
     return Refusal(f"target.{limit.key}", limit.most, f"{words} ({label(found, at)})", least)
 
 
-def check_level(found: Candidates, rows: np.ndarray) -> None:
-    """Raise Refusal, with the nearest level that is possible, where no row meets the level probably enough."""
+def check_level(found: Candidates, rows: np.ndarray, measured: bool = False) -> None:
+    """Raise Refusal, with the nearest level that is possible, where no row meets the level probably enough.
+
+    `measured`: a unit among them was measured within the wish.
+    """
     wish = found.target.wish
     most = float(np.max(found.probability[rows]))
-    if most >= wish.probability_min:
+    if measured or most >= wish.probability_min:
         return
     of = f"none of {rows.size} candidates within the limits" if rows.size < found.count else f"none of {found.count}"
     share, percent = wish.probability_min, 100 * wish.probability_min
