@@ -52,9 +52,8 @@ def assembly(spec, dims):
     """Write how motor and circuit are laid into the mould."""
     return [
         "Solder the motor to the circuit's pad, and try the motor: nothing of it can be reached later.",
-        "Weigh and mix layer 2's silicone now, as this pour's steps say below, and brush a thin coat of the mix onto "
-        "the middle of the film. Lay the circuit on it, its pad in the middle, the motor up, the tail on the base's "
-        "rib. Press the pad down from its middle, so that no air stays under it.",
+        "Brush a thin coat of the mix onto the middle of the film. Lay the circuit on it, its pad in the middle, the "
+        "motor up, the tail on the base's rib. Press the pad down from its middle, so that no air stays under it.",
     ]
 
 

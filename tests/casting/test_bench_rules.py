@@ -7,13 +7,15 @@ from dataclasses import replace
 
 import pytest
 
-from unitcad.casting.instructions import TACK
+from unitcad.casting.instructions import LEVEL_AGAIN, TACK
 from unitcad.casting.procedure import Pour, Procedure, procedure
 from unitcad.casting.rules import broken_rules
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.validation import load, templates
 
+STRAPS = ("templates/custom/strap-lugs.toml",)
 LIDS = ("encapsulating", "moulds.pour=injected", "moulds.cavities=[2,2]")
+FILM = ("templates/custom/film-closed.toml",)
 RESIN = ("three-layer", "moulds.printer=sla")
 
 
@@ -22,7 +24,7 @@ def casting(*source: str) -> Procedure:
     return procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
 
-@pytest.mark.parametrize("source", [*((name,) for name in templates()), LIDS, RESIN], ids=" ".join)
+@pytest.mark.parametrize("source", [*((name,) for name in templates()), LIDS, RESIN, FILM, STRAPS], ids=" ".join)
 def test_every_set_keeps_every_rule(source: tuple[str, ...]) -> None:
     assert broken_rules(casting(*source)) == []
 
@@ -82,7 +84,61 @@ def no_grip(made: Procedure) -> Procedure:
     )
 
 
+def reworded(made: Procedure, old: str, new: str) -> Procedure:
+    def change(pour: Pour) -> Pour:
+        return replace(pour, steps=tuple(replace(s, text=s.text.replace(old, new)) for s in pour.steps))
+
+    return replace(made, pours=tuple(map(change, made.pours)))
+
+
+def unpropped(made: Procedure) -> Procedure:
+    return reworded(made, "Its grip hangs free: put", "It can't sag: leave out")
+
+
+def looks_through_layer_1(made: Procedure) -> Procedure:
+    return reworded(made, "under Layer 1.", "no gap at the core, none under it on the ledge.")
+
+
+def spatula_forgotten(made: Procedure) -> Procedure:
+    return replace(made, bill=tuple(item for item in made.bill if "spatula" not in item.item))
+
+
+def varnish_forgotten(made: Procedure) -> Procedure:
+    return replace(made, bill=tuple(item for item in made.bill if "varnish" not in item.item))
+
+
+def no_time_to_prepare(made: Procedure) -> Procedure:
+    return replace(made, preparation=tuple(replace(s, minutes=0.0, wait_min=0.0) for s in made.preparation))
+
+
+def smear_of_another(made: Procedure) -> Procedure:
+    *steps, cure = made.assembly
+    return replace(made, assembly=(*steps, replace(cure, wait_min=60 * made.pours[-1].cure_h)))
+
+
+def tilted_by_tape(made: Procedure) -> Procedure:
+    return reworded(made, LEVEL_AGAIN, "")
+
+
+def coated_before_mixed(made: Procedure) -> Procedure:
+    def change(pour: Pour) -> Pour:
+        mixing = [step for step in pour.steps if step.kind in ("weigh", "mix")]
+        rest = [step for step in pour.steps if step.kind not in ("weigh", "mix")]
+        return replace(pour, steps=(*rest, *mixing))
+
+    return replace(made, pours=tuple(map(change, made.pours)))
+
+
 PLANTED = {
+    "tape under the plate": (("encapsulating",), tilted_by_tape, "look at the level again"),
+    "lids' bands": (LIDS, tilted_by_tape, "look at the level again"),
+    "a coat before the mix": (FILM, coated_before_mixed, "uses the mix before"),
+    "grip hangs": (("encapsulating",), unpropped, "nothing bears"),
+    "ledge under Layer 1": (("three-layer",), looks_through_layer_1, "pour 2: asks to look"),
+    "no spatula": (("embedded",), spatula_forgotten, "blunt spatula"),
+    "no varnish": (RESIN, varnish_forgotten, "acrylic varnish"),
+    "no preparation": (RESIN, no_time_to_prepare, "Wash: takes no time"),
+    "smear of another silicone": (("encapsulating",), smear_of_another, "another's time"),
     "no picture": (("encapsulating",), without_pictures, "has no picture"),
     "not levelled": (("encapsulating",), unlevelled, "levelled"),
     "opened before the cure": (("encapsulating",), opened_first, "opened before the cure"),

@@ -10,8 +10,9 @@ import pytest
 from PIL import Image
 
 from unitcad.casting.bench_pictures import SIZE, pictures
-from unitcad.casting.bench_views import ARROW, View, picture_path, views
+from unitcad.casting.bench_views import ARROW, CARD, View, picture_path, views
 from unitcad.casting.procedure import Procedure, procedure
+from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.export import composite
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
@@ -104,3 +105,62 @@ def test_a_build_writes_the_pictures_and_names_them(tmp_path: Path) -> None:
 def test_a_view_is_data() -> None:
     """Nothing is meshed to name the pictures."""
     assert all(isinstance(view, View) for view in views(planned("encapsulating")[0]).values())
+
+
+def test_what_strikes_off_passes_what_stands_on_the_base() -> None:
+    """Strap slots' supports stand above rim 1: a strip takes the blade's place, and its way is free."""
+    moulds, casting = planned("templates/custom/strap-lugs.toml")
+    base = realise(moulds.plan.of_kind("base")[0].shape, 32)
+    view, rim = views(moulds)["pour1-strike"], moulds.plan.steps[0].rim
+    assert not any(part.name == "blade" for part in view.parts)
+    strip = realise(next(extra.shape for extra in view.extras if extra.colour == CARD), 32)
+    x0, y0, _, _, y1, top = strip.bounding_box()
+    way = realise(box(x0, -x0, y0, y1, rim, top), 32)
+    assert (way ^ base).volume() < 1e-9
+    assert (realise(box(x0, -x0, -20, 20, rim, top), 32) ^ base).volume() > 1
+    assert "strip" in next(step.text for step in casting.pours[0].steps if step.title == "Strike off")
+    assert any(part.name == "blade" for part in views(moulds)["pour2-strike"].parts)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        ("encapsulating",),
+        ("motor-10mm",),
+        ("chain", "moulds.cavities=[1,3]"),
+        ("encapsulating", "moulds.cavities=[2,2]"),
+        ("three-layer", "moulds.printer=sla"),
+    ],
+    ids=" ".join,
+)
+def test_tongues_lie_on_ledge_and_pad(source: tuple[str, ...]) -> None:
+    """Each tongue's centre of mass lies over its pad, which touches it and stands on the plate without tipping."""
+    moulds, _ = planned(*source)
+    prop, base = tongue_prop(moulds), realise(moulds.plan.of_kind("base")[0].shape, 32)
+    assert prop is not None
+    pads = [realise(pad, 32) for pad in prop.pads]
+    assert len(pads) == len({side for cell in moulds.plan.layout.cells for side in cell.sides})
+    for pad in pads:
+        x0, y0, z0, x1, y1, z1 = pad.bounding_box()
+        assert z1 - z0 == pytest.approx(prop.thickness_mm, abs=0.01)
+        below = realise(box((x0 + x1) / 2 - 0.1, (x0 + x1) / 2 + 0.1, y0, y1, z0 - 0.5, z0), 32) ^ base
+        assert below.volume() > 0
+        for step in moulds.plan.steps:
+            assert (pad ^ realise(moulds.plan.tool(step.cup).shape, 32)).volume() < 1e-6
+    for tool in moulds.plan.of_kind("tongue"):
+        solid = realise(tool.shape, 32)
+        _, _, z0, _, _, z1 = solid.bounding_box()
+        loops = solid.slice((z0 + z1) / 2).to_polygons()
+        centre = sum(_moment(loop) for loop in loops) / sum(_area(loop) for loop in loops)
+        assert any(p[0] < centre < p[3] and abs(p[5] - z0) < 0.01 for p in (pad.bounding_box() for pad in pads))
+
+
+def _area(loop: np.ndarray) -> float:
+    x, y = loop.T
+    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
+
+
+def _moment(loop: np.ndarray) -> float:
+    x, y = loop.T
+    u, v = np.roll(x, -1), np.roll(y, -1)
+    return float(((x + u) * (x * v - u * y)).sum() / 6)

@@ -33,9 +33,9 @@ def test_the_earliest_finish_holds_both_cures_and_the_bench() -> None:
     """Ecoflex 00-10 cures in 4 h, Dragon Skin 30 in 16 h, and each pour is struck again after 10 min."""
     made = casting("encapsulating")
     assert made.earliest_finish_min == pytest.approx(20 * 60 + 2 * 9 + made.bench_min)
-    steps = [*(step for pour in made.pours for step in pour.steps), *made.release]
+    steps = [*made.preparation, *(step for pour in made.pours for step in pour.steps), *made.release]
     assert made.earliest_finish_min == pytest.approx(sum(step.minutes + step.wait_min for step in steps))
-    assert 30 < made.bench_min < 90
+    assert 60 < made.bench_min < 120
     assert made.time_line[-1].name == "motor in"
     for one, other in zip(made.time_line, made.time_line[1:], strict=False):
         assert other.start_min == pytest.approx(one.end_min)
@@ -46,6 +46,41 @@ def test_a_warmer_room_is_done_sooner() -> None:
     cold, warm = casting("encapsulating"), casting("encapsulating", "casting.room_c=33")
     assert warm.bench_min == cold.bench_min
     assert cold.earliest_finish_min - warm.earliest_finish_min == pytest.approx(600)
+
+
+def test_preparation_counts_the_bake_and_the_test_of_the_cure() -> None:
+    """In resin 8 h in the oven, then the longest cure of the silicones, before the first pour begins."""
+    made = casting("three-layer", "moulds.printer=sla")
+    longest = max(pour.cure_h for pour in made.pours)
+    first = next(phase for phase in made.time_line if phase.name == "pour 1")
+    assert first.start_min > 60 * (8 + longest)
+    assert made.time_line[0].name == "preparation"
+    assert made.time_line[0].start_min == 0
+
+
+def test_a_gang_takes_longer_at_the_bench() -> None:
+    """Four cavities are wiped, greased, pulled and peeled one by one; a mix is weighed once."""
+    one, four = casting("encapsulating"), casting("encapsulating", "moulds.cavities=[2,2]")
+    minutes = {step.title: step.minutes for step in four.pours[1].steps}
+    for step in one.pours[1].steps:
+        times = {"Tongue home": 4, "Wipe Layer 1": 4, "Tongue out FIRST": 4, "Weigh": 1, "Cup 2 off": 1}
+        if step.title in times:
+            assert minutes[step.title] == times[step.title] * step.minutes, step.title
+    assert len([step for step in four.assembly if step.title == "Motor in"]) == 2
+    assert four.bench_min > 1.5 * one.bench_min
+
+
+def test_bubbles_rise_in_the_mould_before_it_is_struck_off() -> None:
+    """Ecoflex 00-30 without a vacuum rises in time; Ecoflex 00-10 does not, and is brushed on before it is poured."""
+    for name, order in {
+        "ecoflex-00-30": ["Mix", "Pour", "Let bubbles rise", "Strike off"],
+        "ecoflex-00-10": ["Mix", "Brush a first coat", "Pour", "Strike off"],
+    }.items():
+        made = casting("encapsulating", f"layers.0.material={name}", "casting.vacuum=false")
+        titles = [step.title for step in made.pours[0].steps]
+        at = titles.index("Mix")
+        assert titles[at : at + 4] == order
+        assert all(step.minutes or step.wait_min for step in made.pours[0].steps)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from unitcad.casting.figures import window_length
+from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.designs import layer_colour
 from unitcad.moulds.base import plate_bottom, plate_top
 from unitcad.moulds.layout import CORNER_RADIUS
@@ -22,6 +23,7 @@ FOLDER = "steps"
 ABOVE, UNDER = (0.55, -1.0, 0.62), (0.55, -1.0, -0.6)
 """Directions towards the eye."""
 ARROW, TAPE, BAND, TOOL = (0.10, 0.36, 0.86), (0.47, 0.78, 0.86), (0.35, 0.33, 0.38), (0.80, 0.86, 0.90)
+CARD = (0.45, 0.72, 0.38)
 CLEAR = 5.0
 """Between a piece that is lifted off and what it was on, mm."""
 TAPE_WIDTH, TAPE_THICKNESS, BELOW_RIM = 8.0, 0.4, 0.8
@@ -121,7 +123,8 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
     yield "cup-on", View((*cured, raised), (_downward(*beside, up * 0.6),))
     cup, tongues = Placed(step.cup), plan.standing(step, "tongue")
     home = tuple(Placed(tool.name) for tool in tongues)
-    exits = moulds.dimensions.exit
+    exits, prop = moulds.dimensions.exit, tongue_prop(moulds) if tongues else None
+    pads = tuple(Extra(pad, CARD) for pad in prop.pads) if prop else ()
     if tongues and exits:
         seat = window_length(moulds, step) + lay.cup[0] * 0.35
         out = tuple(
@@ -134,7 +137,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
         )
         opened = Placed(step.cup, half=True)
         yield "tongue-in", View((*cured, opened, *out), arrows)
-        yield "tongue-home", View((*cured, opened, *home))
+        yield "tongue-home", View((*cured, opened, *home), pads)
     closed = (*cured, cup, *home)
     poured, colour = Placed(step.name), layer_colour(step.index - 1)
     if step.lid:
@@ -142,16 +145,17 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
         yield (
             "lid-on",
             View(
-                (*closed, Placed(step.lid, (0.0, 0.0, lift))), (_downward(0.0, beside[1], step.rim + lift / 2, lift),)
+                (*closed, Placed(step.lid, (0.0, 0.0, lift))),
+                (*pads, _downward(0.0, beside[1], step.rim + lift / 2, lift)),
             ),
         )
-        closed, held = (*closed, Placed(step.lid)), _bands(moulds, step)
+        closed, held = (*closed, Placed(step.lid)), (*pads, *_bands(moulds, step))
         filled = Extra(union(step.channels), colour)
         yield "inject", View((*closed, poured), (*held, filled), syringe_on=step.channels[0])
         yield "filled", View((*closed, poured), (*held, filled))
-        held = (filled,)
+        held = (*pads, filled)
     else:
-        held = _tape(moulds, step)
+        held = (*pads, *_tape(moulds, step))
         yield "hold", View(closed, held)
         thread = cylinder(0.6, step.rim - 1.0, step.rim + 14.0)
         cell = min(lay.cells, key=lambda each: (each.y, each.x))
@@ -177,17 +181,15 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
             "pour",
             View((*closed, poured), (*held, *mounds, Extra(moved(thread, cell.x - 0.5 * reach, cell.y), colour))),
         )
-        blades = tuple(
-            Placed(tool.name, (-0.55 * lay.cup[0], 0.0, step.rim - plan.steps[0].rim)) for tool in plan.of_kind("blade")
-        )
+        blades, strips = _strikers(moulds, step)
         yield (
             "strike",
             View(
                 (*closed, poured, *blades),
-                (*held, _sideways(1, -0.2 * lay.cup[0], 0.0, step.rim + 9.0, lay.cup[0])),
+                (*held, *strips, _sideways(1, -0.2 * lay.cup[0], 0.0, step.rim + 9.0, lay.cup[0])),
             ),
         )
-        held = ()
+        held = pads
     if tongues:
         out = tuple(Placed(t.name, (t.removal[0] * lay.cup[0], 0.0, 0.0)) for t in tongues if t.removal is not None)
         arrows = tuple(
@@ -207,6 +209,16 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
             ),
         )
     yield "cup-off", View((*cured, poured, raised), (_upward(*beside, up * 0.6),))
+
+
+def _strikers(moulds: MouldSet, step: Step) -> tuple[tuple[Placed, ...], tuple[Extra, ...]]:
+    """Return the blade on a rim, or a strip as wide as the cavity where what stands on the base is in its way."""
+    plan, back = moulds.plan, -0.55 * moulds.plan.layout.cup[0]
+    if not plan.concentric and plan.dimensions.core_height > step.rim:
+        half = plan.dimensions.radii[step.index - 1]
+        return (), (Extra(box(back, back + 0.8, -half, half, step.rim, step.rim + 12.0), CARD),)
+    lift = step.rim - plan.steps[0].rim
+    return tuple(Placed(tool.name, (back, 0.0, lift)) for tool in plan.of_kind("blade")), ()
 
 
 def _arrow(length: float) -> Shape:

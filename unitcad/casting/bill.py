@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Mix
+from unitcad.casting.needs import Need
+from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.catalogue import Material, motors
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
@@ -27,9 +29,10 @@ class Item:
     note: str
 
 
-def bill(moulds: MouldSet, mixes: list[tuple[Material, Mix]]) -> tuple[Item, ...]:
-    """List pieces, silicone (every pour's mix), motor, circuit or wires, consumables."""
-    return (*_pieces(moulds), *_silicone(mixes), *_inside(moulds), *_consumables(moulds, [mix for _, mix in mixes]))
+def bill(moulds: MouldSet, mixes: list[tuple[Material, Mix]], named: Sequence[Need]) -> tuple[Item, ...]:
+    """List pieces, silicone (every pour's mix), motor, circuit or wires, tools and consumables (`named`: by steps)."""
+    consumables = _consumables(moulds, [mix for _, mix in mixes], named)
+    return (*_pieces(moulds), *_silicone(mixes), *_inside(moulds), *consumables)
 
 
 def to_csv(items: tuple[Item, ...]) -> str:
@@ -97,7 +100,8 @@ def _ratings(spec: Spec) -> Iterator[str]:
             yield f"mass {number(motor.mass_g, 3)} g"
 
 
-def _consumables(moulds: MouldSet, mixes: list[Mix]) -> Iterator[Item]:
+def _consumables(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> Iterator[Item]:
+    """List what the steps name, then what only its numbers make an item of this set's."""
     pours, lengths = len(moulds.plan.steps), moulds.spec.moulds
     yield Item("mixing cups and sticks", pours, "set", "bought", "no latex, no sulphur clay: they inhibit")
     yield Item("gloves", pours, "pair", "bought", "nitrile or vinyl; latex inhibits")
@@ -106,9 +110,10 @@ def _consumables(moulds: MouldSet, mixes: list[Mix]) -> Iterator[Item]:
     yield Item(
         "flat screwdrivers", 2, "piece", "tool", f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide, for the pry slots"
     )
-    yield Item(
-        "knife, small scissors, pin, cotton buds, caliper, level", 1, "set", "tool", "a phone shows the level too"
-    )
+    yield from (Item(need.item, need.quantity, need.unit, need.made, need.note) for need in named)
+    if prop := tongue_prop(moulds):
+        size = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm, {number(prop.thickness_mm, 3)} mm thick"
+        yield Item("pad of stacked card", len(prop.pads), "piece", "cut", f"{size}: bears the tongues' grips")
     if moulds.spec.casting.vacuum:
         size = f"at least {number(CONTAINER * max(mix.millilitres for mix in mixes), 2)} ml, since silicone foams up"
         yield Item(
@@ -118,12 +123,6 @@ def _consumables(moulds: MouldSet, mixes: list[Mix]) -> Iterator[Item]:
             "bought",
             f"{size}; a chamber that reaches {number(VACUUM_INHG, 3)} inHg",
         )
-    if moulds.plan.of_kind("tongue"):
-        yield Item("petroleum jelly", 1, "dab", "bought", "for tongues and windows only")
-    elif not moulds.plan.concentric and any(step.seals or step.inserts for step in moulds.plan.steps):
-        yield Item("petroleum jelly", 1, "dab", "bought", "for what stands beside the cavity, and for slots")
-    if pours > 1:
-        yield Item("isopropanol and lint-free wipes", 1, "set", "bought", "to wipe a cured layer before the next")
     if lengths.pour == "injected":
         size = (
             f"{number(max(mix.syringe_ml for mix in mixes), 2)} ml or more, tip up to {number(lengths.sprue_mm, 3)} mm"

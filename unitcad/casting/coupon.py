@@ -130,8 +130,9 @@ def to_markdown(printer: Printer) -> str:
     every = f"{heights[0]} mm at every station" if len(set(heights)) == 1 else f"{', '.join(heights)} mm from 1 to 5"
     lines += [
         "",
-        f"A window's lower and upper edge end whole layers of {number(float(printer.layer_mm), 3)} mm, as they do in a",
-        f"cup: its height is {every}. Stations of one height differ in width only.",
+        f"A window's lower and upper edge end whole layers of {number(float(printer.layer_mm), 3)} mm: its height is",
+        f"{every}. Stations of one height differ in width only. A cup's layers count from its",
+        "rim, so its window is as high as station 3's or one layer higher, never lower.",
     ]
     return "\n".join(lines) + "\n"
 

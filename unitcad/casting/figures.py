@@ -19,8 +19,13 @@ VACUUM_INHG, KPA_PER_INHG = 29.0, 3.386389
 MIXING_MIN, DEGASSING_MIN, POURING_MIN = 3.0, 3.0, 2.0
 """What the pot life is spent on before and after the bubbles (assumed: usual practice)."""
 WIPE_MIN, LAY_IN_MIN, GREASE_MIN, CUP_ON_MIN, TONGUE_MIN, HOLD_MIN, WEIGH_MIN = 2.0, 5.0, 1.0, 2.0, 1.5, 2.0, 5.0
-STRIKE_MIN, PULL_MIN, LIFT_MIN, PEEL_MIN = 1.0, 1.0, 2.0, 3.0
-"""A person's time for the other steps (assumed): what the time line adds up."""
+STRIKE_MIN, PULL_MIN, LIFT_MIN, PEEL_MIN, BRUSH_MIN = 1.0, 1.0, 2.0, 3.0, 1.0
+PER_CAVITY_MIN = 0.5
+"""A person's time for the other steps (assumed): what the time line adds up. Wiping, laying in, greasing, tongues,
+brushing, pulling and peeling are for one cavity; `PER_CAVITY_MIN` is what each further one takes to pour."""
+SORT_MIN, CLEAN_MIN, DRY_FIT_MIN, FILAMENT_MIN, LEVEL_MIN = 5.0, 10.0, 5.0, 3.0, 5.0
+WASH_MIN, DRY_MIN, CLEAR_MIN, CUT_MIN, BAKE_H = 15.0, 30.0, 5.0, 5.0, 8.0
+"""The same before the first pour: once a set, a cup, a cavity or a tongue; drying and baking are waits (assumed)."""
 STRIKE_AGAIN_MIN = 10.0
 """When what has wept or sunk is topped up and struck off again (assumed)."""
 HELD_BACK_ML = 0.5
@@ -91,6 +96,21 @@ def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE
     density, viscosity = 1000 * float(material.density_g_cm3), float(material.mixed_viscosity_cps) / 1000
     speed = 2 / 9 * density * GRAVITY * (bubble_mm / 2000) ** 2 / viscosity
     return depth_mm / 1000 / speed
+
+
+def pouring_min(cells: int) -> float:
+    """Return the minutes to pour and strike off so many cavities."""
+    return POURING_MIN + PER_CAVITY_MIN * (cells - 1)
+
+
+def rest_min(spec: Spec, depth_mm: float, material: Material) -> float:
+    """Return the minutes in which bubbles rise by themselves without a vacuum; 0 where an open pour would wait in vain.
+
+    In a syringe what does not rise in time still gathers at its tip: the whole allowance is waited.
+    """
+    rise = bubble_rise_s(depth_mm, material) / 60
+    allowed = WITHOUT_VACUUM * at_room(float(material.pot_life_min), spec.casting.room_c)
+    return min(rise, allowed) if rise <= allowed or spec.moulds.pour == "injected" else 0.0
 
 
 def at_room(value: float, room_c: float) -> float:

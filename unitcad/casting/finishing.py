@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 
 from unitcad.casting import figures as fig
 from unitcad.casting.bench_step import BenchStep
@@ -26,7 +27,7 @@ def release(moulds: MouldSet, inner: Material) -> Iterator[BenchStep]:
             f"through: {number(tear, 2)} N on its end tear {inner.name} (computed: tensile strength, "
             f"{inner.tensile_mpa.status}, x its area).",
             picture_path("filament-out"),
-            minutes=fig.PULL_MIN,
+            minutes=fig.PULL_MIN * len(moulds.plan.layout.cells),
         )
     film = ", and the film that the blade left along the edge," if moulds.spec.moulds.pour == "open" else ""
     yield BenchStep(
@@ -34,7 +35,7 @@ def release(moulds: MouldSet, inner: Material) -> Iterator[BenchStep]:
         f"Loosen the unit's edge all round with a blunt spatula, then peel it off the {holds(moulds)} straight up. "
         f"Trim the flash{film} with small scissors.",
         picture_path("peel"),
-        minutes=fig.PEEL_MIN,
+        minutes=fig.PEEL_MIN * len(moulds.plan.layout.cells),
     )
 
 
@@ -44,9 +45,10 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         return
     texts = assembly(moulds)
     for i, text in enumerate(texts):
-        yield BenchStep("Motor in", text, picture_path("motor-in") if i == 0 else "", minutes=fig.LAY_IN_MIN)
+        minutes = fig.LAY_IN_MIN * len(moulds.plan.layout.cells)
+        yield BenchStep("Motor in", text, picture_path("motor-in") if i == 0 else "", minutes=minutes)
     room = moulds.spec.casting.room_c
-    cures = {silicone.name: at_room(float(silicone.cure_h), room) for silicone in silicones}
+    cures = {silicone.name: at_room(float(silicone.cure_h), room) for silicone in smeared(texts, silicones)}
     hours = ", ".join(f"{name} {number(hour, 2)} h" for name, hour in cures.items())
     yield BenchStep(
         "Let the smear cure",
@@ -56,6 +58,20 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         kind="cure",
         wait_min=60 * max(cures.values()),
     )
+
+
+def smeared(texts: Sequence[str], silicones: Sequence[Material]) -> list[Material]:
+    """Return the silicones that an assembly's words name by their layer, of `silicones` from the inside out.
+
+    All of them where it names none.
+    """
+    return [silicones[min(i, len(silicones) - 1)] for i in layers_named(texts)] or list(silicones)
+
+
+def layers_named(texts: Iterable[str]) -> list[int]:
+    """Return the layers (from 0, -1 for the last) whose silicone an assembly's words ask for."""
+    said = re.findall(r"(?:Layer (\d+)|(last) layer)'s silicone", " ".join(texts))
+    return [-1 if last else int(layer) - 1 for layer, last in said]
 
 
 def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float | None) -> Iterator[str]:

@@ -10,6 +10,7 @@ from unitcad.casting.bench_views import View, picture_path
 from unitcad.casting.figures import MOST_ERROR_PCT, STRIKE_AGAIN_MIN, Mix, at_room, window_length
 from unitcad.casting.finishing import assembly, holds, lead, shown
 from unitcad.casting.release_agent import agent_faces
+from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.catalogue import Material
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -18,6 +19,10 @@ from unitcad.text import number, spaced
 
 HOLD = "Hold"
 """How the step begins that keeps an open cup on its base under the blade."""
+LEVEL_AGAIN = (
+    "What runs under the plate may tilt it: look at the level once more, and put paper under until it is right."
+)
+"""How the step that holds a cup or a lid ends: nothing is moved between it and the cure."""
 TACK = (
     "it is done when a gloved fingertip, pressed on lightly and lifted, comes off without a pull and without a trace, "
     "and the dent of a fingernail springs back. If it still pulls or draws threads, wait half an hour and try again"
@@ -45,17 +50,20 @@ def pour_steps(
             "soon as it is cured, on the same day, is the usual practice (assumed), and silicone bonds to cured "
             "silicone of its kind.",
             picture("bond-face"),
-            minutes=fig.WIPE_MIN,
+            minutes=fig.WIPE_MIN * cells,
         )
-    if moulds.design.laid_in == step.index:
-        for i, text in enumerate(assembly(moulds)):
-            yield BenchStep("Lay in", text, picture("laid-in") if i == 0 else "", minutes=fig.LAY_IN_MIN)
+    laid = assembly(moulds) if moulds.design.laid_in == step.index else ()
+    wet = any("the mix" in text for text in laid)
+    for i, text in enumerate(laid):
+        if "the mix" in text and not any("the mix" in each for each in laid[:i]):
+            yield from _mixed(moulds, silicone, mix, verdict)
+        yield BenchStep("Lay in", text, picture("laid-in") if i == 0 else "", minutes=fig.LAY_IN_MIN * cells)
     if any(body.kind in ("circuit", "wire") for body in step.inserts):
         yield BenchStep(
             "Grease the lead",
             f"Coat the {lead(moulds)} thinly with petroleum jelly where the slot of cup {step.index} comes, outside "
             "the cavity only: it keeps silicone from weeping out.",
-            minutes=fig.GREASE_MIN,
+            minutes=fig.GREASE_MIN * cells,
         )
     yield BenchStep(
         f"Cup {step.index} on",
@@ -67,7 +75,7 @@ def pour_steps(
         yield BenchStep(
             "Grease the flanks",
             "Grease the flanks of what stands on the base beside the cavity thinly, and wipe off the rest.",
-            minutes=fig.GREASE_MIN,
+            minutes=fig.GREASE_MIN * cells,
         )
     if tongues:
         slot = "" if first else " and the slot that it left in the layer before"
@@ -78,26 +86,15 @@ def pour_steps(
             f"the {seat} mm just outside the cup thinly, on all four sides, with petroleum jelly: a film that shines, "
             "no beads.",
             picture("tongue-in"),
-            minutes=fig.TONGUE_MIN,
+            minutes=fig.TONGUE_MIN * cells,
         )
-        span = number(moulds.spec.layers[step.index - 1].wall_mm, 3)
-        yield BenchStep(
-            "Tongue home",
-            f"Push {each_tongue} on until its hollow end stops against the core: it lies on the core's ledge. Look "
-            "down "
-            "into the bore: no gap between its end and the core, none under it on the ledge. Wipe off what grease came "
-            "into the bore, with a dry cotton bud. It can't sag: ledge and window hold it on both sides of the "
-            f"{span} mm "
-            "that it bridges. Nothing may lean on its outer end.",
-            picture("tongue-home"),
-            minutes=fig.TONGUE_MIN,
-        )
+        yield _tongue_home(moulds, step, picture("tongue-home"))
     if step.lid:
         yield BenchStep(
             f"Lid {step.index} on",
             f"Put lid {step.index} on, cut corner over cut corner, with a thin line of petroleum jelly on the rim "
             "outside the groove. Hold it down with rubber bands round lid and base, or with a clamp, clear of sprue "
-            "and vents.",
+            f"and vents. {LEVEL_AGAIN}",
             picture("lid-on"),
             minutes=fig.HOLD_MIN,
         )
@@ -106,10 +103,63 @@ def pour_steps(
             f"Hold cup {step.index} down",
             f"{HOLD} cup {step.index} down while it is struck off: on each of the two sides without a pry slot run a "
             "strip of tape from the cup's wall, below the rim, round the plate's edge to its underside, beside the "
-            "filament where there is one. Clamps or weights do as well where they leave the rim free for the blade.",
+            "filament where there is one. Clamps or weights do as well where they leave the rim free for the blade. "
+            f"{LEVEL_AGAIN}",
             picture("hold"),
             minutes=fig.HOLD_MIN,
         )
+    if not wet:
+        yield from _mixed(moulds, silicone, mix, verdict)
+    rests = BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=fig.rest_min(moulds.spec, step.rim, silicone))
+    if step.lid:
+        yield _draw_up(mix)
+        if not moulds.spec.casting.vacuum:
+            yield rests
+        yield _inject(moulds, picture("inject"))
+    else:
+        if not moulds.spec.casting.vacuum and not rests.wait_min:
+            yield BenchStep("Brush a first coat", verdict, minutes=fig.BRUSH_MIN * cells)
+        taken = "into the groove" if step.groove else "onto a scrap, since this cup has no groove"
+        yield BenchStep(
+            "Pour",
+            f"Pour in a thin thread at one place until {'the' if cells == 1 else 'every'} cavity stands over its rim. "
+            "Prick the bubbles that you see with a pin.",
+            picture("pour"),
+            kind="pour",
+            minutes=fig.pouring_min(cells) - fig.STRIKE_MIN,
+        )
+        if not moulds.spec.casting.vacuum and rests.wait_min:
+            yield rests
+        tool = "the blade upright, its narrow edge down"
+        if not plan.concentric and plan.dimensions.core_height > step.rim:
+            tool = (
+                "a straight strip of stiff card or plastic, as wide as the cavity, held upright (what stands on the "
+                "base beside the cavity is higher than this rim and in the blade's way)"
+            )
+        yield BenchStep(
+            "Strike off",
+            f"Strike off along the rim with {tool}, in one slow stroke from end to end; what it takes goes {taken}.",
+            picture("strike"),
+            minutes=fig.STRIKE_MIN,
+        )
+        again = " The window weeps a little." if tongues else ""
+        yield BenchStep(
+            "Wait, strike again",
+            f"Wipe it. Top up and strike again after {number(STRIKE_AGAIN_MIN, 3)} min (assumed).{again} The "
+            "film that it leaves on the rim cures too: it lifts off with the cup, and what of it stays on the "
+            "layer's "
+            "edge is trimmed at the end.",
+            picture("strike"),
+            kind="rest",
+            minutes=fig.STRIKE_MIN,
+            wait_min=STRIKE_AGAIN_MIN - fig.STRIKE_MIN,
+        )
+    yield from _cure_and_open(moulds, step, silicone, picture)
+
+
+def _mixed(moulds: MouldSet, silicone: Material, mix: Mix, verdict: str) -> Iterator[BenchStep]:
+    """Describe the way from the bottles to a mix without air."""
+    cells = len(moulds.plan.layout.cells)
     yield BenchStep(
         "Weigh",
         f"Weigh {shown(mix.part_a_g)} g of {silicone.name} part A and {shown(mix.part_b_g)} g of part B "
@@ -128,66 +178,66 @@ def pour_steps(
         kind="mix",
         minutes=fig.MIXING_MIN,
     )
-    yield from _bubbles_out(moulds, step, silicone, verdict)
-    if step.lid:
-        yield _inject(moulds, mix, picture("inject"))
-    else:
-        taken = "into the groove" if step.groove else "onto a scrap, since this cup has no groove"
-        yield BenchStep(
-            "Pour",
-            f"Pour in a thin thread at one place until {'the' if cells == 1 else 'every'} cavity stands over its rim. "
-            "Prick the bubbles that you see with a pin.",
-            picture("pour"),
-            kind="pour",
-            minutes=fig.POURING_MIN / 2,
-        )
-        higher = ""
-        if not plan.concentric and plan.dimensions.core_height > step.rim:
-            higher = " What stands on the base beside the cavity is higher than this rim: draw the blade past it."
-        yield BenchStep(
-            "Strike off",
-            "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke from end to "
-            "end; "
-            f"what it takes goes {taken}.{higher}",
-            picture("strike"),
-            minutes=fig.POURING_MIN / 2,
-        )
-        again = " The window weeps a little." if tongues else ""
-        yield BenchStep(
-            "Wait, strike again",
-            f"Wipe the blade. Top up and strike again after {number(STRIKE_AGAIN_MIN, 3)} min (assumed).{again} The "
-            "film "
-            "that the blade leaves on the rim cures too: it lifts off with the cup, and what of it stays on the "
-            "layer's "
-            "edge is trimmed at the end.",
-            picture("strike"),
-            kind="rest",
-            minutes=fig.STRIKE_MIN,
-            wait_min=STRIKE_AGAIN_MIN - fig.STRIKE_MIN,
-        )
-    yield from _cure_and_open(moulds, step, silicone, picture)
-
-
-def _bubbles_out(moulds: MouldSet, step: Step, silicone: Material, verdict: str) -> Iterator[BenchStep]:
     if moulds.spec.casting.vacuum:
         yield BenchStep("Degas", verdict, minutes=fig.DEGASSING_MIN)
+
+
+def _tongue_home(moulds: MouldSet, step: Step, picture: str) -> BenchStep:
+    """Say how the tongues come to stand, how to see that they do, and what bears their grips."""
+    tongues, prop = moulds.plan.standing(step, "tongue"), tongue_prop(moulds)
+    each, one = ("the tongue", "its") if len(tongues) == 1 else ("each tongue", "its")
+    if step.index == 1:
+        again = (
+            f" Mark {each} with a pen where it leaves the cup's wall: in the next pour the mark shows where it stops."
+            if len(moulds.plan.steps) > 1
+            else ""
+        )
+        stops = (
+            f"Push {each} on until {one} hollow end stops against the core: it lies on the core's ledge. Look down "
+            f"into the bore: no gap between its end and the core, none under it on the ledge.{again}"
+        )
     else:
-        rise = fig.bubble_rise_s(step.rim, silicone) / 60
-        stands = rise <= fig.WITHOUT_VACUUM * at_room(float(silicone.pot_life_min), moulds.spec.casting.room_c)
-        yield BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=rise if stands else 0.0)
-
-
-def _inject(moulds: MouldSet, mix: Mix, picture: str) -> BenchStep:
-    sprue = moulds.spec.moulds.sprue_mm
+        stops = (
+            f"Push {each} on until it stops: its hollow end lies on the core's ledge again, under Layer 1. The mark "
+            "from pour 1 must be at the cup's wall; farther out, it caught on the slot's edge: draw it back and try "
+            "again."
+        )
+    bears = ""
+    if prop:
+        size = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm"
+        pads = "a pad" if len(prop.pads) == 1 else "a pad on each side"
+        bears = (
+            f" Its grip hangs free: put {pads} of stacked card {number(prop.thickness_mm, 3)} mm thick under "
+            f"{'it' if len(tongues) == 1 else 'the grips'} ({size}; {number(prop.tolerance_mm, 2)} mm more or less "
+            "does no harm: computed, the window's clearance), on the plate, against the cup. It must neither lift the "
+            "tongue nor leave air under it. Nothing may lean on its outer end."
+        )
     return BenchStep(
-        "Inject",
+        "Tongue home",
+        f"{stops} Wipe off what grease came into the bore, with a dry cotton bud.{bears}",
+        picture,
+        minutes=fig.TONGUE_MIN * len(moulds.plan.layout.cells),
+    )
+
+
+def _draw_up(mix: Mix) -> BenchStep:
+    return BenchStep(
+        "Draw up",
         f"Draw at least {number(mix.syringe_ml, 2)} ml into a syringe: tip and plunger hold back some "
         f"{number(fig.HELD_BACK_ML, 2)} ml of it (assumed). Point it up and push until silicone, no air, stands at the "
-        f"tip. Press the tip into the sprue ({number(sprue, 3)} mm) and inject slowly until every vent shows a bead "
-        "without bubbles, sprue by sprue. Leave sprue and vents filled.",
+        "tip.",
+        minutes=fig.STRIKE_MIN,
+    )
+
+
+def _inject(moulds: MouldSet, picture: str) -> BenchStep:
+    return BenchStep(
+        "Inject",
+        f"Press the tip into the sprue ({number(moulds.spec.moulds.sprue_mm, 3)} mm) and inject slowly until every "
+        "vent shows a bead without bubbles, sprue by sprue. Leave sprue and vents filled.",
         picture,
         kind="pour",
-        minutes=fig.POURING_MIN,
+        minutes=fig.pouring_min(len(moulds.plan.layout.cells)) - fig.STRIKE_MIN,
     )
 
 
@@ -211,9 +261,10 @@ def _cure_and_open(
         yield BenchStep(
             "Tongue out FIRST",
             f"Pull {'the tongue' if len(tongues) == 1 else 'every tongue'} out FIRST, straight along "
-            "itself, by its grip, with a steady pull. A cup lifted over a tongue tears the layer.",
+            "itself, by its grip, over the card, with a steady pull. A cup lifted over a tongue tears the layer. Then "
+            "take the card away: it covers the pry slot.",
             picture("tongue-out"),
-            minutes=fig.PULL_MIN,
+            minutes=fig.PULL_MIN * len(tongues),
         )
     if step.lid:
         yield BenchStep(

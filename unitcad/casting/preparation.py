@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from unitcad.casting import figures as fig
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bench_views import View, picture_path
-from unitcad.casting.figures import window_length
+from unitcad.casting.figures import at_room, window_length
+from unitcad.catalogue import Material
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.dents import DENT, TILT_DEG
 from unitcad.moulds.mould_set import MouldSet
@@ -44,17 +46,19 @@ def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
             "lie on "
             "their rims: a first layer that is squeezed out narrows the bore where the layer's edge is."
         )
-    lines.append("slicer.json has PrusaSlicer's time and filament, piece by piece, where it is installed.")
+        lines.append("Time and filament, piece by piece: slicer.json, where PrusaSlicer is installed.")
     lines.append(
-        f"First time on this printer: print the fit coupon (unitcad coupon {spec.moulds.printer}). It shows in half "
-        "an hour whether plinth, tongue and filament fit, and gives the line for the spec where they do not."
+        f"First time on this printer: print the fit coupon (unitcad coupon {spec.moulds.printer}): a print of "
+        "its own, whose time the slicer says. It shows whether plinth, tongue and filament fit, and gives the line for "
+        "the spec where they do not."
     )
     return tuple(lines)
 
 
-def preparation(moulds: MouldSet, views: dict[str, View]) -> Iterator[BenchStep]:
-    """Describe the way from the printer to an empty mould."""
+def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Material]) -> Iterator[BenchStep]:
+    """Describe the way from the printer to an empty mould; `silicones` are those that a resin may keep from curing."""
     plan, lengths = moulds.plan, moulds.spec.moulds
+    cups, cells = len(plan.steps), len(plan.layout.cells)
     marked = listed(["base", "cups", *(["lids"] if plan.of_kind("lid") else [])])
     yield BenchStep(
         "Sort the pieces",
@@ -62,6 +66,7 @@ def preparation(moulds: MouldSet, views: dict[str, View]) -> Iterator[BenchStep]
         f"{plan.label}; "
         "step1-cup.stl is cup 1, engraved C1, and so on.",
         picture_path("pieces"),
+        minutes=fig.SORT_MIN,
     )
     yield from _cut_tongues(moulds)
     if in_resin(moulds):
@@ -69,19 +74,35 @@ def preparation(moulds: MouldSet, views: dict[str, View]) -> Iterator[BenchStep]
             "Wash",
             "Wash the pieces in isopropanol until nothing of them feels slippery to a gloved finger, rinse holes and "
             "corners, and let them dry until no spot is dark any more.",
+            kind="rest",
+            minutes=fig.WASH_MIN,
+            wait_min=fig.DRY_MIN,
         )
         if tunnels(moulds):
-            yield BenchStep("Clear the windows", _clear_tunnels(moulds))
+            yield BenchStep("Clear the windows", _clear_tunnels(moulds), minutes=fig.CLEAR_MIN * len(tunnels(moulds)))
         yield BenchStep(
-            "Post-cure, test the cure",
-            "Resin keeps many platinum silicones from curing: post-cure, bake (60 degC for 8 h, assumed), then "
-            "cure a drop of each silicone on a spot of the base that is no cavity, for its whole cure. Lift it: if its "
-            "underside is tacky, coat (acrylic varnish, assumed) or print in another resin, and test again.",
+            "Post-cure, bake",
+            "Resin keeps many platinum silicones from curing: post-cure, bake in an oven (60 degC for "
+            f"{number(fig.BAKE_H, 2)} h, assumed), and let the pieces cool.",
+            kind="cure",
+            minutes=fig.CLEAN_MIN,
+            wait_min=60 * fig.BAKE_H,
+        )
+        drops = {each.name: at_room(float(each.cure_h), moulds.spec.casting.room_c) for each in silicones}
+        yield BenchStep(
+            "Test the cure",
+            f"Mix a little of each silicone and cure a drop of it on a spot of the base that is no cavity, for its "
+            f"whole cure ({', '.join(f'{name} {number(hours, 2)} h' for name, hours in drops.items())}). Lift it: if "
+            "its underside is tacky, coat (acrylic varnish, assumed) or print in another resin, and test again.",
+            kind="cure",
+            minutes=fig.WEIGH_MIN + fig.MIXING_MIN,
+            wait_min=60 * max(drops.values()),
         )
     else:
         yield BenchStep(
             "Clean",
             "Brush off strings and loose bits. Run a fingernail round every bore and rim: cut off what catches.",
+            minutes=fig.CLEAN_MIN,
         )
     lids = " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
     on = "Put each cup on the plinth once, dry: its cut corner lets it on one way only. It must sit down"
@@ -98,6 +119,7 @@ def preparation(moulds: MouldSet, views: dict[str, View]) -> Iterator[BenchStep]
         "round: the same strip of paper, folded to that thickness, goes in on all four sides. A cup that rocks or "
         f"stands higher on one side: scrape plinth and seat clean, and try again.{lids}",
         picture_path("pour1-cup-on"),
+        minutes=fig.DRY_FIT_MIN * cups,
     )
     if plan.of_kind("stub"):
         each = "the" if len(plan.layout.cells) == 1 else "each"
@@ -105,10 +127,12 @@ def preparation(moulds: MouldSet, views: dict[str, View]) -> Iterator[BenchStep]
             "Filament in",
             f"Push {each} straight piece of filament up through the core from below until its end is flush "
             "with the core's top, and bend what stands out below by a right angle into the groove under the plate: it "
-            "lies on the bench and can't sink. Trim the upper end flush with a knife: 0.5 mm low shows.",
+            "lies on the bench and can't sink. Trim the upper end flush with a knife, so that a fingernail drawn "
+            "across does not catch: what it stands low or proud is a knob or a dent in the cavity.",
             picture_path("filament"),
+            minutes=fig.FILAMENT_MIN * cells,
         )
-    yield BenchStep("Level the bench", _level(moulds))
+    yield BenchStep("Level the bench", _level(moulds), minutes=fig.LEVEL_MIN)
 
 
 def _level(moulds: MouldSet) -> str:
@@ -174,4 +198,5 @@ def _cut_tongues(moulds: MouldSet) -> Iterator[BenchStep]:
             "of that radius, punched or drilled at the strip's end and cut through its middle, makes it. No burr. Fold "
             f"tape over the last {number(GRIP_LENGTH, 2)} mm of the other end: this tab is what you pull by, with "
             "fingers or flat pliers.",
+            minutes=fig.CUT_MIN * len(tongues),
         )

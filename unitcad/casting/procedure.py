@@ -15,6 +15,7 @@ from unitcad.casting.figures import Figure, Mix, sourced
 from unitcad.casting.finishing import measurements, motor_in, release
 from unitcad.casting.instructions import pour_steps
 from unitcad.casting.layer_grid import OffGrid, UnitHeight, off_grid, unit_heights
+from unitcad.casting.needs import needs
 from unitcad.casting.preparation import preparation, printing, tunnels
 from unitcad.casting.release_agent import BondFace, Face, agent_faces, bond_faces
 from unitcad.casting.time_line import Phase, phases
@@ -53,7 +54,7 @@ class Pour:
 class Procedure:
     """A whole casting: numbered steps run on from `preparation` through the pours to `assembly`.
 
-    `earliest_finish_min`: from the first step of the first pour until the units are out of the mould, of which
+    `earliest_finish_min`: from the first step, the pieces just printed, until the units are out of the mould, of which
     `bench_min` with a person at the bench; `time_line` goes on until the motor is in. `printing` says what to print.
 
     `bonds` are the tools' faces that must never get release agent.
@@ -98,7 +99,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
     for step, volume in zip(plan.steps, layer_volumes_mm3, strict=True):
         silicone = known[step.material]
         mix = fig.mix(spec, silicone, len(plan.layout.cells) * volume + _channels_mm3(step))
-        verdict = _bubbles(spec, step, silicone, mix)
+        verdict = _bubbles(spec, step, silicone, mix, len(plan.layout.cells))
         pours.append(
             Pour(
                 step.index,
@@ -118,12 +119,15 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         )
         mixes.append((silicone, mix))
         grams.append(volume * float(silicone.density_g_cm3) / 1000)
+    prepared = tuple(preparation(moulds, shown, list(dict.fromkeys(silicone for silicone, _ in mixes))))
     out = tuple(release(moulds, mixes[0][0]))
     motor = tuple(motor_in(moulds, [silicone for silicone, _ in mixes]))
-    until = phases([*((f"pour {pour.index}", pour.steps) for pour in pours), ("out of the mould", out)])
-    line = phases(
-        [*((f"pour {pour.index}", pour.steps) for pour in pours), ("out of the mould", out), ("motor in", motor)]
-    )
+    stages = [
+        ("preparation", prepared),
+        *((f"pour {pour.index}", pour.steps) for pour in pours),
+        ("out of the mould", out),
+    ]
+    until, line = phases(stages), phases([*stages, ("motor in", motor)])
     return Procedure(
         name=spec.name,
         label=plan.label,
@@ -134,7 +138,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         bench_min=sum(phase.bench_min for phase in until),
         time_line=line,
         printing=printing(moulds, printed_mm3),
-        preparation=tuple(preparation(moulds, shown)),
+        preparation=prepared,
         off_grid=edges,
         unit_heights=tuple(unit_heights(moulds)),
         pours=tuple(pours),
@@ -145,7 +149,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         eccentricity=centred,
         without_ribs=free,
         walls=tuple(_walls(spec, free, centred)) if plan.concentric else (),
-        bill=bill(moulds, mixes),
+        bill=bill(moulds, mixes, needs([*prepared, *(step for pour in pours for step in pour.steps), *out, *motor])),
     )
 
 
@@ -178,7 +182,7 @@ def _figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, volume:
             by_temperature + sourced(silicone.pot_life_min),
         ),
         Figure("mixing", fig.MIXING_MIN, "min", practice),
-        Figure("pouring and striking off", fig.POURING_MIN, "min", practice),
+        Figure("pouring and striking off", fig.pouring_min(len(moulds.plan.layout.cells)), "min", practice),
         Figure("viscosity, mixed", float(silicone.mixed_viscosity_cps), "cps", sourced(silicone.mixed_viscosity_cps)),
         Figure("depth of this pour", step.rim, "mm", "computed: the rim over the seat"),
         Figure(
@@ -223,10 +227,10 @@ def _channels_mm3(step: Step) -> float:
     return sum(map(exact_volume, step.channels))
 
 
-def _bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix) -> str:
+def _bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix, cells: int) -> str:
     """Say how the bubbles leave: in the vacuum, or by themselves, for which a quarter of the pot life is allowed."""
     pot = fig.at_room(float(silicone.pot_life_min), spec.casting.room_c)
-    work = fig.MIXING_MIN + fig.POURING_MIN
+    work = fig.MIXING_MIN + fig.pouring_min(cells)
     if spec.casting.vacuum:
         work += fig.DEGASSING_MIN
         said = (
@@ -241,10 +245,12 @@ def _bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix) -> str:
             f"through {number(step.rim, 3)} mm (Stokes, at the viscosity just mixed). That is optimistic, since "
             f"silicone thickens from the start: a quarter of the pot life, {number(allowed, 2)} min, is allowed."
         )
-        clears = "Such bubbles should rise out: let the mix stand for as long before it is struck off."
-        brush = "brush a thin coat onto core and bore first and pour in a thread from one side"
-        way = "let the syringe stand, its tip up, before you inject slowly" if step.lid else brush
-        stays = f"Such bubbles stay: get a vacuum, or {way}."
+        work += fig.rest_min(spec, step.rim, silicone)
+        where = "stand the syringe up, its tip up," if step.lid else "leave the mould alone"
+        clears = f"Such bubbles should rise out: {where} for {number(rise, 2)} min."
+        brush = "brush a thin coat of the mix now onto all that it will touch, then pour in a thread from one side"
+        stand = f"stand the syringe up, its tip up, for {number(allowed, 2)} min, push out the air, and inject slowly"
+        stays = f"Such bubbles stay: get a vacuum, or {stand if step.lid else brush}."
         said = f"{stokes} {clears if rise <= allowed else stays}"
     late = work - pot
     slower = f" All this ends {number(late, 2)} min after the pot life: cool the room, or take a slower silicone."

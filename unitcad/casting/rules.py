@@ -6,7 +6,9 @@ import re
 from collections.abc import Iterator
 
 from unitcad.casting.bench_step import BenchStep
-from unitcad.casting.instructions import HOLD, TACK
+from unitcad.casting.finishing import layers_named
+from unitcad.casting.instructions import HOLD, LEVEL_AGAIN, TACK
+from unitcad.casting.needs import needs
 from unitcad.casting.procedure import Procedure
 from unitcad.text import spaced
 
@@ -114,7 +116,74 @@ def _gripped(procedure: Procedure) -> Iterator[str]:
             yield "a cut tongue has nothing to pull it by"
 
 
-RULES = (_agent, _degassing, _held, _cleared, _shown, _levelled, _cured, _enough, _gripped)
+def _propped(procedure: Procedure) -> Iterator[str]:
+    """Bear the grip of every tongue that stands, and look at the ledge only where nothing covers it."""
+    for pour in procedure.pours:
+        for step in pour.steps:
+            if step.title == "Tongue home" and "Its grip hangs free: put" not in step.text:
+                yield f"pour {pour.index}: nothing bears the tongue's grip"
+            if pour.index > 1 and "none under it on the ledge" in step.text:
+                yield f"pour {pour.index}: asks to look at a ledge that Layer 1 covers"
+
+
+def _listed(procedure: Procedure) -> Iterator[str]:
+    """List every tool and consumable that a step names."""
+    items = {item.item for item in procedure.bill}
+    for need in needs(_all(procedure)):
+        if need.item not in items:
+            yield f"the bill lacks what a step names: {need.item}"
+
+
+def _timed(procedure: Procedure) -> Iterator[str]:
+    """Give every step its time: at the bench, or as a wait."""
+    for step in _all(procedure):
+        if not step.minutes and not step.wait_min:
+            yield f"{step.title}: takes no time"
+
+
+def _level_again(procedure: Procedure) -> Iterator[str]:
+    """Look at the level again once tape or bands run under the plate."""
+    for pour in procedure.pours:
+        if not any(LEVEL_AGAIN in step.text for step in pour.steps):
+            yield f"pour {pour.index}: nothing says to look at the level again"
+
+
+def _mixed_first(procedure: Procedure) -> Iterator[str]:
+    """Use no mix before it is weighed and mixed."""
+    for pour in procedure.pours:
+        mixed = next((i for i, step in enumerate(pour.steps) if step.kind == "mix"), len(pour.steps))
+        for step in pour.steps[:mixed]:
+            if "the mix " in step.text:
+                yield f"pour {pour.index}: {step.title} uses the mix before it is mixed"
+
+
+def _smeared(procedure: Procedure) -> Iterator[str]:
+    """Let the smear cure as long as the silicone that the steps name for it, and no other."""
+    silicones = [pour.material for pour in procedure.pours]
+    hours = {pour.material: pour.cure_h for pour in procedure.pours}
+    for said in layers_named(step.text for step in procedure.assembly):
+        asked = hours[silicones[min(said, len(silicones) - 1)]]
+        if abs(procedure.assembly[-1].wait_min - 60 * asked) > 1e-6:
+            yield f"the smear is of layer {said % len(silicones) + 1}'s silicone and cures for another's time"
+
+
+RULES = (
+    _agent,
+    _degassing,
+    _held,
+    _cleared,
+    _shown,
+    _levelled,
+    _cured,
+    _enough,
+    _gripped,
+    _propped,
+    _listed,
+    _timed,
+    _smeared,
+    _level_again,
+    _mixed_first,
+)
 
 
 def _all(procedure: Procedure) -> Iterator[BenchStep]:

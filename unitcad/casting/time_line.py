@@ -1,4 +1,4 @@
-"""How long a casting takes: pours and cures one after the other, from the first weighing to the unit in the hand."""
+"""How long a casting takes: work and cures one after the other, from the printed pieces to the unit in the hand."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from unitcad.casting.bench_step import BenchStep
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of work and the wait after it, minutes: `start_min` counts from the first step of the first pour."""
+    """A stretch of work and the wait after it, minutes: `start_min` counts from the first step of all."""
 
     name: str
     start_min: float
@@ -33,7 +33,8 @@ def phases(stages: Iterable[tuple[str, Sequence[BenchStep]]]) -> tuple[Phase, ..
         for i, step in enumerate(steps):
             bench, wait = bench + step.minutes, wait + step.wait_min
             if step.kind == "cure" or i == len(steps) - 1:
-                found.append(Phase(f"{name}: open" if cured else name, clock, bench, wait))
+                later = "open" if name.startswith("pour") else "go on"
+                found.append(Phase(f"{name}: {later}" if cured else name, clock, bench, wait))
                 clock, bench, wait, cured = clock + bench + wait, 0.0, 0.0, True
     return tuple(found)
 

@@ -68,7 +68,7 @@ def to_markdown(procedure: Procedure) -> str:
 def _times(procedure: Procedure) -> Iterator[str]:
     """Yield the earliest finish in a sentence, and the time line."""
     total, bench = duration(procedure.earliest_finish_min), duration(procedure.bench_min)
-    yield f"**{total}** from the first pour's first step to the unit out of the mould, of which {bench} at the bench."
+    yield f"**{total}** from the printed pieces to the unit out of the mould, of which {bench} at the bench."
     if procedure.assembly:
         more = procedure.time_line[-1].end_min - procedure.earliest_finish_min
         yield f"Motor in: {duration(more)} more at most, nearly all of it a smear's cure. Printing comes before."

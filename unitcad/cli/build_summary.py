@@ -45,5 +45,5 @@ def _casting(folder: Path) -> Iterator[str]:
         grams[pour["material"]] += pour["part_a_g"] + pour["part_b_g"]
     total, bench = duration(procedure["earliest_finish_min"]), duration(procedure["bench_min"])
     pours = len(procedure["pours"])
-    yield f"{pours} pour{'s' if pours > 1 else ''}, finished {total} after the first, of which {bench} at the bench"
+    yield f"{pours} pour{'s' if pours > 1 else ''}, ready {total} after the print, of which {bench} at the bench"
     yield "to mix: " + ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams.items())

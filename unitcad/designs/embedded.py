@@ -101,7 +101,7 @@ def assembly(spec: Spec, dims: Dimensions) -> list[str]:
     else:
         steps = ["Push the motor in from the skin's side."]
     if spec.motor.fill or spec.fpcb:
-        return [*steps, motor_hold(spec, dims)]
+        return [*steps[:-1], f"{steps[-1]} {motor_hold(spec, dims)}"]
     return [
         *steps,
         f"Nothing else holds it: lay the body on a greased flat, centre the motor, and fill the ring of "

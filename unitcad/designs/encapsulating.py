@@ -120,11 +120,11 @@ def advice(spec: Spec, dims: Dimensions) -> list[str]:
 def assembly(spec: Spec, dims: Dimensions) -> list[str]:
     """Write how motor and circuit, or wires, go into the cavity."""
     if spec.wires:
-        steps = ["Feed the wires out through the slot from inside, then push the motor in, its back against the cap."]
+        steps = ["Feed the wires out through the slot from inside; leave the motor before the cavity's mouth."]
     elif spec.fpcb and dims.exit:
         steps = [
-            "Solder the motor to the circuit's pad. Feed the tail out through the slot from inside, then push pad "
-            "and motor in until the pad lies against the cap of Layer 1."
+            "Solder the motor to the circuit's pad. Feed the tail out through the slot from inside; leave pad and "
+            "motor before the cavity's mouth."
         ]
         strain = pad_strain(spec.fpcb, dims.exit)
         if spec.fpcb.tail == "both" and strain:
@@ -133,12 +133,14 @@ def assembly(spec: Spec, dims: Dimensions) -> list[str]:
                 f"Solder the next unit on after this one is in its body."
             )
     else:
-        steps = ["Push the motor in from the skin's side."]
+        steps = ["Lay the unit down with the cavity's mouth up, and the motor beside it, its back up."]
+    back, moved_in = ("the pad", "pad and motor") if spec.fpcb else ("the motor's back", "the motor")
     steps.append(
-        "A smear of Layer 1's silicone between the back and the cap holds it (assumed: silicone bonds poorly to bare "
-        "metal and polyimide; a primer or a silicone adhesive holds better)."
+        f"Put a smear of Layer 1's silicone on {back}, where the cap of Layer 1 will touch it: it holds the motor "
+        "(assumed: silicone bonds poorly to bare metal and polyimide; a primer or a silicone adhesive holds better). "
+        f"Push {moved_in} in from the skin's side until {back} lies against that cap. {motor_hold(spec, dims)}"
     )
-    return [*steps, motor_hold(spec, dims)]
+    return steps
 
 
 DESIGN = Design(

@@ -142,13 +142,13 @@
       const late = Number.isFinite(start) && start < Date.now();
       clear(out, Number.isFinite(start) && el("p", { className: late ? "verdict bad" : "verdict good" }, late
         ? `Too late by ${duration((Date.now() - start) / MINUTE)}: begun now, it is ready ${clock(Date.now() + finish * MINUTE)}.`
-        : `Begin pour 1 by ${clock(start)}.`),
+        : `Begin by ${clock(start)}, the pieces printed.`),
       table(["What", "Begin", "At the bench", "Then wait"], rows, { label: "Schedule" }));
     };
     for (const input of [ready, motor]) input.addEventListener("change", () => { state.ready = ready.value; state.motor = motor.checked; keep(); draw(); });
     draw();
     return section("plan", "Time",
-      el("p", {}, el("strong", {}, duration(casting.earliest_finish_min)), ` from the first pour's first step to the unit out of the mould, of which ${duration(casting.bench_min)} at the bench.`),
+      el("p", {}, el("strong", {}, duration(casting.earliest_finish_min)), ` from the printed pieces to the unit out of the mould, of which ${duration(casting.bench_min)} at the bench.`),
       el("div", { className: "fields screen" }, el("label", { className: "field" }, el("span", {}, "Must be ready"), ready),
         casting.assembly.length > 0 && el("label", { className: "field" }, motor, el("span", {}, "with the motor in"))), out);
   }
