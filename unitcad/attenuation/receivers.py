@@ -168,7 +168,10 @@ def neighbours_block(
 def _check(variants: Sequence[EstimateInput], pitch: float) -> None:
     mm = pitch * 1e3
     if len(variants) < 2:
-        raise Refusal("--pitch", mm, "needs two units or more; a spec may be named twice")
+        number = "" if np.isfinite(mm) else "must be a finite number of mm, and "
+        raise Refusal(
+            "--pitch", mm if not number else str(mm), f"{number}needs two units or more; a spec may be named twice"
+        )
     least = max(a.diameter + b.diameter for a, b in pairwise(variants)) * 500.0
     if not least * (1.0 - 1e-9) <= mm <= MOST_PITCH_MM:
         nearest = MOST_PITCH_MM if mm > MOST_PITCH_MM else least

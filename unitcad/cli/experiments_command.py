@@ -28,7 +28,9 @@ def experiments(
         str | None, typer.Option(help="what the readings of a ratio differ in: unit,frequency,body; else the file's")
     ] = None,
     draws: Annotated[int | None, typer.Option(help="of what is not known, for each rival; else the file's")] = None,
-    element_draws: Annotated[int | None, typer.Option(help="the same for finite elements, which cost more")] = None,
+    element_draws: Annotated[
+        int | None, typer.Option(help="the same for finite elements, which cost more: 10 to 2000")
+    ] = None,
     held: Annotated[
         bool | None,
         typer.Option("--held-to-levels/--prior", help="weigh the draws by the nine measured levels, or not"),
