@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from unitcad.accuracy.proposal_reliability import left_out
 from unitcad.attenuation.edge.answer import answer
 from unitcad.attenuation.edge.fitted_models import assessments
-from unitcad.attenuation.edge.predictive import predictive_of
+from unitcad.attenuation.edge.measured_levels import measured_table
+from unitcad.attenuation.edge.predictive import HELD, STACKED, predictive_of
 from unitcad.cli import app
 from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.text import listed
 from unitcad.validation import load, templates
 
 
@@ -111,7 +114,7 @@ def test_a_lab_s_fit_orders_by_its_own_scores() -> None:
     assert sorted(found["better_null"]) == ["bush", "consistent", "fitted"]
     first = found["lines"][0]
     assert first.startswith("9.8 % (9 to 10.7) of the motor's amplitude at the edge, measured on U1")
-    assert "8 of 10" not in first
+    assert "80 %" not in first
     assert "units of the fit ours" in first
 
 
@@ -126,7 +129,38 @@ def test_the_range_is_that_of_the_stacked_models() -> None:
     levels = np.exp(expected.centre[0, which] + expected.scale[0, which] * t)
     for key, share in (("p10", 0.1), ("p50", 0.5), ("p90", 0.9)):
         assert np.mean(levels <= found[key]) == pytest.approx(share, abs=0.004)
-    assert f"8 of 10 such units: {100 * found['p10']:.2g} to {100 * found['p90']:.2g} %" in found["lines"][0]
+    told = (
+        f"The 80 % range by bush and crossings is {100 * found['p10']:.2g} to {100 * found['p90']:.2g} % (6 of the nine"
+    )
+    assert told in found["lines"][0]
+
+
+def test_how_many_ranges_held_is_counted_again() -> None:
+    for models, count in HELD.items():
+        assert sum(one.held for one in left_out(models, measured_table())) == count
+    assert lead("embedded")["held"] == HELD[STACKED]
+    assert lead("embedded", 'estimate.models=["paper"]')["held"] is None
+
+
+@pytest.mark.parametrize(
+    ("spec", "changes", "new"),
+    [
+        ("encapsulating", (), []),
+        ("single-embedded", (), []),
+        ("encapsulating", ("layers.0.wall_mm=2.0",), ["walls"]),
+        ("encapsulating", ("layers.0.cap_mm=1.5",), ["caps"]),
+        ("embedded", ("diameter_mm=17",), ["diameter"]),
+        ("embedded", ("layers.0.material=dragon-skin-30", "layers.1.material=ecoflex-00-10"), []),
+        ("embedded", ("layers.0.material=ecoflex-00-30",), ["silicones"]),
+        ("three-layer", (), ["number of layers", "diameter"]),
+    ],
+)
+def test_what_no_measured_unit_had_is_said_with_the_error(spec: str, changes: tuple[str, ...], new: list[str]) -> None:
+    found = lead(spec, *changes)
+    assert found["not_measured"] == new
+    assert ("how far off bush is here is not known" in found["lines"][0]) == bool(new)
+    if new:
+        assert f"None of them is like this one in {listed(new)}:" in found["lines"][0]
 
 
 def test_a_range_needs_every_input() -> None:

@@ -123,7 +123,7 @@ def test_the_terminal_shows_fit_range_and_own_measurement(fit_file: Path) -> Non
     for name in ("bush", "fitted", "paper", "consistent"):
         assert f"x {own.model[name].left_out:.2f}" in by_fit
     assert "9.8 %" in done.output.splitlines()[1]
-    assert "8 of 10 such units" in done.output.splitlines()[1]
+    assert "The 80 % range by" in done.output.splitlines()[1]
     shown = json.loads(CliRunner().invoke(app, ["estimate", "embedded", "--fit", str(fit_file), "--json"]).output)
     assert len(shown["fit"]["sha256"]) == 64
 

@@ -7,7 +7,7 @@ least error on units that it was not fitted to: the paper's nine, or those of th
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,12 +45,16 @@ SKIN_MM = (5, 10, 20)
 """Distances from the edge that the sentence on the skin names."""
 
 
-def answer(estimated: dict[str, Any], expected: Predictive | None) -> dict[str, Any]:
+def answer(
+    estimated: dict[str, Any], expected: Predictive | None, unlike: Sequence[str] = (), held: int | None = None
+) -> dict[str, Any]:
     """Return the answer of an estimate (`estimates.estimate`) as data; `lines` say it, the level first.
 
     `level`, and p10 to p90 of the distribution `expected` over the models with `weights`, are fractions of the motor's
     amplitude; None where no number can be given. `typical_error` and `worst_error` are factors with the unit left out;
     a lab's fit has no worst one. `better_null`: the models that two constants beat, `null_error` how far these are off.
+    `unlike`, kept as `not_measured`, names what of the unit no measured one had: there no error is known. `held`: how
+    many of the nine measured units lay in their ranges from p10 to p90, each predicted without the unit.
     """
     models, errors = estimated["models"], _errors(estimated)
     order = _order(estimated, errors)
@@ -74,6 +78,8 @@ def answer(estimated: dict[str, Any], expected: Predictive | None) -> dict[str, 
         "typical_error": typical,
         "worst_error": worst,
         "worst_at": worst_at,
+        "held": held,
+        "not_measured": list(unlike),
         "measured": _measured(estimated),
         "not_seen": _unread(block),
         "null_error": null,
@@ -212,13 +218,23 @@ def _expected(estimated: dict[str, Any], data: dict[str, Any]) -> str:
         if data["measured"]
         else f"{level} of the motor's amplitude at the edge, by {model}"
     )
-    likely = f" (8 of 10 such units: {number(100 * data['p10'], 2)} to {percent(data['p90'])})" if data["p10"] else ""
-    off = f"typically off by a factor of {number(data['typical_error'], 2)}"
+    off = f"{model} was typically off by a factor of {number(data['typical_error'], 2)}"
     worst = f", at worst {number(data['worst_error'], 2)}" if data["worst_error"] else ""
-    whose = f"units of the fit {estimated['fit']['name']}" if "fit" in estimated else "the nine measured units"
+    whose = f"the units of the fit {estimated['fit']['name']}" if "fit" in estimated else "the nine measured units"
     whose += " by moduli of a slow pull" if _slow_pull(estimated) else ""
     null = f" {NULL} does better: x {number(data['null_error'], 2)}." if model in data["better_null"] else ""
-    return f"{at}{likely}; {off}{worst} ({whose}, each left out).{null}"
+    new = data["not_measured"]
+    here = f" None of them is like this one in {listed(new)}: how far off {model} is here is not known." if new else ""
+    return f"{at}.{_likely(data)} {off}{worst} on {whose}, each left out.{null}{here}"
+
+
+def _likely(data: dict[str, Any]) -> str:
+    """Say the range of the models together, whose they are, and how often such ranges held."""
+    if data["p10"] is None:
+        return ""
+    held = f" ({data['held']} of the nine measured units lay in theirs)" if data["held"] is not None else ""
+    span = f"{number(100 * data['p10'], 2)} to {percent(data['p90'])}"
+    return f" The 80 % range by {listed(data['weights'])} is {span}{held}."
 
 
 def _how(name: str, data: dict[str, Any], errors: dict[str, Error]) -> str:

@@ -10,9 +10,9 @@ from unitcad.attenuation.curve import decay_at, layered_block
 from unitcad.attenuation.edge.answer import answer
 from unitcad.attenuation.edge.fitted_models import MODELS, assessments, choice, forms, in_order, pairwise
 from unitcad.attenuation.edge.lab_fit import LabFit, error_block, own_block
-from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown
+from unitcad.attenuation.edge.level import measured_block, model_block, ranged, unknown, unlike_measured
 from unitcad.attenuation.edge.measured_levels import Moduli
-from unitcad.attenuation.edge.predictive import STACKED, predictive_of
+from unitcad.attenuation.edge.predictive import HELD, STACKED, predictive_of
 from unitcad.attenuation.edge.scores import RANGE_PERCENT, Assessment
 from unitcad.attenuation.inputs import EstimateInput, Quantity
 
@@ -94,7 +94,10 @@ def estimate(
     names = STACKED if fit is None and set(models) == set(MODELS) else models
     of_this_drive = [name for name in names if not not_of_this_drive(variant, [name])] or names
     expected = predictive_of([variant], of_this_drive, fit) if names else None
-    return rounded({"variant": data.pop("variant"), "answer": answer(data, expected), **data})
+    held = HELD.get(tuple(of_this_drive)) if variant.moduli == "dynamic" else None
+    # The units of a lab's fit may have other lengths than the paper's.
+    lead = answer(data, expected) if fit else answer(data, expected, unlike_measured(variant), held)
+    return rounded({"variant": data.pop("variant"), "answer": lead, **data})
 
 
 def not_of_this_drive(variant: EstimateInput, models: Sequence[str]) -> list[str]:

@@ -322,9 +322,26 @@ def measured_block(variant: EstimateInput) -> dict[str, Any] | None:
     }
 
 
-def _differs_in(variant: EstimateInput, shapes: cf.Section | None) -> list[str]:
-    """Return what of a unit is not as in the measured ones, against the nearest of their possible shapes."""
-    shared, own = measurements().unit, sections([variant.geometry])
+def unlike_measured(variant: EstimateInput) -> list[str]:
+    """Return what of a unit no measured one had, against the nearest of those of its design and number of layers."""
+    table, count = measured_table(), len(variant.layers)
+    alike = [i for i, layers in enumerate(table.layers) if len(layers) == count]
+    design = CONTROL if count == 1 else variant.design
+    own = [i for i in alike if table.designs[i] == design]
+    measured = {name for layers in table.layers for name in layers}
+    kinds = {
+        "number of layers": not alike,
+        "design": bool(alike) and not own,
+        "silicones": any(layer.material not in measured for layer in variant.layers),
+    }
+    by_unit = [_differs_in(variant, table.inputs[i].section) for i in own or alike]
+    lengths = min(by_unit, key=len) if by_unit else _differs_from_all(variant)
+    return [*(name for name, other in kinds.items() if other), *lengths]
+
+
+def _differs_from_all(variant: EstimateInput) -> list[str]:
+    """Return what of a unit is not as in the measured ones, of what these share."""
+    shared = measurements().unit
     motor = motors()[shared.motor]
     of_all = {
         "motor": not np.isclose(variant.geometry.motor_height, 1e-3 * float(motor.thickness_mm), atol=_SAME)
@@ -334,6 +351,12 @@ def _differs_in(variant: EstimateInput, shapes: cf.Section | None) -> list[str]:
         "body": variant.tissue_name != shared.tissue,
         "frequency": not np.isclose(variant.frequency.middle, shared.frequency_hz),
     }
+    return [name for name, other in of_all.items() if other]
+
+
+def _differs_in(variant: EstimateInput, shapes: cf.Section | None) -> list[str]:
+    """Return what of a unit is not as in the measured ones, against the nearest of their possible shapes."""
+    own, of_all = sections([variant.geometry]), _differs_from_all(variant)
     by_shape = []
     assert shapes is not None  # every unit of the catalogue's table has a section
     for i in range(len(np.atleast_1d(shapes.cavity_radius))):
@@ -345,7 +368,7 @@ def _differs_in(variant: EstimateInput, shapes: cf.Section | None) -> list[str]:
             "caps": not np.allclose(own.caps[0], shapes.caps[i], rtol=0.0, atol=_SAME),
             "height of the cavity": abs(own.core_height[0] - shapes.core_height[i]) > _SAME,
         }
-        by_shape.append([name for name, other in {**of_all, **of_shape}.items() if other])
+        by_shape.append([*of_all, *(name for name, other in of_shape.items() if other)])
     return min(by_shape, key=len)
 
 

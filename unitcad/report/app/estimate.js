@@ -71,8 +71,8 @@
 
   function levels(data) {
     const rows = Object.entries(data.models || {}).map(([model, block]) => ({ name: nameOf(model), entry: percents(block.edge_level || {}), reason: (block.edge_level || {}).reason, colour: COLOURS[model] || "series-4" }));
-    const { p10, p50, p90 } = data.answer || {};
-    if (known(p10)) rows.unshift({ name: "8 of 10 such units", entry: percents({ value: p50, low: p10, high: p90 }), colour: "series-6" });
+    const { p10, p50, p90, weights } = data.answer || {};
+    if (known(p10)) rows.unshift({ name: `80 % range by ${Object.keys(weights || {}).join(", ")}`, entry: percents({ value: p50, low: p10, high: p90 }), colour: "series-6" });
     const found = data.measured || {};
     const measured = found.same_size ? found : {};
     const marks = [{ name: "Measured", value: percent(measured.level) }, { name: "Also printed", value: percent(measured.also_printed), dashed: true }, ...ownMarks(data)].filter(({ value }) => known(value));
