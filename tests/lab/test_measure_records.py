@@ -102,7 +102,7 @@ def test_a_low_signal_to_noise_is_said(tmp_path: Path, ratio: float, found: set[
 
 def test_an_amplitude_below_twice_its_uncertainty_is_an_error(tmp_path: Path) -> None:
     """A line under mains as large as itself: the noise is small, and yet nothing is known."""
-    wavfile.write(tmp_path / "a.wav", RATE, (10 * np.cos(2 * np.pi * 100.02 * TIME) / 500 + noise(1e-4)).astype("<f4"))
+    wavfile.write(tmp_path / "a.wav", RATE, (10 * np.cos(2 * np.pi * 100.0 * TIME) / 500 + noise(1e-4)).astype("<f4"))
     campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),))
     mains = Mains(blank=((2, 9.0),))
     result = measure_record(tmp_path / "a.wav", "edge", campaign, (SENSOR,), (mains,), (60.0, 250.0), "a.wav")

@@ -69,6 +69,7 @@ class UnitTable(Table, frozen=True, kw_only=True):
     cavity: Cavity | None = None
     reference: Annotated[Records, Meta(description="the motor alone, where no channel has it")] = ()
     edge: Records = ()
+    lines: Annotated[int, Meta(ge=1, le=6, description="lines that its records have, one a motor of an array")] = 1
     point: tuple[PointTable, ...] = ()
 
 

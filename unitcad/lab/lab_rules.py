@@ -22,9 +22,10 @@ RULES = {
             A time lies off an even grid by more than 0.3 of a step: samples are missing or the clock
             varies. Example: A logger over USB that loses a packet. Fix: Record with a hardware clock.""",
             """L104 warning: several lines
-            More than one line lies in the band. They were fitted together; the strongest one's
-            amplitude is given. Example: Two motors of an array. Fix: Run one motor, or say which line
-            is meant by chain.band_hz.""",
+            The band holds another number of lines than the unit's key lines says, which is 1 if left
+            out. They were fitted together; the strongest one's amplitude is given. Example: Two motors
+            of an array. Fix: Set lines = 2 in the unit's table, run one motor, or say which line is
+            meant by chain.band_hz.""",
             """L105 warning: line on the mains
             The record can't tell the line from a multiple of the mains' frequency. Example: A motor at
             100.2 Hz over 2 s. Fix: Change the drive's voltage, record longer, or add a motor-off record
@@ -34,8 +35,8 @@ RULES = {
             comb at 50 Hz. Fix: Use the chain line, or another drive voltage.""",
             """L107 warning: unsteady
             The amplitude varies by more than 5 %, slowly or up and down, or the frequency by more than
-            5 %, beyond the spin-up. Example: A battery that runs down. Fix: Use a regulated supply and
-            let the motor warm up.""",
+            5 %, beyond the spin-up; or less than half of the record is steady. Example: A battery that
+            runs down. Fix: Use a regulated supply and let the motor warm up.""",
             """L108 warning: fewer than 20 periods
             The steady part is too short for the noise beside the line to be known. Example: 0.1 s at
             125 Hz. Fix: Record 2 s.""",
@@ -71,6 +72,10 @@ RULES = {
             The amplitude is less than ten times the standard deviation of what the fit leaves; where
             twice its uncertainty exceeds it, it is an error. Example: A point far from the unit. Fix:
             Record longer, average more, or a sensor of a smaller range.""",
+            """L119 warning: missing samples
+            Samples are no numbers: empty, or NaN. They are left out; beyond a tenth of them it is an
+            error. Example: A logger that writes NaN where the laser lost the surface. Fix: Put
+            retroreflective tape on the point.""",
         ),
     )
 }

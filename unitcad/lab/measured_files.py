@@ -105,7 +105,8 @@ def lines(result: Measured) -> list[str]:
             size = f"{r.amplitude_um:.4g} +- {2 * r.u_um:.2g} um" if r.usable else f"not used, {r.amplitude_um:.4g} um"
             out.append(
                 f"  {unit}, {r.role}, {r.file}: {size}{ratio}, "
-                f"{r.frequency_hz:.2f} Hz, drift {r.drift:.2%}, signal to noise {r.snr:.3g}{gain}"
+                f"{r.frequency_hz:.2f} Hz over {r.steady_s:.3g} s of {r.length_s:.3g} s, "
+                f"drift {r.drift:.2%}, signal to noise {r.snr:.3g}{gain}"
             )
     for chain in result.chains:
         if chain.assumed:

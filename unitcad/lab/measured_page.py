@@ -66,7 +66,7 @@ def _levels(result: Measured) -> str:
 
 def _records(result: Measured) -> str:
     gains = [chain.name for chain in result.chains if chain.gain]
-    head = ("unit", "place", "file", "used", "um", "2 u, um", "Hz", "drift", "signal to noise")
+    head = ("unit", "place", "file", "used", "um", "2 u, um", "Hz", "steady, s", "drift", "signal to noise")
     head += (*(f"gain of {name}" for name in gains), "SHA-256")
     rows = [
         (_record(unit, record, gains), "" if record.usable else "out")
@@ -78,10 +78,11 @@ def _records(result: Measured) -> str:
 
 def _record(unit: str, r: RecordResult, gains: list[str]) -> tuple[str, ...]:
     figures = (
-        f"{r.amplitude_um:.4g}", f"{2 * r.u_um:.2g}" if r.usable else "", f"{r.frequency_hz:.2f}", f"{r.drift:.2%}",
+        f"{r.amplitude_um:.4g}", f"{2 * r.u_um:.2g}" if r.usable else "", f"{r.frequency_hz:.2f}",
+        f"{r.steady_s:.3g} of {r.length_s:.3g}", f"{r.drift:.2%}",
         f"{r.snr:.3g}", *(f"{r.gains[name]:.3f}" for name in gains if name in r.gains),
     )  # fmt: skip
-    figures = figures if r.frequency_hz else ("",) * (5 + len(gains))
+    figures = figures if r.frequency_hz else ("",) * (6 + len(gains))
     return (unit, r.role, r.file, "yes" if r.usable else "no", *figures, r.sha256[:12])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,9 +44,11 @@ def measure_record(
     mains: tuple[Mains, ...],
     band: tuple[float, float],
     shown: str,
+    lines: int = 1,
 ) -> RecordResult:
     """Return a record's figures by every chain of the campaign; `mains` and `sensors` are the unit's, then the motor's.
 
+    `band` is where its line is looked for, in Hz; `lines` how many it is expected to have.
     Raises Refusal for what can't be read.
     """
     signal = open_signal(path, campaign.recording, sensors, shown)
@@ -78,11 +81,13 @@ def measure_record(
     findings: list[LabFinding] = []
     if signal.off_grid > IRREGULAR:
         findings.append(found("L103", shown, f"a time lies {signal.off_grid:.2g} steps off an even grid"))
-    for part, where in zip(clipped, names, strict=False):
+    for part, gaps, where in zip(clipped, signal.missing, names, strict=False):
         findings += record_findings.clipping(part, where)
+        findings += record_findings.missing(gaps, signal.count, where)
     if not sections:
         where = names[silent[0][1]] if silent else shown
-        findings.append(found("L111", where, f"nothing between {band[0]:g} and {band[1]:g} Hz"))
+        message = f"nothing between {band[0]:.4g} and {band[1]:.4g} Hz"
+        findings.append(found("L111", where, message + _hint(picture, band, campaign)))
         return RecordResult(
             *shared, amplitude_um=0.0, u_um=0.0, shared=0.0, frequency_hz=0.0, drift=0.0, snr=0.0, steady_s=0.0,
             masked=0.0, lines=(), ratio=None, lag_deg=None, by_chain={}, by_line=(), gains={},
@@ -92,7 +97,15 @@ def measure_record(
     fit = together([one.fit for one in sections], counts)
     motors = [one.motor for one in sections if one.motor]
     motor = together(motors, counts) if motors else None
-    findings += _of_lines(fit, motor, signal, names, mains)
+    findings += [
+        replace(one, message=one.message + _hint(picture, band, campaign))
+        if (one.code, one.where) == ("L111", shown)
+        else one
+        for one in _of_lines(fit, motor, signal, names, mains, lines)
+    ]
+    steady = sum(one.fit.end_s - one.fit.start_s for one in sections)
+    if not any(one.severity == "error" for one in findings):
+        findings += record_findings.short_of_steady(steady, sum(counts) / signal.rate, shown)
     if silent:
         count = len(sections) + len(silent)
         message = f"{len(silent)} of {count} sections, the first from {silent[0][0]:.0f} s of {at_s:.0f} s"
@@ -114,7 +127,7 @@ def measure_record(
         frequency_hz=fit.frequency_hz,
         drift=fit.drift,
         snr=fit.snr,
-        steady_s=sum(s.fit.end_s - s.fit.start_s for s in sections),
+        steady_s=steady,
         masked=fit.masked,
         lines=tuple(Line(one.frequency_hz, one.amplitude * factor, one.u * factor) for one in fit.lines),
         ratio=ratio,
@@ -130,13 +143,13 @@ def measure_record(
 
 
 def _of_lines(
-    fit: LineFit, motor: LineFit | None, signal: Signal, names: tuple[str, str], mains: tuple[Mains, ...]
+    fit: LineFit, motor: LineFit | None, signal: Signal, names: tuple[str, str], mains: tuple[Mains, ...], lines: int
 ) -> list[LabFinding]:
     """Return what is wrong with the line of the unit and with that of the motor."""
-    out = record_findings.of_line(fit, signal.rate, signal.raw_rate, names[0], mains[0])
+    out = record_findings.of_line(fit, signal.rate, signal.raw_rate, names[0], mains[0], lines)
     if motor is not None:
         unlike = ("L102", "L108")  # of the rate and the span, which are the same
-        judged = record_findings.of_line(motor, signal.rate, signal.raw_rate, names[1], mains[1])
+        judged = record_findings.of_line(motor, signal.rate, signal.raw_rate, names[1], mains[1], lines)
         out += [one for one in judged if one.code not in unlike]
     return out
 
@@ -155,6 +168,12 @@ def _values(
             findings.append(("L106", message))
     findings += [("L114", f"{name}: {reason}") for name, reason in reasons.items()]
     return values, findings
+
+
+def _hint(picture: tuple[Floats, Floats, Floats, Floats], band: tuple[float, float], campaign: Campaign) -> str:
+    """Return where the strongest line outside a searched band lies, as the end of a message; empty without one."""
+    hertz = record_findings.strongest_outside(*picture[2:], band, campaign.chain.mains_hz)
+    return f"; the strongest line outside that is at about {hertz:.0f} Hz" if hertz else ""
 
 
 def _clipped(samples: Floats) -> float:

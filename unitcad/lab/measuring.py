@@ -110,7 +110,7 @@ def _unit(
     for i, name in enumerate(unit.reference):
         say(name)
         path = file_of(folder, name, f"{field}.reference.{i}")
-        out.append(measure_record(path, "reference", campaign, (motor_sensor,), mains[1:], band, name))
+        out.append(measure_record(path, "reference", campaign, (motor_sensor,), mains[1:], band, name, unit.lines))
     hertz = [record.frequency_hz for record in out if record.usable]
     if hertz:
         middle = float(np.median(hertz))
@@ -122,7 +122,7 @@ def _unit(
         for i, name in enumerate(names):
             say(name)
             path = file_of(folder, name, f"{where}.{i}")
-            out.append(measure_record(path, role, campaign, sensors, mains, band, name))
+            out.append(measure_record(path, role, campaign, sensors, mains, band, name, unit.lines))
     return out
 
 
@@ -146,7 +146,8 @@ def _levels(
             for hertz, values, below in _sides(chain, there, there if paired else motor):
                 at = f"{where}, {hertz:.2f} Hz, by {chain.name}"
                 if not values:
-                    findings.append(found("L116", where, f"nothing near the motor's {hertz:.2f} Hz"))
+                    none = found("L116", where, f"nothing near the motor's {hertz:.2f} Hz")
+                    findings += [] if none in findings else [none]  # the same of every chain
                 elif min(len(values), len(below)) < LEAST_REPEATS:
                     count = min(len(values), len(below))
                     findings.append(found("L112", at, f"{count} usable records; a level needs {LEAST_REPEATS}"))

@@ -13,6 +13,8 @@ from unitcad.lab.lab_rules import LabFinding, found
 MOST_SCATTER = MOST_DRIFT = 0.05
 LEAST_PERIODS, NO_PERIODS = 20, 5
 MOST_MASKED = 0.1
+LEAST_STEADY = 0.5
+"""Part of a record that its steady part is at least: a motor that spins up and runs leaves more of 2 s."""
 LEAST_SNR = 10.0
 LEAST_OVER_U = 5
 """The strongest of the 400 bins of noise in a band of 190 Hz over 2 s is above 4 in a record of ten, above 5 in few of
@@ -28,8 +30,23 @@ def clipping(part: float, where: str) -> list[LabFinding]:
     return [found("L101", where, f"at about {part:.2f} of the amplitude", "error" if part < LOWEST else "warning")]
 
 
-def of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Mains) -> list[LabFinding]:
-    """Return what is wrong with a line, in the order of the codes, beside clipping.
+def missing(count: int, samples: int, where: str) -> list[LabFinding]:
+    """Return the finding of a channel of which `count` of the `samples` are no numbers."""
+    if not count:
+        return []
+    message = f"{count} of {samples} samples ({count / samples:.2g} of them) are no numbers"
+    return [found("L119", where, message, "error" if count > MOST_MASKED * samples else "warning")]
+
+
+def short_of_steady(steady_s: float, length_s: float, where: str) -> list[LabFinding]:
+    """Return the finding of a record of which only a small part is steady, and was used."""
+    if steady_s >= LEAST_STEADY * length_s:
+        return []
+    return [found("L107", where, f"steady for {steady_s:.2f} s of {length_s:.2f} s; only that part was used")]
+
+
+def of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Mains, lines: int = 1) -> list[LabFinding]:
+    """Return what is wrong with a line, in the order of the codes, beside clipping; `lines` are expected.
 
     Of a channel that is clipped beyond repair nothing is said that follows from it: its fit leaves much, and changes.
     """
@@ -51,15 +68,17 @@ def of_line(fit: LineFit, rate: float, raw_rate: float, where: str, mains: Mains
         severity = "error" if periods < NO_PERIODS else "warning"
         out.append(found("L108", where, f"{periods:.0f} periods in the steady part", severity))
     if not cut_off:
-        out += _of_steadiness(fit, rate, where)
+        out += _of_steadiness(fit, rate, where, lines)
     return sorted(out, key=lambda one: one.code)
 
 
-def _of_steadiness(fit: LineFit, rate: float, where: str) -> list[LabFinding]:
+def _of_steadiness(fit: LineFit, rate: float, where: str, lines: int) -> list[LabFinding]:
     out = []
-    if fit.lines:
-        listed = ", ".join(f"{one.frequency_hz:.2f} Hz ({one.amplitude / fit.amplitude:.2f})" for one in fit.lines)
-        out.append(found("L104", where, f"{len(fit.lines)} lines: {listed}"))
+    if max(len(fit.lines), 1) != lines:
+        there = [(one.frequency_hz, one.amplitude / fit.amplitude) for one in fit.lines] or [(fit.frequency_hz, 1.0)]
+        listed = ", ".join(f"{hertz:.2f} Hz ({part:.2f})" for hertz, part in there)
+        expected = f", {lines} expected" if lines > 1 else ""
+        out.append(found("L104", where, f"{len(there)} line{'s' if len(there) > 1 else ''}{expected}: {listed}"))
     noise = np.sqrt(2 / max(0.2 * rate, 1)) / fit.snr
     scatter = float(np.sqrt(max(fit.scatter**2 - noise**2, 0.0)))
     if not fit.lines and (scatter > MOST_SCATTER or fit.drift > MOST_DRIFT):
@@ -72,6 +91,25 @@ def _of_steadiness(fit: LineFit, rate: float, where: str) -> list[LabFinding]:
     return out
 
 
+def strongest_outside(
+    frequency: Floats, size: Floats, band: tuple[float, float], mains_hz: float, own_hz: float | None = None
+) -> float | None:
+    """Return the frequency of the strongest line outside a band; None where all is noise there.
+
+    `frequency` and `size` are a spectrum. The mains are no line, and neither are harmonics of a line at `own_hz`.
+    """
+    near = _near(frequency)
+    outside = (frequency > TREMOR_HZ) & ((frequency < band[0] - near) | (frequency > band[1] + near))
+    outside &= np.abs(frequency - mains_hz * np.round(frequency / mains_hz)) > near
+    if own_hz is not None:
+        harmonic = np.abs(frequency - own_hz * np.round(frequency / own_hz)) <= near
+        outside &= (frequency < 1.5 * own_hz) | ~harmonic
+    if not outside.any():
+        return None
+    at = int(np.argmax(np.where(outside, size, 0.0)))
+    return float(frequency[at]) if size[at] > 8 * float(np.median(size[outside])) else None
+
+
 def stronger_outside(
     frequency: Floats, size: Floats, hertz: float, band: tuple[float, float], mains_hz: float
 ) -> float | None:
@@ -79,13 +117,13 @@ def stronger_outside(
 
     `frequency` and `size` are a spectrum.
     """
-    near = max(1.0, 3 * float(frequency[1] - frequency[0])) if len(frequency) > 1 else 1.0
-    own = np.abs(frequency - hertz) <= near
-    outside = (frequency > TREMOR_HZ) & ((frequency < band[0] - near) | (frequency > band[1] + near))
-    outside &= np.abs(frequency - mains_hz * np.round(frequency / mains_hz)) > near
-    outside &= (frequency < 1.5 * hertz) | (np.abs(frequency - hertz * np.round(frequency / hertz)) > near)
-    if not own.any() or not outside.any():
+    own = np.abs(frequency - hertz) <= _near(frequency)
+    other = strongest_outside(frequency, size, band, mains_hz, hertz)
+    if other is None or not own.any():
         return None
-    at = int(np.argmax(np.where(outside, size, 0.0)))
-    strong = size[at] > max(float(size[own].max()), 8 * float(np.median(size[outside])))
-    return float(frequency[at]) if strong else None
+    return other if size[np.searchsorted(frequency, other)] > float(size[own].max()) else None
+
+
+def _near(frequency: Floats) -> float:
+    """Return within which distance in Hz two lines of a spectrum are one."""
+    return max(1.0, 3 * float(frequency[1] - frequency[0])) if len(frequency) > 1 else 1.0

@@ -46,12 +46,18 @@ class RecordResult:
     unit: str
     picture: tuple[Floats, Floats, Floats, Floats]
 
+    @property
+    def length_s(self) -> float:
+        """The record's length in s."""
+        return self.samples / self.rate_hz
+
     def as_dict(self) -> dict[str, Any]:
         """Return JSON-ready data, six significant digits; a record that counts for nothing has no uncertainty."""
         short = {key: _short(value) for key, value in vars(self).items() if isinstance(value, float | int | str)}
         if not self.usable:
             short |= {"u_um": None, "shared": None}
         size = "amplitude_um" if self.ratio is None else "ratio"
+        short["length_s"] = _short(self.length_s)
         short["by_chain"] = {name: _short(value) for name, value in self.by_chain.items()}
         short["by_line"] = [{"frequency_hz": _short(hertz), size: _short(value)} for hertz, value in self.by_line]
         short["gains"] = {name: _short(value) for name, value in self.gains.items()}

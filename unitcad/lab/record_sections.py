@@ -88,6 +88,8 @@ def together(fits: list[LineFit], counts: list[int]) -> LineFit:
         start_s=first.start_s,
         end_s=first.start_s + sum(fit.end_s - fit.start_s for fit in fits),
         masked=float(weights @ [fit.masked for fit in fits]),
+        dropped=float(weights @ [fit.dropped for fit in fits]),
+        missing=float(weights @ [fit.missing for fit in fits]),
         clipped=min(fit.clipped for fit in fits),
         mains_hz=max(fit.mains_hz for fit in fits),
         lines=max((fit.lines for fit in fits), key=len),

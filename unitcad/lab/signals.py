@@ -30,8 +30,8 @@ HIGHEST_RATE = 5_000.0
 class Signal:
     """A record's samples: `sections()` yields them (n, channels), `rate` is their rate in Hz, `raw_rate` the file's.
 
-    `off_grid` is by how many steps a time lay off an even grid, after the sections have been read; `count` how many
-    samples the file had.
+    After the sections have been read `off_grid` is by how many steps a time lay off an even grid, `count` how many
+    samples the file had, and `missing` how many of each channel's were no numbers.
     """
 
     path: Path
@@ -43,6 +43,7 @@ class Signal:
     time_scale: float = 1.0
     off_grid: float = field(default=0.0, init=False)
     count: int = field(default=0, init=False)
+    missing: list[int] = field(default_factory=list, init=False)
 
     @property
     def averaged(self) -> int:
@@ -96,6 +97,8 @@ class Signal:
                 self.off_grid = max(self.off_grid, float(off.max()) if np.isfinite(off).all() else np.inf)
                 block = block[:, :-1]
             self.count += len(block)
+            gaps = np.count_nonzero(~np.isfinite(block), axis=0)
+            self.missing = [int(n) for n in gaps + (np.array(self.missing) if self.missing else 0)]
             yield block * np.array(self.scales)
 
 

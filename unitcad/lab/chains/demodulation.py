@@ -13,6 +13,12 @@ WINDOW_S = 0.25
 """Length of the Hann window that smooths a demodulated signal; it passes about 4 Hz to either side."""
 STEADY = 0.9
 """Part of the median envelope that a line reaches before its record is used, and keeps to its end."""
+RUNNING = 0.85
+"""Part of its size in the steady span that a line has in a short spectrum as long as the motor runs."""
+FOLLOWED_HZ = 12.0
+"""How far a line's frequency may lie from that of the window beside it, to be followed."""
+SPIN_UP_HZ_PER_S = 8.0
+"""How fast a frequency changes that is a spin-up's, where the steady span has less than a third of it."""
 KNOTS_S = (0.5, 0.25)
 """Distances of the knots of the phase's splines that are tried."""
 
@@ -87,6 +93,52 @@ def steady_span(time: Floats, line: Floats, length_s: float) -> tuple[float, flo
     start = float(time[first] + WINDOW_S / 2) if first else 0.0
     end = float(time[last] - WINDOW_S / 2) if last < len(time) - 1 else length_s
     return (start, end) if end - start > 0.25 * length_s else (0.0, length_s)
+
+
+def frequencies_beyond(x: Floats, rate: float, span: tuple[float, float], frequency: float) -> list[float]:
+    """Return the line's frequency in short windows before and after its steady span, as far as it runs on there.
+
+    A line that leaves the demodulator's band is cut off as if it had stopped: here it is followed from window to
+    window. A spin-up is not: it changes its frequency fast, and then levels off.
+    """
+    count = int(WINDOW_S * rate)
+    step = max(count // 4, 1)
+    starts = np.arange(0, len(x) - count + 1, step)
+    middles = (starts + count / 2) / rate
+    inside = np.flatnonzero((middles >= span[0]) & (middles <= span[1]))
+    if len(inside) in (0, len(starts)) or count < 16:
+        return []
+    window = np.hanning(count + 2)[1:-1]
+    points = 4 * _length(count)
+    hertz = np.fft.rfftfreq(points, 1 / rate)
+
+    def peak(i: int, near: float) -> tuple[float, float]:
+        size = np.abs(np.fft.rfft(x[starts[i] : starts[i] + count] * window, points))
+        at = int(np.argmax(np.where(np.abs(hertz - near) < FOLLOWED_HZ, size, 0.0)))
+        return float(hertz[at]), float(size[at])
+
+    sample = inside[np.unique(np.linspace(0, len(inside) - 1, 20).astype(int))]
+    peaks = np.array([peak(int(i), frequency) for i in sample])
+    least = RUNNING * float(np.median(peaks[:, 1]))
+    own = abs(peaks[-1, 0] - peaks[0, 0]) / max(int(inside[-1] - inside[0]), 1)
+    fastest = max(3 * own, SPIN_UP_HZ_PER_S * step / rate)
+    out: list[float] = []
+    for there, most in (
+        (range(int(inside[0]) - 1, -1, -1), fastest),
+        (range(int(inside[-1]) + 1, len(starts)), np.inf),
+    ):
+        near = float(peaks[0 if most < np.inf else -1, 0])
+        low = 0
+        for i in there:
+            hertz_here, size = peak(i, near)
+            low = low + 1 if size < least else 0
+            if low > count // step + 1:  # more windows than one jump of the frequency reaches
+                break
+            if not low:
+                if abs(hertz_here - near) <= most:
+                    out.append(hertz_here)
+                near = hertz_here
+    return out
 
 
 def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:

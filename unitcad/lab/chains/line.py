@@ -24,7 +24,11 @@ from unitcad.lab.chains.several import several_lines
 
 BAND_HZ = (60.0, 250.0)
 FAR = 4.5
-"""Robust standard deviations of the residual beyond which a sample is a drop-out."""
+"""Robust standard deviations of the residual beyond which a sample is left out, which noise exceeds here and there."""
+FALSE_ALARM = 1e-3
+"""Part of the records of normal noise alone in which a sample may be called a drop-out, at most."""
+LEAST_FOLLOWED = 1.0
+"""Signal to noise from which short spectra tell the line's frequency to a hertz."""
 ROUNDS = 6
 
 
@@ -47,10 +51,14 @@ class _Solution:
     value: complex
     residual: Floats
     mains: Floats
+    mains_beyond: Floats
+    """The mains of the fit, continued over the whole record."""
     line: Floats
     good: Bools
     widening: float
     """How much wider the line's amplitude is than if all columns were orthogonal and no sample left out."""
+    beyond_noise: bool
+    """Whether a sample that was left out lies further off than noise does."""
 
 
 def chain(table: ChainTable) -> Chain:
@@ -104,14 +112,30 @@ def fit_line(
     assert found is not None
     solution, phase, span = found
     fit = _summary(solution, time, rate, phase, span, mains, removed)
+    masked = float(np.mean(~solution.good[good & ~cut]))
     fit = replace(
         fit,
-        masked=float(np.mean(~solution.good[good & ~cut])),
+        masked=masked,
+        dropped=masked if solution.beyond_noise else 0.0,
+        missing=float(np.mean(~good)),
         clipped=part,
     )
     inside = (time >= span[0]) & (time <= span[1])
+    if fit.snr > LEAST_FOLLOWED:
+        clean = np.where(solution.good, x - solution.mains_beyond, solution.line)
+        beyond = demodulation.frequencies_beyond(clean, rate, span, fit.frequency_hz)
+        fit = replace(fit, drift=_drift_while_running(fit, beyond))
     use = inside & solution.good
     return several_lines(x - solution.mains, solution.residual, time, use, fit, rate, mains.frequency_hz) or fit
+
+
+def _drift_while_running(fit: LineFit, beyond: list[float]) -> float:
+    """Return the range of the frequency over its mean, with what it is where the line runs on beyond its span."""
+    assert fit.phase is not None
+    if not beyond:
+        return fit.drift
+    within = _frequencies(fit.phase, (fit.start_s, fit.end_s))
+    return float(np.ptp([*within, *beyond])) / fit.frequency_hz
 
 
 def _hidden(
@@ -195,9 +219,14 @@ def _best_phase(
 
 def _frequency(phase: Phase, span: tuple[float, float]) -> tuple[float, float]:
     """Return the mean of a phase's frequency over a span, and the range of its half-second means, in Hz."""
-    edges = np.linspace(*span, max(round((span[1] - span[0]) / 0.5), 2) + 1)
-    steps = np.diff(phase.at(edges)) / np.diff(edges) / (2 * np.pi)
+    steps = _frequencies(phase, span)
     return float(steps.mean()), float(np.ptp(steps))
+
+
+def _frequencies(phase: Phase, span: tuple[float, float]) -> Floats:
+    """Return the half-second means of a phase's frequency over a span, in Hz."""
+    edges = np.linspace(*span, max(round((span[1] - span[0]) / 0.5), 2) + 1)
+    return np.diff(phase.at(edges)) / np.diff(edges) / (2 * np.pi)
 
 
 def _solve(
@@ -248,9 +277,15 @@ def _solve(
         if fresh.sum() < 0.3 * len(part) or np.array_equal(fresh, use):
             break
         use = fresh
+    deviation = 1.4826 * float(np.median(np.abs(residual[use])))
+    left_out = np.abs(residual[allowed[inside] & ~beyond])
+    beyond_noise = bool(deviation > 0 and np.any(left_out > most_of_noise(len(left_out)) * deviation))
     removed, line = np.zeros(len(x)), np.zeros(len(x))
     lines = len(columns) - 2 - 2 * len(orders)
     removed[inside] = found[lines:-2] @ columns[lines:-2]
+    beyond_span = removed if span == (0.0, len(x) / rate) else np.zeros(len(x))
+    if orders and beyond_span is not removed:
+        beyond_span = found[lines:-2] @ least_squares.mains_columns(time, mains.frequency_hz, orders)
     line[inside] = found[:lines] @ columns[:lines] + found[-2:] @ columns[-2:]
     kept = known.copy()
     kept[inside] = use
@@ -258,7 +293,20 @@ def _solve(
     left[inside] = np.where(use, residual, 0.0)
     towards = found[:2] / max(float(np.hypot(*found[:2])), 1e-300)
     widening = np.sqrt(max(float(towards @ covariance[:2, :2] @ towards) * use.sum() / 2, 1.0))
-    return _Solution(complex(found[0], -found[1]), left, removed, line, kept, float(widening))
+    return _Solution(
+        complex(found[0], -found[1]), left, removed, beyond_span, line, kept, float(widening), beyond_noise
+    )
+
+
+def most_of_noise(count: int) -> float:
+    """Return how far, in robust standard deviations, the largest of `count` samples of normal noise lies at most.
+
+    One record in 1 / FALSE_ALARM exceeds it at most, with the deviation estimated from the same samples: three standard
+    errors of a median of absolute values, 1.17 over the root of the count, are added.
+    """
+    from scipy.stats import norm
+
+    return float(norm.isf(FALSE_ALARM / 4 / count)) * (1 + 3 * 1.17 / np.sqrt(count))
 
 
 def _summary(

@@ -23,9 +23,10 @@ class LineFit:
     `u_noise` is the part of `u` that the noise beside the line gives, `u_mains` the part that every repeat shares.
     `value` is the complex amplitude against `phase`. `drift` is the range of the frequency over its mean, `snr` the
     amplitude over the residual's standard deviation, `scatter` the standard deviation of the amplitude of blocks over
-    their mean. `masked` is the part of the samples left out as drop-outs, `clipped` the level at which the signal is
-    cut off over its true amplitude (infinite where it isn't). `lines` are all lines where several were fitted
-    together, the strongest first.
+    their mean. `masked` is the part of the samples left out by their residual, `dropped` the same where one of them
+    lies further off than noise does, else 0; `missing` the part that are no numbers. `clipped` is the level at which
+    the signal is cut off over its true amplitude (infinite where it isn't). `lines` are all lines where several were
+    fitted together, the strongest first.
     """
 
     amplitude: float
@@ -40,6 +41,8 @@ class LineFit:
     start_s: float
     end_s: float
     masked: float = 0.0
+    dropped: float = 0.0
+    missing: float = 0.0
     clipped: float = float("inf")
     mains_hz: float = 0.0
     """The multiple of the mains' frequency that the record can't tell from the line; 0 where there is none."""

@@ -22,7 +22,7 @@ LOW_HZ, HIGH_HZ, COMB_HZ = 40.0, 200.0, 50.0
 ASSUMED = ("order", "q", "zero_phase", "measure", "trim_s")
 """Parameters of the chain that the paper does not state."""
 MOST_MASKED = 2e-4
-"""Part of the samples that may be drop-outs in a record that the chain takes: it has no robust step."""
+"""Part of the samples that may be missing or drop-outs in a record that the chain takes: it has no robust step."""
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,11 @@ def chain(table: ChainTable) -> Chain:
 
 def _unfit(fits: list[LineFit]) -> str:
     """Return why the filters, which have no robust step, give no amplitude; empty where they do."""
-    masked = max(fit.masked for fit in fits)
-    if masked > MOST_MASKED:
-        return f"{masked:.2%} of the samples are drop-outs, which it does not leave out"
+    missing, dropped = max(fit.missing for fit in fits), max(fit.dropped for fit in fits)
+    if missing > MOST_MASKED:
+        return f"{missing:.2%} of the samples are missing, which it does not leave out"
+    if dropped > MOST_MASKED:
+        return f"{dropped:.2%} of the samples are drop-outs, which it does not leave out"
     if min(fit.clipped for fit in fits) < np.inf:
         return "samples are clipped, which it does not allow for"
     if any(fit.lines for fit in fits):

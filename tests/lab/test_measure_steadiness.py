@@ -1,0 +1,177 @@
+"""What of a record is steady, missing, dropped or looked for elsewhere, and how it is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+
+from unitcad.lab import measured_files
+from unitcad.lab.campaign import Campaign, SensorTable, UnitTable, read_campaign
+from unitcad.lab.chains.chain import ChainTable
+from unitcad.lab.chains.line import FALSE_ALARM, Mains, fit_line, most_of_noise
+from unitcad.lab.chains.paper import chain as paper_chain
+from unitcad.lab.measured_record import measure_record
+from unitcad.lab.measuring import Measured, measure
+from unitcad.lab.record_result import RecordResult
+
+RATE = 2000
+TIME = np.arange(2 * RATE) / RATE
+SENSOR = SensorTable(quantity="displacement", unit="um")
+BAND = (60.0, 250.0)
+
+
+def noise(size: float, seed: int = 1) -> np.ndarray:
+    return size * np.random.default_rng(seed).standard_normal(len(TIME))
+
+
+def line(size: float, hertz: float, seed: int = 1) -> np.ndarray:
+    return size * np.cos(2 * np.pi * hertz * TIME + seed) + noise(0.02 * size, seed)
+
+
+def record(folder: Path, x: np.ndarray, band: tuple[float, float] = BAND, lines: int = 1) -> RecordResult:
+    wavfile.write(folder / "a.wav", RATE, x.astype("<f4"))
+    campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),), chain=ChainTable(use=("line", "paper")))
+    return measure_record(folder / "a.wav", "edge", campaign, (SENSOR,), (Mains(),), band, "a.wav", lines)
+
+
+def said(result: RecordResult) -> dict[str, str]:
+    return {one.code: one.message for one in result.findings}
+
+
+@pytest.mark.parametrize(("first", "last", "least"), [(115.0, 139.0, 15.0), (120.0, 136.0, 9.0), (139.0, 115.0, 15.0)])
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_sweep_is_unsteady(tmp_path: Path, first: float, last: float, least: float, order: int) -> None:
+    """A velocity's amplitude rises with the frequency, too. The range of means over a window is below the whole one."""
+    hertz = first + (last - first) * TIME / 2
+    size = 100 * (hertz / first) ** order
+    result = record(tmp_path, size * np.cos(2 * np.pi * np.cumsum(hertz) / RATE) + noise(2.0))
+    assert "L107" in said(result)
+    assert 100 * result.drift >= least - 3 * order
+
+
+def test_a_record_that_is_steady_for_less_than_half_says_so(tmp_path: Path) -> None:
+    hertz = 115 + 12 * TIME
+    result = record(tmp_path, 100 * np.cos(2 * np.pi * np.cumsum(hertz) / RATE) + noise(2.0))
+    said_of_length = [one.message for one in result.findings if "steady for" in one.message]
+    assert said_of_length == [f"steady for {result.steady_s:.2f} s of 2.00 s; only that part was used"]
+    assert result.steady_s < 1
+    assert result.as_dict()["length_s"] == 2.0
+
+
+@pytest.mark.parametrize("at_start", [True, False])
+def test_a_frequency_that_jumps_is_unsteady(tmp_path: Path, at_start: bool) -> None:
+    hertz = np.where((TIME < 0.6) if at_start else (TIME > 1.4), 118.0, 127.0)
+    result = record(tmp_path, 100 * np.cos(2 * np.pi * np.cumsum(hertz) / RATE) + noise(2.0))
+    assert result.drift == pytest.approx(9 / 127, rel=0.1)
+    assert "L107" in said(result)
+
+
+@pytest.mark.parametrize("constant", [0.03, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_a_spin_up_is_cut_and_nothing_is_wrong(tmp_path: Path, constant: float, order: int) -> None:
+    """A motor's speed approaches its own exponentially; the amplitude with its power, by the quantity."""
+    hertz = 125 * (1 - np.exp(-TIME / constant))
+    phase = 2 * np.pi * 125 * (TIME + constant * np.exp(-TIME / constant))
+    result = record(tmp_path, 100 * (hertz / 125) ** order * np.cos(phase) + noise(2.0))
+    assert "L107" not in said(result)
+    assert 1.0 < result.steady_s < 1.9
+    assert result.amplitude_um == pytest.approx(100.0, rel=0.01)
+
+
+def test_mains_after_a_motor_that_stops_are_no_drift(tmp_path: Path) -> None:
+    """Hum as strong as the line, which runs on 5 Hz beside it."""
+    x = np.where(TIME < 1.5, line(10, 145.0), noise(0.2)) + 12 * np.cos(2 * np.pi * 150 * TIME)
+    result = record(tmp_path, x)
+    assert result.drift < 0.01
+
+
+def test_noise_alone_is_called_a_drop_out_in_one_record_of_a_thousand_at_most() -> None:
+    rng = np.random.default_rng(5)
+    for count in (200, 4000):
+        alarms = 0
+        for _ in range(20):
+            x = np.abs(rng.standard_normal((500, count)))
+            alarms += int(np.sum(x.max(axis=1) > most_of_noise(count) * 1.4826 * np.median(x, axis=1)))
+        assert alarms <= FALSE_ALARM * 10_000
+
+
+def test_the_paper_takes_clean_records_and_no_drop_out(tmp_path: Path) -> None:
+    """The first seeds whose noise has a sample that the fit leaves out are among them."""
+    chain = paper_chain(ChainTable())
+    left_out = 0
+    for seed in range(120):
+        fit = fit_line(line(100, 122.3, seed), RATE)
+        assert fit is not None
+        left_out += fit.masked > 0
+        assert chain.unfit([fit]) == ""
+    assert left_out > 0
+    for spikes in (1, 3, 20):
+        x = line(100, 122.3)
+        x[np.linspace(100, 3900, spikes).astype(int)] += 15.0  # an eighth of the amplitude, 7.5 times the noise
+        assert "drop-outs" in said(record(tmp_path, x))["L114"]
+
+
+@pytest.mark.parametrize(("part", "severity"), [(0.005, "warning"), (0.02, "warning"), (0.6, "error")])
+def test_missing_samples_are_counted_and_named(tmp_path: Path, part: float, severity: str) -> None:
+    x = line(100, 127.3)
+    x[np.random.default_rng(1).permutation(len(x))[: round(part * len(x))]] = np.nan
+    result = record(tmp_path, x)
+    (gaps,) = [one for one in result.findings if one.code == "L119"]
+    assert gaps.severity == severity
+    assert gaps.message.startswith(f"{round(part * len(x))} of 4000 samples")
+    assert result.usable == (severity == "warning")
+    if severity == "warning":
+        assert "missing" in said(result)["L114"]
+        assert result.amplitude_um == pytest.approx(100.0, abs=3 * result.u_um)
+
+
+def test_a_line_outside_the_search_is_named(tmp_path: Path) -> None:
+    near = (0.8 * 127.3, 1.2 * 127.3)
+    message = said(record(tmp_path, line(100, 160.0), near))["L111"]
+    assert message.endswith("the strongest line outside that is at about 160 Hz")
+    assert "strongest line outside" not in said(record(tmp_path, noise(1.0), near))["L111"]
+
+
+HEAD = 'name = "t"\n[sensor]\nquantity = "displacement"\nunit = "um"\n[chain]\nuse = ["line", "paper"]\n'
+UNIT = '[[unit]]\nname = "a"\nreference = ["m0.wav", "m1.wav", "m2.wav"]\nedge = ["e0.wav", "e1.wav", "e2.wav"]\n'
+
+
+def measured(folder: Path, records: dict[str, np.ndarray], text: str = HEAD + UNIT) -> Measured:
+    for name, x in records.items():
+        wavfile.write(folder / f"{name}.wav", RATE, x.astype("<f4"))
+    (folder / "c.toml").write_text(text)
+    return measure(read_campaign(folder / "c.toml"), folder)
+
+
+def test_a_unit_off_the_motors_frequency_is_said_once(tmp_path: Path) -> None:
+    records = {f"m{i}": line(300, 127.3, i) for i in range(3)} | {f"e{i}": line(100, 145.0, 9 + i) for i in range(3)}
+    assert [one.code for one in measured(tmp_path, records).findings] == ["L116"]
+
+
+def test_expected_lines_are_no_finding(tmp_path: Path) -> None:
+    def two(size: float, seed: int) -> np.ndarray:
+        return line(size, 121.3, seed) + line(0.6 * size, 127.0, seed + 50)
+
+    records = {f"m{i}": two(300, i) for i in range(3)} | {f"e{i}": two(100, 9 + i) for i in range(3)}
+    text = (HEAD + UNIT).replace(', "paper"', "")
+    assert {one.code for one in measured(tmp_path, records, text).findings} == {"L104"}
+    result = measured(tmp_path, records, text + "lines = 2\n")
+    assert result.findings == ()
+    assert len(result.levels) == 2
+    findings = measured(tmp_path, records, text + "lines = 3\n").findings
+    assert {one.message.split(":")[0] for one in findings} == {"2 lines, 3 expected"}
+
+
+def test_the_length_that_was_used_is_shown(tmp_path: Path) -> None:
+    records = {f"m{i}": line(300, 127.3, i) for i in range(3)} | {f"e{i}": line(100, 127.3, 9 + i) for i in range(3)}
+    records["e1"] = np.where(TIME > 0.6, records["e1"], 0.0)
+    result = measured(tmp_path, records)
+    (shown,) = [text for text in measured_files.lines(result) if "e1.wav" in text]
+    used = result.records["a"][4].steady_s
+    assert 1.0 < used < 1.4
+    assert f"127.30 Hz over {used:.3g} s of 2 s" in shown
+    measured_files.write(result, tmp_path / "out")
+    assert f"<td>{used:.3g} of 2</td>" in (tmp_path / "out/measure.html").read_text()
