@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from unitcad.casting.bench_pictures import SIZE, pictures
-from unitcad.casting.bench_views import ARROW, CARD, View, picture_path, views
+from unitcad.casting.bench_views import ARROW, BAND, CARD, TAPE, View, picture_path, views
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.export import composite
@@ -48,6 +48,27 @@ def test_views_name_pieces_that_there_are(source: tuple[str, ...]) -> None:
     for name, view in views(moulds).items():
         known = {body.name for body in moulds.unit} if view.group == "unit" else tools
         assert {part.name for part in view.parts} <= known, name
+
+
+@pytest.mark.parametrize("source", SETS, ids=" ".join)
+def test_a_picture_shows_the_state_that_its_words_speak_of(source: tuple[str, ...]) -> None:
+    """Nothing moves while it cures, tape stays until it is taken off, filament comes after the dry fit."""
+    moulds, casting = planned(*source)
+    shown = {picture_path(name): view for name, view in views(moulds).items()}
+    for pour in casting.pours:
+        held = False
+        for step in pour.steps:
+            view = shown.get(step.picture)
+            held = (held or step.title.startswith("Hold")) and "Take off what held" not in step.text
+            if view is None:
+                continue
+            colours = {extra.colour for extra in view.extras}
+            assert bool(colours & {TAPE, BAND}) == held, f"{step.title}: tape or bands"
+            if step.kind == "cure":
+                assert ARROW not in colours
+                assert not any(part.name == "blade" for part in view.parts)
+    fit = next(step for step in casting.preparation if step.title == "Try every cup, dry")
+    assert not any(part.name.startswith("stub") for part in shown[fit.picture].parts)
 
 
 def seen(content: bytes) -> np.ndarray:

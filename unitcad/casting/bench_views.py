@@ -74,6 +74,9 @@ def _views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
     standing = tuple(Placed(tool.name) for kind in ("base", "stub") for tool in plan.of_kind(kind))
     base = tuple(Placed(tool.name) for tool in plan.of_kind("base"))
     yield "pieces", View(tuple(Placed(tool.name) for tool in plan.tools), group="pieces")
+    first = plan.steps[0]
+    tried = Placed(first.cup, (0.0, 0.0, spec.moulds.plinth_height_mm + moulds.dimensions.core_height + CLEAR))
+    yield "dry-fit", View((*base, tried), eye=UNDER, group="moulds")
     if plan.of_kind("stub"):
         down = 1.2 * (moulds.dimensions.core_height - plate_bottom(spec))
         stubs = tuple(Placed(tool.name, (0.0, 0.0, -down)) for tool in plan.of_kind("stub"))
@@ -151,9 +154,10 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
         )
         closed, held = (*closed, Placed(step.lid)), (*pads, *_bands(moulds, step))
         filled = Extra(union(step.channels), colour)
+        yield "lid-held", View(closed, held)
         yield "inject", View((*closed, poured), (*held, filled), syringe_on=step.channels[0])
         yield "filled", View((*closed, poured), (*held, filled))
-        held = (*pads, filled)
+        held = (*held, filled)
     else:
         held = (*pads, *_tape(moulds, step))
         yield "hold", View(closed, held)
@@ -189,7 +193,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
                 (*held, *strips, _sideways(1, -0.2 * lay.cup[0], 0.0, step.rim + 9.0, lay.cup[0])),
             ),
         )
-        held = pads
+        yield "filled", View((*closed, poured), held)
     if tongues:
         out = tuple(Placed(t.name, (t.removal[0] * lay.cup[0], 0.0, 0.0)) for t in tongues if t.removal is not None)
         arrows = tuple(

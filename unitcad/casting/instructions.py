@@ -93,9 +93,15 @@ def pour_steps(
         yield BenchStep(
             f"Lid {step.index} on",
             f"Put lid {step.index} on, cut corner over cut corner, with a thin line of petroleum jelly on the rim "
-            "outside the groove. Hold it down with rubber bands round lid and base, or with a clamp, clear of sprue "
-            f"and vents. {LEVEL_AGAIN}",
+            f"{'outside the groove' if step.groove else 'near its outer edge'}.",
             picture("lid-on"),
+            minutes=fig.LIFT_MIN,
+        )
+        yield BenchStep(
+            f"{HOLD} lid {step.index} down",
+            f"{HOLD} it down with rubber bands round lid and base, or with a clamp, clear of sprue and vents. "
+            f"{LEVEL_AGAIN}",
+            picture("lid-held"),
             minutes=fig.HOLD_MIN,
         )
     else:
@@ -253,7 +259,7 @@ def _cure_and_open(
         "Cure",
         f"Let it cure, level, for {number(cure, 2)} h. Touch {touched}, not the layer, to see whether it is done: "
         f"{TACK}.",
-        picture("filled") or picture("strike"),
+        picture("filled"),
         kind="cure",
         wait_min=60 * cure,
     )

@@ -118,7 +118,7 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
         "cup and plate, all "
         "round: the same strip of paper, folded to that thickness, goes in on all four sides. A cup that rocks or "
         f"stands higher on one side: scrape plinth and seat clean, and try again.{lids}",
-        picture_path("pour1-cup-on"),
+        picture_path("dry-fit"),
         minutes=fig.DRY_FIT_MIN * cups,
     )
     if plan.of_kind("stub"):

@@ -57,7 +57,7 @@
       input.setAttribute("aria-invalid", String(value(name, kind) === undefined));
       keep();
     } });
-    return el("label", { className: "field" }, el("span", {}, label), input, unit);
+    return el("label", { className: "field" }, el("span", {}, label), el("span", { className: "value" }, input, ` ${unit}`));
   }
 
   function words(name, label) {
@@ -249,8 +249,12 @@
   // What only paper has: lines to write on.
   function written() {
     const blank = "__________";
-    const rows = data.casting.pours.map((pour) => [`Pour ${pour.index}`, `A ${blank} of ${number(pour.part_a_g, 3)} g`, `B ${blank} of ${number(pour.part_b_g, 3)} g`, `mixed at ${blank}`, `struck at ${blank}`, `opened at ${blank}`]);
-    return el("div", { className: "paper" }, table(["", "", "", "", "", ""], rows, { label: "To write down" }), el("p", {}, `Date ${blank}   height ${blank} mm   mass ${blank} g   walls ${blank} ${blank} ${blank} ${blank} mm`));
+    const rows = data.casting.pours.map((pour) => [`Pour ${pour.index}`, `A ${blank} of ${number(pour.part_a_g, 3)} g`, `B ${blank} of ${number(pour.part_b_g, 3)} g`, `mixed at ${blank}`, `struck at ${blank}`, `opened at ${blank}`, `lot ${blank}`]);
+    const short = "______";
+    const walls = data.casting.pours.map((pour) => `layer ${pour.index} ${short} ${short} ${short} ${short} mm`).join("; ");
+    const units = Array.from({ length: data.casting.cells }, (_, i) => el("p", { className: "unit" },
+      `Unit${engraved(i + 1)}: height ${short} mm, diameters ${short} ${short} mm, mass ${short} g; walls: ${walls}`));
+    return el("div", { className: "paper" }, el("p", {}, `Date ${blank}`), table(["", "", "", "", "", "", ""], rows, { label: "To write down" }), units);
   }
 
   function draw() {

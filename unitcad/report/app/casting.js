@@ -74,7 +74,7 @@
       const svg = variant.drawings[each.drawing];
       return el("div", { className: "pour" }, el("h3", {}, `Pour ${each.index}: ${partName(each.layer)}, ${each.material}`),
         svg && el("figure", {}, framed(svg, `Pour ${each.index} in section`, `Drawing of pour ${each.index}`)),
-        cards(each.figures), each.verdict && el("p", { className: "verdict" }, each.verdict), steps(each.steps),
+        cards(each.figures), steps(each.steps),
         figures(each.figures, `All figures of pour ${each.index}, with their sources`));
     };
     const print = el("button", { type: "button", className: "main", onclick: () => window.print() }, "Print the procedure");
