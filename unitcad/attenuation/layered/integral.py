@@ -58,11 +58,12 @@ class Problem:
         u_theta = self.medium.shear_transfer(k, self.omega, self.z)
         return np.array([(u_r + u_theta) / 2.0, (u_r - u_theta) / 2.0, u_z])
 
-    def static_part(self) -> np.ndarray:
-        """Return what was taken out, shape (rows, n)."""
+    def static_part(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return what was taken out, shape (rows, n), and a bound of its rounding."""
         if self.reference is None:
-            return np.zeros((len(self.load.orders), self.r.size), dtype=np.complex128)
-        return static_kernel(self.reference, self.load.direction)[:, None] * self.load.static(self.r)
+            shape = (len(self.load.orders), self.r.size)
+            return np.zeros(shape, dtype=np.complex128), np.zeros(shape)
+        return self.load.static_part(static_kernel(self.reference, self.load.direction), self.r)
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     least = float(tail.bounds[-1].max())
     rtol = max(rtol, 0.3 * least / (tail.scale or 1.0))  # what the tail leaves anyway is worth no halving
     problem = replace(bare, reference=tail.reference)
-    known = problem.static_part()
+    known, rounded = problem.static_part()
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
     count, done, exhausted, gained = 0, 0, False, 0.0
     stop = tail.start(tail.scale, rtol)
@@ -136,7 +137,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         gained += float(gains.sum())
         total, quadrature, size = total + parts.sum(0), quadrature + errors.sum(0), size + absolute.sum(0)
     rest = tail.bound(stop)
-    error = quadrature + rest + 4e-15 * size + 4e-16 * np.abs(known)
+    error = quadrature + rest + 4e-15 * size + rounded
     most = 0.5 * float(np.max(error))
     cut_short = least > most or gained + float(rest.max()) - least < most
     return Integrals(known + total, error, count, cut_short, exhausted)

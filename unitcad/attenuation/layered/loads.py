@@ -20,7 +20,7 @@ import numpy as np
 
 from unitcad.attenuation.layered.bessel import bessel, bessel_bound, moment
 from unitcad.attenuation.layered.rheology import MOST, finite
-from unitcad.attenuation.layered.statics import Direction, disc_integrals
+from unitcad.attenuation.layered.statics import Direction, disc_integrals, static_rounding
 from unitcad.errors import Refusal, unknown_name
 
 
@@ -85,6 +85,11 @@ class Point:
             raise Refusal("r", 0.0, "under a point load the surface goes to infinity: give r > 0, z > 0 or a disc")
         return np.broadcast_to(1.0 / (2.0 * np.pi * r), (len(self.orders), *np.shape(r)))
 
+    def static_part(self, kernel: Any, r: Any) -> tuple[Any, Any]:
+        """Return static displacement by `statics.static_kernel` and a bound of its rounding, a row an order."""
+        integrals = self.static(r)
+        return kernel[:, None] * integrals, static_rounding(kernel, integrals)
+
 
 @dataclass(frozen=True)
 class UniformDisc:
@@ -133,6 +138,12 @@ class UniformDisc:
     def static(self, r: Any) -> Any:
         """Return the integrals of q(k) J_n(kr) dk in m, a row an order, r in m."""
         return self.radius * disc_integrals(np.asarray(r, dtype=float) / self.radius, self.direction)
+
+    def static_part(self, kernel: Any, r: Any) -> tuple[Any, Any]:
+        """Return static displacement by `statics.static_kernel` and a bound of its rounding, a row an order."""
+        s = np.asarray(r, dtype=float) / self.radius
+        integrals = disc_integrals(s, self.direction)
+        return self.radius * kernel[:, None] * integrals, self.radius * static_rounding(kernel, integrals, s)
 
 
 Load = Point | UniformDisc

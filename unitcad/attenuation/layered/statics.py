@@ -21,14 +21,15 @@ _CATALAN = 0.915965594177219015
 
 
 def static_kernel(material: w.Material, direction: Direction) -> w.Array:
-    """Return k C(k) of a static half-space, a value a row, 1/Pa (Boussinesq and Cerruti); nu by eps.
+    """Return k C(k) of a static half-space, a value a row, 1/Pa (Boussinesq and Cerruti).
 
-    (1 - nu) / mu along the load, -(1 - 2 nu) / (2 mu) across, and 1 / mu for horizontally polarised shear.
+    (1 - nu) / mu along the load, -(1 - 2 nu) / (2 mu) across, and 1 / mu for horizontally polarised shear; by eps,
+    1 - nu is 1 / (2 (1 - eps)) and 1 - 2 nu, which keeps its digits next to nu = 1/2, is eps / (1 - eps).
     """
-    nu = (1.0 - 2.0 * material.eps) / (2.0 * (1.0 - material.eps))
-    along, across = (1.0 - nu) / material.shear, -(1.0 - 2.0 * nu) / (2.0 * material.shear)
+    eps, twice = material.eps, 2.0 * (1.0 - material.eps) * material.shear
+    along, across = 1.0 / twice, -eps / twice
     if direction == "tangential":
-        return np.array([(2.0 - nu) / (2.0 * material.shear), -nu / (2.0 * material.shear), across])
+        return np.array([(1.5 - eps) / twice, -(0.5 - eps) / twice, across])
     return np.array([across, along] if direction == "normal" else [along, across])
 
 
@@ -44,11 +45,42 @@ def disc_integrals(s: Any, direction: Direction) -> Any:
     return np.array([first, zeroth] if direction == "normal" else [zeroth, _second(s), first])
 
 
+_UNIT = 2.0**-53
+"""Of one rounding, relative."""
+
+
+def static_rounding(kernel: w.Array, integrals: Any, s: Any = None) -> Any:
+    """Bound the rounding of `static_kernel` times the integrals of a load, shape (rows, n); s: radii over the disc's.
+
+    In units of 2^-53, of the kernel's largest row (the rows of a compliance come from one solution, and what is taken
+    out of the integrand leaves the compliance's rounding in the integral: that of 1 / k all over, which adds up
+    to the closed form again) times the integral:
+
+    - 16: the moduli with their damping and eps 3 each, the solution for the compliance 6, the kernel 2, the product
+      and the sum 2;
+    - 24: the integral itself. That is what the second order needs, at m next to `_ELLIPTIC`, where its terms are seven
+      times their sum; the others are within 8, a point's within 4.
+
+    And of the kernel's largest row: s is rounded, once, and the integral follows by s times its slope. That is at most
+    three times the integral and min(s, 1 / s) (1 - ln |1 - s|): the slope is logarithmic at the rim, and a radial
+    load's 1 - s goes to 0 there.
+    """
+    size = 40.0 * np.abs(integrals)
+    if s is not None:
+        with np.errstate(divide="ignore"):
+            near = np.minimum(s, 1.0 / s) * (1.0 - np.log(np.clip(np.abs(1.0 - s), _UNIT, 1.0)))
+        size = size + 3.0 * np.abs(integrals) + near
+    return _UNIT * float(np.max(np.abs(kernel))) * size
+
+
 def _zeroth(s: Any) -> Any:
-    """Return the integral of J1(k) J0(ks) / k by Legendre's E and K."""
+    """Return the integral of J1(k) J0(ks) / k: E inside; outside s (E - (1 - m) K), m = 1 / s^2.
+
+    The latter by Carlson's R_D: for small m the difference of E and K has no digits.
+    """
     inside, outside = np.minimum(s, 1.0), np.maximum(s, 1.0)
-    m = 1.0 / outside**2
-    far = outside * (special.ellipe(m) - (1.0 - m) * special.ellipkm1(np.maximum(1.0 - m, 1e-300)))
+    rest = np.maximum((outside - 1.0) * (outside + 1.0) / outside**2, 1e-300)
+    far = rest * special.elliprd(0.0, 1.0, rest) / (3.0 * outside)
     return 2.0 / np.pi * np.where(s <= 1, special.ellipe(inside**2), far)
 
 
@@ -73,37 +105,44 @@ def _second(s: Any) -> Any:
 def _radial(s: Any) -> Any:
     """Return the integral of J1(ks) q(k) dk of the radial disc: K - E of Legendre, integrated.
 
-    The kernel of a ring of radius x is the integral of J1(kx) J1(ks) dk = 2 (K - E)(m) / (pi max(s, x)), with
+    The kernel of a ring of radius x is the integral of J1(kx) J1(ks) dk = 2 (K - E)(m) / (pi min(s, x)), with
     m = (min / max)^2.
     """
     inside, outside = np.clip(s, 1e-300, 1.0), np.maximum(s, 1.0)
-    near = inside * (_CATALAN - 0.5 + _legendre_integral(1.0, 3) - _legendre_integral(inside, 3))
-    far = outside * _legendre_integral(1.0 / outside, 0)
+    near = inside * (_CATALAN - 0.5 + _legendre_to_1(inside))
+    far = outside * _legendre_from_0(1.0 / outside)
     return 2.0 / np.pi * np.where(s > 1.0, far, np.where(s > 0.0, near, 0.0))
 
 
 _SMALL = 2.0**-30  # of x: below it (K - E)(x^2) is pi x^2 / 4
 
 
-def _legendre_integral(x: Any, power: int) -> Any:
-    """Return the integral of (K - E)(t^2) / t^power from 0 (power 0) or from `_SMALL` (power 3) to x, 0 < x <= 1."""
-    edges, sums = _legendre_sums(power)
+def _legendre_from_0(x: Any) -> Any:
+    """Return the integral of (K - E)(t^2) from 0 to x, 0 < x <= 1."""
+    edges, panels = _legendre_panels(0)
     x = np.asarray(x, dtype=float)
     whole = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, edges.size - 2)
-    integral = sums[whole] + _legendre_panel(edges[whole], x, power)
-    if power == 0:
-        return np.where(x < _SMALL, np.pi / 12.0 * x**3, integral)
-    return np.where(x < _SMALL, np.pi / 4.0 * np.log(x / _SMALL), integral)
+    sums = np.pi / 12.0 * _SMALL**3 + np.concatenate([[0.0], np.cumsum(panels)])
+    return np.where(x < _SMALL, np.pi / 12.0 * x**3, sums[whole] + _legendre_panel(edges[whole], x, 0))
+
+
+def _legendre_to_1(x: Any) -> Any:
+    """Return the integral of (K - E)(t^2) / t^3 from x to 1, 0 < x <= 1; summed from 1, where it is small."""
+    edges, panels = _legendre_panels(3)
+    x = np.asarray(x, dtype=float)
+    next_edge = np.clip(np.searchsorted(edges, x, side="right"), 1, edges.size - 1)
+    sums = np.concatenate([np.cumsum(panels[::-1])[::-1], [0.0]])
+    low = np.maximum(x, _SMALL)
+    integral = sums[next_edge] + _legendre_panel(low, edges[next_edge], 3)
+    return integral + np.pi / 4.0 * np.log(low / x)
 
 
 @cache
-def _legendre_sums(power: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return edges from `_SMALL` to 1, graded towards both ends, and the integral up to each of them."""
+def _legendre_panels(power: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return edges from `_SMALL` to 1, graded towards both ends, and the integral over (K - E) / t^power between."""
     halves = 2.0 ** -np.arange(1, 50)
     edges = np.unique([_SMALL, *halves[halves > _SMALL], *(1.0 - halves), 1.0])
-    panels = _legendre_panel(edges[:-1], edges[1:], power)
-    start = np.pi / 12.0 * _SMALL**3 if power == 0 else 0.0
-    return edges, start + np.concatenate([[0.0], np.cumsum(panels)])
+    return edges, _legendre_panel(edges[:-1], edges[1:], power)
 
 
 def _legendre_panel(low: Any, high: Any, power: int) -> Any:
@@ -111,6 +150,7 @@ def _legendre_panel(low: Any, high: Any, power: int) -> Any:
     nodes, weights = np.polynomial.legendre.leggauss(20)
     low, high = np.broadcast_arrays(low, high)
     x = ((low + high) / 2.0)[..., None] + ((high - low) / 2.0)[..., None] * nodes
-    near_one = np.maximum((1.0 - x) * (1.0 + x), 1e-300)
+    below_1 = (1.0 - high)[..., None] + ((high - low) / 2.0)[..., None] * (1.0 - nodes)  # 1 - x, with all its digits
+    near_one = np.maximum(below_1 * (1.0 + x), 1e-300)
     k_minus_e = special.elliprd(0.0, near_one, 1.0) / 3.0  # over x^2; written as a difference it loses digits
     return (high - low) / 2.0 * ((k_minus_e * x ** (2 - power)) @ weights)

@@ -1,0 +1,104 @@
+"""Where only rounding is left, the errors of a response still hold: one material at rest, known in 30 digits."""
+
+import mpmath as mp
+import numpy as np
+
+from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
+from unitcad.attenuation.layered.rheology import LossFactor
+from unitcad.attenuation.layered.statics import disc_integrals
+
+
+def _order(order: int, s: mp.mpf) -> mp.mpf:
+    """Integral of J1(k) J_order(ks) / k."""
+    if order == 0:
+        return mp.hyp2f1(0.5, -0.5, 1, s * s) if s <= 1 else mp.hyp2f1(0.5, 0.5, 2, s**-2) / (2 * s)
+    if order == 1:
+        return s / 2 if s <= 1 else 1 / (2 * s)
+    return s * s / 8 * mp.hyp2f1(0.5, 1.5, 3, s * s) if s <= 1 else mp.hyp2f1(1.5, -0.5, 2, s**-2) / (2 * s)
+
+
+def _outwards(s: mp.mpf) -> mp.mpf:
+    """Integral of J1(ks) q(k) of a traction outwards: rings of 2 (K - E) / (pi s)."""
+
+    def ring(t: mp.mpf) -> mp.mpf:
+        return mp.mpf(0) if t == 1 else t * t * mp.hyp2f1(0.5, 1.5, 2, t * t) / 2
+
+    if s > 1:
+        return s * mp.quad(ring, [0, 1 / s])
+    return s * (2 / mp.pi * (mp.catalan - mp.mpf(1) / 2) + mp.quad(lambda t: ring(t) / t**3, [s, 1]))
+
+
+def _integrals(load: Load, r: float) -> tuple[mp.mpf, mp.mpf, mp.mpf]:
+    """Integrals of q(k) J_n(kr) dk, n = 0, 1, 2."""
+    r = mp.mpf(r)
+    if isinstance(load, Point):
+        return (1 / (2 * mp.pi * r),) * 3
+    a = mp.mpf(load.radius)
+    s = r / a
+    if load.direction == "radial":
+        return a * max(1 - s, 0), a * _outwards(s), mp.mpf(0)
+    return a * _order(0, s), a * _order(1, s), a * _order(2, s)
+
+
+def _exact(load: Load, body: HalfSpace, r: float) -> list[mp.mpc]:
+    """(u_r, u_theta, u_z) by Boussinesq and Cerruti."""
+    nu, loss = mp.mpf(body.poisson_ratio), body.damping
+    mu = mp.mpf(body.youngs_modulus) / (2 * (1 + nu)) * mp.mpc(1, loss.tan_delta if loss else 0)
+    along, across = (1 - nu) / mu, -(1 - 2 * nu) / (2 * mu)
+    zeroth, first, second = _integrals(load, r)
+    if load.direction == "tangential":
+        a, b = (along + 1 / mu) / 2 * zeroth, (along - 1 / mu) / 2 * second
+        return [a - b, -(a + b), -across * first]
+    if load.direction == "radial":
+        return [along * first, mp.mpf(0), across * zeroth]
+    return [across * first, mp.mpf(0), along * zeroth]
+
+
+def _case(seed: int) -> tuple[LayeredMedium, Load, np.ndarray]:
+    """Draw a body, whole or cut in up to three layers, a load, and radii: some at the rim, some far away."""
+    rng = np.random.default_rng(seed)
+    nu = float(rng.choice([-0.9, -0.3, 0.0, 0.01, 0.3, 0.45, 0.4999999, 0.5, rng.uniform(-0.5, 0.5)]))
+    loss = LossFactor(rng.uniform(0.01, 0.5)) if rng.random() < 0.5 else None
+    body = HalfSpace(1000.0, float(10 ** rng.uniform(3, 10)), nu, loss)
+    layers = [
+        Layer(10 ** rng.uniform(-4, -2), 1000.0, body.youngs_modulus, nu, loss) for _ in range(rng.integers(0, 4))
+    ]
+    radius = float(10 ** rng.uniform(-3.3, -2))
+    load = (
+        Point(),
+        Point("radial"),
+        Point("tangential"),
+        UniformDisc(radius),
+        UniformDisc(radius, "tangential"),
+        UniformDisc(radius, "tangential"),
+        UniformDisc(radius, "radial"),
+    )[seed % 7]
+    rim = radius * (1.0 + rng.choice([-1.0, 1.0]) * 10 ** rng.uniform(-15, -1))
+    return LayeredMedium(layers, body), load, np.array([rim, *10 ** rng.uniform(-3.5, -1.3, 4)])
+
+
+def test_errors_hold_where_only_rounding_is_left_and_stay_as_small():
+    """The closed form of the static half-space, its argument, the compliance that it is taken from."""
+    for seed in range(210):
+        medium, load, r = _case(seed)
+        found = medium.response(load, 0.0, r, rtol=1e-9)
+        with mp.workdps(30):
+            exact = [_exact(load, medium.half_space, float(one)) for one in r]
+            for i, name in enumerate(("r", "theta", "z")):
+                u, bound = getattr(found, f"u_{name}"), getattr(found, f"error_{name}")
+                wrong = [float(abs(mp.mpc(complex(one)) - true[i])) for one, true in zip(u, exact, strict=True)]
+                assert np.all(wrong <= bound), (seed, name, np.max(np.array(wrong) / bound))
+        if isinstance(load, UniformDisc):  # under a point the tail takes its share of rtol
+            assert found.error < 3e-14 * max(float(abs(part)) for true in exact for part in true), seed
+
+
+def test_disc_integrals_keep_their_digits_everywhere():
+    """Far outside E and K cancel; next to the rim 1 - t does; a sum from the axis outwards is large beside the rest."""
+    s = np.concatenate([10.0 ** np.arange(-6, 6, 0.37), 1 + 10.0 ** np.arange(-15, -1), 1 - 10.0 ** np.arange(-15, -1)])
+    with mp.workdps(30):
+        outwards = [float(_outwards(mp.mpf(float(one)))) for one in s[::4]]
+        zeroth, first, second = ([float(_order(n, mp.mpf(float(one)))) for one in s] for n in range(3))
+    for found, exact in zip(disc_integrals(s, "tangential"), (zeroth, second, first), strict=True):
+        np.testing.assert_allclose(found, exact, rtol=2.7e-15)  # 24 roundings
+    np.testing.assert_allclose(disc_integrals(s[::4], "radial")[0], outwards, rtol=2.7e-15)
