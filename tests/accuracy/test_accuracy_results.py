@@ -160,6 +160,10 @@ def test_the_worst_case_on_the_front_page_is_that_of_every_table_of_its_page():
     assert "A plus after a commit" in front(list(results.values()))
 
 
+def test_the_front_page_shows_four_pictures():
+    assert front(runner.read(Path(__file__).parents[2] / "docs")).count("[![") == 4
+
+
 def test_a_bad_option_or_folder_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(runner, "run", lambda *_: pytest.fail("worked"))
     (tmp_path / "file").touch()

@@ -10,6 +10,8 @@ from unitcad.accuracy.plot import svg
 from unitcad.accuracy.result import Result, Table, kept, markdown, table_lines
 
 FOLDER = "accuracy"
+PICTURES = ("tessellation", "hankel", "stability", "models")
+"""Suites whose plot the front page shows. The others' plots are on their own pages."""
 HEAD = """# Accuracy
 
 Errors against exact or independent references, beside what they cost. `unitcad accuracy` computes all of it and writes
@@ -34,12 +36,12 @@ def write(results: Sequence[Result], folder: Path) -> None:
 
 
 def front(results: Sequence[Result]) -> str:
-    """Return the front page: what to pick, a plot of each suite that has one for it, and a line on every suite."""
+    """Return the front page: what to pick, the plots of `PICTURES`, and a line on every suite."""
     lines = [HEAD]
     picks = tuple(pick for result in results for pick in result.summary.picks)
     if picks:
         lines += ["## What to pick", "", *table_lines(Table("", ("for", "error", "pick"), picks)), ""]
-    drawn = [_drawn(result) for result in results if result.summary.plot is not None]
+    drawn = [_drawn(result) for result in results if result.suite in PICTURES and result.summary.plot is not None]
     if drawn:
         cells = [*drawn, *[""] * (len(drawn) % 2)]
         rows = [f"| {left} | {right} |" for left, right in zip(cells[::2], cells[1::2], strict=True)]

@@ -248,7 +248,11 @@ def _inputs(data: dict[str, Any]) -> tuple[Table, str] | None:
         if any(name in by for by in seen.values()):
             table.add_row(name, *[f"{by[name]:+.2f}" if name in by else "not seen" for by in seen.values()])
     unread = [name for name in names if not any(name in by for by in seen.values())]
-    return table, f"seen by none: {', '.join(unread)}" if unread else ""
+    if not unread:
+        return table, ""
+    body = any(name.startswith("tissue ") for name in unread)
+    curve = "; the body's inputs change the curve of the skin alone" if body and "layered" in data else ""
+    return table, f"read by no model of the level: {', '.join(unread)}{curve}"
 
 
 def _reasons(data: dict[str, Any]) -> list[str]:

@@ -23,6 +23,8 @@ RANGE = (0.1, 0.5, 0.9)
 """Parts of the draws that lie below the low end, the middle and the high end of what a rival predicts."""
 LEAST_BITS = 0.005
 """What is shown as 0.00 bits lies below."""
+NAMED = 3
+"""Experiments that are named beside the first one where the errors do not tell them apart."""
 Step = Callable[[str], None]
 
 
@@ -55,7 +57,7 @@ def study(lab: Lab, step: Step = lambda stage: None, store: Store | None = None)
         "most_bits": _number(predicted.most_bits),
         "experiments": [_experiment(one, predicted) for one in ranked],
         "sets": [_set(one) for one in sets],
-        "settles": settles(sets, predicted),
+        "settles": settles(sets, predicted, ranked),
     }
 
 
@@ -214,8 +216,29 @@ def tells(bits: float, error: float) -> bool:
     return bits > error and bits >= LEAST_BITS
 
 
-def settles(sets: Sequence[Ranked], predicted: Predictions) -> str:
-    """Say in a sentence or two what to measure and what is still open after it."""
+def equals(ranked: Sequence[Ranked]) -> list[Ranked]:
+    """Return the others of a ranking that say as much as the first, within the two errors (root of their squares)."""
+    first = ranked[0].information
+    return [
+        one
+        for one in ranked[1:]
+        if first.bits - one.information.bits <= np.hypot(first.error, one.information.error)
+        and tells(one.information.bits, one.information.error)
+    ]
+
+
+def _ties(ranked: Sequence[Ranked]) -> str:
+    """Say which other experiments may be as good a first one."""
+    others = equals(ranked)
+    if not others:
+        return ""
+    named = "; ".join(f"{one.ratios[0]} ({one.information.bits:.2f})" for one in others[:NAMED])
+    more = f"; and {len(others) - NAMED} more" if len(others) > NAMED else ""
+    return f" Within the errors it says no more than {named}{more}."
+
+
+def settles(sets: Sequence[Ranked], predicted: Predictions, ranked: Sequence[Ranked]) -> str:
+    """Say in a few sentences what to measure, what may be as good, and what is still open after it."""
     first, last = sets[0], sets[-1]
     most = predicted.most_bits
     if not any(tells(one.information.bits, one.information.error) for one in sets):
@@ -224,7 +247,8 @@ def settles(sets: Sequence[Ranked], predicted: Predictions) -> str:
             f"Nothing here tells these rivals apart: the best measurements say {found.bits:.2f} ± {found.error:.2f} of "
             f"{most:.2f} bits."
         )
-    text = f"Measure first {first.ratios[0]}: {first.information.bits:.2f} of {most:.2f} bits."
+    text = f"Measure first {first.ratios[0]}: {first.information.bits:.2f} ± {first.information.error:.2f} "
+    text += f"of {most:.2f} bits.{_ties(ranked)}"
     if len(sets) > 1:
         rest = "; then ".join(str(ratio) for ratio in last.ratios[1:])
         text += f" Then {rest}: {last.information.bits:.2f} bits together."
