@@ -85,6 +85,7 @@ def test_the_terminal_warns_and_batch_json_tells(tmp_path: Path) -> None:
     warning = "warning: fitted does not read layers.0.wall_mm and layers.1.wall_mm: its level stays the same"
     assert warning in done.output
     told = json.loads((tmp_path / "b" / "batch.json").read_text())["estimate"]
+    assert told["not_measured"] == {"layers.0.wall_mm": 1.25, "layers.1.wall_mm": 1.25}
     assert told["not_read"] == {
         "bush": [],
         "fitted": ["layers.0.wall_mm", "layers.1.wall_mm"],
@@ -96,3 +97,31 @@ def test_the_terminal_warns_and_batch_json_tells(tmp_path: Path) -> None:
     assert warning in CliRunner().invoke(app, ["batch", "thickness", "--dry-run"]).output
     quiet = CliRunner().invoke(app, ["batch", "thickness", "--dry-run", "--only", "unit"])
     assert "does not read" not in quiet.output
+
+
+@pytest.mark.parametrize(
+    ("values", "lengths"),
+    [
+        ({"layers__0__wall_mm": [1.25, 1.5]}, {"layers.0.wall_mm": 1.25}),
+        ({"layers__0__wall_mm": [1.25]}, {}),
+        ({"diameter_mm": [14.0, 15.0], "layers__1__cap_mm": [1.0]}, {"diameter_mm": 14.0, "layers.1.cap_mm": 1.25}),
+        ({"layers__0__material": ["ecoflex-00-10", "dragon-skin-10"]}, {}),
+    ],
+)
+def test_swept_lengths_that_every_measured_unit_had_alike_are_named(
+    values: dict[str, Any], lengths: dict[str, float]
+) -> None:
+    sweep = swept(**values)
+    found = swept_estimate(sweep, sweep.count)
+    assert found is not None
+    assert found.not_measured == lengths
+    told = [line for line in warnings(found) if line.startswith("every measured unit had")]
+    assert len(told) == len(set(lengths.values()))
+    assert all(any(path in line and f"{length:g} mm" in line for line in told) for path, length in lengths.items())
+
+
+def test_a_control_s_wall_is_that_of_the_measured_controls() -> None:
+    sweep = swept("single-embedded", layers__0__wall_mm=[2.0, 2.5])
+    found = swept_estimate(sweep, sweep.count)
+    assert found is not None
+    assert found.not_measured == {"layers.0.wall_mm": 2.5}

@@ -1,4 +1,8 @@
-"""Which swept keys do not enter a model of the edge level: levels that stay the same are no result of the sweep."""
+"""Which swept keys do not enter a model of the edge level, and which no measurement supports.
+
+Levels that stay the same are no result of the sweep. Of a length that every measured unit had alike, how a level
+changes with it is a model's word alone.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +20,7 @@ from unitcad.attenuation.edge.fitted_models import edge_levels, stored
 from unitcad.attenuation.edge.variant_units import nominal
 from unitcad.attenuation.inputs import EstimateInput
 from unitcad.batch.sweep import Sweep
+from unitcad.catalogue import measurements
 from unitcad.errors import UnitcadError
 from unitcad.estimating import closed_forms, estimate_input, fit_of
 from unitcad.spec import Spec
@@ -27,16 +32,22 @@ _OF_THE_UNIT = re.compile(
     r"|estimate\.(frequency_hz|tissue|moduli))(\.|$)"
 )
 """Keys that a person may expect a level to depend on: not those of tooling, casting and files."""
+_LENGTH = re.compile(r"diameter_mm|layers\.\d+\.(wall|cap)_mm")
+"""Lengths that every measured unit of one number of layers had alike."""
 _STARTS, _VALUES = 4, 8
 """Variants from which a key is changed alone, and values of it that are tried."""
 _SAME = 1e-9
 
 
 class SweptEstimate(Struct, frozen=True):
-    """What a batch's levels are worth: each model's typical error, a factor, the best first, and the keys not read."""
+    """What a batch's levels are worth: each model's typical error, a factor, the best first, and the keys not read.
+
+    `not_measured`: swept lengths in mm with values that no measured unit had, each with the one that all of them had.
+    """
 
     typical_error: dict[str, float]
     not_read: dict[str, list[str]]
+    not_measured: dict[str, float]
 
 
 def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
@@ -58,11 +69,28 @@ def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
             told = [group[model] for group in groups if len(group[model]) > 1]
             if told and all(np.ptp(np.log(levels)) < _SAME for levels in told):
                 unread[model].append(path)
-    errors = typical_errors(fit_of(starts[0][1]), starts[0][1].estimate.moduli)
+    fit = fit_of(starts[0][1])
+    errors = typical_errors(fit, starts[0][1].estimate.moduli)
     ordered = sorted(models, key=lambda model: errors[model])
     return SweptEstimate(
-        {model: float(f"{errors[model]:.6g}") for model in ordered}, {model: unread[model] for model in ordered}
+        {model: float(f"{errors[model]:.6g}") for model in ordered},
+        {model: unread[model] for model in ordered},
+        {} if fit else _not_measured(sweep, [spec for _, spec in starts]),  # a lab's units may have other lengths
     )
+
+
+def _not_measured(sweep: Sweep, specs: Sequence[Spec]) -> dict[str, float]:
+    """Return the swept lengths with values that no measured unit of as many layers had, and the one that these had."""
+    shared, found = measurements().unit, dict[str, float]()
+    walls = [2 * shared.wall_mm / count for count in sorted({len(spec.layers) for spec in specs})]
+    for path in sweep.paths:
+        if not _LENGTH.fullmatch(path):
+            continue
+        measured = [shared.diameter_mm] if path == "diameter_mm" else walls
+        values = [value for value in _values(sweep, path) if isinstance(value, int | float)]
+        if any(all(abs(value - one) > _SAME for one in measured) for value in values):
+            found[path] = measured[-1]
+    return found
 
 
 def warnings(found: SweptEstimate | None) -> list[str]:
@@ -79,6 +107,12 @@ def warnings(found: SweptEstimate | None) -> list[str]:
         who = "no model of the edge level reads" if every else f"{listed(models)} {_do(models)} not read"
         lines.append(
             f"{who} {listed(paths)}: {'the' if every else 'their' if len(models) > 1 else 'its'} level stays the same"
+        )
+    for length in dict.fromkeys(found.not_measured.values()):
+        same = [path for path, one in found.not_measured.items() if one == length]
+        lines.append(
+            f"every measured unit had {length:g} mm for {listed(same)}: no measurement supports how a level changes "
+            f"with {'it' if len(same) == 1 else 'them'}, and the error there is not known"
         )
     return lines
 

@@ -23,10 +23,14 @@ class ListedVariant(Struct):
 
 
 class SweptLevels(Struct):
-    """Each model's typical error in a batch, a factor, and the swept keys that it does not read."""
+    """Each model's typical error in a batch, a factor, and the swept keys that it does not read.
+
+    `not_measured`: swept lengths with the one value, mm, that every measured unit had; earlier batches have none.
+    """
 
     typical_error: dict[str, float]
     not_read: dict[str, list[str]]
+    not_measured: dict[str, float] = {}
 
 
 class BatchFile(Struct):
