@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
+from unitcad.errors import Refusal
 from unitcad.lab import measured_files
 from unitcad.lab.campaign import Campaign, SensorTable, UnitTable, read_campaign
 from unitcad.lab.chains.chain import ChainTable
 from unitcad.lab.chains.line import FALSE_ALARM, Mains, fit_line, most_of_noise
 from unitcad.lab.chains.paper import chain as paper_chain
+from unitcad.lab.measured_charts import charts_of
 from unitcad.lab.measured_record import measure_record
 from unitcad.lab.measuring import Measured, measure
+from unitcad.lab.readers.formats import expect_ending
 from unitcad.lab.record_result import RecordResult
 
 RATE = 2000
@@ -175,3 +178,28 @@ def test_the_length_that_was_used_is_shown(tmp_path: Path) -> None:
     assert f"127.30 Hz over {used:.3g} s of 2 s" in shown
     measured_files.write(result, tmp_path / "out")
     assert f"<td>{used:.3g} of 2</td>" in (tmp_path / "out/measure.html").read_text()
+
+
+def test_charts_say_what_is_shaded_and_a_single_place_has_a_wide_axis(tmp_path: Path) -> None:
+    records = {f"m{i}": line(300, 127.3, i) for i in range(3)} | {f"e{i}": line(100, 127.3, 9 + i) for i in range(3)}
+    charts = charts_of(measured(tmp_path, records))
+    assert ">10</text>" in charts["decay-01.svg"]
+    assert "0.025" not in charts["decay-01.svg"]
+    spectrum = charts["record-01-spectrum.svg"]
+    assert "pass band of paper" in spectrum
+    drawn = [float(pair.split(",")[0]) for pair in spectrum.split('points="')[1].split('"')[0].split()]
+    assert min(drawn) < 72 + 3
+    assert max(drawn) > 760 - 210 - 3
+
+
+def test_channels_that_have_one_name_are_asked_for_by_number(tmp_path: Path) -> None:
+    wavfile.write(tmp_path / "a.wav", RATE, np.column_stack([line(100, 127.3)] * 2).astype("<f4"))
+    campaign = Campaign(name="t", sensor=SENSOR, unit=(UnitTable(name="a"),))
+    with pytest.raises(Refusal, match=r"a name or a number: .* has 2 channels: 1 channel 1, 2 channel 2"):
+        measure_record(tmp_path / "a.wav", "edge", campaign, (SENSOR,), (Mains(),), BAND, "a.wav")
+
+
+def test_a_file_without_a_reader_is_named(tmp_path: Path) -> None:
+    with pytest.raises(Refusal) as refused:
+        expect_ending(tmp_path / "scan 3.svd", "unit.0.edge.1")
+    assert refused.value.value == "scan 3.svd"

@@ -42,10 +42,16 @@ def chart(
     log_x: bool = False,
     log_y: bool = False,
     shaded: tuple[float, float] | None = None,
+    shaded_name: str = "",
+    x_range: tuple[float, float] | None = None,
 ) -> str:
-    """Return the chart as an SVG document; `shaded` marks a range of x. What an axis can't show is left out."""
+    """Return the chart as an SVG document. What an axis can't show is left out.
+
+    `shaded` marks a range of x, which the legend names where `shaded_name` does; `x_range` is what a linear axis of x
+    shows, where the series don't say it.
+    """
     kept = [(one, _kept(one, log_x, log_y)) for one in series]
-    across = _axis(np.concatenate([xy[0] for _, xy in kept] or [np.zeros(0)]), log_x, LEFT, WIDTH - RIGHT)
+    across = _axis(np.concatenate([xy[0] for _, xy in kept] or [np.zeros(0)]), log_x, LEFT, WIDTH - RIGHT, x_range)
     ends = [np.ravel(np.asarray(one.bars, float)) for one in series]
     up = _axis(np.concatenate([*(xy[1] for _, xy in kept), *ends] or [np.zeros(0)]), log_y, HEIGHT - BOTTOM, TOP)
     parts = [
@@ -84,6 +90,11 @@ def chart(
             parts.append(_text(WIDTH - RIGHT + 30, y, line))
             y += 15
         y += 4
+    if shaded and shaded_name:
+        parts.append(f'<rect x="{WIDTH - RIGHT + 10}" y="{y - 10}" width="14" height="12" fill="#f3ead8"/>')
+        for line in textwrap.wrap(shaded_name, LEGEND_LETTERS):
+            parts.append(_text(WIDTH - RIGHT + 30, y, line))
+            y += 15
     return "\n".join([*parts, "</svg>", ""])
 
 
@@ -101,7 +112,7 @@ def _kept(one: Series, log_x: bool, log_y: bool) -> tuple[np.ndarray, np.ndarray
     return x[::step], y[::step]
 
 
-def _axis(values: np.ndarray, log: bool, start: float, end: float) -> _Axis:
+def _axis(values: np.ndarray, log: bool, start: float, end: float, whole: tuple[float, float] | None = None) -> _Axis:
     low, high = (float(values.min()), float(values.max())) if values.size else (1.0, 10.0)
     if log:
         first, last = math.floor(math.log10(low) + 1e-9), math.ceil(math.log10(high) - 1e-9)
@@ -109,6 +120,13 @@ def _axis(values: np.ndarray, log: bool, start: float, end: float) -> _Axis:
         step = max(1, math.ceil((last - first) / 8))
         ticks = [(10.0**d, f"{10.0**d:g}") for d in range(first, last + 1, step)]
         return _Axis(lambda v: start + (math.log10(v) - first) / (last - first) * (end - start), ticks)
+    if whole is not None and whole[1] > whole[0]:
+        low, high = whole
+        unit = 10.0 ** math.floor(math.log10((high - low) / 6))
+        step = next(unit * k for k in (1, 2, 5, 10) if unit * k >= (high - low) / 6)
+        inside = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
+        ticks = [(k * step, f"{k * step:.6g}") for k in inside]
+        return _Axis(lambda v: start + (v - low) / (high - low) * (end - start), ticks)
     low, high = min(low, 0.0) if low > 0 and low < 0.3 * high else low, high if high > low else low + 1.0
     unit = 10.0 ** math.floor(math.log10((high - low) / 6))
     step = next(unit * k for k in (1, 2, 5, 10) if unit * k >= (high - low) / 6)

@@ -17,8 +17,10 @@ STRETCHES = 100
 """Parts of a record of which its chart shows the least and the largest value."""
 BESIDE_HZ = 30.0
 """To either side of the lines, what a spectrum shows: one multiple of 50 Hz at least."""
-APART = 0.012
-"""Part of the largest distance by which the levels of two chains are drawn apart, so that no bar covers another."""
+APART = 0.008
+"""Part of the axis by which the levels of two chains are drawn apart, so that no bar covers another."""
+LEAST_WIDE_MM = 10.0
+"""What the axis of distances shows at least: beside it APART is no distance."""
 
 
 def charts_of(result: Measured) -> dict[str, str]:
@@ -81,10 +83,13 @@ def _spectrum_chart(record: RecordResult, chains: tuple[Chain, ...]) -> str:
             bars = [(floor, float(size.max()))] * len(zeros)
             name = f"zeros of {chain.name}'s comb"
             series.append(Series(name, zeros, np.full(len(zeros), floor), points=True, bars=bars))
-    band = next((chain.pass_hz for chain in chains if chain.pass_hz), None)
+    filtered = next((chain for chain in chains if chain.pass_hz), None)
     return chart(
-        series, f"{record.file}: spectrum", "frequency, Hz", f"amplitude, {record.unit}", log_y=True, shaded=band
-    )
+        series, f"{record.file}: spectrum", "frequency, Hz", f"amplitude, {record.unit}", log_y=True,
+        shaded=filtered.pass_hz if filtered else None,
+        shaded_name=f"pass band of {filtered.name}" if filtered else "",
+        x_range=(float(frequency[0]), float(frequency[-1])) if len(frequency) else None,
+    )  # fmt: skip
 
 
 def _decay_chart(name: str, levels: list[PlaceLevel]) -> str:
@@ -95,12 +100,13 @@ def _decay_chart(name: str, levels: list[PlaceLevel]) -> str:
         return f"{one.chain}, {one.frequency_hz:.1f} Hz" if several else one.chain
 
     kinds = {key: list(there) for key, there in groupby(sorted(levels, key=kind), kind)}
-    wide = max(one.distance_mm for one in levels) or 1.0
+    wide = max(LEAST_WIDE_MM, *(one.distance_mm for one in levels))
     series = []
     for i, (key, there) in enumerate(kinds.items()):
         there.sort(key=lambda one: one.distance_mm)
-        shift = APART * wide * i
+        shift = APART * wide * (i - (len(kinds) - 1) / 2)
         x = [one.distance_mm + shift for one in there]
         bars = [(one.level.low, one.level.high) for one in there]
         series.append(Series(f"{key}, 95 % interval", x, [one.level.value for one in there], points=True, bars=bars))
-    return chart(series, f"{name}: level over the distance from the edge", "distance, mm", "level", log_y=True)
+    title = f"{name}: level over the distance from the edge"
+    return chart(series, title, "distance, mm", "level", log_y=True, x_range=(-0.03 * wide, 1.03 * wide))

@@ -42,7 +42,9 @@ def page(result: Measured, charts: dict[str, str]) -> str:
         f"<title>{name}</title><style>{_STYLE}</style></head><body><h1>{name}</h1>"
         f"<p>{escape(result.campaign.note)}</p><h2>Levels</h2>{_levels(result)}{assumed}{decay}"
         f"<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
-        f"<h2>Records</h2>{_records(result)}<h2>Charts of the records</h2>{figures}</body></html>\n"
+        f"<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "
+        f"comes from the scatter of the repeats.</p>{_records(result)}"
+        f"<h2>Charts of the records</h2>{figures}</body></html>\n"
     )
 
 

@@ -117,8 +117,9 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
             continue
         others = [i for i in range(len(recording.channels)) if i != time]
         if len(others) != 1:
-            names = ", ".join(recording.channels[i].name for i in others)
-            raise Refusal(f"recording.{key}", None, f"is needed: {shown} has {len(others)} channels: {names}")
+            names = ", ".join(f"{i + 1} {recording.channels[i].name}" for i in others)
+            limit = f"is needed, a name or a number: {shown} has {len(others)} channels: {names}"
+            raise Refusal(f"recording.{key}", None, limit, others[0] + 1 if others else None)
         columns.append(others[0])
     rate, scale = _rate(recording, table, time, columns[0], shown)
     if table.rate_hz is not None:

@@ -58,9 +58,9 @@ def expect_ending(path: Path, field: str) -> str:
     """Return the ending of a file's name, in small letters. Raises Unreadable for one that no reader has."""
     ending = path.suffix.lower()
     if ending in VENDOR:
-        raise Unreadable(field, ending, "Polytec's own format is read by Polytec's library alone: export UFF")
+        raise Unreadable(field, path.name, "Polytec's own format is read by Polytec's library alone: export UFF")
     if ending not in by_ending():
-        raise Unreadable(field, ending, f"no reader; known endings: {', '.join((*by_ending(), *VENDOR))}", ".csv")
+        raise Unreadable(field, path.name, f"no reader; known endings: {', '.join((*by_ending(), *VENDOR))}", ".csv")
     return ending
 
 
