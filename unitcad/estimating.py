@@ -41,7 +41,8 @@ def estimate_spec(
     Raises `Refusal` where no frequency is known, for an unknown material or tissue, and for values no body has.
     """
     variant, asked = estimate_input(spec, frequency_hz), tuple(models or spec.estimate.models)
-    data = estimate(variant, closed_forms(asked), layered, fit_of(spec))
+    stack = spec.estimate.stack if models is None and spec.estimate.fit is None else None
+    data = estimate(variant, closed_forms(asked), layered, fit_of(spec), stack)
     if "fit" in data:
         data["fit"] = {**_fit_file(spec), **data["fit"]}
     if MECHANICS in asked:

@@ -188,7 +188,7 @@ def test_three_per_cent_is_answered_with_the_least_that_is_possible() -> None:
     with pytest.raises(Refusal) as refused:
         invert(_target(PAPER, edge_max=0.03), check=False)
     assert refused.value.nearest == pytest.approx(0.0434, abs=0.0003)
-    assert "4.3 % of the motor's amplitude is the least with it (encapsulating ecoflex-00-10/dragon-skin-30" in str(
+    assert "4.34 % of the motor's amplitude is the least with it (encapsulating ecoflex-00-10/dragon-skin-30" in str(
         refused.value
     )
 

@@ -74,7 +74,7 @@ def _print(data: dict[str, Any]) -> None:
     for one in data["proposals"]:
         if one["rank"] == other:
             screen.print(f"{words.OTHERS}:", soft_wrap=True)
-        screen.print(Text(f"{one['rank']}. {one['label']}", style="bold"), soft_wrap=True)
+        screen.print(Text(f"{one['rank']}. {words.title(one)}", style="bold"), soft_wrap=True)
         screen.print(f"   {words.level_line(one)}", soft_wrap=True)
         for line in [words.size_line(one), *words.reasons(one)]:
             screen.print(f"   - {line}", soft_wrap=True)

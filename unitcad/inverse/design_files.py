@@ -29,8 +29,8 @@ from unitcad.text import cell, markdown, number
 SPECS = "specs"
 OWN = ("ranking.csv", "front.svg", "design.md", "design.html", "design.json", SPECS)
 _COLUMNS = (
-    "place", "name", "design", "motor", "materials", "walls_mm", "caps_mm", "diameter_mm", "height_mm", "mass_g",
-    "cure_hours", "crosstalk_ratio", "probability", "edge_p10", "edge_p50", "edge_p90", "over",
+    "place", "proposal", "name", "design", "motor", "materials", "walls_mm", "caps_mm", "diameter_mm", "height_mm",
+    "mass_g", "cure_hours", "crosstalk_ratio", "probability", "edge_p10", "edge_p50", "edge_p90", "measured", "over",
 )  # fmt: skip
 
 
@@ -106,22 +106,25 @@ def ranking(made: Inversion) -> str:
     low, middle, high = found.range
     asked, text = limits(found), io.StringIO()
     over = {int(row): [limit.key for limit in asked if not limit.met[row]] for row in outside}
+    numbers_of = {one["name"]: one["rank"] for one in made.data["proposals"]}
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
     for place, row in enumerate([*ordered(found, made.rows), *ordered(found, outside)], 1):
-        lengths = found.lengths(row)
+        lengths, name, own = found.lengths(row), name_of(found, int(row)), made.measured.get(int(row))
         numbers = [found.diameter_mm, found.height_mm, found.mass_g, found.hours, found.crosstalk]
         numbers += [found.probability, low, middle, high]
         writer.writerow(
             [
                 place if int(row) not in over else "",
-                cell(name_of(found, int(row))),
+                numbers_of.get(name, ""),
+                cell(name),
                 lengths.design,
                 cell(lengths.motor),
                 cell(" ".join(found.materials(row))),
                 " ".join(f"{wall:g}" for wall in lengths.walls),
                 " ".join(f"{cap:g}" for cap in lengths.caps),
                 *("" if np.isnan(each[row]) else number(each[row], 4) for each in numbers),
+                number(own["level"], 4) if own else "",
                 " ".join(over.get(int(row), [])),
             ]
         )
@@ -136,7 +139,7 @@ def page(data: Mapping[str, Any]) -> str:
     for one in data["proposals"]:
         if one["rank"] == other:
             lines += [f"*{words.OTHERS}.*", ""]
-        lines += [f"## {one['rank']}. {markdown(one['label'])}", "", f"**{markdown(words.level_line(one))}**", ""]
+        lines += [f"## {one['rank']}. {markdown(words.title(one))}", "", f"**{markdown(words.level_line(one))}**", ""]
         lines += [f"- {markdown(line)}" for line in [words.size_line(one), *words.reasons(one)]]
         lines += [f"- build it: `unitcad build {one['file']}`", ""]
     if data["decides"]:

@@ -56,7 +56,7 @@ def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
         ]
         if one["rank"] == other:
             rows.append(f'<tr><td></td><td colspan="{len(_HEAD) - 1}">{escape(words.OTHERS)}</td></tr>')
-        link = f'<a href="#proposal-{one["rank"]}">{escape(one["label"])}</a>'
+        link = f'<a href="#proposal-{one["rank"]}">{escape(words.title(one))}</a>'
         numbers = "".join(f"<td{_NUMBER}>{escape(cell)}</td>" for cell in cells)
         rows.append(f"<tr><td>{one['rank']}</td><td>{link}</td>{numbers}</tr>")
     return (
@@ -72,7 +72,7 @@ def _measured(measured: Mapping[str, Any]) -> str:
 def _proposal(one: Mapping[str, Any], section: str) -> str:
     return "\n".join(
         [
-            f'<section id="proposal-{one["rank"]}"><h2>{one["rank"]}. {escape(one["label"])}</h2>',
+            f'<section id="proposal-{one["rank"]}"><h2>{one["rank"]}. {escape(words.title(one))}</h2>',
             f"<p><strong>{escape(words.level_line(one))}</strong></p>",
             f"<p>{escape(words.size_line(one))}</p>",
             _list(words.reasons(one)),

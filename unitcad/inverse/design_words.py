@@ -71,6 +71,11 @@ def not_castable_lines(data: Mapping[str, Any]) -> list[str]:
     return [f"can't be cast, {one['candidate']}: {'; '.join(one['failed'])}" for one in data["not_castable"]]
 
 
+def title(one: Mapping[str, Any]) -> str:
+    """Return what a candidate is, and whether a unit of its lengths was never measured."""
+    return one["label"] + ("" if one["lengths_measured"] else " (not measured at these lengths)")
+
+
 def level_line(one: Mapping[str, Any]) -> str:
     """Return a proposal's measurement, if there is one, then its probability and range."""
     measured, first = one["measured"], ""
@@ -104,7 +109,7 @@ def size_line(one: Mapping[str, Any]) -> str:
     checks = "moulds not checked" if one["checks"] is None else f"moulds pass at {one['checks']} places"
     parts = [
         f"{number(one['diameter_mm'], 3)} mm wide, {number(one['height_mm'], 3)} mm high",
-        f"{number(one['mass_g'], 2)} g",
+        f"{number(one['mass_g'], 3)} g with motor",
         f"out of the mould in {number(one['cure_hours'], 3)} h",
         checks,
     ]
@@ -128,6 +133,11 @@ def reasons(one: Mapping[str, Any]) -> list[str]:
     if max(by_model.values()) - min(by_model.values()) > _APART:
         lines.append(f"the models differ: {listed(f'{name} {share(p)}' for name, p in by_model.items())}")
     lines.append(one["lengths_gain"])
+    if crosstalk := one.get("crosstalk"):
+        lines.append(
+            f"{percent(crosstalk['neighbour'])} of the motor's amplitude is expected at the neighbour; the crosstalk "
+            f"ratio is the same for every unit of {number(one['diameter_mm'], 3)} mm and tells no designs apart"
+        )
     return [*lines, *one["remarks"]]
 
 
@@ -135,7 +145,9 @@ def explanation_lines(data: Mapping[str, Any]) -> list[str]:
     """Return what `explain` found."""
     head = data["name"]
     if data["probability"] is not None:
-        place = f", place {data['rank']} of {data['of']}" if data["rank"] else ""
+        among = data.get("among", True)
+        place = f", place {data['rank']} of {data['of']}" if among else f", place {data['rank']} if it were tried"
+        place = place if data["rank"] else ""
         head += (
             f": probability {share(data['probability'])}, {percent(data['edge']['p10'])} to "
             f"{percent(data['edge']['p90'])} at the edge (10 to 90 %){place}"

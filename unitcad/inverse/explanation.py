@@ -79,6 +79,7 @@ def _of_spec(made: Inversion, spec: Spec) -> dict[str, Any]:
         "name": spec.name,
         "rank": None,
         "of": int(made.rows.size),
+        "among": not reasons,
         "probability": None,
         "edge": None,
     }
@@ -143,6 +144,13 @@ def _not_varied(found: Candidates, spec: Spec) -> list[str]:
     outside = [layer.wall_mm for layer in spec.layers if not low - 1e-9 <= layer.wall_mm <= high + 1e-9]
     if outside:
         reasons.append(f"vary.wall_mm goes from {low:g} to {high:g} mm, and a wall is {outside[0]:g}")
+    tried = sorted({one.lengths.diameter for one in found.geometries})
+    low, high = vary.diameter_mm or (tried[0], tried[-1])
+    if not low - 1e-9 <= spec.diameter_mm <= high + 1e-9:
+        span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        reasons.append(
+            f"diameters of {span} mm are tried, and this one's is {spec.diameter_mm:g}: see vary.diameter_mm"
+        )
     names = [layer.material for layer in spec.layers]
     if any(a == b for a, b in itertools.pairwise(names)):
         reasons.append("neighbouring layers are of one silicone, which is tried as one layer")

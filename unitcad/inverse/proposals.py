@@ -26,7 +26,7 @@ from unitcad.inverse.geometries import Lengths, Say, spec_data
 from unitcad.inverse.own_measurement import measured_rows, measurement
 from unitcad.inverse.ranking_order import ALIKE, Kind, kinds
 from unitcad.inverse.refinement import alone, refined
-from unitcad.inverse.reliance import reliance
+from unitcad.inverse.reliance import length_notes, reliance
 from unitcad.inverse.target_file import Target
 from unitcad.inverse.wishes import check_level, label, limits, within
 from unitcad.spec import Spec
@@ -42,12 +42,16 @@ TRIES = 3
 
 @dataclass(frozen=True)
 class Inversion:
-    """What was found: every candidate, the rows within the limits, the specs of the proposals, all as data."""
+    """What was found: every candidate, the rows within the limits, the specs of the proposals, all as data.
+
+    `measured`: the measurements of rows that were measured themselves.
+    """
 
     found: Candidates
     rows: np.ndarray
     specs: tuple[Spec, ...]
     data: dict[str, Any]
+    measured: dict[int, dict[str, Any]]
 
 
 def invert(target: Target, check: bool = True, say: Say = lambda stage: None) -> Inversion:
@@ -72,7 +76,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
         "wish": {key: value for key, value in _wish(target).items() if value is not None},
         "tried": {
             "candidates": found.count,
-            "geometries": len(found.geometries),
+            "geometries": int(np.unique(found.geometry).size),
             "within_limits": int(rows.size),
             "refused": [
                 {"what": what, "count": one.count, "first": one.first} for what, one in sorted(found.refused.items())
@@ -85,7 +89,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
         "decides": decides,
         "decision": decision,
     }
-    return Inversion(found, rows, specs, rounded(data))
+    return Inversion(found, rows, specs, rounded(data), measured_rows(found, np.arange(found.count)))
 
 
 def models_block(target: Target) -> dict[str, Any]:
@@ -199,6 +203,7 @@ def proposal(
         "refined": refined,
         "within": [limit.shown(row) for limit in limits(found)],
         "checks": checked,
+        "lengths_measured": not length_notes(found, lengths),
         "relies_on": reliance(found, row),
         "lengths_gain": _gain(found, kind),
         "remarks": [*warnings(spec), *_scale(spec, found, row)],
@@ -212,6 +217,7 @@ def proposal(
             "pitch_mm": wish.pitch_mm,
             "drive": variant.drive,
             "range": CROSSTALK_RANGE,
+            "neighbour": (ratio.value or ratio.middle) * middle,
         }
         if wish.crosstalk_ratio_max is not None and (ratio.high or 0.0) > wish.crosstalk_ratio_max:
             data["remarks"].append(

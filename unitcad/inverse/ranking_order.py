@@ -34,9 +34,9 @@ def novelty(found: Candidates) -> np.ndarray:
 
 
 def ordered(found: Candidates, rows: np.ndarray) -> np.ndarray:
-    """Return rows by their probability to two digits, then by what they rely on, then by mass."""
+    """Return rows by their probability, equal ones by what they rely on, then by mass."""
     p, new = found.probability[rows], novelty(found)[rows]
-    return rows[np.lexsort((rows, np.round(found.mass_g[rows], 6), new, -np.round(p, 2)))]
+    return rows[np.lexsort((rows, np.round(found.mass_g[rows], 6), new, -np.round(p, 6)))]
 
 
 def kinds(found: Candidates, rows: np.ndarray) -> list[Kind]:

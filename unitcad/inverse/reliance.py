@@ -7,15 +7,16 @@ import numpy as np
 from unitcad.catalogue import Measurements, measurements, motors
 from unitcad.inverse.candidates import Candidates
 from unitcad.inverse.geometries import Lengths
-from unitcad.text import listed
+from unitcad.text import listed, number
 
 BLIND: dict[str, tuple[str, ...]] = {
-    "crossings": ("wall", "cap", "diameter"),
-    "fitted": ("wall", "cap", "diameter"),
+    "crossings": ("wall", "cap", "diameter", "frequency"),
+    "fitted": ("wall", "cap", "diameter", "frequency"),
+    "bush": ("frequency",),
     "paper": ("cap", "diameter"),
     "consistent": ("cap", "diameter"),
 }
-"""Lengths that a model does not read."""
+"""Lengths and other inputs that a model does not read."""
 _SAME = 1e-6
 
 
@@ -28,7 +29,8 @@ def length_notes(found: Candidates, lengths: Lengths) -> list[str]:
     """Return what is to be said of walls, caps and diameter that no measured unit had, and which models read them."""
     shared, count = measurements().unit, len(lengths.walls)
     wall = 2 * shared.wall_mm / count
-    of = f"the measured units of {_layers(count)} had {wall:g} mm each"
+    had = f"the measured units of {_layers(count)} had {wall:g} mm each"
+    of = had if count in _counts(measurements()) else f"no unit of {_layers(count)} was measured"
     notes = []
     if any(abs(each - wall) > _SAME for each in lengths.walls):
         notes.append(f"walls of {_mm(lengths.walls)}: {of}{_unread(found, 'wall')}")
@@ -43,7 +45,7 @@ def length_notes(found: Candidates, lengths: Lengths) -> list[str]:
 def _kinds(found: Candidates, row: int, data: Measurements) -> list[str]:
     lengths, names = found.lengths(row), found.materials(row)
     notes = []
-    counts = {1, *(len(unit.split("/")) for design in data.designs.values() for unit in design.levels)}
+    counts = _counts(data)
     if len(names) not in counts:
         measured = listed(str(count) for count in sorted(counts))
         notes.append(f"{_layers(len(names))}: only units of {measured} layers were measured")
@@ -63,8 +65,14 @@ def _kinds(found: Candidates, row: int, data: Measurements) -> list[str]:
         notes.append(f"the motor {lengths.motor} ({size}): every unit was measured with {data.unit.motor}")
     variant = found.geometries[found.geometry[row]].variant
     if not np.isclose(variant.frequency.middle, data.unit.frequency_hz, rtol=0.01):
-        notes.append(f"{variant.frequency.middle:g} Hz: measured was at {data.unit.frequency_hz:g} Hz")
+        hertz, measured = number(variant.frequency.middle, 3), number(data.unit.frequency_hz, 3)
+        notes.append(f"{hertz} Hz: measured was at {measured} Hz{_unread(found, 'frequency')}")
     return notes
+
+
+def _counts(data: Measurements) -> set[int]:
+    """Return the numbers of layers of the measured units."""
+    return {len(data.layers(unit)) for unit in _units(data)}
 
 
 def _units(data: Measurements) -> list[str]:
@@ -72,7 +80,7 @@ def _units(data: Measurements) -> list[str]:
 
 
 def _unread(found: Candidates, length: str) -> str:
-    """Say which of the models that count do not read a length."""
+    """Say which of the models that count do not read an input."""
     blind = [model for model in found.predictive.models if length in BLIND.get(model, ())]
     if not blind:
         return ""

@@ -13,6 +13,7 @@ wall_mm = [1.0, 2.0]
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,13 +22,14 @@ from typing import Annotated, Any
 from msgspec import Meta, Struct
 
 from unitcad import catalogue
+from unitcad.attenuation.edge.fitted_models import MODELS
 from unitcad.attenuation.edge.lab_fit import LabFit
 from unitcad.attenuation.edge.predictive import STACKED, check_models
 from unitcad.attenuation.receivers import MOST_PITCH_MM
 from unitcad.catalogue import MaterialEntry, MotorEntry, PrinterEntry, TissueEntry
 from unitcad.catalogue import entries as kinds
 from unitcad.designs import shipped as designs
-from unitcad.errors import Refusal, UnitcadError, WrongArgument, unknown_name
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
 from unitcad.files import read_text
 from unitcad.spec import convert, read_toml
 from unitcad.spec.asked import DEFAULT_MOTOR, LEAST_LAYER, CastingTable, Moduli
@@ -47,6 +49,7 @@ Wall = Annotated[float, Meta(ge=LEAST_LAYER, le=20)]
 Step = Annotated[float, Meta(ge=0.01, le=10)]
 Name = Annotated[str, Meta(min_length=1, max_length=60)]
 _SPEC_KEYS = ("motor", "fpcb", "wires", "moulds", "casting", "output")
+_PERCENT = re.compile(r"\s*([0-9]{1,3}(?:\.[0-9]{1,6})?)\s*(?:%|per cent|percent)\s*")
 MOST_GEOMETRIES = 20_000
 """Sets of lengths that are tried; each costs about half a millisecond."""
 
@@ -156,7 +159,11 @@ def load_target(source: str | os.PathLike[str]) -> Target:
 def target_of(data: Mapping[str, Any], name: str = "target", folder: Path = Path()) -> Target:
     """Return the target of a file's data; `folder` is where its relative paths start. Raises as `load_target`."""
     _check_percent(data)
-    asked = convert(data, TargetFile)
+    try:
+        asked = convert(data, TargetFile)
+    except UnknownKey as key:
+        limit = key.limit.replace("`unitcad schema`", "`unitcad schema target`")
+        raise UnknownKey(key.field, key.value, limit, key.nearest) from None
     _check_target(asked.target)
     _check_ranges(asked.vary)
     _check_spec(asked.spec)
@@ -204,6 +211,9 @@ def _check_percent(data: Mapping[str, Any]) -> None:
     table = data.get("target")
     for key in ("edge_max", "edge_min"):
         value = table.get(key) if isinstance(table, Mapping) else None
+        if isinstance(value, str) and (given := _PERCENT.fullmatch(value)) and 0.1 <= float(given[1]) <= 200:
+            limit = "is a fraction of the motor's amplitude: a number without a unit"
+            raise Refusal(f"target.{key}", value, limit, round(float(given[1]) / 100, 6))
         if isinstance(value, int | float) and not isinstance(value, bool) and 2 < value <= 200:
             raise Refusal(f"target.{key}", value, "is a fraction of the motor's amplitude, at most 2", value / 100)
 
@@ -245,6 +255,10 @@ def _entries(asked: TargetFile, data: Mapping[str, Any], fit_text: str) -> dict[
     lab = {"scale_resolution_g": asked.at_hand.scale_g, "room_c": asked.at_hand.room_c, "vacuum": asked.at_hand.vacuum}
     tables["casting"] = {**lab, **tables.get("casting", {})}
     estimate: dict[str, Any] = {"tissue": asked.estimate.tissue, "moduli": asked.estimate.moduli}
+    if asked.estimate.models is not None:
+        shown = [model for model in asked.estimate.models if model in MODELS]
+        estimate |= {"models": shown} if shown else {}
+        estimate |= {} if asked.estimate.fit else {"stack": list(asked.estimate.models)}
     if asked.target.frequency_hz is not None:
         estimate["frequency_hz"] = asked.target.frequency_hz
     if asked.estimate.fit is not None:

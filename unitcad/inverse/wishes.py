@@ -62,6 +62,8 @@ def within(found: Candidates) -> np.ndarray:
     met = np.array([limit.met for limit in made]).reshape(len(made), found.count)
     if met.all(axis=0).any():
         return np.flatnonzero(met.all(axis=0))
+    if len(alone := [limit for limit in made if not limit.met.any() and np.isfinite(limit.values).any()]) > 1:
+        raise _none_alone(found, alone)
     for i, limit in enumerate(made):
         others = np.delete(met, i, axis=0).all(axis=0) & np.isfinite(limit.values)
         if others.any():
@@ -71,11 +73,43 @@ def within(found: Candidates) -> np.ndarray:
     raise _none(found, short, np.isfinite(short.values), f" by itself; {names} are not met together")
 
 
+def _none_alone(found: Candidates, alone: list[Limit]) -> Refusal:
+    """Return the refusal of several limits none of which any candidate meets, each with its own nearest."""
+    each = []
+    for limit in alone:
+        at = _least(found, limit.values, np.flatnonzero(np.isfinite(limit.values)))
+        least = _up(float(limit.values[at]))
+        each.append(f"target.{limit.key} = {limit.most:g}: {least:g}{limit.unit} is the least ({label(found, at)})")
+    first = alone[0]
+    least = _up(float(np.nanmin(first.values)))
+    words = (
+        f"none of {found.count} candidates is within it, nor within {listed(f'target.{one.key}' for one in alone[1:])}"
+    )
+    return Refusal(f"target.{first.key}", first.most, f"{words}: {'; '.join(each)}{_left_out(found)}", least)
+
+
+def _left_out(found: Candidates) -> str:
+    """Say which silicones were not tried."""
+    names = list(found.silicones.left_out)
+    return f"; not tried, without a modulus: {listed(names)}" if names else ""
+
+
+def _hint(limit: Limit) -> str:
+    """Say what a crosstalk ratio depends on."""
+    if limit.key != "crosstalk_ratio_max":
+        return ""
+    return (
+        "; only diameter, pitch, body and drive enter it: a larger target.pitch_mm or other vary.diameter_mm change it"
+    )
+
+
 def _none(found: Candidates, limit: Limit, rows: np.ndarray, how: str) -> Refusal:
     at = _least(found, limit.values, np.flatnonzero(rows))
     least = _up(float(limit.values[at]))
     words = f"none of {found.count} candidates is within it{how}; {limit.what} {least:g}{limit.unit} is the least"
-    return Refusal(f"target.{limit.key}", limit.most, f"{words} ({label(found, at)})", least)
+    return Refusal(
+        f"target.{limit.key}", limit.most, f"{words} ({label(found, at)}){_hint(limit)}{_left_out(found)}", least
+    )
 
 
 def check_level(found: Candidates, rows: np.ndarray, measured: bool = False) -> None:
@@ -94,14 +128,14 @@ def check_level(found: Candidates, rows: np.ndarray, measured: bool = False) -> 
         levels = found.predictive.quantile(share)
         at = _least(found, levels, rows)
         least = _up(float(levels[at]))
-        words = f"{missed}; {100 * least:.2g} % of the motor's amplitude is the least with it ({label(found, at)})"
-        raise Refusal("target.edge_max", wish.edge_max, words, least)
+        words = f"{missed}; {100 * least:.3g} % of the motor's amplitude is the least with it ({label(found, at)})"
+        raise Refusal("target.edge_max", wish.edge_max, words + _left_out(found), least)
     if wish.edge_max is None:
         levels = found.predictive.quantile(1 - share)
         at = _least(found, -levels, rows)
         largest = -_up(-float(levels[at]))
-        words = f"{missed}; {100 * largest:.2g} % of the motor's amplitude is the most with it ({label(found, at)})"
-        raise Refusal("target.edge_min", wish.edge_min, words, largest)
+        words = f"{missed}; {100 * largest:.3g} % of the motor's amplitude is the most with it ({label(found, at)})"
+        raise Refusal("target.edge_min", wish.edge_min, words + _left_out(found), largest)
     raise Refusal("target.probability_min", share, missed, -_up(-most))
 
 

@@ -29,6 +29,7 @@ Format = Literal["stl", "3mf", "step", "svg", "png", "glb"]
 _LAYERS = "one [[layers]] table or more, from the inside out, each with material and wall_mm"
 _TISSUE = "one layer or more by name, skin first, each a table with density_kg_m3, poisson_ratio and a modulus"
 Moduli = Literal["dynamic", "quasi-static"]
+Stacked = Literal["bush", "fitted", "paper", "consistent", "crossings"]
 Model = Literal["bush", "fitted", "paper", "consistent", "mechanics"]
 
 
@@ -138,6 +139,10 @@ class EstimateTable(Table, frozen=True, kw_only=True):
     amplitude_um: kinds.Amplitude | None = None
     tissue: str = "forearm"
     models: Annotated[tuple[Model, ...], Meta(min_length=1)] = ("bush", "fitted", "paper", "consistent")
+    stack: Annotated[
+        Annotated[tuple[Stacked, ...], Meta(min_length=1)] | None,
+        Meta(description="closed forms behind the range; else the models"),
+    ] = None
     moduli: Annotated[Moduli, Meta(description="of the silicones: youngs_modulus_kpa, or quasistatic_modulus_kpa")] = (
         "dynamic"
     )

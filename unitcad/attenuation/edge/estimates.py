@@ -56,11 +56,13 @@ def estimate(
     models: Sequence[str] = MODELS,
     layered: Layered = layered_block,
     fit: LabFit | None = None,
+    stack: Sequence[str] | None = None,
 ) -> dict[str, Any]:
     """Return {variant, answer, models, layered, measured, table_error, assumptions}; numbers to nine digits.
 
     With a lab's `fit` the constants are its own, each model has a predictive range, and the data have `fit` and
-    `own_measured`. `layered` gives the layered solver's block, which reads no silicone: variants on one body share it.
+    `own_measured`. `stack` names the closed forms behind the answer's range, where they are not `models`.
+    `layered` gives the layered solver's block, which reads no silicone: variants on one body share it.
     A quantity that can't be given is null beside a `reason`. Raises `Refusal` for values that no body has.
     """
     errors = table_error(variant.moduli)
@@ -91,7 +93,7 @@ def estimate(
         data["table_error"] = errors | {"constants": "the stored ones, not this fit's; fit_error has the fit's own"}
         data |= {"fit": fit_block(fit, models), "own_measured": own_block(fit, variant)}
     # Where no model is singled out `crossings`, which gives no estimate of its own, is stacked too.
-    names = STACKED if fit is None and set(models) == set(MODELS) else models
+    names = stack or (STACKED if fit is None and set(models) == set(MODELS) else models)
     of_this_drive = [name for name in names if not not_of_this_drive(variant, [name])] or names
     expected = predictive_of([variant], of_this_drive, fit) if names else None
     held = HELD.get(tuple(of_this_drive)) if variant.moduli == "dynamic" else None
