@@ -37,3 +37,10 @@ def test_what_an_axis_can_not_show_is_left_out() -> None:
     assert len(spots) == 2 + 2  # two in the legend
     assert all(TOP - 0.1 <= y <= HEIGHT for _, y in spots)
     ET.fromstring(chart([], "empty", "x", "y"))
+
+
+@pytest.mark.parametrize(("low", "first"), [(-0.001, "0"), (-0.2, "-5")])
+def test_an_axis_starts_at_zero_unless_values_are_seen_below_it(low: float, first: str) -> None:
+    text = chart([Series("a", [0, 1], [low, 20])], "t", "x", "y")
+    ticks = [t.text for t in ET.fromstring(text).iter(f"{SVG}text") if t.get("text-anchor") == "end"]
+    assert ticks[0] == first

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from unitcad.attenuation.edge.lab_fit import unit_key
 from unitcad.cli import app
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.estimating import estimate_input
+from unitcad.estimating import estimate_input, estimate_spec
 from unitcad.lab.fit_files import contents
 from unitcad.lab.fit_lab import load_fit_lab
 from unitcad.lab.fitting import fit_lab
@@ -143,3 +143,36 @@ def test_the_command_writes_four_files_and_prints_the_null(tmp_path: Path) -> No
     assert sorted(file.name for file in out.iterdir()) == ["fit.json", "fit.md", "fit.svg", "lab-fit.toml"]
     shown = CliRunner().invoke(app, ["fit", _written(tmp_path), "--json"])
     assert json.loads(shown.output)["fit"] == tomllib.loads((out / "lab-fit.toml").read_text())
+
+
+def test_a_constant_on_its_bound_is_said_and_its_model_comes_last(tmp_path: Path) -> None:
+    """Levels that fall as the outer layer softens: no positive kappa fits, so the search ends at its lower bound."""
+    names, levels = ("ecoflex-00-10", "dragon-skin-30"), (0.9, 0.05)
+    units = [
+        {
+            "name": f"u{i}{j}",
+            "spec": "embedded",
+            "set": {"layers.0.material": names[i], "layers.1.material": names[1 - i]},
+            "level": {"value": levels[i] * (1.0 + 0.1 * j)},
+        }
+        for i in (0, 1)
+        for j in range(3)
+    ]
+    lab = _written(tmp_path, unit=units, with_paper=False)
+    result = fit_lab(load_fit_lab(lab))
+    assert result.fit.model["fitted"].constants["kappa"] == pytest.approx(1e-3)
+    assert result.fit.model["fitted"].at_bound == "kappa"
+    assert result.chosen.order[-1] == "fitted"
+    made = contents(result)
+    assert "Warning: fitted: kappa ran into the bound" in made["fit.md"]
+    assert tomllib.loads(made["lab-fit.toml"])["model"]["fitted"]["at_bound"] == "kappa"
+    (tmp_path / "lab-fit.toml").write_text(made["lab-fit.toml"])
+    told = CliRunner().invoke(app, ["fit", lab]).stdout
+    assert "warning: fitted: kappa ran into the bound" in told
+    found = estimate_spec(load("embedded", {"estimate.fit": str(tmp_path / "lab-fit.toml")}))
+    others = next(line for line in found["answer"]["lines"] if line.startswith("Other models"))
+    assert others.split("; ")[-1].startswith("fitted")
+    assert any("lies on the bound" in line for line in found["answer"]["lines"])
+    free = fit_lab(load_fit_lab("synthetic-bench"))
+    assert free.fit.model["fitted"].at_bound is None
+    assert "Warning" not in contents(free)["fit.md"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import os
@@ -467,3 +468,41 @@ def test_a_dynamic_test_fills_the_modulus_at_the_motor_s_frequency(tmp_path: Pat
     assert json.loads(done.stdout)["dynamic"]["extrapolated"] is True
     assert "extrapolated from" in entry["youngs_modulus_kpa"]["source"]
     ET.parse(tmp_path / "out" / "dynamic.svg")
+
+
+def test_laws_that_agree_are_each_seen_beside_the_next(tmp_path: Path) -> None:
+    strain, stress = _curve()
+    path = _table(tmp_path / "a.csv", "Strain (%),Stress (kPa)", [100 * strain, stress / 1e3])
+    from unitcad.lab.material_files import tensile_chart
+
+    result = evaluate([read_curve(path, {}, Specimen())], (0.12, 0.24))
+    lines = [one for one in ET.fromstring(tensile_chart("a", result)).iter("{http://www.w3.org/2000/svg}polyline")]
+    drawn = [one for one in lines if (one.get("points") or "").count(" ") > 1][-4:]
+    widths = [float(one.get("stroke-width", "0")) for one in drawn]
+    assert len({one.get("stroke") for one in drawn}) == 4
+    assert all(a - b >= 1.5 for a, b in itertools.pairwise(widths))
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("lbF", 4.4482216152605), ("LBF", 4.4482216152605), ("KGF", 9.80665)])
+def test_a_unit_s_case_does_not_matter_where_it_can_t_be_another_unit(unit: str, factor: float, tmp_path: Path) -> None:
+    strain, stress = _curve()
+    head = f"Travel [mm],Load [{unit}]"
+    path = _table(tmp_path / "a.csv", head, [33 * strain, stress * 18e-6 / factor])
+    curve = read_curve(path, {}, Specimen(6.0, 3.0, 33.0))
+    assert curve.stress[-1] == pytest.approx(stress[-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("head", ["Travel [Mm],Load [N]", "Travel [mm],Load [MN]", "Travel [mm],Stress [mPa]"])
+def test_a_unit_s_case_that_may_be_a_prefix_s_is_exact(head: str, tmp_path: Path) -> None:
+    strain, stress = _curve()
+    path = _table(tmp_path / "a.csv", head, [33 * strain, stress])
+    with pytest.raises(Refusal, match="has the unit"):
+        read_curve(path, {}, Specimen(6.0, 3.0, 33.0))
+
+
+def test_a_bare_length_is_the_gauge_length_unless_one_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text('"Width","6.0","mm"\n"Length","33","mm"\n"Grip length","60","mm"\nTime,Load\n1,2\n')
+    assert header_of(path).gauge_mm == 33.0
+    path.write_text('"Length","115","mm"\n"Gauge length","33","mm"\nTime,Load\n1,2\n')
+    assert header_of(path).gauge_mm == 33.0

@@ -277,3 +277,31 @@ def test_a_solid_of_the_box_is_exact() -> None:
     figure = realise(engraving("3", 0.8, 0.0, 0.4), 64).volume()
     assert realise(frame.shape, 256).volume() == pytest.approx(1.5 * (ring + ears) - figure, rel=1e-5)
     assert exact_volume(_skin().layers[0].shape) == pytest.approx(1.5 * 4 * lengths.rim**2, rel=1e-5)
+
+
+def test_the_bill_has_what_the_procedure_asks_for() -> None:
+    text = bench.casting_markdown(_skin()).split("## Needed")[0].lower()
+    items = " ".join(f"{one.item} {one.note}" for one in bench.bill(_skin())).lower()
+    for asked in ("tape", "clips", "pen", "rubber band", "emery paper", "primer", "degas", "talc", "calliper", "blade"):
+        assert asked in text or asked == "calliper", asked
+        assert asked in items, asked
+    assert next(one for one in bench.bill(_skin()) if one.item == "silicone primer").note.startswith("optional")
+
+
+def test_a_bubble_that_rises_for_longer_than_the_pot_life_is_said_to_stay() -> None:
+    for line in bench.casting_markdown(_skin()).splitlines():
+        if line.startswith("| pot life"):
+            pot = float(line.split("|")[2].split()[0])
+        if line.startswith("| bubble"):
+            rise = float(line.split("|")[2].split()[0])
+            assert ("longer than the pot life" in line) == (rise > pot)
+    assert "longer than the pot life" in bench.casting_markdown(_skin())
+
+
+def test_the_sheet_wants_the_first_layer_s_height_of_the_tray_and_the_others_of_frames() -> None:
+    lines = bench.sheet_markdown(_skin()).splitlines()
+    frames = next(line for line in lines if line.startswith("Frame heights"))
+    assert "muscle" not in frames
+    assert "hypodermis (4)" in frames
+    assert "skin (1.5)" in frames
+    assert "muscle (25)" in next(line for line in lines if line.startswith("Tray, rim above the plate"))

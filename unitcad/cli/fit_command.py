@@ -68,6 +68,8 @@ def _print(result: Fitted) -> None:
     screen.print("constants, stored -> fitted (90 %):")
     for name in chosen.order:
         screen.print(f"  {name}: {fit_files.constants_text(fit_files.entry(result, name))}", soft_wrap=True)
+    for one in fit_files.warnings(result):
+        screen.print(f"  warning: {one}", soft_wrap=True)
     by_source = Table("moduli", *chosen.judged, title="unit left out, by where the moduli come from")
     for source, compared in result.by_source.items():
         by_source.add_row(

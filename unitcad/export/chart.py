@@ -19,11 +19,15 @@ MOST_POINTS = 2000
 _GREY, _DARK = "#e2e2e2", "#444444"
 
 
+_NIL = 0.005
+"""An axis starts at zero where values lie below it by at most this part of their span, less than a point's size."""
+
+
 @dataclass(frozen=True)
 class Series:
     """A series: x and y of the same length; drawn as `points`, else as a curve, `dashed` or not.
 
-    `bars`: (low, high) of y at each point, drawn as a line.
+    `bars`: (low, high) of y at each point, drawn as a line. `width`: of a curve, px.
     """
 
     name: str
@@ -32,6 +36,7 @@ class Series:
     points: bool = False
     dashed: bool = False
     bars: Sequence[tuple[float, float]] = ()
+    width: float = 1.8
 
 
 def chart(
@@ -127,6 +132,7 @@ def _axis(values: np.ndarray, log: bool, start: float, end: float, whole: tuple[
         inside = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
         ticks = [(k * step, f"{k * step:.6g}") for k in inside]
         return _Axis(lambda v: start + (v - low) / (high - low) * (end - start), ticks)
+    low = 0.0 if -_NIL * (high - low) <= low < 0.0 else low
     low, high = min(low, 0.0) if low > 0 and low < 0.3 * high else low, high if high > low else low + 1.0
     unit = 10.0 ** math.floor(math.log10((high - low) / 6))
     step = next(unit * k for k in (1, 2, 5, 10) if unit * k >= (high - low) / 6)
@@ -140,7 +146,7 @@ def _drawn(one: Series, spots: list[tuple[float, float]], colour: str) -> list[s
         return [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.5" fill="{colour}"/>' for x, y in spots]
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in spots)
     dashes = ' stroke-dasharray="5 4"' if one.dashed else ""
-    return [f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.8"{dashes}/>']
+    return [f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="{one.width:.3g}"{dashes}/>']
 
 
 def _line(x0: float, y0: float, x1: float, y1: float, colour: str) -> str:

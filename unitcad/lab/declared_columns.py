@@ -32,6 +32,8 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "tan_delta": {"1": 1.0, "-": 1.0},
 }
 """Factors to SI by quantity and unit; frequency to Hz."""
+_ANY_CASE = ("lbf", "kgf", "kN", "kPa", "psi", "in", "in/in", "Hz")
+"""Units that mean one thing in any case: none has a prefix whose other case is another one."""
 _NAMES = {
     "time": r"(?:test )?time",
     "strain": r"(?:(?:engineering|eng\.?|nominal|tensile) )?strain",
@@ -119,5 +121,9 @@ def columns(recording: Recording, wanted: Mapping[str, tuple[int, float]]) -> tu
 
 
 def _unit(text: str, quantity: str) -> float | None:
-    known = UNITS[quantity]
-    return known.get(text.strip(), known.get(plain(text)))
+    known, written = UNITS[quantity], plain(text)
+    if (factor := known.get(text.strip(), known.get(written))) is not None:
+        return factor
+    # Case alone may differ where it can't be a prefix's: mN and MN, mm and Mm are two units.
+    alike = [unit for unit in known if unit.lower() == written.lower()]
+    return known[alike[0]] if len(alike) == 1 and alike[0] in _ANY_CASE else None

@@ -51,6 +51,7 @@ def as_data(result: Fitted) -> dict[str, Any]:
         "units": unit_rows(result),
         "fit": _plain(msgspec.to_builtins(result.fit)),
         "prior": prior_text(result),
+        "warnings": warnings(result),
     }
 
 
@@ -107,7 +108,18 @@ def constants_text(one: ModelFit) -> str:
     for name, value in one.constants.items():
         stored = f"{one.stored[name]:.3g} -> " if one.stored else ""
         parts.append(f"{name} {stored}{value:.3g} ({one.low[name]:.3g} to {one.high[name]:.3g})")
+        parts[-1] += ", on its bound" if name == one.at_bound else ""
     return "; ".join(parts)
+
+
+def warnings(result: Fitted) -> list[str]:
+    """Say which models have a constant on the bound of its search."""
+    return [
+        f"{name}: {one.at_bound} ran into the bound of its search, {one.constants[one.at_bound]:.3g}: the units do not "
+        "determine it, its range says nothing, and the model comes last"
+        for name, one in result.fit.model.items()
+        if one.at_bound
+    ]
 
 
 def against_text(one: ModelFit) -> str:
@@ -138,6 +150,7 @@ def page(result: Fitted) -> str:
             f"{_factor(one.own_left_out)} | {_factor(one.own_by_stored)} | {against_text(one)} | {one.held} | "
             f"{constants_text(one)} |"
         )
+    lines += [f"\nWarning: {one}." for one in warnings(result)]
     lines += [
         "",
         "Factors are geometric means of predicted over measured, 1 is exact; in brackets 5 to 95 % over units drawn "

@@ -8,7 +8,7 @@ from typing import get_args
 
 import numpy as np
 
-from unitcad.attenuation.edge.fitted_models import MODELS
+from unitcad.attenuation.edge.fitted_models import KAPPA, MODELS
 from unitcad.attenuation.edge.lab_fit import LabFit, ModelFit, unit_key
 from unitcad.attenuation.edge.measured_levels import CONTROL, MeasuredTable, Moduli, measured_table
 from unitcad.attenuation.edge.scores import SEED
@@ -41,8 +41,16 @@ class Compared:
 
     @property
     def order(self) -> list[str]:
-        """The models by their score, the best first."""
-        return sorted(self.judged, key=lambda name: round(self.judged[name].score, 4))
+        """The models by their score, the best first; those with a constant on its bound last."""
+        return sorted(
+            self.judged, key=lambda name: (self.at_bound(name) is not None, round(self.judged[name].score, 4))
+        )
+
+    def at_bound(self, name: str) -> str | None:
+        """Return the constant of a model that the fit left on the bound of its search, if there is one."""
+        if name != "fitted":
+            return None
+        return "kappa" if np.any(np.isclose(self.fitted[name].constants[0], KAPPA, rtol=1e-6)) else None
 
 
 @dataclass(frozen=True)
@@ -168,6 +176,7 @@ def _entry(model: Model, name: str, compared: Compared) -> ModelFit:
         against_null_error=None if against[1] is None else _short(against[1]),
         against_null_p=None if against[2] is None else _short(against[2]),
         held=f"{judged.held()} of {judged.errors.size}",
+        at_bound=compared.at_bound(name),
     )
 
 

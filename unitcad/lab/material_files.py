@@ -129,12 +129,14 @@ def tensile_chart(name: str, result: TensileResult) -> str:
     if toe := result.toes[0]:
         strain = np.linspace(toe.origin, result.used[1] + max(toe.origin, 0.0), 60)
         series.append(Series("start, origin fitted", 100 * strain, toe.stress(strain) / 1e3))
-    for one in result.by_curve[0]:
-        if one.fit and one.fit.up_to <= _SHOWN_TO:
+    laws = [one for one in result.by_curve[0] if one.fit and one.fit.up_to <= _SHOWN_TO]
+    for i, one in enumerate(laws):
+        if one.fit:
             strain = np.linspace(0.0, one.fit.up_to, 100)
             dashed = bool(one.fit.unstable)
+            width = 1.8 * (len(laws) - i)  # laws that agree lie on each other: each shows beside the next
             label = one.method + (", unstable" if dashed else "")
-            series.append(Series(label, 100 * strain, one.fit.stress(strain) / 1e3, dashed=dashed))
+            series.append(Series(label, 100 * strain, one.fit.stress(strain) / 1e3, dashed=dashed, width=width))
     low, high = (100 * end for end in result.used)
     title = f"{name}: nominal stress, quasi-static; shaded: the strain of use"
     return chart(series, title, "engineering strain, %", "nominal stress, kPa", shaded=(low, high))

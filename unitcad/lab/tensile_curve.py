@@ -115,6 +115,8 @@ def header_of(path: Path) -> Specimen:
                 found["crosshead"] = True
             elif re.search("extensometer|video|dic", value, re.IGNORECASE):
                 found["crosshead"] = False
+    if length := found.pop("length_mm", None):  # a bare "Length" is the gauge length where no other line gives one
+        found.setdefault("gauge_mm", length)
     return Specimen(**found)  # type: ignore[arg-type]
 
 
@@ -122,6 +124,7 @@ _HEADER = (
     (r"thickness\s*[\[(](mm|cm|in)[\])]", "thickness_mm"),
     (r"width\s*[\[(](mm|cm|in)[\])]", "width_mm"),
     (r"(?:specimen|gauge|initial) length\s*[\[(](mm|cm|in)[\])]", "gauge_mm"),
+    (r"^\s*length\s*[\[(](mm|cm|in)[\])]", "length_mm"),
     (r"(?:cross-?section|area)\s*[\[(](mm2|mm\^2|cm2|cm\^2)[\])]", "area_mm2"),
     (r"(?:speed|rate)\s*[\[(](mm/min)[\])]", "speed_mm_min"),
     (r"load cell", "cell_n"),

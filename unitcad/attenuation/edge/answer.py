@@ -130,9 +130,11 @@ def _slow_pull(estimated: dict[str, Any]) -> bool:
 
 
 def _order(estimated: dict[str, Any], errors: dict[str, Error]) -> list[str]:
-    """Return the models, the least error first; those of another drive than the motor's last."""
-    models = estimated["models"]
-    return sorted(models, key=lambda name: ("not_of_this_drive" in models[name], round(errors[name][0], 3)))
+    """Return the models, the least error first; those of a constant on its bound or of another drive last."""
+    models, at_bound = estimated["models"], estimated.get("fit", {}).get("at_bound", {})
+    return sorted(
+        models, key=lambda name: ("not_of_this_drive" in models[name], name in at_bound, round(errors[name][0], 3))
+    )
 
 
 def _middle(level: dict[str, Any]) -> float | None:
@@ -179,6 +181,8 @@ def _lines(
         yield f"Measured in the paper at {at}: {levels} %; this unit differs in {listed(found['differs_in'])}."
     if _slow_pull(estimated):
         yield QUASI_STATIC
+    for name, constant in estimated.get("fit", {}).get("at_bound", {}).items():
+        yield f"{name}: the fit's {constant} lies on the bound of its search, the units do not determine it."
     if data["not_seen"]:
         yield f"{data['model']} does not read: {', '.join(data['not_seen'])}."
     others = [name for name in order if name != data["model"]]

@@ -119,6 +119,7 @@ def fit_block(fit: LabFit, models: Sequence[str]) -> dict[str, Any]:
             name: {"geometric_mean": one.left_out, "low": one.left_out_low, "high": one.left_out_high}
             for name, one in scores.items()
         },
+        "at_bound": {name: one.at_bound for name, one in scores.items() if one.at_bound},
     }
 
 

@@ -35,6 +35,10 @@ def one_constant(path: Predict) -> Fit:
     return fit
 
 
+KAPPA = (1e-3, 1e2)
+"""Bounds of the search for the divider's kappa: a fit that ends on one does not determine it."""
+
+
 def fit_divider(table: MeasuredTable, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Fit (kappa, s) of level = s / (1 + kappa n E_outer/E_inner) for masks or counts (M, units), shape (M,) each.
 
@@ -47,7 +51,7 @@ def fit_divider(table: MeasuredTable, chosen: np.ndarray) -> tuple[np.ndarray, n
         mean = np.sum(each * chosen, axis=1) / count
         return mean, np.sum((each - mean[:, None]) ** 2 * chosen, axis=1)
 
-    low, high = np.full(len(chosen), np.log(1e-3)), np.full(len(chosen), np.log(1e2))
+    low, high = (np.full(len(chosen), np.log(end)) for end in KAPPA)
     golden = (np.sqrt(5.0) - 1.0) / 2.0
     while np.max(high - low) > 1e-9:
         left, right = high - golden * (high - low), low + golden * (high - low)

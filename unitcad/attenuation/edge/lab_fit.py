@@ -29,6 +29,7 @@ class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     `discrepancy`: standard deviation of a unit's ln level about the model. `covariance`: of the constants' logarithms,
     in the order of `constants`, over discrepancy^2. `left_out` is the factor with the unit left out.
+    `at_bound`: the constant that the search left on its bound, None where the units determine all.
     """
 
     constants: dict[str, Positive]
@@ -47,6 +48,7 @@ class ModelFit(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     against_null_error: float | None = None
     against_null_p: float | None = None
     held: str = ""
+    at_bound: str | None = None
 
 
 class OwnLevel(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -147,11 +147,15 @@ def sheet_markdown(phantom: PhantomSet) -> str:
         "| coupon of pour | width, mm | thickness, mm | file of the curve | modulus, kPa (unitcad material) |",
         "| --- | --- | --- | --- | --- |",
     ]
-    for p in pours(phantom):
+    first, *further = pours(phantom)
+    for p in (first, *further):
         lines += [f"| {p.index}.{i + 1} {p.name} | | | | |" for i in range(phantom.table.coupons)]
     lines += [
         "",
-        "Frame heights by calliper, mm (wanted): " + ", ".join(f"{p.name} ({p.frame_mm:g})" for p in pours(phantom)),
+        "Frame heights by calliper, mm (wanted): " + ", ".join(f"{p.name} ({p.frame_mm:g})" for p in further)
+        if further
+        else "Frames: none.",
+        f"Tray, rim above the plate by depth gauge, mm (wanted): {first.name} ({first.frame_mm:g})",
         "",
     ]
     return "\n".join(lines)
@@ -186,8 +190,18 @@ def bill(phantom: PhantomSet) -> list[Item]:
     ):
         items.append(Item(tool, 1, "piece", "at hand", note))
     items.append(Item("mixing cup and stick", len(found), "piece", "bought", "a set for each pour"))
+    items.append(Item("vacuum chamber and pump", 1, "piece", "at hand", "degasses each mix before it is poured"))
     for stuff in ("release agent", "petroleum jelly", "talc", "nitrile gloves"):
         items.append(Item(stuff, 1, "piece", "bought", "for all pours"))
+    for stuff, note in (
+        ("tape or clips", "hold the frames down"),
+        ("pen", "marks the skin through the lid"),
+        ("thin blade", "loosens the slab from the wall"),
+        ("rubber band", "holds the tray in its holder"),
+        ("emery paper, fine", "faces the grips; also roughens the plate" if table.coupons else "roughens the plate"),
+        ("silicone primer", "optional: bonds the lowest layer to the plate, in place of roughening it"),
+    ):
+        items.append(Item(stuff, 1, "piece", "bought", note))
     items.append(Item("bolt", 4, "piece", "bought", f"M{table.stage_bolt_mm:g}, for the holder"))
     return items
 
@@ -264,10 +278,12 @@ def _figures(phantom: PhantomSet, p: PhantomPour) -> Iterator[tuple[str, str, st
         f"without thinner, at {phantom.table.room_c:g} degC (data sheet at {DATASHEET_C:g}); thinner: longer",
     )
     seconds = bubble_rise_s(p.frame_mm, one.silicone)
+    late = seconds / 60 > p.pot_life_min
     yield (
         "bubble of 0.2 mm through the layer",
         f"{seconds / 60:.3g} min",
-        "computed: Stokes, without thinner; optimistic",
+        "computed: Stokes, without thinner; optimistic"
+        + ("; longer than the pot life: it stays in the layer, so degas the mix before pouring" if late else ""),
     )
     yield "weight of a millimetre", f"{p.grams_per_mm:.2f} g", "computed: tells the thickness by the scale"
 
