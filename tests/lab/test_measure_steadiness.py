@@ -10,7 +10,7 @@ from scipy.io import wavfile
 
 from unitcad.errors import Refusal
 from unitcad.lab import measured_files
-from unitcad.lab.campaign import Campaign, SensorTable, UnitTable, read_campaign
+from unitcad.lab.campaign import Campaign, RecordingTable, SensorTable, UnitTable, read_campaign
 from unitcad.lab.chains.chain import ChainTable
 from unitcad.lab.chains.line import FALSE_ALARM, Mains, fit_line, most_of_noise
 from unitcad.lab.chains.paper import chain as paper_chain
@@ -203,3 +203,17 @@ def test_a_file_without_a_reader_is_named(tmp_path: Path) -> None:
     with pytest.raises(Refusal) as refused:
         expect_ending(tmp_path / "scan 3.svd", "unit.0.edge.1")
     assert refused.value.value == "scan 3.svd"
+
+
+def test_hdf5_tells_its_time_and_a_channel_goes_without_its_group(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, values, unit in (("G/t", TIME, "s"), ("G/x", line(100, 127.3), "um"), ("H/y", TIME, "um")):
+            file[name] = values
+            file[name].attrs["units"] = unit
+    table = RecordingTable(channel="x")
+    campaign = Campaign(name="t", sensor=SENSOR, recording=table, unit=(UnitTable(name="a"),))
+    result = measure_record(tmp_path / "a.h5", "edge", campaign, (SENSOR,), (Mains(),), BAND, "a.h5")
+    assert (result.rate_hz, result.findings) == (pytest.approx(2000.0), ())
+    assert result.amplitude_um == pytest.approx(100.0, rel=0.01)

@@ -11,6 +11,8 @@ from unitcad.geometry.arrays import Floats
 
 ROWS = 2**17
 """Samples of a block at most."""
+GROUPED = ("tdms", "hdf5")
+"""Forms whose channels are named group/channel."""
 LARGEST_WHOLE = 250_000_000
 """Bytes of a file whose format can only be read whole."""
 TIME_NAMES = ("time", "t", "zeit", "temps", "timestamp", "time stamp")
@@ -45,7 +47,10 @@ class Recording:
     time: int | None = None
 
     def index(self, wanted: str | int, field: str) -> int:
-        """Return the index of a channel by its name or its number, which counts from 1. Raises Refusal."""
+        """Return the index of a channel by its name or its number, which counts from 1. Raises Refusal.
+
+        The name may lack its group where one channel alone ends so.
+        """
         names = [channel.name for channel in self.channels]
         if isinstance(wanted, int):
             if not 1 <= wanted <= len(names):
@@ -54,6 +59,10 @@ class Recording:
         if names.count(wanted) > 1:
             first = names.index(wanted) + 1
             raise Refusal(field, wanted, f"{self.path.name} has several channels of this name; give a number", first)
+        if wanted not in names and self.form in GROUPED:
+            ends = [i for i, name in enumerate(names) if name.rpartition("/")[2] == wanted]
+            if len(ends) == 1:
+                return ends[0]
         if wanted not in names:
             raise unknown_name(field, wanted, names)
         return names.index(wanted)

@@ -13,7 +13,7 @@ from unitcad import children
 from unitcad.geometry.arrays import Floats
 from unitcad.lab.readers.recording_layout import Layout
 from unitcad.lab.readers.whole import columns_of
-from unitcad.lab.recording import Channel, Recording, Unreadable
+from unitcad.lab.recording import Channel, Recording, Unreadable, is_time
 
 ENDINGS = (".h5", ".hdf5")
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
@@ -38,7 +38,9 @@ def read(path: Path, layout: Layout) -> Recording:
             lazy = [_Column(file[found[i][0]], found[i][1]) for i in indices]
             yield from columns_of(path, [found[i][2].name for i in indices], lazy)  # type: ignore[arg-type]
 
-    return Recording(path, "hdf5", tuple(channel for _, _, channel in found), blocks)
+    channels = tuple(channel for _, _, channel in found)
+    times = [i for i, one in enumerate(channels) if is_time(one.name.rpartition("/")[2], one.unit)]
+    return Recording(path, "hdf5", channels, blocks, times[0] if len(times) == 1 else None)
 
 
 class _Column:
