@@ -194,7 +194,9 @@ def test_three_per_cent_is_answered_with_the_least_that_is_possible() -> None:
 
 
 def test_limits_that_exclude_each_other_are_named_together() -> None:
-    with pytest.raises(Refusal, match=r"target\.mass_max_g and target\.cure_hours_max are not met together"):
+    with pytest.raises(
+        Refusal, match=r"within it, nor within target\.cure_hours_max: target\.mass_max_g = 0\.3: 0\.47 g"
+    ):
         invert(_target(mass_max_g=0.3, cure_hours_max=1.0), check=False)
 
 
