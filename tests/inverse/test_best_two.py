@@ -97,7 +97,8 @@ def test_two_of_one_level_are_the_same_for_a_purpose() -> None:
     sentence, _ = best_two(replace(target), [slow[0], fast[0]], [{**slow[1], "measured": None}, fast[1]])
     assert sentence is not None
     assert sentence.startswith("#1 and #2 are the same for your purpose: their levels' ratio is ")
-    assert sentence.endswith("Take the faster, #2: 10.2 h against 21.2 h.")
+    hours = [f"{one[1]['cure_hours']:.3g}" for one in (fast, slow)]
+    assert sentence.endswith(f"Take the faster, #2: {hours[0]} h against {hours[1]} h.")
 
 
 def test_a_control_of_a_design_that_is_not_said_is_one_unit() -> None:
