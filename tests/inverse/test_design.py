@@ -84,9 +84,9 @@ def test_each_candidate_is_what_its_spec_is_alone(found: Candidates) -> None:
         assert found.predictive.quantile(0.9)[row] == pytest.approx(alone.quantile(0.9)[0], rel=1e-6)
         assert found.mass_g[row] == pytest.approx(1e3 * unit_mass(variant).middle, rel=1e-9)
         assert found.diameter_mm[row] == spec.diameter_mm
-        assert found.hours[row] == pytest.approx(
-            procedure(MouldSet(spec), [400.0] * len(spec.layers), 9e3).earliest_finish_min / 60
-        )
+        made = procedure(MouldSet(spec), [400.0] * len(spec.layers), 9e3)
+        steps = [*(step for pour in made.pours for step in pour.steps), *made.release]
+        assert found.hours[row] == pytest.approx(sum(step.minutes + step.wait_min for step in steps) / 60)
         tops = [body.shape for body in MouldSet(spec).unit]
         assert tops
         assert found.height_mm[row] == pytest.approx(_top(MouldSet(spec)), abs=0.02)

@@ -19,12 +19,15 @@ Work = dict[tuple[str, str, int], float]
 
 
 def finish_hours(spec: Spec) -> float:
-    """Return the hours from the first weighing until the units are out of the mould.
+    """Return the hours from the first pour's first step until the units are out of the mould.
 
-    Raises Refusal where the moulds can't be made.
+    What comes before it is done once for a mould, and in resin waits for a test of the silicones' cure. Raises Refusal
+    where the moulds can't be made.
     """
     # Volumes enter the grams alone, and of these the procedure's times read none.
-    return procedure(MouldSet(spec), (1.0,) * len(spec.layers), 1.0).earliest_finish_min / 60
+    made = procedure(MouldSet(spec), (1.0,) * len(spec.layers), 1.0)
+    begins = next(phase.start_min for phase in made.time_line if phase.name == "pour 1")
+    return (made.earliest_finish_min - begins) / 60
 
 
 def cure_hours(materials: Sequence[str], known: dict[str, Material], room_c: float) -> float:
