@@ -8,6 +8,7 @@ import pytest
 from manifold3d import Manifold
 from msgspec.structs import replace
 
+from unitcad.designs.limits import SLOT_CLEARANCE
 from unitcad.pipeline import Variant
 from unitcad.validation import templates
 
@@ -73,7 +74,8 @@ def test_the_circuit_touches_what_the_design_says(name: str) -> None:
         assert 0.85 * pad < cap <= pad
         for layer in layers[1:]:
             assert _contact_area(solids[layer], circuit) == 0
-            assert circuit.min_gap(solids[layer], 1) >= 0.15  # the slot's clearance
+            # The slot's floor ends a whole layer, so the circuit need not lie in its middle.
+            assert circuit.min_gap(solids[layer], 1) >= SLOT_CLEARANCE / 4
     assert _contact_area(circuit, solids["motor"]) == pytest.approx(
         math.pi * variant.dimensions.motor_radius**2, rel=1e-6
     )

@@ -250,7 +250,7 @@ def test_provenance_and_range_of_a_silicone_are_written(path: str, value: object
 
 
 def test_a_key_that_is_read_by_nothing_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    for reader in ("figures", "instructions"):
+    for reader in ("figures", "instructions", "preparation", "finishing"):
         monkeypatch.setattr(f"unitcad.casting.{reader}.at_room", lambda value, room_c: value)
     _before.cache_clear()
     assert not any(_effect("whole", "casting.room_c", value) for value in (20.0, 30.0))

@@ -268,4 +268,4 @@ def test_command(built: Path, tmp_path: Path) -> None:
         app, ["build", "embedded", "-o", str(tmp_path), "--only", "unit", "--formats", "stl", "--report"]
     )
     assert done.exit_code == 0, done.output
-    assert (Path(done.output.splitlines()[-1]) / "report.html").is_file()
+    assert (Path(done.stdout.splitlines()[-1]) / "report.html").is_file()
