@@ -57,11 +57,14 @@ def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
         if one["rank"] == other:
             rows.append(f'<tr><td></td><td colspan="{len(_HEAD) - 1}">{escape(words.OTHERS)}</td></tr>')
         link = f'<a href="#proposal-{one["rank"]}">{escape(words.title(one))}</a>'
-        numbers = "".join(f"<td{_NUMBER}>{escape(cell)}</td>" for cell in cells)
+        numbers = "".join(
+            f'<td{_NUMBER} data-head="{escape(head)}">{escape(cell)}</td>'
+            for head, cell in zip(_HEAD[2:], cells, strict=True)
+        )
         rows.append(f"<tr><td>{one['rank']}</td><td>{link}</td>{numbers}</tr>")
     return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="proposals"><table><thead><tr>{head}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div>"
+        '<div class="scroll" tabindex="0" role="region" aria-label="proposals"><table class="cards">'
+        f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
     )
 
 
