@@ -127,18 +127,22 @@ def _axis(values: np.ndarray, log: bool, start: float, end: float, whole: tuple[
         return _Axis(lambda v: start + (math.log10(v) - first) / (last - first) * (end - start), ticks)
     if whole is not None and whole[1] > whole[0]:
         low, high = whole
-        unit = 10.0 ** math.floor(math.log10((high - low) / 6))
-        step = next(unit * k for k in (1, 2, 5, 10) if unit * k >= (high - low) / 6)
+        step = _step(low, high)
         inside = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
         ticks = [(k * step, f"{k * step:.6g}") for k in inside]
         return _Axis(lambda v: start + (v - low) / (high - low) * (end - start), ticks)
     low = 0.0 if -_NIL * (high - low) <= low < 0.0 else low
     low, high = min(low, 0.0) if low > 0 and low < 0.3 * high else low, high if high > low else low + 1.0
-    unit = 10.0 ** math.floor(math.log10((high - low) / 6))
-    step = next(unit * k for k in (1, 2, 5, 10) if unit * k >= (high - low) / 6)
+    step = _step(low, high)
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
     ticks = [(k * step, f"{k * step:.6g}") for k in range(first, last + 1)]
     return _Axis(lambda v: start + (v / step - first) / (last - first) * (end - start), ticks)
+
+
+def _step(low: float, high: float) -> float:
+    """Return a round distance of ticks, of which some six fit between the ends."""
+    unit = 10.0 ** math.floor(math.log10((high - low) / 6))
+    return next(unit * k for k in (1, 2, 5, 10) if unit * k >= (high - low) / 6)
 
 
 def _drawn(one: Series, spots: list[tuple[float, float]], colour: str) -> list[str]:

@@ -51,6 +51,22 @@ def spread(wanted: Sequence[float], sizes: Sequence[float], gap: float = 4.0) ->
     return middles
 
 
+def within(
+    middles: Sequence[float], sizes: Sequence[float], ends: tuple[float, float], gap: float = 4.0
+) -> list[float]:
+    """Return middles moved between `ends`, each no farther than it must be; where they don't fit, past the far end."""
+    found = list(middles)
+    order = sorted(range(len(found)), key=lambda i: found[i])
+    start, end = ends
+    for i in reversed(order):
+        found[i] = min(found[i], end - sizes[i] / 2)
+        end = found[i] - sizes[i] / 2 - gap
+    for i in order:
+        found[i] = max(found[i], start + sizes[i] / 2)
+        start = found[i] + sizes[i] / 2 + gap
+    return found
+
+
 def line(start: Point, end: Point, kind: str) -> str:
     """Draw a line of the style `kind`."""
     (x1, y1), (x2, y2) = start, end

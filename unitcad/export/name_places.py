@@ -60,7 +60,9 @@ def place(owner: np.ndarray, sizes: Mapping[int, tuple[float, float]]) -> dict[i
     wanted = [ends[part][1] if part in ends else 0.0 for part in left]
     heights = [sizes[part][1] for part in left]
     edge = first - LEADER_PX
-    for part, y in zip(left, _column(wanted, heights, owner.shape[0]), strict=True):
+    ends_px = EDGE_PX, owner.shape[0] - EDGE_PX
+    middles = drawing.within(drawing.spread(wanted, heights, GAP_PX), heights, ends_px, GAP_PX)
+    for part, y in zip(left, middles, strict=True):
         width, height = sizes[part]
         found[part] = Label((edge - width, edge, y - height / 2, y + height / 2), ends.get(part))
     return found
@@ -111,18 +113,3 @@ def _free(drawn: np.ndarray, taken: list[Box], box: Box) -> bool:
 def overlap(one: Box, other: Box) -> bool:
     """Return whether two boxes share an area."""
     return one[0] < other[1] and other[0] < one[1] and one[2] < other[3] and other[2] < one[3]
-
-
-def _column(wanted: list[float], heights: list[float], room: float) -> list[float]:
-    """Return middles of names in a column, near the wanted ones, none over another, all on the page if they fit."""
-    found = drawing.spread(wanted, heights, GAP_PX)
-    order = sorted(range(len(found)), key=lambda i: found[i])
-    top = room - EDGE_PX
-    for i in reversed(order):
-        found[i] = min(found[i], top - heights[i] / 2)
-        top = found[i] - heights[i] / 2 - GAP_PX
-    bottom = EDGE_PX
-    for i in order:
-        found[i] = max(found[i], bottom + heights[i] / 2)
-        bottom = found[i] + heights[i] / 2 + GAP_PX
-    return found

@@ -247,27 +247,14 @@ class _Page:
         """Draw names in a row above the drawing, each with a leader to its point."""
         anchors = [self.at(note.at) for note in notes]
         widths = [drawing.text_width(note.text) for note in notes]
-        middles = self._on_page(drawing.spread([x for x, _ in anchors], widths, LABEL_GAP_PX), widths)
+        spread = drawing.spread([x for x, _ in anchors], widths, LABEL_GAP_PX)
+        middles = drawing.within(spread, widths, (EDGE_PX, self.width - EDGE_PX), LABEL_GAP_PX)
         row = self.top - 38
         marks = []
         for note, anchor, middle in zip(notes, anchors, middles, strict=True):
             marks.append(drawing.line((middle, row + drawing.TEXT_PX * 0.7), anchor, "leader"))
             marks += [drawing.dot(anchor), drawing.text(note.text, (middle, row))]
         return marks
-
-    def _on_page(self, middles: Sequence[float], widths: Sequence[float]) -> list[float]:
-        """Return the middles of a row's labels moved onto the page, each no farther than it must be."""
-        found = list(middles)
-        order = sorted(range(len(found)), key=lambda i: found[i])
-        end = self.width - EDGE_PX
-        for i in reversed(order):
-            found[i] = min(found[i], end - widths[i] / 2)
-            end = found[i] - widths[i] / 2 - LABEL_GAP_PX
-        start = EDGE_PX
-        for i in order:
-            found[i] = max(found[i], start + widths[i] / 2)
-            start = found[i] + widths[i] / 2 + LABEL_GAP_PX
-        return found
 
     def _ends(self, measure: Measure) -> tuple[Point, Point]:
         """Return where a dimension line runs (px)."""

@@ -33,10 +33,21 @@ def html_page(
     sheets = [asset(name) for name in styles]
     text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
     packed = base64.b64encode(gzip.compress(text.encode("utf-8", "replace"), 9, mtime=0)).decode()
+    body = [
+        '<main id="page"><p>Reading ...</p></main>',
+        f"<noscript><p>A script draws this page. {html.escape(without_script)}</p></noscript>",
+        f'<script type="text/plain" id="data">{packed}</script>',
+        f'<script type="text/plain" id="licences">{html.escape(licences, quote=False)}</script>',
+    ]
+    return document(title, sheets, body, scripts)
+
+
+def document(title: str, sheets: Sequence[str], body: Sequence[str], scripts: Sequence[str] = ()) -> str:
+    """Return the HTML of a page that contacts nothing and runs `scripts` alone; `body` is markup, escaped already."""
     policy = "; ".join(
         [
             "default-src 'none'",
-            "script-src " + " ".join(_hash(script) for script in scripts),
+            *(["script-src " + " ".join(_hash(script) for script in scripts)] if scripts else []),
             "style-src " + " ".join(_hash(style) for style in sheets),
             "img-src data:",
             "base-uri 'none'",
@@ -55,10 +66,7 @@ def html_page(
         *(f"<style>{style}</style>" for style in sheets),
         "</head>",
         "<body>",
-        '<main id="page"><p>Reading ...</p></main>',
-        f"<noscript><p>A script draws this page. {html.escape(without_script)}</p></noscript>",
-        f'<script type="text/plain" id="data">{packed}</script>',
-        f'<script type="text/plain" id="licences">{html.escape(licences, quote=False)}</script>',
+        *body,
         *(f"<script>{script}</script>" for script in scripts),
         "</body>",
         "</html>",
