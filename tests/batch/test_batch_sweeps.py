@@ -175,6 +175,18 @@ def test_a_dry_run_of_refused_variants_alone_is_refused(tmp_path: Path) -> None:
     assert "diameter_mm" in done.stderr
 
 
+def test_every_fault_of_a_base_is_listed(tmp_path: Path) -> None:
+    (tmp_path / "unit.toml").write_text(
+        'diameter_mm = -3\n[fpcb]\ntail = "sideways"\n[[layers]]\n'
+        'material = "ecoflex-00-11"\n[moulds]\nprinter = "prusa"\n'
+    )
+    sweep = tmp_path / "s.toml"
+    sweep.write_text('base = "./unit.toml"\n[sweep]\n"layers.0.wall_mm" = [1.0, 1.5]\n')
+    for more in ([], ["--dry-run"]):
+        said = unitcad("batch", sweep, "-o", tmp_path / "out", *more).stderr
+        assert all(field in said for field in ("diameter_mm", "fpcb.tail", "layers.0.material", "moulds.printer")), said
+
+
 def test_dry_run_counts_and_makes_nothing(tmp_path: Path) -> None:
     sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=5)
     done = unitcad("batch", sweep, "-o", tmp_path / "out", "--dry-run", "--json", "--allow-code")

@@ -67,7 +67,7 @@ def make(
 
     Raises Refusal or UnitcadError where nothing can be run.
     """
-    if options.only == ("estimate",):
+    if options.only == ("estimate",) and not sweep.of_arrays:
         return write_estimates(sweep, folder, options)
     with workers.executor(options.timeout) as (executor, number):
         remote = workers.scheduler is not None

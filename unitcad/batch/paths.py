@@ -7,6 +7,7 @@ import typing
 from collections.abc import Iterator
 from typing import Any
 
+from unitcad.arrays.array_tables import AskedArray
 from unitcad.errors import Refusal
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
@@ -18,7 +19,7 @@ def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
     `where` is the table of the sweep file that has it. "layers.0.wall_mm", "estimate.frequency_hz" and whole tables
     ("fpcb", "layers") are paths.
     """
-    kind: Any = AskedSpec
+    kind: Any = _kind(base)
     node: Any = base
     steps = path.split(".")
     for i, step in enumerate(steps):
@@ -42,7 +43,11 @@ def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
 
 def known_paths(base: dict[str, Any]) -> list[str]:
     """List every path of a spec like `base`, tables and values, in the models' order."""
-    return list(_walk(AskedSpec, "", base))
+    return list(_walk(_kind(base), "", base))
+
+
+def _kind(base: dict[str, Any]) -> Any:
+    return AskedArray if "array" in base else AskedSpec
 
 
 def _walk(kind: Any, prefix: str, node: Any) -> Iterator[str]:

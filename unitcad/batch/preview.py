@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unitcad.arrays.array import Array
+from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.batch.batch_records import Preview, RefusedVariant
 from unitcad.batch.run import BatchOptions, counted
 from unitcad.batch.sweep import Sweep
@@ -11,10 +13,9 @@ from unitcad.cache import MemoryStore
 from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.bodies import body_key, groups
-from unitcad.pipeline.geometry import build_key
-from unitcad.pipeline.product import checked_outputs, make, possible_outputs
+from unitcad.pipeline.product import checked_outputs
 from unitcad.pipeline.stages import Stages
-from unitcad.spec import Spec
+from unitcad.pipeline.subjects import Made, key_of, outputs_of, product_of
 
 LOOKED_AT = 20_000
 """Variants whose geometry is worked out; of a larger sweep the rest is estimated in proportion."""
@@ -32,17 +33,17 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     only = checked_outputs(options.only)
     count = counted(sweep, options.limit)
     looked = min(count, LOOKED_AT)
-    geometries: dict[str, Spec] = {}
+    geometries: dict[str, Made] = {}
     refused: list[RefusedVariant] = []
     accepted = 0
     for index in range(looked):
         try:
             spec = sweep.spec(index)
         except UnitcadError as error:
-            refused.append(RefusedVariant(index, str(error)))
+            refused.append(RefusedVariant(index, sweep.faults(index, error)))
             continue
         accepted += 1
-        geometries.setdefault(build_key(spec, only, options.check), spec)
+        geometries.setdefault(key_of(spec, only, options.check), spec)
     if refused and not accepted:
         raise UnitcadError(f"every variant is refused, the first: {refused[0].reason}")
     share = count / looked
@@ -66,20 +67,20 @@ def preview(sweep: Sweep, options: BatchOptions) -> Preview:
     )
 
 
-def _distinct_parts(specs: list[Spec], only: tuple[str, ...]) -> int:
+def _distinct_parts(specs: list[Made], only: tuple[str, ...]) -> int:
     """Count the different bodies of these specs."""
     keys = set()
     for spec in specs:
-        moulds = MouldSet(spec)
-        for group in groups(moulds, possible_outputs(spec, only)):
+        moulds = patch_moulds(spec) if isinstance(spec, Array) else MouldSet(spec)
+        for group in groups(moulds, outputs_of(spec, only)):
             keys |= {body_key(moulds, body, "record") for body in group.bodies}
     return len(keys)
 
 
-def _weight(spec: Spec, only: tuple[str, ...]) -> tuple[int, int, int]:
+def _weight(spec: Made, only: tuple[str, ...]) -> tuple[int, int, int]:
     """Return (bytes shared, bytes of its own, files) of one variant, made in memory without checks."""
     store = MemoryStore()
-    product = make(spec, only, False, store, Stages())
+    product = product_of(spec, only, False, store, Stages())
     shared = {sha: len(store.content(sha)) for sha in product.shared.values()}
     own = sum(map(len, product.own.values()))
     return sum(shared.values()), own, len(product.shared) + len(product.own) + 1

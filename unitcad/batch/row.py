@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from unitcad import catalogue
+from unitcad.arrays.array import Array
 from unitcad.batch.batch_records import Values
 from unitcad.pipeline.manifest_records import Manifest
-from unitcad.spec import Spec
+from unitcad.pipeline.subjects import Made, unit_of
 
 
-def row(spec: Spec, manifest: Manifest) -> Values:
+def row(of: Made, manifest: Manifest) -> Values:
     """Return volumes (mm3) and masses (g) of the cast layers, mould checks, mesh checks, and edge level by model."""
+    spec = unit_of(of)
     densities = catalogue.materials(spec.materials)
-    columns: Values = {"name": spec.name, "design": spec.design, "diameter_mm": spec.diameter_mm}
+    columns: Values = {"name": of.name, "design": spec.design, "diameter_mm": spec.diameter_mm}
+    if isinstance(of, Array):
+        columns |= {"array": of.construction, "units": len(of.places), "pitch_mm": round(of.pitch_mm, 3)}
     total = 0.0
     for part in manifest["parts"]:
-        if part["role"] == "unit" and part["material"] is not None:
+        # An array's own silicone; its units' parts are named after their folders.
+        own = not isinstance(of, Array) or ":" not in part["name"]
+        if own and part["role"] == "unit" and part["material"] is not None:
             # g/cm3 times mm3 is mg.
             mass = part["volume_mm3"] * float(densities[part["material"]].density_g_cm3) / 1000
             columns[f"layer{part['step']}_volume_mm3"] = float(f"{part['volume_mm3']:.9g}")

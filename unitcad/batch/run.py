@@ -27,11 +27,10 @@ from unitcad.batch.unread_keys import warnings as unread_warnings
 from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.pipeline.artifacts import OUTPUTS
-from unitcad.pipeline.folder import clear_leftovers, folder_name, whole
-from unitcad.pipeline.geometry import build_key
+from unitcad.pipeline.folder import clear_leftovers, whole
 from unitcad.pipeline.product import checked_outputs
+from unitcad.pipeline.subjects import key_of, subject_of, to_text
 from unitcad.pipeline.versions import kernel_versions
-from unitcad.spec import to_json
 
 WINDOW = 2048
 """Variants held in memory: enough to group those that share a geometry."""
@@ -203,16 +202,16 @@ class _Batch:
             try:
                 spec = self.sweep.spec(index)
             except UnitcadError as error:
-                self._finished(VariantOutcome(index, tasks.REFUSED, reason=tasks.failure(index, error).reason))
+                self._finished(VariantOutcome(index, tasks.REFUSED, reason=self.sweep.faults(index, error)))
                 continue
-            first = self.seen.setdefault(int(folder_name(spec)[-12:], 16), index)
+            first = self.seen.setdefault(int(subject_of(spec).folder_name[-12:], 16), index)
             if first != index:
                 self.journal.add(JournalEntry(index=index, same_as=first, values=self.sweep.values(index)[1]))
                 self._finished(VariantOutcome(index, tasks.OK), fresh=False)
                 continue
-            key = build_key(spec, self.only, self.options.check)
+            key = key_of(spec, self.only, self.options.check)
             self.groups.setdefault(key, _GeometryJobs()).jobs.append(
-                Job(index, to_json(spec), entry.manifest if entry else "")
+                Job(index, to_text(spec), entry.manifest if entry else "")
             )
             self.waiting += 1
 

@@ -23,13 +23,16 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from msgspec import Meta, Struct, field, structs
 
+from unitcad.arrays.array_file import array_templates, confirm_known, expanded, is_array
 from unitcad.batch.paths import check_path
 from unitcad.cache import digest
-from unitcad.errors import Refusal, WrongArgument
+from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import names_device
-from unitcad.spec import Spec, check_plain, convert, read_toml
+from unitcad.pipeline.subjects import Made, of_data
+from unitcad.spec import check_plain, convert, read_toml
 from unitcad.spec.fields import fields_of
-from unitcad.validation import from_data, override, put, read
+from unitcad.validation import override, put, read
+from unitcad.validation.load import all_faults
 from unitcad.validation.shipped_files import is_path, named_file, shipped_files
 
 T = TypeVar("T", bound=Struct)
@@ -38,6 +41,8 @@ _KEYS = {
     "mode": {"enum": list(get_args(Mode)), "default": "product"},
     "cases": {"type": "array", "items": {"type": "object"}},
 }
+EXPLAINED = 20
+"""Of so many variants, the first ones, every fault is looked for: a base's own faults are then all listed."""
 MOST = 1_000_000
 """Variants that a sweep may have without --limit."""
 
@@ -160,13 +165,27 @@ class Sweep:
             chosen[axis.path] = axis.values[here]
         return self.bases[base][0], {axis.path: chosen[axis.path] for axis in self.axes}
 
-    def spec(self, index: int) -> Spec:
-        """Return the effective spec of variant `index`. Raises Refusal."""
+    def spec(self, index: int) -> Made:
+        """Return the effective spec, or the array, of variant `index`. Raises Refusal."""
+        return of_data(self._data(index))
+
+    def faults(self, index: int, first: UnitcadError) -> str:
+        """Return what is wrong with a refused variant in one line, `first` being what it was refused for."""
+        if index >= EXPLAINED or not isinstance(first, Refusal) or self.of_arrays:
+            return str(first)
+        return "; and ".join(map(str, all_faults(first, self._data(index), "")))
+
+    @property
+    def of_arrays(self) -> bool:
+        """Whether any base is an array."""
+        return any("array" in data for _, data in self.bases)
+
+    def _data(self, index: int) -> dict[str, Any]:
         base, values = self.values(index)
         data = self.base_data(base)
         for path, value in values.items():
             put(data, path, value)
-        return from_data(data, Path())
+        return data
 
     def base_data(self, base: str) -> dict[str, Any]:
         """Return a copy of a base's data."""
@@ -228,13 +247,13 @@ def _parted(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[st
 
 
 def _read_base(base: str, folder: Path) -> dict[str, Any]:
-    if is_path(base):
-        data = read(folder / base)
+    place = folder / base if is_path(base) else base
+    confirm_known(base, "base", Refusal)
+    if is_array(place):
+        path = array_templates().get(base) or Path(place)
+        data = expanded(read_toml(path), path.parent)
     else:
-        try:
-            data = read(base)
-        except Refusal as refusal:
-            raise Refusal("base", base, refusal.limit, refusal.nearest) from None
+        data = read(place)
     check_plain(data)
     return data
 

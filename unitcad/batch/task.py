@@ -10,7 +10,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from unitcad import files
@@ -22,10 +22,11 @@ from unitcad.pipeline import folder as folders
 from unitcad.pipeline.build import build_into
 from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import Manifest, failed_codes
-from unitcad.pipeline.product import Product, make, possible_outputs
+from unitcad.pipeline.product import Product
 from unitcad.pipeline.stages import Stages
+from unitcad.pipeline.subjects import Made, of_text, outputs_of, product_of, subject_of, unit_of
 from unitcad.pipeline.versions import code_version
-from unitcad.spec import Spec, custom_code, from_json
+from unitcad.spec import custom_code
 
 OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no space"
 """broken: made, but a mould check or a mesh check failed. refused: the spec is invalid. failed: not made."""
@@ -33,7 +34,7 @@ OK, BROKEN, REFUSED, FAILED, NO_SPACE = "ok", "broken", "refused", "failed", "no
 
 @dataclass(frozen=True)
 class Job:
-    """One variant: its number in the sweep and its effective spec as JSON (a tenth of the object's size).
+    """One variant: its number in the sweep and its spec, or array, as JSON (a tenth of the object's size).
 
     `damaged` is the SHA-256 of the manifest that an earlier run made, if its folder has not stayed whole.
     """
@@ -121,23 +122,23 @@ def _locally(job: Job, task: Task) -> VariantOutcome:
     """Make a variant into its folder, with the cache on this disk."""
     assert task.out is not None
     assert task.cache is not None
-    spec = from_json(job.spec)
-    folder = task.out / folders.folder_name(spec)
+    spec = of_text(job.spec)
+    folder = task.out / subject_of(spec).folder_name
     manifest = _finished(folder, spec, task, job.damaged)
     if manifest is not None:
         return _outcome(job, spec, folder.name, manifest, Counter({"file reused": 1}))
     store = _store(task.cache)
     before = Counter(store.counts)
-    built = build_into(folder, spec, only=task.only, check=task.check, store=store)
+    built = build_into(folder, partial(product_of, spec, task.only, task.check), store, Stages())
     return _outcome(job, spec, folder.name, built.manifest, store.counts - before)
 
 
 def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
     """Make a variant in memory and return it: contents that the caller has are only named."""
-    spec = from_json(job.spec)
+    spec = of_text(job.spec)
     store = MemoryStore(known)
-    product = make(spec, task.only, task.check, store, Stages())
-    outcome = _outcome(job, spec, folders.folder_name(spec), product.manifest, store.counts)
+    product = product_of(spec, task.only, task.check, store, Stages())
+    outcome = _outcome(job, spec, subject_of(spec).folder_name, product.manifest, store.counts)
     needed = set(product.shared.values()) & set(store.contents)
     return replace(
         outcome,
@@ -147,7 +148,7 @@ def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
     )
 
 
-def _outcome(job: Job, spec: Spec, folder: str, manifest: Manifest, counts: Counter[str]) -> VariantOutcome:
+def _outcome(job: Job, spec: Made, folder: str, manifest: Manifest, counts: Counter[str]) -> VariantOutcome:
     codes = failed_codes(manifest)
     return VariantOutcome(
         job.index,
@@ -161,7 +162,7 @@ def _outcome(job: Job, spec: Spec, folder: str, manifest: Manifest, counts: Coun
     )
 
 
-def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> Manifest | None:
+def _finished(folder: Path, spec: Made, task: Task, damaged: str) -> Manifest | None:
     """Return the manifest of a result that an interrupted run completed, if it is what is wanted now.
 
     Raises UnitcadError for a folder that holds something else.
@@ -172,17 +173,17 @@ def _finished(folder: Path, spec: Spec, task: Task, damaged: str) -> Manifest | 
         with contextlib.suppress(UnitcadError):
             if digest(files.read(folder / "manifest.json", links=False)) == damaged:
                 return None
-        folders.earlier_formats(folder, spec, ours=True)
+        folders.earlier_formats(folder, subject_of(spec), ours=True)
         return None
-    formats = folders.earlier_formats(folder, spec)
+    formats = folders.earlier_formats(folder, subject_of(spec))
     manifest = folders.whole(folder, hashes=True)  # the journal lacks it: it may not have reached the disk
     if manifest is None:
         return None
     try:
         same = (
             files.read_json(folder / "timings.json", links=False).get("code") == task.code
-            and set(manifest["outputs"]) == set(possible_outputs(spec, task.only))
-            and set(formats) == set(spec.output.formats)
+            and set(manifest["outputs"]) == set(outputs_of(spec, task.only))
+            and set(formats) == set(unit_of(spec).output.formats)
             and task.check != any(left["why"] == folders.UNCHECKED for left in manifest["left_out"])
         )
     except (UnitcadError, KeyError, TypeError, AttributeError):

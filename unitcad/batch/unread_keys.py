@@ -56,6 +56,8 @@ def swept_estimate(sweep: Sweep, count: int) -> SweptEstimate | None:
     A key is changed alone, from several variants, through several of its values, since a rule by name would have to
     know every model. A key that can't be changed alone, or whose levels are not known, is taken for read.
     """
+    if sweep.of_arrays:
+        return None
     starts = [(index, spec) for index in _spread(count, _STARTS) if (spec := _spec(sweep, index))]
     if not starts:
         return None
@@ -130,6 +132,7 @@ def _spec(sweep: Sweep, index: int) -> Spec | None:
     """Return a variant's spec; None where it is refused or has no estimate."""
     try:
         spec = sweep.spec(index)
+        assert isinstance(spec, Spec)
         estimate_input(spec)
     except UnitcadError:
         return None

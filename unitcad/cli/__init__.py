@@ -31,6 +31,7 @@ from unitcad.cli.output import say_error, speak_anywhere
 from unitcad.cli.phantom_command import phantom
 from unitcad.cli.report_command import report
 from unitcad.cli.schema_command import schema
+from unitcad.cli.serve_command import serve
 from unitcad.errors import UnitcadError
 
 app = typer.Typer(
@@ -71,6 +72,7 @@ app.command("measure")(measure)
 app.command("phantom")(phantom)
 app.command("report")(report)
 app.command("schema")(schema)
+app.command("serve")(serve)
 app.add_typer(cache, name="cache")
 
 

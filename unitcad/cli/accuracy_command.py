@@ -24,7 +24,7 @@ def accuracy(
     ] = None,
     media: Annotated[
         int | None,
-        typer.Option(min=9, max=90_000, help="How many random media the suite stability takes."),
+        typer.Option(min=10, max=90_000, help="How many random media the suite stability takes."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the random media: another one, other media.")] = 0,
     out: Annotated[

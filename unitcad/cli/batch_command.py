@@ -18,6 +18,7 @@ from unitcad.cli.shared_options import (
     Page,
     Sets,
     allow_code,
+    finite,
     outputs,
     overrides,
 )
@@ -59,12 +60,13 @@ def batch(
     ] = False,
     keep_going: Annotated[bool, typer.Option("--keep-going", help="Go on after a variant that fails.")] = False,
     timeout: Annotated[
-        float | None, typer.Option(metavar="S", min=0.001, max=1e7, help="Seconds that a variant may take.")
+        float | None,
+        typer.Option(metavar="S", min=0.001, max=1e7, callback=finite, help="Seconds that a variant may take."),
     ] = (None),
     limit: Annotated[int | None, typer.Option(metavar="N", help="The first N variants only.")] = None,
     cache: Annotated[Path | None, typer.Option(help="Where distinct parts are kept; else in the user's cache.")] = None,
     cache_limit: Annotated[
-        float, typer.Option(metavar="MB", min=0, max=1e12, help="What the cache keeps at the end.")
+        float, typer.Option(metavar="MB", min=0, max=1e12, callback=finite, help="What the cache keeps at the end.")
     ] = 4096,
     sets: Sets = None,
     formats: Formats = None,

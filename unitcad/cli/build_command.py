@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+from contextlib import AbstractContextManager, nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from unitcad.cli.output import warn
+from unitcad.cli.output import say_error, warn
 from unitcad.cli.shared_options import (
     AllowCode,
     AsJson,
@@ -18,17 +20,21 @@ from unitcad.cli.shared_options import (
     Only,
     Sets,
     allow_code,
+    listed,
     outputs,
     overrides,
     with_fit,
 )
 
 if TYPE_CHECKING:
+    from unitcad.export.step_process import StepProcess
     from unitcad.pipeline.manifest_records import Manifest
 
 
 def build(
-    specs: Annotated[list[str], typer.Argument(metavar="SPEC", help="A spec file, or the name of a template.")],
+    specs: Annotated[
+        list[str], typer.Argument(metavar="SPEC", help="A spec or array file, or the name of a template.")
+    ],
     out: Annotated[Path, typer.Option("-o", "--out", help="Where the result's folder goes.")] = Path("out"),
     fit: Fit = None,
     sets: Sets = None,
@@ -42,47 +48,114 @@ def build(
         ),
     ] = None,
     no_check: NoCheck = False,
-    no_slice: Annotated[
-        bool, typer.Option("--no-slice", help="Leave out PrusaSlicer's print time and filament (slicer.json).")
+    slicing: Annotated[
+        bool, typer.Option("--slice", help="Have PrusaSlicer say print time and filament of each piece (slicer.json).")
+    ] = False,
+    no_slice: Annotated[bool, typer.Option("--no-slice", hidden=True)] = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Build again after every save of the spec, until Ctrl-C.")
     ] = False,
     code: AllowCode = False,
     as_json: AsJson = False,
 ) -> None:
-    """Make a unit and its casting moulds. The last line printed is the folder."""
-    from unitcad.cli.build_summary import summary
+    """Make a unit and its casting moulds, or an array of units. The last line printed is the folder."""
+    if no_slice:
+        warn("note: nothing is sliced without --slice: leave out --no-slice, which the next release does not know")
+    once = partial(_built, specs, out, fit, sets, formats, only, page, no_check, slicing, code, as_json)
+    if not watch:
+        if not once():
+            sys.exit(1)
+        return
+    from unitcad.cli.saves import saves
+    from unitcad.errors import UnitcadError, WrongArgument
+
+    if lacking := [spec for spec in specs if not Path(spec).is_file()]:
+        why = "is no file that could be saved; unitcad init makes one from a template"
+        raise WrongArgument("watch", lacking[0], why)
+    with suppress(KeyboardInterrupt):
+        for _ in saves(map(Path, specs)):
+            try:
+                once()
+            except UnitcadError as error:
+                say_error(error, as_json)
+            warn("waiting for a save; Ctrl-C ends")
+
+
+def _built(
+    specs: list[str],
+    out: Path,
+    fit: Path | None,
+    sets: list[str] | None,
+    formats: str | None,
+    only: str | None,
+    page: bool | None,
+    no_check: bool,
+    slicing: bool,
+    code: bool,
+    as_json: bool,
+) -> bool:
+    """Build the specs and print what came out; return whether every check passed."""
+    from unitcad.arrays.array import Array
+    from unitcad.arrays.array_file import confirm_known, is_array, load_array
+    from unitcad.cli.build_summary import array_summary, summary
     from unitcad.cli.output import print_json, progress
-    from unitcad.pipeline.build import build as run
-    from unitcad.pipeline.folder import PAGE, held
-    from unitcad.pipeline.slicing import slice_tools
+    from unitcad.pipeline.array_build import array_subject, build_array
+    from unitcad.pipeline.build import Built
+    from unitcad.pipeline.build import build as build_spec
+    from unitcad.pipeline.folder import PAGE, held, subject
     from unitcad.validation import load
 
-    changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
-    allow_code(code)
-    # Every spec is validated before the first one is built.
-    wanted = [load(spec, changes) for spec in specs]
-    results, printing = [], []
-    sliced = only is None and not no_slice
-    for spec in wanted:
-        with progress(spec.name) as say:
-            results.append(run(spec, out, only=chosen, check=not no_check, say=say))
-            printing.append(slice_tools(results[-1].folder, results[-1].manifest, spec, say) if sliced else "")
-            if page or (page is None and only is None) or (results[-1].folder / PAGE).is_file():
-                from unitcad.report import write_report
+    with _step_process(only, formats) as step:
+        changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
+        allow_code(code)
+        # Every spec is validated before the first one is built.
+        for spec in specs:
+            confirm_known(spec)
+        wanted = [load_array(spec, changes) if is_array(spec) else load(spec, changes) for spec in specs]
+        results: list[Built] = []
+        printing = [""] * len(wanted)
+        if slicing:
+            from unitcad.pipeline.slicing import begin, check_slicing, finish, take
 
-                say("page")
-                with held(results[-1].folder):
-                    write_report(results[-1].folder, warn)
+            for spec in wanted:
+                check_slicing(spec.unit if isinstance(spec, Array) else spec, chosen)
+        for i, spec in enumerate(wanted):
+            of = array_subject(spec) if isinstance(spec, Array) else subject(spec)
+            run = partial(build_array, spec) if isinstance(spec, Array) else partial(build_spec, spec)
+            with progress(spec.name) as say:
+                made = partial(run, out, only=chosen, check=not no_check, say=say, step=step)
+                if slicing:
+                    with begin(spec.unit if isinstance(spec, Array) else spec, out / of.folder_name, say) as pieces:
+                        results.append(made(take=take(pieces)))
+                        printing[i] = finish(pieces, results[-1].folder, results[-1].manifest)
+                else:
+                    results.append(made())
+                if page or (page is None and only is None) or (results[-1].folder / PAGE).is_file():
+                    from unitcad.report import write_report
+
+                    say("page")
+                    with held(results[-1].folder):
+                        write_report(results[-1].folder, warn)
     if as_json:
         print_json({"variants": [{"folder": str(r.folder), "ok": r.ok, "manifest": r.manifest} for r in results]})
     else:
         for spec, result, prints in zip(wanted, results, printing, strict=True):
             _print_faults(result.manifest)
             # Standard output has the folder alone, for a script to take.
-            for line in (*summary(spec, result), *([prints] if prints else ())):
+            lines = array_summary(spec, result) if isinstance(spec, Array) else summary(spec, result)
+            for line in (*lines, *([prints] if prints else ())):
                 warn(f"{spec.name}: {line}")
             typer.echo(str(result.folder))
-    if not all(result.ok for result in results):
-        sys.exit(1)
+    return all(result.ok for result in results)
+
+
+def _step_process(only: str | None, formats: str | None) -> AbstractContextManager[StepProcess | None]:
+    """Return a process for STEP files, begun before anything else where STEP may be asked for; None without use."""
+    from unitcad.export.step_process import StepProcess, worthwhile
+
+    drawn = only is None or {"unit", "moulds"} & set(listed(only))
+    asked = drawn and (formats is None or "step" in listed(formats))
+    return StepProcess() if asked and worthwhile() else nullcontext()
 
 
 def _print_faults(manifest: Manifest) -> None:

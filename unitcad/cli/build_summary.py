@@ -7,8 +7,12 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+from unitcad.arrays.array import Array
+from unitcad.arrays.array_extras import CROSSTALK
+from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.batch.row import row
 from unitcad.casting.time_line import duration
+from unitcad.check.findings import counted
 from unitcad.pipeline.build import Built
 from unitcad.pipeline.folder import PAGE
 from unitcad.spec import Spec
@@ -24,7 +28,9 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         height = max(box[5] for box in boxes) - min(box[2] for box in boxes)
         mass = columns.get("silicone_mass_g")
         silicone = f", {number(mass, 3)} g of silicone" if isinstance(mass, float) else ""
-        yield f"{number(spec.diameter_mm, 3)} mm across, {number(height, 3)} mm high{silicone}"
+        cells = json.loads((built.folder / "casting.json").read_bytes())["cells"] if manifest["casting"] else 1
+        each = f"{cells} units, each " if cells > 1 else ""
+        yield f"{each}{number(spec.diameter_mm, 3)} mm across, {number(height, 3)} mm high{silicone}"
     if manifest["casting"]:
         yield from _casting(built.folder)
     checks, check = manifest["laws"], manifest["check"]
@@ -38,11 +44,30 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         yield f"open {built.folder / PAGE}"
 
 
+def array_summary(array: Array, built: Built) -> Iterator[str]:
+    """Yield a line each: units and size, casting, checks, crosstalk, the page."""
+    manifest, box = built.manifest, array.sheet.outline
+    size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
+    yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {number(array.sheet.thickness_mm, 3)} mm thick"
+    if manifest["casting"]:
+        yield from _casting(built.folder)
+    if checks := manifest["laws"]:
+        check, passed = manifest["check"], sum(entry["ok"] for entry in checks)
+        files = f"{check['errors']} errors and {check['warnings']} warnings in the files"
+        yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
+    crosstalk = built.folder / CROSSTALK
+    if "estimate" in manifest["outputs"] and crosstalk.is_file():
+        yield from crosstalk_lines(json.loads(crosstalk.read_bytes()))[:2]
+    if (built.folder / PAGE).is_file():
+        yield f"open {built.folder / PAGE}"
+
+
 def _casting(folder: Path) -> Iterator[str]:
     procedure = json.loads((folder / "casting.json").read_bytes())
     grams: dict[str, float] = defaultdict(float)
-    for pour in procedure["pours"]:
-        grams[pour["material"]] += pour["part_a_g"] + pour["part_b_g"]
+    for item in procedure["bill"]:  # the pours' own, and of an array with pockets those of the units
+        if item["unit"] == "g":
+            grams[item["item"].removesuffix(" part A").removesuffix(" part B")] += item["quantity"]
     total, bench = duration(procedure["earliest_finish_min"]), duration(procedure["bench_min"])
     pours = len(procedure["pours"])
     yield f"{pours} pour{'s' if pours > 1 else ''}, ready {total} after the print, of which {bench} at the bench"

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from unitcad.cli.shared_options import AsJson
+from unitcad.cli.shared_options import AsJson, finite
 
 cache = typer.Typer(help="The cache of distinct parts.", no_args_is_help=True)
 Where = Annotated[Path | None, typer.Option("--cache", help="The cache's folder; else the user's.")]
@@ -26,7 +26,9 @@ def ls(where: Where = None, as_json: AsJson = False) -> None:
 @cache.command("gc")
 def gc(
     where: Where = None,
-    limit: Annotated[float, typer.Option(metavar="MB", min=0, max=1e12, help="What may stay; 0 empties it.")] = 4096,
+    limit: Annotated[
+        float, typer.Option(metavar="MB", min=0, max=1e12, callback=finite, help="What may stay; 0 empties it.")
+    ] = 4096,
     as_json: AsJson = False,
 ) -> None:
     """Remove what was used longest ago, down to a size. Results keep their files: they are links."""

@@ -18,7 +18,9 @@ _MOST_FREQUENCIES = 1000
 
 
 def estimate(
-    specs: Annotated[list[str], typer.Argument(metavar="SPEC", help="a template's name or a path to a TOML file")],
+    specs: Annotated[
+        list[str], typer.Argument(metavar="SPEC", help="a template's name or a path to a TOML file; or arrays")
+    ],
     model: Annotated[
         str, typer.Option(help="bush, fitted, paper, consistent or all of them; or mechanics; else the spec's")
     ] = "",
@@ -31,6 +33,7 @@ def estimate(
             metavar="MM", help="units in a row, so far apart: how far the first moves the others, with their masses"
         ),
     ] = None,
+    masses: Annotated[bool, typer.Option("--masses", help="an array's crosstalk with the units' masses too")] = False,
     fit: Fit = None,
     sets: Sets = None,
     details: Annotated[
@@ -38,11 +41,13 @@ def estimate(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Estimate the vibration at the unit's edge.
+    """Estimate the level at a unit's edge, or an array's crosstalk.
 
     The first line is the answer: which part of the motor's amplitude reaches the edge, in per cent, by the model with
-    the least error, and what was measured.
+    the least error, and what was measured. Of an array: which part of a unit's motion reaches its neighbours. Of
+    several arrays each is compared with the first.
     """
+    from unitcad.arrays.array_file import confirm_known, is_array
     from unitcad.attenuation.edge.fitted_models import MODELS
     from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec, neighbours_of_specs
     from unitcad.validation import load
@@ -53,6 +58,18 @@ def estimate(
         raise Refusal("--frequency", frequency, "must be one frequency for mechanics, whose draws cost seconds each")
     models = None if not model else MODELS if model == "all" else (model,)
     hertz = frequencies(frequency) if frequency else []
+    for name in specs:
+        confirm_known(name)
+    if any(is_array(name) for name in specs):
+        if pitch is not None:
+            raise Refusal("--pitch", pitch, "an array has its own pitch: --set layout.pitch_mm=...")
+        if model:
+            raise Refusal("--model", model, "an array's crosstalk is a range over the models")
+        from unitcad.cli.estimate_arrays import estimate_arrays
+
+        return estimate_arrays(specs, with_fit(sets, fit), hertz, masses, details, as_json)
+    if masses:
+        raise Refusal("--masses", None, "is for arrays; units in a row, with their masses: --pitch")
     loaded = [load(name, with_fit(sets, fit)) for name in specs]
     for spec in loaded:
         _warn_of_moulds(spec)

@@ -9,7 +9,8 @@ import typer
 from unitcad.cli.shared_options import AsJson
 
 KINDS = (
-    "templates", "designs", "materials", "motors", "printers", "experiments", "phantoms", "sweeps", "targets", "rules",
+    "templates", "arrays", "designs", "materials", "motors", "printers", "experiments", "phantoms", "sweeps", "targets",
+    "rules",
 )  # fmt: skip
 
 
@@ -52,6 +53,10 @@ def _entries(kind: str) -> dict[str, Any]:
         return {
             name: _first_comment(path.read_text("utf-8")) for name, path in (templates() | custom_templates()).items()
         }
+    if kind == "arrays":
+        from unitcad.arrays.array_file import array_templates
+
+        return {name: _first_comment(path.read_text("utf-8")) for name, path in array_templates().items()}
     if kind == "designs":
         return {name: design.about for name, design in shipped().items()}
     if kind == "experiments":

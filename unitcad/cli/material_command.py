@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from unitcad.cli.shared_options import AsJson
+from unitcad.cli.shared_options import AsJson, finite
 from unitcad.errors import Refusal, unknown_name
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from unitcad.lab.tensile_result import TensileResult
 
 _DELIMITERS = {"tab": "\t", "space": " "}
-_Length = typer.Option(min=0.001, max=10000, help="Of the specimen; goes before the file's header.")
+_Length = typer.Option(min=0.001, max=10000, callback=finite, help="Of the specimen; goes before the file's header.")
 
 
 def material(
@@ -37,13 +37,15 @@ def material(
     width_mm: Annotated[float | None, _Length] = None,
     thickness_mm: Annotated[float | None, _Length] = None,
     gauge_mm: Annotated[float | None, _Length] = None,
-    cell_n: Annotated[float | None, typer.Option(min=0.001, help="Full scale of the force cell.")] = None,
+    cell_n: Annotated[
+        float | None, typer.Option(min=0.001, callback=finite, help="Full scale of the force cell.")
+    ] = None,
     strain: Annotated[
         str, typer.Option(metavar="LOW:HIGH", help="Strain of use in %; else amplitude over the walls.")
     ] = "",
-    amplitude_um: Annotated[float, typer.Option(min=0.001, max=1e5, help="Of the motor.")] = 300.0,
+    amplitude_um: Annotated[float, typer.Option(min=0.001, max=1e5, callback=finite, help="Of the motor.")] = 300.0,
     wall_mm: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Walls that the motor strains.")] = "1.25:2.5",
-    frequency_hz: Annotated[float, typer.Option(min=1, max=5000, help="Of the motor.")] = 125.0,
+    frequency_hz: Annotated[float, typer.Option(min=1, max=5000, callback=finite, help="Of the motor.")] = 125.0,
     deformation: Annotated[str, typer.Option(help="Of --dma, where the file does not say: shear or tension.")] = "",
     out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for material.toml, .json and charts.")] = None,
     as_json: AsJson = False,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -21,6 +22,13 @@ NoCheck = Annotated[bool, typer.Option("--no-check", help="Leave out the mould c
 AllowCode = Annotated[
     bool, typer.Option("--allow-code", help="Run Python code that came with a spec (design_source), not from a file.")
 ]
+
+
+def finite(value: float | None) -> float | None:
+    """Return an option's number. Raises BadParameter for nan and infinity: a range of Typer's lets nan through."""
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"{value} is not a finite number.")
+    return value
 
 
 def with_fit(sets: list[str] | None, fit: Path | None) -> list[str]:

@@ -1,0 +1,76 @@
+"""The live page in Chromium: what a test does on it and waits for."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from running import Server
+
+WALL = 'input[name="layers.0.wall_mm"]'
+STATES = ("checks passed", "checks failed", "refused", "no moulds")
+
+
+class Live:
+    """A page of a server in a browser: what it said on the console, what it asked for, what it threw."""
+
+    def __init__(self, running: Any, server: Server, width: int = 1280, height: int = 900, dark: bool = False) -> None:
+        self.server = server
+        self.context = running.new_context(
+            viewport={"width": width, "height": height},
+            color_scheme="dark" if dark else "light",
+            reduced_motion="reduce",
+        )
+        self.page = self.context.new_page()
+        self.console: list[str] = []
+        self.requests: list[str] = []
+        self.errors: list[str] = []
+        self.page.on("console", lambda message: self.console.append(f"{message.type}: {message.text}"))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.goto(server.url)
+        self.page.wait_for_selector("html[data-ready=yes]", timeout=60_000)
+        self.settled()
+
+    @property
+    def state(self) -> str:
+        """What the page says of the spec."""
+        return self.page.inner_text("#state")
+
+    def until(self, done: Callable[[], bool], seconds: float = 60.0) -> None:
+        """Wait until something holds."""
+        end = time.monotonic() + seconds
+        while not done():
+            assert time.monotonic() < end, self.state
+            self.page.wait_for_timeout(30)
+
+    def settled(self) -> None:
+        """Wait until nothing is under way."""
+        self.until(lambda: any(word in self.state for word in STATES))
+
+    def choose(self, selector: str, value: str) -> None:
+        """Type a value, and wait until all of it has been seen."""
+        count = len(self.timings())
+        self.page.fill(selector, value)
+        self.until(lambda: len(self.timings()) > count)
+        self.settled()
+
+    def start_from(self, name: str) -> None:
+        """Choose a template."""
+        count = len(self.timings())
+        self.page.select_option('select[name="template"]', name)
+        self.until(lambda: len(self.timings()) > count)
+        self.settled()
+
+    def timings(self) -> list[dict[str, Any]]:
+        """What the page has measured: what was asked, and ms from the change to what is shown."""
+        return self.page.evaluate("() => window.unitcad.timings")
+
+    def close(self) -> None:
+        """End the visit; nothing was thrown, said, or asked of anybody else."""
+        self.context.close()
+        assert self.errors == []
+        # A question that a newer one overtakes is told as a failed request.
+        assert [line for line in self.console if "409" not in line] == []
+        assert all(url.startswith((self.server.base, "data:", "blob:")) for url in self.requests)

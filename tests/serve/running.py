@@ -1,0 +1,88 @@
+"""A server that runs as a command, and a client that speaks to it as its page does."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+MESSAGE = {"Content-Type": "application/json"}
+
+
+class Server:
+    """A running `unitcad serve`: its address, its token, its process."""
+
+    def __init__(self, url: str, process: subprocess.Popen[str]) -> None:
+        self.url, self.process = url, process
+        self.base, _, self.token = url.partition("/?token=")
+        self.port = int(self.base.rpartition(":")[2])
+
+    def send(
+        self, path: str, message: Any = None, *, headers: dict[str, str] | None = None, body: bytes | None = None
+    ) -> tuple[int, bytes, dict[str, str]]:
+        """Send a message as the page does; `headers` replace the page's, "" leaves one out."""
+        if message is not None:
+            body = json.dumps(message).encode()
+        given = {"X-Unitcad-Token": self.token, **(MESSAGE if body is not None else {}), **(headers or {})}
+        request = urllib.request.Request(
+            self.base + path, body, {name: value for name, value in given.items() if value != ""}
+        )
+        try:
+            with urllib.request.urlopen(request, timeout=120) as answer:
+                return answer.status, answer.read(), dict(answer.headers)
+        except urllib.error.HTTPError as error:
+            return error.code, error.read(), dict(error.headers)
+
+    def ask(self, text: str, what: str = "unit", edits: list[dict[str, Any]] | None = None) -> dict[str, Any]:
+        """Ask about a text; returns the answer."""
+        status, content, _ = self.send("/ask", {"text": text, "what": what, "edits": edits or []})
+        assert status == 200, content
+        return json.loads(content)
+
+    def raw(self, content: bytes, seconds: float = 20.0) -> bytes:
+        """Send bytes over a socket and return what comes back until the server closes or `seconds` have passed."""
+        with socket.create_connection(("127.0.0.1", self.port), timeout=seconds) as line:
+            line.sendall(content)
+            got = b""
+            with contextlib.suppress(TimeoutError, ConnectionResetError):
+                while part := line.recv(65536):
+                    got += part
+                    if b"\r\n\r\n" in got:
+                        break
+            return got
+
+
+def interruptible() -> None:
+    """Have a child obey Ctrl-C, which it ignores where the tests were started in the background of a script."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@contextlib.contextmanager
+def serving(folder: Path, *arguments: str) -> Iterator[Server]:
+    """Run `unitcad serve` in a folder."""
+    command = [sys.executable, "-P", "-m", "unitcad", "serve", *arguments, "--no-browser"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        command, cwd=folder, stdout=pipe, stderr=pipe, text=True, preexec_fn=interruptible
+    ) as process:
+        try:
+            assert process.stdout
+            yield Server(process.stdout.readline().strip(), process)
+        finally:
+            process.send_signal(signal.SIGINT)
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                raise
+            assert process.stderr
+            told = process.stderr.read()
+            assert (told, process.returncode) == ("", 0), told

@@ -1,0 +1,120 @@
+"""What the page is told is what the commands give: the same findings, the same estimate, the same refusals."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from running import Server, serving
+
+from unitcad.estimating import estimate_spec
+from unitcad.mould_checks import check_moulds
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.bodies import glb_content
+from unitcad.serve.messages import Field
+from unitcad.validation import load, templates
+
+
+@pytest.mark.parametrize("name", sorted(templates()))
+def test_answers_are_those_of_the_commands(server: Server, name: str) -> None:
+    text = templates()[name].read_text("utf-8")
+    spec = load(name)
+    moulds = MouldSet(spec)
+    unit = server.ask(text)
+    assert "faults" not in unit
+    assert base64.b64decode(unit["model"]["unit"]) == glb_content(moulds, moulds.unit)
+    judged = server.ask(text, "moulds")
+    assert judged["checks"] == json.loads(json.dumps([finding.as_dict() for finding in check_moulds(moulds)]))
+    assert base64.b64decode(judged["model"]["moulds"]) == glb_content(moulds, moulds.plan.tools)
+    assert len(judged["lines"]) == 2
+    if name == "encapsulating":
+        assert server.ask(text, "estimate")["estimate"] == json.loads(json.dumps(estimate_spec(spec)))
+
+
+def test_every_fault_is_told_with_its_line_and_what_would_do(server: Server, text: str) -> None:
+    edits = [{"path": "layers.0.wall_mm", "value": 0.1}, {"path": "fpcb.tail_width_mm", "value": 0.1}]
+    answer = server.ask(text, "unit", edits)
+    faults = {fault["field"]: fault for fault in answer["faults"]}
+    assert set(faults) == {"layers.0.wall_mm", "fpcb.tail_width_mm"}
+    lines = answer["text"].splitlines()
+    assert "wall_mm" in lines[faults["layers.0.wall_mm"]["line"] - 1]
+    fixed = [{"path": field, "value": fault["nearest"]} for field, fault in faults.items()]
+    assert "faults" not in server.ask(answer["text"], "unit", fixed)
+    # The form shows what was typed, refused or not.
+    fields = {field["path"]: field for group in answer["groups"] for field in group["fields"]}
+    assert fields["layers.0.wall_mm"]["value"] == 0.1
+
+
+def test_a_text_that_is_no_toml_is_told_with_its_line(server: Server, text: str) -> None:
+    answer = server.ask(text.replace("diameter_mm =", "diameter_mm = ="))
+    assert len(answer["faults"]) == 1
+    assert "no TOML" in answer["faults"][0]["message"]
+
+
+def test_the_form_has_every_key_of_the_schema_with_its_range(server: Server, text: str) -> None:
+    groups = server.ask(text)["groups"]
+    fields = {field["path"]: field for group in groups for field in group["fields"]}
+    assert {"name", "design", "diameter_mm", "layers.0.wall_mm", "layers.1.material", "motor.part"} <= set(fields)
+    assert {"moulds.printer", "casting.vacuum", "estimate.frequency_hz", "output.tolerance_mm"} <= set(fields)
+    assert fields["layers.0.wall_mm"]["low"] == 0.5
+    assert any(word == "dragon-skin-30" for word, _ in fields["layers.0.material"]["choices"])
+    assert [group["title"] for group in groups if not group.get("present", True)] == ["Wires"]
+    assert all(set(field) <= set(Field.__struct_fields__) for field in fields.values())
+
+
+def test_a_worker_that_is_killed_or_hangs_is_replaced(tmp_path: Path, text: str) -> None:
+    with serving(tmp_path) as own:
+        assert "faults" not in own.ask(text)
+        children = [
+            int(pid) for pid in Path(f"/proc/{own.process.pid}/task/{own.process.pid}/children").read_text().split()
+        ]
+        assert len(children) == 3
+        for pid in children:
+            os.kill(pid, signal.SIGKILL)
+        deadline = time.monotonic() + 60
+        while True:
+            status, content, _ = own.send("/ask", {"text": text})
+            if status == 200:
+                break
+            assert status == 500
+            assert "worker ended" in content.decode()
+            assert time.monotonic() < deadline
+        assert "faults" not in json.loads(content)
+
+
+def test_a_build_is_that_of_the_command_and_can_be_cancelled(tmp_path: Path, text: str) -> None:
+    with serving(tmp_path, "encapsulating", "-o", "made") as own:
+        quick = text + '\n[output]\nformats = ["stl"]\n'
+        state = json.loads(own.send("/build", {"text": quick})[1])
+        assert own.send("/build", {"text": quick})[0] == 422  # one at a time
+        while not state["ended"]:
+            time.sleep(0.2)
+            state = json.loads(own.send(f"/job/{state['job']}")[1])
+        assert state["code"] == 0
+        assert (tmp_path / state["folder"] / "manifest.json").is_file()
+        status, _, headers = own.send(f"/files/{state['page']}")
+        assert status == 200
+        assert headers["content-security-policy"].startswith("sandbox ")
+        state = json.loads(own.send("/build", {"text": quick.replace("14.0", "15.0")})[1])
+        time.sleep(0.5)
+        state = json.loads(own.send("/cancel", {"job": state["job"]})[1])
+        assert state["ended"]
+        assert state["code"] != 0
+        assert len(list((tmp_path / "made").glob("encapsulating-*"))) == 1
+
+
+def test_a_sweep_makes_a_batch_with_its_page(tmp_path: Path, text: str) -> None:
+    with serving(tmp_path) as own:
+        quick = text + "\n[output]\nformats = []\n"
+        message = {"text": quick, "key": "layers.0.wall_mm", "low": 1.0, "high": 1.5, "count": 2}
+        state = json.loads(own.send("/sweep", message)[1])
+        while not state["ended"]:
+            time.sleep(0.2)
+            state = json.loads(own.send(f"/job/{state['job']}")[1])
+        assert state["code"] == 0, state
+        assert own.send(f"/files/{state['page']}")[0] == 200

@@ -1,0 +1,197 @@
+"""Requests of others: another site's, a rebound name's, without the token, too large, too slow, out of the folder."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from running import Server, serving
+
+from unitcad.serve.gate import BODY_S, LARGEST_BODY
+
+HOSTS = ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example", "0.0.0.0", "[::]", ""]
+ORIGINS = ["http://evil.example", "https://127.0.0.1", "null", "http://localhost", "file://", "http://127.0.0.1:1"]
+TOKENS = ["", "x", "0" * 32, "é" * 16, "a" * 5000]
+PATHS = [
+    "../../etc/passwd", "..%2f..%2fetc%2fpasswd", "%2e%2e/%2e%2e/etc/passwd", "....//....//etc/passwd", "/etc/passwd",
+    "//etc/passwd", "C:%5cwindows", "..%5c..%5csecret.toml", "a/../../secret.toml", ".hidden/x.json", "link.html",
+    "linked/secret.toml", "secret.toml%00.html", "%00", "~root/x.html", "proc/self/environ", "out/../secret.toml",
+]  # fmt: skip
+MESSAGES: list[Any] = [
+    [], None, 3, "text", {}, {"text": 5}, {"text": "x", "what": "secrets"}, {"text": "x", "other": 1},
+    {"text": "x", "edits": [{"path": "name", "value": 1, "code": "x"}]}, {"text": "x", "edits": [{}] * 60},
+    {"text": "x" * 1_000_001}, {"text": "x", "page": "../x"}, {"text": "x", "edits": {"path": "name"}},
+]  # fmt: skip
+
+
+def test_pages_of_other_sites_and_rebound_names_are_refused(server: Server, text: str) -> None:
+    """Every pair of a wrong Host, a wrong Origin or a wrong token, on every route."""
+    ask = {"text": text}
+    refused = 0
+    for path, host in itertools.product(("/ask", "/save", "/build", "/"), HOSTS):
+        if not host:
+            continue
+        status, content, headers = server.send(path, None if path == "/" else ask, headers={"Host": host})
+        assert status == 421, (path, host, content)
+        assert "Access-Control-Allow-Origin" not in headers
+        refused += 1
+    for path, origin in itertools.product(("/ask", "/save", "/build", "/sweep", "/cancel", "/"), ORIGINS):
+        status, _, headers = server.send(path, None if path == "/" else ask, headers={"Origin": origin})
+        assert status == 403, (path, origin)
+        assert "Access-Control-Allow-Origin" not in headers
+        refused += 1
+    for path, token in itertools.product(
+        ("/ask", "/save", "/build", "/sweep", "/cancel", "/", "/files/x.json", "/job/0"), TOKENS
+    ):
+        message = None if path.startswith(("/files", "/job")) or path == "/" else ask
+        status, content, _ = server.send(path, message, headers={"X-Unitcad-Token": token.encode().decode("latin-1")})
+        assert status == 403, (path, token, content)
+        refused += 1
+    for site in ("cross-site", "same-site"):
+        assert server.send("/ask", ask, headers={"Sec-Fetch-Site": site})[0] == 403
+        refused += 1
+    # A cookie alone, which a form of another site could make the browser send, is enough to read, not to act.
+    cookie = {"X-Unitcad-Token": "", "Cookie": f"unitcad-{server.port}={server.token}"}
+    assert server.send("/", headers=cookie)[0] == 200
+    assert server.send("/ask", ask, headers=cookie)[0] == 403
+    assert refused > 100
+
+
+def test_a_request_has_one_host(server: Server) -> None:
+    two = f"GET /?token={server.token} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nHost: evil.example\r\n\r\n"
+    assert b" 421 " in server.raw(two.encode()) or b" 400 " in server.raw(two.encode())
+    none = f"GET /?token={server.token} HTTP/1.0\r\n\r\n"
+    assert b" 421 " in server.raw(none.encode())
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_no_path_leads_out_of_the_folder(tmp_path: Path, path: str) -> None:
+    from unitcad.serve.application import _within
+
+    out = tmp_path / "out"
+    (out / ".hidden").mkdir(parents=True)
+    (out / ".hidden" / "x.json").write_text("{}")
+    (tmp_path / "secret.toml").write_text("secret = 1")
+    (out / "link.html").symlink_to(tmp_path / "secret.toml")
+    (out / "linked").symlink_to(tmp_path)
+    (out / "fine.json").write_text("{}")
+    from urllib.parse import unquote
+
+    assert _within(out, unquote(path)) is None
+    assert _within(out, "fine.json") == (out / "fine.json").resolve()
+
+
+def test_paths_are_refused_by_the_server(server: Server) -> None:
+    for path in PATHS:
+        line = f"GET /files/{path} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nX-Unitcad-Token: {server.token}\r\n\r\n"
+        answer = server.raw(line.encode("latin-1"))
+        assert answer.split(b" ")[1] in (b"404", b"400"), (path, answer[:200])
+
+
+@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: repr(message)[:40])
+def test_messages_that_the_page_never_sends_are_refused(server: Server, message: Any) -> None:
+    status, content, _ = server.send("/ask", body=json.dumps(message).encode())
+    assert status == 400, content
+
+
+def test_a_body_is_json_and_says_so(server: Server) -> None:
+    assert server.send("/ask", body=b"{", headers={})[0] == 400
+    assert server.send("/ask", body=b"\xff\xfe")[0] == 400
+    assert server.send("/ask", body=b"[" * 100_000)[0] == 400
+    form = {"Content-Type": "application/x-www-form-urlencoded"}
+    assert server.send("/ask", body=b"text=x", headers=form)[0] == 415
+    assert server.send("/ask", body=b"{}", headers={"Content-Type": "text/plain"})[0] == 415
+
+
+def test_a_huge_body_is_refused_before_it_is_read(server: Server) -> None:
+    head = f"POST /ask HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nX-Unitcad-Token: {server.token}\r\n"
+    told = head + f"Content-Type: application/json\r\nContent-Length: {LARGEST_BODY + 1}\r\n\r\n"
+    assert b" 413 " in server.raw(told.encode())
+    chunk = b"10000\r\n" + b"x" * 0x10000 + b"\r\n"
+    untold = (head + "Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n").encode()
+    assert b" 413 " in server.raw(untold + chunk * (LARGEST_BODY // 0x10000 + 2))
+
+
+def test_a_slow_body_is_given_up(server: Server) -> None:
+    head = f"POST /ask HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nX-Unitcad-Token: {server.token}\r\n"
+    begun = time.monotonic()
+    slow = head + 'Content-Type: application/json\r\nContent-Length: 100\r\n\r\n{"te'
+    answer = server.raw(slow.encode(), seconds=BODY_S + 20)
+    assert b" 408 " in answer
+    assert time.monotonic() - begun >= BODY_S - 1
+
+
+def test_code_in_a_text_does_not_run(server: Server, text: str, tmp_path: Path) -> None:
+    """A design of the page's own: by its file's path, by its source in the text, by an edit."""
+    marker = tmp_path / "ran"
+    file = tmp_path / "evil.py"
+    file.write_text(f"open({str(marker)!r}, 'w').close()\ndef evil(spec): return {{}}\n")
+    source = json.dumps(file.read_text())
+    texts = [
+        text.replace('design = "encapsulating"', f'design = "{file}:evil"'),
+        text.replace('design = "encapsulating"', f'design = "evil.py:evil"\ndesign_source = {source}'),
+    ]
+    for one in texts:
+        for what in ("unit", "moulds", "estimate"):
+            answer = server.ask(one, what)
+            assert "model" not in answer
+            assert "estimate" not in answer
+            assert "faults" in answer or what == "estimate", one
+        assert server.send("/build", {"text": one})[0] == 422
+        assert server.send("/sweep", {"text": one, "key": "diameter_mm", "low": 13, "high": 14, "count": 2})[0] == 422
+    edits = [{"path": "design", "value": "evil.py:evil"}, {"path": "design_source", "value": file.read_text()}]
+    assert server.ask(text, "unit", edits)["faults"]
+    assert not marker.exists()
+
+
+def test_files_that_a_text_names_are_not_read(server: Server, text: str, tmp_path: Path) -> None:
+    secret = tmp_path / "secret.toml"
+    secret.write_text('password = "hunter2"')
+    for one in (
+        text + f'\n[estimate]\nfit = "{secret}"\n',
+        text.replace('design = "encapsulating"', f'design = "{secret}.stl"'),
+    ):
+        answer = server.ask(one, "estimate")
+        assert answer["faults"]
+        assert "hunter2" not in json.dumps(answer)
+
+
+def test_specs_are_saved_in_the_folder_alone(tmp_path: Path, text: str) -> None:
+    with serving(tmp_path, "embedded") as own:
+        for name in (
+            "../x.toml",
+            "/tmp/x.toml",
+            "a/b.toml",
+            ".x.toml",
+            "x.py",
+            "x.toml\n",
+            "",
+            "x" * 200 + ".toml",
+            "..toml/",
+        ):
+            status, _, _ = own.send("/save", {"text": text, "name": name})
+            assert status == 400, name
+        assert own.send("/save", {"text": text, "name": "mine.toml"})[0] == 200
+        assert (tmp_path / "mine.toml").read_text() == text
+        status, content, _ = own.send("/save", {"text": text + "# more\n", "name": "mine.toml"})
+        assert status == 422
+        assert "is there already" in content.decode()
+        assert (tmp_path / "mine.toml").read_text() == text
+        assert own.send("/save", {"text": text + "# more\n", "name": "mine.toml", "replace": True})[0] == 200
+        assert (tmp_path / "mine.toml").read_text().endswith("# more\n")
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.toml"]
+
+
+def test_the_page_can_be_framed_by_nobody_and_contacts_its_own_server_alone(server: Server) -> None:
+    status, content, headers = server.send(f"/?token={server.token}", headers={"X-Unitcad-Token": ""})
+    assert status == 200
+    assert headers["x-frame-options"] == "DENY"
+    assert "frame-ancestors 'none'" in headers["content-security-policy"]
+    assert "HttpOnly" in headers["set-cookie"]
+    assert "SameSite=strict" in headers["set-cookie"]
+    assert b"connect-src &#x27;self&#x27;" in content
+    assert b"default-src &#x27;none&#x27;" in content

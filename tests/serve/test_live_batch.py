@@ -1,0 +1,54 @@
+"""A batch's folder in the live page: its table, and a row that opens live."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from live import WALL, Live
+from running import serving
+
+from unitcad.cache import MemoryStore
+from unitcad.pipeline.build import build
+from unitcad.validation import load
+
+
+@pytest.fixture(scope="module")
+def batch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out, store = tmp_path_factory.mktemp("batch"), MemoryStore()
+    for wall in (1.0, 1.5):
+        build(load("encapsulating", [f"layers.0.wall_mm={wall}", "output.formats=[]"]), out, only=["unit"], store=store)
+    return out
+
+
+def test_a_row_of_a_batch_opens_live(running: Any, batch: Path) -> None:
+    with serving(batch.parent, str(batch)) as own:
+        visit = Live(running, own)
+        names = visit.page.locator("#variants tbody th a")
+        assert names.count() == 2
+        opened = []
+        for index in (0, 1):
+            before = visit.page.input_value(WALL)
+            names.nth(index).click()
+            visit.until(lambda before=before: visit.page.input_value(WALL) != before)
+            visit.settled()
+            opened.append(visit.page.input_value(WALL))
+        assert sorted(opened) == ["1", "1.5"]
+        visit.close()
+
+
+def test_the_folder_of_a_result_opens_its_spec(batch: Path) -> None:
+    folder = sorted(batch.glob("encapsulating-*"))[0]
+    with serving(batch.parent, str(folder)) as own:
+        _, content, _ = own.send("/")
+        assert own.ask((folder / "spec.toml").read_text())["layers"] == 2
+        assert b"html" in content
+
+
+@pytest.mark.parametrize("folder", ["../secret", "..", "%2e%2e", "nothing"])
+def test_no_folder_but_a_variant_s_is_read(batch: Path, folder: str) -> None:
+    (batch.parent / "secret").mkdir(exist_ok=True)
+    (batch.parent / "secret" / "spec.toml").write_text("name = 'secret'")
+    with serving(batch.parent, str(batch)) as own:
+        assert own.send(f"/variant/{folder}")[0] == 404

@@ -1,0 +1,289 @@
+"""The live page in Chromium: every template, a refusal and its button, undo, two variants, saving and building."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from live import WALL, Live
+from running import Server, serving
+
+from unitcad.validation import load, templates
+
+
+@pytest.fixture
+def live(running: Any, server: Server) -> Iterator[Live]:
+    visit = Live(running, server)
+    yield visit
+    visit.close()
+
+
+def test_every_template_is_shown_and_judged(live: Live) -> None:
+    for name in sorted(templates()):
+        live.start_from(name)
+        assert "mould checks passed" in live.state, name
+        assert live.page.inner_text("h1") == load(name).name
+        bodies = set(live.page.get_attribute(".stage-host", "data-shown").split())
+        assert f"layer{len(load(name).layers)}" in bodies, name
+        assert live.page.locator("#estimate .lead").count() == 1, name
+        assert live.page.locator("#section img").count() == 1
+        assert live.page.locator(".spec-form .refusal:not(:empty)").count() == 0
+
+
+def test_a_refused_value_stays_with_its_reason_and_a_button_that_accepts(live: Live) -> None:
+    live.choose(WALL, "0.2")
+    assert live.state == "1 value is refused"
+    fault = live.page.locator('.field[data-path="layers.0.wall_mm"] .refusal')
+    assert "must be at least 0.5" in fault.inner_text()
+    assert live.page.input_value(WALL) == "0.2"
+    assert live.page.get_attribute(WALL, "aria-invalid") == "true"
+    assert live.page.get_attribute("#page", "data-stale") == "true"
+    fault.get_by_role("button").click()
+    live.until(lambda: "passed" in live.state)
+    assert live.page.input_value(WALL) == "0.5"
+    assert live.page.evaluate("() => document.activeElement.name") == "layers.0.wall_mm"
+
+
+def test_form_and_text_are_in_step_and_changes_are_undone(live: Live) -> None:
+    live.page.click("text=As TOML text")
+    live.choose(WALL, "1.4")
+    text = live.page.input_value("#text")
+    assert "wall_mm = 1.4" in text
+    assert "# inside out" in text  # comments stay
+    live.choose("#text", text.replace("wall_mm = 1.4", "wall_mm = 1.5"))
+    assert live.page.input_value(WALL) == "1.5"
+    live.page.wait_for_timeout(1000)  # typing without a pause is one step
+    live.choose("#text", text + "\n[[")
+    assert "no TOML" in live.page.inner_text("#text-fault")
+    for wanted in ("1.5", "1.4", "1.25"):
+        live.page.click("text=Undo")
+        live.until(lambda wanted=wanted: live.page.input_value(WALL) == wanted)
+    live.page.click("text=Redo")
+    live.until(lambda: live.page.input_value(WALL) == "1.4")
+    live.settled()
+
+
+def test_every_control_changes_the_spec(live: Live) -> None:
+    """Each kind of control of every group, to a value that is accepted."""
+    live.page.evaluate("() => document.querySelectorAll('.spec-form details').forEach((one) => { one.open = true; })")
+    count = live.page.locator(".field").count()
+    assert count > 50
+    for path in (
+        "diameter_mm", "motor.fill", "fpcb.tail", "layers.1.material", "moulds.cavities", "moulds.plate_mm",
+        "casting.vacuum", "estimate.models",
+    ):  # fmt: skip
+        field = live.page.locator(f'.field[data-path="{path}"]')
+        before = live.page.input_value("#text")
+        kind = (field.get_attribute("class") or "").split()[1]
+        main = field.locator("input, select").first
+        if kind == "of-switch":
+            main.click()
+        elif kind == "of-word":
+            words = [one.get_attribute("value") for one in main.locator("option").all()]
+            main.select_option(next(word for word in words if word != main.input_value()))
+        elif kind == "of-toml":
+            main.fill({"moulds.cavities": "[1, 2]", "estimate.models": '["bush"]'}[path])
+            main.press("Tab")
+        else:
+            field.locator('input[type="range"]').focus()
+            live.page.keyboard.press("ArrowRight")
+        live.until(lambda before=before: live.page.input_value("#text") != before)
+        live.settled()
+        assert "refused" not in live.state, (path, live.page.inner_text("#faults"))
+    live.page.get_by_label("with circuit").click()
+    live.until(lambda: "[fpcb]" not in live.page.input_value("#text"))
+    live.settled()
+
+
+def test_layers_are_added_and_taken_out(live: Live) -> None:
+    live.page.click("text=Add a layer outside")
+    live.until(lambda: live.page.locator('.field[data-path^="layers.2."]').count() == 3)
+    live.settled()
+    live.page.click("text=Remove layer 3")
+    live.until(lambda: live.page.locator('.field[data-path^="layers.2."]').count() == 0)
+    live.settled()
+
+
+def test_a_pinned_variant_stands_beside_the_changed_one(live: Live) -> None:
+    live.page.click("text=Pin this variant")
+    live.choose('input[name="diameter_mm"]', "16")
+    table = live.page.locator("#pinned table")
+    assert table.locator("img").count() == 2
+    assert "diameter_mm" in table.inner_text()
+    assert "14 mm" in table.inner_text()
+    assert "16 mm" in table.inner_text()
+    live.page.click("text=Go back to it")
+    live.until(lambda: live.page.input_value('input[name="diameter_mm"]') == "14")
+    live.settled()
+    live.page.click("text=Unpin")
+    assert table.count() == 0
+
+
+def test_everything_works_from_the_keyboard(live: Live) -> None:
+    live.page.locator(WALL).focus()
+    live.page.keyboard.press("Control+A")
+    live.page.keyboard.type("0.3")
+    live.until(lambda: "refused" in live.state)
+    live.page.keyboard.press("Tab")
+    for _ in range(6):  # over the slider to the button that accepts
+        if live.page.evaluate("() => document.activeElement.textContent.startsWith('Use ')"):
+            break
+        live.page.keyboard.press("Tab")
+    live.page.keyboard.press("Enter")
+    live.until(lambda: "passed" in live.state)
+    assert live.page.input_value(WALL) == "0.5"
+    live.page.keyboard.press("Control+z")
+    live.until(lambda: "refused" in live.state or live.page.input_value(WALL) == "1.25")
+    live.settled()
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_nothing_reaches_over_a_phone_s_edge(running: Any, server: Server, dark: bool) -> None:
+    visit = Live(running, server, width=390, height=844, dark=dark)
+    visit.page.click("text=Pin this variant")
+    visit.choose(WALL, "0.2")
+    wide = visit.page.evaluate(
+        """() => [...document.body.querySelectorAll("*")]
+             .filter((node) => !node.closest(".scroll, .plot, script, style") && node.checkVisibility())
+             .filter((node) => node.getBoundingClientRect().right > innerWidth + 0.5)
+             .map((node) => node.outerHTML.slice(0, 90))"""
+    )
+    assert wide == []
+    ground = visit.page.evaluate("() => getComputedStyle(document.body).backgroundColor")
+    assert (ground == "rgb(20, 23, 26)") is dark
+    visit.close()
+
+
+def test_save_and_build_from_the_page(running: Any, tmp_path: Path) -> None:
+    with serving(tmp_path) as own:
+        visit = Live(running, own)
+        visit.page.click("text=As TOML text")
+        visit.choose("#text", visit.page.input_value("#text") + '\n[output]\nformats = ["stl"]\n')
+        visit.page.click("text=Save spec")
+        visit.until(lambda: (tmp_path / "encapsulating.toml").is_file())
+        visit.page.click("text=Build this")
+        visit.page.wait_for_selector('.job[data-ended="true"]', timeout=120_000)
+        assert "The build is done." in visit.page.inner_text(".job")
+        with visit.context.expect_page() as opened:
+            visit.page.click("text=Open its page")
+        result = opened.value
+        result.wait_for_selector("html[data-ready=yes]", timeout=60_000)
+        # It runs apart from the server: no token, no cookie, no question.
+        assert result.evaluate("() => window.origin") == "null"
+        visit.close()
+    manifests = list((tmp_path / "out").glob("*/manifest.json"))
+    assert len(manifests) == 1
+    assert all(check["ok"] for check in json.loads(manifests[0].read_text())["laws"])
+
+
+def test_an_older_answer_does_not_replace_a_newer_one(live: Live) -> None:
+    """A slider that is dragged: the last value is the one that is shown, whatever was asked meanwhile."""
+    live.page.evaluate(
+        """async (selector) => {
+          const input = document.querySelector(selector);
+          for (let i = 0; i <= 40; i += 1) {
+            input.value = String((1 + i / 100).toFixed(2));
+            input.dispatchEvent(new Event("input"));
+            await new Promise((done) => setTimeout(done, 5));
+          }
+        }""",
+        WALL,
+    )
+    live.until(lambda: live.page.input_value("#text").count("wall_mm = 1.4") == 1)
+    live.settled()
+    assert live.page.input_value(WALL) == "1.4"
+    live.page.click("text=Undo")  # one drag is one step
+    live.until(lambda: live.page.input_value(WALL) == "1.25")
+    live.settled()
+
+
+@pytest.mark.long
+def test_ten_thousand_random_edits(running: Any, server: Server) -> None:
+    """No error on either side, and no growth of memory after the first thousand."""
+    import random
+
+    import psutil
+
+    rng = random.Random(20261122)
+    visit = Live(running, server)
+    visit.page.evaluate("() => document.querySelectorAll('.spec-form details').forEach((one) => { one.open = true; })")
+
+    def memory() -> tuple[float, float]:
+        process = psutil.Process(server.process.pid)
+        every = [process, *process.children(recursive=True)]
+        heap = visit.context.new_cdp_session(visit.page)
+        heap.send("HeapProfiler.collectGarbage")
+        used = heap.send("Runtime.getHeapUsage")["usedSize"]
+        heap.detach()
+        return sum(one.memory_info().rss for one in every) / 1e6, used / 1e6
+
+    early = None
+    for i in range(10_000):
+        if i % 50 == 0:
+            visit.page.select_option('select[name="template"]', rng.choice(sorted(templates())))
+        else:
+            visit.page.evaluate(EDIT, rng.random())
+        visit.page.wait_for_timeout(rng.choice((0, 5, 20, 60)))
+        if i == 1000:
+            visit.settled()
+            early = memory()
+    visit.settled()
+    assert early is not None
+    server_mb, page_mb = memory()
+    assert server_mb < 1.25 * early[0]
+    assert page_mb < 1.5 * early[1] + 20
+    visit.close()
+
+
+EDIT = """(draw) => {
+  const fields = [...document.querySelectorAll(".field")];
+  const field = fields[Math.floor(draw * fields.length)];
+  const rest = (draw * fields.length) % 1;
+  const main = field.querySelector("input, select");
+  if (main.tagName === "SELECT") {
+    main.selectedIndex = Math.floor(rest * main.options.length);
+    main.dispatchEvent(new Event("change"));
+  } else if (main.type === "checkbox") main.click();
+  else if (main.type === "number") {
+    main.value = String(rest < 0.2 ? -rest : Number(main.value || 1) * (0.5 + rest));
+    main.dispatchEvent(new Event("input"));
+  } else {
+    main.value = ["", "[1, 2]", "x", "[", '["bush"]', "fill"][Math.floor(rest * 6)];
+    main.dispatchEvent(new Event("change"));
+  }
+}"""
+
+
+def test_moulds_that_are_refused_are_not_shown(live: Live) -> None:
+    live.page.check('input[value="moulds"]')
+    live.page.fill('input[name="diameter_mm"]', "300")  # the unit can be made, its moulds exceed the bed
+    live.until(lambda: live.state == "no moulds")
+    assert live.page.is_disabled('input[value="moulds"]')
+    assert live.page.get_attribute("#page", "data-moulds") == "none"
+    assert "has no moulds" in live.page.inner_text("#faults")
+
+
+def test_an_emptied_number_is_no_change_and_says_so(live: Live) -> None:
+    live.page.fill(WALL, "")
+    assert "is empty" in live.page.inner_text('.field[data-path="layers.0.wall_mm"] .refusal')
+    assert "wall_mm = 1.25" in live.page.input_value("#text")
+    live.choose(WALL, "1.3")
+    assert live.page.inner_text('.field[data-path="layers.0.wall_mm"] .refusal') == ""
+
+
+def test_a_server_that_has_ended_is_told_at_every_button(running: Any, tmp_path: Path) -> None:
+    with serving(tmp_path) as own:
+        visit = Live(running, own)
+        visit.page.fill("#file-name", "../x")
+        visit.page.click("text=Save spec")
+        assert "letters, digits" in visit.page.inner_text("#do")
+        visit.page.fill("#file-name", "mine")
+    visit.page.click("text=Save spec")
+    visit.until(lambda: "does not answer" in visit.page.inner_text("#do"))
+    visit.page.click("text=Build this")
+    visit.until(lambda: "does not answer" in visit.page.inner_text(".job"))
+    visit.context.close()
+    assert visit.errors == []

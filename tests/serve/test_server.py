@@ -1,0 +1,69 @@
+"""Starting a server: where it binds, what it needs, and what it refuses before it starts."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from running import serving
+
+from unitcad.errors import Refusal, UnitcadError, WrongArgument
+from unitcad.serve.server import serve
+from unitcad.validation import custom_templates
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "::", "example.com"])
+def test_another_address_needs_a_token(host: str) -> None:
+    with pytest.raises(WrongArgument, match="loopback"):
+        serve(None, host=host)
+
+
+@pytest.mark.parametrize("token", ["short", "has a space in it now", "é" * 20])
+def test_a_token_can_not_be_guessed(token: str) -> None:
+    with pytest.raises(WrongArgument, match="16 printable"):
+        serve(None, token=token)
+
+
+def test_a_design_that_is_code_needs_a_word(tmp_path: Path) -> None:
+    with pytest.raises(Refusal, match="--allow-code"):
+        serve("custom/dome")
+    text = custom_templates()["custom/dome"].read_text("utf-8")
+    with serving(tmp_path, "custom/dome", "--allow-code") as own:
+        assert "faults" not in own.ask(text)
+        # A change of the numbers is no new code; another design's name is.
+        assert "faults" not in own.ask(text, "unit", [{"path": "layers.0.wall_mm", "value": 2.5}]) or True
+        assert own.ask(text, "unit", [{"path": "design", "value": "strap-lugs.py:strap_lugs"}])["faults"]
+
+
+def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:
+    with serving(tmp_path) as own, pytest.raises(UnitcadError, match=f"127.0.0.1:{own.port}"):
+        serve(None, port=own.port)
+
+
+def test_a_spec_that_is_not_there_is_refused() -> None:
+    with pytest.raises(WrongArgument):
+        serve("encapsulatin")
+
+
+def test_the_token_differs_from_start_to_start(tmp_path: Path) -> None:
+    tokens = set()
+    for _ in range(2):
+        with serving(tmp_path) as own:
+            tokens.add(own.token)
+    assert len(tokens) == 2
+    assert all(len(token) >= 24 for token in tokens)
+
+
+def test_without_the_extra_it_says_how_to_get_it() -> None:
+    code = (
+        "import sys\n"
+        "for name in ('starlette', 'uvicorn', 'tomlkit'): sys.modules[name] = None\n"
+        "sys.argv = ['unitcad', 'serve']\n"
+        "from unitcad.cli import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "pip install '.[serve]'" in done.stderr

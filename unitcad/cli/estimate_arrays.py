@@ -1,0 +1,127 @@
+"""`unitcad estimate` of arrays: their crosstalk, as sentences and tables for a person or as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import typer
+from rich.table import Table
+from rich.text import Text
+
+from unitcad.check.findings import counted
+from unitcad.cli.output import console, print_json, progress
+from unitcad.errors import Refusal
+from unitcad.text import number
+
+_MOST_PLACES, _MOST_PAIRS = 64, 16
+"""Units up to which each has a row, and each pair a cell, on the screen; the JSON has all."""
+_HOW = "root of the sum of squares, or sum in phase"
+
+
+def estimate_arrays(
+    names: Sequence[str], sets: Sequence[str], hertz: Sequence[float], masses: bool, details: bool, as_json: bool
+) -> None:
+    """Print the crosstalk of arrays and, of several, each over the first. `hertz`: one frequency, or a band."""
+    from unitcad.arrays.array_file import is_array, load_array
+    from unitcad.arrays.crosstalk_matrix import BAND_HZ, crosstalk
+    from unitcad.arrays.crosstalk_words import ratio_line, ratios
+
+    for name in names:
+        if not is_array(name):
+            raise Refusal("SPEC", name, "is a unit, and the others are arrays: estimate them apart")
+    own = [f"estimate.frequency_hz={hertz[0]!r}"] if len(hertz) == 1 else []
+    arrays = [load_array(name, [*sets, *own]) for name in names]
+    band = hertz if len(hertz) > 1 else () if hertz else BAND_HZ
+    with progress("crosstalk") as stage:
+        every = [crosstalk(array, band, masses, say=stage) for array in arrays]
+    compared = ratios(every)
+    if as_json:
+        print_json(every[0] if len(every) == 1 else {"arrays": every, "ratios": compared})
+        return
+    screen = console()
+    for array, data in zip(arrays, every, strict=True):
+        units = ", ".join(dict.fromkeys(f"{unit.name} {number(unit.diameter_mm, 4)} mm" for unit in array.units))
+        places = data["places"]
+        drives = " and ".join(sorted({place["drive"] for place in places}))
+        frequency = " and ".join(sorted({f"{place['frequency_hz']:g} Hz" for place in places}))
+        rest = f": {counted(len(places), 'unit')} ({units}), {frequency}, {drives} drive, {data['tissue']}"
+        screen.print(Text.assemble((data["array"], "bold"), rest))
+        for line in data["answer"]:
+            screen.print(f"  {line}", soft_wrap=True)
+        if details:
+            _print_details(data)
+    for one in compared:
+        screen.print(ratio_line(one), soft_wrap=True)
+    if not details:
+        typer.echo("--details prints what each unit gets, the pairs, the band, each model's range and the assumptions")
+
+
+def _print_details(data: Mapping[str, Any]) -> None:
+    screen = console()
+    names = [place["name"] for place in data["places"]]
+    if len(names) <= _MOST_PLACES:
+        screen.print(_sums(data, names))
+    if 1 < len(names) <= _MOST_PAIRS:
+        screen.print(_matrix(data, names))
+    if data["band"] and len(names) > 1:
+        screen.print(_band(data))
+    if data["absolute"]["by_model"]:
+        screen.print(_models(data["absolute"]))
+    ranges = f"In brackets: {data['range']}."
+    for line in (ranges, *data["assumptions"], f"Distances are {data['distances']}."):
+        screen.print(f"  {line}", soft_wrap=True)
+
+
+def _sums(data: Mapping[str, Any], names: Sequence[str]) -> Table:
+    """Tabulate what all others make at each unit."""
+    mixed = len({place["drive"] for place in data["places"]}) > 1
+    labels = {"own_drive": "own", "flat": "flat", "axial": "axial", "axial_u_z": "axial u_z"}
+    labels = {key: label for key, label in labels.items() if mixed or key != "own_drive"}
+    table = Table("unit", title=f"what all other units make there, times one unit's edge level: {_HOW}")
+    for label in labels.values():
+        table.add_column(f"{label}\nroot")
+        table.add_column(f"{label}\nsum")
+    for i, name in enumerate(names):
+        cells = [number(data["sums"][key][kind][i], 2) for key in labels for kind in ("root_sum_of_squares", "sum")]
+        table.add_row(name, *cells)
+    return table
+
+
+def _matrix(data: Mapping[str, Any], names: Sequence[str]) -> Table:
+    """Tabulate the decay between each two units, by the own drive of the one that drives."""
+    table = Table("drives", *names, title="% of a unit's motion at its edge that reaches the middle of another")
+    for i, place in enumerate(data["places"]):
+        row = data["matrix"][place["drive"]]["centre"][i]
+        table.add_row(place["name"], *["-" if value is None else number(100 * value, 2) for value in row])
+    return table
+
+
+def _band(data: Mapping[str, Any]) -> Table:
+    """Tabulate the nearest neighbour and the worst place over the band."""
+    table = Table("Hz", title=f"nearest neighbour, %; what all others make at {data['worst']['place']}: {_HOW}")
+    for drive in ("flat", "axial"):
+        for head in ("middle", "edge", "root", "sum"):
+            table.add_column(f"{drive}\n{head}")
+    for row in data["band"]:
+        cells = []
+        for drive in ("flat", "axial"):
+            one = row[drive]
+            cells += [number(100 * one[key], 2) for key in ("nearest_centre", "nearest_edge")]
+            cells += [number(one[key], 2) for key in ("root_sum_of_squares", "sum")]
+        table.add_row(f"{row['frequency_hz']:g}", *cells)
+    return table
+
+
+def _models(absolute: Mapping[str, Any]) -> Table:
+    """Tabulate each model's range at the worst place."""
+    table = Table(
+        "model", "root of squares %", "in phase %", title=f"at {absolute['place']}, % of the motor's amplitude"
+    )
+    for model, one in absolute["by_model"].items():
+        cells = []
+        for key in ("root_sum_of_squares", "sum"):
+            low, high = (number(100 * one[f"{key}_{end}"], 2) for end in ("low", "high"))
+            cells.append(low if low == high else f"{low} to {high}")
+        table.add_row(model, *cells)
+    return table

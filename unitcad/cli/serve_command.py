@@ -1,0 +1,40 @@
+"""unitcad serve."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from unitcad.cli.shared_options import AllowCode
+
+
+def serve(
+    source: Annotated[
+        str | None,
+        typer.Argument(metavar="SPEC", help="A spec file, a template's name, or a folder of results."),
+    ] = None,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Where builds and sweeps from the page go.")] = Path("out"),
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = 0,
+    host: Annotated[
+        str, typer.Option(help="The address that it binds to; another one than the loopback needs --token.")
+    ] = "127.0.0.1",
+    token: Annotated[str | None, typer.Option(help="The token in the address; left out, a random one.")] = None,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
+    code: AllowCode = False,
+) -> None:
+    """Open a live page of a spec in the browser.
+
+    A change of a number shows unit, moulds, refusals and estimate at once. Ctrl-C ends it.
+    """
+    from unitcad.serve.server import serve as run
+
+    def ready(address: str) -> None:
+        typer.echo(address)
+        if browser:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    run(source, host=host, port=port, token=token, out=out, code=code, ready=ready)

@@ -1,0 +1,99 @@
+// Saving the text, the full build, and a sweep of one key: with progress, where the result lies, and a way to stop it.
+(() => {
+  "use strict";
+  const { el, clear, section, number } = window.unitcad;
+  const EVERY_MS = 400;
+
+  // options: server, text(), name, folder, numbers() gives [{path, value, low, high}] of the form's numbers.
+  function createJobs({ server, text, name, folder, numbers }) {
+    const progress = el("div", { className: "job", role: "status" });
+    const file = el("input", { type: "text", id: "file-name", value: name, spellcheck: "false" });
+    const said = el("p", { className: "note", role: "status" });
+    let running = null;
+
+    async function save(replace) {
+      const named = file.value.trim();
+      file.value = named && !named.includes(".") ? `${named}.toml` : named;
+      if (!/^[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}\.toml$/.test(file.value)) {
+        clear(said, "A file's name has letters, digits, dots, dashes and blanks, begins with a letter or a digit and ends in .toml.");
+        return;
+      }
+      const answer = await server.send("/save", { text: text(), name: file.value, replace });
+      if (answer.path) clear(said, `Saved as ${answer.path}.`);
+      else {
+        const there = answer.faults[0].field === "name" && !replace;
+        clear(said, answer.faults[0].message, " ", there && el("button", { type: "button", onclick: () => save(true) }, "Replace it"));
+      }
+    }
+
+    async function follow(state) {
+      if (!state.job) {
+        clear(progress, el("p", { className: "fault" }, state.faults[0].message));
+        return;
+      }
+      running = state.job;
+      let now = state;
+      while (running === state.job) {
+        show(now);
+        if (now.ended) break;
+        await new Promise((done) => setTimeout(done, EVERY_MS));
+        const next = await server.send(`/job/${state.job}`);
+        if (!next.job) {
+          clear(progress, el("p", { className: "fault" }, next.faults[0].message));
+          break;
+        }
+        now = next;
+      }
+    }
+
+    function show(state) {
+      const done = state.ended && (state.code === 0 || state.code === 1);
+      const words = !state.ended ? `${state.title} is under way ...` : state.code === 0 ? `${state.title} is done.` : state.code === 1 ? `${state.title} is done, with findings.` : state.code === 130 || state.code < 0 ? `${state.title} was cancelled.` : `${state.title} failed.`;
+      progress.dataset.ended = String(Boolean(state.ended));
+      clear(progress, el("p", { className: "lead" }, words[0].toUpperCase() + words.slice(1)),
+        !state.ended && el("progress", { "aria-label": state.title }),
+        !state.ended && el("button", { type: "button", onclick: () => server.send("/cancel", { job: state.job }) }, "Cancel"),
+        done && state.folder && el("p", {}, "In ", el("code", {}, state.folder), ". ", state.page && el("a", { href: `/files/${state.page.split("/").map(encodeURIComponent).join("/")}`, target: "_blank", rel: "noopener" }, "Open its page")),
+        state.lines.length > 0 && el("pre", { className: "scroll" }, state.lines.join("\n")));
+    }
+
+    const key = el("select", { id: "sweep-key", onchange: () => offer() });
+    const low = el("input", { type: "number", step: "any", id: "sweep-low" });
+    const high = el("input", { type: "number", step: "any", id: "sweep-high" });
+    const count = el("input", { type: "number", min: "2", max: "50", step: "1", value: "5", id: "sweep-count" });
+    const offer = () => {
+      const one = numbers().find((each) => each.path === key.value);
+      if (!one) return;
+      low.value = String(Number(Math.max(one.low ?? -Infinity, one.value * 0.8).toPrecision(4)));
+      high.value = String(Number(Math.min(one.high ?? Infinity, one.value * 1.2).toPrecision(4)));
+    };
+
+    function keys() {
+      const chosen = key.value;
+      clear(key, numbers().map((each) => el("option", { value: each.path }, each.path)));
+      if (chosen) key.value = chosen;
+      else {
+        key.value = "layers.0.wall_mm";
+        offer();
+      }
+    }
+
+    const sweep = async () => {
+      if (![low, high, count].every((one) => one.value !== "" && one.checkValidity())) {
+        clear(progress, el("p", { className: "fault" }, "A sweep needs its two ends, and from 2 to 50 values."));
+        return;
+      }
+      follow(await server.send("/sweep", { text: text(), key: key.value, low: low.valueAsNumber, high: high.valueAsNumber, count: count.valueAsNumber }));
+    };
+    const field = (label, control) => el("label", {}, `${label} `, control);
+    const node = section("do", "Save, build, sweep",
+      el("div", { className: "tools" }, field(`Spec file in ${folder}`, file), el("button", { type: "button", onclick: () => save(false) }, "Save spec")), said,
+      el("div", { className: "tools" }, el("button", { type: "button", className: "main", onclick: async () => follow(await server.send("/build", { text: text() })) }, "Build this")),
+      el("details", {}, el("summary", {}, "Sweep this"), el("div", { className: "tools" }, field("Key", key), field("from", low), field("to", high), field("values", count),
+        el("button", { type: "button", onclick: sweep }, "Run the sweep"))),
+      progress);
+    return { node, keys };
+  }
+
+  Object.assign(window.unitcad, { createJobs });
+})();

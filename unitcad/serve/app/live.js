@@ -1,0 +1,275 @@
+// The live page: form and text on the left, unit, moulds, section and estimate on the right, in step.
+(() => {
+  "use strict";
+  const U = window.unitcad;
+  const { el, clear, section, theme, number } = U;
+  const page = document.getElementById("page");
+  const APART_MS = 900;
+  const AFTER_MS = 120;
+
+  function start() {
+    const packed = Uint8Array.from(atob(document.getElementById("data").textContent), (c) => c.charCodeAt(0));
+    const data = JSON.parse(new TextDecoder().decode(packed));
+    // The token stands in no address that is copied, bookmarked or kept as history.
+    history.replaceState(null, "", location.pathname + location.hash);
+    const server = U.createServer(data.token);
+    const state = { text: data.text, pending: [], past: [], future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], later: 0, asked: 0 };
+    window.unitcad.timings = [];
+
+    const form = U.createForm({
+      change: (path, value, how = {}) => edit({ path, value, ...(how.toml ? { toml: true } : {}) }, how.coalesce),
+      remove: (path) => edit({ path, remove: true }),
+      unread: (path, why) => form.unread(path, why),
+      table: (path, present) => edit(present ? { path, value: {} } : { path, remove: true }),
+      layers: () => state.layers,
+      addLayer: () => {
+        const last = `layers.${state.layers - 1}`;
+        const held = (name) => (state.groups.find((group) => group.path === last).fields.find((field) => field.path === `${last}.${name}`) || {}).value;
+        const layer = { material: held("material"), wall_mm: held("wall_mm") };
+        if (held("cap_mm")) layer.cap_mm = held("cap_mm");
+        edit({ path: `layers.${state.layers}`, value: layer });
+      },
+    });
+    const text = el("textarea", { id: "text", name: "text", spellcheck: "false", rows: "26", "aria-describedby": "text-fault", oninput: () => typed() });
+    const textFault = el("p", { className: "refusal", id: "text-fault", role: "status" });
+    const undo = el("button", { type: "button", onclick: () => step(state.past, state.future) }, "Undo");
+    const redo = el("button", { type: "button", onclick: () => step(state.future, state.past) }, "Redo");
+    const template = el("select", { name: "template", "aria-label": "Start from a template", onchange: () => { if (template.value) replaceText(data.templates[template.value]); template.value = ""; } },
+      el("option", { value: "" }, "Start from ..."), Object.keys(data.templates).map((name) => el("option", { value: name }, name)));
+    const title = el("h1", { tabindex: "-1" }, data.name);
+    const chip = el("span", { className: "chip", role: "status", id: "state" }, "starting");
+    const host = el("div", { className: "stage-host" });
+    const figures = el("div", { className: "chips", id: "figures" });
+    const others = el("div", { id: "faults", role: "status" });
+    const drawn = el("div", { id: "drawn" });
+    const judged = el("div", { id: "judged" });
+    const estimated = el("div", { id: "estimated" });
+    const batch = data.batch && createBatch(data.batch);
+    const view = section("view", "3D", figures, others, host);
+    const pinned = U.createPinned({ current, restore: replaceText });
+    const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers });
+    const tabs = el("details", { className: "as-text" }, el("summary", {}, "As TOML text"), el("label", { for: "text", className: "hidden" }, "The spec as TOML"), text, textFault);
+    clear(page,
+      el("header", { className: "top" }, el("div", {}, title, el("p", { className: "line" }, "A change is shown at once. Nothing is written until you save, build or sweep.")), el("div", { className: "chips" }, chip, theme.button())),
+      batch && batch.node,
+      el("div", { className: "columns" },
+        el("section", { id: "spec", "aria-label": "Spec" }, el("div", { className: "buttons" }, template, undo, redo), form.node, tabs),
+        el("div", { className: "shown" }, view, section("section", "Section", drawn), jobs.node, pinned.node, section("judgement", "Moulds", judged), estimated)),
+      el("footer", {}, el("p", {}, `unitcad ${data.version}. This page contacts its own server alone.`)));
+
+    let stage = null;
+    const firstModel = (model) => U.createStage(host, model).then((made) => { stage = made; }, (error) => clear(host, el("p", { className: "absent" }, `This browser draws no 3D (${error.message}); the section stands below.`)));
+
+    // The text as the page knows it; edits that are under way are in the next one.
+    function now() { return state.text; }
+
+    function numbers() {
+      return state.groups.flatMap((group) => group.fields).filter((field) => field.kind === "number" && typeof field.value === "number");
+    }
+
+    // What is shown, each with the spec that it is of: of a refused text the last unit that could be made.
+    function current() {
+      const { unit } = state;
+      const { moulds, estimate } = { moulds: state.moulds.of === unit.text ? state.moulds : {}, estimate: state.estimate.of === unit.text ? state.estimate : {} };
+      const answer = estimate.estimate && estimate.estimate.answer ? estimate.estimate.answer.lines[0] : (estimate.lines || [])[0];
+      const failed = (moulds.checks || []).filter((check) => !check.ok).length;
+      const more = moulds.checks ? [["mould checks failed", failed, `of ${moulds.checks.length}`]] : [];
+      return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...(unit.figures || []), ...more], answer, text: unit.text || state.text };
+    }
+
+    function remember(path, coalesce) {
+      const at = performance.now();
+      const same = coalesce && path === state.last.path && at - state.last.at < APART_MS;
+      if (!same) {
+        state.past.push(state.text);
+        if (state.past.length > 200) state.past.shift();
+      }
+      state.future = [];
+      state.last = { path, at };
+    }
+
+    function edit(change, coalesce = false) {
+      if (!state.pending.length || change.path !== state.last.path) remember(change.path, coalesce);
+      else state.last = { path: change.path, at: performance.now() };
+      // Only the newest value of a key that is being dragged is worth sending.
+      state.pending = state.pending.filter((one) => one.path !== change.path || one.remove || change.remove);
+      state.pending.push(change);
+      ask();
+    }
+
+    function typed() {
+      remember("text", true);
+      state.text = text.value;
+      state.pending = [];
+      ask();
+    }
+
+    function replaceText(next) {
+      remember("", false);
+      state.text = next;
+      state.pending = [];
+      ask();
+    }
+
+    function step(from, to) {
+      if (!from.length) return;
+      to.push(state.text);
+      state.text = from.pop();
+      state.pending = [];
+      state.last = { path: "", at: 0 };
+      ask();
+    }
+
+    async function ask() {
+      const begun = performance.now();
+      const mine = (state.asked += 1);
+      buttons();
+      clearTimeout(state.later);
+      chip.textContent = "working";
+      const sent = state.pending.length;
+      const answer = await server.ask("unit", state.text, state.pending);
+      if (!answer || mine !== state.asked) return;
+      if (answer.lost || answer.text === undefined) {
+        said("bad", answer.faults[0].message);
+        return;
+      }
+      state.text = answer.text;
+      state.pending = state.pending.slice(sent);
+      const faults = answer.faults || [];
+      state.layers = answer.layers || 0;
+      if (answer.groups) {
+        state.groups = answer.groups;
+        form.show(answer.groups);
+      }
+      if (document.activeElement !== text) text.value = answer.text;
+      const homeless = form.refuse(faults);
+      textFault.textContent = faults.map((one) => (one.line ? `line ${one.line}: ${one.message}` : one.message)).join("\n");
+      clear(others, homeless.map((one) => el("p", { className: "refusal" }, one.message)), faults.length > 0 && el("p", { className: "note" }, state.unit.section ? "What is shown is the last unit that could be made." : "Nothing could be made yet."));
+      page.dataset.stale = String(faults.length > 0);
+      buttons();
+      if (!faults.length) await shown(answer);
+      pinned.show();
+      window.unitcad.timings.push({ what: "unit", ms: performance.now() - begun, server: answer.milliseconds, faults: faults.length });
+      document.documentElement.dataset.ready = "yes";
+      if (faults.length) {
+        said("bad", faults.length === 1 ? "1 value is refused" : `${faults.length} values are refused`);
+        return;
+      }
+      // While a number is being dragged the moulds wait; the estimate and the moulds then come side by side.
+      state.later = setTimeout(() => rest(mine, begun), AFTER_MS);
+    }
+
+    async function shown(answer) {
+      state.unit = answer;
+      title.textContent = (answer.spec && answer.spec.name) || data.name;
+      document.title = `${title.textContent} - unitcad`;
+      clear(figures, (answer.figures || []).map(([name, value, unit]) => el("span", { className: "chip" }, `${name} ${number(value, 3)} ${unit}`)));
+      clear(drawn, U.framed(answer.section, "The unit cut along its tail, with its main dimensions", "Section drawing"));
+      jobs.keys();
+      state.model = { ...(state.model || {}), ...answer.model };
+      if (stage) await stage.update(state.model).catch(() => {});
+      else if (!host.firstChild) await firstModel(state.model);
+      page.dataset.moulds = "old";
+    }
+
+    async function rest(mine, begun) {
+      const time = (what, answer) => window.unitcad.timings.push({ what, ms: performance.now() - begun, server: answer.milliseconds, faults: (answer.faults || []).length });
+      chip.textContent = "judging the moulds";
+      await Promise.all([
+        server.ask("estimate", state.text).then((answer) => {
+          if (!answer || mine !== state.asked) return;
+          state.estimate = { ...answer, of: state.unit.text };
+          time("estimate", answer);
+          showEstimate(answer);
+        }),
+        server.ask("moulds", state.text).then(async (answer) => {
+          if (!answer || mine !== state.asked) return;
+          state.moulds = { ...answer, of: state.unit.text };
+          await showMoulds(answer);
+          time("moulds", answer);
+        }),
+      ]);
+      if (mine === state.asked) pinned.show();
+    }
+
+    function showEstimate(answer) {
+      const refused = (answer.faults || []).map((one) => el("p", { className: "refusal" }, one.message));
+      if (answer.estimate) clear(estimated, U.estimate({ estimate: answer.estimate, manifest: {} }));
+      else clear(estimated, section("estimate", "Attenuation estimate", refused, (answer.lines || []).map((line) => el("p", { className: "absent" }, line))));
+    }
+
+    async function showMoulds(answer) {
+      const faults = answer.faults || [];
+      const failed = (answer.checks || []).filter((check) => !check.ok);
+      const manifest = { laws: answer.checks || [], warnings: state.unit.warnings || [] };
+      if (answer.checks) {
+        const list = U.parts.checks({ manifest });
+        clear(judged, (answer.lines || []).map((line) => el("p", {}, line)), [...list.childNodes].slice(1));
+      } else clear(judged, faults.map((one) => el("p", { className: "refusal" }, one.message)));
+      if (answer.model && state.model) {
+        state.model = { ...state.model, ...answer.model };
+        if (stage) await stage.update(state.model).catch(() => {});
+      }
+      page.dataset.moulds = faults.length ? "none" : "new";
+      if (faults.length) {
+        said("bad", "no moulds");
+        const left = form.refuse(faults);
+        clear(others, left.map((one) => el("p", { className: "refusal" }, one.message)), el("p", { className: "note" }, "This unit has no moulds; the view keeps the unit alone."));
+        state.model = { ...state.model, moulds: null };
+        if (stage) await stage.update(state.model).catch(() => {});
+      } else said(failed.length ? "bad" : "good", failed.length ? `${failed.length} of ${manifest.laws.length} mould checks failed` : `${manifest.laws.length} mould checks passed`);
+    }
+
+    function said(kind, words) {
+      chip.className = `chip ${kind}`;
+      chip.textContent = words;
+    }
+
+    function buttons() {
+      undo.disabled = !state.past.length;
+      redo.disabled = !state.future.length;
+    }
+
+    document.addEventListener("keydown", (event) => {
+      if (!(event.ctrlKey || event.metaKey) || event.altKey || event.target === text) return;
+      const key = event.key.toLowerCase();
+      if (key === "z" && !event.shiftKey) step(state.past, state.future);
+      else if (key === "y" || (key === "z" && event.shiftKey)) step(state.future, state.past);
+      else return;
+      event.preventDefault();
+    });
+    // A row of the batch that is opened: its spec becomes the one that is changed.
+    async function openVariant() {
+      const folder = U.variantAsked();
+      if (!folder) return;
+      const answer = await server.send(`/variant/${encodeURIComponent(folder)}`);
+      if (answer.text === undefined) {
+        clear(others, el("p", { className: "refusal" }, answer.faults[0].message));
+        return;
+      }
+      replaceText(answer.text);
+      // The same row may be opened again.
+      history.replaceState(null, "", location.pathname);
+      page.querySelector(".columns").scrollIntoView();
+    }
+
+    text.value = state.text;
+    if (batch) {
+      batch.plot();
+      window.addEventListener("hashchange", openVariant);
+    }
+    ask();
+  }
+
+  function createBatch(data) {
+    const { variant, why } = U.records(data);
+    const made = U.batch(data, why, variant);
+    return { plot: made.plot, node: el("details", { id: "of-batch", open: true }, el("summary", {}, `${data.title}: a name opens the variant live`), made.sections) };
+  }
+
+  try {
+    start();
+  } catch (error) {
+    clear(page, el("p", { className: "absent" }, `The page can't be drawn: ${error.message}`));
+  }
+})();

@@ -1,0 +1,278 @@
+"""The routes of the live page: each parses a message, asks a worker or a job, and answers with JSON."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hashlib
+from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import TypeVar
+
+import msgspec
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.routing import Route
+
+from unitcad import files
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.files import read_text
+from unitcad.report.page import page_data
+from unitcad.serve.gate import Gate, Limits
+from unitcad.serve.jobs import Jobs
+from unitcad.serve.live_page import HEADER_POLICY, live_page
+from unitcad.serve.live_worker import Worker, WorkerLost
+from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep, Trusted
+from unitcad.text import toml
+
+T = TypeVar("T", bound=msgspec.Struct)
+ANSWER_S = {"unit": 10.0, "moulds": 60.0, "estimate": 30.0}
+"""Seconds that a question may take, by what is asked."""
+FILE_TYPES = {
+    ".html": "text/html; charset=utf-8", ".svg": "image/svg+xml", ".png": "image/png", ".json": "application/json",
+    ".md": "text/plain; charset=utf-8", ".csv": "text/csv; charset=utf-8", ".toml": "text/plain; charset=utf-8",
+    ".stl": "model/stl", ".3mf": "model/3mf", ".step": "model/step", ".glb": "model/gltf-binary",
+    ".dxf": "image/vnd.dxf", ".gcode": "text/plain; charset=utf-8",
+}  # fmt: skip
+_SANDBOX = "sandbox allow-scripts allow-downloads allow-popups; frame-ancestors 'self'"
+"""A result's page runs apart: it can reach neither the token nor this server."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a server works on: the first text and its file's name, where files go, and what texts may name.
+
+    `folder`: where specs are saved; `out`: where results go, whose files are served. `batch`: a folder of variants that
+    the page lists.
+    """
+
+    text: str
+    name: str
+    folder: Path
+    out: Path
+    trusted: Trusted
+    token: str
+    hosts: frozenset[str]
+    port: int
+    batch: Path | None = None
+
+
+class Superseded(Exception):
+    """A newer question of the same page about the same thing."""
+
+
+def application(setting: Setting, limits: Limits = Limits()) -> Gate:  # noqa: B008  # frozen
+    """Return the ASGI application of a live page."""
+    live = Live(setting)
+    routes = [
+        Route("/", live.page),
+        Route("/files/{path:path}", live.file),
+        Route("/job/{job}", live.job),
+        Route("/variant/{folder}", live.variant),
+        Route("/ask", live.ask, methods=["POST"]),
+        Route("/save", live.save, methods=["POST"]),
+        Route("/build", live.build, methods=["POST"]),
+        Route("/sweep", live.sweep, methods=["POST"]),
+        Route("/cancel", live.cancel, methods=["POST"]),
+    ]
+    inner = Starlette(routes=routes, lifespan=live.lifespan)
+    return Gate(inner, setting.token, setting.hosts, live.cookie, limits)
+
+
+class Live:
+    """The handlers of the routes, with a worker for each kind of question and the jobs."""
+
+    def __init__(self, setting: Setting) -> None:
+        self.setting = setting
+        self.cookie = f"unitcad-{setting.port}"
+        self.workers = {what: Worker() for what in ANSWER_S}
+        self.jobs = Jobs(setting.out)
+        self._newest: dict[tuple[str, str], int] = {}
+        self._trusted = msgspec.json.encode(setting.trusted)
+
+    @contextlib.asynccontextmanager
+    async def lifespan(self, app: Starlette) -> AsyncIterator[None]:
+        """Warm the workers up at the start, end workers and jobs at the end."""
+        warming = [asyncio.create_task(self._warm(what)) for what in self.workers]
+        try:
+            yield
+        finally:
+            await asyncio.gather(self.jobs.close(), *(worker.close() for worker in self.workers.values()))
+            await asyncio.gather(*warming)
+
+    async def page(self, request: Request) -> Response:
+        """Answer with the page, and let the browser keep the token for files."""
+        setting = self.setting
+        batch = page_data(setting.batch, with_models=False)[0] if setting.batch else None
+        html = live_page(setting.text, setting.name, setting.token, str(setting.folder), batch)
+        headers = {"content-security-policy": HEADER_POLICY}
+        response = Response(html, media_type="text/html; charset=utf-8", headers=headers)
+        response.set_cookie(self.cookie, self.setting.token, httponly=True, samesite="strict")
+        return response
+
+    async def ask(self, request: Request) -> Response:
+        """Answer a question about a text by the worker for it."""
+        return await _handled(request, Ask, self._ask)
+
+    async def _ask(self, ask: Ask) -> bytes:
+        key = (ask.page, ask.what)
+        mine = self._newest[key] = self._newest.get(key, 0) + 1
+        while len(self._newest) > _MOST_PAGES:
+            del self._newest[next(iter(self._newest))]
+        worker = self.workers[ask.what]
+        async with worker.turn:
+            if self._newest.get(key, mine) != mine:
+                raise Superseded
+            message = msgspec.json.encode(ask)
+            return await worker.ask("unitcad.serve.answers:respond", message, self._trusted, seconds=ANSWER_S[ask.what])
+
+    async def _warm(self, what: str) -> None:
+        ask = Ask(text=self.setting.text, what=what)  # type: ignore[arg-type]
+        with contextlib.suppress(WorkerLost):
+            await self._ask(ask)
+
+    async def save(self, request: Request) -> Response:
+        """Write the text as a file in the server's folder."""
+        return await _handled(request, Save, self._save)
+
+    async def _save(self, save: Save) -> bytes:
+        path = self.setting.folder / save.name
+        content = save.text.encode("utf-8")
+        there = path.exists() or path.is_symlink()
+        if there and not save.replace:
+            same = path.is_file() and not path.is_symlink() and path.read_bytes() == content
+            if not same:
+                raise Refusal("name", save.name, "is there already; replace it, or choose another name")
+        files.write(path, content)
+        return msgspec.json.encode({"path": str(path), "sha256": hashlib.sha256(content).hexdigest()})
+
+    async def build(self, request: Request) -> Response:
+        """Start the full build of the text."""
+        return await _handled(request, Build, self._build)
+
+    async def _build(self, build: Build) -> bytes:
+        text, code = await self._effective(build.text)
+        arguments = ["build", "{spec}", "-o", _plain(self.setting.out), *code]
+        state = await self.jobs.start("the build", arguments, {"spec.toml": text})
+        return msgspec.json.encode(state)
+
+    async def sweep(self, request: Request) -> Response:
+        """Start the batch of a key's values."""
+        return await _handled(request, Sweep, self._sweep)
+
+    async def _sweep(self, sweep: Sweep) -> bytes:
+        if not sweep.low < sweep.high:
+            raise Refusal("high", sweep.high, f"must be above low, {sweep.low:g}")
+        text, code = await self._effective(sweep.text)
+        step = (sweep.high - sweep.low) / (sweep.count - 1)
+        values = [round(sweep.low + i * step, 6) for i in range(sweep.count)]
+        asked = f'base = "spec.toml"\n\n[sweep]\nmode = "product"\n{toml(sweep.key)} = {toml(values)}\n'
+        arguments = ["batch", "{sweep}", "-o", _plain(self.setting.out / "sweep"), "--report", *code]
+        state = await self.jobs.start("the sweep", arguments, {"spec.toml": text, "sweep.toml": asked})
+        return msgspec.json.encode(state)
+
+    async def _effective(self, text: str) -> tuple[str, list[str]]:
+        """Return the effective spec of a text, which names no file, and the option that its code needs.
+
+        Raises UnitcadError for a text that is refused.
+        """
+        worker = self.workers["unit"]
+        async with worker.turn:
+            content = await worker.ask(
+                "unitcad.serve.answers:effective", text.encode("utf-8", "replace"), self._trusted, seconds=10.0
+            )
+        given = msgspec.json.decode(content)
+        if "refused" in given:
+            raise UnitcadError(given["refused"])
+        return given["text"], ["--allow-code"] if given["code"] else []
+
+    async def variant(self, request: Request) -> Response:
+        """Answer with the spec of a variant of the batch, as text."""
+        root, folder = self.setting.batch, request.path_params["folder"]
+        path = _within(root, f"{folder}/spec.toml") if root else None
+        if path is None:
+            return PlainTextResponse("no such variant\n", 404)
+        try:
+            return _json(msgspec.json.encode({"text": read_text(path)}))
+        except UnitcadError as error:
+            return _json(msgspec.json.encode({"faults": [Fault(str(error))]}), 422)
+
+    async def job(self, request: Request) -> Response:
+        """Answer with how far a job is."""
+        try:
+            name = msgspec.convert(request.path_params["job"], JobId)
+            return _json(msgspec.json.encode(self.jobs.state(name)))
+        except (msgspec.ValidationError, UnitcadError):
+            return PlainTextResponse("no such job\n", 404)
+
+    async def cancel(self, request: Request) -> Response:
+        """End a job."""
+
+        async def cancelled(cancel: Cancel) -> bytes:
+            return msgspec.json.encode(await self.jobs.cancel(cancel.job))
+
+        return await _handled(request, Cancel, cancelled)
+
+    async def file(self, request: Request) -> Response:
+        """Answer with a file of a result, which runs apart from this server."""
+        path = _within(self.setting.out, request.path_params["path"])
+        if path is None:
+            return PlainTextResponse("no such file\n", 404)
+        headers = {"content-security-policy": _SANDBOX}
+        return FileResponse(path, media_type=FILE_TYPES[path.suffix], headers=headers)
+
+
+_MOST_PAGES = 100
+"""Pairs of a page and a question whose newest one is remembered."""
+
+
+async def _handled(request: Request, kind: type[T], handle: Callable[[T], Awaitable[bytes]]) -> Response:
+    """Parse a message, handle it, and answer with JSON: with the one fault where there is one."""
+    if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
+        return PlainTextResponse("messages are application/json\n", 415)
+    try:
+        message = msgspec.json.decode(await request.body(), type=kind)
+    except (msgspec.DecodeError, RecursionError) as error:
+        return PlainTextResponse(f"not a message that this page sends: {error}\n", 400)
+    try:
+        return _json(await handle(message))
+    except Superseded:
+        return PlainTextResponse("a newer question is under way\n", 409)
+    except WorkerLost as error:
+        return _json(msgspec.json.encode({"faults": [Fault(str(error))]}), 500)
+    except Refusal as error:
+        return _json(msgspec.json.encode({"faults": [Fault(str(error), error.field, error.as_dict()["nearest"])]}), 422)
+    except (UnitcadError, OSError) as error:
+        return _json(msgspec.json.encode({"faults": [Fault(str(error))]}), 422)
+
+
+def _json(content: bytes, status: int = 200) -> Response:
+    return Response(content, status, media_type="application/json")
+
+
+def _plain(path: Path) -> str:
+    """Return a path for an argument in which braces stand for files."""
+    return str(path).replace("{", "{{").replace("}", "}}")
+
+
+def _within(root: Path, asked: str) -> Path | None:
+    """Return the regular file below a folder that a request's path means; None where it means none, or a way out."""
+    parts = PurePosixPath(asked).parts
+    if (
+        not parts
+        or "\0" in asked
+        or "\\" in asked
+        or any(part in ("..", ".", "/") or part.startswith(".") for part in parts)
+    ):
+        return None
+    path = root.joinpath(*parts)
+    if path.suffix not in FILE_TYPES:
+        return None
+    try:
+        real = path.resolve(strict=True)
+        inside = real.is_relative_to(root.resolve(strict=True))
+    except (OSError, ValueError):
+        return None
+    return real if inside and real.is_file() else None

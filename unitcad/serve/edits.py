@@ -1,0 +1,86 @@
+"""Changes of a spec's text that keep its comments and its layout."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.serve.messages import Edit
+from unitcad.spec.fields import index_in
+
+
+def edited(text: str, edits: Sequence[Edit]) -> str:
+    """Return a TOML text after `edits`.
+
+    Raises UnitcadError for a text that is no TOML, Refusal for a path that runs through what is not there.
+    """
+    if not edits:
+        return text
+    try:
+        document = tomlkit.parse(text)
+    except (TOMLKitError, RecursionError) as error:
+        raise UnitcadError(f"the text is no TOML: {error}") from None
+    for edit in edits:
+        _apply(document, edit)
+    return tomlkit.dumps(document)
+
+
+def _apply(document: Any, edit: Edit) -> None:
+    *way, last = edit.path.split(".")
+    node = document
+    for step in way:
+        if isinstance(node, list):
+            node = node[_index(node, step, edit)]
+        elif isinstance(node, dict):
+            if step not in node:
+                if edit.remove:
+                    return
+                node[step] = tomlkit.table()
+            node = node[step]
+        else:
+            raise Refusal(edit.path, edit.value, "the path runs through a value, not a table")
+    if isinstance(node, list):
+        if edit.remove:
+            del node[_index(node, last, edit)]
+        elif last == str(len(node)):
+            node.append(_item(_value(edit)))
+        else:
+            node[_index(node, last, edit)] = _value(edit)
+    elif isinstance(node, dict):
+        if edit.remove:
+            node.pop(last, None)
+        else:
+            node[last] = _item(_value(edit))
+    else:
+        raise Refusal(edit.path, edit.value, "the path runs through a value, not a table")
+
+
+def _index(node: Sequence[Any], step: str, edit: Edit) -> int:
+    index = index_in(step, len(node))
+    if index is None:
+        raise Refusal(edit.path, edit.value, f"the list has entries 0 to {len(node) - 1}")
+    return index
+
+
+def _value(edit: Edit) -> Any:
+    """Return an edit's value, read where it is a text in TOML syntax."""
+    if not edit.toml:
+        return edit.value
+    try:
+        return tomlkit.value(str(edit.value))
+    except (TOMLKitError, RecursionError):
+        raise Refusal(edit.path, edit.value, "is no TOML value; a list is [2, 3], a word in quotes") from None
+
+
+def _item(value: Any) -> Any:
+    """Return a value as TOML has it; a table comes on lines of its own."""
+    if isinstance(value, dict):
+        table = tomlkit.table()
+        for key, each in value.items():
+            table[key] = _item(each)
+        return table
+    return value

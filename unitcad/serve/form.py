@@ -1,0 +1,141 @@
+"""The form of a spec: a group for each table of its schema, with documented ranges, choices and what holds now."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
+
+import msgspec
+
+from unitcad.catalogue import Material, materials, motors, printers, tissue
+from unitcad.designs import shipped
+from unitcad.serve.messages import Field, Group
+from unitcad.spec import Spec, to_data
+from unitcad.spec.asked import (
+    AskedSpec,
+    CastingTable,
+    EstimateTable,
+    FpcbTable,
+    LayerTable,
+    MotorTable,
+    MouldsTable,
+    OutputTable,
+    WiresTable,
+)
+from unitcad.spec.fields import alternatives, fields_of, meaning, notes
+from unitcad.text import number, toml
+from unitcad.validation.dotted import ABSENT, at
+
+Choices = Mapping[str, list[tuple[str, str]]]
+_TABLES = (
+    ("motor", "Motor", MotorTable),
+    ("fpcb", "Circuit", FpcbTable),
+    ("wires", "Wires", WiresTable),
+    ("moulds", "Moulds", MouldsTable),
+    ("casting", "Casting", CastingTable),
+    ("estimate", "Estimate", EstimateTable),
+    ("output", "Output", OutputTable),
+)
+_OPTIONAL = ("fpcb", "wires")
+_TEXTS_OF_FILES = ("estimate.fit_source",)
+SPAN = 4.0
+"""A slider goes from the first value over this to the first value times this, within the documented range."""
+
+
+def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
+    """Return the form of a spec's plain data; `spec` is the effective one, None where the data is refused."""
+    holds = to_data(spec) if spec else {}
+    choices = _choices(data)
+    made = [Group("", "Unit", [*_fields(AskedSpec, "", data, holds, choices, ("name", "design", "diameter_mm"))])]
+    layers = data.get("layers")
+    for i in range(len(layers) if isinstance(layers, list) else 0):
+        made.append(Group(f"layers.{i}", f"Layer {i + 1}", [*_fields(LayerTable, f"layers.{i}", data, holds, choices)]))
+    for path, title, table in _TABLES:
+        optional = path in _OPTIONAL
+        present = not optional or isinstance(data.get(path), dict)
+        fields = [*_fields(table, path, data, holds, choices)] if present else []
+        made.append(Group(path, title, fields, present, optional))
+    return made
+
+
+def _fields(
+    table: type[msgspec.Struct],
+    path: str,
+    data: Mapping[str, Any],
+    holds: Mapping[str, Any],
+    choices: Choices,
+    only: tuple[str, ...] = (),
+) -> Iterator[Field]:
+    for name, info in fields_of(table).items():
+        where = f"{path}.{name}" if path else name
+        if (only and name not in only) or where in _TEXTS_OF_FILES:
+            continue
+        given = at(data, where)
+        default = None if info.default is msgspec.NODEFAULT else info.default
+        value = next((one for one in (given, at(holds, where)) if one is not ABSENT and one is not None), default)
+        yield _field(where, name, info.type, value, given is not ABSENT, choices.get(_place(where), []))
+
+
+def _place(path: str) -> str:
+    """Return a path without its indices: layers.0.material as layers.material."""
+    return ".".join(step for step in path.split(".") if not step.isdigit())
+
+
+def _field(path: str, name: str, kind: Any, value: Any, given: bool, choices: list[tuple[str, str]]) -> Field:
+    members = [one for one in alternatives(kind) if one is not type(None)]
+    words = [(word, "") for one in members if typing.get_origin(one) is Literal for word in typing.get_args(one)]
+    limits = list(notes(kind))
+    low = next((float(note.ge) for note in limits if note.ge is not None), None)
+    high = next((float(note.le) for note in limits if note.le is not None), None)
+    how: Literal["number", "integer", "word", "text", "switch", "toml"]
+    if any(typing.get_origin(one) in (tuple, list, dict) for one in members):
+        # A list is typed as TOML has it.
+        how, value = "toml", None if value is None else toml(value)
+    elif bool in members:
+        how = "switch"
+    elif float in members:
+        how = "number"
+    elif int in members:
+        how = "integer"
+    else:
+        how = "word" if choices or words else "text"
+    least, most = (None, None) if how != "number" else _slider(value, low, high)
+    label = name.removesuffix("_mm").replace("_", " ")
+    return Field(path, label, how, value, given, low, high, choices or words, meaning(kind), least, most)
+
+
+def _slider(value: Any, low: float | None, high: float | None) -> tuple[float | None, float | None]:
+    """Return the ends of a number's slider: about its value, within the documented range."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or low is None or high is None:
+        return None, None
+    if value <= 0:
+        return low, min(high, max(1.0, low * SPAN))
+    return max(low, value / SPAN), min(high, value * SPAN)
+
+
+def _choices(data: Mapping[str, Any]) -> Choices:
+    """Return the words of each field that the catalogue or the shipped designs give."""
+    own = {
+        name: data[name] for name in ("materials", "motors", "printers", "tissue") if isinstance(data.get(name), dict)
+    }
+
+    def names(name: str) -> list[tuple[str, str]]:
+        return [(each, "of this spec") for each in own.get(name, {})]
+
+    found: dict[str, list[tuple[str, str]]] = {
+        "design": [(name, design.about) for name, design in shipped().items()],
+        "layers.material": [*((name, _modulus(entry)) for name, entry in materials().items()), *names("materials")],
+        "motor.part": [*((name, f"{number(entry.diameter_mm, 3)} mm across") for name, entry in motors().items()),
+                       *names("motors")],
+        "moulds.printer": [*((name, str(entry.technology.value)) for name, entry in printers().items()),
+                           *names("printers")],
+        "estimate.tissue": [*((name, "") for name in ("forearm",) if tissue(name)), *names("tissue")],
+    }  # fmt: skip
+    return found
+
+
+def _modulus(entry: Material) -> str:
+    """Return what the list of materials says of one: its modulus at the motor's frequency."""
+    modulus = entry.youngs_modulus_kpa
+    return f"{number(modulus.value, 3)} kPa" if modulus else "no modulus at small strain"

@@ -1,0 +1,152 @@
+"""What the page and the server say to each other: JSON of these types, unknown keys refused. Lengths in mm."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct
+
+LARGEST_TEXT = 1_000_000
+"""Characters of a spec that the page may send."""
+Text = Annotated[str, Meta(max_length=LARGEST_TEXT)]
+Path = Annotated[str, Meta(min_length=1, max_length=300)]
+FileName = Annotated[str, Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}\.toml\Z")]
+JobId = Annotated[str, Meta(pattern=r"^[0-9a-f]{16}\Z")]
+What = Literal["unit", "moulds", "estimate"]
+
+
+class Message(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A message of the page."""
+
+
+class Edit(Message, frozen=True, kw_only=True):
+    """A change of the spec's text: the value at a dotted path, or `remove`: the key goes, its default holds.
+
+    `toml`: the value is a text in TOML syntax, such as [2, 3].
+    """
+
+    path: Path
+    value: bool | int | float | str | list[Any] | dict[str, Any] | None = None
+    remove: bool = False
+    toml: bool = False
+
+
+class Ask(Message, frozen=True, kw_only=True):
+    """A question about a spec's text, after `edits`. `page` names the asker: its newer question drops an older one."""
+
+    text: Text
+    what: What = "unit"
+    edits: Annotated[list[Edit], Meta(max_length=50)] = []
+    page: Annotated[str, Meta(pattern=r"^[0-9a-z]{1,32}\Z")] = "0"
+
+
+class Save(Message, frozen=True, kw_only=True):
+    """A wish to write the text as a file in the folder; `replace`: a file that is there."""
+
+    text: Text
+    name: FileName
+    replace: bool = False
+
+
+class Build(Message, frozen=True, kw_only=True):
+    """A wish for the full build of the text."""
+
+    text: Text
+
+
+class Sweep(Message, frozen=True, kw_only=True):
+    """A wish for a batch: the values of one key from `low` to `high`, `count` of them."""
+
+    text: Text
+    key: Path
+    low: float
+    high: float
+    count: Annotated[int, Meta(ge=2, le=50)]
+
+
+class Cancel(Message, frozen=True, kw_only=True):
+    """A wish that a job end."""
+
+    job: JobId
+
+
+class Fault(Struct, frozen=True):
+    """A value that is refused: the sentence, its field, a value that would be accepted, and its line in the text."""
+
+    message: str
+    field: str = ""
+    nearest: Any = None
+    line: int | None = None
+
+
+class Field(Struct, frozen=True, omit_defaults=True):
+    """A control of the form.
+
+    `value` is what holds now, `given` tells whether the text says it. A number has its documented range from `low` to
+    `high`; its slider goes from `least` to `most`. `choices` are words, each with what it means.
+    """
+
+    path: str
+    label: str
+    kind: Literal["number", "integer", "word", "text", "switch", "toml"]
+    value: Any = None
+    given: bool = False
+    low: float | None = None
+    high: float | None = None
+    choices: list[tuple[str, str]] = []
+    meaning: str = ""
+    least: float | None = None
+    most: float | None = None
+
+
+class Group(Struct, frozen=True, omit_defaults=True):
+    """A table of the form; `optional`: it may be put in and left out, as `present` tells."""
+
+    path: str
+    title: str
+    fields: list[Field]
+    present: bool = True
+    optional: bool = False
+
+
+class Answer(Struct, kw_only=True, omit_defaults=True):
+    """What a question gets: the text after its edits, the faults, and what was asked for where there is none.
+
+    `groups` are the form's; `spec` the effective spec; `figures` are (name, value, unit).
+    """
+
+    text: str
+    faults: list[Fault] = []
+    groups: list[Group] = []
+    spec: dict[str, Any] | None = None
+    model: dict[str, Any] | None = None
+    section: str | None = None
+    figures: list[tuple[str, float, str]] = []
+    lines: list[str] = []
+    warnings: list[str] = []
+    checks: list[dict[str, Any]] = []
+    estimate: dict[str, Any] | None = None
+    layers: int = 0
+    milliseconds: float = 0.0
+
+
+class JobState(Struct, kw_only=True):
+    """How far a job is: the lines it printed, and once it has ended its exit code, its folder and its page."""
+
+    job: str
+    title: str
+    lines: list[str]
+    ended: bool = False
+    code: int | None = None
+    folder: str | None = None
+    page: str | None = None
+
+
+class Trusted(Struct, frozen=True):
+    """What the page's texts may name besides data: the folder of the server's own spec, and its values that name files.
+
+    `folder` None: no file at all.
+    """
+
+    folder: str | None = None
+    named: dict[str, str] = {}

@@ -1,0 +1,155 @@
+"""Starting the live page: the address, the token, the spec that it begins with."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ipaddress
+import secrets
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+from unitcad.errors import Missing, Refusal, UnitcadError, WrongArgument
+from unitcad.files import read_text
+from unitcad.report.page import page_data
+from unitcad.report.read_results import is_variant
+from unitcad.serve.messages import Trusted
+from unitcad.spec import read_toml
+from unitcad.spec.custom_code import files_named, is_body_file, is_custom
+from unitcad.validation import custom_templates, default_template, templates
+from unitcad.validation.shipped_files import is_path, named_file
+
+LOOPBACK = "127.0.0.1"
+DEFAULT_OUT = Path("out")
+
+
+def serve(
+    source: str | None,
+    *,
+    host: str = LOOPBACK,
+    port: int = 0,
+    token: str | None = None,
+    out: Path = DEFAULT_OUT,
+    code: bool = False,
+    ready: Callable[[str], None] = lambda address: None,
+) -> None:
+    """Serve the live page of a spec until it is interrupted; `ready` is told its address, the token in it.
+
+    `source` is a spec file, a template's name, a result's folder, or a batch's, whose rows open live; None: the default
+    template. `port` 0: any that is free.
+    Raises Missing without the extra, WrongArgument for an address beyond the loopback without a `token`, Refusal for a
+    spec whose design is code unless `code`, and UnitcadError for a port that is taken.
+    """
+    uvicorn = _uvicorn()
+    from unitcad.serve.application import Setting, application
+
+    _check_address(host, token)
+    token = token or secrets.token_urlsafe(24)
+    source, batch = _source(source)
+    if batch and out == DEFAULT_OUT:
+        out = batch
+    path, text, folder = _first(source)
+    trusted = _trusted(text, path, code)
+    with _listening(host, port) as listening:
+        bound = listening.getsockname()[1]
+        hosts = frozenset(f"{name}:{bound}" for name in _names(host))
+        setting = Setting(
+            text, path.name if is_own(source) else f"{path.stem}.toml", folder, out, trusted, token, hosts, bound, batch
+        )
+        shown = f"[{host}]" if ":" in host else host
+        config = uvicorn.Config(
+            application(setting), log_level="error", access_log=False, server_header=False, date_header=False,
+            timeout_keep_alive=5, timeout_graceful_shutdown=2, limit_concurrency=200,
+            h11_max_incomplete_event_size=16384, ws="none", lifespan="on",
+        )  # fmt: skip
+        server = uvicorn.Server(config)
+        # Ctrl-C is how a server is ended.
+        with contextlib.suppress(KeyboardInterrupt):
+            asyncio.run(_told(server, listening, lambda: ready(f"http://{shown}:{bound}/?token={token}")))
+
+
+async def _told(server, listening: socket.socket, ready: Callable[[], None]) -> None:
+    """Run a server, and say when it answers and a signal ends it."""
+    running = asyncio.create_task(server.serve(sockets=[listening]))
+    while not (server.started or running.done()):
+        await asyncio.sleep(0.01)
+    if server.started:
+        ready()
+    await running
+
+
+def _source(source: str | None) -> tuple[str | None, Path | None]:
+    """Return the first spec and the folder of a batch. Raises UnitcadError for a folder that holds no result."""
+    if source is None or source in templates() or not Path(source).is_dir():
+        return source, None
+    folder = Path(source)
+    if is_variant(folder):
+        return str(folder / "spec.toml"), None
+    page_data(folder, with_models=False)
+    return None, folder
+
+
+def is_own(source: str | None) -> bool:
+    """Tell whether a source is a file of the person's own, not a template's name."""
+    return source is not None and is_path(source)
+
+
+def _uvicorn():
+    try:
+        import starlette  # noqa: F401  # asked for here, so that its lack is told with the extra
+        import tomlkit  # noqa: F401
+        import uvicorn
+    except ImportError as error:
+        raise Missing(f"the live page needs {error.name}: in a clone, pip install '.[serve]'") from None
+    return uvicorn
+
+
+def _check_address(host: str, token: str | None) -> None:
+    try:
+        loopback = ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        loopback = host == "localhost"
+    if not loopback and not token:
+        limit = "is not this machine's loopback address; another one needs a token of yours too (--token)"
+        raise WrongArgument("host", host, limit, LOOPBACK)
+    if token is not None and (len(token) < 16 or not token.isascii() or not token.isprintable() or " " in token):
+        raise WrongArgument("token", "(not shown)", "needs at least 16 printable ASCII characters without spaces")
+
+
+def _names(host: str) -> set[str]:
+    """Return the names under which a browser may ask for the server at an address."""
+    own = f"[{host}]" if ":" in host else host
+    return {own, "localhost", "127.0.0.1", "[::1]"} if host in ("localhost", LOOPBACK, "::1") else {own}
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listening = socket.socket(family, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((host, port))
+        listening.listen(100)
+    except OSError as error:
+        listening.close()
+        raise UnitcadError(f"{host}:{port}: {error.strerror}; choose another with --port, or 0 for any") from None
+    return listening
+
+
+def _first(source: str | None) -> tuple[Path, str, Path]:
+    """Return the file of the first spec, its text, and the folder where specs are saved."""
+    path = named_file(source or default_template(), templates() | custom_templates(), "spec", WrongArgument)
+    text = read_text(path)
+    read_toml(path)  # a file that is no TOML is refused at once
+    return path, text, path.parent.resolve() if is_own(source) else Path.cwd()
+
+
+def _trusted(text: str, path: Path, code: bool) -> Trusted:
+    """Return what the page's texts may name. Raises Refusal for a design that is code, unless that is allowed."""
+    import tomllib
+
+    named = files_named(tomllib.loads(text))
+    design = named.get("design")
+    if design and is_custom(design) and not is_body_file(design) and not code:
+        raise Refusal("design", design, "is code; it runs in the live page with --allow-code alone: read it first")
+    return Trusted(str(path.parent.resolve()), named) if named else Trusted()
