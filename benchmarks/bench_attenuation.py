@@ -1,4 +1,4 @@
-"""The attenuation against its peers, in one run: cold process, response against quad_vec, arrays against single calls.
+"""The attenuation against its peers, in one run: cold process, response against quad_vec, arrays, crosstalk.
 
 python benchmarks/bench_attenuation.py [ROUNDS]       medians of interleaved rounds, least and most, and ratios
 """
@@ -14,7 +14,10 @@ from collections.abc import Callable
 import numpy as np
 
 from unitcad.accuracy.hankel_peers import adaptive
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.crosstalk_matrix import Decays, crosstalk
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
+from unitcad.attenuation.crosstalk import decay
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels
 from unitcad.attenuation.inputs import EstimateInput, TissueLayer, body
@@ -136,8 +139,31 @@ def arrays(rounds: int) -> None:
         )
 
 
+def crosstalk_of_arrays(rounds: int) -> None:
+    """Crosstalk of 256 units, whole, and its matrix beside a response for every pair; regular and scattered places."""
+    unit = {"like": "encapsulating", "fpcb": {"tail_length_mm": 1.0}}
+    grid = {"kind": "grid", "columns": 16, "rows": 16, "pitch_mm": 20.0}
+    off = np.random.default_rng(1).uniform(-1.0, 1.0, (256, 2))
+    points = [[22.0 * (i % 16) + dx, 22.0 * (i // 16) + dy] for i, (dx, dy) in enumerate(off.tolist())]
+    listed = {"kind": "list", "points_mm": points}
+    for name, layout in (("16 x 16", grid), ("256 scattered", listed)):
+        array = load_array({"name": "bench", "array": "pockets", "unit": unit, "layout": layout})
+        units = Decays(array)
+        variant, distances = units.inputs[0], units.pairs.centre
+        jobs: dict[str, Callable[[], object]] = {
+            "crosstalk, whole": lambda array=array: crosstalk(array),
+            "matrix, one radial response": lambda units=units, far=distances: units.matrix(far, "flat"),
+            f"{SINGLE} pairs alone": lambda variant=variant, far=distances: [
+                decay(variant, np.array([1e-3 * r])) for r in far[0, 1 : SINGLE + 1]
+            ],
+        }
+        _, matrix, alone = show(f"crosstalk, {name}", interleaved(jobs, max(2, rounds // 3))).values()
+        print(f"  {alone / SINGLE * 256 * 255 / matrix:,.0f} x a response for every pair")
+
+
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 9
     cold(count)
     response(count)
     arrays(count)
+    crosstalk_of_arrays(count)

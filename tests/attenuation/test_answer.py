@@ -96,6 +96,18 @@ def test_a_range_without_a_value_is_a_range() -> None:
     assert re.match(r"\d\d to \d\d % of the motor's", found["lines"][0])
 
 
+def test_a_range_whose_ends_round_alike_is_one_number_and_two_digits_are_kept() -> None:
+    data = estimate_spec(load("embedded", ["layers.0.wall_mm=1.3"]))
+    data["models"]["bush"]["edge_level"] = {"value": None, "low": 0.4512, "high": 0.4538}
+    data["models"]["fitted"]["edge_level"] = {"value": 0.02, "low": 0.013, "high": 0.047}
+    data["models"]["paper"]["edge_level"] = {"value": None, "low": 0.02, "high": 0.047}
+    first, *rest = answer(data, None)["lines"]
+    assert first.startswith("45 % of the motor's amplitude at the edge, by bush.")
+    others = next(line for line in rest if line.startswith("Other models"))
+    assert "fitted 2.0 % (" in others
+    assert "paper 2.0 to 4.7 % (" in others
+
+
 @pytest.mark.parametrize("name", templates())
 def test_no_sentence_has_a_fraction_for_a_level_or_a_long_number(name: str) -> None:
     for line in lead(name)["lines"]:
@@ -116,6 +128,13 @@ def test_a_lab_s_fit_orders_by_its_own_scores() -> None:
     assert first.startswith("9.8 % (9 to 10.7) of the motor's amplitude at the edge, measured on U1")
     assert "80 %" not in first
     assert "units of the fit ours" in first
+
+
+def test_levels_of_one_source_are_named_together() -> None:
+    data = estimate_spec(load("encapsulating"))
+    data["own_measured"] = [{"unit": "U1", "value": 0.098, "low": 0.09, "high": 0.107}]
+    first = answer(data, None)["lines"][0]
+    assert "measured on U1 (also 5.17 % and 4.58 % in the paper)." in first
 
 
 def test_the_range_is_that_of_the_stacked_models() -> None:

@@ -43,12 +43,13 @@ def test_the_example_of_the_docstring_runs():
     assert doctest.testmod(medium).failed == 0
 
 
-def test_a_stack_with_a_loss_has_it_in_every_body():
+def test_a_stack_with_a_loss_has_at_least_that_in_every_body():
     some = attenuation.LayeredMedium(
         [attenuation.Layer(1e-3, 1000, 1e5, 0.4), attenuation.Layer(0.0, 1000, 1e3, 0.4, attenuation.KelvinVoigt(1.0))],
         attenuation.HalfSpace(1000, 1e4, 0.4),
     )
-    assert {m.shear.imag / m.shear.real for m in some.with_loss(0.25).materials(785.0)} == {0.25}
+    losses = [m.shear.imag / m.shear.real for m in some.with_loss(0.25).materials(785.0)]
+    assert losses == pytest.approx([0.25, 2.198, 0.25], rel=1e-3)
     assert isinstance(some, Stack)
     assert some.without_empty_layers().layers == some.layers[:1]
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.edge.fitted_models import MODELS, edge_levels, stored
 from unitcad.attenuation.edge.inputs_seen import changed, inputs_seen
 from unitcad.attenuation.edge.level import nominal, stacked
@@ -98,3 +99,23 @@ def test_another_model_s_slopes_come_from_the_same_function() -> None:
     nothing = inputs_seen(variant, lambda variants: np.full(len(variants), np.nan))
     assert nothing["by"] is None
     assert "no finite level" in nothing["reason"]
+
+
+def test_the_curve_says_what_its_decay_reads() -> None:
+    """Against differences of specs that were changed, by another step and a smaller rtol."""
+    found = layered_block(estimate_input(load("encapsulating")))["inputs_seen"]
+    by = found["by"]
+    assert set(by) == {
+        *("diameter_mm", "motor.diameter_mm", "estimate.frequency_hz"),
+        *(f"tissue {name}" for name in ("shear modulus", "damping", "thickness", "density")),
+    }
+    for path, value in (("estimate.frequency_hz", 125.0), ("diameter_mm", 20.0)):
+        ends = []
+        for factor in (math.exp(-STEP), math.exp(STEP)):
+            variant = estimate_input(load("encapsulating", [f"{path}={value * factor!r}"]))
+            ends.append(layered_block(variant, rtol=1e-8)["drives"]["flat"]["u"]["value"][30])
+        middle = estimate_input(load("encapsulating", [f"{path}={value!r}"]))
+        slope = layered_block(middle)["inputs_seen"]["by"][path]
+        assert slope == pytest.approx(math.log(ends[1] / ends[0]) / (2 * STEP), abs=1e-3)
+    assert "layers.0.wall_mm" not in by
+    assert "not in it" in found["nothing_else"]

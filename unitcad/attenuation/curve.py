@@ -9,6 +9,7 @@ import numpy as np
 from scipy import special
 
 from unitcad.attenuation.edge import closed_form as cf
+from unitcad.attenuation.edge.inputs_seen import inputs_seen
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
 from unitcad.attenuation.layered.loads import UniformDisc
 from unitcad.attenuation.layered.response import Response
@@ -38,6 +39,9 @@ ASSUMPTIONS = [
 _DIRECTIONS: dict[Drive, Direction] = {"flat": "tangential", "axial": "normal"}
 _COMPONENTS = {"flat": ("u_r", "u_theta", "u_z"), "axial": ("u_r", "u_z")}
 _SPREAD_RTOL = 1e-3
+_SLOPE_RTOL, _SLOPE_STEP = 1e-6, 0.01
+"""They leave the slopes off by less than 1e-3."""
+_NO_UNIT = "a laterally uniform body under the motor's disc: walls, caps, silicones, circuit and mass are not in it"
 
 
 def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
@@ -45,7 +49,8 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
 
     `drives`: the motor's own first, each over |u| at the edge under the same force. `flat_over_axial_per_newton`: |u|
     by one newton that turns, over |u| by one newton of axial amplitude. `u_z`, `u_r`, `depths` and
-    `surface_m_per_pa` are the axial pressure's, over |u_z| at the edge. The spread takes each kind of input (moduli,
+    `surface_m_per_pa` are the axial pressure's, over |u_z| at the edge. `inputs_seen`: of the decay to `EDGE_TO_MM`
+    under the motor's drive. The spread takes each kind of input (moduli,
     damping, thicknesses, frequency) by itself to its low and high end.
     """
     r_mm = np.arange(EDGE_TO_MM + 1)
@@ -80,9 +85,34 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
         "surface_m_per_pa": {"u_z_at_the_edge": float(edge)},
         "error_estimate": axial.error / edge,
         "wavenumbers": axial.wavenumbers,
+        "inputs_seen": _inputs_seen(variant),
         "hierarchical_over_control": None,
         "hierarchical_over_control_reason": NO_RATIO,
         "assumptions": ASSUMPTIONS,
+    }
+
+
+def _inputs_seen(variant: EstimateInput) -> dict[str, Any]:
+    """Return d ln (|u| at `EDGE_TO_MM` over |u| at the edge) / d ln input under the motor's drive.
+
+    Variants of one body, diameter, disc and frequency are solved once.
+    """
+    known: dict[str, float] = {}
+
+    def decay(one: EstimateInput) -> float:
+        reads = repr((one.tissue, one.frequency, one.diameter, one.motor_diameter))
+        if reads not in known:
+            r = one.diameter / 2.0 + 1e-3 * np.array([0.0, EDGE_TO_MM])
+            edge, far = _size(_response(one, one.drive, r, {}, _SLOPE_RTOL))
+            known[reads] = float(far / edge)
+        return known[reads]
+
+    seen = inputs_seen(variant, lambda variants: [decay(one) for one in variants], _SLOPE_STEP)
+    return {
+        "of": f"|u| of the skin {EDGE_TO_MM} mm from the unit's edge over |u| at the edge",
+        "drive": variant.drive,
+        "by": seen["by"],
+        "nothing_else": _NO_UNIT,
     }
 
 

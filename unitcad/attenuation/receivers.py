@@ -17,8 +17,8 @@ import numpy as np
 
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
 from unitcad.attenuation.layered.loads import UniformDisc
+from unitcad.attenuation.layered.many_radii import components
 from unitcad.attenuation.layered.medium import LayeredMedium
-from unitcad.attenuation.layered.response import Response
 from unitcad.errors import Refusal
 
 FORCES: dict[Drive, tuple[complex, complex, complex]] = {"flat": (1.0, -1.0j, 0.0), "axial": (0.0, 0.0, 1.0)}
@@ -70,8 +70,8 @@ def influence(medium: LayeredMedium, patches: Sequence[Patch], omega: float, rto
         steps = (ways[:, None, :2] + ways[:, None, 2:] * _over_disc()).reshape(-1, 2)
         distances, at = np.unique(np.round(np.linalg.norm(steps, axis=1), 12), return_inverse=True)
         r = np.concatenate([inside * radius, distances])
-        normal = medium.response(UniformDisc(radius, "normal"), omega, r, rtol=rtol)
-        sideways = medium.response(UniformDisc(radius, "tangential"), omega, r, rtol=rtol)
+        normal = components(medium, UniformDisc(radius, "normal"), omega, r, rtol)
+        sideways = components(medium, UniformDisc(radius, "tangential"), omega, r, rtol)
         area = np.pi * radius**2
         alone = _own(normal, sideways) / area
         for j in np.nonzero(radii == radius)[0]:
@@ -83,11 +83,14 @@ def influence(medium: LayeredMedium, patches: Sequence[Patch], omega: float, rto
 
 
 def motion(g: np.ndarray, masses: Sequence[float] | np.ndarray, forces: np.ndarray, omega: float) -> np.ndarray:
-    """Return the motion u of the patches in m, shape (n, 3), for G (m/N), masses (kg, n) and forces (N, (n, 3))."""
+    """Return the motion u of the patches in m for G (m/N), masses (kg, n) and forces (N), u shaped as the forces.
+
+    Forces: (n, 3), or (n, 3, cases) for any number of cases.
+    """
     size = 3 * len(masses)
     flat = g.reshape(size, size)
     loaded = np.eye(size) - omega**2 * flat * np.repeat(masses, 3)
-    return np.linalg.solve(loaded, flat @ forces.ravel()).reshape(-1, 3)
+    return np.linalg.solve(loaded, flat @ forces.reshape(size, -1)).reshape(forces.shape)
 
 
 def unit_mass(variant: EstimateInput) -> Quantity:
@@ -192,21 +195,21 @@ def _over_disc() -> np.ndarray:
     return np.stack([np.outer(rings, np.cos(spokes)).ravel(), np.outer(rings, np.sin(spokes)).ravel()], axis=1)
 
 
-def _own(normal: Response, sideways: Response) -> np.ndarray:
+def _own(normal: np.ndarray, sideways: np.ndarray) -> np.ndarray:
     """Return the mean motion of a disc under its own traction, shape (3, 3), from the first radii of the responses."""
     own = slice(0, _NODES.size)
-    along = np.sum(_WEIGHTS * (sideways.u_r - sideways.u_theta)[own]) / 4.0
-    return np.diag([along, along, np.sum(_WEIGHTS * normal.u_z[own]) / 2.0])
+    along = np.sum(_WEIGHTS * (sideways[0] - sideways[1])[own]) / 4.0
+    return np.diag([along, along, np.sum(_WEIGHTS * normal[2, own]) / 2.0])
 
 
-def _tensors(normal: Response, sideways: Response, at: np.ndarray, steps: np.ndarray) -> np.ndarray:
+def _tensors(normal: np.ndarray, sideways: np.ndarray, at: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return the motion (x, y, z) per traction along x, y and z a step (m) from the source, shape (steps, 3, 3)."""
     outwards = steps / np.linalg.norm(steps, axis=1)[:, None]
     both = outwards[:, :, None] * outwards[:, None, :]
     tensors = np.zeros((len(steps), 3, 3), dtype=np.complex128)
-    u_r, u_theta = sideways.u_r[at][:, None, None], sideways.u_theta[at][:, None, None]
+    u_r, u_theta = sideways[0, at][:, None, None], sideways[1, at][:, None, None]
     tensors[:, :2, :2] = u_r * both - u_theta * (np.eye(2) - both)
-    tensors[:, 2, :2] = sideways.u_z[at][:, None] * outwards
-    tensors[:, :2, 2] = normal.u_r[at][:, None] * outwards
-    tensors[:, 2, 2] = normal.u_z[at]
+    tensors[:, 2, :2] = sideways[2, at][:, None] * outwards
+    tensors[:, :2, 2] = normal[0, at][:, None] * outwards
+    tensors[:, 2, 2] = normal[2, at]
     return tensors

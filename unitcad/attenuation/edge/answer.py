@@ -106,9 +106,15 @@ def typical_errors(fit: LabFit | None = None, moduli: Moduli = "dynamic") -> dic
     return {name: one.left_out.geometric_mean for name, one in assessments(moduli).items()}
 
 
-def percent(level: float, digits: int = 2) -> str:
-    """Return a fraction in per cent, to so many digits."""
-    return f"{number(100 * level, digits)} %"
+def percent(level: float) -> str:
+    """Return a fraction in per cent, with two digits."""
+    return f"{number(100 * level, 2, zeros=True)} %"
+
+
+def _range(low: float, high: float) -> str:
+    """Return two fractions as a range in per cent; one number where both round to the same."""
+    first, last = percent(low), percent(high)
+    return last if first == last else f"{first.removesuffix(' %')} to {last}"
 
 
 Error = tuple[float, float | None, str | None]
@@ -198,13 +204,16 @@ def _first(estimated: dict[str, Any], data: dict[str, Any]) -> str:
     if not data["measured"]:
         return expected or "No model gives a level."
     first, *others = data["measured"]
-    also = f" (also {listed(f'{_spread(one)} {_where(one)}' for one in others)})" if others else ""
+    by: dict[str, list[str]] = {}
+    for one in others:
+        by.setdefault(_where(one), []).append(_spread(one))
+    also = f" (also {listed(f'{listed(levels)} {where}' for where, levels in by.items())})" if others else ""
     return f"{_spread(first)} of the motor's amplitude at the edge, measured {_where(first)}{also}. {expected}".strip()
 
 
 def _spread(one: dict[str, Any]) -> str:
     ends = f" ({number(100 * one['low'], 3)} to {number(100 * one['high'], 3)})" if one["low"] is not None else ""
-    return f"{percent(one['level'], 3)}{ends}"
+    return f"{number(100 * one['level'], 3)} %{ends}"
 
 
 def _where(one: dict[str, Any]) -> str:
@@ -237,8 +246,7 @@ def _likely(data: dict[str, Any]) -> str:
     if data["p10"] is None:
         return ""
     held = f" ({data['held']} of the nine measured units lay in theirs)" if data["held"] is not None else ""
-    span = f"{number(100 * data['p10'], 2)} to {percent(data['p90'])}"
-    return f" The 80 % range by {listed(data['weights'])} is {span}{held}."
+    return f" The 80 % range by {listed(data['weights'])} is {_range(data['p10'], data['p90'])}{held}."
 
 
 def _how(name: str, data: dict[str, Any], errors: dict[str, Error]) -> str:
@@ -253,7 +261,7 @@ def _level(level: dict[str, Any]) -> str:
         return percent(level["value"])
     if level["low"] is None:
         return "not known"
-    return f"{number(100 * level['low'], 2)} to {percent(level['high'])}"
+    return _range(level["low"], level["high"])
 
 
 def _skin(layered: dict[str, Any]) -> Iterator[str]:

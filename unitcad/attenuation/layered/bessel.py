@@ -22,7 +22,9 @@ def bessel(order: int, x: Any) -> Any:
 
 
 def bessels(orders: tuple[int, ...], x: Any) -> Any:
-    """Return J of each of the orders 0, 1 or 2 at real x >= 0, shape (orders,) + x.shape."""
+    """Return J of each of the orders 0, 1 or 2 at real x >= 0 or complex x, shape (orders,) + x.shape."""
+    if np.iscomplexobj(x):
+        return np.stack([special.jv(order, x) for order in orders])
     zeroth, first = special.j0(x), special.j1(x)
     values = {0: zeroth, 1: first}
     if 2 in orders:

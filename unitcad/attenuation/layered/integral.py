@@ -1,20 +1,23 @@
-"""The Hankel integral of a medium's compliance along the real axis, with a bound on its error.
+"""The Hankel integral of a medium's compliance along a path of panels, with a bound on its error.
 
 Composite Gauss-Legendre on panels in proportion to the oscillation; a panel whose last Legendre coefficients have not
-died is halved. Each row of the load's kernel meets the Bessel function of its own order. At the surface the static
-half-space of one of the layers, known in closed form, is taken out first.
+died is halved, or goes around the pole that is next to it. Each row of the load's kernel meets the Bessel function of
+its own order. At the surface the static half-space of one of the layers, known in closed form, is taken out first.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import factorial2
 
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.bessel import bessel_bound, bessels
+from unitcad.attenuation.layered.detours import HIDDEN, Poles, around, poles
 from unitcad.attenuation.layered.loads import Load
+from unitcad.attenuation.layered.path import MAX_PANELS, PHASE, cut, from_origin, onwards, pieced, wavenumbers
 from unitcad.attenuation.layered.stack import Stack
 from unitcad.attenuation.layered.statics import static_kernel
 from unitcad.attenuation.layered.tail import measure_tail
@@ -23,13 +26,11 @@ from unitcad.errors import UnitcadError
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_NODES, _NODES.size - 1))
 _ODD_FACTORIALS = np.array([float(factorial2(2 * (2 * _NODES.size - j) - 1)) for j in range(_NODES.size)])
-PHASE = 8.0 * np.pi
-"""Of the fastest Bessel product over one panel."""
 ROUNDING = 1e-15
 """Of a wavenumber, as the kernel feels it next to a pole."""
-_LEAST_PANELS = 6  # up to the last pole
-_MAX_PANELS = 40_000
 _MAX_ROUNDS = 40
+_FLOOR = 1e-12
+"""Of a panel's error, times 4 a halving: what its detour may leave out where less is rounding's and not to be had."""
 _CHUNK = 200_000  # integrand values held at once
 
 
@@ -94,7 +95,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     materials = bare.medium.materials(bare.omega)
     r_max = float(r.max())
     span = r_max + load.reach + 2.0 * z
-    far = PHASE / span * _MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
+    far = PHASE / span * MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
     tail = measure_tail(bare.kernel, materials, load, r, z, end, far, rtol, largest)
     least = float(tail.bounds[-1].max())
     rtol = max(rtol, 0.3 * least / (tail.scale or 1.0))  # what the tail leaves anyway is worth no halving
@@ -103,84 +104,52 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
     count, done, exhausted, gained = 0, 0, False, 0.0
     stop = tail.start(tail.scale, rtol)
-    pending = _graded(_panels(end, stop, span), materials)
-    for _ in range(_MAX_ROUNDS):
-        parts, errors, absolute, gains = _evaluate(problem, pending)
-        if not np.all(np.isfinite(parts)):
+    pending = from_origin(end, stop, span, materials)
+    for halvings in range(_MAX_ROUNDS):
+        found = _evaluate(problem, pending)
+        if not np.all(np.isfinite(found.parts)):
             raise overflow(bare.omega)
         count += pending.shape[0] * _NODES.size
-        scale = min(float(np.max(np.abs(known + total + parts.sum(0)))) or 1.0, largest)
+        scale = min(float(np.max(np.abs(known + total + found.parts.sum(0)))) or 1.0, largest)
         done += pending.shape[0]
         limit = 0.3 * rtol * scale / max(done, 1)
-        bad = gains > limit
-        if np.max(quadrature + errors.sum(0)) <= 0.4 * rtol * scale:
+        bad = found.gains > limit
+        if np.max(quadrature + found.errors.sum(0)) <= 0.4 * rtol * scale:
             bad[:] = False
-        room = (_MAX_PANELS - done) // 4  # quarters of them are what is left
+        room = (MAX_PANELS - done) // 4  # quarters of them are what is left
         exhausted |= np.count_nonzero(bad) > room
-        bad = _worst(gains, bad, room)
-        total = total + parts[~bad].sum(0)
-        quadrature += errors[~bad].sum(0)
-        gained += float(gains[~bad].sum())
-        size += absolute[~bad].sum(0)
+        bad = _worst(found.gains, bad, room)
+        total = total + found.parts[~bad].sum(0)
+        quadrature += found.errors[~bad].sum(0)
+        gained += float(found.gains[~bad].sum())
+        size += found.sizes[~bad].sum(0)
         if np.any(bad):
-            far_off = bad & (gains > 1e3 * limit)
-            pending = np.concatenate([_cut(pending[bad & ~far_off], 2), _cut(pending[far_off], 4)])
+            far_off = bad & (found.gains > 1e3 * limit)
+            enough = np.maximum(limit, _FLOOR * 4.0**halvings * found.gains)
+            turned, pieces = _around(problem, pending, found, bad, enough, span)
+            quadrature += found.hidden[turned].sum(0)
+            bad, far_off = bad & ~turned, far_off & ~turned
+            pending = np.concatenate([cut(pending[bad & ~far_off], 2), cut(pending[far_off], 4), pieces])
             continue
         wanted = tail.start(min(float(np.max(np.abs(known + total))), largest), rtol)
-        exhausted |= wanted > stop and done > _MAX_PANELS
+        exhausted |= wanted > stop and done > MAX_PANELS
         if wanted <= stop or exhausted:
             break
-        pending = _panels(0.0, wanted, span, start=stop)
+        pending = onwards(stop, wanted, span)
         stop = wanted
     else:
-        parts, errors, absolute, gains = _evaluate(problem, pending)
-        gained += float(gains.sum())
-        total, quadrature, size = total + parts.sum(0), quadrature + errors.sum(0), size + absolute.sum(0)
+        found = _evaluate(problem, pending)
+        gained += float(found.gains.sum())
+        total, quadrature, size = (
+            total + found.parts.sum(0),
+            quadrature + found.errors.sum(0),
+            size + found.sizes.sum(0),
+        )
     rest = tail.bound(stop)
     error = quadrature + rest + 4e-15 * size + rounded
     most = 0.5 * float(np.max(error))
     cut_short = least > most or gained + float(rest.max()) - least < most
     return Integrals(known + total, error, count, cut_short, exhausted)
-
-
-def _graded(panels: np.ndarray, materials: tuple[w.Material, ...]) -> np.ndarray:
-    """Halve the panel at k = 0 towards 0 until it is shorter than the least wavenumber of a material.
-
-    A stiff half-space's branch points and pole lie there, too small a feature for a long panel's last coefficients.
-    """
-    least = min(abs(m.ks2) ** 0.5 * (m.eps**0.5 or 1.0) for m in materials if m.shear != 0)
-    first = panels[0, 1]
-    if panels[0, 0] != 0 or least == 0.0 or least >= first:
-        return panels
-    halvings = min(int(np.ceil(np.log2(first / least))) + 1, _MAX_ROUNDS)
-    cuts = panels[0, 1] * np.concatenate([[0.0], 2.0 ** -np.arange(halvings, -1, -1)])
-    return np.concatenate([np.stack([cuts[:-1], cuts[1:]], axis=1), panels[1:]])
-
-
-def _panels(end: float, stop: float, span: float, start: float = 0.0) -> np.ndarray:
-    """Return panels (n, 2) from `start` to `stop`, of one length up to `end`; span: phase per unit wavenumber (m)."""
-    longest = PHASE / span if span > 0 else np.inf
-    line = [start]
-    if start < end:
-        line = list(np.linspace(start, end, max(_LEAST_PANELS, int(np.ceil((end - start) / longest))) + 1))
-    elif start == 0.0:
-        line += [min(stop, longest) / 8.0]
-    while line[-1] < stop and len(line) < _MAX_PANELS:
-        growth = line[-1]
-        if growth > longest:
-            count = int(min(np.ceil((stop - line[-1]) / longest), _MAX_PANELS))
-            line += list(line[-1] + longest * np.arange(1, count + 1))
-        else:
-            line.append(line[-1] + growth)
-    if len(line) > 1 and line[-1] > max(stop, end):
-        line[-1] = max(stop, end)  # the tail's bound counts from there, and so do panels added later
-    return np.stack([line[:-1], line[1:]], axis=1)
-
-
-def _cut(panels: np.ndarray, pieces: int) -> np.ndarray:
-    """Cut each panel in `pieces` equal ones."""
-    edges = panels[:, :1] + (panels[:, 1:] - panels[:, :1]) * (np.arange(pieces + 1) / pieces)
-    return np.stack([edges[:, :-1].ravel(), edges[:, 1:].ravel()], axis=1)
 
 
 def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
@@ -192,37 +161,103 @@ def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
     return worst
 
 
-def _evaluate(problem: Problem, panels: w.Array) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return, per panel, row and radius, the integral, a bound of its error and its absolute size.
+class _Evaluated(NamedTuple):
+    """Of each panel, row and radius: the integral, a bound of its error, its absolute size.
 
-    And, per panel, the largest part of that error that halving it would lessen.
+    gains: of each panel, the largest part of its error that halving it would lessen; poles: the one of each panel;
+    hidden (panels, rows, radii): what a detour around it may leave out.
     """
+
+    parts: np.ndarray
+    errors: np.ndarray
+    sizes: np.ndarray
+    gains: np.ndarray
+    poles: Poles
+    hidden: np.ndarray
+
+
+def _around(
+    problem: Problem, panels: w.Array, found: _Evaluated, bad: np.ndarray, enough: np.ndarray, span: float
+) -> tuple[np.ndarray, w.Array]:
+    """Return which of the `bad` panels go around a pole, and all their pieces.
+
+    enough: what the detour of each may leave out.
+    """
+    clear = bad & (found.hidden.max(axis=(1, 2)) <= enough) & (panels[:, :2].imag == 0).all(axis=1)
+
+    def lossier(panel: w.Array, loss: float) -> Poles:
+        return _poles(replace(problem, medium=problem.medium.with_loss(loss)), panel[None])
+
+    at = np.flatnonzero(clear)
+    of = Poles(found.poles.at[at], found.poles.uncertainty[at], found.poles.rest[:, at])
+    turned, corners = around(panels[at], of, 1.0 / span if span > 0 else np.inf, lossier)
+    which = np.zeros_like(bad)
+    which[at[turned]] = True
+    return which, pieced(panels[which], corners)
+
+
+def _poles(problem: Problem, panels: w.Array) -> Poles:
+    k, slope, _ = _nodes(panels)
+    kernel = problem.kernel(k.ravel()).reshape(-1, *k.shape) * slope
+    return poles(kernel, _NODES, _TO_LEGENDRE, _closeness(panels))
+
+
+def _nodes(panels: w.Array) -> tuple[w.Array, w.Array, w.Array]:
+    """Return wavenumbers and their slopes, shape (panels, nodes), and half of each panel in s."""
+    half = (panels[:, 1] - panels[:, 0]) / 2.0
+    return *wavenumbers(panels, panels[:, :2].mean(1)[:, None] + half[:, None] * _NODES), half
+
+
+def _closeness(panels: w.Array) -> np.ndarray:
+    """Return the wavenumber over half of what a panel covers of it."""
+    ends, _ = wavenumbers(panels, panels[:, :2])
+    return np.abs(ends).max(axis=1) / (np.abs(ends[:, 1] - ends[:, 0]) / 2.0)
+
+
+def _evaluate(problem: Problem, panels: w.Array) -> _Evaluated:
+    """Integrate over each panel, on the axis or off it."""
     orders = problem.load.orders
     step = max(1, _CHUNK // (_NODES.size * problem.r.size * len(orders)))
+    on_axis = (panels[:, :2].imag == 0).all(axis=1)
+    chunks = [
+        which[first : first + step]
+        for which in (np.flatnonzero(on_axis), np.flatnonzero(~on_axis))
+        for first in range(0, which.size, step)
+    ]
     shape = (len(panels), len(orders), problem.r.size)
-    parts, errors, sizes = np.empty(shape, dtype=np.complex128), np.empty(shape), np.empty(shape)
-    gains = np.empty(len(panels))
-    for first in range(0, len(panels), step):
-        part = slice(first, first + step)
-        half = (panels[part, 1] - panels[part, 0]) / 2.0
-        k = (panels[part].mean(1)[:, None] + half[:, None] * _NODES).ravel()
-        phase = k[:, None] * problem.r
-        waves = bessels(orders, phase) * problem.load.transform(k)[:, None]
+    out = _Evaluated(
+        np.empty(shape, dtype=np.complex128),
+        np.empty(shape),
+        np.empty(shape),
+        np.empty(len(panels)),
+        Poles(np.empty(len(panels), dtype=np.complex128), np.empty(len(panels)), np.empty((len(orders), len(panels)))),
+        np.empty(shape),
+    )
+    for part in chunks:
+        nodes, slope, half = _nodes(panels[part])
+        k = nodes.ravel()
+        real = k.real if on_axis[part[0]] else k  # Bessel functions of real numbers are cheaper
+        waves = bessels(orders, real[:, None] * problem.r) * problem.load.transform(real)[:, None]
         waves = waves.reshape(len(orders), half.size, _NODES.size, -1) * half[:, None, None]
-        kernel = problem.kernel(k.astype(np.complex128)).reshape(len(orders), half.size, _NODES.size)
-        parts[part] = ((kernel * _WEIGHTS)[:, :, None] @ waves)[:, :, 0].swapaxes(0, 1)
-        sizes[part], errors[part], gains[part] = _sizes_and_errors(problem, panels[part], kernel, np.abs(waves))
-    return parts, errors, sizes, gains
+        kernel = problem.kernel(k).reshape(len(orders), half.size, _NODES.size) * slope
+        out.parts[part] = ((kernel * _WEIGHTS)[:, :, None] @ waves)[:, :, 0].swapaxes(0, 1)
+        found = poles(kernel, _NODES, _TO_LEGENDRE, _closeness(panels[part]))
+        for whole, values in zip(out.poles, found, strict=True):
+            whole[..., part] = values
+        sizes, errors, gains, covered = _sizes_and_errors(problem, panels[part], kernel, np.abs(waves))
+        out.sizes[part], out.errors[part], out.gains[part] = sizes, errors, gains
+        out.hidden[part] = HIDDEN * found.rest.T[..., None] * covered
+    return out
 
 
 def _sizes_and_errors(
     problem: Problem, panels: w.Array, kernel: w.Array, waves: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return, per panel, row and radius, the absolute size of the integral and a bound of its error.
 
-    Per panel: the largest part of the error that halving would lessen.
+    Per panel: the largest part of the error that halving would lessen. And that of the waves alone.
 
-    kernel (rows, panels, nodes), waves (rows, panels, nodes, radii): the rest of the integrand, absolute.
+    kernel (rows, panels, nodes): with dk/ds; waves (rows, panels, nodes, radii): the rest of the integrand, absolute.
 
     The kernel is its Legendre series to degree n - 1 and a rest. The rest is at most twice the last two coefficients
     that were seen, as soon as they halve within n degrees or so (to count on the rate at which they seem to fall was
@@ -230,7 +265,7 @@ def _sizes_and_errors(
     rule. The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `weight`: their coefficient of degree m is
     at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
     meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
-    six halves: there their envelope takes the place of the weight.
+    six halves: there their envelope takes the place of the weight. Off the axis both grow by e^{|Im k| span}.
 
     Next to a pole the wavenumber's own rounding, times the kernel's slope of at most itself over the panel, is all that
     is left of the last coefficients: halving does not lessen that.
@@ -238,22 +273,24 @@ def _sizes_and_errors(
     n, span = _NODES.size, float(problem.r.max()) + problem.load.reach
     coefficients = np.abs(kernel @ _TO_LEGENDRE.T)
     rest = 2.0 * coefficients[..., -2:].sum(axis=-1)
-    half = (panels[:, 1] - panels[:, 0]) / 2.0
-    phi = half * span
+    ends, slope = wavenumbers(panels, panels[:, :2])
+    half = np.abs(panels[:, 1] - panels[:, 0]) / 2.0
+    phi = half * np.abs(slope).max(axis=1) * span
     swing = np.zeros_like(rest)
     for j in range(n):  # Horner
         swing = (swing + coefficients[..., j] / _ODD_FACTORIALS[j]) * phi
-    swing *= 3.0 * half * phi**n
-    least = panels[:, 0]
-    far = (least > 6.0 * half)[:, None]
-    at = np.maximum(least, half)[:, None] / 2.0
+    swing *= 3.0 * half * phi**n * np.exp(np.abs(ends.imag).max(axis=1) * span)
+    least, covers = ends.real.min(axis=1), np.abs(ends[:, 1] - ends[:, 0]) / 2.0
+    far = (least > 6.0 * covers)[:, None]
+    at = np.maximum(least, covers)[:, None] / 2.0
     phase = at * problem.r
     wave = 2.0 * problem.load.envelope(at)[:, None] * np.stack([bessel_bound(n, phase) for n in problem.load.orders], 1)
     weight = np.where(far[:, None], wave, problem.load.weight)
     size = np.abs(kernel) * _WEIGHTS
     covered_size = np.stack([size, np.broadcast_to(_WEIGHTS, size.shape)], axis=2) @ waves
     sizes, covered = np.moveaxis(covered_size, (2, 0), (0, 2))
-    rounding = ROUNDING * (panels[:, 1] / half) * np.abs(kernel).max(axis=-1)
+    rounding = ROUNDING * _closeness(panels) * np.abs(kernel).max(axis=-1)
     oscillation = swing.T[..., None] * weight
     gains = 2.0 * np.maximum(rest - rounding, 0.0).T[..., None] * covered + oscillation
-    return sizes, 2.0 * np.maximum(rest, rounding).T[..., None] * covered + oscillation, gains.max(axis=(1, 2))
+    errors = 2.0 * np.maximum(rest, rounding).T[..., None] * covered + oscillation
+    return sizes, errors, gains.max(axis=(1, 2)), covered

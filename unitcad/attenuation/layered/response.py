@@ -7,8 +7,9 @@ u_r = cos(theta) (A - B), u_theta = -sin(theta) (A + B), u_z = -cos(theta) Z, wh
 
 The path is the real axis. It is where damping puts the path: each pole is on the side where it belongs. A path lifted
 into the upper half plane would be smoother, but waves whose energy runs against their phase (backward waves of plates
-and of layers on a stiff base) and the bending of a stiff layer on a soft one have their poles there. Where nothing is
-damped, poles lie on the axis, and the displacement is the limit of a loss that goes to 0.
+and of layers on a stiff base) and the bending of a stiff layer on a soft one have their poles there. Where a body has
+no damping, poles may lie on the axis or too close to it to pass: there the path goes around each of them (`detours`),
+on the side on which a little loss would leave it. No loss is put into the medium for that, and nothing is extrapolated.
 
 All layers count at every wavenumber: no bound is known of what a lower layer sends back that is both proved and
 cheaper than the layer.
@@ -22,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from unitcad.attenuation.layered import waves as w
-from unitcad.attenuation.layered.integral import PHASE, ROUNDING, Integrals, Problem, integrate, overflow
+from unitcad.attenuation.layered.integral import Integrals, Problem, integrate, overflow
 from unitcad.attenuation.layered.loads import Load
+from unitcad.attenuation.layered.path import PHASE
 from unitcad.attenuation.layered.rheology import LEAST, MOST, finite, out_of_range
 from unitcad.attenuation.layered.stack import Stack
 from unitcad.errors import Refusal
@@ -80,12 +82,10 @@ def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rto
     flat = radii.ravel()
     end = _last_pole(medium, materials, omega)
     _check_size(end, float(flat.max()) + load.reach + 2.0 * z, omega)
-    lossless = omega > 0 and all(material.shear.imag == 0 for material in materials)
-    solve = _solve_lossless if lossless else _solve
     sideways = load.direction == "tangential"
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what is no number is refused below
         # Each component is made of at most two rows, and one of them is at least as large as each row.
-        integrals = solve(Problem(medium, load, omega, flat, z), end, rtol / 2.0 if sideways else rtol)
+        integrals = _solve(Problem(medium, load, omega, flat, z), end, rtol / 2.0 if sideways else rtol)
     rows, errors = (part.reshape(-1, *radii.shape) for part in (integrals.total, integrals.error))
     if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(errors))):
         raise overflow(omega)
@@ -117,59 +117,8 @@ def _radii(r: Any) -> w.Array:
     return radii
 
 
-_LIMITS = np.array(
-    [
-        [6.0, -15.0, 20.0, -15.0, 6.0, -1.0],
-        [5.0, -10.0, 10.0, -5.0, 1.0, 0.0],
-        [4.0, -6.0, 4.0, -1.0, 0.0, 0.0],
-    ]
-)
-"""Weights that give a polynomial's value at 0 from those at 1 to 6 and, less by one and two degrees, to 5 and to 4."""
-_SLOWEST = 0.9  # rate of convergence that is still believed
-
-
-def _solve_lossless(bare: Problem, end: float, rtol: float) -> Integrals:
-    """Return the limit of a loss that goes to 0: a polynomial through six small losses.
-
-    The error is what one of a degree less would give differs by, d5, and the sum of the further differences where they
-    fall slowly, as (d5 / d4)^n. Waves decay little over the distance at these losses;
-    next to a frequency at which a wave is cut off the displacement changes sooner, and smaller ones are tried. Where
-    rounding next to the poles outweighs the polynomial's error, which it about does at the least of the first ones,
-    larger ones are tried, unless the first of them leaves as much.
-    """
-    phase = max(1.0, end * (float(bare.r.max()) + bare.load.reach))
-    by_rounding = (80.0 * ROUNDING * phase / 2.0) ** (1.0 / 6.0)
-    loss = min(0.02, 2.0 * max((0.3 * rtol) ** 0.2, by_rounding) / phase)
-    best, count, before, left = None, 0, None, np.inf
-    for _ in range(_MOST_ATTEMPTS):
-        wanted, start = max(0.008 * rtol, 2.0 * ROUNDING / loss), count
-        lossy: list[Integrals] = []
-        for i in range(1, _LIMITS.shape[1] + 1):
-            problem = replace(bare, medium=bare.medium.with_loss(i * loss))
-            lossy.append(_solve(problem, end, wanted, _MOST_WAVENUMBERS - count))
-            count += lossy[-1].wavenumbers
-            if best is not None and before and np.max(lossy[0].error) > 0.9 * left:
-                return replace(best, wavenumbers=count)
-        values, errors = np.array([one.total for one in lossy]), np.array([one.error for one in lossy])
-        total, lower, lowest = np.tensordot(_LIMITS, values, 1)
-        integrals, limit = np.tensordot(abs(_LIMITS[0]), errors, 1), np.abs(total - lower)
-        rate = np.minimum(limit / np.maximum(np.abs(lower - lowest), 1e-300), _SLOWEST)
-        limit = limit * np.maximum(1.0, rate / (1.0 - rate))
-        if best is None or np.max(integrals + limit) < np.max(best.error):
-            best = replace(lossy[0], total=total, error=integrals + limit)
-        if np.max(best.error) <= rtol * np.max(np.abs(best.total)):
-            break
-        rounded = np.max(integrals) > np.max(limit)
-        if before not in (None, rounded) or 2 * count - start > _MOST_WAVENUMBERS:
-            break
-        left = np.max(errors[0])
-        before, loss = bool(rounded), loss * (3.0 if rounded else 1.0 / 30.0)
-    assert best is not None
-    return replace(best, wavenumbers=count)
-
-
-def _solve(bare: Problem, end: float, rtol: float, most: int = _MOST_WAVENUMBERS) -> Integrals:
-    """Return the best that is reached, in a few attempts, which take `most` wavenumbers if the first one does not.
+def _solve(bare: Problem, end: float, rtol: float) -> Integrals:
+    """Return the best that is reached, in a few attempts.
 
     What was integrated first may have been accepted beside a largest |u| that the rest then took away: again, beside
     the one that came out. Where the panels do not suffice for rtol, a larger one may spend them better.
@@ -182,7 +131,7 @@ def _solve(bare: Problem, end: float, rtol: float, most: int = _MOST_WAVENUMBERS
             best = integrals
         before, size = size, float(np.max(np.abs(best.total))) or 1.0
         reached = float(np.max(best.error)) / size
-        if reached <= rtol or integrals.cut_short or count + integrals.wavenumbers > most:
+        if reached <= rtol or integrals.cut_short or count + integrals.wavenumbers > _MOST_WAVENUMBERS:
             break
         if integrals.exhausted:
             rtol = float(np.sqrt(rtol * min(reached, 0.1)))

@@ -13,7 +13,7 @@ Time factor e^{+i omega t}; z into the body; u_z with J0(kr), u_r with J1(kr), b
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -25,7 +25,6 @@ from unitcad.attenuation.layered.propagation import Plane, parameter, raised, un
 from unitcad.attenuation.layered.rheology import (
     MOST,
     Damping,
-    LossFactor,
     complex_shear_modulus,
     compressibility,
     finite,
@@ -80,7 +79,7 @@ class Stack:
     Raises `Refusal` for what is no `Layer` or no `HalfSpace`.
     """
 
-    def __init__(self, layers: Iterable[Layer], half_space: HalfSpace) -> None:
+    def __init__(self, layers: Iterable[Layer], half_space: HalfSpace, least_loss: float = 0.0) -> None:
         entries: list[Any] = list(layers) if isinstance(layers, Iterable) else [layers]
         for i, layer in enumerate(entries):
             if not isinstance(layer, Layer):
@@ -89,6 +88,7 @@ class Stack:
             raise Refusal("half_space", str(half_space), "must be a HalfSpace")
         self.layers: tuple[Layer, ...] = tuple(entries)
         self.half_space = half_space
+        self.least_loss = least_loss
 
     def __repr__(self) -> str:
         count, thickness = len(self.layers), sum(layer.thickness for layer in self.layers)
@@ -115,20 +115,18 @@ class Stack:
 
     def without_empty_layers(self) -> Stack:
         """Return the same stack without layers of no thickness, which change nothing."""
-        return Stack([layer for layer in self.layers if layer.thickness > 0], self.half_space)
+        return Stack([layer for layer in self.layers if layer.thickness > 0], self.half_space, self.least_loss)
 
     def with_loss(self, tan_delta: float) -> Stack:
-        """Return the same stack with that loss factor in every body."""
-        loss = LossFactor(tan_delta)
-        layers = [replace(layer, damping=loss) for layer in self.layers]
-        return Stack(layers, replace(self.half_space, damping=loss))
+        """Return the same stack with at least that loss factor in every body."""
+        return Stack(self.layers, self.half_space, tan_delta)
 
     def materials(self, omega: float) -> tuple[w.Material, ...]:
         """Return the layers' and the half-space's complex moduli at omega. Raises `Refusal` for a static free body."""
         omega = finite("omega", omega)
         if self.half_space.youngs_modulus == 0.0 and omega == 0.0:
             raise Refusal("omega", omega, "nothing holds this body: static loads would carry it away")
-        return tuple(_material(body, omega) for body in (*self.layers, self.half_space))
+        return tuple(_material(body, omega, self.least_loss) for body in (*self.layers, self.half_space))
 
     def planes(self, k: w.Array, omega: float, depth: float = 0.0) -> list[Plane]:
         """Return the stack's planes, top first, down to the cut at `depth` (m), for k of shape (n,).
@@ -169,8 +167,9 @@ class Stack:
         return shear_horizontal.compliance(base, pieces, k)
 
 
-def _material(body: Layer | HalfSpace, omega: float) -> w.Material:
+def _material(body: Layer | HalfSpace, omega: float, least_loss: float) -> w.Material:
     shear = complex_shear_modulus(body.youngs_modulus, body.poisson_ratio, body.damping, omega)
+    shear = complex(shear.real, max(shear.imag, least_loss * shear.real))
     ks2 = body.density * omega * omega / shear if shear != 0 else 0.0
     return w.Material(shear, compressibility(body.poisson_ratio), complex(ks2))
 

@@ -61,8 +61,12 @@ def mirrored(a: Array) -> Array:
 
 
 def decaying_root(squared: Array) -> Array:
-    """Return sqrt with Re >= 0, and +i on the negative real axis: waves decay or leave downwards."""
-    return np.sqrt(squared.real + 1j * (squared.imag + 0.0))
+    """Return sqrt with Re >= 0, and +i on the negative real axis: waves decay or leave downwards.
+
+    Below that axis it goes on from there, so that a wavenumber may leave the real axis either way.
+    """
+    root = np.sqrt(squared.real + 1j * (squared.imag + 0.0))
+    return np.where((squared.real < 0) & (squared.imag < 0), -root, root)
 
 
 def rates(material: Material, k: Array) -> tuple[Array, Array]:

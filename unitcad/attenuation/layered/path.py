@@ -1,0 +1,105 @@
+"""The path of a Hankel integral in panels: rows of (a, b, base, turn), complex.
+
+A panel runs from s = a to b, straight in s. The wavenumber is s itself, or, next to a branch point on the axis,
+base + turn s^2, in which the kernel has no root any more.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from unitcad.attenuation.layered import waves as w
+
+PHASE = 8.0 * np.pi
+"""Of the fastest Bessel product over one panel."""
+MAX_PANELS = 40_000
+_LEAST_PANELS = 6  # up to the last pole
+_MAX_HALVINGS = 40
+
+
+def wavenumbers(panels: w.Array, s: w.Array) -> tuple[w.Array, w.Array]:
+    """Return the wavenumbers (1/m) at s, a row a panel, and their slopes over s."""
+    base, turn = panels[:, 2, None], panels[:, 3, None]
+    return np.where(turn == 0, s, base + turn * s * s), np.where(turn == 0, 1.0, 2.0 * turn * s)
+
+
+def from_origin(end: float, stop: float, span: float, materials: tuple[w.Material, ...]) -> w.Array:
+    """Return the panels from 0 to `stop`, of one length up to `end`; span: phase per unit wavenumber (m).
+
+    The one at k = 0 is halved towards 0 until it is shorter than the least wavenumber of a material: a stiff
+    half-space's branch points and pole lie there, too small a feature for a long panel's last coefficients.
+    """
+    longest = PHASE / span if span > 0 else np.inf
+    if end > 0:
+        line = np.linspace(0.0, end, max(_LEAST_PANELS, int(np.ceil(end / longest))) + 1)
+    else:
+        line = np.array([0.0, min(stop, longest) / 8.0])
+    line = _continued(line, end, stop, longest)
+    least = min(abs(m.ks2) ** 0.5 * (m.eps**0.5 or 1.0) for m in materials if m.shear != 0)
+    if 0.0 < least < line[1]:
+        halvings = min(int(np.ceil(np.log2(line[1] / least))) + 1, _MAX_HALVINGS)
+        line = np.concatenate([[0.0], line[1] * 2.0 ** -np.arange(halvings, -1, -1), line[2:]])
+    return _turned(line, _branch_points(materials[-1]), 1.0 / span if span > 0 else np.inf)
+
+
+def onwards(start: float, stop: float, span: float) -> w.Array:
+    """Return the panels beyond all poles, from `start` to `stop`."""
+    return _plain(_continued(np.array([start]), 0.0, stop, PHASE / span if span > 0 else np.inf))
+
+
+def _continued(line: np.ndarray, end: float, stop: float, longest: float) -> np.ndarray:
+    """Continue the corners to `stop`, at first each panel as long as its distance from 0."""
+    corners = list(line)
+    while corners[-1] < stop and len(corners) < MAX_PANELS:
+        growth = corners[-1]
+        if growth > longest:
+            count = int(min(np.ceil((stop - corners[-1]) / longest), MAX_PANELS))
+            corners += list(corners[-1] + longest * np.arange(1, count + 1))
+        else:
+            corners.append(corners[-1] + growth)
+    if len(corners) > 1 and corners[-1] > max(stop, end):
+        corners[-1] = max(stop, end)  # the tail's bound counts from there, and so do panels added later
+    return np.array(corners)
+
+
+def _branch_points(half_space: w.Material) -> list[float]:
+    """Return the branch points on the axis: those of a half-space without damping."""
+    if half_space.shear == 0 or half_space.ks2.imag != 0 or half_space.ks2 == 0:
+        return []
+    ks = half_space.ks2.real**0.5
+    return sorted({k for k in (half_space.eps**0.5 * ks, ks) if k > 0})
+
+
+def _plain(line: np.ndarray) -> w.Array:
+    nothing = np.zeros(len(line) - 1)
+    return np.stack([line[:-1], line[1:], nothing, nothing], axis=1).astype(np.complex128)
+
+
+def _turned(line: np.ndarray, branch_points: list[float], longest: float) -> w.Array:
+    """Return the panels between the corners, those on both sides of each branch point in the square root there."""
+    inside = [k for k in branch_points if k < line[-1]]
+    others = [k for k in line if all(abs(k - one) > 1e-6 * one for one in inside)]
+    line = np.unique([*others, *inside])
+    panels = []
+    for k in inside:
+        i = int(np.searchsorted(line, k))
+        # Half of what lies between two corners is each one's: the next may be a branch point too.
+        low, high = max(k - longest, (line[i - 1] + k) / 2.0), min(k + longest, (k + line[i + 1]) / 2.0)
+        panels += [[(k - low) ** 0.5, 0.0, k, -1.0], [0.0, (high - k) ** 0.5, k, 1.0]]
+        line = np.concatenate([line[:i], [low, k, high], line[i + 1 :]])
+    plain = _plain(line)
+    at = np.isin(plain[:, 0].real, inside) | np.isin(plain[:, 1].real, inside)
+    return np.concatenate([plain[~at], np.array(panels, dtype=np.complex128).reshape(-1, 4)])
+
+
+def cut(panels: w.Array, pieces: int) -> w.Array:
+    """Cut each panel in `pieces` equal ones."""
+    edges = panels[:, :1] + (panels[:, 1:2] - panels[:, :1]) * (np.arange(pieces + 1) / pieces)
+    return pieced(panels, edges)
+
+
+def pieced(panels: w.Array, corners: w.Array) -> w.Array:
+    """Return the pieces of each panel between its corners, shape (panels, pieces + 1)."""
+    pieces = corners.shape[1] - 1
+    ends = np.stack([corners[:, :-1].ravel(), corners[:, 1:].ravel()], axis=1)
+    return np.concatenate([ends, np.repeat(panels[:, 2:], pieces, axis=0)], axis=1)
