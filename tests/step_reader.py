@@ -12,6 +12,7 @@ from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
+from OCP.TopoDS import TopoDS_Shape
 from OCP.XCAFDoc import XCAFDoc_ColorTool, XCAFDoc_ColorType, XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from unitcad.kernels import occt
@@ -19,7 +20,7 @@ from unitcad.kernels import occt
 
 @dataclass(frozen=True)
 class StepBody:
-    """A body as read back: name, colour (or None), and its measures as assembled (mm, mm3)."""
+    """A body as read back: name, the colour of all its solids (or None), and its measures as assembled (mm, mm3)."""
 
     name: str
     colour: tuple[float, float, float] | None
@@ -36,11 +37,11 @@ def read(path: Path) -> list[StepBody]:
     assert reader.Transfer(document)
     roots = TDF_LabelSequence()
     XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
-    bodies = []
+    colours, bodies = XCAFDoc_DocumentTool.ColorTool_s(document.Main()), []
     for root in _labels(roots):
         parts = TDF_LabelSequence()
         XCAFDoc_ShapeTool.GetComponents_s(root, parts)
-        bodies += [_body(part) for part in (_labels(parts) or [root])]
+        bodies += [_body(part, colours) for part in (_labels(parts) or [root])]
     return bodies
 
 
@@ -48,16 +49,22 @@ def _labels(sequence: TDF_LabelSequence) -> list[TDF_Label]:
     return [sequence.Value(i) for i in range(1, sequence.Length() + 1)]
 
 
-def _body(label: TDF_Label) -> StepBody:
+def _body(label: TDF_Label, colours: XCAFDoc_ColorTool) -> StepBody:
     part = TDF_Label()
     if not XCAFDoc_ShapeTool.GetReferredShape_s(label, part):
         part = label
-    quantity, colour = Quantity_Color(), None
-    for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
-        if XCAFDoc_ColorTool.GetColor_s(part, kind, quantity):
-            red, green, blue = quantity.Values(Quantity_TypeOfColor.Quantity_TOC_sRGB)
-            colour = (round(red, 6), round(green, 6), round(blue, 6))
-            break
+    whole = XCAFDoc_ShapeTool.GetShape_s(part)
+    found = {_colour(solid, colours) for solid in (occt.solids_in(whole) or [whole])}
+    colour = found.pop() if len(found) == 1 else None
     name = TDataStd_Name()
     text = name.Get().ToExtString() if part.FindAttribute(TDataStd_Name.GetID_s(), name) else ""
     return StepBody(text, colour, occt.measure(XCAFDoc_ShapeTool.GetShape_s(label)))
+
+
+def _colour(solid: TopoDS_Shape, colours: XCAFDoc_ColorTool) -> tuple[float, float, float] | None:
+    quantity = Quantity_Color()
+    for kind in (XCAFDoc_ColorType.XCAFDoc_ColorSurf, XCAFDoc_ColorType.XCAFDoc_ColorGen):
+        if colours.GetColor(solid, kind, quantity):
+            red, green, blue = quantity.Values(Quantity_TypeOfColor.Quantity_TOC_sRGB)
+            return (round(red, 6), round(green, 6), round(blue, 6))
+    return None

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from unitcad.casting.time_line import duration
 from unitcad.cli import app
+from unitcad.export import slicer
 
 
 def _run(*words: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -133,6 +134,8 @@ def test_help_cuts_no_option_s_name_and_no_square_bracket(command: str) -> None:
     assert not [line for line in lines[1:] if line.endswith(("\u2026", "..."))], "a summary is cut"
     shown = " ".join(" ".join(lines[1:]).split())
     for parameter in _commands()[command].params:
+        if getattr(parameter, "hidden", False):
+            continue
         for option in (*parameter.opts, *parameter.secondary_opts):
             assert not option.startswith("-") or option in shown.replace(",", " ").split()
         assert " ".join((getattr(parameter, "help", None) or "").split()) in shown
@@ -159,9 +162,44 @@ def test_a_refused_argument_is_called_as_in_the_help(words: list[str], field: st
     assert json.loads(done.stdout)["error"]["field"] == field.partition(" ")[0]
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--only", "estimate"], "--only = 'estimate': has no moulds, which --slice is for; nearest accepted"),
+        (["--formats", "3mf"], 'output.formats = ["3mf"]: has no stl, which --slice reads'),
+        (["--set", "moulds.printer=sla"], "moulds.printer = 'sla': prints no filament"),
+    ],
+)
+def test_slicing_is_refused_before_the_work_where_nothing_can_be_sliced(
+    words: list[str], said: str, tmp_path: Path
+) -> None:
+    if slicer.program() is None:
+        said = "PrusaSlicer is not installed"
+    done = _run("build", "embedded", "--slice", *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_nothing_is_sliced_unasked_and_the_old_option_says_that_it_is_not_needed(tmp_path: Path) -> None:
+    done = _run("build", "single-embedded", "--formats", "stl", "--no-slice", "--no-report", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "leave out --no-slice" in done.stderr
+    folder = tmp_path / done.stdout.strip()
+    assert not (folder / "slicer.json").exists()
+    assert "build spec.toml --slice -o .." in (folder / "casting.md").read_text()
+    assert "no-slice" not in _run("build", "--help").stdout
+
+
+def test_the_summary_of_a_gang_speaks_of_each_unit(tmp_path: Path) -> None:
+    gang = ("--set", "moulds.cavities=[2,1]", "--only", "unit,casting", "--no-report")
+    done = _run("build", "embedded", *gang, "-o", str(tmp_path))
+    assert done.stderr.startswith("embedded: 2 units, each 14 mm across")
+
+
 def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_output(tmp_path: Path) -> None:
     """Every figure is that of a file in the folder."""
-    done = _run("build", "embedded", "--formats", "stl", "--no-slice", "-o", str(tmp_path))
+    done = _run("build", "embedded", "--formats", "stl", "-o", str(tmp_path))
     folder = Path(done.stdout.strip())
     assert done.stdout.count("\n") == 1
     assert folder.is_dir()
@@ -175,6 +213,6 @@ def test_build_ends_with_a_summary_on_standard_error_and_the_folder_on_standard_
     assert lines[4] == manifest["estimate"]["answer"]
     assert lines[5] == f"open {folder / 'report.html'}"
     assert (folder / "report.html").is_file()
-    without = _run("build", "embedded", "--formats", "stl", "--no-slice", "-o", str(tmp_path / "b"), "--no-report")
+    without = _run("build", "embedded", "--formats", "stl", "-o", str(tmp_path / "b"), "--no-report")
     assert not (Path(without.stdout.strip()) / "report.html").exists()
     assert "open " not in without.stderr

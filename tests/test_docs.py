@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from unitcad.arrays.array_file import load_array
 from unitcad.validation import from_data
 
 ROOT = Path(__file__).parent.parent
@@ -32,6 +33,8 @@ def test_toml_examples_are_specs(text: str) -> None:
     data = tomllib.loads(text)
     if data.get("design") in ("embedded", "encapsulating"):
         from_data(data)
+    if "array" in data:
+        assert load_array(data).places
 
 
 @pytest.mark.parametrize("text", _blocks("python"))

@@ -1,4 +1,5 @@
 import hashlib
+import math
 import os
 import subprocess
 import sys
@@ -122,6 +123,27 @@ def test_bodies_of_one_shape_keep_their_own_names_colours_and_places(tmp_path):
     bodies_read = step_reader.read(tmp_path / "pair.step")
     assert [(body.name, body.colour) for body in bodies_read] == [(body.name, body.colour) for body in pair]
     assert bodies_read[1].measures.box[2] - bodies_read[0].measures.box[2] == pytest.approx(5, abs=1e-9)
+
+
+def test_a_body_of_several_solids_keeps_them_all(tmp_path):
+    three = Union((cylinder(1, 0, 1), moved(cylinder(1, 0, 1), 5, 0, 0), moved(cylinder(1, 0, 2), 9, 0, 0)))
+    pair = [
+        Body("one", "unit", "layer", cylinder(2, 3, 4), (0, 1, 0)),
+        Body("three", "unit", "layer", three, (1, 0, 0)),
+    ]
+    step.write(tmp_path / "a.step", pair, "a")
+    one, back = step_reader.read(tmp_path / "a.step")
+    assert [(body.name, body.colour, body.measures.solids) for body in (one, back)] == [
+        ("one", (0, 1, 0), 1),
+        ("three", (1, 0, 0), 3),
+    ]
+    assert back.measures.volume == pytest.approx(4 * math.pi, rel=1e-9)
+
+
+def test_a_solid_that_occt_leaves_out_is_missed():
+    text = step.content([tube()], "tube").decode()
+    with pytest.raises(UnitcadError, match=r"OCCT wrote \[1\] solids, by body, of \[2\] as STEP"):
+        step._with_styles(text, [tube().colour], [2])
 
 
 def test_a_body_that_occt_gets_wrong_is_not_written():

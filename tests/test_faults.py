@@ -214,3 +214,4 @@ def test_the_shipped_sweeps_are_listed() -> None:
     done = CliRunner().invoke(app, ["list", "sweeps"])
     assert [line.split("\t")[0] for line in done.output.splitlines()] == ["all-materials", "paper", "thickness"]
     assert all(len(line.split("\t")[1]) > 20 for line in done.output.splitlines())
+    assert all(line.endswith(".") for line in done.output.splitlines())

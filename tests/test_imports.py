@@ -18,11 +18,11 @@ from unitcad.validation import default_template, templates
 PACKAGE = Path(unitcad.__file__).parent
 FLOORS = [
     {"cli"},
-    {"api", "accuracy"},
+    {"api", "accuracy", "serve"},
     {"batch", "inverse"},
     {"report"},
     {"pipeline"},
-    {"lab"},
+    {"lab", "arrays"},
     {"casting", "mould_checks"},
     {"experiments"},
     {"moulds", "estimating"},

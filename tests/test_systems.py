@@ -140,7 +140,7 @@ def test_what_is_written_has_the_same_line_ends_everywhere(tmp_path: Path, monke
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a terminal of Windows takes any character")
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
-@pytest.mark.parametrize("words", [["estimate"], ["estimate", "--json"], ["build", "--no-slice", "--formats", "stl"]])
+@pytest.mark.parametrize("words", [["estimate"], ["estimate", "--json"], ["build", "--formats", "stl"]])
 def test_a_name_that_the_terminal_lacks_is_shown_by_its_code(encoding: str, words: list[str], tmp_path: Path) -> None:
     import json
     import subprocess

@@ -92,7 +92,7 @@ def test_the_command_ends_as_the_outcome_says(seed, ranges, tmp_path):
     data = seeded_spec(seed, ranges)
     file = tmp_path / "spec.toml"
     file.write_text(text_of(data), "utf-8")
-    command = [sys.executable, "-m", "unitcad", "build", str(file), "--no-slice", "-o", str(tmp_path / "out")]
+    command = [sys.executable, "-m", "unitcad", "build", str(file), "-o", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     refused = refusal_of(data)
     assert done.returncode == (2 if refused else 0), done.stderr

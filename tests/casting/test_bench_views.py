@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from unitcad.casting.bench_extras import ARROW, BAND, CARD, TAPE
 from unitcad.casting.bench_pictures import SIZE, pictures
-from unitcad.casting.bench_views import ARROW, BAND, CARD, TAPE, View, picture_path, views
+from unitcad.casting.bench_views import View, picture_path, views
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.export import composite
+from unitcad.export.picture_letters import Name, written
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.build import build
@@ -89,7 +91,9 @@ def test_pictures_show_what_their_views_hold_and_repeat_to_the_byte() -> None:
     assert drawn == pictures(MouldSet(moulds.spec))
     for name, view in shown.items():
         content = drawn[picture_path(name)]
-        assert Image.open(io.BytesIO(content)).size == SIZE
+        width, height = Image.open(io.BytesIO(content)).size
+        assert width == SIZE[0]
+        assert height <= SIZE[1]
         arrows = any(extra.colour == ARROW for extra in view.extras)
         assert (hues(content, ARROW) > 30) == arrows, name
     tongue = next(tool.colour for tool in moulds.plan.tools if tool.kind == "tongue")
@@ -115,6 +119,89 @@ def test_a_nearer_body_hides_one_behind_it_whatever_the_order() -> None:
     assert (seen(one)[1, 1] == 255).all()
 
 
+@pytest.mark.parametrize("source", SETS, ids=" ".join)
+def test_what_words_name_is_named_in_the_picture(source: tuple[str, ...]) -> None:
+    """What a step speaks of beside the pieces stands in its picture under the same name."""
+    moulds, casting = planned(*source)
+    shown = {picture_path(name): view for name, view in views(moulds).items()}
+    steps = [*casting.preparation, *(step for pour in casting.pours for step in pour.steps)]
+    wanted = {
+        "Try every cup, dry": "cut corner, paper",
+        "Level the bench": "level, paper",
+        "Tongue home": "card",
+        "Tongue out FIRST": "card",
+        "Inject": "sprue, vent",
+    }
+    for step in steps:
+        names = {name.text for name in shown[step.picture].names} if step.picture else set()
+        assert set(wanted.get(step.title, "").split(", ")) - {""} <= names, step.title
+        if step.title == "Tongue in, grease":
+            length = step.text.partition("until ")[2].partition(" mm")[0]
+            assert names == {f"grease {length} mm"}
+        if step.title.endswith(" off") and step.title.startswith("Cup"):
+            assert names == {"screwdriver"}
+        if step.title.startswith("Hold cup"):
+            assert names == {"tape"}
+
+
+@pytest.mark.parametrize("cavities", ["[1,1]", "[2,2]", "[1,3]"])
+@pytest.mark.parametrize("name", ["embedded", "encapsulating"])
+def test_sprue_and_vent_point_at_the_silicone_in_them(name: str, cavities: str) -> None:
+    moulds, _ = planned(name, "moulds.pour=injected", f"moulds.cavities={cavities}")
+    for step in moulds.plan.steps:
+        count = len(step.channels) // len(moulds.plan.layout.cells)
+        for view, words in (("inject", ("sprue", "vent")), ("filled", ("touch here",))):
+            named = {one.text: one.at for one in views(moulds)[f"pour{step.index}-{view}"].names}
+            for word in words:
+                x, y, z = named[word]
+                probe = realise(moved(box(-0.1, 0.1, -0.1, 0.1, -0.2, 0), x, y, z), 32)
+                held = [(realise(each, 32) ^ probe).volume() > 0.99 * probe.volume() for each in step.channels]
+                assert held.count(True) == 1, f"{word} of pour {step.index}"
+                assert (held.index(True) % count == 0) == (word == "sprue")
+
+
+def test_a_ring_leaves_what_it_names_in_view() -> None:
+    camera = composite.view((0.0, -1.0, 0.0), np.array([[-9.0, -9.0, -6.0], [9.0, 9.0, 6.0]]), (360, 240))
+    solid = arrays(realise(box(-3, 3, -0.5, 0.5, -3, 3), 32))
+    body = composite.drawn(np.asarray(solid[0]), np.asarray(solid[1]), (1, 0, 0), camera)
+
+    def middle(*names: Name) -> list[int]:
+        picture = seen(composite.together([body], camera, names))
+        rows, columns = np.nonzero((picture[..., 0] > 150) & (picture[..., 1] < 50))
+        return list(picture[(rows.min() + rows.max()) // 2, (columns.min() + columns.max()) // 2])
+
+    plain = middle()
+    assert middle(Name("vent", (0.0, -0.5, 0.0), ring=True)) == plain
+    assert middle(Name("vent", (0.0, -0.5, 0.0))) == [0, 0, 0]
+
+
+def test_names_cover_neither_bodies_nor_each_other() -> None:
+    camera = composite.view((0.0, -1.0, 0.0), np.array([[-9.0, -9.0, -6.0], [9.0, 9.0, 6.0]]), (360, 240))
+
+    def drawn(half: tuple[float, float], colour: tuple[float, float, float]) -> composite.DrawnBody:
+        vertices, faces = arrays(realise(box(-half[0], half[0], -3, 3, -half[1], half[1]), 32))
+        return composite.drawn(np.asarray(vertices), np.asarray(faces), colour, camera)
+
+    bodies = [drawn((3, 3), (1, 0, 0)), drawn((0.1, 6), (0, 1, 0))]  # the second one keeps the rows above and below
+    names = [Name("cup 1", (2.0, -3.0, 0.0)), Name("tape 2.5 mm", (2.0, -3.0, 1.0))]
+    plain, named = (seen(composite.together(bodies, camera, each)) for each in ([], names))
+    red = (plain[:, :, 0] > 150) & (plain[:, :, 1] < 50)
+    black = named.max(axis=2) < 90
+    letters = sum(written(text, composite.LETTER_PX).sum() for text in ("cup 1", "tape 2.5 mm"))
+    assert (black & ~red).sum() > 0.6 * letters  # the names, side by side on white
+    assert (black & red).sum() < 250  # no more than two leaders and their dots
+    assert np.array_equal(named, seen(composite.together(bodies, camera, names)))
+
+
+def test_letters_differ_and_lie_in_their_box() -> None:
+    drawn = {letter: written(letter, 3.0) for letter in "abcdefghijklmnopqrstuvwxyz0123456789.-"}
+    assert len({(ink.shape, ink.tobytes()) for ink in drawn.values()}) == len(drawn)
+    assert all(ink.any() for ink in drawn.values())
+    assert written("Cup 1", 3.0) is not None
+    assert np.array_equal(written("CUP", 3.0), written("cup", 3.0))
+    assert written("ü", 3.0).any()
+
+
 def test_a_build_writes_the_pictures_and_names_them(tmp_path: Path) -> None:
     done = build(load("embedded"), tmp_path, only=("casting",), check=False)
     text = (done.folder / "casting.md").read_text("utf-8")
@@ -124,7 +211,7 @@ def test_a_build_writes_the_pictures_and_names_them(tmp_path: Path) -> None:
 
 
 def test_a_view_is_data() -> None:
-    """Nothing is meshed to name the pictures."""
+    """Under open pours nothing is meshed to name the pictures."""
     assert all(isinstance(view, View) for view in views(planned("encapsulating")[0]).values())
 
 

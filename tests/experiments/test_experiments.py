@@ -288,6 +288,24 @@ def test_a_lab_may_bring_bodies_and_spec_files(tmp_path: Path) -> None:
     assert lab.variants[lab.conditions[1]].tissue[0].shear_modulus.middle == pytest.approx(20e3 / 2 / 1.49)
 
 
+def test_a_lab_may_bring_silicones_of_its_own(tmp_path: Path) -> None:
+    """A table as `unitcad material` writes it: of a dynamic test, or of a slow pull where the unit asks for that."""
+    (tmp_path / "lab.toml").write_text(
+        'frequencies_hz = [60, 200]\nbodies = ["forearm"]\n'
+        '[units.dynamic]\nbase = "embedded"\n"layers.0.material" = "our-blend"\n'
+        '[units.slow]\nbase = "embedded"\n"layers.0.material" = "our-blend"\n"estimate.moduli" = "quasi-static"\n'
+        '[materials.our-blend]\nlike = "ecoflex-00-30"\n'
+        'youngs_modulus_kpa = { value = 90.68, low = 85.07, high = 96.67, status = "measured", source = "dma.csv" }\n'
+        'loss_factor = { value = 0.1724, low = 0.1657, high = 0.1794, status = "measured", source = "dma.csv" }\n'
+        'quasistatic_modulus_kpa = { value = 40, low = 30, high = 50, status = "measured", source = "pull.csv" }\n'
+    )
+    lab = load_lab(tmp_path / "lab.toml")
+    layers = {condition.unit: variant.layers[0] for condition, variant in lab.variants.items()}
+    assert layers["dynamic"].youngs_modulus.ends == pytest.approx((85.07e3, 96.67e3))
+    assert layers["dynamic"].tan_delta.ends == pytest.approx((0.1657, 0.1794))
+    assert layers["slow"].youngs_modulus.ends == pytest.approx((30e3, 50e3))
+
+
 def test_the_most_telling_experiment_is_the_first_of_a_study_of_the_two() -> None:
     specs = {
         name: load(table["base"], {path: value for path, value in table.items() if path != "base"})

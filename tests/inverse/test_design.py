@@ -153,6 +153,7 @@ def test_refinement_finds_what_lies_between_the_steps() -> None:
     second = next(one for one in made.data["proposals"] if (one["design"], tuple(one["materials"])) == kind)
     of_kind = [row for row in made.rows if (made.found.kind(row)[0], made.found.materials(row)) == kind]
     assert second["refined"]
+    assert second["lengths_gain"].endswith("this one lies between the steps")
     assert second["probability"] > made.found.probability[of_kind].max() + 0.02
     assert 1.05 < second["mass_g"] <= 1.08
     assert all(round(wall / 0.05, 6) == round(wall / 0.05) for wall in second["walls_mm"])
@@ -176,28 +177,98 @@ def test_an_impossible_wish_is_refused_with_the_nearest_that_is_possible(wish: d
     with pytest.raises(Refusal, match="none of") as refused:
         invert(_target(PAPER, **wish), check=False)
     assert refused.value.field == field
-    key = field.removeprefix("target.")
-    nearest = {**wish, key: refused.value.nearest}
-    if field not in ("target.edge_max", "target.edge_min", "target.probability_min"):
-        nearest |= {"edge_max": 2.0}
-    made = invert(_target(PAPER, **nearest), check=False)
-    assert made.data["proposals"]
+    assert invert(_target(PAPER, **_changed(wish, refused.value)), check=False).data["proposals"]
+
+
+def _changed(wish: dict[str, Any], refused: Refusal) -> dict[str, Any]:
+    """Return a wish with every value that a refusal offers in its place."""
+    return {"edge_max": 0.06, **wish} | {one.field.split(".")[1]: one.nearest for one in (refused, *refused.others)}
+
+
+def test_what_is_offered_for_several_impossible_wishes_is_accepted_together() -> None:
+    """Wishes drawn at random over and under what there is: each refusal's offers are accepted, all at once."""
+    rng, refusals, several = np.random.default_rng(17), 0, 0
+    for i in range(60):
+        ends = {
+            "diameter_max_mm": (9, 16),
+            "height_max_mm": (1.8, 5),
+            "mass_max_g": (0.3, 1.2),
+            "cure_hours_max": (1, 25),
+            "pitch_mm": (9, 40),
+        }
+        kept = {key: ends[key] for key in ends if rng.random() < 0.5}
+        wish = {key: round(float(rng.uniform(*of)), 2) for key, of in kept.items()}
+        level = float(np.exp(rng.uniform(np.log(0.01), np.log(0.2))))
+        wish |= {"edge_max": level} if i % 3 else {"edge_max": level, "edge_min": 0.9 * level}
+        if "pitch_mm" in wish:
+            wish["crosstalk_ratio_max"] = float(np.exp(rng.uniform(np.log(0.02), 0.0)))
+        models = PAPER if i % 2 else None
+        try:
+            invert(_target(models, **wish), check=False)
+        except Refusal as refused:
+            refusals, several = refusals + 1, several + bool(refused.others)
+            assert invert(_target(models, **_changed(wish, refused)), check=False).data["proposals"], wish
+    assert refusals > 30
+    assert several > 10
 
 
 def test_three_per_cent_is_answered_with_the_least_that_is_possible() -> None:
     with pytest.raises(Refusal) as refused:
         invert(_target(PAPER, edge_max=0.03), check=False)
+    assert refused.value.nearest == 0.04
+    least = "4 % of the motor's amplitude is the least as measured (encapsulating ecoflex-00-10/dragon-skin-10-medium"
+    assert least in str(refused.value)
+    accepted = invert(_target(PAPER, edge_max=0.04), check=False).data["proposals"][0]
+    assert (accepted["measured"]["level"], accepted["nearest_other"]) == (0.04, False)
+    with pytest.raises(Refusal):
+        invert(_target(PAPER, edge_max=0.0399), check=False)
+
+
+def test_what_no_unit_was_measured_at_is_answered_by_the_probability() -> None:
+    vary = {"wall_mm": [1.5, 1.5]}
+    with pytest.raises(Refusal, match=r"4\.34 % of the motor's amplitude is the least with it") as refused:
+        invert(_target(PAPER, vary, edge_max=0.03), check=False)
     assert refused.value.nearest == pytest.approx(0.0434, abs=0.0003)
-    assert "4.34 % of the motor's amplitude is the least with it (encapsulating ecoflex-00-10/dragon-skin-30" in str(
-        refused.value
-    )
+    assert invert(_target(PAPER, vary, edge_max=refused.value.nearest), check=False).data["proposals"]
+
+
+def test_a_measured_level_is_the_most_where_it_is_above_the_probable_ones() -> None:
+    with pytest.raises(Refusal) as refused:
+        invert(_target(PAPER, edge_max=None, edge_min=0.95, probability_min=0.9), check=False)
+    assert refused.value.nearest == 0.671
+    assert "67.1 % of the motor's amplitude is the most as measured" in str(refused.value)
+    wish = {"edge_max": None, "edge_min": 0.671, "probability_min": 0.9}
+    assert invert(_target(PAPER, **wish), check=False).data["proposals"][0]["measured"]["meets"]
 
 
 def test_limits_that_exclude_each_other_are_named_together() -> None:
     with pytest.raises(
-        Refusal, match=r"within it, nor within target\.cure_hours_max: target\.mass_max_g = 0\.3: 0\.47 g"
-    ):
+        Refusal, match=r"target\.mass_max_g = 0\.3: none of .* with target\.cure_hours_max = "
+    ) as refused:
         invert(_target(mass_max_g=0.3, cure_hours_max=1.0), check=False)
+    assert [one.field for one in refused.value.others] == ["target.cure_hours_max"]
+
+
+def test_a_pitch_at_which_units_overlap_is_answered_with_one_that_keeps_the_crosstalk() -> None:
+    wish = {"pitch_mm": 10.0, "crosstalk_ratio_max": 0.4}
+    with pytest.raises(Refusal, match=r"a pitch of 18\.3 mm is the least") as refused:
+        invert(_target(**wish), check=False)
+    variant = estimate_input(load("encapsulating"))
+    assert crosstalk_ratio(variant, 1e-3 * refused.value.nearest).value <= 0.4
+    assert crosstalk_ratio(variant, 1e-3 * (refused.value.nearest - 0.1)).value > 0.4
+
+
+def test_a_single_layer_is_tried_as_thick_as_the_measured_controls() -> None:
+    made = invert(_target(edge_max=0.5), check=False)
+    controls = [one for one in made.measured if len(made.found.materials(one)) == 1]
+    assert {made.found.lengths(row).walls for row in controls} == {(2.5,)}
+    assert {made.found.materials(row)[0] for row in controls} == {
+        "ecoflex-00-10",
+        "dragon-skin-10-medium",
+        "dragon-skin-30",
+    }
+    two = [one.lengths.walls for one in made.found.geometries if len(one.lengths.walls) == 2]
+    assert max(map(max, two)) == 2.0
 
 
 def test_what_is_over_a_limit_is_no_proposal() -> None:

@@ -59,7 +59,7 @@ def test_what_is_refused(data: dict[str, Any], field: str, limit: str, nearest: 
 
 def test_a_fault_of_a_table_for_every_spec_is_named() -> None:
     wrong = {"target": {"edge_max": 0.06}, "spec": {"fpcb": {"tail_width_mm": 30.0}}}
-    with pytest.raises(Refusal, match=r"fpcb\.tail_width_mm = 30: "):
+    with pytest.raises(Refusal, match=r"^spec\.fpcb\.tail_width_mm = 30: "):
         candidates(target_of(wrong))
 
 

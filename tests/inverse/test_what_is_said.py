@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import csv
+import html
 import itertools
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from unitcad.attenuation.crosstalk import crosstalk_ratio
 from unitcad.errors import Refusal, UnknownKey
-from unitcad.estimating import estimate_spec
-from unitcad.inverse.design_files import ranking
+from unitcad.estimating import estimate_input, estimate_spec
+from unitcad.inverse.design_files import contents, ranking
 from unitcad.inverse.design_words import explanation_lines, reasons, size_line, title
 from unitcad.inverse.explanation import explain
 from unitcad.inverse.proposals import Inversion, invert
 from unitcad.inverse.target_file import load_target, target_of
+from unitcad.spec import to_data, to_toml
+from unitcad.validation import from_data, load
 
 FIELD = "target.edge_max"
 
@@ -53,8 +58,8 @@ def test_lengths_of_no_measured_number_of_layers_are_not_called_measured() -> No
 def test_only_lengths_that_some_candidate_has_are_counted(paper: Inversion) -> None:
     two = {"target": {"edge_max": 0.6}, "at_hand": {"materials": ["ecoflex-00-10"]}}
     tried = invert(target_of(two), check=False).data["tried"]
-    assert (tried["candidates"], tried["geometries"]) == (10, 10)
-    assert paper.data["tried"]["geometries"] == 60
+    assert (tried["candidates"], tried["geometries"]) == (14, 14)
+    assert paper.data["tried"]["geometries"] == 64
 
 
 def test_lengths_that_were_never_measured_stand_in_the_title(paper: Inversion, quiet: Inversion) -> None:
@@ -76,7 +81,7 @@ def test_the_ranking_has_the_proposals_numbers_and_the_measurements(quiet: Inver
     assert numbered == of_grid
     measured = {row["name"]: row["measured"] for row in rows if row["measured"]}
     assert measured["encapsulating-e10-d30-1.25-1.25"] == "0.0517"
-    assert all("1.25-1.25" in name for name in measured)
+    assert all("1.25-1.25" in name or name.endswith("-2.5") for name in measured)
 
 
 def test_crosstalk_that_tells_no_designs_apart_and_the_level_at_the_neighbour(quiet: Inversion) -> None:
@@ -95,17 +100,82 @@ def test_another_diameter_and_a_unit_that_was_not_tried_are_explained(paper: Inv
     why = explain(paper, "motor-10mm")["reasons"]
     assert any("diameters of 14 to 15.2 mm are tried, and this one's is 17" in line for line in why)
     head = explanation_lines(explain(quiet, "three-layer"))[0]
-    assert head.endswith("if it were tried")
+    assert head.endswith(" if it were tried")
 
 
-def test_every_wish_that_is_impossible_alone_has_its_nearest() -> None:
-    wish: dict[str, Any] = {"height_max_mm": 2.0, "cure_hours_max": 3.0}
-    with pytest.raises(Refusal, match=r"target\.height_max_mm = 2: 2\.11 mm .*target\.cure_hours_max = 3: 4\.\d+ h"):
-        _target(**wish)
+def _spec(made: Inversion, at: int, folder: Path, **changes: Any) -> str:
+    """Write a proposal's spec with other values, and return the file."""
+    file = folder / "mine.toml"
+    file.write_text(to_toml(from_data({**to_data(made.specs[at]), "name": "mine", "fpcb": {}, **changes})), "utf-8")
+    return str(file)
+
+
+def test_a_proposals_own_spec_is_recognised_and_another_is_not_called_a_proposal(
+    paper: Inversion, quiet: Inversion, tmp_path: Path
+) -> None:
+    for made in (paper, quiet):
+        own = explain(made, _spec(made, 1, tmp_path))
+        assert (own["listed"], own["reasons"], own["among"]) == (2, [], True)
+        assert explanation_lines(own)[1:] == ["  it is among the proposals, as number 2"]
+    thicker = [{"material": m, "wall_mm": 1.5, "cap_mm": 1.5} for m in paper.data["proposals"][0]["materials"]]
+    of_table = explain(paper, _spec(paper, 0, tmp_path, layers=thicker))
+    assert "encapsulating-e10-d30-1.25-1.25 is the best of its kind" in of_table["reasons"][0]
+    between = [{**one, "wall_mm": 1.3, "cap_mm": 1.3} for one in thicker]
+    lines = explanation_lines(explain(paper, _spec(paper, 0, tmp_path, layers=between)))
+    assert any("not tried: its lengths lie between the steps" in line for line in lines)
+    motor = {"part": "LCM0720A3463F", "fill": True}
+    filled = explanation_lines(explain(paper, _spec(paper, 0, tmp_path, motor=motor)))
+    assert any("with another motor or circuit" in line for line in filled)
+    assert not any("among the proposals" in line for line in [*lines, *filled])
+
+
+def test_a_specs_crosstalk_over_its_limit_is_among_the_reasons() -> None:
+    """The edge of a wider unit lies nearer to its neighbour's middle."""
+    made = _target(crosstalk_ratio_max=0.4, pitch_mm=20)
+    over = [line for line in explain(made, "three-layer")["reasons"] if "crosstalk" in line]
+    ratio = crosstalk_ratio(estimate_input(load("three-layer")), 20e-3).value
+    assert ratio is not None
+    assert over == [f"over a limit: crosstalk ratio {ratio:.3g} of at most 0.4"]
+    assert not any("crosstalk" in line for line in explain(made, "encapsulating")["reasons"])
+
+
+def test_the_command_that_builds_is_quoted(paper: Inversion) -> None:
+    found = contents(paper, "odd dir/design-paper")
+    file = f"odd dir/design-paper/specs/1-{paper.data['proposals'][0]['name']}.toml"
+    assert f"`unitcad build '{file}'`" in found["design.md"].decode()
+    assert f"unitcad build '{file}'" in html.unescape(found["design.html"].decode())
+
+
+def test_a_refined_proposals_name_is_explained() -> None:
+    made = _target({"layers": [2], "wall_mm": [1.1, 2.1], "step_mm": 0.5}, edge_max=0.06, mass_max_g=1.08)
+    one = next(one for one in made.data["proposals"] if one["refined"])
+    own = explain(made, one["name"])
+    assert (own["listed"], own["probability"]) == (one["rank"], one["probability"])
+
+
+def test_a_measurement_is_shown_and_the_nearest_others_are_no_proposals(paper: Inversion) -> None:
+    names = {one["rank"]: one["name"] for one in paper.data["proposals"]}
+    first = explanation_lines(explain(paper, names[1]))
+    assert "measured 5.2 % (the paper, also printed as 4.6 %): meets the wish; probability 0.79" in first[0]
+    for third in (names[3], "embedded"):
+        lines = explanation_lines(explain(paper, third))
+        assert "measured 16 % (the paper): outside the wish; probability 0.10, below your 50 %" in lines[0]
+        assert lines[1:] == [
+            "  it is no proposal: it was measured outside the wish, and stands among the nearest others as number 3"
+        ]
+
+
+def test_every_impossible_wish_has_its_nearest() -> None:
+    with pytest.raises(
+        Refusal, match=r"target\.height_max_mm = 2: .* together with target\.cure_hours_max = "
+    ) as refused:
+        _target(height_max_mm=2.0, cure_hours_max=3.0)
+    assert "target.cure_hours_max = 3: none of" in str(refused.value.others[0])
+    assert refused.value.nearest == 2.11
 
 
 def test_a_crosstalk_that_is_out_of_reach_says_what_reaches_it() -> None:
-    with pytest.raises(Refusal, match=r"a larger target\.pitch_mm or other vary\.diameter_mm") as refused:
+    with pytest.raises(Refusal, match=r"other vary\.diameter_mm.*; or target\.pitch_mm = 22.* in its place") as refused:
         _target(crosstalk_ratio_max=0.3, pitch_mm=20)
     assert "not tried, without a modulus: ecoflex-00-30" in str(refused.value)
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from faulty_sets import set_of
 
@@ -21,6 +22,7 @@ from unitcad.casting.release_agent import Face
 from unitcad.casting.rules import broken_rules
 from unitcad.catalogue import materials
 from unitcad.designs.dimensions import Exit
+from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.build import build
@@ -234,6 +236,27 @@ def test_the_unit_is_as_asked_for_and_its_heights_in_layers_are_said() -> None:
     }
     assert unit_heights(set_of("embedded")) == []
     assert "| layer 1's cap | 1.25 | 1.2 |" in written.to_markdown(procedure("encapsulating"))
+
+
+def test_flats_of_the_printed_pieces_end_whole_layers() -> None:
+    """Every level face of base and lids, read off the meshes, is on the grid of a set that asks for no height."""
+    moulds = set_of("encapsulating", "moulds.pour=injected", "moulds.cavities=[1,2]")
+    for tool in (*moulds.plan.of_kind("base"), *moulds.plan.of_kind("lid")):
+        vertices, faces = arrays(realise(tool.shape, 64))
+        corners = np.asarray(vertices, float)[np.asarray(faces, int)]
+        level = np.ptp(corners[:, :, 2], axis=1) < 1e-6
+        x, y = (corners[level, 1:, :2] - corners[level, :1, :2]).transpose(1, 2, 0)
+        area = np.abs(x[0] * y[1] - x[1] * y[0]) / 2
+        bed = corners[:, :, 2].max() if tool.upside_down else corners[:, :, 2].min()
+        heights = np.abs(corners[level, 0, 2] - bed)
+        found = {round(float(h), 3) for h in np.unique(heights.round(3)) if area[np.abs(heights - h) < 2e-3].sum() > 1}
+        asked = {6 + 2.11} if tool.kind == "base" else set()  # the core's top is the unit's
+        off = {h for h in found if abs(h / 0.2 - round(h / 0.2)) > 0.02}
+        assert all(any(abs(h - a) < 2e-3 for a in asked) for h in off), (tool.name, off)
+
+
+def test_no_label_reads_as_a_cups_number() -> None:
+    assert all("C" not in set_of(name).plan.label for name in templates())
 
 
 @pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25", "sla"])

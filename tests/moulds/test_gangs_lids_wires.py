@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from faulty_sets import broken, of_spec, set_of
+from manifold3d import CrossSection
 
 from unitcad.accuracy.outcomes import put_in, refusal_of
 from unitcad.accuracy.random_specs import DOCUMENTED, Seeded, random_spec
@@ -78,6 +79,35 @@ def test_cells_are_numbered_and_numbers_keep_off_grooves_and_each_other() -> Non
     rings = sum(1 for part in top.decompose() if part.area() > 1)
     assert top.area() < moulds.solids["cup2"].slice(rim - 1.2).area()
     assert rings >= 1 + 20  # the plate, and the land of each cell inside its groove
+
+
+@pytest.mark.parametrize("wall", [0.5, 0.55, 0.6, 0.7, 0.85, 0.95])
+@pytest.mark.parametrize("tolerance", [0.002, 0.1])
+def test_grooves_that_just_miss_each_other_are_joined(wall: float, tolerance: float) -> None:
+    """The pitch is the last layer's; grooves of the one before leave a web of 2 * wall - 1 mm, which is not printed."""
+    data = {
+        "name": "webs",
+        "design": "embedded",
+        "diameter_mm": 12.0,
+        "motor": {"diameter_mm": 12.0 - 4 * wall, "thickness_mm": 1.8, "fill": True},
+        "layers": [{"material": "ecoflex-00-10", "wall_mm": wall}] * 2,
+        "moulds": {"cavities": [2, 2]},
+        "output": {"tolerance_mm": tolerance},
+    }
+    moulds = of_spec(from_data(data))
+    assert broken(moulds) == set()
+    lay, radius, lengths = moulds.plan.layout, 6 - wall, moulds.spec.moulds
+    assert lay.pitch - 2 * (radius + 2.5) == pytest.approx(2 * wall - 1)
+    section = moulds.solids["cup1"].slice(moulds.plan.steps[0].rim - 0.75)
+    middle = lay.pitch / 2
+    for i in range(-40, 41):
+        for axis in (0, 1):
+            line = CrossSection.square((3.0, 1e-3), True).translate((0, middle + i / 10)).rotate(90 * axis)
+            ends = [part.bounds()[axis::2] for part in (section ^ line).decompose()]
+            assert all(high - low >= lengths.least_wall_mm for low, high in ends if low < 0 < high), i
+    for cell in lay.cells:
+        land = CrossSection.circle(radius + 1 - tolerance, 200) - CrossSection.circle(radius + tolerance, 200)
+        assert (land.translate((cell.x, cell.y)) - section).area() < 1e-3
 
 
 def test_flat_lid_without_vents_traps_what_an_exact_integral_says() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from unitcad.errors import Refusal
 from unitcad.mould_checks import balance, check_moulds, mould_checks
 from unitcad.moulds import dents
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, ring, union
 from unitcad.shape.tree import Common, Revolve
 from unitcad.validation import from_data, templates
@@ -110,6 +112,11 @@ FAULTS: list[Fault] = [
     ("C220", "cup2", "a rib of 0.05 more", more(box(-9.9, -9.45, 3.5, 3.7, -1.3, -0.6))),
     ("C220", "base", "plinth 0.05 narrower at +x", less(box(9.45, 10.5, -99, 99, -1.9, 1))),
     ("C220", "cup1", "a rib up to the seat", more(box(9.45, 9.9, 3.4, 3.8, -0.9, 0))),
+    ("C230", "cup1", "a pin's hole into the groove", less(moved(cylinder(2.0, -3, 2.5), 0, 7.5))),
+    ("C230", "cup1", "a pin's hole 0.5 under the groove", less(moved(cylinder(0.5, -3, 1.86), 0, 7.5))),
+    ("C230", "cup2", "a slot beside the groove", less(box(-2, 2, 9.9, 10.5, 2.0, 9))),
+    ("C240", "cup1", "a hole 0.5 from the bore", less(moved(cylinder(0.3, 0.5, 2.5), -6.55, 0))),
+    ("C240", "cup2", "a hole 0.6 from the groove", less(moved(cylinder(0.3, 3.5, 9), -10.4, 0))),
     ("C300", "cup1", "a lip of 0.05 in the bore", more(ring(5.7, 5.8, 1.0, 1.2))),
     ("C300", "cup1", "a lip of 0.01 in the bore", more(ring(5.74, 5.8, 1.0, 1.2))),
     ("C300", "cup2", "a bore that narrows upwards", more(Revolve(polygon((7.1, 0.2), (7.1, 4), (6.95, 4))))),
@@ -150,6 +157,48 @@ def test_an_unpulled_tongue_holds_the_cup() -> None:
     solids = set_of("encapsulating").solids
     assert blocked(solids["cup1"], solids["tongue"], (0, 0, 1)) > 10
     assert blocked(solids["tongue"], solids["cup1"], (1, 0, 0)) == 0
+
+
+def reordered(moulds: MouldSet, index: int, change: Callable[[tuple[Removal, ...]], tuple[Removal, ...]]) -> MouldSet:
+    """Return the set with other removals after one pour (from 0)."""
+    steps = tuple(
+        replace(step, removals=change(step.removals)) if i == index else step
+        for i, step in enumerate(moulds.plan.steps)
+    )
+    return MouldSet(moulds.spec, replace(moulds.plan, steps=steps))
+
+
+@pytest.mark.parametrize(
+    ("index", "change", "where", "why"),
+    [
+        (0, lambda order: order[::-1], "pour 1: cup1 out against tongue", "undercut"),
+        (0, lambda order: order[:1], "pour 1: cup1 stays", "pour 2 has no place for it"),
+        (1, lambda order: order[:1], "pour 2: cup2 stays", "it holds the unit"),
+        (1, lambda order: (*order, order[0]), "pour 2: tongue out", "it is not there"),
+        (0, lambda order: (*order, Removal("lid1", (0, 0, 1))), "pour 1: lid1 out", "it is not there"),
+        (0, lambda order: (*order, Removal(CAST, (0, 0, 1))), "pour 1: cast out", "pour 2 is cast on it"),
+        (1, lambda order: (order[0], Removal("cup2", (0, 0, -1))), "pour 2: cup2 out against base", "undercut"),
+        (1, lambda order: (Removal(CAST, (0, 0, 1)), *order), "pour 2: cast out against tongue", "undercut"),
+    ],
+)
+def test_an_order_of_removal_that_is_impossible_is_caught(
+    index: int, change: Callable[[tuple[Removal, ...]], tuple[Removal, ...]], where: str, why: str
+) -> None:
+    findings = check_moulds(reordered(set_of("encapsulating"), index, change))
+    named = [finding for finding in findings if finding.code == "C300" and not finding.ok]
+    assert where in [finding.where for finding in named]
+    assert why in " ".join(finding.advice for finding in named if finding.where == where)
+
+
+def test_a_unit_that_is_pushed_out_last_holds_nothing() -> None:
+    """The silicone comes out by itself: neither base nor cup holds it any more, whatever is left on the bench."""
+
+    def pushed(order: tuple[Removal, ...]) -> tuple[Removal, ...]:
+        down = (0, 0, -1)
+        return (order[0], Removal("stub", down), Removal("base", down), Removal(CAST, down))
+
+    moulds = reordered(set_of("encapsulating"), 1, pushed)
+    assert [finding.where for finding in check_moulds(moulds) if finding.code == "C300" and not finding.ok] == []
 
 
 @pytest.mark.parametrize(("reach", "sides"), [(5.5, 1), (6.7, 1), (6.7, 2)])

@@ -6,19 +6,21 @@ import json
 import math
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from faulty_sets import set_of
 
-from unitcad.casting import coupon
+from unitcad.casting import coupon, figures
 from unitcad.catalogue import printers
 from unitcad.errors import UnitcadError
 from unitcad.export import slicer, stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.ribs import SLOPE, ribs
+from unitcad.pipeline import slicing
 from unitcad.pipeline.build import build
-from unitcad.pipeline.slicing import slice_tools
+from unitcad.pipeline.folder import folder_name
 from unitcad.validation import load, templates
 
 pytestmark = [
@@ -42,11 +44,25 @@ def written(folder: Path, *source: str) -> list[Path]:
     return files
 
 
+def sliced(files: list[Path]) -> dict[str, Any]:
+    with slicer.Pieces(printers()["fdm-0.4"]) as pieces:
+        return pieces.report({path.name: path.read_bytes() for path in files})
+
+
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
 def test_no_tool_needs_a_repair(source: tuple[str, ...], tmp_path: Path) -> None:
     files = written(tmp_path, *source)
     assert len(files) >= 3
     assert [file.name for file in files if slicer.needs_repair(file)] == []
+
+
+@pytest.mark.parametrize("source", [("embedded",), ("three-layer",), ("encapsulating", "moulds.printer=fdm-0.25")])
+def test_the_procedures_time_is_within_a_third_of_the_slicers(source: tuple[str, ...], tmp_path: Path) -> None:
+    moulds, files = set_of(*source), written(tmp_path, *source)
+    with slicer.Pieces(printers()[moulds.spec.moulds.printer]) as pieces:
+        taken = pieces.report({path.name: path.read_bytes() for path in files})["print_s"] / 60
+    solid = sum(moulds.solids[tool.name].volume() for tool in moulds.plan.tools if tool.made == "printed")
+    assert figures.print_min(moulds.spec, solid, 0.0) == pytest.approx(taken, rel=1 / 3)
 
 
 @pytest.mark.parametrize("locale", ["xx_YY.UTF-8", "de_DE.UTF-8", ""])
@@ -75,15 +91,13 @@ def test_a_broken_mesh_needs_one(tmp_path: Path) -> None:
 def test_print_time_and_filament(tmp_path: Path) -> None:
     """Filament by volume lies between the walls alone and the solid piece."""
     (tongue,) = (file for file in written(tmp_path, "encapsulating") if file.name == "tongue.stl")
-    report = slicer.report([tongue], printers()["fdm-0.4"])
-    assert report is not None
+    report = sliced([tongue])
     assert report["pieces"][0]["repaired"] is False
     assert 10 < report["print_s"] < 3600
     moulds = set_of("encapsulating")
     solid = realise(moulds.plan.tool("tongue").shape, moulds.segments).volume() / 1000
     # A skirt round the piece comes on top.
     assert 0.5 * solid < report["filament_cm3"] < 5 * solid
-    assert slicer.report([tongue], printers()["sla"]) is None
 
 
 @pytest.mark.parametrize("name", ["fdm-0.4", "fdm-0.25"])
@@ -126,8 +140,7 @@ def test_durations() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
 def test_every_tool_slices(source: tuple[str, ...], tmp_path: Path) -> None:
-    report = slicer.report(written(tmp_path, *source), printers()["fdm-0.4"])
-    assert report is not None
+    report = sliced(written(tmp_path, *source))
     assert all(piece["print_s"] > 0 and not piece["repaired"] for piece in report["pieces"])
 
 
@@ -138,20 +151,28 @@ def test_coupon_needs_no_repair(tmp_path: Path) -> None:
         assert not slicer.needs_repair(file)
 
 
-def test_build_writes_print_times_once_a_piece(tmp_path: Path) -> None:
+def test_print_times_are_written_once_a_piece_and_begin_while_the_rest_is_made(tmp_path: Path) -> None:
     """A second call takes what it knows; a changed piece is sliced again."""
     spec = load("single-embedded")
-    built = build(spec, tmp_path, only=("moulds",), check=False)
-    sliced: list[str] = []
-    assert slice_tools(built.folder, built.manifest, spec, sliced.append).startswith("prints in 0 h ")
-    report = json.loads((built.folder / "slicer.json").read_text())
+    said: list[str] = []
+
+    def run() -> str:
+        with slicing.begin(spec, tmp_path / folder_name(spec), said.append) as pieces:
+            built = build(spec, tmp_path, only=("moulds",), check=False, take=slicing.take(pieces))
+            assert {name for name, _ in pieces._sliced} == {"base.stl", "step1-cup.stl", "blade.stl"}
+            return slicing.finish(pieces, built.folder, built.manifest)
+
+    assert run().startswith("prints in 0 h ")
+    report = json.loads((tmp_path / folder_name(spec) / "slicer.json").read_text())
     assert {piece["file"] for piece in report["pieces"]} == {"base.stl", "step1-cup.stl", "blade.stl"}
-    assert len(sliced) == 3
-    slice_tools(built.folder, built.manifest, spec, sliced.append)
-    assert len(sliced) == 3
-    blade = built.folder / "moulds" / "blade.stl"
-    blade.write_bytes((built.folder / "moulds" / "base.stl").read_bytes())
-    slice_tools(built.folder, built.manifest, spec, sliced.append)
-    assert sliced[3:] == ["slicing blade.stl"]
-    blade.write_bytes(b"no mesh")
-    assert slice_tools(built.folder, built.manifest, spec).startswith("not sliced: ")
+    assert report["print_s"] == sum(piece["print_s"] for piece in report["pieces"]) > 60
+    assert len(said) == 3
+    assert run().startswith("prints in 0 h ")
+    assert len(said) == 3
+    built = build(spec, tmp_path, only=("moulds",), check=False)
+    for content, expected in ((None, "prints in"), (b"no mesh", "not sliced: ")):
+        blade = built.folder / "moulds" / "blade.stl"
+        blade.write_bytes(content or (built.folder / "moulds" / "base.stl").read_bytes())
+        with slicing.begin(spec, built.folder, said.append) as pieces:
+            assert slicing.finish(pieces, built.folder, built.manifest).startswith(expected)
+    assert said[3:] == ["slicing blade.stl"] * 2

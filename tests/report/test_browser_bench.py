@@ -40,6 +40,14 @@ def page_of_one(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_printed_sheet_fits_two_pages(name: str, running: Any, tmp_path: Path) -> None:
     visit = Visit(running, bench(name, SETS[name], tmp_path))
     pdf = visit.page.pdf(prefer_css_page_size=True)
+    visit.page.emulate_media(media="print")
+    least = visit.page.evaluate(
+        """() => Math.min(...[...document.querySelectorAll("p, td, li, h1, h2, h3")]
+          .filter((node) => node.checkVisibility()).map((node) => parseFloat(getComputedStyle(node).fontSize)))"""
+    )
+    assert least >= 8 * 96 / 72 - 0.01  # 8 pt
+    rows = visit.page.locator("#plan tbody tr:visible").all_inner_texts()
+    assert any("motor in" in row for row in rows)
     visit.close()
     assert 1 <= len(re.findall(rb"/Type\s*/Page[^s]", pdf)) <= 2
 

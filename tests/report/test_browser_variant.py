@@ -283,6 +283,14 @@ def test_nothing_overflows_at_390_pixels(running: Any, page: Path, dark: bool) -
     seen.close()
 
 
+def test_rows_of_the_parts_have_one_line_at_390_pixels(running: Any, page: Path) -> None:
+    visit = Visit(running, page, width=390, height=844)
+    heights = visit.page.evaluate("[...document.querySelectorAll('#parts tbody tr')].map((row) => row.offsetHeight)")
+    visit.close()
+    assert heights
+    assert max(heights) < 50
+
+
 def test_light_and_dark(running: Any, page: Path) -> None:
     def background(visit: Visit) -> list[int]:
         text = visit.page.evaluate("() => getComputedStyle(document.body).backgroundColor")
@@ -308,7 +316,12 @@ def test_the_procedure_is_all_there(visit: Visit, built: Path) -> None:
     assert starts == [1 + sum(lengths[:i]) for i in range(len(lengths))]
     for image in visit.page.locator("#procedure img").all():
         assert image.evaluate("(node) => node.naturalWidth") > 200
-    assert visit.page.locator("#procedure img").count() == len(casting["pours"])
+    assert visit.page.locator("#procedure figure img").count() == len(casting["pours"])
+    pictured = [step["title"] for step in steps if step["picture"]]
+    assert pictured
+    shown = visit.page.locator("#procedure li > img.state")
+    assert shown.evaluate_all("(nodes) => nodes.map((node) => node.alt)") == pictured
+    assert visit.page.locator("#procedure img").count() == len(casting["pours"]) + len(pictured)
 
 
 def test_print_shows_the_procedure_and_not_the_controls(visit: Visit) -> None:

@@ -233,6 +233,7 @@ _WORDS = {
     "zero thickness": "a medium with a layer of no thickness",
     "large k a": "a load that is large to the wavelength",
     "undamped": "an undamped medium",
+    "partly damped": "a partly damped medium",
 }
 
 

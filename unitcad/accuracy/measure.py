@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +19,7 @@ from unitcad.accuracy.synthetic_records import (
     Synthetic,
     synthetic,
 )
-from unitcad.accuracy.timing import machine
+from unitcad.accuracy.timing import PROCESSOR, PROCESSOR_NOTE, machine
 from unitcad.lab.chains.line import Mains, fit_line
 from unitcad.lab.chains.paper import PaperChain
 from unitcad.lab.levels import level
@@ -79,7 +78,8 @@ def run(quick: bool, say: Say) -> Result:
                 "Error of the amplitude against run time",
                 ("chain", "median, %", "95th percentile, %", "worst within 1 Hz of 100 or 150 Hz, %", "ms", "frontier"),
                 chains,
-                f"{trials} records; the column before the last has {near} records of its own, the sign is the error's.",
+                f"{trials} records; the column before the last but one has {near} records of its own, the sign is the "
+                f"error's. {PROCESSOR_NOTE}",
             ),
             Table(
                 "`line`: error and coverage by scenario",
@@ -204,9 +204,9 @@ def _chain_errors(trials: int) -> tuple[int, list[tuple[str, float, float, float
     for name, chain in CHAINS.items():
         seconds, errors = [], []
         for record in far:
-            began = time.perf_counter()
+            began = PROCESSOR()
             found = chain(record.x, RATE)
-            seconds.append(time.perf_counter() - began)
+            seconds.append(PROCESSOR() - began)
             errors.append(100 * abs(found / record.amplitude - 1))
         beside = [100 * (chain(record.x, RATE) / record.amplitude - 1) for record in near]
         worst = max(beside, key=abs)

@@ -132,6 +132,18 @@ def _undamped(rng: np.random.Generator) -> LayeredMedium:
     return LayeredMedium(layers, HalfSpace(below.density, below.youngs_modulus, below.poisson_ratio))
 
 
+def _partly_damped(rng: np.random.Generator) -> LayeredMedium:
+    """Draw an ordinary medium or a wide contrast with at least one layer and about half of its bodies undamped."""
+    medium = _ordinary(rng) if rng.random() < 0.5 else _wide_contrast(rng)
+    while not medium.layers:
+        medium = _ordinary(rng)
+    bare = rng.random(len(medium.layers) + 1) < 0.5
+    bare[rng.integers(0, bare.size)] = True
+    layers = [replace(layer, damping=None) if no else layer for layer, no in zip(medium.layers, bare, strict=False)]
+    below = medium.half_space
+    return LayeredMedium(layers, replace(below, damping=None) if bare[-1] else below)
+
+
 def _wide_contrast(rng: np.random.Generator) -> LayeredMedium:
     """Draw moduli of 1 kPa to 1 GPa in any order, layers from 3 micrometres on, damped or not."""
     damped = rng.random() < 0.7
@@ -172,5 +184,6 @@ _MEDIA: dict[str, Callable[[np.random.Generator], LayeredMedium]] = {
     "undamped": _undamped,
     "wide contrast": _wide_contrast,
     "extreme contrast": _extreme_contrast,
+    "partly damped": _partly_damped,
 }
 CLASSES = tuple(_MEDIA)

@@ -18,7 +18,7 @@ from unitcad.accuracy.result import Promise, Result, Say, Summary, Table, shown
 from unitcad.accuracy.timing import Timing, interleaved, machine, timing
 from unitcad.errors import Missing, UnitcadError
 from unitcad.pipeline import Variant
-from unitcad.validation import default_template
+from unitcad.validation import default_template, load
 
 ROOT = Path(__file__).parents[2]
 SCRIPTS = {
@@ -29,6 +29,7 @@ SCRIPTS = {
 }
 OURS, CADQUERY, BUILD123D, BARE = SCRIPTS
 FULL = "unitcad build, the whole command"
+BARE_STEP = "bare OCCT, the same STEP"
 OTHERS = (("bench_check.py",), ("bench_attenuation.py",), ("bench_batch.py", "--rounds", "1", "--sizes", "100,1000"))
 """Other scripts of benchmarks/ with their options; batches take long, so they run once."""
 
@@ -66,6 +67,8 @@ def run(quick: bool, say: Say) -> Result:
             return {n: _warm(folder / SCRIPTS[n], lengths, out / n, formats, warm) for n in scripts(formats)}
 
         cold_stl, cold_step, warm_stl, warm_step = cold("stl"), cold("both"), warmed("stl"), warmed("both")
+        say("the default command")
+        whole = whole_command(folder, lengths, out, rounds)
     warm_title = "The same, {}, warm: the library is loaded, geometry made anew"
     tables += [
         _time_table(f"The {default_template()} set, parameters to STL, cold processes", cold_stl, CADQUERY),
@@ -73,6 +76,7 @@ def run(quick: bool, say: Say) -> Result:
         _time_table(warm_title.format("STL"), warm_stl, CADQUERY),
         _time_table(warm_title.format("STL and STEP"), warm_step, CADQUERY),
         _aims(cold_stl, cold_step, warm_step),
+        *whole,
     ]
     failed: list[str] = []
     for command in () if quick else OTHERS:
@@ -111,6 +115,33 @@ def run(quick: bool, say: Say) -> Result:
     )
 
 
+def whole_command(folder: Path, lengths: Path, out: Path, rounds: int) -> list[Table]:
+    """Time the default command, with all that it makes, beside the bare kernels; return the tables with their aims."""
+    formats = load(default_template()).output.formats
+    others = ",".join(form for form in formats if form != "step")
+    step = interleaved(
+        {
+            FULL: partial(_build, out / "whole", ",".join(formats)),
+            BARE_STEP: partial(_call, folder / "bare_occt.py", lengths, out / BARE_STEP, "step"),
+        },
+        rounds,
+    )
+    mesh = interleaved(
+        {
+            FULL: partial(_build, out / "whole-mesh", others),
+            BARE: partial(_call, folder / SCRIPTS[BARE], lengths, out / BARE, "stl"),
+        },
+        rounds,
+    )
+    what = "unit, moulds, drawings, procedure with its pictures, checks, estimate and page"
+    rows = []
+    for made, times, peer, aim in (("with STEP", step, BARE_STEP, 1.25), ("without STEP", mesh, BARE, 4.3)):
+        ratio = times[FULL].median / times[peer].median
+        rows.append((made, str(times[FULL]), peer, str(times[peer]), ratio, aim, "yes" if ratio <= aim else "no"))
+    head = ("default build", "time", "beside", "time", "ratio of medians", "aim, at most", "met")
+    return [Table(f"The whole default command, cold: {what}", head, tuple(rows))]
+
+
 def summary(stl: dict[str, Timing], step: dict[str, Timing], worst: float) -> Summary:
     """Return what the set costs in cold processes, as STL and with STEP."""
     picks = [
@@ -136,7 +167,7 @@ def _call(script: Path, *arguments: object) -> str:
 
 
 def _build(out: Path, formats: str) -> None:
-    words = ["build", default_template(), "--no-slice", "--formats", formats, "-o", str(out)]
+    words = ["build", default_template(), "--formats", formats, "-o", str(out)]
     subprocess.run([sys.executable, "-m", "unitcad", *words], capture_output=True, check=True, env=_installed())
 
 

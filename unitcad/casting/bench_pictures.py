@@ -6,17 +6,20 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from unitcad.casting.bench_views import TOOL, Placed, View, picture_path, views
+from unitcad.casting.bench_extras import TOOL
+from unitcad.casting.bench_views import Placed, View, picture_path, views
 from unitcad.designs import layer_colour
 from unitcad.export import composite
+from unitcad.export.picture_letters import Name
 from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, moved, polygon
 from unitcad.shape.tree import Revolve
+from unitcad.text import spaced
 
 SIZE = (540, 360)
 """Of a picture, px."""
-_GAP = 6.0
+_GAP = 9.0
 """Between pieces laid out side by side, mm."""
 _Solid = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
 
@@ -35,10 +38,10 @@ def pictures(moulds: MouldSet) -> dict[str, bytes]:
                 solids[extra] = [(*_mesh(moulds, extra.shape), extra.colour)]
         if view.syringe_on is not None and view.syringe_on not in solids:
             solids[view.syringe_on] = [(*_mesh(moulds, _syringe(moulds, view.syringe_on)), TOOL)]
-    return {picture_path(name): content for name, content in _drawn(shown, solids)}
+    return {picture_path(name): content for name, content in _drawn(moulds, shown, solids)}
 
 
-def _drawn(shown: dict[str, View], solids: dict[object, list[_Solid]]) -> Iterable[tuple[str, bytes]]:
+def _drawn(moulds: MouldSet, shown: dict[str, View], solids: dict[object, list[_Solid]]) -> Iterable[tuple[str, bytes]]:
     for group in dict.fromkeys((view.group, view.eye) for view in shown.values()):
         own = {name: view for name, view in shown.items() if (view.group, view.eye) == group}
         keys = {name: list(_keys(view)) for name, view in own.items()}
@@ -49,7 +52,25 @@ def _drawn(shown: dict[str, View], solids: dict[object, list[_Solid]]) -> Iterab
         camera = composite.view(group[1], points, SIZE)
         bodies = {key: [composite.drawn(*solid, camera) for solid in each] for key, each in placed.items()}
         for name, each in keys.items():
-            yield name, composite.together([body for key in each for body in bodies[key]], camera)
+            names = _piece_names(moulds, placed) if group[0] == "pieces" else own[name].names
+            yield name, composite.together([body for key in each for body in bodies[key]], camera, names)
+
+
+def _piece_names(moulds: MouldSet, placed: dict[object, list[_Solid]]) -> list[Name]:
+    """Name the pieces laid out: each by itself, tongues and filaments of several cavities by their number."""
+    runs: dict[str, list[np.ndarray]] = {}
+    for key, solids in placed.items():
+        if isinstance(key, tuple) and isinstance(key[1], Placed):
+            tool = moulds.plan.tool(key[1].name)
+            name = {"tongue": "tongue", "stub": "filament"}.get(tool.kind, spaced(tool.name))
+            runs.setdefault(name, []).append(np.concatenate([vertices for vertices, _, _ in solids]))
+    names = []
+    for name, points in runs.items():
+        low, high = points[0].min(axis=0), points[0].max(axis=0)
+        # At the nearer edge of the upper face, where most pieces are solid.
+        at = float(low[0] + high[0]) / 2, float(low[1] + 0.1 * (high[1] - low[1])), float(high[2])
+        names.append(Name(f"{len(points)} {name}s" if len(points) > 1 else name, at))
+    return names
 
 
 def _keys(view: View) -> Iterable[object]:

@@ -1,6 +1,7 @@
 """What each picture of the procedure shows: which pieces stand where, which one moves, what holds or fills them.
 
-Data alone: `bench_pictures` draws it. A view's name is the name of its file.
+Data: `bench_pictures` draws it, and only a lid's channels are meshed here, to find their mouths.
+A view's name is the name of its file.
 """
 
 from __future__ import annotations
@@ -9,24 +10,28 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+from unitcad.casting import bench_extras as draw
+from unitcad.casting.bench_extras import CARD, CLEAR, Extra
 from unitcad.casting.figures import window_length
 from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.designs import layer_colour
+from unitcad.designs.tooling import Cell
+from unitcad.export.picture_letters import Name
+from unitcad.kernels.mesh import arrays, realise
 from unitcad.moulds.base import plate_bottom, plate_top
-from unitcad.moulds.layout import CORNER_RADIUS
+from unitcad.moulds.layout import MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.shape import Revolve, Shape, box, cylinder, moved, polygon, turned, union
+from unitcad.moulds.tongue import GRIP_WIDTH
+from unitcad.shape import Shape, box, cylinder, moved, union
+from unitcad.text import number
 
 FOLDER = "steps"
 """The pictures' folder in a result."""
-ABOVE, UNDER = (0.55, -1.0, 0.62), (0.55, -1.0, -0.6)
+ABOVE, UNDER, OVER, LOW = (0.55, -1.0, 0.62), (0.55, -1.0, -0.6), (0.25, -1.0, 1.2), (0.55, -1.0, 0.3)
 """Directions towards the eye."""
-ARROW, TAPE, BAND, TOOL = (0.10, 0.36, 0.86), (0.47, 0.78, 0.86), (0.35, 0.33, 0.38), (0.80, 0.86, 0.90)
-CARD = (0.45, 0.72, 0.38)
-CLEAR = 5.0
-"""Between a piece that is lifted off and what it was on, mm."""
-TAPE_WIDTH, TAPE_THICKNESS, BELOW_RIM = 8.0, 0.4, 0.8
 
 Offset = tuple[float, float, float]
 
@@ -41,22 +46,19 @@ class Placed:
 
 
 @dataclass(frozen=True)
-class Extra:
-    """Something beside the pieces: an arrow, tape, a thread of silicone; its colour as three numbers 0 to 1."""
-
-    shape: Shape
-    colour: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
 class View:
-    """One picture. Views of one `eye` and `group` share their scale. `syringe_on`: channels that one stands on."""
+    """One picture. Views of one `eye` and `group` share their scale.
+
+    `syringe_on`: channels that one stands on. `names` stand beside the points that they name; pieces laid out side by
+    side are named by their own names.
+    """
 
     parts: tuple[Placed, ...]
     extras: tuple[Extra, ...] = ()
     eye: Offset = ABOVE
     group: Literal["moulds", "under", "pieces", "unit"] = "moulds"
     syringe_on: Shape | None = None
+    names: tuple[Name, ...] = ()
 
 
 def views(moulds: MouldSet) -> dict[str, View]:
@@ -73,23 +75,36 @@ def _views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
     plan, spec = moulds.plan, moulds.spec
     standing = tuple(Placed(tool.name) for kind in ("base", "stub") for tool in plan.of_kind(kind))
     base = tuple(Placed(tool.name) for tool in plan.of_kind("base"))
-    yield "pieces", View(tuple(Placed(tool.name) for tool in plan.tools), group="pieces")
-    first = plan.steps[0]
-    tried = Placed(first.cup, (0.0, 0.0, spec.moulds.plinth_height_mm + moulds.dimensions.core_height + CLEAR))
-    yield "dry-fit", View((*base, tried), eye=UNDER, group="moulds")
+    yield "pieces", View(tuple(Placed(tool.name) for tool in plan.tools), eye=OVER, group="pieces")
+    first, (cup_x, cup_y) = plan.steps[0], plan.layout.cup
+    paper, low = draw.paper_in_slit(moulds), plate_top(spec)
+    pressed = tuple(
+        draw.downward(x * 0.8 * cup_x, y * 0.8 * cup_y, first.rim + 5, 8.0) for x in (1, -1) for y in (1, -1)
+    )
+    slit = Name("paper", (cup_x + 6.0, 5.0 - cup_y, low))
+    yield "dry-fit", View((*base, Placed(first.cup)), (*paper, *pressed), names=(slit, _corner(moulds, first.rim)))
     if plan.of_kind("stub"):
         down = 1.2 * (moulds.dimensions.core_height - plate_bottom(spec))
         stubs = tuple(Placed(tool.name, (0.0, 0.0, -down)) for tool in plan.of_kind("stub"))
         arrows = tuple(
-            _upward(cell.x + 4.0, cell.y - 4.0, plate_bottom(spec) - down / 2, 7.0) for cell in plan.layout.cells
+            draw.upward(cell.x + 4.0, cell.y - 4.0, plate_bottom(spec) - down / 2, 7.0) for cell in plan.layout.cells
         )
-        yield "filament", View((*base, *stubs), arrows, UNDER, "under")
+        cell = plan.layout.cells[0]
+        bent = cell.x, -plan.layout.plate[1] * 0.8, plate_bottom(spec) - down
+        names = Name("filament", bent), Name("groove", (cell.x, -plan.layout.plate[1] * 0.7, plate_bottom(spec)))
+        yield "filament", View((*base, *stubs), arrows, UNDER, "under", names=names)
+    on = level_on(moulds)
+    names = (
+        Name("level", (0.0, -4.0, on.rim + 2)),
+        Name("paper", (-plan.layout.plate[0] - 4, -plan.layout.plate[1], plate_bottom(spec))),
+    )
+    yield "level", View((*standing, Placed(on.cup)), draw.spirit_level(moulds, on.rim), names=names)
     for step in plan.steps:
         for name, view in _pour(moulds, step, standing):
             yield f"pour{step.index}-{name}", view
     if plan.of_kind("stub"):
         arrows = tuple(
-            _downward(cell.x + 4.0, cell.y - 4.0, plate_bottom(spec) - 2.0, 7.0) for cell in plan.layout.cells
+            draw.downward(cell.x + 4.0, cell.y - 4.0, plate_bottom(spec) - 2.0, 7.0) for cell in plan.layout.cells
         )
         cured = tuple(Placed(step.name) for step in plan.steps)
         yield "filament-out", View((*base, *stubs, *cured), arrows, UNDER, "under")
@@ -104,8 +119,10 @@ def _views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
         cast = tuple(Placed(body.name, half=True) for body in moulds.unit if body.made == "cast")
         laid = tuple(Placed(body.name, (0.0, 0.0, away)) for body in inside)
         at = moulds.dimensions.outer_radius * 0.8
-        arrow = (_upward if below else _downward)(-at, -2.0, away / 2 + moulds.dimensions.heights[-1] / 2, 5.0)
-        yield "motor-in", View((*cast, *laid), (arrow,), UNDER if below else ABOVE, "unit")
+        arrow = (draw.upward if below else draw.downward)(-at, -2.0, away / 2 + moulds.dimensions.heights[-1] / 2, 5.0)
+        eye = UNDER if below else LOW
+        yield "motor-in", View((*cast, *laid), (arrow,), eye, "unit")
+        yield "motor-home", View((*cast, *(Placed(body.name) for body in inside)), eye=eye, group="unit")
 
 
 def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterator[tuple[str, View]]:
@@ -115,32 +132,42 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
     cured = (*standing, *(Placed(each.name) for each in before))
     if before:
         earlier = before[-1].inserts
-        yield "bond-face", View((*cured, *(Placed(body.name) for body in earlier)))
+        cell = min(lay.cells, key=lambda each: (each.y, each.x))
+        face = Name("bond face", (cell.x, cell.y - moulds.dimensions.radii[step.index - 2], 0.6 * before[-1].rim))
+        names = (face,) if plan.concentric else ()
+        yield "bond-face", View((*cured, *(Placed(body.name) for body in earlier)), names=names)
     if moulds.design.laid_in == step.index:
         raised = tuple(Placed(body.name, (0.0, 0.0, 2 * CLEAR)) for body in step.inserts)
-        yield "laid-in", View((*cured, *raised), (_downward(-lay.cup[0], -lay.cup[1], step.rim + CLEAR, 6.0),))
+        yield "laid-in", View((*cured, *raised), (draw.downward(-lay.cup[0], -lay.cup[1], step.rim + CLEAR, 6.0),))
     cured = (*cured, *inserts)
     up = spec.moulds.plinth_height_mm + max(step.rim, moulds.dimensions.core_height) + CLEAR
     beside = 0.0, -lay.cup[1] - 4.0, plate_top(spec) + up / 2
     raised = Placed(step.cup, (0.0, 0.0, up))
-    yield "cup-on", View((*cured, raised), (_downward(*beside, up * 0.6),))
+    key = _corner(moulds, step.rim + up)
+    yield "cup-on", View((*cured, raised), (draw.downward(*beside, up * 0.6),), names=(key,))
     cup, tongues = Placed(step.cup), plan.standing(step, "tongue")
     home = tuple(Placed(tool.name) for tool in tongues)
     exits, prop = moulds.dimensions.exit, tongue_prop(moulds) if tongues else None
     pads = tuple(Extra(pad, CARD) for pad in prop.pads) if prop else ()
     if tongues and exits:
-        seat = window_length(moulds, step) + lay.cup[0] * 0.35
+        seat = window_length(moulds, step)
         out = tuple(
             Placed(tool.name, (seat * tool.removal[0], 0.0, 0.0)) for tool in tongues if tool.removal is not None
         )
         arrows = tuple(
-            _sideways(-side, side * (lay.cup[0] + seat), cell.y, exits.high + 3.0, seat)
+            draw.sideways(-side, side * (lay.cup[0] + seat + 10.0), cell.y, exits.high + 3.0, 10.0)
             for cell in lay.cells
             for side in cell.sides
         )
         opened = Placed(step.cup, half=True)
-        yield "tongue-in", View((*cured, opened, *out), arrows)
-        yield "tongue-home", View((*cured, opened, *home), pads)
+        cell, side = _nearest_exit(moulds)
+        wall = side * lay.cup[0], cell.y - exits.width / 2, exits.high
+        greased = Name(f"grease {number(seat, 2)} mm", (wall[0] + side * seat / 2, *wall[1:]))
+        yield "tongue-in", View((*cured, opened, *out), (*arrows, *draw.grease(moulds, step, seat)), names=(greased,))
+        marks = draw.pen_marks(moulds) if len(plan.steps) > 1 else ()
+        marked = (Name("pen mark", (wall[0] + side * 0.3, *wall[1:])),) if marks else ()
+        card = (Name("card", _on_pad(moulds, side)),) if pads else ()
+        yield "tongue-home", View((*cured, opened, *home), (*pads, *marks), names=(*marked, *card))
     closed = (*cured, cup, *home)
     poured, colour = Placed(step.name), layer_colour(step.index - 1)
     if step.lid:
@@ -149,18 +176,22 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
             "lid-on",
             View(
                 (*closed, Placed(step.lid, (0.0, 0.0, lift))),
-                (*pads, _downward(0.0, beside[1], step.rim + lift / 2, lift)),
+                (*pads, draw.grease_on_rim(moulds, step), draw.downward(0.0, beside[1], step.rim + lift / 2, lift)),
+                names=(Name("grease", (0.4 * lay.cup[0], 0.8 - lay.cup[1], step.rim)),),
             ),
         )
-        closed, held = (*closed, Placed(step.lid)), (*pads, *_bands(moulds, step))
+        closed, held = (*closed, Placed(step.lid)), (*pads, *draw.bands(moulds, step))
         filled = Extra(union(step.channels), colour)
-        yield "lid-held", View(closed, held)
-        yield "inject", View((*closed, poured), (*held, filled), syringe_on=step.channels[0])
-        yield "filled", View((*closed, poured), (*held, filled))
+        band = Name("rubber band", (lay.cup[0] - 2.0, 0.0, step.top + 1))
+        yield "lid-held", View(closed, held, names=(band,))
+        sprue, vent = _sprue_and_vent(moulds, step)
+        names = Name("sprue", sprue), Name("vent", vent, ring=True)
+        yield "inject", View((*closed, poured), (*held, filled), syringe_on=step.channels[0], names=names)
+        yield "filled", View((*closed, poured), (*held, filled), names=(Name("touch here", vent, ring=True),))
         held = (*held, filled)
     else:
-        held = (*pads, *_tape(moulds, step))
-        yield "hold", View(closed, held)
+        held = (*pads, *draw.tape(moulds, step))
+        yield "hold", View(closed, held, names=(Name("tape", (6.0 - lay.cup[0], -lay.plate[1], plate_top(spec))),))
         thread = cylinder(0.6, step.rim - 1.0, step.rim + 14.0)
         cell = min(lay.cells, key=lambda each: (each.y, each.x))
         reach = (
@@ -190,29 +221,82 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
             "strike",
             View(
                 (*closed, poured, *blades),
-                (*held, *strips, _sideways(1, -0.2 * lay.cup[0], 0.0, step.rim + 9.0, lay.cup[0])),
+                (*held, *strips, draw.sideways(1, -0.2 * lay.cup[0], 0.0, step.rim + 9.0, lay.cup[0])),
             ),
         )
-        yield "filled", View((*closed, poured), held)
+        yield "filled", View((*closed, poured), held, names=_touched(moulds, step))
     if tongues:
         out = tuple(Placed(t.name, (t.removal[0] * lay.cup[0], 0.0, 0.0)) for t in tongues if t.removal is not None)
         arrows = tuple(
-            _sideways(side, side * (lay.cup[0] + 2.0), cell.y, (exits.high if exits else 0.0) + 3.0, lay.cup[0] * 0.7)
+            draw.sideways(
+                side, side * (lay.cup[0] + 2.0), cell.y, (exits.high if exits else 0.0) + 3.0, lay.cup[0] * 0.7
+            )
             for cell in lay.cells
             for side in cell.sides
         )
         lid = (Placed(step.lid),) if step.lid else ()
-        yield "tongue-out", View((*cured, cup, *lid, poured, *out), (*held, *arrows))
+        card = (Name("card", _on_pad(moulds, _nearest_exit(moulds)[1])),) if pads else ()
+        yield "tongue-out", View((*cured, cup, *lid, poured, *out), (*held, *arrows), names=card)
     if step.lid:
         lift = step.top - step.rim + 2 * CLEAR
-        yield (
-            "lid-off",
-            View(
-                (*cured, cup, poured, Placed(step.lid, (0.0, 0.0, lift))),
-                (_upward(0.0, beside[1], step.rim + lift / 2, lift),),
-            ),
-        )
-    yield "cup-off", View((*cured, poured, raised), (_upward(*beside, up * 0.6),))
+        off = Placed(step.lid, (0.0, 0.0, lift))
+        pushed = tuple(draw.upward(side * (lay.cup[0] + 3.0), 0.0, step.rim + lift / 2, lift) for side in (1, -1))
+        yield "lid-off", View((*cured, cup, poured, off), pushed)
+    lever = Name("screwdriver", (lay.plate[0] + 8.0, 0.0, plate_top(spec)))
+    yield "cup-off", View((*cured, poured, raised), draw.screwdrivers(moulds), names=(lever,))
+
+
+def level_on(moulds: MouldSet) -> Step:
+    """Return the first pour on whose rim a level lies flat: nothing on the base stands higher."""
+    steps, core = moulds.plan.steps, moulds.dimensions.core_height
+    return next((step for step in steps if step.rim >= core - 1e-9), steps[-1])
+
+
+def _corner(moulds: MouldSet, z: float) -> Name:
+    """Name the cut corner of a cup whose rim is at `z`."""
+    x, y = moulds.plan.layout.cup
+    return Name("cut corner", (x - MARK / 2, y - MARK / 2, z))
+
+
+def _nearest_exit(moulds: MouldSet) -> tuple[Cell, int]:
+    """Return the cell nearest the eye that a tongue leaves, and the side to which: to the right where one does."""
+    cells = sorted(moulds.plan.layout.cells, key=lambda cell: (cell.y, -max(cell.sides, default=0)))
+    return cells[0], max(cells[0].sides, default=1)
+
+
+def _on_pad(moulds: MouldSet, side: int) -> Offset:
+    """Return the middle of the nearer end of the card under the grips on a side."""
+    prop, lay = tongue_prop(moulds), moulds.plan.layout
+    if prop is None:
+        return 0.0, 0.0, 0.0
+    near = min(cell.y for cell in lay.cells if side in cell.sides) - GRIP_WIDTH / 2 - 1
+    return side * (lay.cup[0] + prop.width_mm / 2), near, plate_top(moulds.spec) + prop.thickness_mm / 3
+
+
+def _sprue_and_vent(moulds: MouldSet, step: Step) -> tuple[Offset, Offset]:
+    """Return the mouths of a cell's sprue and of its vent nearest the eye: of the second cell, clear of the syringe."""
+    count = len(step.channels) // len(moulds.plan.layout.cells)
+    first = count if len(step.channels) > count else 0
+    sprue, *vents = (_mouth(moulds, shape) for shape in step.channels[first : first + count])
+    return sprue, max(vents, key=lambda at: ABOVE[0] * at[0] + ABOVE[1] * at[1])
+
+
+def _mouth(moulds: MouldSet, channel: Shape) -> Offset:
+    """Return the middle of a channel's upper end."""
+    vertices = np.asarray(arrays(realise(channel, moulds.segments))[0], float)
+    top = vertices[:, 2].max()
+    upper = vertices[vertices[:, 2] > top - 1e-3]
+    x, y, _ = ((upper.min(axis=0) + upper.max(axis=0)) / 2).tolist()
+    return x, y, float(top)
+
+
+def _touched(moulds: MouldSet, step: Step) -> tuple[Name, ...]:
+    """Name the place in the overflow groove that shows whether a pour is cured."""
+    if not step.groove or not moulds.plan.concentric:
+        return ()
+    cell, lengths = min(moulds.plan.layout.cells, key=lambda each: (each.y, each.x)), moulds.spec.moulds
+    out = moulds.dimensions.radii[step.index - 1] + lengths.land_mm + lengths.groove_width_mm / 2
+    return (Name("touch here", (cell.x - 0.5 * out, cell.y - 0.866 * out, step.rim - lengths.groove_depth_mm)),)
 
 
 def _strikers(moulds: MouldSet, step: Step) -> tuple[tuple[Placed, ...], tuple[Extra, ...]]:
@@ -225,65 +309,6 @@ def _strikers(moulds: MouldSet, step: Step) -> tuple[tuple[Placed, ...], tuple[E
     return tuple(Placed(tool.name, (back, 0.0, lift)) for tool in plan.of_kind("blade")), ()
 
 
-def _arrow(length: float) -> Shape:
-    """Draw an arrow along +z, its middle at the origin."""
-    shaft, head = 0.55, 1.5
-    tip = min(3.6, length / 2)
-    outline = polygon((0, 0), (shaft, 0), (shaft, length - tip), (head, length - tip), (0, length))
-    return moved(Revolve(outline), 0, 0, -length / 2)
-
-
-def _upward(x: float, y: float, z: float, length: float) -> Extra:
-    return Extra(moved(_arrow(length), x, y, z), ARROW)
-
-
-def _downward(x: float, y: float, z: float, length: float) -> Extra:
-    return Extra(moved(turned(_arrow(length), "x", 2), x, y, z), ARROW)
-
-
-def _sideways(side: int, x: float, y: float, z: float, length: float) -> Extra:
-    """Draw an arrow along x to the given side, its middle at (x, y, z)."""
-    return Extra(moved(turned(_arrow(length), "y", 1 if side > 0 else 3), x, y, z), ARROW)
-
-
 def _raised(moulds: MouldSet, up: float) -> Extra:
     lay = moulds.plan.layout
-    return _upward(0.0, -lay.cup[1], up / 2, up * 0.8)
-
-
-def _tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
-    """Draw the strips of tape on the two sides without a pry slot: cup's wall, plate, plate's edge, underside."""
-    spec, lay = moulds.spec, moulds.plan.layout
-    top, bottom, thick = plate_top(spec), plate_bottom(spec), TAPE_THICKNESS
-    left = CORNER_RADIUS - lay.cup[0]  # beside the filaments, which leave in the middle
-    strips: list[Extra] = []
-    for side in (1, -1):
-        runs = [
-            (lay.cup[1], lay.cup[1] + thick, top, step.rim - BELOW_RIM),
-            (lay.cup[1], lay.plate[1] + thick, top, top + thick),
-            (lay.plate[1], lay.plate[1] + thick, bottom - thick, top + thick),
-            (lay.plate[1] - 5.0, lay.plate[1] + thick, bottom - thick, bottom),
-        ]
-        boxes = [
-            box(left, left + TAPE_WIDTH, min(side * a, side * b), max(side * a, side * b), low, high)
-            for a, b, low, high in runs
-        ]
-        strips.append(Extra(union(boxes), TAPE))
-    return tuple(strips)
-
-
-def _bands(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
-    """Draw two rubber bands round lid and base, beyond the outermost cells."""
-    spec, lay = moulds.spec, moulds.plan.layout
-    low, high, y = plate_bottom(spec), step.top, lay.plate[1]
-    bands = []
-    for side in (1, -1):
-        x0, x1 = sorted((side * (lay.cup[0] - 1.0), side * (lay.cup[0] - 3.0)))
-        runs = [
-            (-y - 1, y + 1, high, high + 1),
-            (-y - 1, -y, low - 1, high + 1),
-            (y, y + 1, low - 1, high + 1),
-            (-y - 1, y + 1, low - 1, low),
-        ]
-        bands.append(Extra(union(box(x0, x1, *run) for run in runs), BAND))
-    return tuple(bands)
+    return draw.upward(0.0, -lay.cup[1], up / 2, up * 0.8)

@@ -8,7 +8,7 @@ from unitcad.catalogue import Material, Value
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.spec import Spec
+from unitcad.spec import Spec, printer_of
 
 GRAVITY = 9.80665
 BUBBLE_MM = 0.2
@@ -32,6 +32,11 @@ HELD_BACK_ML = 0.5
 """What a syringe's tip and plunger keep of the silicone drawn in (assumed: a 5 to 10 ml syringe, a wide tip)."""
 WITHOUT_VACUUM = 0.25
 """Share of the pot life in which bubbles must rise out by themselves (assumed): after it silicone is too thick."""
+FDM_RATE = 950.0
+"""Volume of the pieces, solid, that a filament printer makes in a minute, mm3 for each mm of its layers' height: what
+PrusaSlicer's times come to for six sets, each within a third."""
+RESIN_LAYER_S = 10.0
+"""What a resin printer takes for a layer, s (assumed)."""
 MOST_ERROR_PCT = 5.0
 """What a scale may do to the ratio before a cure suffers (assumed)."""
 DATASHEET_C = 23.0
@@ -135,6 +140,14 @@ def weep_mm3(moulds: MouldSet, step: Step, material: Material) -> float:
     flow = gaps * pressure / (12 * float(material.mixed_viscosity_cps) / 1000 * length)
     seconds = 60 * at_room(float(material.pot_life_min), spec.casting.room_c)
     return len(dims.sides) * flow * seconds * 1e9
+
+
+def print_min(spec: Spec, solid_mm3: float, tallest_mm: float) -> float:
+    """Return roughly how long the pieces print, min: by volume in filament, by the tallest piece's layers in resin."""
+    layer = spec.moulds.layer_mm
+    if printer_of(spec).technology.value == "sla":
+        return tallest_mm / layer * RESIN_LAYER_S / 60
+    return solid_mm3 / (FDM_RATE * layer)
 
 
 def window_length(moulds: MouldSet, step: Step) -> float:

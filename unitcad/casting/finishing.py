@@ -13,7 +13,8 @@ from unitcad.casting.eccentricity import eccentricity
 from unitcad.casting.figures import at_room
 from unitcad.catalogue import Material
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.text import number
+from unitcad.moulds.removal import CAST
+from unitcad.text import number, spaced
 
 
 def release(moulds: MouldSet, inner: Material) -> Iterator[BenchStep]:
@@ -29,7 +30,30 @@ def release(moulds: MouldSet, inner: Material) -> Iterator[BenchStep]:
             picture_path("filament-out"),
             minutes=fig.PULL_MIN * len(moulds.plan.layout.cells),
         )
+    order = moulds.plan.steps[-1].removals
+    held = moulds.plan.standing(moulds.plan.steps[-1], "base")
+    if any(removal.piece == piece.name for removal in order for piece in held):
+        cup = spaced(moulds.plan.steps[-1].cup)
+        yield BenchStep(
+            "Base off, downwards",
+            f"Take off what held the cup down. Leave {cup} on: it can't be lifted past the silicone that lies over it. "
+            f"Lift the mould off the bench by {cup}, a screwdriver in each of the two pry slots, and lever the base "
+            "off downwards, on both sides at once and a little at a time, until it comes free of the silicone. It must "
+            f"come straight. The {moulds.makes} stays in {cup}.",
+            picture_path("peel"),
+            minutes=fig.LIFT_MIN * 2,
+        )
     film = ", and the film that the blade left along the edge," if moulds.spec.moulds.pour == "open" else ""
+    if any(removal.piece == CAST for removal in order):
+        yield BenchStep(
+            "Push out",
+            f"Loosen the edge of the {moulds.makes} all round with a blunt spatula. Push it up out of "
+            f"{spaced(moulds.plan.steps[-1].cup)} from below with the thumbs, first at the edge, then unit by unit. "
+            f"Trim the flash{film} with small scissors.",
+            picture_path("peel"),
+            minutes=fig.PEEL_MIN * len(moulds.plan.layout.cells),
+        )
+        return
     yield BenchStep(
         "Peel off",
         f"Loosen the unit's edge all round with a blunt spatula, then peel it off the {holds(moulds)} straight up. "
@@ -46,7 +70,7 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     texts = assembly(moulds)
     for i, text in enumerate(texts):
         minutes = fig.LAY_IN_MIN * len(moulds.plan.layout.cells)
-        yield BenchStep("Motor in", text, picture_path("motor-in") if i == 0 else "", minutes=minutes)
+        yield BenchStep("Motor in", text, picture_path("motor-in" if i == 0 else "motor-home"), minutes=minutes)
     room = moulds.spec.casting.room_c
     cures = {silicone.name: at_room(float(silicone.cure_h), room) for silicone in smeared(texts, silicones)}
     hours = ", ".join(f"{name} {number(hour, 2)} h" for name, hour in cures.items())
@@ -55,6 +79,7 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
         f"A smear of silicone is mixed like any batch ({number(moulds.spec.casting.minimum_mix_g, 3)} g at least) and "
         f"spread as thin as butter. It needs its whole cure ({hours}): lay the unit down with the cavity's mouth up, "
         "level, and don't run the motor before. Without a smear there is nothing to wait for.",
+        picture_path("motor-home"),
         kind="cure",
         wait_min=60 * max(cures.values()),
     )
@@ -107,12 +132,12 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
             f"Less means air{low}."
         )
     else:
-        yield f"Weigh one unit, trimmed, without motor and circuit: {weights} g. Less means air{low}."
+        yield f"Weigh one {moulds.makes}, trimmed, without motor and circuit: {weights} g. Less means air{low}."
 
 
 def assembly(moulds: MouldSet) -> tuple[str, ...]:
     """Describe how motor and circuit go into the body, or into the mould: in the design's words, where it has any."""
-    return tuple(moulds.design.assembly(moulds.spec, moulds.plan.dimensions)) or tuple(_by_opening(moulds))
+    return moulds.assembly or tuple(_by_opening(moulds))
 
 
 def _by_opening(moulds: MouldSet) -> Iterator[str]:

@@ -36,6 +36,7 @@ def pour_steps(
     """Describe one pour, from an empty mould to a cured layer on the core."""
     plan, first, tongues = moulds.plan, step.index == 1, moulds.plan.standing(step, "tongue")
     cells, each_tongue = len(plan.layout.cells), "the tongue" if len(tongues) == 1 else "each tongue"
+    groove = _groove(moulds)
 
     def picture(name: str) -> str:
         path = f"pour{step.index}-{name}"
@@ -56,7 +57,7 @@ def pour_steps(
     wet = any("the mix" in text for text in laid)
     for i, text in enumerate(laid):
         if "the mix" in text and not any("the mix" in each for each in laid[:i]):
-            yield from _mixed(moulds, silicone, mix, verdict)
+            yield from mixed(moulds, silicone, mix, verdict)
         yield BenchStep("Lay in", text, picture("laid-in") if i == 0 else "", minutes=fig.LAY_IN_MIN * cells)
     if any(body.kind in ("circuit", "wire") for body in step.inserts):
         yield BenchStep(
@@ -92,8 +93,9 @@ def pour_steps(
     if step.lid:
         yield BenchStep(
             f"Lid {step.index} on",
-            f"Put lid {step.index} on, cut corner over cut corner, with a thin line of petroleum jelly on the rim "
-            f"{'outside the groove' if step.groove else 'near its outer edge'}.",
+            f"Draw a thin line of petroleum jelly all round the rim of cup {step.index}, near its outer edge"
+            f"{f': outside {groove}, since what creeps under the lid runs in there' if step.groove else ''}. Put lid "
+            f"{step.index} on, cut corner over cut corner, and press it down.",
             picture("lid-on"),
             minutes=fig.LIFT_MIN,
         )
@@ -115,7 +117,7 @@ def pour_steps(
             minutes=fig.HOLD_MIN,
         )
     if not wet:
-        yield from _mixed(moulds, silicone, mix, verdict)
+        yield from mixed(moulds, silicone, mix, verdict)
     rests = BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=fig.rest_min(moulds.spec, step.rim, silicone))
     if step.lid:
         yield _draw_up(mix)
@@ -125,7 +127,7 @@ def pour_steps(
     else:
         if not moulds.spec.casting.vacuum and not rests.wait_min:
             yield BenchStep("Brush a first coat", verdict, minutes=fig.BRUSH_MIN * cells)
-        taken = "into the groove" if step.groove else "onto a scrap, since this cup has no groove"
+        taken = f"into {groove}" if step.groove else "onto a scrap, since this cup has no groove"
         yield BenchStep(
             "Pour",
             f"Pour in a thin thread at one place until {'the' if cells == 1 else 'every'} cavity stands over its rim. "
@@ -163,7 +165,12 @@ def pour_steps(
     yield from _cure_and_open(moulds, step, silicone, picture)
 
 
-def _mixed(moulds: MouldSet, silicone: Material, mix: Mix, verdict: str) -> Iterator[BenchStep]:
+def _groove(moulds: MouldSet) -> str:
+    """Return what to call the overflow grooves: each cavity has one, which stops beside a window."""
+    return "the groove" if len(moulds.plan.layout.cells) == 1 else "the grooves round the cavities"
+
+
+def mixed(moulds: MouldSet, silicone: Material, mix: Mix, verdict: str) -> Iterator[BenchStep]:
     """Describe the way from the bottles to a mix without air."""
     cells = len(moulds.plan.layout.cells)
     yield BenchStep(
@@ -253,7 +260,11 @@ def _cure_and_open(
     tongues = moulds.plan.standing(step, "tongue")
     cure = at_room(float(silicone.cure_h), moulds.spec.casting.room_c)
     touched = (
-        "the bead on a vent" if step.lid else "the silicone in the groove" if step.groove else "what was struck off"
+        "the bead on a vent"
+        if step.lid
+        else f"the silicone in {_groove(moulds)}"
+        if step.groove
+        else "what was struck off"
     )
     yield BenchStep(
         "Cure",
@@ -275,16 +286,20 @@ def _cure_and_open(
     if step.lid:
         yield BenchStep(
             "Lid off",
-            "Take off what held the lid down. Lift the lid straight up: sprue and vents tear off at the layer. Trim "
-            "them flush with a knife.",
+            f"Take off what held the lid down. The lid stands out over cup {step.index} all round: push its edge up "
+            "from below, with the thumbs or the blunt spatula on two opposite sides, a little at a time, the cup held "
+            "down. Then lift it straight up: sprue and vents tear off at the layer. Trim them flush with a knife.",
             picture("lid-off"),
             minutes=fig.LIFT_MIN,
         )
+    if all(removal.piece != step.cup for removal in step.removals):
+        return
     free = "" if step.lid else "Take off what held the cup down. "
+    seat = "base" if moulds.plan.pins else "plinth"
     yield BenchStep(
         f"Cup {step.index} off",
-        f"{free}Lift cup {step.index} straight up, a screwdriver in each pry slot, both at once and a little at a "
-        "time. "
+        f"{free}Lay a screwdriver in each of the two pry slots, its tip under the cup. Press both handles down at "
+        f"once, a little at a time, until the cup comes free of the {seat}. Lift cup {step.index} straight up. "
         f"Layer {step.index} stays on the {holds(moulds)}.",
         picture("cup-off"),
         minutes=fig.LIFT_MIN,
@@ -297,6 +312,8 @@ def _put_on(moulds: MouldSet, step: Step) -> str:
         return (
             f"Put cup {step.index} on and press it down evenly until it sits. Its ribs centre it: push it to no side."
         )
+    if moulds.plan.pins:
+        return f"Put cup {step.index} on over the pins, cut corner over cut corner, and push it towards that corner."
     pushed = ", so that the play lies on one side." if step.index == 1 else ", as the cup before."
     if step.index > 1 and moulds.plan.concentric:
         pushed = f", as the cup before: Layer {step.index} lies between two cup positions."

@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from unitcad.moulds.base import plate_bottom, plate_top
+from unitcad.designs.limits import filament_groove
+from unitcad.moulds.base import plate_bottom, plate_top, pry_floor
 from unitcad.moulds.cup import groove_depth_of, window_section
+from unitcad.moulds.lid import skirt_end
 from unitcad.moulds.mould_set import MouldSet
 
 NEAR = 0.02
@@ -79,7 +81,13 @@ def _edges(moulds: MouldSet) -> list[tuple[str, str, float]]:
     """Return piece, edge and height above the bed, mm. Cups lie upside down: theirs count from the rim."""
     spec, dims = moulds.spec, moulds.plan.dimensions
     bottom = plate_bottom(spec)
-    edges = [("base", "plate", plate_top(spec) - bottom), ("base", "seat", -bottom)]
+    edges = [
+        ("base", "plate", plate_top(spec) - bottom),
+        ("base", "seat", -bottom),
+        ("base", "pry slots' floor", pry_floor(spec) - bottom),
+    ]
+    if moulds.plan.of_kind("stub"):
+        edges.append(("base", "filament groove's roof", filament_groove(spec)))
     if dims.exit:
         edges += [("base", "ledge", dims.exit.low - bottom), ("tongue", "thickness", dims.exit.height)]
     for step, rim in zip(moulds.plan.steps, dims.heights, strict=True):
@@ -89,4 +97,7 @@ def _edges(moulds: MouldSet) -> list[tuple[str, str, float]]:
             _, low, high = window_section(spec, dims.exit, rim)
             edges += [(cup, "window's lower edge", rim - low)]
             edges += [(cup, "window's upper edge", rim - high)] if high < rim else []
+        if step.lid and moulds.plan.concentric:
+            edges.append((step.lid, "skirt's edge", step.top - skirt_end(spec, dims, step.index - 1)))
+            edges.append((step.lid, "underside", step.top - rim))
     return edges

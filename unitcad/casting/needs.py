@@ -25,7 +25,7 @@ NEEDS = (
     Need(r"\bknife", "sharp knife", 1, "piece", "tool", "for flash, sprues and filament"),
     Need(r"\bscissors", "small scissors", 1, "piece", "tool", "to trim"),
     Need(r"\bpin\b", "pin", 1, "piece", "tool", "for bubbles"),
-    Need(r"\bspatula", "blunt spatula", 1, "piece", "tool", "loosens the unit's edge"),
+    Need(r"\bspatula", "blunt spatula", 1, "piece", "tool", "loosens what sticks, from its edge"),
     Need(r"\blevel, or a small spirit level", "level", 1, "piece", "tool", "a phone shows it too"),
     Need(r"\bpaper\b", "paper", 1, "sheet", "bought", "under corners, and to feel the slit at the seat"),
     Need(r"\bvice\b", "vice and two boards", 1, "set", "tool", "where the hand can't press a cup on"),

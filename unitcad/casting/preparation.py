@@ -7,11 +7,13 @@ from collections.abc import Iterator, Sequence
 
 from unitcad.casting import figures as fig
 from unitcad.casting.bench_step import BenchStep
-from unitcad.casting.bench_views import View, picture_path
+from unitcad.casting.bench_views import View, level_on, picture_path
 from unitcad.casting.figures import at_room, window_length
+from unitcad.casting.time_line import duration
 from unitcad.catalogue import Material
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.dents import DENT, TILT_DEG
+from unitcad.moulds.layout import BLADE_HEIGHT
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.ribs import ribs
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
@@ -26,14 +28,22 @@ def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
     """Say which file to print and how, a sentence or two each. `solid_mm3`: volume of all printed pieces, solid."""
     spec, plan = moulds.spec, moulds.plan
     printed = [tool for tool in plan.tools if tool.made == "printed"]
-    turned = listed(dict.fromkeys(f"{tool.kind}s" if tool.step else tool.kind for tool in printed if tool.upside_down))
+    mixed = {tool.kind for tool in printed if not tool.upside_down}
+    names = (
+        spaced(t.name) if t.kind in mixed else f"{t.kind}s" if t.step else t.kind for t in printed if t.upside_down
+    )
+    turned = listed(dict.fromkeys(names))
     count = "one piece" if len(printed) == 1 else f"{len(printed)} pieces"
     lines = [
         f"Plate: moulds/moulds.3mf ({count}; moulds/ has them singly as STL too). They lie in it as they are printed: "
         f"{turned} upside down, the rest as drawn. Turn none of them.",
         f"Printer {spec.moulds.printer}, layers of {number(spec.moulds.layer_mm, 3)} mm, no supports.",
     ]
+    standing = spec.moulds.plinth_height_mm + spec.moulds.plate_mm + plan.dimensions.core_height
+    time = fig.print_min(spec, solid_mm3, max(standing, BLADE_HEIGHT if plan.of_kind("blade") else 0.0))
+    takes = f"Takes about {duration(5 * max(round(time / 5), 1))}"
     if in_resin(moulds):
+        lines.append(f"{takes} ({number(fig.RESIN_LAYER_S, 2)} s a layer, assumed).")
         lines.append(
             f"At most {number(solid_mm3 / 1000, 2)} ml of resin (computed: the pieces' volume). Flat on the plate, no "
             "tilt: seats and rims are then whole layers. Compensate the first layers' growth (bottom tolerance): what "
@@ -46,7 +56,11 @@ def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
             "lie on "
             "their rims: a first layer that is squeezed out narrows the bore where the layer's edge is."
         )
-        lines.append("Time and filament, piece by piece: slicer.json, where PrusaSlicer is installed.")
+        lines.append(
+            f"{takes} (by volume and layer height, within a third of PrusaSlicer's times for other sets). Time and "
+            f"filament, piece by piece: run unitcad build {moulds.source} --slice -o .. in this folder, on a machine "
+            "with PrusaSlicer; it writes slicer.json."
+        )
     lines.append(
         f"First time on this printer: print the fit coupon (unitcad coupon {spec.moulds.printer}): a print of "
         "its own, whose time the slicer says. It shows whether plinth, tongue and filament fit, and gives the line for "
@@ -60,15 +74,60 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
     plan, lengths = moulds.plan, moulds.spec.moulds
     cups, cells = len(plan.steps), len(plan.layout.cells)
     marked = listed(["base", "cups", *(["lids"] if plan.of_kind("lid") else [])])
+    own = [f"C{step.index:X} is {spaced(step.cup)}" for step in plan.steps]
+    own += [f"L{step.index:X} is {spaced(step.lid)}" for step in plan.steps if step.lid]
     yield BenchStep(
         "Sort the pieces",
         f"Print the pieces as they lie in their files, without supports. {marked.capitalize()} are engraved "
-        f"{plan.label}; "
-        "step1-cup.stl is cup 1, engraved C1, and so on.",
+        f"{plan.label}: the base with a B before it, the others with {plan.label[:2]} and {plan.label[2:]} in two "
+        f"corners and their own number in the third: {listed(own)}.",
         picture_path("pieces"),
         minutes=fig.SORT_MIN,
     )
     yield from _cut_tongues(moulds)
+    yield from cleaning(moulds, silicones)
+    lids = " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
+    on = "Put each cup on the plinth once, dry: its cut corner lets it on one way only. It must sit down"
+    if standing := ribs(moulds.spec, plan.layout):
+        on = (
+            "Press each cup onto the plinth once, dry: its cut corner lets it on one way only. Press evenly at all "
+            f"corners, in a vice between two boards where the hand is too weak: its {len(standing)} ribs are crushed "
+            "and centre it from then on. It must sit down"
+        )
+    if plan.pins:
+        fits = (
+            "Put each cup over the pins once, dry: one pin stands off the square of the others, which lets the cup on "
+            "in one way only. It must lie flat on the base until no paper goes in between them, on any side. A cup "
+            "that rocks: cut off the bulge of the first layer round pins and holes, scrape both faces clean, and try "
+            "again."
+        )
+        yield BenchStep("Try every cup, dry", fits, picture_path("dry-fit"), minutes=fig.DRY_FIT_MIN * cups)
+    else:
+        yield BenchStep(
+            "Try every cup, dry",
+            f"{on} until seat and plinth touch; a slit of {number(lengths.seat_relief_mm, 3)} mm is then left between "
+            "cup and plate, all "
+            "round: the same strip of paper, folded to that thickness, goes in on all four sides. A cup that rocks or "
+            f"stands higher on one side: scrape plinth and seat clean, and try again.{lids}",
+            picture_path("dry-fit"),
+            minutes=fig.DRY_FIT_MIN * cups,
+        )
+    if plan.of_kind("stub"):
+        each = "the" if len(plan.layout.cells) == 1 else "each"
+        yield BenchStep(
+            "Filament in",
+            f"Push {each} straight piece of filament up through the core from below until its end is flush "
+            "with the core's top, and bend what stands out below by a right angle into the groove under the plate: it "
+            "lies on the bench and can't sink. Trim the upper end flush with a knife, so that a fingernail drawn "
+            "across does not catch: what it stands low or proud is a knob or a dent in the cavity.",
+            picture_path("filament"),
+            minutes=fig.FILAMENT_MIN * cells,
+        )
+    yield BenchStep("Level the bench", level_text(moulds), picture_path("level"), minutes=fig.LEVEL_MIN)
+
+
+def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
+    """Describe how printed pieces get clean; `silicones` are those that a resin may keep from curing."""
     if in_resin(moulds):
         yield BenchStep(
             "Wash",
@@ -104,38 +163,9 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
             "Brush off strings and loose bits. Run a fingernail round every bore and rim: cut off what catches.",
             minutes=fig.CLEAN_MIN,
         )
-    lids = " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
-    on = "Put each cup on the plinth once, dry: its cut corner lets it on one way only. It must sit down"
-    if standing := ribs(moulds.spec, plan.layout):
-        on = (
-            "Press each cup onto the plinth once, dry: its cut corner lets it on one way only. Press evenly at all "
-            f"corners, in a vice between two boards where the hand is too weak: its {len(standing)} ribs are crushed "
-            "and centre it from then on. It must sit down"
-        )
-    yield BenchStep(
-        "Try every cup, dry",
-        f"{on} until seat and plinth touch; a slit of {number(lengths.seat_relief_mm, 3)} mm is then left between "
-        "cup and plate, all "
-        "round: the same strip of paper, folded to that thickness, goes in on all four sides. A cup that rocks or "
-        f"stands higher on one side: scrape plinth and seat clean, and try again.{lids}",
-        picture_path("dry-fit"),
-        minutes=fig.DRY_FIT_MIN * cups,
-    )
-    if plan.of_kind("stub"):
-        each = "the" if len(plan.layout.cells) == 1 else "each"
-        yield BenchStep(
-            "Filament in",
-            f"Push {each} straight piece of filament up through the core from below until its end is flush "
-            "with the core's top, and bend what stands out below by a right angle into the groove under the plate: it "
-            "lies on the bench and can't sink. Trim the upper end flush with a knife, so that a fingernail drawn "
-            "across does not catch: what it stands low or proud is a knob or a dent in the cavity.",
-            picture_path("filament"),
-            minutes=fig.FILAMENT_MIN * cells,
-        )
-    yield BenchStep("Level the bench", _level(moulds), minutes=fig.LEVEL_MIN)
 
 
-def _level(moulds: MouldSet) -> str:
+def level_text(moulds: MouldSet) -> str:
     """Say how level the mould must lie, and how to see it."""
     tilt = number(fall_deg(moulds), 2)
     if moulds.spec.moulds.pour == "injected":
@@ -147,10 +177,11 @@ def _level(moulds: MouldSet) -> str:
             "of a "
             f"cavity {across} mm wide (computed)"
         )
+    cup = spaced(level_on(moulds).cup)
     return (
-        f"{how}. Lay a phone with its level, or a small spirit level, on the base's plate, along it and across, and "
-        "put "
-        "paper under a corner until it shows less. Leave the mould there: it is poured and cured on this spot."
+        f"{how}. Put the base where it will stay and {cup} on it, dry. Lay a phone with its level, or a small spirit "
+        f"level, on the rim of {cup}, along the base and across, and put paper under a corner of the base until it "
+        f"shows less. Lift {cup} off again. The base stays there: it is poured and cured on this spot."
     )
 
 

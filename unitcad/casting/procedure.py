@@ -57,9 +57,11 @@ class Procedure:
     `earliest_finish_min`: from the first step, the pieces just printed, until the units are out of the mould, of which
     `bench_min` with a person at the bench; `time_line` goes on until the motor is in. `printing` says what to print.
 
+    `makes`: what comes out; `last`: what `assembly` does.
     `bonds` are the tools' faces that must never get release agent.
     `tunnels`: the cups whose windows resin may cure shut.
-    `eccentricity` is that of the cups on the core, `without_ribs` what it would be without what centres them.
+    `eccentricity` is that of the cups on the core, `without_ribs` what it would be without what centres them; None
+    where there are no cups.
     `walls` is () where the tooling is not concentric: nothing tells which of its walls a cup's play changes.
     """
 
@@ -80,10 +82,12 @@ class Procedure:
     release: tuple[BenchStep, ...]
     assembly: tuple[BenchStep, ...]
     measure: tuple[str, ...]
-    eccentricity: Eccentricity
-    without_ribs: Eccentricity
+    eccentricity: Eccentricity | None
+    without_ribs: Eccentricity | None
     walls: tuple[Figure, ...]
     bill: tuple[Item, ...]
+    makes: str = "unit"
+    last: str = "Motor in"
 
 
 def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
@@ -98,14 +102,15 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
     pours, mixes, grams = [], [], []
     for step, volume in zip(plan.steps, layer_volumes_mm3, strict=True):
         silicone = known[step.material]
-        mix = fig.mix(spec, silicone, len(plan.layout.cells) * volume + _channels_mm3(step))
-        verdict = _bubbles(spec, step, silicone, mix, len(plan.layout.cells))
+        poured = volume * len(step.layer) / moulds.pieces(step.name)
+        mix = fig.mix(spec, silicone, poured + _channels_mm3(step))
+        verdict = bubbles(spec, step, silicone, mix, len(plan.layout.cells))
         pours.append(
             Pour(
                 step.index,
                 step.name,
                 silicone.name,
-                _figures(moulds, step, silicone, mix, volume),
+                pour_figures(moulds, step, silicone, mix, volume),
                 verdict,
                 agent_faces(moulds, step),
                 fig.DEGASSING_MIN if spec.casting.vacuum else 0.0,
@@ -149,11 +154,12 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         eccentricity=centred,
         without_ribs=free,
         walls=tuple(_walls(spec, free, centred)) if plan.concentric else (),
+        makes=moulds.makes,
         bill=bill(moulds, mixes, needs([*prepared, *(step for pour in pours for step in pour.steps), *out, *motor])),
     )
 
 
-def _figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, volume: float) -> tuple[Figure, ...]:
+def pour_figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, volume: float) -> tuple[Figure, ...]:
     casting, room = moulds.spec.casting, moulds.spec.casting.room_c
     by_temperature = "assumed: half the time for every 10 K more; at 23 degC "
     digit = f"half of {number(casting.scale_resolution_g, 3)} g"
@@ -227,7 +233,7 @@ def _channels_mm3(step: Step) -> float:
     return sum(map(exact_volume, step.channels))
 
 
-def _bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix, cells: int) -> str:
+def bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix, cells: int) -> str:
     """Say how the bubbles leave: in the vacuum, or by themselves, for which a quarter of the pot life is allowed."""
     pot = fig.at_room(float(silicone.pot_life_min), spec.casting.room_c)
     work = fig.MIXING_MIN + fig.pouring_min(cells)

@@ -58,7 +58,7 @@ def to_markdown(procedure: Procedure) -> str:
         lines += [f"## Pour {pour.index}: {spaced(pour.layer)}, {markdown(pour.material)}", "", *steps(pour.steps), ""]
     lines += ["## Out of the mould", "", *steps(procedure.release), ""]
     if procedure.assembly:
-        lines += ["## Motor in", "", *steps(procedure.assembly), ""]
+        lines += [f"## {procedure.last}", "", *steps(procedure.assembly), ""]
     lines += ["## Measure on the first part", "", *(f"- {markdown(text)}" for text in procedure.measure), ""]
     saves = "bench.html (unitcad report) takes down what was weighed and measured, and saves it as a cast record."
     lines += [saves, ""]
@@ -68,10 +68,12 @@ def to_markdown(procedure: Procedure) -> str:
 def _times(procedure: Procedure) -> Iterator[str]:
     """Yield the earliest finish in a sentence, and the time line."""
     total, bench = duration(procedure.earliest_finish_min), duration(procedure.bench_min)
-    yield f"**{total}** from the printed pieces to the unit out of the mould, of which {bench} at the bench."
+    out = f"{procedure.makes} out of the mould"
+    yield f"**{total}** from the printed pieces to the {out}, of which {bench} at the bench."
     if procedure.assembly:
         more = procedure.time_line[-1].end_min - procedure.earliest_finish_min
-        yield f"Motor in: {duration(more)} more at most, nearly all of it a smear's cure. Printing comes before."
+        smear = ", nearly all of it a smear's cure" if any(step.wait_min for step in procedure.assembly) else ""
+        yield f"{procedure.last}: {duration(more)} more at most{smear}. Printing comes before."
     yield ""
     rows = [
         (phase.name, duration(phase.start_min), duration(phase.bench_min), duration(phase.wait_min))

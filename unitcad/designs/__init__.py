@@ -19,6 +19,7 @@ from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import is_custom
 
 __all__ = [
+    "CIRCUIT_COLOUR",
     "Design",
     "Dimensions",
     "Tooling",
@@ -40,7 +41,7 @@ _LAYER_COLOURS = (
     (0.55, 0.85, 0.85),
     (0.95, 0.60, 0.55),
 )
-_MOTOR_COLOUR, _CIRCUIT_COLOUR = (0.70, 0.70, 0.78), (0.93, 0.56, 0.15)
+_MOTOR_COLOUR, CIRCUIT_COLOUR = (0.70, 0.70, 0.78), (0.93, 0.56, 0.15)
 
 
 @cache
@@ -120,10 +121,10 @@ def _inside(spec: Spec, dims: Dimensions) -> tuple[Body, ...]:
     bodies = [Body("motor", "unit", "motor", parts.motor(dims), _MOTOR_COLOUR, made="bought")]
     if spec.fpcb and dims.pad:
         drawn = parts.circuit(spec.fpcb, dims.pad, dims)
-        bodies.append(Body("fpcb", "unit", "circuit", drawn, _CIRCUIT_COLOUR, made="bought"))
+        bodies.append(Body("fpcb", "unit", "circuit", drawn, CIRCUIT_COLOUR, made="bought"))
     if spec.wires and dims.exit:
         bodies += [
-            Body(f"wire{i + 1}", "unit", "wire", shape, _CIRCUIT_COLOUR, made="bought")
+            Body(f"wire{i + 1}", "unit", "wire", shape, CIRCUIT_COLOUR, made="bought")
             for i, shape in enumerate(parts.wires(spec.wires, dims.exit.wires_y, dims))
         ]
     return tuple(bodies)

@@ -162,8 +162,9 @@ def check_filament(spec: Spec, dims: Dimensions) -> None:
 
 
 def filament_groove(spec: Spec) -> float:
-    """Return depth and width of the groove that takes the bent filament under the plate, mm."""
-    return spec.moulds.filament_mm + 0.5
+    """Return depth and width of the groove that takes the bent filament under the plate, mm: a whole layer ends it."""
+    layer = spec.moulds.layer_mm
+    return math.ceil((spec.moulds.filament_mm + 0.5) / layer - EPS) * layer
 
 
 def at_least(field: str, value: float, limit: float, why: str) -> None:

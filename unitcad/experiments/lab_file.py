@@ -22,7 +22,7 @@ from typing import Annotated, Any
 from msgspec import Meta, Struct, field
 
 from unitcad.attenuation.inputs import EstimateInput, Quantity
-from unitcad.catalogue import TissueEntry, tissue
+from unitcad.catalogue import MaterialEntry, TissueEntry, tissue
 from unitcad.catalogue.entries import Frequency
 from unitcad.errors import Refusal, WrongArgument, unknown_name
 from unitcad.estimating import estimate_input
@@ -68,6 +68,7 @@ class LabFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     seed: Annotated[int, Meta(ge=0, le=2**32 - 1)] = 1
     held_to_levels: Annotated[bool, Meta(description="draws weigh by the nine measured levels")] = True
     tissue: dict[str, dict[str, TissueEntry]] = {}
+    materials: dict[str, MaterialEntry] = {}
     measured: list[MeasuredTable] = []
 
 
@@ -103,10 +104,10 @@ def lab_of_data(data: Mapping[str, Any], folder: Path, name: str) -> Lab:
     """Return the lab of a file's data; `folder` is where its relative paths start. Raises as `load_lab`."""
     settings = convert(data, LabFile)
     _check_twice(settings)
-    bodies = {f"tissue.{name}": layers for name, layers in data.get("tissue", {}).items()}
+    own = {f"{key}.{name}": entry for key in ("tissue", "materials") for name, entry in data.get(key, {}).items()}
     specs = {
         unit: spec_with(
-            f"units.{unit}", table.get("base"), {k: v for k, v in table.items() if k != "base"}, folder, bodies
+            f"units.{unit}", table.get("base"), {k: v for k, v in table.items() if k != "base"}, folder, own
         )
         for unit, table in settings.units.items()
     }

@@ -10,10 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from unitcad.export import raster
+from unitcad.export import picture_letters, raster
+from unitcad.export.name_places import nearest_free
+from unitcad.export.picture_letters import Name
 from unitcad.export.raster import Camera
 
 CREASE_DEG = 25.0
@@ -23,6 +26,11 @@ SHARPER = 2
 _INK = 0.28
 """What a line leaves of the colour under it."""
 _TIE_MM = 1e-4
+MARGIN_PX = 6
+"""White above and below what a picture shows, pixels."""
+LETTER_PX = 2.7
+_APART = 12
+"""A fourth of a small letter's height, in pixels of the picture."""
 _EFFORT = 6
 """Of the compression: half the time of the greatest, files a few per cent larger."""
 
@@ -75,8 +83,13 @@ def _patches(faces: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return connected_components(links, directed=False)[1] + 1
 
 
-def together(bodies: Sequence[DrawnBody], of: Camera) -> bytes:
-    """Return the picture of bodies drawn for one view as a PNG; of two in one place the later one is seen."""
+def together(bodies: Sequence[DrawnBody], of: Camera, names: Sequence[Name] = ()) -> bytes:
+    """Return the picture of bodies drawn for one view as a PNG, without the empty rows above and below.
+
+    Of two bodies in one place the later one is seen.
+
+    Names stand clear of the bodies and of each other where there is room, each with a line to what it names.
+    """
     width, height = of.size
     depth = np.full(width * height, -np.inf, np.float32)
     colour = np.full(width * height, 0xFFFFFFFF, np.uint32)
@@ -95,7 +108,51 @@ def together(bodies: Sequence[DrawnBody], of: Camera) -> bytes:
         line[other] |= differs
     pixels = colour.view(np.uint8).reshape(height, width, 4)[:, :, :3]
     pixels[line] = (pixels[line] * _INK).astype(np.uint8)
-    return raster.png(_shrunk(pixels), _EFFORT)
+    _write(pixels, np.isfinite(depth).reshape(height, width), names, of)
+    rows = np.flatnonzero((pixels < 255).any(axis=(1, 2)))
+    top, bottom = (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (0, height)
+    top, bottom = max(top // SHARPER - MARGIN_PX, 0), min(-(-bottom // SHARPER) + MARGIN_PX, height // SHARPER)
+    return raster.png(_shrunk(pixels[SHARPER * top : SHARPER * bottom]), _EFFORT)
+
+
+def _write(pixels: np.ndarray, drawn: np.ndarray, names: Sequence[Name], of: Camera) -> None:
+    """Write names into a picture (height, width, 3), black on a white border, beside what is `drawn`."""
+    taken = drawn.copy()
+    for name in names:
+        ink = picture_letters.written(name.text, SHARPER * LETTER_PX)
+        x, y, _ = of.project(np.array(name.at))[0]
+        rows, columns = ink.shape
+        left, top = nearest_free(taken, (x, y), (columns, rows))
+        end = min(max(x, left), left + columns), min(max(y, top), top + rows)
+        steps = np.linspace(0, 1, max(int(np.hypot(end[0] - x, end[1] - y)), 2))[:, None]
+        line = np.round(np.array([y, x]) + steps * (np.array(end[::-1]) - (y, x))).astype(int)
+        line = np.clip(line, 0, np.array(drawn.shape) - 1)
+        # All that changes lies round line, dot and letters: the rest of the picture is left alone.
+        dot, reach = (7.0 if name.ring else 3.0) * SHARPER, 3 * SHARPER + 1
+        low = np.floor(np.minimum(line.min(axis=0), np.minimum((top, left), (y - dot, x - dot)))).astype(int) - reach
+        high = np.ceil(np.maximum(line.max(axis=0), np.maximum((top + rows, left + columns), (y + dot, x + dot))))
+        (up, side), (down, far) = np.maximum(low, 0), np.minimum(high.astype(int) + reach, drawn.shape)
+        window = np.s_[up:down, side:far]
+        mask = np.zeros((down - up, far - side), bool)
+        mask[tuple((line - (up, side)).T)] = True
+        mask = _grown(mask, 1)
+        mask[_disc(window, (x, y), dot)] = True
+        if name.ring:
+            mask[_disc(window, (x, y), dot - 1.2 * SHARPER)] = False
+        mask[top - up : top - up + rows, left - side : left - side + columns] |= ink
+        pixels[window][_grown(mask, SHARPER)] = 255
+        pixels[window][mask] = 0
+        taken[window] |= _grown(mask, 3 * SHARPER)
+        taken[max(top - _APART, 0) : top + rows + _APART, max(left - _APART, 0) : left + columns + _APART] = True
+
+
+def _grown(mask: np.ndarray, pixels: int) -> np.ndarray:
+    return np.asarray(binary_dilation(mask, iterations=pixels), bool)
+
+
+def _disc(window: tuple[slice, slice], middle: tuple[float, float], radius: float) -> np.ndarray:
+    row, column = np.ogrid[window]
+    return (column + 0.5 - middle[0]) ** 2 + (row + 0.5 - middle[1]) ** 2 <= radius**2
 
 
 def _shrunk(picture: np.ndarray) -> np.ndarray:

@@ -110,6 +110,28 @@ def _free(drawn: np.ndarray, taken: list[Box], box: Box) -> bool:
     return not any(overlap(wide, other) for other in taken) and not drawn[y0:y1, x0:x1].any()
 
 
+def nearest_free(drawn: np.ndarray, at: tuple[float, float], size: tuple[int, int]) -> tuple[int, int]:
+    """Return the left column and top row of the box of `size` (width, height) nearest to a point (x, y).
+
+    `drawn` (height, width), row 0 the highest: the pixels that the box, with a gap round it, keeps clear of; where no
+    place is clear it covers as few of them as it can.
+    """
+    gap, edge = round(GAP_PX), round(EDGE_PX)
+    height, width = drawn.shape
+    total = np.zeros((height + 1, width + 1), np.int32)  # enough for every picture's pixels
+    np.cumsum(np.cumsum(drawn, axis=1, dtype=np.int32), axis=0, out=total[1:, 1:])
+    left = np.arange(edge, max(width - edge - size[0], edge) + 1, 2)
+    top = np.arange(edge, max(height - edge - size[1], edge) + 1, 2)
+    x0, x1 = left - gap, np.minimum(left + size[0] + gap, width)
+    y0, y1 = top - gap, np.minimum(top + size[1] + gap, height)
+    covered = total[np.ix_(y1, x1)] - total[np.ix_(y0, x1)] - total[np.ix_(y1, x0)] + total[np.ix_(y0, x0)]
+    across = np.maximum(np.maximum(left - at[0], at[0] - left - size[0]), 0.0)
+    down = np.maximum(np.maximum(top - at[1], at[1] - top - size[1]), 0.0)
+    cost = np.hypot(across[None, :], down[:, None]) + 1e6 * covered
+    row, column = np.unravel_index(int(cost.argmin()), cost.shape)
+    return int(left[column]), int(top[row])
+
+
 def overlap(one: Box, other: Box) -> bool:
     """Return whether two boxes share an area."""
     return one[0] < other[1] and other[0] < one[1] and one[2] < other[3] and other[2] < one[3]

@@ -75,7 +75,8 @@ def content(bodies: Sequence[Body], name: str) -> bytes:
         if not done or writer.WriteStream(stream) != IFSelect_ReturnStatus.IFSelect_RetDone:
             raise UnitcadError(f"OCCT could not write {name} as STEP")
     text = _settled(_with_header(stream.getvalue().decode("ascii"), name))
-    return _with_styles(text, [body.colour for body in bodies]).encode("ascii")
+    counts = [len(occt.solids_in(solid)) for solid in solids]
+    return _with_styles(text, [body.colour for body in bodies], counts).encode("ascii")
 
 
 def _document(bodies: Sequence[Body], solids: Sequence[TopoDS_Shape], name: str) -> TDocStd_Document:
@@ -125,15 +126,24 @@ def _settled(text: str) -> str:
     return re.sub(r"(?<=NEXT_ASSEMBLY_USAGE_OCCURRENCE\(')\d+", lambda _: str(next(number)), text)
 
 
-def _with_styles(text: str, colours: Sequence[tuple[float, float, float]]) -> str:
+def _with_styles(text: str, colours: Sequence[tuple[float, float, float]], counts: Sequence[int]) -> str:
     """Return the file with a surface colour for every solid: `colours` by body, in the order of its representations.
 
+    `counts` says how many solids each body has; several are written as a plain representation, as the assembly is.
     Laid out after the recommended practices for model styling of the MBx Interoperability Forum (CAx-IF).
+    Raises UnitcadError where a body or a solid of one is missing.
     """
-    bodies = re.findall(r"(?:ADVANCED|FACETED)_BREP_SHAPE_REPRESENTATION\('[^']*',\(([^)]*)\),\s*(#\d+)\s*\);", text)
-    solids = set(re.findall(r"(#\d+) = (?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS)\(", text))
+    solids = set(re.findall(r"(#\d+) = (?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\(", text))
+    representations = re.findall(
+        r" = (?:ADVANCED_BREP_|FACETED_BREP_)?SHAPE_REPRESENTATION\('[^']*',\(([^)]*)\),\s*(#\d+)\s*\);", text
+    )
+    held = [([item for item in re.findall(r"#\d+", items) if item in solids], at) for items, at in representations]
+    bodies = [(items, context) for items, context in held if items]
     if len(bodies) != len(colours):
         raise UnitcadError(f"OCCT wrote {len(bodies)} bodies of {len(colours)} as STEP")
+    written = [len(items) for items, _ in bodies]
+    if written != list(counts):
+        raise UnitcadError(f"OCCT wrote {written} solids, by body, of {list(counts)} as STEP")
     highest = int(re.findall(r"^#(\d+) = ", text, flags=re.MULTILINE)[-1])
     number, lines = itertools.count(highest + 1), []
 
@@ -145,9 +155,7 @@ def _with_styles(text: str, colours: Sequence[tuple[float, float, float]]) -> st
         last = entity(f"COLOUR_RGB('',{','.join(_real(channel) for channel in channels)})")
         for wrapper in _STYLE:
             last = entity(wrapper.format(last))
-        styled = [
-            entity(f"STYLED_ITEM('color',({last}),{item})") for item in re.findall(r"#\d+", items) if item in solids
-        ]
+        styled = [entity(f"STYLED_ITEM('color',({last}),{item})") for item in items]
         entity(f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',({','.join(styled)}),{context})")
     end = text.rindex("ENDSEC;")
     return text[:end] + "\n".join([*lines, ""]) + text[end:]

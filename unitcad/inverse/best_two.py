@@ -1,8 +1,8 @@
-"""What would decide between the best two: by the ranking's own models, and by these held to what was measured."""
+"""What would decide between the best two: their measurements, or the ranking's models and these held to the levels."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,11 +27,12 @@ _POINTS = 400
 def best_two(target: Target, specs: Sequence[Spec], data: Sequence[dict[str, Any]]) -> tuple[str | None, Any]:
     """Return the sentence on what would decide between the first two proposals, and the figures behind it.
 
-    None where there are not two. Their models and weights are the ranking's.
+    None where there are not two. Their models and weights are the ranking's. Where both were measured in one lab, the
+    sentence follows the measurements.
     """
     if len(specs) < 2:
         return None, None
-    stack = stack_of(target.models, target.fit)
+    stack = stack_of(target.models, target.fit, target.asked.estimate.moduli)
     weights = {model: float(weight) for model, weight in zip(stack.models, stack.weights, strict=True)}
     names = [one["name"] for one in data[:2]]
     try:
@@ -49,7 +50,8 @@ def best_two(target: Target, specs: Sequence[Spec], data: Sequence[dict[str, Any
         "error": decision.order.error,
         "open_bits": decision.open_bits,
     }
-    return " ".join([*_measured(data[:2]), _sentence(target, decision, below, data[:2])]), figures
+    by_measurement = _by_measurement(below, data[:2])
+    return " ".join([*_measured(data[:2]), by_measurement or _sentence(target, decision, below, data[:2])]), figures
 
 
 def below_by_ranking(both: Sequence[Predictive]) -> float:
@@ -70,11 +72,48 @@ def _measured(data: Sequence[dict[str, Any]]) -> list[str]:
     measured = [one["measured"] for one in data]
     if not all(measured):
         return []
-    printed = [listed([percent(level) for level in (one["level"], one.get("also")) if level]) for one in measured]
-    one_unit = all(len(one["materials"]) == 1 for one in data) and data[0]["materials"] == data[1]["materials"]
-    if one_unit and all(one["by"].startswith("the paper") for one in measured):
+    printed = [listed([percent(level) for level in _levels(one)]) for one in measured]
+    if _one_unit(data):
         return [f"One unit of this silicone was measured, {printed[0]}, once; of which of the two designs is not said."]
     return [f"The two best were measured, #1 printed as {printed[0]}, #2 as {printed[1]}, each unit once."]
+
+
+def _levels(measured: Mapping[str, Any]) -> list[float]:
+    return [level for level in (measured["level"], measured.get("also")) if level]
+
+
+def _by_paper(one: Mapping[str, Any]) -> bool:
+    return bool(one["measured"]["by"].startswith("the paper"))
+
+
+def _one_unit(data: Sequence[Mapping[str, Any]]) -> bool:
+    """Tell whether the measurements of two proposals are one control's, whose design the paper does not say."""
+    one_silicone = all(len(one["materials"]) == 1 for one in data) and data[0]["materials"] == data[1]["materials"]
+    return one_silicone and all(map(_by_paper, data))
+
+
+def _by_measurement(below: float, data: Sequence[dict[str, Any]]) -> str | None:
+    """Return the order by the measurements of both, beside what the ranking expects; None where they tell none.
+
+    Levels of two labs are not compared.
+    """
+    if not all(one["measured"] for one in data) or _one_unit(data) or _by_paper(data[0]) != _by_paper(data[1]):
+        return None
+    first, second = (_levels(one["measured"]) for one in data)
+    if max(first) >= min(second) and max(second) >= min(first):
+        side, ranked = ("below", below) if below >= 0.5 else ("above", 1.0 - below)
+        return (
+            "These levels leave the order of the two open; "
+            f"the ranking expects #1 {side} #2 ({100 * ranked:.0f} %). Cast and measure both."
+        )
+    lower, share = (1, below) if max(first) < min(second) else (2, 1.0 - below)
+    measured = f"By its measurement #{lower} is the lower"
+    if share >= 0.5:
+        return f"{measured}, as the ranking expects ({100 * share:.0f} %)."
+    return (
+        f"{measured}; the ranking, which has the models alone, expects the reverse ({100 * (1.0 - share):.0f} %). "
+        "To be sure of the order cast and measure both again."
+    )
 
 
 def percent(level: float) -> str:

@@ -82,8 +82,13 @@ class Candidates:
 
 def candidates(target: Target, say: Say = lambda stage: None) -> Candidates:
     """Return every candidate of a target. Raises Refusal where there is none, or too many."""
-    made, refused = geometries(target, say)
-    return tabulate(target, made, refused, silicones_of(target, made[0].variant.frequency), say)
+    try:
+        made, refused = geometries(target, say)
+        return tabulate(target, made, refused, silicones_of(target, made[0].variant.frequency), say)
+    except Refusal as refusal:
+        if refusal.field.partition(".")[0] not in target.asked.spec:
+            raise
+        raise Refusal(f"spec.{refusal.field}", refusal.value, refusal.limit, refusal.nearest) from None
 
 
 def silicones_of(target: Target, frequency: Quantity) -> Silicones:

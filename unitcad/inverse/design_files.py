@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -141,7 +142,7 @@ def page(data: Mapping[str, Any]) -> str:
             lines += [f"*{words.OTHERS}.*", ""]
         lines += [f"## {one['rank']}. {markdown(words.title(one))}", "", f"**{markdown(words.level_line(one))}**", ""]
         lines += [f"- {markdown(line)}" for line in [words.size_line(one), *words.reasons(one)]]
-        lines += [f"- build it: `unitcad build {one['file']}`", ""]
+        lines += [f"- build it: `unitcad build {shlex.quote(one['file'])}`", ""]
     if data["decides"]:
         lines += ["## What would decide", "", markdown(data["decides"]), ""]
     lines += ["## What pulls apart", "", "![probability of the level over mass, time and size](front.svg)", ""]

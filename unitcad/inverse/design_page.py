@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
@@ -63,7 +64,7 @@ def _table(proposals: Sequence[Mapping[str, Any]]) -> str:
         )
         rows.append(f"<tr><td>{one['rank']}</td><td>{link}</td>{numbers}</tr>")
     return (
-        '<div class="scroll" tabindex="0" role="region" aria-label="proposals"><table class="cards">'
+        '<div class="scroll" tabindex="0" role="region" aria-label="proposals"><table class="stacked">'
         f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
     )
 
@@ -80,7 +81,7 @@ def _proposal(one: Mapping[str, Any], section: str) -> str:
             f"<p>{escape(words.size_line(one))}</p>",
             _list(words.reasons(one)),
             drawing(section, f"section of {one['label']}"),
-            f"<p>Build it: <code>unitcad build {escape(one['file'])}</code></p>",
+            f"<p>Build it: <code>unitcad build {escape(shlex.quote(one['file']))}</code></p>",
             "</section>",
         ]
     )

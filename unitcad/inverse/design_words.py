@@ -78,17 +78,20 @@ def title(one: Mapping[str, Any]) -> str:
 
 def level_line(one: Mapping[str, Any]) -> str:
     """Return a proposal's measurement, if there is one, then its probability and range."""
-    measured, first = one["measured"], ""
-    if measured:
-        also = f", also printed as {percent(measured['also'])}" if _differs(measured) else ""
-        verdict = "meets the wish" if measured["meets"] else "outside the wish"
-        first = f"measured {percent(measured['level'])} ({measured['by']}{also}): {verdict}; "
+    first = f"{measured_words(one['measured'])}; " if one["measured"] else ""
     edge, least = one["edge"], one["probability_min"]
     below = f", below your {100 * least:.3g} %" if one["probability"] < least else ""
     return (
         f"{first}probability {share(one['probability'])}{below}, {percent(edge['p10'])} to {percent(edge['p90'])} "
         "at the edge (10 to 90 %)"
     )
+
+
+def measured_words(measured: Mapping[str, Any]) -> str:
+    """Return a unit's measurement, by whom, and whether it is within the wish."""
+    also = f", also printed as {percent(measured['also'])}" if _differs(measured) else ""
+    verdict = "meets the wish" if measured["meets"] else "outside the wish"
+    return f"measured {percent(measured['level'])} ({measured['by']}{also}): {verdict}"
 
 
 def _differs(measured: Mapping[str, Any]) -> bool:
@@ -145,11 +148,10 @@ def explanation_lines(data: Mapping[str, Any]) -> list[str]:
     """Return what `explain` found."""
     head = data["name"]
     if data["probability"] is not None:
-        among = data.get("among", True)
-        place = f", place {data['rank']} of {data['of']}" if among else f", place {data['rank']} if it were tried"
-        place = place if data["rank"] else ""
-        head += (
-            f": probability {share(data['probability'])}, {percent(data['edge']['p10'])} to "
-            f"{percent(data['edge']['p90'])} at the edge (10 to 90 %){place}"
-        )
-    return [head, *(f"  {reason}" for reason in data["reasons"] or ["it is among the proposals"])]
+        place = f", place {data['rank']} of {data['of']}" + ("" if data["among"] else " if it were tried")
+        head += f": {level_line(data)}{place if data['rank'] else ''}"
+    elif data["measured"]:
+        head += f": {measured_words(data['measured'])}"
+    proposal = data["listed"] and not data["nearest_other"]
+    among = [f"it is among the proposals, as number {data['listed']}"] if proposal else []
+    return [head, *(f"  {line}" for line in [*among, *data["reasons"]])]

@@ -112,10 +112,9 @@ def geometries(target: Target, say: Say = lambda stage: None) -> tuple[list[Geom
 
 def _lengths(target: Target) -> Iterator[Lengths]:
     vary, known = target.asked.vary, designs()
-    walls = grid(vary.wall_mm, vary.step_mm)
     caps = grid(vary.cap_mm, vary.step_mm) if vary.cap_mm else ()
     for design, motor, count in itertools.product(target.designs, target.asked.at_hand.motors, sorted(vary.layers)):
-        for chosen in itertools.product(walls, repeat=count):
+        for chosen in itertools.product(grid(vary.walls(count), vary.step_mm), repeat=count):
             if not known[design].caps:
                 over: list[tuple[float, ...]] = [()]
             else:

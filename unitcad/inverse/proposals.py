@@ -21,14 +21,14 @@ from unitcad.estimating import estimate_input
 from unitcad.inverse.best_two import best_two
 from unitcad.inverse.candidates import Candidates, candidates, probability_by_model
 from unitcad.inverse.castability import Verdict, castability
-from unitcad.inverse.finish_time import finish_hours
 from unitcad.inverse.geometries import Lengths, Say, spec_data
+from unitcad.inverse.nearest_wish import check_possible
 from unitcad.inverse.own_measurement import measured_rows, measurement
 from unitcad.inverse.ranking_order import ALIKE, Kind, kinds
 from unitcad.inverse.refinement import alone, refined
 from unitcad.inverse.reliance import length_notes, reliance
 from unitcad.inverse.target_file import Target
-from unitcad.inverse.wishes import check_level, label, limits, within
+from unitcad.inverse.wishes import label, limits, within
 from unitcad.spec import Spec
 from unitcad.text import listed, number
 from unitcad.validation import from_data, warnings
@@ -63,7 +63,7 @@ def invert(target: Target, check: bool = True, say: Say = lambda stage: None) ->
     found = candidates(target, say)
     rows = within(found)
     measured = measured_rows(found, rows)
-    check_level(found, rows, any(one["meets"] for one in measured.values()))
+    check_possible(found, rows, measured)
     chosen, out = _chosen(found, _ranked(found, rows, measured), check, say)
     if not chosen:
         limit = f"none of the best can be cast: {out[0]['candidate']}: {out[0]['failed'][0]}"
@@ -121,7 +121,7 @@ def _chosen(found: Candidates, ranked: list[Kind], check: bool, say: Say) -> tup
             tried.insert(0, (better, 0))
         for table, row in tried:
             spec = from_data(spec_data(found.target, table.lengths(row), table.materials(row), name_of(table, row)))
-            verdict = _in_time(spec, table, castability(spec) if check else Verdict(0, ()))
+            verdict = castability(spec) if check else Verdict(0, ())
             if verdict.castable:
                 checked = verdict.checked if check else None
                 data = proposal(table, row, spec, kind, len(chosen) + 1, checked, refined=table is not found)
@@ -160,19 +160,6 @@ def _ranked(found: Candidates, rows: np.ndarray, measured: Mapping[int, Mapping[
     return sorted(made, key=group)
 
 
-def _in_time(spec: Spec, found: Candidates, verdict: Verdict) -> Verdict:
-    """Return the verdict, failed where the spec has no procedure, or one that ends later than is wished for."""
-    if not verdict.castable:
-        return verdict
-    try:
-        most, hours = found.target.wish.cure_hours_max, finish_hours(spec)
-    except Refusal as refusal:
-        return Verdict(verdict.checked, (str(refusal),))
-    if most is None or hours <= most * (1 + 1e-9):
-        return verdict
-    return Verdict(verdict.checked, (f"its procedure ends after {number(hours, 3)} h, at most {number(most, 3)} h",))
-
-
 def proposal(
     found: Candidates, row: int, spec: Spec, kind: Kind, rank: int, checked: int | None, refined: bool
 ) -> dict[str, Any]:
@@ -199,13 +186,13 @@ def proposal(
         "diameter_mm": float(found.diameter_mm[row]),
         "height_mm": float(found.height_mm[row]),
         "mass_g": float(found.mass_g[row]),
-        "cure_hours": finish_hours(spec),
+        "cure_hours": float(found.hours[row]),
         "refined": refined,
         "within": [limit.shown(row) for limit in limits(found)],
         "checks": checked,
         "lengths_measured": not length_notes(found, lengths),
         "relies_on": reliance(found, row),
-        "lengths_gain": _gain(found, kind),
+        "lengths_gain": _gain(kind, refined),
         "remarks": [*warnings(spec), *_scale(spec, found, row)],
     }
     if wish.pitch_mm is not None:
@@ -263,14 +250,16 @@ def _sibling(found: Candidates, row: int, measured: dict[str, Any] | None) -> di
     return level and {**level, "label": label(table, 0), "probability": float(table.probability[0])}
 
 
-def _gain(found: Candidates, kind: Kind) -> str:
-    """Say what the lengths change of a kind's probability."""
+def _gain(kind: Kind, refined: bool) -> str:
+    """Say what the lengths change of a kind's probability; `refined`: the proposal lies between the steps."""
     if kind.rows.size < 2:
         return "its lengths are the only ones within the limits"
     of = f"{kind.rows.size} sets of lengths within the limits"
     if kind.most - kind.least < 1e-6:
         return f"lengths gain nothing: the probability is the same for all {of}"
-    return f"lengths change the probability from {kind.least:.2f} to {kind.most:.2f} over the {of}"
+    return f"lengths change the probability from {kind.least:.2f} to {kind.most:.2f} over the {of}" + (
+        "; this one lies between the steps" if refined else ""
+    )
 
 
 def _scale(spec: Spec, found: Candidates, row: int) -> list[str]:

@@ -68,7 +68,7 @@ def _coordinates(
     vary = found.target.asked.vary
     own_caps = bool(start.caps) and vary.cap_mm is not None
     ranges = [
-        ("walls", start.walls, vary.wall_mm),
+        ("walls", start.walls, vary.walls(len(start.walls))),
         ("caps", start.caps if own_caps else (), vary.cap_mm),
         ("diameter", (start.diameter,), vary.diameter_mm),
     ]

@@ -82,14 +82,24 @@ class AtHandTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 
 
 class VaryTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What may vary, each from its least to its largest value; caps are as thick as walls unless they are given."""
+    """What may vary, each from its least to its largest value; caps are as thick as walls unless they are given.
+
+    Without `wall_mm` see `walls`.
+    """
 
     layers: Annotated[tuple[Layers, ...], Meta(min_length=1, max_length=5)] = (1, 2)
-    wall_mm: tuple[Wall, Wall] = (1.0, 2.0)
+    wall_mm: tuple[Wall, Wall] | None = None
     cap_mm: tuple[Wall, Wall] | None = None
     diameter_mm: tuple[kinds.MotorDiameter, kinds.MotorDiameter] | None = None
     step_mm: Annotated[Step, Meta(description="of walls and caps; the best are refined between the steps")] = 0.25
     diameter_step_mm: Step = 1.0
+
+    def walls(self, layers: int) -> tuple[float, float]:
+        """Return the least and largest wall of units of so many layers, mm.
+
+        By default a single layer goes up to the measured controls' 2.5 mm.
+        """
+        return self.wall_mm or ((1.0, 2.5) if layers == 1 else (1.0, 2.0))
 
 
 class ModelsTable(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

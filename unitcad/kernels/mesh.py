@@ -9,9 +9,6 @@ from typing import Any
 import manifold3d
 import numpy as np
 from manifold3d import CrossSection, Manifold
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
 from unitcad.shape.profile import GRID_PER_MM, Profile, points
@@ -136,6 +133,10 @@ def _plumb(vertices: np.ndarray) -> np.ndarray:
 
     Else two prisms that should share a wall keep a crack between them.
     """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
     pairs = KDTree(vertices[:, :2]).query_pairs(_SAME_LINE, output_type="ndarray")
     n = len(vertices)
     joined = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
@@ -145,6 +146,9 @@ def _plumb(vertices: np.ndarray) -> np.ndarray:
 
 def _patches(faces: np.ndarray) -> list[np.ndarray]:
     """Return faces (m, 3) in groups that are joined by edges."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     of_face = np.repeat(np.arange(len(faces)), 3)
     order = np.lexsort((edges[:, 1], edges[:, 0]))

@@ -74,7 +74,7 @@ def confirm(shape: Shape, solid: TopoDS_Shape, segments: int = 96) -> None:
     """
     properties, other = GProp_GProps(), mesh.realise(shape, segments)
     BRepGProp.VolumeProperties_s(solid, properties)
-    count, parts = len(_solids_in(solid)), len(other.decompose())
+    count, parts = len(solids_in(solid)), len(other.decompose())
     allowed = volume_bound(shape, segments) + 1e-6 * other.volume()
     if count != parts or abs(properties.Mass() - other.volume()) > allowed:
         raise UnitcadError(
@@ -90,7 +90,7 @@ def measure(solid: TopoDS_Shape) -> Measures:
     BRepGProp.SurfaceProperties_s(solid, surface, 1e-12)
     centre = inside.CentreOfMass()
     place = (centre.X(), centre.Y(), centre.Z())
-    return Measures(len(_solids_in(solid)), inside.Mass(), surface.Mass(), _box(solid), place)
+    return Measures(len(solids_in(solid)), inside.Mass(), surface.Mass(), _box(solid), place)
 
 
 def _box(solid: TopoDS_Shape) -> tuple[float, ...]:
@@ -167,7 +167,7 @@ def common(one: TopoDS_Shape, other: TopoDS_Shape) -> TopoDS_Shape:
 
 
 def component(solid: TopoDS_Shape, at: brep.Point) -> TopoDS_Shape:
-    for piece in _solids_in(solid):
+    for piece in solids_in(solid):
         if BRepClass3d_SolidClassifier(piece, gp_Pnt(*at), 1e-7).State() == TopAbs_IN:
             return piece
     raise UnitcadError(f"OCCT: no solid holds the point {at}")
@@ -232,11 +232,12 @@ def _unified(solid: TopoDS_Shape) -> TopoDS_Shape:
     upgrade = ShapeUpgrade_UnifySameDomain(solid, True, True, True)
     upgrade.AllowInternalEdges(False)
     upgrade.Build()
-    solids = _solids_in(upgrade.Shape())
+    solids = solids_in(upgrade.Shape())
     return solids[0] if len(solids) == 1 else upgrade.Shape()
 
 
-def _solids_in(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+def solids_in(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
+    """Return the solids of a shape: itself, or those of a compound."""
     explorer, solids = TopExp_Explorer(shape, TopAbs_SOLID), []
     while explorer.More():
         solids.append(explorer.Current())

@@ -22,6 +22,11 @@ Record = Annotated[str, Meta(min_length=1, max_length=1000)]
 Records = Annotated[tuple[Record, ...], Meta(max_length=1000)]
 Positive = Annotated[float, Meta(ge=1e-12, le=1e12)]
 Column = Annotated[int, Meta(ge=1, le=4096)] | Name
+Rate = Annotated[float, Meta(ge=1, le=1e10)]
+TimeUnit = Literal["s", "ms", "us", "ns"]
+Delimiter = Literal["", ",", ";", "\t", " "]
+DecimalSign = Literal["", ".", ","]
+SkippedLines = Annotated[int, Meta(ge=0, le=100000)]
 
 
 class SensorTable(Table, frozen=True, kw_only=True):
@@ -33,17 +38,32 @@ class SensorTable(Table, frozen=True, kw_only=True):
     full_scale: Annotated[Positive | None, Meta(description="largest value that the sensor gives, in unit")] = None
 
 
-class RecordingTable(Table, frozen=True, kw_only=True):
-    """How the files are read, where they don't say it themselves."""
+class OwnRecordingTable(Table, frozen=True, kw_only=True):
+    """How some of the records are read: names, or patterns such as "motor-*.mat", and what is their own."""
 
-    rate_hz: Annotated[float, Meta(ge=1, le=1e10)] | None = None
+    records: Records
+    rate_hz: Rate | None = None
+    channel: Column | None = None
+    motor_channel: Column | None = None
+    time_column: Column | None = None
+    time_unit: TimeUnit | None = None
+    delimiter: Delimiter | None = None
+    decimal: DecimalSign | None = None
+    skip_lines: SkippedLines | None = None
+
+
+class RecordingTable(Table, frozen=True, kw_only=True):
+    """How the files are read, where they don't say it themselves; `own` has other values for some of them."""
+
+    rate_hz: Rate | None = None
     channel: Column | None = None
     motor_channel: Annotated[Column | None, Meta(description="the motor, recorded at the same time")] = None
     time_column: Column | None = None
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    delimiter: Literal["", ",", ";", "\t", " "] = ""
-    decimal: Literal["", ".", ","] = ""
-    skip_lines: Annotated[int, Meta(ge=0, le=100000)] = 0
+    time_unit: TimeUnit | None = None
+    delimiter: Delimiter = ""
+    decimal: DecimalSign = ""
+    skip_lines: SkippedLines = 0
+    own: Annotated[tuple[OwnRecordingTable, ...], Meta(max_length=100)] = ()
 
 
 class BlankTable(Table, frozen=True, kw_only=True):

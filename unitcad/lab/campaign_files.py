@@ -8,6 +8,7 @@ from pathlib import Path
 from unitcad.errors import Refusal
 from unitcad.files import sha256
 from unitcad.lab.campaign import Campaign, UnitTable
+from unitcad.lab.own_recordings import check_own
 from unitcad.lab.readers.formats import expect_ending
 from unitcad.lab.unit_files import file_of, source_file
 
@@ -15,10 +16,13 @@ from unitcad.lab.unit_files import file_of, source_file
 def check_files(campaign: Campaign, folder: Path) -> None:
     """Check every name of a campaign whose files lie in or below `folder`, and read no record for it.
 
-    Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice.
+    Raises Refusal for a spec that is no template, a file that is not there or has no reader, a record given twice,
+    a [[recording.own]] of no record.
     """
     for field, name in blank_files(campaign):
         expect_ending(file_of(folder, name, field), field)
+    units = (name for unit in campaign.unit for _, name in _records(unit, ""))
+    check_own(campaign.recording, (*(name for _, name in blank_files(campaign)), *units))
     for i, unit in enumerate(campaign.unit):
         field = f"unit.{i}"
         source_file(unit, folder, field)

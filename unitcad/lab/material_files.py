@@ -156,8 +156,10 @@ def dynamic_chart(name: str, result: DynamicResult, factor: float) -> str:
         Series("storage, fractional Kelvin-Voigt", hertz, [one.real / 1e3 for one in modulus]),
         Series("loss, fractional Kelvin-Voigt", hertz, [one.imag / 1e3 for one in modulus]),
     ]
-    title = f"{name}: Young's modulus over frequency"
-    shaded = (curve.frequency[-1], result.frequency_hz) if result.frequency_hz > curve.frequency[-1] else None
+    title = f"{name}: Young's modulus over frequency{'; shaded: extrapolated' if result.extrapolated else ''}"
+    nearest = curve.frequency[-1] if result.frequency_hz > curve.frequency[-1] else curve.frequency[0]
+    low, high = sorted((float(nearest), result.frequency_hz))
+    shaded = (low, high) if result.extrapolated else None
     return chart(series, title, "frequency, Hz", "modulus, kPa", log_x=True, log_y=True, shaded=shaded)
 
 

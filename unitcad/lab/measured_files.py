@@ -110,8 +110,7 @@ def lines(result: Measured) -> list[str]:
             )
     for chain in result.chains:
         if chain.assumed:
-            values = ", ".join(f"{name} {value}" for name, value in chain.assumed.items())
-            out.append(f"  chain {chain.name}, assumed: {values}")
+            out.append(f"  chain {chain.name}, assumed: {chain.assumed_text}")
     return out
 
 

@@ -15,7 +15,9 @@ background:var(--back);overflow-wrap:anywhere}
 .wide{overflow-x:auto;overflow-wrap:normal}table{border-collapse:collapse}td{white-space:nowrap}
 td,th{border:1px solid var(--edge);padding:.2rem .5rem;text-align:left}tr.out td{color:var(--error)}
 figure{display:inline-block;margin:.5rem 0;max-width:100%}svg{max-width:100%;height:auto}
-.error{color:var(--error)}.warning{color:var(--warning)}@media(max-width:500px){h1{font-size:1.4rem}}"""
+.error{color:var(--error)}.warning{color:var(--warning)}@media(max-width:500px){
+h1{font-size:1.4rem}table{font-size:13px}td,th{padding:.15rem .3rem}td:first-child{white-space:normal}
+figure{overflow-x:auto}svg{max-width:none;width:31rem}}"""
 
 
 def page(result: Measured, charts: dict[str, str]) -> str:
@@ -26,9 +28,7 @@ def page(result: Measured, charts: dict[str, str]) -> str:
         for one in result.findings
     )
     assumed = "".join(
-        f"<p>Chain {escape(chain.name)}, assumed: "
-        + escape(", ".join(f"{key} {value}" for key, value in chain.assumed.items()))
-        + ".</p>"
+        f"<p>Chain {escape(chain.name)}, assumed: {escape(chain.assumed_text)}.</p>"
         for chain in result.chains
         if chain.assumed
     )

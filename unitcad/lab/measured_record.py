@@ -18,6 +18,7 @@ from unitcad.lab.chains.line import Mains
 from unitcad.lab.chains.line_fit import Line, LineFit
 from unitcad.lab.chains.signal_chains import chains_of
 from unitcad.lab.lab_rules import LabFinding, found
+from unitcad.lab.own_recordings import own_keys, recording_of
 from unitcad.lab.record_result import RecordResult
 from unitcad.lab.record_sections import (
     Section,
@@ -51,7 +52,8 @@ def measure_record(
     `band` is where its line is looked for, in Hz; `lines` how many it is expected to have.
     Raises Refusal for what can't be read.
     """
-    signal = open_signal(path, campaign.recording, sensors, shown)
+    with own_keys(campaign.recording, shown):
+        signal = open_signal(path, recording_of(campaign.recording, shown), sensors, shown)
     chains = chains_of(campaign.chain)
     names = (shown, f"{shown}, motor")
     sections: list[Section] = []

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
-from unitcad.errors import Refusal, unknown_name
+from unitcad.errors import Refusal
 from unitcad.geometry.arrays import Floats
 
 ROWS = 2**17
@@ -46,6 +47,11 @@ class Recording:
     read: Callable[[tuple[int, ...]], Iterator[Floats]]
     time: int | None = None
 
+    def numbered(self, indices: Iterable[int] | None = None) -> str:
+        """Return the channels' numbers and names, of some or of all."""
+        shown = range(len(self.channels)) if indices is None else indices
+        return ", ".join(f"{i + 1} {self.channels[i].name}" for i in shown)
+
     def index(self, wanted: str | int, field: str) -> int:
         """Return the index of a channel by its name or its number, which counts from 1. Raises Refusal.
 
@@ -64,7 +70,9 @@ class Recording:
             if len(ends) == 1:
                 return ends[0]
         if wanted not in names:
-            raise unknown_name(field, wanted, names)
+            close = get_close_matches(wanted, names, n=1)
+            limit = f"is no channel of {self.path.name}, which has {self.numbered()}"
+            raise Refusal(field, wanted, limit, close[0] if close else None)
         return names.index(wanted)
 
 

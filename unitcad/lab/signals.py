@@ -14,7 +14,7 @@ from unitcad.lab.campaign import RecordingTable, SensorTable
 from unitcad.lab.quantities import UNITS, plain, seconds
 from unitcad.lab.readers.formats import open_recording
 from unitcad.lab.readers.recording_layout import Layout
-from unitcad.lab.recording import Recording
+from unitcad.lab.recording import TIME_NAMES, Recording
 
 SECTION = 2**18
 """Samples that are fitted at a time: a longer record is fitted in sections."""
@@ -117,9 +117,9 @@ def open_signal(path: Path, table: RecordingTable, sensors: tuple[SensorTable, .
             continue
         others = [i for i in range(len(recording.channels)) if i != time]
         if len(others) != 1:
-            names = ", ".join(f"{i + 1} {recording.channels[i].name}" for i in others)
-            limit = f"is needed, a name or a number: {shown} has {len(others)} channels: {names}"
-            raise Refusal(f"recording.{key}", None, limit, others[0] + 1 if others else None)
+            limit = f"is needed, a name or a number: {shown} has {len(others)} channels: {recording.numbered(others)}"
+            likely = [i for i in others if recording.channels[i].name.strip().lower() not in TIME_NAMES]
+            raise Refusal(f"recording.{key}", None, limit, likely[0] + 1 if likely else None)
         columns.append(others[0])
     rate, scale = _rate(recording, table, time, columns[0], shown)
     if table.rate_hz is not None:

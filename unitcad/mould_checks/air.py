@@ -8,6 +8,7 @@ thinnest part thins it by less than the printer's play does, and counts as none.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
+from unitcad.mould_checks.each_cavity import each_cavity
 from unitcad.mould_checks.finding import MouldFinding, at_most
 from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.dents import TILT_DEG, deepest
@@ -42,9 +44,9 @@ class Pocket:
     peak: tuple[float, float, float]
 
 
-def findings(moulds: MouldSet) -> list[MouldFinding]:
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure the deepest pocket of every cavity over the five attitudes."""
-    return [_of_cavity(cavity, deepest(moulds.spec, cavity.step.index - 1)) for cavity in moulds.cavities]
+    return each_cavity(moulds, lambda cavity: [_of_cavity(cavity, deepest(moulds.spec, cavity.step.index - 1))])
 
 
 def _of_cavity(cavity: Cavity, limit: float) -> MouldFinding:

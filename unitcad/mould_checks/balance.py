@@ -8,17 +8,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from unitcad.mould_checks.check import MouldCheck
+from unitcad.mould_checks.each_cavity import each_cavity
 from unitcad.mould_checks.finding import MouldFinding, at_most
-from unitcad.moulds.cavities import BALANCE
+from unitcad.moulds.cavities import BALANCE, Cavity
 from unitcad.moulds.mould_set import MouldSet
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Compare what silicone can reach with the layer, in every cavity."""
-    for _, where, drawn, reached in moulds.cavities:
-        # What one has and the other lacks, both ways.
-        differ = abs(reached.volume() + drawn.volume() - 2 * (reached ^ drawn).volume())
-        yield at_most("C100", where, differ / drawn.volume(), BALANCE, "share of the layer")
+    return each_cavity(moulds, _of_cavity)
+
+
+def _of_cavity(cavity: Cavity) -> Iterator[MouldFinding]:
+    drawn, reached = cavity.drawn, cavity.reached
+    # What one has and the other lacks, both ways.
+    differ = abs(reached.volume() + drawn.volume() - 2 * (reached ^ drawn).volume())
+    yield at_most("C100", cavity.where, differ / drawn.volume(), BALANCE, "share of the layer")
 
 
 CHECK = MouldCheck(

@@ -40,12 +40,16 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     base, lengths = moulds.solids["base"], moulds.spec.moulds
     standing = ribs(moulds.spec, moulds.plan.layout)
     for step in moulds.plan.steps:
+        if step.cup not in moulds.solids:
+            continue
         cup, where = moulds.solids[step.cup], step.cup
         if not standing:
-            level = -(lengths.plinth_height_mm - lengths.seat_relief_mm) / 2
+            pins = moulds.plan.pins
+            level = pins.height / 2 if pins else -(lengths.plinth_height_mm - lengths.seat_relief_mm) / 2
+            on = "pins" if pins else "plinth, no ribs"
             limit = lengths.plinth_clearance_mm * SQUARE + GRID
             advice = "the cup slips aside by more than the clearance asked for"
-            yield at_most("C220", f"{where}: play on the plinth, no ribs", _play(cup, base, level), limit, "mm", advice)
+            yield at_most("C220", f"{where}: play on the {on}", _play(cup, base, level), limit, "mm", advice)
             continue
         held = _patches(cup, base, (standing[0].bottom + standing[0].top) / 2)
         directions = _faces(direction for _, direction in held)
@@ -57,7 +61,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         asked = lengths.rib_interference_mm
         yield at_least("C220", f"{where}: least interference of a rib", min(depths), asked - GRID, "mm")
         yield at_most("C220", f"{where}: greatest interference of a rib", max(depths), asked + GRID, "mm")
-        shared = cup ^ base ^ moulds.rib_spaces
+        shared = cup ^ moulds.crushing
         room = -shared.bounding_box()[5] if not shared.is_empty() else -standing[0].head
         advice = "what is crushed there lifts the cup off its seat"
         yield at_least("C220", f"{where}: from the seat down to a rib", room, -standing[0].head - GRID, "mm", advice)

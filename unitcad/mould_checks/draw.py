@@ -1,4 +1,6 @@
-"""C300: every piece comes out, in the order of the procedure, without passing through anything that stays.
+"""C300: every piece comes out, in the plan's order, without passing through anything that stays.
+
+What is already gone is left out. An order that can't be followed is a finding too.
 
 A piece that moves along +z meets what stays if, and only if, somewhere an upward face of the piece lies below (or
 against) a downward face of what stays, on one vertical line. So the test is exact for any polyhedron: project the faces
@@ -8,7 +10,7 @@ is sampled.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 
 import numpy as np
@@ -19,9 +21,10 @@ from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks import overlap
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_most
-from unitcad.moulds.cavities import boxes_meet
+from unitcad.moulds.cavities import boxes_meet, united
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.removal import removals
+from unitcad.moulds.plan import Step
+from unitcad.moulds.removal import CAST
 
 BLOCKED = 1e-5
 """Largest area of facing faces, mm2: what rounding leaves of faces that only touch along an edge."""
@@ -31,28 +34,66 @@ _BLOCK = 100_000  # pairs of triangles clipped together
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
-    """Yield the area of every removed piece that runs into what stays.
+    """Yield the area of every removed piece that runs into what stays, and every step of the order that can't be done.
 
     Where pieces overlap, the piece is cut out of what stays first: silicone has taken the tool's real shape.
     """
     overlapping = any(not finding.ok for finding in overlap.findings(moulds))
     facing = cache(_facing)
-    layers = {step.index: moulds.meshes((*step.layer, *step.earlier)) for step in moulds.plan.steps}
-    laid = {step.index: [(body.name, moulds.mesh(body)) for body in step.inserts] for step in moulds.plan.steps}
-    for removal in removals(moulds.plan):
-        staying = [(name, moulds.pressed[name]) for name in removal.stays]
-        staying += [*(("layer", solid) for solid in layers[removal.step]), *laid[removal.step]]
-        piece, way = moulds.pressed[removal.piece], removal.direction
-        areas = []
-        for name, solid in staying:
-            if overlapping and boxes_meet(piece, solid):
-                areas.append((blocked(piece, solid, way), name))
-            elif _in_the_way(piece, solid, way):
-                areas.append((_meeting(facing(piece, way, True), facing(solid, way, False)), name))
-        largest, name = max(areas, default=(0.0, ""))
-        where = f"pour {removal.step}: {removal.piece} out" + (f" against {name}" if largest > BLOCKED else "")
-        advice = f"something of the piece lies under {name}: the two are drawn with an undercut"
-        yield at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", advice)
+    steps = moulds.plan.steps
+    for step, after in zip(steps, (*steps[1:], None), strict=True):
+        there = {name: moulds.pressed[name] for name in step.tools}
+        layers = moulds.meshes((*step.layer, *step.earlier))
+        laid = [(body.name, moulds.mesh(body)) for body in step.inserts]
+        silicone = [*(("layer", solid) for solid in layers), *laid]
+        for removal in step.removals:
+            where = f"pour {step.index}: {removal.piece} out"
+            cast = removal.piece == CAST
+            if cast and silicone:
+                piece, silicone = united(layers), []
+            elif removal.piece in there:
+                piece = there.pop(removal.piece)
+            else:
+                yield _out_of_order(where, "it is not there: it was taken away before, or does not stand in this pour")
+                continue
+            areas, way, cells = [], removal.direction, []
+            for name, solid in (*there.items(), *silicone):
+                if overlapping and boxes_meet(piece, solid):
+                    # Silicone has taken the tool's shape, whichever of the two moves.
+                    areas.append((blocked(piece - solid, solid, way) if cast else blocked(piece, solid, way), name))
+                elif _in_the_way(piece, solid, way) and name == "layer":
+                    cells.append(facing(solid, way, False))
+                elif _in_the_way(piece, solid, way):
+                    areas.append((_meeting(facing(piece, way, True), facing(solid, way, False)), name))
+            if cells:
+                # All at once: one after the other they would take the square of the cells' number.
+                areas.append((_meeting(facing(piece, way, True), np.concatenate(cells)), "layer"))
+            largest, name = max(areas, default=(0.0, ""))
+            where += f" against {name}" if largest > BLOCKED else ""
+            advice = f"something of the piece lies under {name}: the two are drawn with an undercut"
+            yield at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", advice)
+        yield from _left(moulds, step, after, there, cast=bool(silicone))
+
+
+def _left(
+    moulds: MouldSet, step: Step, after: Step | None, there: Iterable[str], *, cast: bool
+) -> Iterator[MouldFinding]:
+    """Yield a finding for every piece that the order leaves where the next pour, or the unit, can't have it.
+
+    `cast`: the silicone is still there. It must be for the next pour; after the last, it is peeled off what stays.
+    """
+    for name in there if after or cast else ():
+        if moulds.plan.tool(name).removal and name not in (after.tools if after else ()):
+            then = f"pour {after.index} has no place for it" if after else "it holds the unit"
+            yield _out_of_order(f"pour {step.index}: {name} stays", f"it is never taken away, and {then}")
+    if after and not cast:
+        why = f"pour {after.index} is cast on it"
+        yield _out_of_order(f"pour {step.index}: {CAST} out", why)
+
+
+def _out_of_order(where: str, why: str) -> MouldFinding:
+    """Return the finding of a step that can't be done."""
+    return at_most("C300", where, 1, 0, "", f"the order of removal is impossible: {why}")
 
 
 def blocked(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -> float:
@@ -66,6 +107,8 @@ def blocked(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -
 
 def _meeting(up: np.ndarray, down: np.ndarray) -> float:
     """Area of the triangles `up` (n, 3, 3) that lie below, or against, the triangles `down`."""
+    # Of the larger set most lies beside a small piece.
+    up, down = (up, _in_sight(down, up)) if len(up) < len(down) else (_in_sight(up, down), down)
     if not len(up) or not len(down):
         return 0.0
     frame = frame_of(np.concatenate([up, down]).reshape(-1, 3))
@@ -80,6 +123,19 @@ def _meeting(up: np.ndarray, down: np.ndarray) -> float:
             near = _overlap(one, other)
             total += float(_area_below(one[near], other[near]).sum())
     return total
+
+
+def _in_sight(triangles: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return the triangles that reach into the box, seen along the way, of the others."""
+    if not len(triangles) or not len(others):
+        return triangles[:0]
+    low, high = others[:, :, :2].min(axis=(0, 1)), others[:, :, :2].max(axis=(0, 1))
+    keep = np.ones(len(triangles), bool)
+    for axis in range(2):
+        first, second, third = triangles[:, :, axis].T
+        keep &= np.maximum(np.maximum(first, second), third) >= low[axis]
+        keep &= np.minimum(np.minimum(first, second), third) <= high[axis]
+    return triangles[keep]
 
 
 def _boxed(triangles: np.ndarray, frame: Frame, higher: float) -> tuple[np.ndarray, np.ndarray]:

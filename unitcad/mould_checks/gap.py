@@ -1,4 +1,4 @@
-"""C210: faces that must slide have the printer's clearance: skirt and plinth, tongue and window, lid and cup.
+"""C210: faces that must slide have the printer's clearance: skirt and plinth, or pins, tongue and window, lid and cup.
 
 The skirt is measured below the seat, where cup and plinth touch on purpose, and beside its ribs, which reach into the
 plinth; the lid's below the rim. Round corners are polygons of as many sides a turn on both pieces: midway along a facet
@@ -17,7 +17,10 @@ from manifold3d import Manifold
 from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
+from unitcad.moulds.cavities import united
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.pins import PIN_RADIUS
+from unitcad.shape import cylinder, moved
 from unitcad.shape.profile import GRID_PER_MM
 
 KNIFE = "the base carries an edge thinner than that clearance: give the silicone over it a corner less sharp"
@@ -34,10 +37,18 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     skirt, window = min(lengths.plinth_clearance_mm, lengths.seat_relief_mm), lengths.window_clearance_mm
     play = lengths.plinth_clearance_mm
     for step in moulds.plan.steps:
+        if step.cup not in solids:  # what stands alone slides on nothing
+            continue
         cup = solids[step.cup]
         beside = cup - moulds.rib_spaces
-        gap = beside.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
-        yield at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm")
+        if pins := moulds.plan.pins:
+            column = cylinder(PIN_RADIUS + play, 0, pins.height)
+            columns = united(moulds.meshes(moved(column, *at) for at in pins.places))
+            gap = _sideways(beside, solids["base"] ^ columns, play + 1)
+            yield at_least("C210", f"{step.cup} holes and pins", gap, pins.clearance * chord - GRID, "mm")
+        else:
+            gap = beside.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
+            yield at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm")
         if not moulds.plan.concentric:
             gap = _sideways(beside, solids["base"], window + 1)
             where = f"{step.cup} and what stands on the base"

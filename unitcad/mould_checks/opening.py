@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from unitcad.mould_checks.check import MouldCheck
+from unitcad.mould_checks.each_cavity import each_cavity
 from unitcad.mould_checks.finding import MouldFinding, at_least
 from unitcad.moulds.cavities import Cavity
 from unitcad.moulds.mould_set import MouldSet
@@ -22,8 +23,7 @@ _SNAPPED = 1 / GRID_PER_MM
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure the opening of every cavity, and the narrowest of its vents under a lid."""
-    for cavity in moulds.cavities:
-        yield from _of_cavity(cavity)
+    return each_cavity(moulds, _of_cavity)
 
 
 def _of_cavity(cavity: Cavity) -> Iterator[MouldFinding]:

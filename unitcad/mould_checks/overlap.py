@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import combinations
+import math
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 
+import numpy as np
 from manifold3d import Manifold
 
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_most
-from unitcad.moulds.cavities import boxes_meet, united
+from unitcad.moulds.congruence import MARGIN, column_round
 from unitcad.moulds.mould_set import MouldSet
 
 OVERLAP = 1e-6
@@ -21,40 +22,125 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
 
     The cells of a layer are compared with each other, then count as one solid.
     """
-    return moulds.once("C200", lambda: [*of_unit(moulds), *_of_pours(moulds)])
+    return moulds.once("C200", lambda: [*of_unit(moulds, volumes := _Volumes({})), *_of_pours(moulds, volumes)])
 
 
-def of_unit(moulds: MouldSet) -> list[MouldFinding]:
-    """Look at the unit alone."""
-    return _overlaps("unit", [(body.name, moulds.mesh(body)) for body in moulds.unit], {})
+def of_unit(moulds: MouldSet, volumes: _Volumes | None = None) -> list[MouldFinding]:
+    """Look at the unit alone; `volumes` keeps what its pairs share."""
+    there = [(body.name, [moulds.mesh(body)]) for body in (*moulds.unit, *moulds.laid_later)]
+    return _findings("unit", there, volumes or _Volumes({}))
 
 
-def _of_pours(moulds: MouldSet) -> Iterator[MouldFinding]:
-    cast: list[tuple[str, Manifold]] = []
-    shared: dict[tuple[str, str], float] = {}
+_There = Sequence[tuple[str, Sequence[Manifold]]]
+"""What stands in a pour by name: a layer has a part in every cell."""
+
+
+def _of_pours(moulds: MouldSet, of_unit: _Volumes) -> Iterator[MouldFinding]:
+    cast: list[tuple[str, list[Manifold]]] = []
+    # A layer that is cast singly is the unit's own body: what it shares with another such layer is known.
+    drawn = {body.name: (body.shape,) for body in moulds.unit}
+    single = {step.name for step in moulds.plan.steps if step.layer == drawn.get(step.name)}
+    known = {pair: volume for pair, volume in of_unit.of_names.items() if single.issuperset(pair)}
+    volumes = _Volumes(_surroundings(moulds), known)
     for step in moulds.plan.steps:
         cells = moulds.meshes(step.layer)
-        yield from _overlaps(f"pour {step.index}", [(f"{step.name}.{i + 1}", c) for i, c in enumerate(cells)], shared)
-        cast.append((step.name, united(cells)))
-        laid = [(body.name, moulds.mesh(body)) for body in step.inserts]
-        standing = [(name, moulds.pressed[name]) for name in step.tools] + cast + laid
-        yield from _overlaps(f"pour {step.index}", standing, shared)
+        alone = [(f"{step.name}.{i + 1}", [cell]) for i, cell in enumerate(cells)]
+        yield from _findings(f"pour {step.index}", alone, volumes)
+        cast.append((step.name, cells))
+        laid = [(body.name, [moulds.mesh(body)]) for body in step.inserts]
+        tools = [(name, [moulds.pressed[name]]) for name in step.tools]
+        yield from _findings(f"pour {step.index}", [*tools, *cast, *laid], volumes)
 
 
-def _overlaps(
-    where: str, there: list[tuple[str, Manifold]], shared: dict[tuple[str, str], float]
-) -> list[MouldFinding]:
-    """Return the pair that shares most, and every pair that shares too much.
+def _surroundings(moulds: MouldSet) -> dict[int, Hashable]:
+    """Return for a gang's small solids, by identity, a value that is the same for those in like surroundings."""
+    plan = moulds.plan
+    if len(plan.layout.cells) == 1:
+        return {}
+    alike: dict[int, Hashable] = {
+        id(solid): (step.index, cell)
+        for step in plan.steps
+        if len(step.layer) == len(moulds.cells)
+        for solid, cell in zip(moulds.meshes(step.layer), moulds.cells, strict=True)
+    }
+    whole = _reach(moulds.pressed["base"])
+    for tool in plan.tools:
+        solid = moulds.pressed[tool.name]
+        if _reach(solid) < whole / 2:
+            alike[id(solid)] = moulds.congruence.number(column_round([solid], MARGIN))
+    return alike
 
-    `shared` keeps the volumes by name: a pair that stands together in several pours is cut once.
-    """
+
+def _findings(where: str, there: _There, volumes: _Volumes) -> list[MouldFinding]:
+    """Return the pair that shares most, and every pair that shares too much."""
     pairs = []
-    for (a, solid), (b, other) in combinations(there, 2):
-        if boxes_meet(solid, other):
-            if (a, b) not in shared:
-                shared[a, b] = (solid ^ other).volume()
-            pairs.append(at_most("C200", f"{where}: {a} and {b}", shared[a, b], OVERLAP, "mm3"))
+    boxes = np.array([volumes.box(parts) for _, parts in there]).reshape(-1, 6)
+    for i, k in np.argwhere(np.triu(_meet(boxes, boxes), 1)):
+        volume = volumes.shared(there[i], there[k])
+        if volume is not None:
+            pairs.append(at_most("C200", f"{where}: {there[i][0]} and {there[k][0]}", volume, OVERLAP, "mm3"))
     return [f for f in pairs if not f.ok] or sorted(pairs, key=lambda f: -f.value)[:1]
+
+
+class _Volumes:
+    """The volumes that pairs share: a pair that stands together in several pours, or in like places, is cut once.
+
+    `alike` has, for small solids by identity, a value that is the same for those in like surroundings; `known` and
+    `of_names` hold volumes by names.
+    """
+
+    def __init__(self, alike: Mapping[int, Hashable], known: Mapping[tuple[str, str], float] | None = None) -> None:
+        self._alike = alike
+        self.of_names = dict(known or {})
+        self._of_places: dict[Hashable, float] = {}
+        self._boxes: dict[int, tuple[float, ...]] = {}
+        self._kept: list[Manifold] = []
+
+    def shared(self, one: tuple[str, Sequence[Manifold]], other: tuple[str, Sequence[Manifold]]) -> float | None:
+        """Return the volume that two named pieces share, mm3; None where no boxes of theirs meet."""
+        (a, parts), (b, others) = one, other
+        boxes, beside = (np.array([self._box(part) for part in each]) for each in (parts, others))
+        meeting = np.argwhere(_meet(boxes, beside))
+        if not len(meeting):
+            return None
+        if (a, b) not in self.of_names:
+            self.of_names[a, b] = sum(self._cut(parts[i], a, others[k], b) for i, k in meeting)
+        return self.of_names[a, b]
+
+    def _cut(self, part: Manifold, a: str, beside: Manifold, b: str) -> float:
+        if id(part) not in self._alike:
+            part, a, beside, b = beside, b, part, a
+        if id(part) not in self._alike:
+            return float((part ^ beside).volume())
+        # Of the large pieces there is one of each name; a small one is known by its place beside the first.
+        own, box = self._box(part), self._box(beside)
+        place = tuple(round(y - x, 6) for x, y in zip(own, box, strict=True)) if id(beside) in self._alike else b
+        key = self._alike[id(part)], place
+        if key not in self._of_places:
+            self._of_places[key] = float((part ^ beside).volume())
+        return self._of_places[key]
+
+    def box(self, parts: Sequence[Manifold]) -> np.ndarray:
+        """Return the box round several solids: its low corner, then the high one, mm."""
+        boxes = np.array([self._box(part) for part in parts])
+        return np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
+
+    def _box(self, solid: Manifold) -> tuple[float, ...]:
+        if id(solid) not in self._boxes:
+            self._boxes[id(solid)] = solid.bounding_box()
+            self._kept.append(solid)  # or its identity could become another's
+        return self._boxes[id(solid)]
+
+
+def _meet(boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Tell for every two of two sets of boxes (n, 6) and (m, 6) whether they touch."""
+    low, high = boxes[:, None, :3], boxes[:, None, 3:]
+    return np.all((low <= others[None, :, 3:]) & (others[None, :, :3] <= high), axis=2)
+
+
+def _reach(solid: Manifold) -> float:
+    x0, y0, _, x1, y1, _ = solid.bounding_box()
+    return math.hypot(x1 - x0, y1 - y0) / 2
 
 
 CHECK = MouldCheck("C200", "overlap: no two solids of an assembled step share volume", findings)

@@ -14,7 +14,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Look at every body of unit and tooling; genus only where the drawing means one."""
     genus = expected_genus(moulds.plan)
     for name, solid in moulds.solids.items():
-        yield exactly("C000", f"{name} components", len(solid.decompose()), 1, "")
+        yield exactly("C000", f"{name} components", len(solid.decompose()), moulds.pieces(name), "")
         yield MouldFinding("C000", f"{name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3")
         if name in genus:
             yield exactly("C000", f"{name} genus", solid.genus(), genus[name], "")
@@ -24,10 +24,10 @@ def expected_genus(plan: Plan) -> dict[str, int]:
     """Return the number of through holes of each tool.
 
     A base has a filament hole a core; a cup a bore a cell and a closed window a tail; a lid a sprue and its vents. Of
-    moulds by complement only the blade's is known.
+    moulds by complement only the blade's is known; a plan may state others.
     """
     if not plan.concentric:
-        return {tool.name: 0 for tool in plan.of_kind("blade")}
+        return {tool.name: 0 for tool in plan.of_kind("blade")} | dict(plan.genus)
     genus = {tool.name: 0 for tool in plan.tools}
     genus["base"] = len(plan.of_kind("stub"))
     for step in plan.steps:

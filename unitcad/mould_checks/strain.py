@@ -18,6 +18,7 @@ from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_most
 from unitcad.moulds.cavities import united
+from unitcad.moulds.congruence import once_each
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.spec import Spec
 
@@ -43,8 +44,8 @@ def strains(moulds: MouldSet) -> list[Strain]:
     """Return the strains that the geometry asks for: each unit's peel off its core along +z, the tail's way out."""
     needed = []
     pulled = peel(moulds)
-    for i, (body, base) in enumerate(pulled):
-        strain, z, room = peel_strain(body, base)
+    judged = once_each(moulds.cells, lambda i: peel_strain(united(pulled[i][0]), pulled[i][1]))
+    for i, (_, (strain, z, room)) in enumerate(judged):
         where = "peel off the core" + (f", cell {i + 1}" if len(pulled) > 1 else "")
         if strain > 0:
             where += f", at z = {z:.3g} mm"
@@ -52,6 +53,7 @@ def strains(moulds: MouldSet) -> list[Strain]:
     fpcb, slot = moulds.spec.fpcb, moulds.dimensions.exit
     if fpcb and slot:
         needed.append(Strain("tail through the slot", 100 * tail_strain(fpcb, slot)))
+    needed += [Strain(where, percent) for where, percent in moulds.plan.stretches]
     return needed
 
 
@@ -66,11 +68,19 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
     return strain_findings(moulds.spec, strains(moulds))
 
 
-def peel(moulds: MouldSet) -> list[tuple[Manifold, Manifold]]:
-    """Return for each cell what is pulled off at the end (all layers, bonded) and the base that stays."""
-    last, cells = moulds.plan.steps[-1], len(moulds.plan.layout.cells)
-    shapes = (*last.earlier, *last.layer)
-    return [(united(moulds.meshes(shapes[i::cells])), moulds.solids["base"]) for i in range(cells)]
+def peel(moulds: MouldSet) -> list[tuple[list[Manifold], Manifold]]:
+    """Return for each cell what is pulled off at the end (all layers, bonded) and the base that stays.
+
+    Where one layer joins all cells, a cell's part is what lies within half the pitch of it.
+    """
+    last, lay = moulds.plan.steps[-1], moulds.plan.layout
+    shapes, cells = (*last.earlier, *last.layer), len(lay.cells)
+    if len(last.layer) != cells:
+        whole, half = united(moulds.meshes(shapes)), lay.pitch / 2
+        _, _, low, _, _, high = whole.bounding_box()
+        column = Manifold.cube((2 * half, 2 * half, high - low)).translate((-half, -half, low))
+        return [([whole ^ column.translate((c.x, c.y, 0))], moulds.solids["base"]) for c in lay.cells]
+    return [(moulds.meshes(shapes[i::cells]), moulds.solids["base"]) for i in range(cells)]
 
 
 def _advice(strain: Strain, limit: float) -> str:

@@ -54,7 +54,14 @@ def stand(spec: Spec, lay: Layout, standing: Sequence[Shape], tools: Sequence[Sh
     """Draw plate and plinth with what stands on them (its foot sunk in) in one piece, with pry slots, less `tools`."""
     top, bottom = plate_top(spec), plate_bottom(spec)
     plate = Extrude(outline(lay.plate, MARK), bottom, top)
-    return cut(union((plate, plinth(spec, lay), *standing)), [*(_pry_slot(lay, top, side) for side in (1, -1)), *tools])
+    return cut(union((plate, plinth(spec, lay), *standing)), [*(pry_slot(spec, lay, side) for side in (1, -1)), *tools])
+
+
+def pry_floor(spec: Spec) -> float:
+    """Return z of a pry slot's floor: PRY_DEPTH or a little more under the plate's face, on a whole layer."""
+    layer, bottom = spec.moulds.layer_mm, plate_bottom(spec)
+    wanted = max(spec.moulds.plate_mm - PRY_DEPTH, 0.0)
+    return bottom + (math.floor(wanted / layer + 1e-6) * layer if wanted >= layer else wanted)
 
 
 def plinth(spec: Spec, lay: Layout) -> Shape:
@@ -91,7 +98,8 @@ def tapered(lay: Layout, clearance: float, bottom: float) -> Shape:
     return Extrude(section(bottom), bottom, 0.0, top=section(0.0))
 
 
-def _pry_slot(lay: Layout, top: float, side: int) -> Shape:
+def pry_slot(spec: Spec, lay: Layout, side: int) -> Shape:
     """Draw a slot in the plate's edge that reaches under the skirt: a screwdriver lifts the cup there."""
     inner, outer = side * (lay.cup[0] - PRY_UNDER), side * (lay.plate[0] + BEYOND)
-    return box(min(inner, outer), max(inner, outer), -PRY_HALF_WIDTH, PRY_HALF_WIDTH, top - PRY_DEPTH, top + BEYOND / 4)
+    ends, top = (min(inner, outer), max(inner, outer)), plate_top(spec) + BEYOND / 4
+    return box(*ends, -PRY_HALF_WIDTH, PRY_HALF_WIDTH, pry_floor(spec), top)

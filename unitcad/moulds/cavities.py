@@ -2,42 +2,94 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+import numpy as np
 from manifold3d import Manifold, OpType
 
 from unitcad.kernels.mesh import realise
+from unitcad.moulds.congruence import MARGIN, column_round, cropped, once_each
 from unitcad.moulds.plan import Plan, Step
-from unitcad.shape import box
+from unitcad.shape import Shape, box
+from unitcad.shape.column import Standing
 
 BALANCE = 1e-6
 """Largest share of a layer's volume by which cavity and layer may differ."""
+_SAME_MM = 1e-6
 
 
 class Cavity(NamedTuple):
-    """One cell of a pour: the layer as drawn with what stands in sprue and vents, and what silicone can reach there."""
+    """One cell of a pour: the layer as drawn with what stands in sprue and vents, and what silicone can reach there.
+
+    `first` is the place, among all cavities, of the first one in surroundings like this one's; what a check finds there
+    holds here.
+    """
 
     step: Step
     where: str
     drawn: Manifold
     reached: Manifold
+    first: int
 
 
-def cavities(plan: Plan, solids: Mapping[str, Manifold], segments: int) -> tuple[Cavity, ...]:
-    """Return the cavities of all pours in their order, one a cell."""
+def cavities(plan: Plan, solids: Mapping[str, Manifold], segments: int, cells: Sequence[int]) -> tuple[Cavity, ...]:
+    """Return the cavities of all pours in their order, one a cell; `cells` are equal in like surroundings."""
     filled: list[Cavity] = []
-    cured = Manifold()
     for step in plan.steps:
-        layers = [realise(shape, segments) for shape in step.layer]
-        cells = list(_cells(step, layers, _reached(step, solids, cured, segments), segments))
-        if any(abs(cell.reached.volume() - cell.drawn.volume()) > BALANCE * cell.drawn.volume() for cell in cells):
-            # Among very fine facets the union of all that touches can lose a wedge: a second opinion, piece by piece.
-            pieces = _reached(step, solids, cured, segments, one_by_one=True)
-            cells = list(_cells(step, layers, pieces, segments))
-        filled += cells
-        cured = united([cured, *layers])
+        if len(step.layer) == 1:
+            filled.append(_alone(step, solids, segments, len(filled)))
+        else:
+            filled += _gang(plan, step, solids, segments, cells, len(filled))
     return tuple(filled)
+
+
+def _alone(step: Step, solids: Mapping[str, Manifold], segments: int, first: int) -> Cavity:
+    """Return the cavity of a pour that casts one solid."""
+    tools = [solids[name] for name in step.tools]
+    others = [realise(shape, segments) for shape in _not_tools(step)]
+    layer, channels = realise(step.layer[0], segments), [realise(shape, segments) for shape in step.channels]
+    cavity = _one(layer, channels, [*tools, *others], _block_round(tools, step.top))
+    return Cavity(step, f"pour {step.index}", *cavity, first)
+
+
+def _gang(
+    plan: Plan, step: Step, solids: Mapping[str, Manifold], segments: int, cells: Sequence[int], first: int
+) -> list[Cavity]:
+    """Return the cavities of a pour's cells, worked out once for all cells in like surroundings.
+
+    A cell is looked at in a column that is a little larger than what is cast in it. Silicone that leaves the column has
+    leaked: beyond its wall all is open, as it is beyond the tools of the whole.
+    """
+    tools = [plan.tool(name).shape for name in step.tools]
+    there, others = Standing([*tools, *_not_tools(step)]), _not_tools(step)
+    layers, share = [realise(shape, segments) for shape in step.layer], len(step.channels) // len(step.layer)
+
+    def channels(i: int) -> list[Manifold]:
+        return [realise(shape, segments) for shape in step.channels[i * share : (i + 1) * share]]
+
+    def cavity(i: int) -> tuple[Manifold, Manifold]:
+        column = column_round([layers[i], *channels(i)], MARGIN, endless=True)
+        near = there.inside(column)
+        filled = [solids[step.tools[k]] for k in near if k < len(tools)]
+        filled += [realise(others[k - len(tools)], segments) for k in near if k >= len(tools)]
+        filled = [solid for whole in filled if not (solid := cropped(whole, column)).is_empty()]
+        return _one(layers[i], channels(i), filled, _block_round(filled, step.top))
+
+    # Of an array's tools the layout's cells need not be those of every pour.
+    numbers = cells if len(cells) == len(layers) else range(len(layers))
+    found: list[Cavity] = []
+    for i, (k, (drawn, reached)) in enumerate(once_each(numbers, cavity)):
+        if k != i:
+            by = np.subtract(layers[i].bounding_box()[:3], layers[k].bounding_box()[:3])
+            drawn, reached = drawn.translate(tuple(by)), reached.translate(tuple(by))
+        found.append(Cavity(step, f"pour {step.index} cell {i + 1}", drawn, reached, first + k))
+    return found
+
+
+def _not_tools(step: Step) -> list[Shape]:
+    """Return what keeps silicone out beside the tools: cured layers, what is laid in, seals."""
+    return [*step.earlier, *(body.shape for body in step.inserts), *step.seals]
 
 
 def boxes_meet(a: Manifold, b: Manifold) -> bool:
@@ -51,34 +103,43 @@ def united(solids: Iterable[Manifold]) -> Manifold:
     return Manifold.batch_boolean(list(solids), OpType.Add)
 
 
-def _reached(
-    step: Step, solids: Mapping[str, Manifold], cured: Manifold, segments: int, *, one_by_one: bool = False
-) -> list[Manifold]:
-    """Return what silicone can reach, in components: block - tools - cured layers - seals, at once or `one_by_one`.
+def _block_round(solids: Sequence[Manifold], top: float) -> Manifold:
+    """Return a block that is larger than the tools and reaches below them, so that a leak joins outside and cavity.
 
-    The block is larger than the tools and reaches below the base, so a leak joins the outside to the cavity. It ends at
-    the rim plane, where the pour is open and the blade runs, or at the lid's upper face, where sprue and vents open.
+    It ends at the rim plane, where the pour is open and the blade runs, or at the lid's upper face, where sprue and
+    vents open.
     """
-    tools = [solids[name] for name in step.tools]
-    x0, y0, z0, x1, y1, _ = Manifold.compose(tools).bounding_box()
-    block = realise(box(x0 - 5, x1 + 5, y0 - 5, y1 + 5, z0 - 5, step.top), segments)
-    laid = [body.shape for body in step.inserts]
-    filled = [*tools, cured, *(realise(shape, segments) for shape in (*laid, *step.seals))]
-    if one_by_one:
+    x0, y0, z0, x1, y1, _ = Manifold.compose(list(solids)).bounding_box()
+    # On the grid, as everything drawn is: a film above the tools would close every cavity.
+    return realise(box(x0 - 5, x1 + 5, y0 - 5, y1 + 5, z0 - 5, top), 4)
+
+
+def _one(
+    layer: Manifold, channels: Sequence[Manifold], filled: Sequence[Manifold], block: Manifold
+) -> tuple[Manifold, Manifold]:
+    """Return what is drawn to be cast in a cell, and the part of a block less what is `filled` that holds the layer."""
+    drawn = united([layer, *channels])
+    reached = _holding(layer, drawn, Manifold.batch_boolean([block, *filled], OpType.Subtract).decompose())
+    if abs(reached.volume() - drawn.volume()) > BALANCE * drawn.volume():
+        # Among very fine facets the union of all that touches can lose a wedge: a second opinion, piece by piece.
         for piece in filled:
             block = block - piece
             block.num_tri()  # evaluated here, or all of it is joined into one operation again
-        return block.decompose()
-    return Manifold.batch_boolean([block, *filled], OpType.Subtract).decompose()
+        reached = _holding(layer, drawn, block.decompose())
+    return drawn, reached
 
 
-def _cells(step: Step, layers: list[Manifold], components: list[Manifold], segments: int) -> Iterator[Cavity]:
-    """Yield each layer with the component that holds it."""
-    channels = [realise(shape, segments) for shape in step.channels]
-    share = len(channels) // len(layers)
-    for i, layer in enumerate(layers):
-        where = f"pour {step.index}" + (f" cell {i + 1}" if len(layers) > 1 else "")
-        drawn = united([layer, *channels[i * share : (i + 1) * share]])
-        near = [c for c in components if boxes_meet(c, layer)]
-        volumes = [(c ^ layer).volume() if len(near) > 1 else 1.0 for c in near]
-        yield Cavity(step, where, drawn, near[volumes.index(max(volumes))] if near else Manifold())
+def _holding(layer: Manifold, drawn: Manifold, components: Iterable[Manifold]) -> Manifold:
+    """Return the component that is the layer as drawn with its channels, or holds most of the layer; else nothing."""
+    near = [component for component in components if boxes_meet(component, layer)]
+    found = next((component for component in near if _alike(component, drawn)), None)
+    return found or max(
+        near, key=lambda component: (component ^ layer).volume() if len(near) > 1 else 1.0, default=Manifold()
+    )
+
+
+def _alike(a: Manifold, b: Manifold) -> bool:
+    """Tell whether volume and bounding box are the same: of the components of a pour one alone can be so."""
+    if abs(a.volume() - b.volume()) > BALANCE * b.volume():
+        return False
+    return all(abs(p - q) < _SAME_MM for p, q in zip(a.bounding_box(), b.bounding_box(), strict=True))

@@ -29,7 +29,7 @@ from unitcad.kernels.mesh import area_true, arrays, bounds, realise, segment_cou
 from unitcad.kernels.sections import widest
 from unitcad.moulds.base import stand
 from unitcad.moulds.blade import blade
-from unitcad.moulds.cup import cup_blank, groove, recess, skirt_end
+from unitcad.moulds.cup import cup_blank, groove, grooves, recess, skirt_end
 from unitcad.moulds.layout import layout
 from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece
 from unitcad.moulds.pour_opening import LEAST_AREA, LEAST_WIDTH, regions
@@ -78,6 +78,7 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
     base = stand(spec, lay, in_cells(standing))
     solid_of = [realise(piece, segments).trim_by_plane((0, 0, 1), 0.0) for piece in standing]
     cups, sealed, grooved = [], [], []
+    wall_kept = min(spec.moulds.least_wall_mm, spec.moulds.land_mm) - LEVEL
     for i, rim in enumerate(rims):
         blank, under = cup_blank(spec, lay, rim), Below(union(cast[: i + 1]), -BEYOND)
         slots = [_grown(Below(shape, skirt_end(spec) - BEYOND), clearance) for shape in there(i)]
@@ -90,12 +91,13 @@ def complement(spec: Spec, cast: Sequence[Shape]) -> Tooling:
             for piece, solid in zip(standing, solid_of, strict=True)
             if wall.min_gap(solid, 2 * clearance) < clearance
         ]
-        grooves = [groove(spec, dims, i, cell) for cell in lay.cells]
-        if any((realise(grooves[0], segments) ^ realise(hole, segments)).volume() > 0 for hole in slid):
-            grooves = []
-        grooved.append(bool(grooves))
+        overflow = grooves(spec, dims, lay, i)
+        own = realise(groove(spec, dims, i, replace(lay.cells[0], x=0.0, y=0.0)), segments)
+        if any(own.min_gap(realise(hole, segments), wall_kept) < wall_kept for hole in slid):
+            overflow = []
+        grooved.append(bool(overflow))
         bores, holes = in_cells([under]), in_cells(slid)
-        cup = cut(blank, [recess(spec, lay), *bores, *holes, *grooves])
+        cup = cut(blank, [recess(spec, lay), *bores, *holes, *overflow])
         pieces = _pieces(realise(cup, segments))
         if len(pieces) > 1:
             cup = Component(cup, (lay.cup[0] - spec.moulds.skirt_wall_mm / 2, 0.0, skirt_end(spec) + LEVEL))

@@ -22,7 +22,7 @@ def cup(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
     rim, radius = dims.heights[layer], dims.radii[layer]
     tools: list[Shape] = [recess(spec, lay)]
     tools += [moved(cylinder(radius, -BEYOND, rim + BEYOND), c.x, c.y) for c in lay.cells]
-    tools += [groove(spec, dims, layer, c) for c in lay.cells]
+    tools += grooves(spec, dims, lay, layer)
     tools += windows(spec, dims, lay, rim)
     return cut(cup_blank(spec, lay, rim), tools)
 
@@ -42,6 +42,33 @@ def recess(spec: Spec, lay: Layout) -> Shape:
     the ribs that centre the cup.
     """
     return cut(tapered(lay, spec.moulds.plinth_clearance_mm * SQUARE, skirt_end(spec)), rib_shapes(spec, lay))
+
+
+def grooves(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
+    """Draw the overflow grooves of all cells, neighbours joined where the web between them would be too thin."""
+    return [groove(spec, dims, layer, cell) for cell in lay.cells] + _joints(spec, dims, lay, layer)
+
+
+def _joints(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:
+    """Draw what is cut from between neighbours' grooves, as far as the web there is thinner than the least wall.
+
+    The pitch is the outermost layer's, whose grooves overlap: those of the layers inside it may just miss each other.
+    The circles are polygons within the tolerance, so that is added to the wall on both sides. The lands stay whole.
+    """
+    moulds, rim, tolerance = spec.moulds, dims.heights[layer], spec.output.tolerance_mm
+    outer = dims.radii[layer] + moulds.land_mm + moulds.groove_width_mm
+    web, wall = lay.pitch - 2 * outer, moulds.least_wall_mm + 2 * tolerance
+    if not -tolerance < web < wall:
+        return []
+    across = min(wall / 2 + tolerance, web / 2 + moulds.groove_width_mm)
+    along = math.sqrt(outer**2 - max((lay.pitch - wall) / 2, 0.0) ** 2)
+    low, high, step = rim - groove_depth_of(spec, rim), rim + BEYOND, lay.pitch / 2
+    places = {(cell.x, cell.y) for cell in lay.cells}
+    beside = [(x + step, y) for x, y in sorted(places) if (x + lay.pitch, y) in places]
+    behind = [(x, y + step) for x, y in sorted(places) if (x, y + lay.pitch) in places]
+    return [moved(box(-across, across, -along, along, low, high), x, y) for x, y in beside] + [
+        moved(box(-along, along, -across, across, low, high), x, y) for x, y in behind
+    ]
 
 
 def groove(spec: Spec, dims: Dimensions, layer: int, cell: Cell) -> Shape:

@@ -27,11 +27,12 @@ _QUARTER = math.tan(math.pi / 8)
 def way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
     """Draw the hole through a core, flared below, and the groove under the plate (whose lower face is z = `bottom`)."""
     radius, depth = spec.moulds.filament_hole_mm / 2, filament_groove(spec)
-    roof = bottom + depth
+    roof, layer = bottom + depth, spec.moulds.layer_mm
+    below = roof - math.ceil(BEYOND / 2 / layer - 1e-6) * layer  # the floor beside the groove ends a whole layer
     hole = Revolve(
         polygon(
-            (0, roof - BEYOND / 2),
-            (radius + FLARE, roof - BEYOND / 2),
+            (0, below),
+            (radius + FLARE, below),
             (radius + FLARE, roof),
             (radius, roof + FLARE),
             (radius, dims.core_height + BEYOND),

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Layout
-from unitcad.moulds.base import plate_top
 from unitcad.moulds.layout import TEXT_MARGIN
 from unitcad.shape import Cut, Shape, cut, moved
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
@@ -18,9 +17,9 @@ def engraved(blank: Shape, letters: list[Shape]) -> Shape:
     return replace(blank, tools=(*blank.tools, *letters)) if isinstance(blank, Cut) else cut(blank, letters)
 
 
-def base_label(spec: Spec, lay: Layout, label: str) -> list[Shape]:
-    """Draw the base's label on the plate's upper face, in front of the cup."""
-    stroke, depth, top = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm, plate_top(spec)
+def base_label(spec: Spec, lay: Layout, label: str, top: float) -> list[Shape]:
+    """Draw the base's label on the plate's upper face, z = `top`, in front of the cup."""
+    stroke, depth = spec.moulds.engraving_stroke_mm, spec.moulds.engraving_depth_mm
     text = engraving(label, stroke, top - depth, top + BEYOND)
     width = text_width(label, stroke)
     return [moved(text, -width / 2, (lay.cup[1] + lay.plate[1]) / 2 - lay.label_height / 2)]

@@ -37,11 +37,18 @@ GATE = 0.8
 def lid(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> Shape:
     """Draw the lid of a layer's pour (from 0), lying on the cup's rim."""
     rim, top, play = dims.heights[layer], lid_top(dims, layer), spec.moulds.plinth_clearance_mm
+    low = skirt_end(spec, dims, layer)
+    tools = [Extrude(outline(lay.cup, MARK, play), low - BEYOND, rim), *channels(spec, dims, lay, layer, beyond=BEYOND)]
+    return cut(Extrude(outline(lay.cup, MARK, play + SKIRT_WALL), low, top), tools)
+
+
+def skirt_end(spec: Spec, dims: Dimensions, layer: int) -> float:
+    """Return z of the lower edge of a lid's skirt: above the windows, a whole layer from its printed underside."""
+    rim, top, height = dims.heights[layer], lid_top(dims, layer), spec.moulds.layer_mm
     low = rim - SKIRT
     if dims.exit:
         low = max(low, window_section(spec, dims.exit, rim)[2] + SKIRT_OFF_WINDOW)
-    tools = [Extrude(outline(lay.cup, MARK, play), low - BEYOND, rim), *channels(spec, dims, lay, layer, beyond=BEYOND)]
-    return cut(Extrude(outline(lay.cup, MARK, play + SKIRT_WALL), low, top), tools)
+    return top - math.floor((top - low) / height + 1e-6) * height
 
 
 def lid_top(dims: Dimensions, layer: int) -> float:

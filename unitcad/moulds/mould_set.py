@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
     from unitcad.moulds.cavities import Cavity
+    from unitcad.moulds.congruence import Congruence
 
 _T = TypeVar("_T")
 
@@ -93,6 +94,11 @@ class MouldSet:
         return unit_bodies(self.spec) if self.blank is self else self.blank.unit
 
     @cached_property
+    def laid_later(self) -> tuple[Body, ...]:
+        """What goes into the silicone after casting, where `unit` is the silicone alone."""
+        return ()
+
+    @cached_property
     def plan(self) -> Plan:
         """Tools and pours. Raises Refusal where the moulds can't be made."""
         if self.altered:
@@ -110,20 +116,74 @@ class MouldSet:
 
     def mesh(self, body: Body) -> Manifold:
         """Return a body's mesh, kept once made."""
+        return self.mesh_of(body.shape)
+
+    def mesh_of(self, shape: Shape) -> Manifold:
+        """Return a shape's mesh in the frame of the tools, kept once made."""
         from unitcad.kernels.mesh import realise
 
-        return realise(body.shape, self.segments)
+        return realise(shape, self.segments)
+
+    @property
+    def makes(self) -> str:
+        """What comes out of the mould."""
+        return "unit"
+
+    @property
+    def source(self) -> str:
+        """The file in a result's folder that makes the result again."""
+        return "spec.toml"
+
+    @property
+    def assembly(self) -> tuple[str, ...]:
+        """How motor and circuit go into the body, or into the mould, in the design's words; () where it has none."""
+        return tuple(self.design.assembly(self.spec, self.plan.dimensions))
+
+    def pieces(self, name: str) -> int:
+        """Return the number of solids that a body of that name is drawn of."""
+        return 1
 
     def meshes(self, shapes: Iterable[Shape]) -> list[Manifold]:
         """Return the meshes of shapes in the frame of the tools: the cells of a layer, seals, channels."""
-        from unitcad.kernels.mesh import realise
-
-        return [realise(shape, self.segments) for shape in shapes]
+        return [self.mesh_of(shape) for shape in shapes]
 
     @cached_property
     def solids(self) -> dict[str, Manifold]:
         """The mesh of every body of unit and tooling by name."""
         return {body.name: self.mesh(body) for body in (*self.unit, *self.plan.tools)}
+
+    @cached_property
+    def congruence(self) -> Congruence:
+        """All tools that stand in a pour, what is cast or laid in there, and seals: which places of it are alike."""
+        from unitcad.moulds.congruence import Congruence
+
+        plan = self.plan
+        last = plan.steps[-1]
+        tools = [tool for tool in plan.tools if any(tool.name in step.tools for step in plan.steps)]
+        shapes = [tool.shape for tool in tools] + [*last.earlier, *last.layer]
+        for step in plan.steps:
+            shapes += [*step.seals, *step.channels, *(body.shape for body in step.inserts)]
+        shapes += rib_spaces(self.spec, plan.layout)
+        return Congruence(shapes, [self.solids[tool.name] for tool in tools])
+
+    @cached_property
+    def cells(self) -> tuple[int, ...]:
+        """For every cell a number that is the same for cells in like surroundings."""
+        from unitcad.moulds.congruence import MARGIN, column_round
+
+        last, count = self.plan.steps[-1], len(self.plan.layout.cells)
+        if len(last.layer) != count or count == 1:
+            # One layer joins all cells: none is like another.
+            return tuple(range(count))
+        above = [step.channels for step in self.plan.steps]
+        columns = []
+        for i in range(count):
+            shapes = [*(*last.earlier, *last.layer)[i::count]]
+            for channels in above:
+                share = len(channels) // count
+                shapes += channels[i * share : (i + 1) * share]
+            columns.append(column_round(self.meshes(shapes), MARGIN, endless=True))
+        return tuple(self.congruence.number(column) for column in columns)
 
     @cached_property
     def rib_spaces(self) -> Manifold:
@@ -136,17 +196,21 @@ class MouldSet:
     def pressed(self) -> dict[str, Manifold]:
         """The tools by name as they stand in a pour: where a cup's rib reaches into the base, it is crushed."""
         tools = {tool.name: self.solids[tool.name] for tool in self.plan.tools}
-        if not self.rib_spaces.is_empty():
-            taken = tools["base"] ^ self.rib_spaces
-            tools |= {step.cup: tools[step.cup] - taken for step in self.plan.steps}
+        if not self.crushing.is_empty():
+            tools |= {step.cup: tools[step.cup] - self.crushing for step in self.plan.steps}
         return tools
+
+    @cached_property
+    def crushing(self) -> Manifold:
+        """What of the base stands where ribs reach into it; empty without ribs."""
+        return self.solids["base"] ^ self.rib_spaces
 
     @cached_property
     def cavities(self) -> tuple[Cavity, ...]:
         """The cavities of all pours in their order, one a cell."""
         from unitcad.moulds.cavities import cavities
 
-        return cavities(self.plan, self.solids, self.segments)
+        return cavities(self.plan, self.solids, self.segments, self.cells)
 
     def once(self, name: str, make: Callable[[], _T]) -> _T:
         """Return what `make` gives, worked out once for this set under `name`."""

@@ -9,8 +9,11 @@ from unitcad.designs import Dimensions, design_of, inserts, unit_bodies
 from unitcad.designs.tooling import Cell, Layout, Tooling
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.moulds import lid
+from unitcad.moulds.base import plate_top
 from unitcad.moulds.concentric import concentric
 from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved
+from unitcad.moulds.pins import Pins
+from unitcad.moulds.removal import Removal, customary
 from unitcad.shape import Shape, Union, content_hash, moved, turned, union
 from unitcad.shape.body import Body, Kind
 from unitcad.spec import Spec
@@ -25,6 +28,7 @@ class Step:
     `inserts` are motor and circuit where they are laid in before this pour, or lie there already: of all cells.
     `rim` is z of the plane that the blade runs on, `top` where the silicone is open: the rim or the lid's upper face.
     `windows` counts the cup's passages for tongues that are closed all round; `groove`: it has an overflow groove.
+    `removals` are what is taken away once the layer has cured, in that order; what is left stands in the next pour.
     """
 
     index: int
@@ -40,6 +44,7 @@ class Step:
     windows: int = 0
     groove: bool = True
     inserts: tuple[Body, ...] = ()
+    removals: tuple[Removal, ...] = ()
 
     def __repr__(self) -> str:
         return f"Step({self.index}: {self.name}, {self.material or 'no material'}; {', '.join(self.tools)})"
@@ -60,6 +65,9 @@ class Plan:
     """All tools as assembled, the pours in their order, and the four characters that their labels end in.
 
     `dimensions` are those that the tools were drawn to; `concentric`: they tell every hole and gap in the tools.
+    `pins` centre the cups on the base in place of plinth and skirt; `genus`: the through holes of a tool, by its name,
+    where neither is told by dimensions of rings.
+    `stretches`: where the silicone stretches after casting, and by how many percent, beside what the tools ask for.
     """
 
     tools: tuple[Body, ...]
@@ -68,6 +76,9 @@ class Plan:
     label: str
     dimensions: Dimensions
     concentric: bool = True
+    stretches: tuple[tuple[str, float], ...] = ()
+    pins: Pins | None = None
+    genus: tuple[tuple[str, int], ...] = ()
 
     def __repr__(self) -> str:
         pours = f"{len(self.steps)} {'pour' if len(self.steps) == 1 else 'pours'}"
@@ -76,6 +87,10 @@ class Plan:
     def tool(self, name: str) -> Body:
         """Return the tool of that name. Raises KeyError."""
         return {tool.name: tool for tool in self.tools}[name]
+
+    def walled(self, step: Step) -> str:
+        """Return the name of the piece that has a pour's wall and rim: its cup, else the piece that stays."""
+        return (self.standing(step, "cup") or self.standing(step, "base"))[0].name
 
     def of_kind(self, kind: Kind) -> tuple[Body, ...]:
         """Return the tools of a kind."""
@@ -96,18 +111,21 @@ def plan(spec: Spec) -> Plan:
     made = _tooling(spec, layers)
     dims, lay = made.dimensions, made.layout
     # Material variants share pieces: the label is of geometry alone, drawn before there is a label on it.
-    label = content_hash(Union((*(tool.shape for tool in made.tools), *layers)))[:4].upper()
+    # No C in it: "C9" in a corner would read as the ninth cup's.
+    label = content_hash(Union((*(tool.shape for tool in made.tools), *layers))).replace("c", "")[:4].upper()
     tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in made.tools)
     cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
     laid_in, laid = design_of(spec).laid_in, inserts(spec)
     laid = tuple(replace(b, shape=union(placed(b.shape, dims, cell) for cell in lay.cells)) for b in laid)
     tails = sum(len(cell.sides) for cell in lay.cells) if dims.exit else 0
+    pours = range(1, len(layers) + 1)
+    standing = [[tool for tool in tools if tool.kind != "blade" and tool.step in (None, pour)] for pour in pours]
     steps = tuple(
         Step(
             index=i + 1,
             name=f"layer{i + 1}",
             material=layer.material,
-            tools=tuple(tool.name for tool in tools if tool.kind != "blade" and tool.step in (None, i + 1)),
+            tools=tuple(tool.name for tool in standing[i]),
             layer=cast[i],
             earlier=tuple(shape for earlier in cast[:i] for shape in earlier),
             seals=made.seals[i],
@@ -117,6 +135,7 @@ def plan(spec: Spec) -> Plan:
             windows=tails if dims.exit and dims.exit.high < dims.heights[i] else 0,
             groove=made.grooves[i] if made.grooves else True,
             inserts=laid if i + 1 >= laid_in else (),
+            removals=tuple(customary(standing[i], last=i + 1 == len(layers))),
         )
         for i, layer in enumerate(spec.layers)
     )
@@ -171,7 +190,7 @@ def _engraved(tool: Body, spec: Spec, dims: Dimensions, lay: Layout, label: str)
     """Return the tool with the set's label, and a cup with the numbers of its cells."""
     corners = label[:2], label[2:]
     if tool.kind == "base":
-        letters = base_label(spec, lay, f"B{label}")
+        letters = base_label(spec, lay, f"B{label}", plate_top(spec))
     elif tool.kind == "cup" and tool.step:
         rim = dims.heights[tool.step - 1]
         letters = corner_labels(spec, lay, rim, (f"C{tool.step:X}", *corners)) + cell_numbers(spec, lay, rim)

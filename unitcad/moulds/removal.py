@@ -1,38 +1,30 @@
-"""The order in which pieces are removed, and the direction of each."""
+"""What is taken away after a pour: a piece and its way. A step's removals stand in their order."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from unitcad.moulds.plan import Plan
+from unitcad.shape.body import Body
+
+CAST = "cast"
+"""Stands for the silicone of all pours so far, bonded, in the place of a tool's name."""
 
 
 @dataclass(frozen=True)
 class Removal:
-    """One removal after pour `step`: the piece, its direction, and the tools that stay.
+    """One movement: a tool's name, or `CAST`, and the signed axis along which it is taken away."""
 
-    The layers that are there stay too. The unit is peeled off the core last; that is C310's.
-    """
-
-    step: int
     piece: str
     direction: tuple[int, int, int]
-    stays: tuple[str, ...]
 
 
-def removals(plan: Plan) -> Iterator[Removal]:
-    """Yield every movement in its order: lid, tongues, cup, a pour at a time; at the end the filaments."""
-    for step in plan.steps:
-        there = list(step.tools)
-        pieces = [tool for kind in ("lid", "tongue", "cup") for tool in plan.standing(step, kind)]
-        for piece in pieces:
-            there.remove(piece.name)
-            if piece.removal:
-                yield Removal(step.index, piece.name, piece.removal, tuple(there))
-    last = plan.steps[-1]
-    there = [tool.name for kind in ("base", "stub") for tool in plan.standing(last, kind)]
-    for piece in plan.standing(last, "stub"):
-        there.remove(piece.name)
-        if piece.removal:
-            yield Removal(last.index, piece.name, piece.removal, tuple(there))
+def customary(standing: Sequence[Body], *, last: bool) -> Iterator[Removal]:
+    """Yield the removals of moulds that a unit is peeled off: lid, tongues, cup; after the last pour the filaments.
+
+    `standing` are the tools of the pour. A piece without a way of its own stays. The peel itself is C310's.
+    """
+    for kind in ("lid", "tongue", "cup", *(("stub",) if last else ())):
+        for piece in standing:
+            if piece.kind == kind and piece.removal:
+                yield Removal(piece.name, piece.removal)

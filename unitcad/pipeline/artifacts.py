@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from unitcad.cache import Store, digest
 from unitcad.moulds.mould_set import MouldSet
@@ -21,6 +21,7 @@ from unitcad.pipeline.bodies import (
     groups,
     is_printed,
     joint_key,
+    step_asked,
     step_content,
     stl_content,
     threemf_content,
@@ -29,10 +30,14 @@ from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.shape.body import Body
 from unitcad.spec import to_toml
+from unitcad.spec.asked import Format
+
+if TYPE_CHECKING:
+    from unitcad.export.step_process import StepProcess
 
 Output = Literal["unit", "moulds", "estimate", "casting"]
 OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
-FORMATS = ("step", "stl", "3mf", "svg", "png", "glb")
+FORMATS: tuple[Format, ...] = ("step", "stl", "3mf", "svg", "png", "glb")
 GEOMETRIC: tuple[Output, ...] = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
 CASTING = ("bom.csv", "casting.json", "casting.md")
@@ -61,6 +66,15 @@ def shared(moulds: MouldSet, only: Sequence[str], forms: Sequence[str]) -> list[
     table = [*_of_bodies(moulds, only), *_drawings(moulds, only), *(_pictures(moulds, only) if "png" in forms else ())]
     asked = (artifact for artifact in table if artifact.form in ("", *forms))
     return sorted(asked, key=lambda artifact: STAGES.index(artifact.stage))
+
+
+def begun(
+    steps: Sequence[Artifact], moulds: MouldSet, only: Sequence[str], process: StepProcess | None
+) -> list[Artifact]:
+    """Return STEP files that a process is asked for at once; it makes them while other files are made here."""
+    by_path = {f"{group.together}.step": group for group in groups(moulds, only)}
+    made = {one.path: step_asked(by_path[one.path].bodies, by_path[one.path].name, process) for one in steps}
+    return [replace(one, make=made[one.path]) for one in steps]
 
 
 def _of_bodies(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,8 @@ from unitcad.shape.body import Body
 
 if TYPE_CHECKING:
     import numpy as np
+
+    from unitcad.export.step_process import StepProcess
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,23 @@ def step_content(bodies: Sequence[Body], name: str) -> bytes:
         path = Path(scratch) / f"{name}.step"
         step.write(path, bodies, name)
         return path.read_bytes()
+
+
+def step_asked(bodies: Sequence[Body], name: str, process: StepProcess | None) -> Callable[[], bytes]:
+    """Ask a process for the STEP of an assembly at once; return what gives it, made here where the process is lost."""
+    if process is None:
+        return partial(step_content, bodies, name)
+    from unitcad.export.step_process import Lost
+
+    asked = process.ask(bodies, name)
+
+    def made() -> bytes:
+        try:
+            return asked.result()
+        except Lost:
+            return step_content(bodies, name)
+
+    return made
 
 
 def record(moulds: MouldSet, body: Body) -> PartRecord:

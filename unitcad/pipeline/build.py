@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from unitcad import files
 from unitcad.cache import MemoryStore, MissingContent, Store
@@ -14,11 +16,17 @@ from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import FORMATS, OUTPUTS
 from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import Manifest, failed_codes
-from unitcad.pipeline.product import checked_outputs, make, possible_outputs
-from unitcad.pipeline.stages import Say, Stages
+from unitcad.pipeline.product import Product, checked_outputs, make, possible_outputs
+from unitcad.pipeline.stages import Say, Stages, Take
 from unitcad.pipeline.versions import code_version
 from unitcad.spec import Spec, with_formats
+from unitcad.spec.asked import Format
 
+if TYPE_CHECKING:
+    from unitcad.export.step_process import StepProcess
+
+Maker = Callable[[Store, Stages], Product]
+"""Makes a product whole, nothing written yet."""
 TRIES = 5
 """How often a result is made when what it shares vanishes from the cache meanwhile."""
 
@@ -43,27 +51,59 @@ def build(
     only: Sequence[str] = OUTPUTS,
     check: bool = True,
     say: Say = lambda message: None,
+    take: Take | None = None,
+    step: StepProcess | None = None,
     store: Store | None = None,
 ) -> Built:
     """Build a spec's variant into `out`/<slug>-<hash12>.
 
     `only` is a choice of OUTPUTS; without `check` mould checks and mesh checks are left out. Formats and outputs that
-    the folder has from before are made again beside the new ones. What others have made already comes out of `store`.
+    the folder has from before are made again beside the new ones. What others have made already comes out of `store`;
+    `take` gets what is made anew, while the rest is still being made. `step` writes STEP files beside the rest.
     Raises Refusal or UnitcadError before anything is written; a failed check is no exception, see `Built.ok`.
     """
-    only = possible_outputs(spec, checked_outputs(only))
+    return build_subject(
+        out,
+        folders.subject(spec),
+        possible_outputs(spec, checked_outputs(only)),
+        spec.output.formats,
+        check,
+        lambda formats, outputs, checked: partial(make, with_formats(spec, formats), outputs, checked),
+        Stages(say, take, step),
+        store,
+    )
+
+
+def build_subject(
+    out: Path,
+    subject: folders.Subject,
+    only: Sequence[str],
+    formats: Sequence[str],
+    check: bool,
+    maker: Callable[[tuple[Format, ...], tuple[str, ...], bool], Maker],
+    stages: Stages,
+    store: Store | None,
+) -> Built:
+    """Build a subject into its folder below `out`, beside what that has from before; `maker` gives what makes it.
+
+    Raises as `build`.
+    """
     if out.exists() and not out.is_dir():
         raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o")
-    folder = out / folders.folder_name(spec)
+    folder = out / subject.folder_name
     store = store or MemoryStore()
     folders.clear_leftovers(out)
     while True:
-        earlier = folders.earlier(folder, spec)
-        wanted = _of_formats(spec, (*earlier.formats, *spec.output.formats))
-        outputs = checked_outputs((*only, *earlier.outputs))
+        earlier = folders.earlier(folder, subject)
+        wanted: tuple[Format, ...] = tuple(form for form in FORMATS if form in (*earlier.formats, *formats))
+        made = maker(wanted, checked_outputs((*only, *earlier.outputs)), check or earlier.checked)
         try:
             return build_into(
-                folder, wanted, only=outputs, check=check or earlier.checked, store=store, say=say, earlier=earlier
+                folder,
+                made,
+                store,
+                stages,
+                lambda there=earlier: folders.earlier(folder, subject) == there,
             )
         except _Changed:  # another build has put a result there meanwhile: what it has is made too
             continue
@@ -75,29 +115,26 @@ class _Changed(Exception):
 
 def build_into(
     folder: Path,
-    spec: Spec,
-    *,
-    only: Sequence[str],
-    check: bool,
+    maker: Maker,
     store: Store,
-    say: Say = lambda message: None,
-    earlier: folders.Earlier | None = None,
+    wanted: Stages,
+    unchanged: Callable[[], bool] = lambda: True,
 ) -> Built:
-    """Build into a folder, in place of what it holds; files of the old result that the new one lacks stay.
+    """Put what `maker` makes into a folder, in place of what it holds; files that the new result lacks stay.
 
-    Raises _Changed where the folder does not hold `earlier` any more.
+    `wanted` shows the stages and takes the files. Raises _Changed where the folder is not `unchanged` any more.
     """
     for left in reversed(range(TRIES)):
-        stages, before = Stages(say), Counter(store.counts)
+        stages, before = Stages(wanted.say, wanted.take, wanted.step), Counter(store.counts)
         try:
-            product = make(spec, only, check, store, stages)
+            product = maker(store, stages)
             timings = {
                 "code": code_version(),
                 "seconds": {stage: round(seconds, 4) for stage, seconds in stages.seconds.items()},
                 "store": dict(sorted((store.counts - before).items())),
             }
             with folders.replacing(folder) as fresh:
-                if earlier is not None and folders.earlier(folder, spec) != earlier:
+                if not unchanged():
                     raise _Changed
                 product.place(fresh, store)
                 files.write_new(fresh / "timings.json", json_bytes(timings))
@@ -106,7 +143,3 @@ def build_into(
             if not left:
                 raise
     raise AssertionError
-
-
-def _of_formats(spec: Spec, wanted: Sequence[str]) -> Spec:
-    return with_formats(spec, tuple(form for form in FORMATS if form in wanted))

@@ -7,10 +7,11 @@ import os
 import re
 import shutil
 import stat
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from unitcad import cache, files
 from unitcad.cache import digest
@@ -28,36 +29,64 @@ BENCH = "bench.html"
 """The bench page of a variant's procedure, made beside the page."""
 
 
+@dataclass(frozen=True)
+class Subject:
+    """What a folder is the result of: its name and hash, the file that holds it, and that file's hash and formats."""
+
+    kind: str
+    name: str
+    hash: str
+    file: str
+    read: Callable[[dict[str, Any]], tuple[str, tuple[str, ...]]]
+
+    @property
+    def folder_name(self) -> str:
+        """Return <slug>-<hash12>, at most 63 characters."""
+        slug = re.sub(r"[^a-z0-9]+", "-", self.name.lower()).strip("-")[:50].rstrip("-") or "unit"
+        return f"{slug}-{self.hash[:12]}"
+
+
+def subject(spec: Spec) -> Subject:
+    """Return a spec as the subject of a result."""
+    return Subject("spec", spec.name, spec_hash(spec), "spec.toml", _spec_there)
+
+
+def _spec_there(data: dict[str, Any]) -> tuple[str, tuple[str, ...]]:
+    from unitcad.validation import from_data
+
+    there = from_data(data)
+    return spec_hash(there), tuple(there.output.formats)
+
+
 def folder_name(spec: Spec) -> str:
     """Return <slug>-<hash12>, at most 63 characters; the hash covers the effective spec without name and formats."""
-    slug = re.sub(r"[^a-z0-9]+", "-", spec.name.lower()).strip("-")[:50].rstrip("-") or "unit"
-    return f"{slug}-{spec_hash(spec)[:12]}"
+    return subject(spec).folder_name
 
 
-def earlier_formats(folder: Path, spec: Spec, *, ours: bool = False) -> tuple[str, ...]:
+def earlier_formats(folder: Path, of: Spec | Subject, *, ours: bool = False) -> tuple[str, ...]:
     """Return the formats that an existing result has. `ours`: it is known to be a result, perhaps damaged since.
 
     Raises UnitcadError for a folder that holds something else: no spec.toml of ours, or another spec.
     """
+    wanted = of if isinstance(of, Subject) else subject(of)
     expect_folder(folder)
     if not folder.exists():
         return ()
-    file = folder / "spec.toml"
+    file = folder / wanted.file
     if not file.is_file():
         if ours:
             return ()
-        raise UnitcadError(f"{folder}: is not a result of unitcad (no spec.toml); choose another folder with -o")
+        raise UnitcadError(f"{folder}: is not a result of unitcad (no {wanted.file}); choose another folder with -o")
     try:
-        from unitcad.validation import from_data
-
-        there = from_data(read_toml(file, links=False))
+        there, formats = wanted.read(read_toml(file, links=False))
     except UnitcadError as error:
         if ours:
             return ()
-        raise UnitcadError(f"{folder}: its spec.toml can't be read ({error}); move the folder away") from None
-    if spec_hash(there) != spec_hash(spec):
-        raise UnitcadError(f"{folder}: holds the result of another spec (spec.toml differs); move it away or use -o")
-    return tuple(there.output.formats)
+        raise UnitcadError(f"{folder}: its {wanted.file} can't be read ({error}); move the folder away") from None
+    if there != wanted.hash:
+        other = f"{folder}: holds the result of another {wanted.kind} ({wanted.file} differs)"
+        raise UnitcadError(f"{other}; move it away or use -o")
+    return formats
 
 
 @dataclass(frozen=True)
@@ -69,9 +98,9 @@ class Earlier:
     checked: bool = False
 
 
-def earlier(folder: Path, spec: Spec) -> Earlier:
+def earlier(folder: Path, of: Spec | Subject) -> Earlier:
     """Return what is in a folder already. Raises UnitcadError where that is no result of this spec."""
-    formats = earlier_formats(folder, spec)
+    formats = earlier_formats(folder, of)
     try:
         manifest = files.read_json(folder / "manifest.json", links=False)
         outputs = tuple(name for name in manifest["outputs"] if isinstance(name, str))

@@ -18,7 +18,7 @@ from unitcad.cache import Store, digest
 from unitcad.mould_checks.finding import FindingRecord
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import artifacts
-from unitcad.pipeline.artifacts import GEOMETRIC, geometry_key
+from unitcad.pipeline.artifacts import GEOMETRIC, Artifact, geometry_key
 from unitcad.pipeline.bodies import body_key, groups, record
 from unitcad.pipeline.manifest_records import BodyFile, MeshFinding, MeshFindings, PartRecord, PourRecord
 from unitcad.pipeline.stages import Stages
@@ -79,21 +79,30 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, stag
     with stages("plan"):
         bodies = [body for group in groups(moulds, only) for body in group.bodies]
         label = moulds.plan.label if pours else None
+        table = artifacts.shared(moulds, only, forms)
+        steps = artifacts.begun([artifact for artifact in table if artifact.form == "step"], moulds, only, stages.step)
     parts: dict[str, PartRecord] = {}
     with stages("meshes"):
         for body in bodies:
             part: PartRecord = store.data(body_key(moulds, body, "record"), lambda body=body: record(moulds, body))
             parts[body.name] = {**part, "files": {}}
     files: dict[str, str] = {}
-    for artifact in artifacts.shared(moulds, only, forms):
-        with stages(artifact.stage):
-            files[artifact.path] = store.file(artifact.key(), artifact.make)
-        for name in artifact.bodies:
-            parts[name]["files"][artifact.form] = BodyFile(path=artifact.path, sha256=files[artifact.path])
+
+    def put(table: Sequence[Artifact]) -> None:
+        for artifact in table:
+            with stages(artifact.stage):
+                files[artifact.path] = store.file(artifact.key(), artifact.make)
+            if stages.take:
+                stages.take(artifact.path, store.content(files[artifact.path]))
+            for name in artifact.bodies:
+                parts[name]["files"][artifact.form] = BodyFile(path=artifact.path, sha256=files[artifact.path])
+
+    put([artifact for artifact in table if artifact.form != "step"])
     with stages("mould checks"):
         findings, strains = _mould_findings(moulds, only, store) if check else ([], [])
     with stages("check"):
         mesh_findings = _mesh_findings(moulds, parts, store) if check else []
+    put(steps)
     return {
         "label": label,
         "air_ring_mm": round(moulds.dimensions.air_ring, 9),

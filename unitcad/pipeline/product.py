@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -51,12 +51,15 @@ class Product:
 def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
     """Return everything asked for of a spec, nothing written yet. Raises Refusal where the moulds can't be made."""
     moulds, possible = MouldSet(spec), possible_outputs(spec, only)
+    if "estimate" in possible and stages.step:  # while the other process loads OCCT
+        with stages("estimate"):
+            artifacts.estimated(moulds, store)
     shape = geometry(moulds, possible, check, store, stages)
     drawn, no_pictures = _pictures(moulds, possible, store, stages)
     shared = {**shape["files"], **drawn}
     volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
     own: dict[str, bytes] = {}
-    for artifact in artifacts.own(moulds, possible, volumes, _printed_mm3(shape), store):
+    for artifact in artifacts.own(moulds, possible, volumes, printed_mm3(shape["parts"]), store):
         with stages(artifact.stage):
             own[artifact.path] = artifact.make()
     listed = {path: FileRecord(bytes=len(content), sha256=digest(content)) for path, content in own.items()}
@@ -78,7 +81,7 @@ def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Sta
         },
         parts=[{**part, "material": _material(spec, part)} for part in shape["parts"]],
         steps=[{**step, "material": spec.layers[step["index"] - 1].material} for step in shape["steps"]],
-        laws=_mould_findings(spec, shape),
+        laws=mould_findings(spec, shape),
         estimate=_estimate(moulds, store) if "estimate" in possible else None,
         check=mesh_findings(shape["check"]),
         pictures=list(drawn),
@@ -123,12 +126,12 @@ def _pictures(
         return {}, [("pictures", str(error))]
 
 
-def _printed_mm3(shape: Geometry) -> float:
+def printed_mm3(parts: Iterable[PartRecord]) -> float:
     """Return the volume of all printed tools."""
-    return sum(part["volume_mm3"] for part in shape["parts"] if part["role"] == "tool" and part["made"] == "printed")
+    return sum(part["volume_mm3"] for part in parts if part["role"] == "tool" and part["made"] == "printed")
 
 
-def _mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
+def mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
     """Return the geometry's mould findings, and its strains against this variant's silicones, by code."""
     if not shape["strains"]:
         return shape["laws"]

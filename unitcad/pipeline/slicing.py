@@ -1,42 +1,67 @@
-"""slicer.json: print time and filament of a built folder's tools, by PrusaSlicer where it is installed."""
+"""slicer.json: print time and filament of a built folder's tools, by PrusaSlicer."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from unitcad import files
-from unitcad.errors import UnitcadError
+from unitcad.errors import Missing, Refusal, UnitcadError
 from unitcad.export import slicer
 from unitcad.pipeline.folder import held
 from unitcad.pipeline.manifest_records import Manifest
-from unitcad.pipeline.stages import Say
+from unitcad.pipeline.stages import Say, Take
 from unitcad.spec import Spec, printer_of
 
 SLICED = "slicer.json"
 
 
-def slice_tools(folder: Path, manifest: Manifest, spec: Spec, say: Say = lambda message: None) -> str:
-    """Slice the folder's tools into slicer.json and return in a sentence what they take; "" where nothing is to do.
+def check_slicing(spec: Spec, only: Sequence[str]) -> None:
+    """Raise UnitcadError, before the work, where nothing of a spec can be sliced."""
+    if slicer.program() is None:
+        raise Missing("--slice: PrusaSlicer is not installed, or not on the path (prusa-slicer)")
+    if "moulds" not in only:
+        raise Refusal("--only", ",".join(only), "has no moulds, which --slice is for", ",".join((*only, "moulds")))
+    if "stl" not in spec.output.formats:
+        raise Refusal("output.formats", list(spec.output.formats), "has no stl, which --slice reads")
+    printer = printer_of(spec)
+    if printer.technology.value != "fdm":
+        raise Refusal("moulds.printer", printer.name, "prints no filament: leave out --slice", "fdm-0.4")
 
-    Pieces whose STL is that of the slicer.json that is there are not sliced again. A file that the slicer refuses is
-    named and no error, since another slicer may take it.
+
+def begin(spec: Spec, folder: Path, say: Say = lambda message: None) -> slicer.Pieces:
+    """Return the slicing of a spec's pieces; those that the folder's slicer.json has are not sliced again."""
+    return slicer.Pieces(printer_of(spec), _earlier(folder / SLICED), say)
+
+
+def take(pieces: slicer.Pieces) -> Take:
+    """Return what `build` gives its files to, so that tools are sliced while the rest is made."""
+
+    def taken(path: str, content: bytes) -> None:
+        folder, _, name = path.rpartition("/")
+        if folder == "moulds" and name.endswith(".stl"):
+            pieces.add(name, content)
+
+    return taken
+
+
+def finish(pieces: slicer.Pieces, folder: Path, manifest: Manifest) -> str:
+    """Write the slicer.json of a built folder's tools and return in a sentence what they take.
+
+    A file that the slicer refuses is named and no error, since another slicer may take it.
     """
     tools = [
         folder / part["files"]["stl"]["path"]
         for part in manifest["parts"]
-        if part["role"] == "tool" and "stl" in part["files"]
+        if part["role"] == "tool" and "stl" in part["files"] and part["files"]["stl"]["path"].startswith("moulds/")
     ]
-    if not tools:
-        return ""
     with held(folder):
         try:
-            report = slicer.report(tools, printer_of(spec), _earlier(folder / SLICED), say)
+            report = pieces.report({path.name: path.read_bytes() for path in tools})
         except UnitcadError as error:
             return f"not sliced: {error}"
-        if report is None:
-            return ""
         files.write(folder / SLICED, (json.dumps(report, indent=2) + "\n").encode())
     if repaired := [piece["file"] for piece in report["pieces"] if piece["repaired"]]:
         return f"{report['slicer']} had to repair {', '.join(repaired)}"

@@ -1,4 +1,4 @@
-"""The time that each stage of a build takes, and the callback that shows it."""
+"""The time that each stage of a build takes, and the callbacks that show it and take the files as they come."""
 
 from __future__ import annotations
 
@@ -6,15 +6,26 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from unitcad.export.step_process import StepProcess
 
 Say = Callable[[str], None]
+Take = Callable[[str, bytes], None]
+"""Takes a file that unit and moulds share with other variants: its path in the folder and its content."""
 
 
 @dataclass
 class Stages:
-    """`with stages("meshes"): ...` calls `say`, once a stage, and adds to `seconds`."""
+    """`with stages("meshes"): ...` calls `say`, once a stage, and adds to `seconds`; `take` gets files as they come.
+
+    step: the process that writes STEP files; without one they are written in this process.
+    """
 
     say: Say = lambda stage: None
+    take: Take | None = None
+    step: StepProcess | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextlib.contextmanager

@@ -5,7 +5,6 @@ One HTML file as the report is, made from casting.json, the pictures of the step
 
 from __future__ import annotations
 
-import base64
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +17,12 @@ from unitcad.pipeline.folder import BENCH
 from unitcad.pipeline.manifest_records import Manifest
 from unitcad.report.html_page import html_page
 from unitcad.report.records import expect
+from unitcad.report.step_pictures import step_pictures
 from unitcad.report.viewer_models import spec_in
 from unitcad.spec import spec_hash, to_data
 
 PROGRAMS = ("dom.js", "glb.js", "bench.js")
 STYLES = ("app/page.css", "app/bench.css")
-LARGEST_PICTURE = 1_000_000
-"""Bytes of a step's picture, at most."""
-MOST_PICTURES = 500
-PNG = b"\x89PNG\r\n\x1a\n"
 
 
 class ListedStep(msgspec.Struct):
@@ -67,6 +63,7 @@ class ListedItem(msgspec.Struct):
     item: str
     quantity: float
     unit: str
+    made: str
     note: str
 
 
@@ -111,7 +108,7 @@ def write_bench(folder: Path) -> Path | None:
         "room_c": spec.casting.room_c if spec else None,
         "scale_g": spec.casting.scale_resolution_g if spec else None,
         "record": {"format": FORMAT, "version": 1, "ending": ENDING},
-        "pictures": _pictures(folder, casting),
+        "pictures": step_pictures(folder, _paths(casting)),
         "slicer": _slicer(folder),
     }
     target = folder / BENCH
@@ -126,22 +123,9 @@ def _hash(folder: Path) -> str:
     return str(manifest["hash"])
 
 
-def _pictures(folder: Path, casting: CastingFile) -> dict[str, str]:
-    """Return the pictures that steps name, as data; one that is not there, or no PNG in the folder, is left out."""
-    steps = [*casting.preparation, *(s for pour in casting.pours for s in pour.steps)]
-    steps += [*casting.release, *casting.assembly]
-    read: dict[str, str] = {}
-    for path in list(dict.fromkeys(step.picture for step in steps if step.picture))[:MOST_PICTURES]:
-        parts = Path(path).parts
-        if Path(path).is_absolute() or ".." in parts or any((folder / p).is_symlink() for p in Path(path).parents):
-            continue
-        try:
-            content = files.read(folder / path, largest=LARGEST_PICTURE, links=False)
-        except UnitcadError:
-            continue
-        if content.startswith(PNG):
-            read[path] = f"data:image/png;base64,{base64.b64encode(content).decode()}"
-    return read
+def _paths(casting: CastingFile) -> list[str]:
+    steps = [*casting.preparation, *(step for pour in casting.pours for step in pour.steps)]
+    return [step.picture for step in (*steps, *casting.release, *casting.assembly)]
 
 
 def _slicer(folder: Path) -> dict[str, Any] | None:

@@ -42,14 +42,20 @@ def html_page(
     return document(title, sheets, body, scripts)
 
 
-def document(title: str, sheets: Sequence[str], body: Sequence[str], scripts: Sequence[str] = ()) -> str:
-    """Return the HTML of a page that contacts nothing and runs `scripts` alone; `body` is markup, escaped already."""
+def document(
+    title: str, sheets: Sequence[str], body: Sequence[str], scripts: Sequence[str] = (), connects: bool = False
+) -> str:
+    """Return the HTML of a page that runs `scripts` alone; `body` is markup, escaped already.
+
+    It contacts nothing, or with `connects` the server that it came from.
+    """
     policy = "; ".join(
         [
             "default-src 'none'",
             *(["script-src " + " ".join(_hash(script) for script in scripts)] if scripts else []),
             "style-src " + " ".join(_hash(style) for style in sheets),
             "img-src data:",
+            *(["connect-src 'self'"] if connects else []),
             "base-uri 'none'",
             "form-action 'none'",
         ]

@@ -15,6 +15,7 @@ from unitcad.errors import UnitcadError
 from unitcad.files import write
 from unitcad.pipeline.folder import BENCH, PAGE
 from unitcad.report import read_results
+from unitcad.report.array_page import is_array_folder, write_array_page
 from unitcad.report.bench_page import write_bench
 from unitcad.report.html_page import asset, html_page
 from unitcad.report.pool import Pool
@@ -25,7 +26,7 @@ from unitcad.spec import Spec
 VENDORED = ("three.min.js", "uplot.min.js")
 PROGRAMS = (
     "dom.js", "glb.js", "viewer.js", "controls.js", "plots.js", "estimate.js", "sections.js", "casting.js",
-    "filters.js", "rows.js", "compare.js", "table.js", "main.js",
+    "filters.js", "rows.js", "compare.js", "table.js", "batch.js", "main.js",
 )  # fmt: skip
 MOST_DAMAGED = 20
 """Damaged results that are named when a page is written; the page names all."""
@@ -37,6 +38,12 @@ def write_report(folder: Path, warn: Callable[[str], None] = lambda line: None) 
 
     `warn` gets lines that say which results are damaged, and why. Raises UnitcadError where the folder holds none.
     """
+    if is_array_folder(folder):
+        for unit in sorted((folder / "units").glob("*")):
+            if unit.is_dir() and not unit.is_symlink() and read_results.is_variant(unit):
+                write_report(unit, warn)
+        _write_bench(folder, warn)
+        return write_array_page(folder, warn)
     if folder.is_dir() and read_results.is_variant(folder):
         _write_bench(folder, warn)
     data, title, damage = page_data(folder)
@@ -60,10 +67,10 @@ def _write_bench(folder: Path, warn: Callable[[str], None]) -> None:
         warn(f"warning: no {BENCH}: {error}")
 
 
-def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
+def page_data(folder: Path, with_models: bool = True) -> tuple[dict[str, Any], str, dict[str, str]]:
     """Collect the page's data, its title, and why a result is damaged by its folder's name.
 
-    Raises UnitcadError where the folder holds no result.
+    Geometries are made only `with_models`. Raises UnitcadError where the folder holds no result.
     """
     if not folder.is_dir():
         raise UnitcadError(f"{folder}: is not a folder")
@@ -94,7 +101,7 @@ def page_data(folder: Path) -> tuple[dict[str, Any], str, dict[str, str]]:
             batch, records, {name: why for name, why in damaged.items() if name != "batch.json"}
         )
         title = f"{(batch or {}).get('name') or folder.resolve().name}: {counted(len(table.rows), 'variant')}"
-    models = _models(records, specs)
+    models = _models(records, specs) if with_models else {}
     pool = Pool()
     data = {
         "title": title,

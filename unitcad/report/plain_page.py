@@ -23,5 +23,11 @@ def drawing(svg: str, alt: str, narrow: str = "") -> str:
     return f'<picture><source media="(max-width: 600px)" srcset="{_data(narrow)}">{image}</picture>'
 
 
+def picture(png: bytes, alt: str) -> str:
+    """Return a PNG as an image in the page, with what it shows in words."""
+    data = base64.b64encode(png).decode()
+    return f'<img class="drawing" alt="{html.escape(alt)}" src="data:image/png;base64,{data}">'
+
+
 def _data(svg: str) -> str:
     return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"

@@ -22,6 +22,7 @@ from unitcad.files import TEMPORARY
 from unitcad.pipeline.folder import PAGE
 from unitcad.pipeline.manifest_records import Manifest
 from unitcad.report.records import BatchFile, ResultsTable, VariantRecord, expect
+from unitcad.report.step_pictures import step_pictures
 from unitcad.report.viewer_models import model_key, spec_in
 from unitcad.spec import Spec, to_data
 
@@ -37,6 +38,8 @@ LARGEST_DRAWING = 4_000_000
 """Bytes of a drawing, at most."""
 MOST_CASTS = 200
 """Cast records of a variant that the page shows, at most."""
+STEPS = "steps/"
+"""Where the pictures of the procedure's steps lie in a variant's folder."""
 MOST_FILES = 2000
 """Files of a variant that the page lists, at most."""
 
@@ -71,6 +74,8 @@ def read_variant(folder: Path, root: Path) -> tuple[VariantRecord, Spec | None]:
         manifest=manifest,
         **tables,
         drawings={path: text for path, text in read.items() if text is not None},
+        # A page of many variants would be too large with all of them; bench.html of each has them.
+        pictures=step_pictures(folder, (p for p in listed if p.startswith(STEPS))) if folder == root else {},
         casts=[cast for cast in casts if cast is not None],
         files=[(path, (folder / path).lstat().st_size) for path in listed if path not in (PAGE, TIMINGS)],
         damaged=damage,

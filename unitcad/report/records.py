@@ -44,7 +44,8 @@ class BatchFile(Struct):
 class VariantRecord(Struct, kw_only=True):
     """A variant on the page; a file that its folder lacks, or that can't be read, is None.
 
-    `casts` are the cast records in it, `drawings` SVG by path, `files` (path, bytes); `damaged` says what can't be
+    `casts` are the cast records in it, `drawings` SVG by path, `pictures` of the procedure's steps as data by path, for
+    a page of one variant alone, `files` (path, bytes); `damaged` says what can't be
     read; `model` is the key of the geometry, and `no_model` says why there is none.
     """
 
@@ -54,6 +55,7 @@ class VariantRecord(Struct, kw_only=True):
     casting: dict[str, Any] | None
     slicer: dict[str, Any] | None
     drawings: dict[str, str]
+    pictures: dict[str, str]
     casts: list[dict[str, Any]]
     files: list[tuple[str, int]]
     damaged: list[str]

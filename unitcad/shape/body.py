@@ -33,7 +33,8 @@ class Body:
     `name` comes from role and layer number alone ("layer1", "cup2", "base"), never from a material or a variant, since
     files of equal bodies are shared. `made` is "cast", "printed", "cut" (from film or filament) or "bought".
     `step` is the pour that it belongs to. `upside_down`: how it lies on the printer's bed, turned by 180 degrees about
-    x. `removal` is the signed axis along which a piece of tooling is taken away, None for one that stays.
+    x. `removal` is the signed axis along which a piece of tooling is taken away, None for one that stays; the
+    plan has the order.
     """
 
     name: str

@@ -12,6 +12,8 @@ GRID_PER_MM = 1024
 """Lengths live on a grid of 1/1024 mm: sums and differences are exact in binary, so faces meant to coincide do."""
 
 Vertex = tuple[float, float, float]
+_BLOCK = 256
+"""Sides of a polygon that are compared with all others at once."""
 
 
 def mm(length: float) -> float:
@@ -176,22 +178,26 @@ def _crosses_itself(polygon: np.ndarray) -> bool:
     """Return whether two sides of a polygon meet other than neighbours in their common vertex."""
     a, b = polygon, np.roll(polygon, -1, axis=0)
     n = len(a)
-    i, j = np.triu_indices(n, 1)
+    low, high = np.minimum(a, b), np.maximum(a, b)
 
     def side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
         return np.sign((q[:, 0] - p[:, 0]) * (r[:, 1] - p[:, 1]) - (q[:, 1] - p[:, 1]) * (r[:, 0] - p[:, 0]))
 
-    neighbours = (j == i + 1) | ((i == 0) & (j == n - 1))
-    # Neighbours cross only by folding back on each other.
-    after = np.where(j == i + 1, j, i)
-    before = np.where(j == i + 1, i, j)
-    along = np.einsum("ij,ij->i", b[before] - a[before], b[after] - a[after])
-    folded = neighbours & (side(a[before], b[before], b[after]) == 0) & (along < 0)
-    i, j = i[~neighbours], j[~neighbours]
-    apart = (side(a[i], b[i], a[j]) * side(a[i], b[i], b[j]) > 0) | (
-        side(a[j], b[j], a[i]) * side(a[j], b[j], b[i]) > 0
-    )
-    low_i, high_i = np.minimum(a[i], b[i]), np.maximum(a[i], b[i])
-    low_j, high_j = np.minimum(a[j], b[j]), np.maximum(a[j], b[j])
-    near = np.all((low_i <= high_j) & (low_j <= high_i), axis=1)
-    return bool(np.any(folded) or np.any(near & ~apart))
+    for start in range(0, n, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        near = np.all((low[block, None] <= high) & (low <= high[block, None]), axis=2)
+        i, j = np.nonzero(near)
+        i = i + start
+        i, j = i[i < j], j[i < j]
+        neighbours = (j == i + 1) | ((i == 0) & (j == n - 1))
+        # Neighbours cross only by folding back on each other.
+        after, before = np.where(j == i + 1, j, i), np.where(j == i + 1, i, j)
+        along = np.einsum("ij,ij->i", b[before] - a[before], b[after] - a[after])
+        folded = neighbours & (side(a[before], b[before], b[after]) == 0) & (along < 0)
+        i, j = i[~neighbours], j[~neighbours]
+        apart = (side(a[i], b[i], a[j]) * side(a[i], b[i], b[j]) > 0) | (
+            side(a[j], b[j], a[i]) * side(a[j], b[j], b[i]) > 0
+        )
+        if np.any(folded) or not np.all(apart):
+            return True
+    return False

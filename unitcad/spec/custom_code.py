@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ from unitcad.files import read_text
 
 _FORM = re.compile(r"(?P<file>.+\.py):(?P<name>[A-Za-z_][A-Za-z0-9_]*)", re.DOTALL)
 LARGEST = 1_000_000
+FILE_KEYS = (("design",), ("estimate", "fit"))
+"""Keys of a spec whose values name files."""
 BODIES = (".step", ".stp", ".stl", ".3mf")
 
 
@@ -28,6 +30,18 @@ def is_body_file(design: object) -> bool:
 def is_custom(design: object) -> bool:
     """Tell whether a spec's `design` means a file, or something in one."""
     return is_body_file(design) or (isinstance(design, str) and _FORM.fullmatch(design) is not None)
+
+
+def files_named(data: Mapping[str, Any]) -> dict[str, str]:
+    """Return the values of a spec that name files, by their paths; a shipped design's name is none."""
+    found = {}
+    for way in FILE_KEYS:
+        node: Any = data
+        for key in way:
+            node = node.get(key) if isinstance(node, Mapping) else None
+        if isinstance(node, str) and (way != ("design",) or is_custom(node)):
+            found[".".join(way)] = node
+    return found
 
 
 def name_in_file(design: str) -> str:

@@ -128,22 +128,43 @@ def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
 
 def _explained(first: Refusal, data: dict[str, Any], source: Source) -> Refusal:
     """Return the refusal with the spec's other faults, each with its file and line where it stands in one."""
-    try:
-        every = faults(with_source(dict(data), Path()), _judge, _sound(data))
-    except RecursionError:  # nested too deeply to be looked through again
-        return first
-    if not any(str(one) == str(first) for one in every):
-        every = [first, *(one for one in every if one.field != first.field)]
+    every = _all_faults(first, with_source(dict(data), Path()))
     path = _file(source)
     if path is not None:
         text = read_text(path)
         written = tomllib.loads(text)
         for one in every:
             # What an option or a caller changed, or validation worked out, stands on no line.
-            if one.value is None or at(written, one.field) == at(data, one.field) is not ABSENT:
+            if one.value is None or _same(at(written, one.field), at(data, one.field)):
                 one.file, one.line = os.fspath(path), line_of(text, one.field)
     every[0].others = tuple(every[1:])
     return every[0]
+
+
+def _same(written: object, asked: object) -> bool:
+    """Tell whether what a file holds is what was asked; of what is nested too deeply to be compared, that it isn't."""
+    try:
+        return written is not ABSENT and written == asked
+    except RecursionError:
+        return False
+
+
+def all_faults(first: Refusal, data: Mapping[str, Any], text: str) -> list[Refusal]:
+    """Return every fault of a text's plain data, `first` among them, each with its line; no file is read for it."""
+    every = _all_faults(first, data)
+    for one in every:
+        one.line = line_of(text, one.field)
+    return every
+
+
+def _all_faults(first: Refusal, data: Mapping[str, Any]) -> list[Refusal]:
+    try:
+        every = faults(dict(data), _judge, _sound(data))
+    except RecursionError:  # nested too deeply to be looked through again
+        return [first]
+    if not any(str(one) == str(first) for one in every):
+        every = [first, *(one for one in every if one.field != first.field)]
+    return every
 
 
 def _file(source: Source) -> Path | None:

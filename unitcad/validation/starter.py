@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 from typing import Any
 
 from msgspec import NODEFAULT, Struct
@@ -28,38 +29,42 @@ def starter(name: str, template: str | None = None) -> str:
     known, template = templates(), template or default_template()
     if template not in known:
         raise UnitcadError(f"--template {template}: not known; one of {', '.join(known)}")
-    there = read_toml(known[template])
-    text = re.sub(
-        r"^name = .*$",
-        f"name = {json.dumps(name)}",
-        known[template].read_text("utf-8"),
-        count=1,
-        flags=re.MULTILINE,
-    )
+    return commented(known[template], name, AskedSpec, SCHEMA)
+
+
+def commented(template: Path, name: str, model: type[Struct], schema: str) -> str:
+    """Return a template's text under another name, with the further keys of its `model` commented out below.
+
+    Its first line names the `schema` file for an editor.
+    """
+    there = read_toml(template)
+    named = f"name = {json.dumps(name)}"
+    text = re.sub(r"^name = .*$", named, template.read_text("utf-8"), count=1, flags=re.MULTILINE)
     sections = re.split(r"\n(?=\[)", text)
-    tables = [section.rstrip() + "\n" + _further_keys(section, there) for section in sections]
-    return "\n".join([f"#:schema ./{SCHEMA}", *tables, _further_tables(there)])
+    tables = [section.rstrip() + "\n" + _further_keys(section, there, model) for section in sections]
+    return "\n".join([f"#:schema ./{schema}", *tables, _further_tables(there, model)])
 
 
-def _further_keys(section: str, there: dict[str, Any]) -> str:
+def _further_keys(section: str, there: dict[str, Any], model: type[Struct]) -> str:
     """Return the keys that a table of the template leaves out, commented out."""
     header = re.match(r"\[(\w+)\]", section)
-    field = fields_of(AskedSpec).get(header[1]) if header else None
+    field = fields_of(model).get(header[1]) if header else None
     table = table_in(field.type) if field else None
     return "".join(f"{line}\n" for line in _keys(table, set(there[field.name]))) if field and table else ""
 
 
-def _further_tables(there: dict[str, Any]) -> str:
+def _further_tables(there: dict[str, Any], model: type[Struct]) -> str:
     lines = [
         "# The tables below show the defaults; ... stands for a value from the catalogue.",
         "# To change a value, remove the # from its line and from its table's header.",
     ]
-    for name, field in fields_of(AskedSpec).items():
+    for name, field in fields_of(model).items():
         if name in there or name in _NOT_OFFERED:
             continue
         table = table_in(field.type) or table_in(entry_in(field.type))
         about = f"  # {(table.__doc__ or '').splitlines()[0]}" if table else _note(field)
-        lines += ["", f"# [{name}]{about}", *(_keys(table, set()) if table else ())]
+        head = f"[[{name}]]" if table_in(entry_in(field.type)) else f"[{name}]"
+        lines += ["", f"# {head}{about}", *(_keys(table, set()) if table else ())]
     return "\n".join(lines) + "\n"
 
 

@@ -49,3 +49,12 @@ class Chain:
     pass_hz: tuple[float, float] | None = None
     assumed: Mapping[str, Any] = field(default_factory=dict)
     """Parameters that the chain's source does not state, with the values that are assumed."""
+
+    @property
+    def assumed_text(self) -> str:
+        """What the chain assumes, as keys of [chain] with their values."""
+        shown = {True: "true", False: "false"}
+        return ", ".join(
+            f"{key} {shown[value] if isinstance(value, bool) else f'{value:g}' if isinstance(value, float) else value}"
+            for key, value in self.assumed.items()
+        )

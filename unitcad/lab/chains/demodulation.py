@@ -19,6 +19,8 @@ FOLLOWED_HZ = 12.0
 """How far a line's frequency may lie from that of the window beside it, to be followed."""
 SPIN_UP_HZ_PER_S = 8.0
 """How fast a frequency changes that is a spin-up's, where the steady span has less than a third of it."""
+NO_LINE = 1e-6
+"""Part of a line's largest envelope below which its phase says nothing."""
 KNOTS_S = (0.5, 0.25)
 """Distances of the knots of the phase's splines that are tried."""
 
@@ -29,6 +31,10 @@ class Phase:
 
     at: Callable[[Floats], Floats]
     parameters: int
+
+    def later(self, by_s: float) -> Phase:
+        """Return the phase of the same line over a time that begins later by so many seconds."""
+        return Phase(lambda t: self.at(t + by_s), self.parameters)
 
 
 def coarse_frequency(x: Floats, rate: float, band: tuple[float, float], mains_hz: float) -> float:
@@ -142,9 +148,16 @@ def frequencies_beyond(x: Floats, rate: float, span: tuple[float, float], freque
 
 
 def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
-    """Yield the line's phase, of rising flexibility: constant frequency, linear, cubic, splines."""
+    """Yield the line's phase, of rising flexibility: constant frequency, linear, cubic, splines.
+
+    None at all where fewer than three points have a line. A spline has a point between any two of its knots.
+    """
     from scipy.interpolate import make_lsq_spline
 
+    there = np.abs(line) > NO_LINE * np.abs(line).max(initial=0.0)
+    time, line = time[there], line[there]
+    if len(time) < 3:
+        return
     angle = np.unwrap(np.angle(line))
     weight = np.abs(line) / np.abs(line).max()
     middle, half = (time[0] + time[-1]) / 2, max((time[-1] - time[0]) / 2, 1e-9)
@@ -157,7 +170,10 @@ def phases(time: Floats, line: Floats, frequency: float) -> Iterator[Phase]:
         pieces = round((time[-1] - time[0]) / distance)
         if pieces < 2 or pieces + 4 > len(time) / 2:
             continue
-        inner = np.linspace(time[0], time[-1], pieces + 1)[1:-1]
+        ends = np.linspace(time[0], time[-1], pieces + 1)
+        if np.histogram(time, ends)[0].min() == 0:  # a gap: what the spline does there is not known
+            continue
+        inner = ends[1:-1]
         knots = np.concatenate([[time[0]] * 4, inner, [time[-1]] * 4])
         spline = make_lsq_spline(time, angle, knots, 3, w=weight)
         yield Phase(lambda t, spline=spline, time=time: omega * t + _straight_beyond(spline, t, time), pieces + 3)

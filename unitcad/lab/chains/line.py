@@ -20,6 +20,7 @@ from unitcad.lab.chains.chain import Chain, ChainTable
 from unitcad.lab.chains.clipping import LOWEST, NEAR, clip_mask
 from unitcad.lab.chains.demodulation import Phase
 from unitcad.lab.chains.line_fit import LineFit
+from unitcad.lab.chains.running_part import MOST_RUNNING, running_part
 from unitcad.lab.chains.several import several_lines
 
 BAND_HZ = (60.0, 250.0)
@@ -30,6 +31,7 @@ FALSE_ALARM = 1e-3
 LEAST_FOLLOWED = 1.0
 """Signal to noise from which short spectra tell the line's frequency to a hertz."""
 ROUNDS = 6
+LEAST_SAMPLES = 16
 
 
 @dataclass(frozen=True)
@@ -77,12 +79,41 @@ def fit_line(
 ) -> LineFit | None:
     """Return the line of samples x (n) at `rate` in Hz; None where the band holds no line.
 
-    With `phase` and `span`, which are another channel's, the line has that channel's phase and its own amplitude.
+    With `phase` and `span`, which are another channel's, the line has that channel's phase and its own amplitude. Where
+    the line is there for less than about two thirds of the samples, it is fitted to the longest stretch that has it.
     """
     mains = mains or Mains()
     good = np.isfinite(x)
+    if span is not None:
+        short = span[1] - span[0] <= MOST_RUNNING * len(x) / rate
+        part = (int(span[0] * rate), int(np.ceil(span[1] * rate)) + 1) if short else None
+    elif good.sum() < LEAST_SAMPLES:
+        return None
+    else:
+        part = running_part(x - np.median(x[good]), good, rate, band, mains.frequency_hz)
+    if part is None:
+        return _fit_line(x, rate, band, mains, full_scale, phase, span)
+    start = part[0] / rate
+    within = None if span is None else (span[0] - start, span[1] - start)
+    fit = _fit_line(x[slice(*part)], rate, band, mains, full_scale, phase and phase.later(start), within)
+    if fit is None or fit.phase is None:
+        return fit
+    return replace(fit, start_s=fit.start_s + start, end_s=fit.end_s + start, phase=phase or fit.phase.later(-start))
+
+
+def _fit_line(
+    x: Floats,
+    rate: float,
+    band: tuple[float, float],
+    mains: Mains,
+    full_scale: float | None,
+    phase: Phase | None,
+    span: tuple[float, float] | None,
+) -> LineFit | None:
+    """Return the line of samples that hold it for most of their length; see `fit_line`."""
+    good = np.isfinite(x)
     x = np.where(good, x, 0.0)
-    if good.sum() < 16 or not np.ptp(x[good]) > 0:
+    if good.sum() < LEAST_SAMPLES or not np.ptp(x[good]) > 0:
         return None
     middle = float(np.median(x[good]))
     x = np.where(good, x - middle, 0.0)
@@ -99,7 +130,8 @@ def fit_line(
     for attempt in range(2):
         if phase is not None and span is not None:
             frequency = _frequency(phase, span)[0]
-            found = _solve(x, time, rate, known, good & ~cut, cut, span, phase, frequency, mains), phase, span
+            solution = _solve(x, time, rate, known, good & ~cut, cut, span, phase, frequency, mains)
+            found = (solution, phase, span) if solution else None
         else:
             frequency = demodulation.coarse_frequency(np.where(known, x, 0.0), rate, band, mains.frequency_hz)
             found = _twice(x, time, rate, known, good & ~cut, cut, frequency, mains) if frequency > 0 else None
@@ -192,8 +224,12 @@ def _twice(
         span = demodulation.steady_span(at, line, len(x) / rate)
         inside = (at >= span[0]) & (at <= span[1])
         phase = _best_phase(clean, time, rate, use, span, demodulation.phases(at[inside], line[inside], frequency))
+        if phase is None:
+            return found
         frequency = _frequency(phase, span)[0]
         solution = _solve(x, time, rate, known, allowed, cut, span, phase, frequency, mains)
+        if solution is None:
+            return found
         found = solution, phase, span
         left_out = (time >= span[0]) & (time <= span[1]) & ~solution.good
         clean, use = np.where(left_out, solution.line, x - solution.mains), use | left_out
@@ -202,8 +238,8 @@ def _twice(
 
 def _best_phase(
     x: Floats, time: Floats, rate: float, use: Bools, span: tuple[float, float], candidates: Iterable[Phase]
-) -> Phase:
-    """Return the phase that explains the samples best for its number of parameters (Schwarz's criterion)."""
+) -> Phase | None:
+    """Return the phase that explains the samples best for its number of parameters (Schwarz's criterion), if any."""
     inside = slice(int(np.searchsorted(time, span[0])), int(np.searchsorted(time, span[1], side="right")))
     here, part, weight = time[inside], x[inside], use[inside].astype(float)
     scores = []
@@ -214,7 +250,7 @@ def _best_phase(
         squares = float(np.sum(weight * left**2)) / max(weight.sum(), 1)
         score = weight.sum() * np.log(max(squares, 1e-300)) + candidate.parameters * np.log(max(weight.sum(), 2))
         scores.append((score, len(scores), candidate))
-    return min(scores)[-1]
+    return min(scores)[-1] if scores else None
 
 
 def _frequency(phase: Phase, span: tuple[float, float]) -> tuple[float, float]:
@@ -240,8 +276,8 @@ def _solve(
     phase: Phase,
     frequency: float,
     mains: Mains,
-) -> _Solution:
-    """Fit a line of given phase over a span, without the samples whose residual is far off.
+) -> _Solution | None:
+    """Fit a line of given phase over a span, without the samples whose residual is far off; None without samples.
 
     Of samples that are `cut` the fit knows that the line lies beyond them. To leave them out, and those near them by
     their own noise, would bias it; and where the rate is a small multiple of the frequency, too few phases are left.
@@ -259,6 +295,8 @@ def _solve(
         ]
     )
     use, beyond = known[inside].copy(), cut[inside].copy()
+    if use.sum() < LEAST_SAMPLES:
+        return None
     side = np.where(beyond, np.sign(part), 0.0)
     ends = [(1 - NEAR) * float(np.max(sign * x[cut], initial=0.0)) for sign in (1, -1)]
     for _ in range(ROUNDS):

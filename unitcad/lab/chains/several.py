@@ -32,6 +32,8 @@ def several_lines(
 
     None where one line explains them as well. The amplitude is then the strongest line's.
     """
+    if not fit.snr > 0:
+        return None
     x = np.where(use, x, 0.0)
     first, last = np.flatnonzero(use)[[0, -1]]
     part, at, weight = x[first : last + 1], time[first : last + 1], use[first : last + 1].astype(float)

@@ -4,6 +4,8 @@
   const { el, clear, number, section, table, theme } = window.unitcad;
   const page = document.getElementById("page");
   const MINUTE = 60000;
+  // Of two printed pages in mm²: all, a letter, a step's title, a pour's lines to write on, a unit's, head and schedule; and widths in mm.
+  const PAPER = { mm2: 2 * 190 * 277 * 0.86, letter: 5, title: 220, pour: 1500, unit: 900, page: 5000, most: 36, least: 22 };
   const LIMITS = { grams: [1e-4, 1e5], mm: [0.01, 1000] };
   let data, key, state;
 
@@ -112,8 +114,8 @@
     const picture = data.pictures[step.picture];
     return el("li", { className: `bench-step${data.repeated.has(at) ? " repeated" : ""}`, value: at + 1, "data-step": String(at) },
       el("h3", {}, el("label", {}, ticked, el("span", { className: "count" }, `${at + 1}`), ` ${step.title}`)),
-      picture && el("img", { src: picture, alt: step.title, width: "540", height: "360" }),
-      el("p", {}, step.text), data.repeated.has(at) && el("p", { className: "as" }, `As step ${data.repeated.get(at) + 1}.`), own);
+      picture && el("img", { className: again(at) ? "again" : undefined, src: picture, alt: step.title, width: "540" }),
+      el("p", { className: "whole" }, step.text), data.repeated.has(at) && el("p", { className: "as" }, data.repeated.get(at)), own);
   }
 
   // The first step that is not done is the one to do.
@@ -134,11 +136,13 @@
     const motor = el("input", { type: "checkbox", name: "motor", checked: state.motor });
     const total = () => (state.motor ? casting.time_line[casting.time_line.length - 1] : null);
     const draw = () => {
-      const phases = casting.time_line.filter((phase) => state.motor || phase.start_min < casting.earliest_finish_min - 1e-6);
+      const withMotor = (phase) => phase.start_min >= casting.earliest_finish_min - 1e-6;
+      const phases = casting.time_line;
       const finish = total() ? total().start_min + total().bench_min + total().wait_min : casting.earliest_finish_min;
       const end = state.ready ? new Date(state.ready).getTime() : NaN;
       const start = end - finish * MINUTE;
-      const rows = phases.map((phase) => [phase.name, Number.isFinite(start) ? clock(start + phase.start_min * MINUTE) : `after ${duration(phase.start_min)}`, duration(phase.bench_min), duration(phase.wait_min)]);
+      // On paper the motor's row is there either way.
+      const rows = phases.map((phase) => ({ className: withMotor(phase) && !state.motor ? "unasked" : undefined, cells: [phase.name, Number.isFinite(start) ? clock(start + phase.start_min * MINUTE) : `after ${duration(phase.start_min)}`, duration(phase.bench_min), duration(phase.wait_min)] }));
       const late = Number.isFinite(start) && start < Date.now();
       clear(out, Number.isFinite(start) && el("p", { className: late ? "verdict bad" : "verdict good" }, late
         ? `Too late by ${duration((Date.now() - start) / MINUTE)}: begun now, it is ready ${clock(Date.now() + finish * MINUTE)}.`
@@ -159,8 +163,11 @@
     return section("print", "Print", el("ul", {}, casting.printing.map((text) => el("li", {}, text)), sliced && el("li", {}, sliced)));
   }
 
+  // What paper lists without its note: the print's or the mix's own words have it.
+  const plain = (item) => item.made.startsWith("printed") || / part [AB]$/.test(item.item);
+
   function needed() {
-    const rows = data.casting.bill.map((item) => [item.item.replace(/^([a-z]+)(\d+)$/, "$1 $2"), `${number(item.quantity, 3)} ${item.unit}`, item.note]);
+    const rows = data.casting.bill.map((item) => ({ className: plain(item) ? "plain" : undefined, cells: [item.item.replace(/^([a-z]+)(\d+)$/, "$1 $2"), `${number(item.quantity, 3)} ${item.unit}`, item.note] }));
     return section("needed", "Needed", table(["Item", "How much", "Note"], rows, { label: "What is needed" }));
   }
 
@@ -283,13 +290,45 @@
     return input;
   }
 
-  // Letters decide how small a printed sheet is: two pages of A4, with room for the pictures.
+  // The printed sheet has letters of 8 pt; what two pages of A4 leave beside them, the pictures get.
   function paperSize() {
-    const letters = data.steps.reduce((sum, each, at) => sum + each.step.title.length + (data.repeated.has(at) ? 14 : each.step.text.length), 0)
-      + [...data.casting.printing, ...data.casting.measure].join("").length + data.casting.bill.reduce((sum, item) => sum + item.item.length + item.note.length + 12, 0);
-    const pictures = data.steps.filter((each, at) => each.step.picture && !data.repeated.has(at)).length;
-    const area = 2 * 182 * 265 * 0.8 - pictures * 27 * 18 - 6000;
-    document.documentElement.style.setProperty("--paper-text", `${Math.max(4.5, Math.min(7.5, Math.sqrt(area / letters / 0.112))).toFixed(2)}pt`);
+    const words = data.steps.map((each, at) => data.repeated.get(at) ?? each.step.text);
+    const letters = [...words, ...data.casting.printing, ...data.casting.measure].join(" ").length
+      + data.casting.bill.reduce((sum, item) => sum + item.item.length + (plain(item) ? 0 : item.note.length) + 12, 0);
+    const high = data.steps.filter((each, at) => data.pictures[each.step.picture] && !data.repeated.has(at) && !again(at))
+      .reduce((sum, each) => sum + shape(data.pictures[each.step.picture]), 0);
+    const fixed = PAPER.page + data.steps.length * PAPER.title + data.casting.pours.length * PAPER.pour + data.casting.cells * PAPER.unit;
+    const room = PAPER.mm2 - letters * PAPER.letter - fixed;
+    const wide = Math.max(PAPER.least, Math.min(PAPER.most, Math.sqrt(Math.max(room, 0) / Math.max(high, 1))));
+    document.documentElement.style.setProperty("--paper-picture", `${wide.toFixed(1)}mm`);
+  }
+
+  // Whether a step has the picture of the one before: paper shows it once.
+  const again = (at) => at > 0 && data.steps[at].step.picture === data.steps[at - 1].step.picture;
+
+  // The height of a PNG over its width, as its header says.
+  function shape(picture) {
+    const bytes = Uint8Array.from(atob(picture.slice(picture.indexOf(",") + 1).slice(0, 32)), (letter) => letter.charCodeAt(0));
+    const header = new DataView(bytes.buffer);
+    return header.getUint32(20) / header.getUint32(16);
+  }
+
+  // On paper a step that an earlier pour had too refers to it, and says only what differs. Returns those words by step.
+  function repeated(steps) {
+    const sentences = (text) => text.split(/(?<=[.!?]) (?=[A-Z])/);
+    const alike = (text) => text.replace(/\b(cup|lid|layer|pour) \d+/gi, "$1");
+    const before = new Map(), said = new Map();
+    steps.forEach(({ step }, at) => {
+      const title = alike(step.title), earlier = before.get(title) || [];
+      before.set(title, [...earlier, at]);
+      const differs = earlier.map((first) => {
+        const known = new Set(sentences(steps[first].step.text).map(alike));
+        return [sentences(step.text).filter((sentence) => !known.has(alike(sentence))).join(" "), first];
+      });
+      const [own, first] = differs.reduce((least, each) => (each[0].length < least[0].length ? each : least), [step.text, at]);
+      if (own.length < 0.8 * step.text.length) said.set(at, `As step ${first + 1}${own ? `, but: ${own}` : "."}`);
+    });
+    return said;
   }
 
   async function start() {
@@ -297,14 +336,7 @@
     const { casting } = data;
     const of = (steps, pour) => steps.map((step) => ({ step, pour }));
     data.steps = [...of(casting.preparation, null), ...casting.pours.flatMap((pour) => of(pour.steps, pour)), ...of(casting.release, null), ...of(casting.assembly, null)];
-    // On paper a step whose words stood before only refers to them.
-    const before = new Map();
-    data.repeated = new Map();
-    data.steps.forEach(({ step }, at) => {
-      const words = `${step.title}\n${step.text}`;
-      if (before.has(words)) data.repeated.set(at, before.get(words));
-      else before.set(words, at);
-    });
+    data.repeated = repeated(data.steps);
     key = `unitcad bench ${data.hash} ${casting.label}`;
     state = restore();
     paperSize();

@@ -64,7 +64,10 @@
     let next = 1;
     const steps = (list) => {
       if (!list || !list.length) return null;
-      const node = el("ol", { start: String(next) }, list.map((step) => el("li", {}, el("strong", {}, `${step.title}. `), step.text)));
+      const node = el("ol", { start: String(next) }, list.map((step) => {
+        const picture = (variant.pictures || {})[step.picture];
+        return el("li", {}, el("strong", {}, `${step.title}. `), step.text, picture && el("img", { className: "state", src: picture, alt: step.title, width: "540" }));
+      }));
       next += list.length;
       return node;
     };

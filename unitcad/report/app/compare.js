@@ -12,6 +12,23 @@
     return found;
   }
 
+  const differing = (cells) => cells.some((cell) => cell !== cells[0]);
+
+  // [path, cells] of what differs between specs, each flat; their names may.
+  function differences(specs) {
+    const paths = [...new Set(specs.flatMap((spec) => [...spec.keys()]))];
+    return paths.filter((path) => path !== "name" && differing(specs.map((spec) => spec.get(path))))
+      .map((path) => [path, specs.map((spec) => (spec.has(path) ? facts(spec.get(path)) : "–"))]);
+  }
+
+  // A table of variants side by side: their heads, and parts [title, [[name, cells]]].
+  function sideBySide(heads, parts) {
+    const line = ([name, cells]) => el("tr", {}, el("th", { scope: "row" }, name), cells.map((cell) => el("td", {}, cell)));
+    const part = ([title, lines]) => lines.length > 0 && el("tbody", {}, el("tr", {}, el("th", { scope: "rowgroup", colspan: String(heads.length + 1), className: "part" }, title)), lines.map(line));
+    return el("div", { className: "scroll compare", tabindex: "0", role: "group", "aria-label": "Variants side by side" },
+      el("table", {}, el("thead", {}, el("tr", {}, el("td"), heads.map((head) => el("th", { scope: "col" }, head)))), parts.map(part)));
+  }
+
   // options: {nameOf(row), variant(folder), shown(column, value), head(column)}; `pin(row)` makes a row's box.
   function createPins(table, { nameOf, variant, shown, head }) {
     let pinned = [];
@@ -46,24 +63,19 @@
       const rows = pinned;
       const variants = rows.map((row) => variant(row[0]));
       const specs = variants.map((each) => flat((each && each.spec) || {}));
-      const heads = rows.map((row) => el("th", { scope: "col" }, row[0] ? el("a", { href: `#${encodeURIComponent(row[0])}` }, nameOf(row)) : nameOf(row), " ",
-        el("button", { type: "button", className: "quiet", "aria-label": `Unpin ${nameOf(row)}`, onclick: () => unpin(row) }, "Unpin")));
-      const line = (name, cells) => el("tr", {}, el("th", { scope: "row" }, name), cells.map((cell) => el("td", {}, cell)));
-      const differing = (cells) => cells.some((cell) => cell !== cells[0]);
-      const part = (title, lines) => lines.length > 0 && el("tbody", {}, el("tr", {}, el("th", { scope: "rowgroup", colspan: String(pinned.length + 1), className: "part" }, title)), lines);
+      const heads = rows.map((row) => [row[0] ? el("a", { href: `#${encodeURIComponent(row[0])}` }, nameOf(row)) : nameOf(row), " ",
+        el("button", { type: "button", className: "quiet", "aria-label": `Unpin ${nameOf(row)}`, onclick: () => unpin(row) }, "Unpin")]);
       const sections = variants.map((each) => (each && each.drawings["section.svg"] ? drawing(each.drawings["section.svg"], "The unit in section") : "–"));
       const answers = variants.map((each) => ((each && each.estimate && each.estimate.answer && each.estimate.answer.lines) || ["–"])[0]);
       const columns = table.columns.map((name, i) => [name, rows.map((row) => row[i + 1])]).filter(([name]) => !["index", "status", "reason", "name"].includes(name));
-      const figures = columns.filter(([name, cells]) => !table.swept.has(name) && differing(cells)).map(([name, cells]) => line(head(name), cells.map((cell) => shown(name, cell))));
-      const paths = [...new Set(specs.flatMap((spec) => [...spec.keys()]))];
-      const unlike = paths.filter((path) => path !== "name" && differing(specs.map((spec) => spec.get(path))));
+      const figures = columns.filter(([name, cells]) => !table.swept.has(name) && differing(cells)).map(([name, cells]) => [head(name), cells.map((cell) => shown(name, cell))]);
+      const unlike = differences(specs);
       const own = unlike.length > 0 || specs.some((spec) => spec.size);
-      const chosen = own ? unlike.map((path) => line(path, specs.map((spec) => (spec.has(path) ? facts(spec.get(path)) : "–"))))
-        : columns.filter(([name, cells]) => table.swept.has(name) && differing(cells)).map(([name, cells]) => line(name, cells.map((cell) => number(cell, 6))));
-      return el("div", { className: "scroll compare", tabindex: "0", role: "group", "aria-label": "Variants side by side" },
-        el("table", {}, el("thead", {}, el("tr", {}, el("td"), heads)),
-          part("Section and estimate", [["Section", sections], ["Estimate", answers]].filter(([, cells]) => cells.some((cell) => cell !== "–")).map(([name, cells]) => line(name, cells))),
-          part("What differs in the specs", chosen), part("What differs in the results", figures)));
+      const chosen = own ? unlike
+        : columns.filter(([name, cells]) => table.swept.has(name) && differing(cells)).map(([name, cells]) => [name, cells.map((cell) => number(cell, 6))]);
+      return sideBySide(heads, [
+        ["Section and estimate", [["Section", sections], ["Estimate", answers]].filter(([, cells]) => cells.some((cell) => cell !== "–"))],
+        ["What differs in the specs", chosen], ["What differs in the results", figures]]);
     }
 
     function pin(row) {
@@ -78,5 +90,5 @@
     return { node, pin };
   }
 
-  Object.assign(window.unitcad, { createPins });
+  Object.assign(window.unitcad, { createPins, sideBySide, differences, flat });
 })();

@@ -15,21 +15,24 @@
     return `#${colour.map(channel).join("")}`;
   }
 
-  // The scenes of a model: the unit, the whole set of moulds with the layers, and each moment of casting.
+  // The scenes of a model: the unit, the whole set of moulds with the layers, and each moment of casting. A model
+  // whose moulds are not there yet has the unit alone.
   function scenes(model, unit, tools) {
+    const alone = unit.map((mesh) => ({ name: mesh.name, mesh, offset: model.unit_apart[mesh.name] }));
+    const names = (parts) => [...new Set(parts.map((part) => part.name))];
+    const ofUnit = [{ title: "The unit", parts: alone, names: names(alone) }];
+    if (!tools) return { unit: ofUnit, moulds: [] };
     const layers = unit.filter((mesh) => mesh.extras.made === "cast");
     const inMoulds = [
       ...tools.map((mesh) => ({ name: mesh.name, mesh, offset: model.moulds_apart[mesh.name] })),
       ...layers.flatMap((mesh) => model.cells.map((place) => ({ name: mesh.name, mesh, place, offset: model.moulds_apart[mesh.name] }))),
     ];
-    const alone = unit.map((mesh) => ({ name: mesh.name, mesh, offset: model.unit_apart[mesh.name] }));
-    const names = (parts) => [...new Set(parts.map((part) => part.name))];
     const moments = model.moments.map((moment) => {
       const isUnit = moment.parts.some((name) => unit.some((mesh) => mesh.name === name && mesh.extras.made !== "cast"));
       return { title: moment.title, parts: isUnit ? alone : inMoulds, names: moment.parts };
     });
     return {
-      unit: [{ title: "The unit", parts: alone, names: names(alone) }],
+      unit: ofUnit,
       moulds: [{ title: "The whole set", parts: inMoulds, names: names(inMoulds) }, ...moments],
     };
   }
@@ -41,7 +44,9 @@
     return { node: el("div", { className: "control" }, el("label", { for: id }, label), input, output), input, output };
   }
 
-  async function createStage(host, model) {
+  // The view of a model. `update(model)` shows another one under the same controls, from the same side.
+  async function createStage(host, first) {
+    let model = first;
     const canvas = el("canvas", {
       tabindex: "0", role: "img",
       "aria-label": "3D view. Arrow keys turn it, plus and minus zoom, zero looks from the corner again.",
@@ -50,8 +55,8 @@
     const frame = el("div", { className: "view" }, canvas);
     clear(host, el("div", { className: "stage" }, frame, panel));
     const viewer = createViewer(canvas);
-    const [unit, tools] = await Promise.all([readGlb(model.unit), readGlb(model.moulds)]);
-    const kinds = scenes(model, unit, tools);
+    const read = async (from) => scenes(from, ...(await Promise.all([readGlb(from.unit), from.moulds && readGlb(from.moulds)])));
+    let kinds = await read(model);
     const state = { kind: "unit", step: 0, hidden: new Set(), parts: null };
     const current = () => kinds[state.kind][Math.min(state.step, kinds[state.kind].length - 1)];
 
@@ -60,7 +65,7 @@
     const radios = [["unit", "Unit"], ["moulds", "Moulds"]].map(([kind, label]) =>
       el("label", {}, el("input", { type: "radio", name: kindName, value: kind, checked: kind === state.kind, onchange: () => choose(kind) }), label));
 
-    const step = range("Casting step", { min: 0, max: kinds.moulds.length - 1, step: 1, value: 0, name: "step" }, (value) => { state.step = value; update(true); });
+    const step = range("Casting step", { min: 0, max: 0, step: 1, value: 0, name: "step" }, (value) => { state.step = value; update(true); });
     const before = el("button", { type: "button", onclick: () => move(-1), "aria-label": "Step back" }, "‹");
     const after = el("button", { type: "button", onclick: () => move(1), "aria-label": "Step on" }, "›");
     const stepRow = el("div", { className: "step" }, step.node, el("div", { className: "buttons" }, before, after));
@@ -70,9 +75,9 @@
       viewer.apart(value / 100);
     });
     apart.input.addEventListener("change", () => viewer.look(state.view || "corner"));
-    const at = range("Cut at", { min: 0, max: 1, step: 0.05, value: 0, name: "cut-at" }, cut);
+    const at = range("Cut at", { min: 0, max: 1, step: 0.05, value: 0, name: "cut-at" }, () => { state.moved = true; cut(); });
     const cutOn = el("input", { type: "checkbox", name: "cut", checked: true, onchange: cut });
-    const axis = el("select", { name: "axis", "aria-label": "Direction of the cut", onchange: () => { limits(); cut(); } },
+    const axis = el("select", { name: "axis", "aria-label": "Direction of the cut", onchange: () => { state.moved = false; limits(); cut(); } },
       Object.entries(AXES).map(([value, label]) => el("option", { value }, label)));
     const buttons = el("div", { className: "buttons" }, views.map((name) =>
       el("button", { type: "button", onclick: () => { state.view = name; viewer.look(name); } }, spoken(name))));
@@ -97,14 +102,15 @@
       at.input.min = stop(low, Math.floor);
       at.input.max = stop(high, Math.ceil);
       // Through the unit's axis; in a set of several, through the nearest row of cells.
-      const row = state.parts === kinds.moulds[0].parts ? Math.min(...model.cells.map((cell) => cell[1])) : 0;
+      const row = kinds.moulds.length && state.parts === kinds.moulds[0].parts ? Math.min(...model.cells.map((cell) => cell[1])) : 0;
       const middle = { x: 0, y: row, z: (low + high) / 2 }[axis.value];
-      at.input.value = stop(middle, Math.round);
+      if (!state.moved) at.input.value = stop(middle, Math.round);
     }
 
     function choose(kind) {
       state.kind = kind;
       state.step = 0;
+      state.moved = false;
       step.input.value = 0;
       update(true);
     }
@@ -123,6 +129,7 @@
         limits();
       }
       stepRow.hidden = state.kind !== "moulds";
+      step.input.max = Math.max(0, kinds.moulds.length - 1);
       step.output.textContent = state.step ? `${state.step} of ${kinds.moulds.length - 1}: ${scene.title}` : scene.title;
       step.input.setAttribute("aria-valuetext", scene.title);
       clear(list, scene.names.map((name) => {
@@ -148,8 +155,29 @@
     }
 
     apart.output.textContent = "0 %";
+    offer();
     update(true);
-    return { free: () => viewer.free() };
+
+    // What there is to show can be chosen.
+    function offer() {
+      for (const label of radios) label.firstChild.disabled = !kinds[label.firstChild.value].length;
+    }
+
+    async function replace(next) {
+      const asked = (state.asked = (state.asked || 0) + 1);
+      const fresh = await read(next);
+      if (asked !== state.asked) return;
+      model = next;
+      kinds = fresh;
+      if (!kinds[state.kind].length) state.kind = "unit";
+      for (const label of radios) label.firstChild.checked = label.firstChild.value === state.kind;
+      offer();
+      state.step = Math.min(state.step, Math.max(0, kinds.moulds.length - 1));
+      step.input.value = state.step;
+      update(false);
+    }
+
+    return { update: replace, free: () => viewer.free() };
   }
 
   Object.assign(window.unitcad, { createStage, partName });

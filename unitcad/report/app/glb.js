@@ -33,5 +33,10 @@
     });
   }
 
-  Object.assign(window.unitcad, { unpacked, readGlb: async (text) => parsed(await unpacked(text)) });
+  // Base 64 of a GLB file, compressed or not: "H4sI" is how a compressed one begins.
+  async function readGlb(text) {
+    return parsed(text.startsWith("H4sI") ? await unpacked(text) : Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+  }
+
+  Object.assign(window.unitcad, { unpacked, readGlb });
 })();

@@ -1,0 +1,164 @@
+"""An array's folder: complete, the same bytes again, built again from its own array.toml."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from unitcad.arrays.array_file import array_hash, load_array
+from unitcad.arrays.patch import patch_bodies
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.pocket_procedure import pocket_procedure
+from unitcad.cache import MemoryStore
+from unitcad.casting.procedure import procedure
+from unitcad.casting.time_line import duration
+from unitcad.check import Options, check_bytes
+from unitcad.cli.build_summary import array_summary
+from unitcad.errors import UnitcadError
+from unitcad.kernels.mesh import realise
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.array_build import build_array
+from unitcad.pipeline.build import Built
+from unitcad.spec import printer_of
+
+SMALL = [
+    "layout.columns=2",
+    "layout.rows=1",
+    "moulds.cavities=[1, 1]",
+    'output.formats=["stl", "3mf", "glb"]',
+    "sheet.strap_slot_mm=[3, 8]",
+]
+
+
+@pytest.fixture(scope="module")
+def store() -> MemoryStore:
+    return MemoryStore()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, store: MemoryStore) -> Path:
+    built = build_array(load_array("forearm-pockets", SMALL), tmp_path_factory.mktemp("out"), store=store)
+    assert built.ok
+    return built.folder
+
+
+def _contents(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file() and path.name != "timings.json")
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def test_the_folder_holds_units_patch_tools_and_procedure(folder: Path) -> None:
+    there = set(_contents(folder))
+    assert there >= {
+        "array.toml", "manifest.json", "casting.md", "casting.json", "bom.csv", "step1-section.svg",
+        "moulds/base.stl", "moulds/blade.stl", "moulds/moulds.3mf", "patch/layer1.stl", "patch/patch.glb",
+        "units/encapsulating/spec.toml", "units/encapsulating/unit.3mf", "units/encapsulating/moulds/step1-cup.stl",
+        "crosstalk.json", "crosstalk.csv", "crosstalk.svg", "crosstalk-patch.svg",
+        "pictures/patch-skin-side.png", "pictures/tools.png", "pictures/pour1.png",
+    }  # fmt: skip
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert set(manifest["files"]) == there - {"manifest.json"}
+    assert [place["name"] for place in manifest["array"]["places"]] == ["A1", "A2"]
+    assert all(finding["ok"] for finding in manifest["laws"])
+    assert manifest["check"]["findings"] == []
+
+
+def test_the_summary_has_the_silicone_of_units_and_sheet(folder: Path) -> None:
+    array = load_array("forearm-pockets", SMALL)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    (line,) = [one for one in array_summary(array, Built(folder, manifest)) if one.startswith("to mix: ")]
+    mixed = {name: float(mass) for mass, name in re.findall(r"([0-9.]+) g of ([^ ,]+)", line)}
+    with (folder / "bom.csv").open() as file:
+        bought = [row for row in csv.DictReader(file) if row["unit"] == "g"]
+    assert set(mixed) == {layer.material for layer in array.unit.layers} | {array.sheet.material}
+    assert sum(mixed.values()) == pytest.approx(sum(float(row["quantity"]) for row in bought), rel=0.01)
+
+
+@pytest.mark.parametrize(("count", "words"), [(1, "one casting in"), (2, "2 castings, one after the other, in")])
+def test_the_units_take_the_time_of_their_whole_time_line(count: int, words: str) -> None:
+    """Two units, two cavities or one: the motors' time counts at the bench and in all, in words and in numbers."""
+    array = load_array("forearm-pockets", [*SMALL, f"moulds.cavities=[{3 - count}, 1]"])
+    moulds = patch_moulds(array)
+    spec = MouldSet(array.unit)
+    unit = procedure(spec, [spec.solids[step.name].volume() for step in spec.plan.steps], 1000.0)
+    made = pocket_procedure(moulds, 1000.0, 1000.0, {"units/encapsulating": unit})
+    (step,) = [step for step in made.preparation if step.title == "Cast the units"]
+    bench, whole = sum(phase.bench_min for phase in unit.time_line), unit.time_line[-1].end_min
+    assert bench > unit.bench_min
+    assert (step.minutes, step.minutes + step.wait_min) == (count * bench, count * whole)
+    take = f"{'takes' if count == 1 else 'take'} {duration(count * whole)}, of which {duration(count * bench)} at"
+    assert words in step.text
+    assert take in step.text
+
+
+def test_no_file_of_a_tool_has_a_finding(folder: Path) -> None:
+    printer = printer_of(load_array("forearm-pockets").unit)
+    for path in folder.rglob("*.stl"):
+        options = Options(printer=printer if path.parent.name == "moulds" else None)
+        findings = check_bytes(path.read_bytes(), path.name, options).findings
+        assert [f for f in findings if f.severity != "info"] == [], path
+
+
+def test_the_same_input_gives_the_same_bytes_from_its_own_file(folder: Path, tmp_path: Path) -> None:
+    again = build_array(load_array(folder / "array.toml"), tmp_path)
+    assert again.folder.name == folder.name
+    assert _contents(again.folder) == _contents(folder)
+
+
+def test_the_hash_follows_the_array_and_not_its_name() -> None:
+    array = load_array("forearm-pockets")
+    assert array_hash(load_array("forearm-pockets", ["name='other'", "output.formats=['stl']"])) == array_hash(array)
+    assert array_hash(load_array("forearm-pockets", ["sheet.margin_mm=4"])) != array_hash(array)
+    assert array_hash(load_array("forearm-pockets", ["unit.diameter_mm=14.5"])) != array_hash(array)
+
+
+def test_a_folder_of_something_else_is_left_alone(folder: Path, tmp_path: Path) -> None:
+    array = load_array("forearm-pockets", SMALL)
+    place = tmp_path / folder.name
+    place.mkdir()
+    (place / "notes.txt").write_text("mine")
+    with pytest.raises(UnitcadError, match=r"no array\.toml"):
+        build_array(array, tmp_path)
+    assert [path.name for path in place.iterdir()] == ["notes.txt"]
+
+
+def test_the_procedure_names_every_place_and_weighs_all_units(folder: Path) -> None:
+    casting = json.loads((folder / "casting.json").read_text())
+    (together,) = casting["assembly"]
+    for place in load_array("forearm-pockets", SMALL).places:
+        assert place.name in together["text"]
+    bill = {item["item"]: item["quantity"] for item in casting["bill"]}
+    motor = load_array("forearm-pockets").unit.motor.part
+    assert bill[motor] == bill["flexible circuit"] == 2
+    unit = json.loads((folder / "units/encapsulating/casting.json").read_text())
+    inner = sum(p["part_a_g"] for p in unit["pours"] if p["material"] == "ecoflex-00-10")
+    assert bill["ecoflex-00-10 part A"] == pytest.approx(2 * inner)
+    assert casting["earliest_finish_min"] > 2 * unit["earliest_finish_min"]
+
+
+def test_the_array_file_in_the_folder_is_whole(folder: Path) -> None:
+    data = tomllib.loads((folder / "array.toml").read_text())
+    assert data["unit"]["layers"][0]["material"] == "ecoflex-00-10"
+    assert load_array(folder / "array.toml") == load_array("forearm-pockets", SMALL)
+
+
+def test_a_back_sheet_is_written_as_step(tmp_path: Path, store: MemoryStore) -> None:
+    """The inner layers of all units are one body of as many solids, and both colours come back on all of them."""
+    pytest.importorskip("unitcad.export.step", exc_type=UnitcadError)
+    import step_reader
+
+    asked = ["layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3, 8]", 'output.formats=["step"]']
+    array = load_array("forearm-patch", asked)
+    built = build_array(array, tmp_path, only=("unit",), store=store)
+    layer1, sheet, *others = step_reader.read(built.folder / "patch" / "patch.step")
+    bodies = patch_bodies(array)
+    assert [layer1.name, sheet.name, *(body.name for body in others)] == [body.name for body in bodies]
+    assert (layer1.measures.solids, sheet.measures.solids) == (2, 1)
+    for back, body in zip((layer1, sheet), bodies, strict=False):
+        assert back.colour == pytest.approx(body.colour, abs=1e-6)
+        assert back.measures.volume == pytest.approx(realise(body.shape, 720).volume(), rel=1e-4)

@@ -1,0 +1,101 @@
+"""The commands know arrays: init, schema, list, build and report."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from unitcad.arrays.array_file import array_templates, load_array
+from unitcad.batch.sweep import load_sweep
+from unitcad.cli import app
+from unitcad.errors import Refusal
+
+run = CliRunner()
+
+
+def test_arrays_are_listed() -> None:
+    shown = json.loads(run.invoke(app, ["list", "arrays", "--json"]).stdout)["arrays"]
+    assert list(shown) == list(array_templates())
+    assert all(about for about in shown.values())
+
+
+@pytest.mark.parametrize("name", array_templates())
+def test_a_new_file_is_the_template_under_its_own_name(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = run.invoke(app, ["init", "mine", "--template", name])
+    assert done.exit_code == 0, done.output
+    text = Path("mine.toml").read_text()
+    assert text.startswith("#:schema ./unitcad-array.schema.json")
+    assert {**load_array("mine.toml").asked, "name": name} == {**load_array(name).asked, "name": name}
+    # Every further key that is offered is one: its table is accepted with the comment's sign taken away.
+    offered = [line[2:] for line in text.splitlines() if line.startswith("# ") and " = " in line and "..." not in line]
+    assert "hold_mm = 0.2  # how much smaller than the unit's a pocket's radius is" in offered
+
+
+def test_the_schema_has_each_kind_of_layout() -> None:
+    schema = json.loads(run.invoke(app, ["schema", "array"]).stdout)
+    kinds = schema["$defs"]["AskedArray"]["properties"]["layout"]["oneOf"]
+    assert {kind["$ref"].rpartition("/")[2] for kind in kinds} == {"GridTable", "HexTable", "RingTable", "ListTable"}
+    jsonschema = pytest.importorskip("jsonschema")
+    for path in array_templates().values():
+        jsonschema.validate(tomllib.loads(path.read_text()), schema)
+
+
+def test_a_refusal_names_file_line_and_the_pitch_that_fits(tmp_path: Path) -> None:
+    file = tmp_path / "near.toml"
+    file.write_text(array_templates()["hex-19"].read_text().replace("pitch_mm = 20.0", "pitch_mm = 12.0"))
+    with pytest.raises(Refusal) as refused:
+        load_array(file)
+    assert refused.value.located.startswith(f"{file}:9: layout.pitch_mm = 12: ")
+    assert refused.value.nearest == 16
+    with pytest.raises(Refusal) as refused:
+        load_array(file, ["layout.pitch_mm=11"])
+    assert refused.value.line is None
+
+
+def test_build_writes_an_array_and_its_page(tmp_path: Path) -> None:
+    options = [
+        "--formats",
+        "stl",
+        "--set",
+        "layout.columns=1",
+        "--set",
+        "layout.rows=1",
+        "--set",
+        "moulds.cavities=[1,1]",
+    ]
+    options += ["--set", "sheet.strap_slot_mm=[3,8]"]
+    done = run.invoke(app, ["build", "forearm-pockets", "-o", str(tmp_path), "--report", *options])
+    assert done.exit_code == 0, done.output
+    folder = Path(done.stdout.splitlines()[-1])
+    page = (folder / "report.html").read_text()
+    assert "1 units" not in page
+    assert "The patch from the skin&#x27;s side" in page
+    assert "<script" not in page
+    assert (folder / "bench.html").is_file()
+    assert (folder / "units/encapsulating/report.html").is_file()
+    assert "1 unit on a sheet" in done.stderr
+
+
+@pytest.mark.parametrize("command", ["build", "estimate"])
+def test_an_unknown_name_is_told_the_arrays_too(command: str) -> None:
+    done = run.invoke(app, [command, "wrist-band"])
+    assert isinstance(done.exception, Refusal)
+    assert all(name in done.exception.limit for name in ("encapsulating", "forearm-patch", "hex-19"))
+    near = run.invoke(app, [command, "forearm-pocket"])
+    assert isinstance(near.exception, Refusal)
+    assert near.exception.nearest == "forearm-pockets"
+
+
+def test_a_batch_tells_the_arrays_too(tmp_path: Path) -> None:
+    file = tmp_path / "sweep.toml"
+    file.write_text('base = "hex-20"\n[sweep]\nmode = "product"\n"sheet.margin_mm" = [3, 4]\n')
+    with pytest.raises(Refusal) as refused:
+        load_sweep(file)
+    assert (refused.value.field, refused.value.nearest) == ("base", "hex-19")

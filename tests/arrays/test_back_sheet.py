@@ -1,0 +1,184 @@
+"""Back sheets: every mould check holds on their tools, and a fault drawn into one is caught by its code."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.check import Options, check_bytes
+from unitcad.errors import Refusal
+from unitcad.export import stl
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays
+from unitcad.mould_checks import check_moulds, mould_checks
+from unitcad.mould_checks.draw import blocked
+from unitcad.moulds.cavities import united
+from unitcad.moulds.removal import Removal
+from unitcad.shape import Shape, box, cut, cylinder, moved, union
+from unitcad.spec import printer_of
+
+Change = Callable[[Shape], Shape]
+
+
+@cache
+def patch(*overrides: str) -> PatchMoulds:
+    return patch_moulds(load_array("forearm-patch", overrides))
+
+
+VARIANTS = [
+    (),
+    ("unit=three-layer", "layout.pitch_mm=24"),
+    ("unit=single-encapsulating", "moulds.printer=fdm-0.25"),
+    ("layout.columns=1", "layout.pitch_mm=18"),
+    ("layout.rows=1", "sheet.strap_slot_mm=[3,8]", "moulds.printer=fdm-0.25", "sheet.thickness_mm=1.5"),
+    ("sheet.thickness_mm=0.6", "circuit.row_width_mm=2", "layout.pitch_mm=[18,19]", "sheet.margin_mm=7"),
+]
+
+
+@pytest.mark.parametrize("overrides", VARIANTS, ids=[" ".join(v) for v in VARIANTS])
+def test_every_mould_check_holds(overrides: tuple[str, ...]) -> None:
+    findings = check_moulds(patch(*overrides))
+    assert [f for f in findings if not f.ok] == []
+    assert {f.code for f in findings} == set(mould_checks())
+    assert max(f.value for f in findings if f.code == "C100") < 1e-6
+
+
+@pytest.mark.parametrize("overrides", VARIANTS[:4], ids=[" ".join(v) for v in VARIANTS[:4]])
+def test_every_tool_prints_without_support(overrides: tuple[str, ...]) -> None:
+    moulds = patch(*overrides)
+    for body in (*moulds.unit, *moulds.plan.tools):
+        content = stl.content(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
+        printer = printer_of(moulds.spec) if body.made == "printed" else None
+        assert check_bytes(content, f"{body.name}.stl", Options(printer=printer)).findings == ()
+
+
+def test_the_silicone_has_the_volume_of_its_lengths() -> None:
+    """Twelve notches, 3.4 wide and 2.11 high, in nine rings; the sheet 76 x 60 x 1.25, corners of 10, two slots."""
+    moulds = patch()
+    layer1, layer2 = (moulds.mesh(body).volume() for body in moulds.unit)
+
+    def notch(inner: float, outer: float, half: float = 1.7) -> float:
+        """Area of a strip on one side between two circles."""
+
+        def inside(r: float) -> float:
+            return half * math.sqrt(r**2 - half**2) + r**2 * math.asin(half / r)
+
+        return inside(outer) - inside(inner)
+
+    drawn = moulds.arranged.sheet
+    slots = 2 * (3 * 23 + math.pi * 1.5**2)
+    sheet = (76 * 60 - (4 - math.pi) * drawn.corner_mm**2 - slots) * 1.25
+    rings = 9 * math.pi * (7**2 - 5.75**2) * 3.36 - 12 * notch(5.75, 7) * 2.11
+    inner = 9 * math.pi * (5.75**2 * 3.36 - 4.5**2 * 2.11) - 12 * notch(4.5, 5.75) * 2.11
+    assert layer2 == pytest.approx(sheet + rings, rel=1e-3)
+    assert layer1 == pytest.approx(inner, rel=2e-3)
+
+
+def test_the_base_goes_down_since_the_last_cup_can_not_go_up() -> None:
+    moulds = patch()
+    last = moulds.plan.steps[-1]
+    order = [(removal.piece, removal.direction) for removal in last.removals]
+    assert order[-2:] == [("base", (0, 0, -1)), ("cast", (0, 0, 1))]
+    assert all(piece.startswith("stub") for piece, _ in order[:-2])
+    # The sheet lies on the cup between the units: its area, less the bores and the posts of the strap slots.
+    held = blocked(moulds.solids["cup2"], united(moulds.meshes(last.layer)), (0, 0, 1))
+    assert held == pytest.approx(moulds.mesh(moulds.unit[1]).slice(4.0).area() - 9 * math.pi * 7**2, rel=1e-3)
+
+
+def test_a_cup_goes_on_the_pins_in_one_attitude_only() -> None:
+    pins = patch().plan.pins
+    assert pins is not None
+    turned = {(-x, -y) for x, y in pins.places}
+    assert len(turned - set(pins.places)) == 2
+    assert min(math.dist(p, q) for p in turned - set(pins.places) for q in pins.places) > pins.hole_radius
+
+
+def with_tool(moulds: PatchMoulds, name: str, change: Change) -> PatchMoulds:
+    plan = moulds.plan
+    tools = tuple(replace(tool, shape=change(tool.shape)) if tool.name == name else tool for tool in plan.tools)
+    return patch_moulds(moulds.arranged, replace(plan, tools=tools))
+
+
+def less(*tools: Shape) -> Change:
+    return lambda shape: cut(shape, tools)
+
+
+def more(*parts: Shape) -> Change:
+    return lambda shape: union((shape, *parts))
+
+
+# Units at -20, 0, 20; cup 1: bore 5.75, groove 6.75 to 8.25; cup 2: groove from 31 to 32.5 at y, pins at y = 35.45.
+FAULTS: list[tuple[str, str, str, Change]] = [
+    ("C230", "cup1", "a pin's hole into a groove", less(moved(cylinder(2.15, -1, 2.5), 0, 7.5))),
+    ("C230", "cup2", "a pin's hole into the groove", less(moved(cylinder(2.15, -1, 3.7), 10, 31.75))),
+    ("C230", "cup2", "a pin's hole 0.6 under the groove", less(moved(cylinder(2.15, -1, 3.0), 10, 31.75))),
+    ("C000", "cup2", "a pin's hole through the rim", less(moved(cylinder(2.15, -1, 9), 0, 35.45))),
+    ("C240", "cup2", "a pin's hole 0.5 from a bore", less(moved(cylinder(2.15, -1, 2.4), 0, 29.6))),
+    ("C210", "base", "a pin 0.1 too thick", more(moved(cylinder(2.1, 0, 1.5), 23.2, -35.45))),
+    ("C210", "base", "a fin 0.1 too wide", more(box(-15, -12.5, -1.8, 1.8, 0, 2.11))),
+    ("C220", "cup1", "holes and slots too wide", less(box(-99, 99, -99, 99, -1, 1.5))),
+    ("C100", "base", "a fin 0.2 low", less(box(-15, -12.5, -2, 2, 1.91, 3))),
+    ("C100", "base", "no core", less(cylinder(4.6, 0, 3))),
+    ("C100", "cup2", "a scratch over the land", less(box(-1, 1, 29, 32, 4.3, 9))),
+    ("C200", "base", "a fin longer than its slot", more(box(-12, -11.4, -1.7, 1.7, 0, 2.11))),
+    ("C200", "base", "a pin higher than its hole", more(moved(cylinder(1.5, 0, 2.6), 23.2, -35.45))),
+    ("C300", "base", "a knob on a core", more(moved(cylinder(4.7, 1.0, 1.4), 20, 20))),
+    ("C300", "cup2", "a lip in a bore", more(box(-7.2, -6.9, -1, 1, 2.5, 2.8))),
+    ("C410", "cup2", "a lid with a pinhole", more(cut(box(-38, 38, -30, 30, 4.4, 4.61), [box(0, 0.3, 0, 0.3, 4, 5)]))),
+]
+
+
+@pytest.mark.parametrize(("code", "tool", "what", "change"), FAULTS, ids=[f"{f[0]}-{f[1]}-{f[2]}" for f in FAULTS])
+def test_a_planted_fault_is_caught(code: str, tool: str, what: str, change: Change) -> None:
+    found = mould_checks()[code].findings(with_tool(patch(), tool, change))
+    assert not all(f.ok for f in found), what
+
+
+def test_an_impossible_order_is_caught() -> None:
+    """Cup 2 lifted, or the patch pushed out over the fins before the base is off."""
+    moulds = patch()
+    plan, last = moulds.plan, moulds.plan.steps[-1]
+    for order in (
+        (*last.removals[:-2], Removal("cup2", (0, 0, 1)), last.removals[-2]),
+        (*last.removals[:-2], last.removals[-2], last.removals[-2], last.removals[-1]),
+        last.removals[:1] + last.removals[-2:] + last.removals[1:-2],
+    ):
+        steps = (*plan.steps[:-1], replace(last, removals=order))
+        found = mould_checks()["C300"].findings(patch_moulds(moulds.arranged, replace(plan, steps=steps)))
+        assert not all(f.ok for f in found)
+
+
+def test_a_tail_into_a_neighbour_is_an_overlap() -> None:
+    """A unit's own tail of 10 mm reaches x = 17, and the neighbour begins at 13."""
+    moulds = patch_moulds(load_array("forearm-patch"))
+    circuit = moulds.laid_later[-1]
+    tail = box(-1.5, 1.5, 0, 17, 2.0, 2.11)
+    moulds.__dict__["laid_later"] = (*moulds.laid_later[:-1], replace(circuit, shape=union((circuit.shape, tail))))
+    found = [f.where for f in mould_checks()["C200"].findings(moulds) if not f.ok]
+    assert found == ["unit: layer1 and circuit", "unit: layer2 and circuit"]
+
+
+@pytest.mark.parametrize(
+    ("override", "field"),
+    [
+        ("unit=embedded", "unit.design"),
+        ("unit=no-fpcb", "unit.fpcb"),
+        ("layout.pitch_mm=15", "layout.pitch_mm"),
+        ("sheet.thickness_mm=2", "sheet.thickness_mm"),
+        ("moulds.pour=injected", "moulds.pour"),
+        ("moulds.bed_x_mm=90", "moulds.bed_x_mm"),
+    ],
+)
+def test_what_can_not_be_cast_is_refused_with_what_would(override: str, field: str) -> None:
+    with pytest.raises(Refusal) as refused:
+        patch_moulds(load_array("forearm-patch", [override])).plan  # noqa: B018
+    assert refused.value.field == field
+    if refused.value.nearest is not None and field != "unit.design":
+        kept = f"{field}={refused.value.nearest}"
+        assert patch_moulds(load_array("forearm-patch", [override, kept])).plan

@@ -1,0 +1,52 @@
+"""The procedure of a back sheet: its order, its amounts and its words."""
+
+from __future__ import annotations
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.casting.procedure import Procedure
+
+
+@pytest.fixture(scope="module")
+def made() -> Procedure:
+    moulds = patch_moulds(load_array("forearm-patch"))
+    return back_sheet_procedure(moulds, [moulds.mesh(body).volume() for body in moulds.unit], 1000.0)
+
+
+def test_the_base_comes_off_before_the_patch_is_pushed_out(made: Procedure) -> None:
+    assert [step.title for step in made.release] == ["Filament out", "Base off, downwards", "Push out"]
+    titles = [[step.title for step in pour.steps] for pour in made.pours]
+    assert titles[0][-1] == "Cup 1 off"
+    assert titles[1][-1] == "Cure"
+    assert all("Grease the flanks" in each for each in titles)
+    assert "Leave cup 2 on" in made.release[1].text
+
+
+def test_the_silicone_of_all_units_is_mixed_once(made: Procedure) -> None:
+    """1.91 g of Layer 1 for nine units; 7.35 g of Layer 2 and sheet (6.87 cm3 of 1.07 g/cm3)."""
+    net = [next(f.value for f in pour.figures if f.name == "in the cavities, net") for pour in made.pours]
+    assert net == [pytest.approx(1.90, abs=0.02), pytest.approx(7.35, abs=0.02)]
+    assert any("1.90 + 7.35 = 9.25 g" in line for line in made.measure)
+
+
+def test_words_speak_of_the_pieces_that_are_there(made: Procedure) -> None:
+    steps = [*made.preparation, *(step for pour in made.pours for step in pour.steps), *made.release, *made.assembly]
+    words = " ".join(step.text for step in steps)
+    assert "plinth" not in words
+    assert "tongue" not in words
+    assert "over the pins" in words
+    assert "Solder the 9 motors to the circuit's pads" in words
+    assert {step.picture for step in steps} <= {
+        "",
+        "pictures/tools.png",
+        "pictures/pour1.png",
+        "pictures/pour2.png",
+        "pictures/patch-skin-side.png",
+    }
+    (circuit,) = [item for item in made.bill if item.item == "flexible circuit"]
+    assert circuit.quantity == 1
+    assert "cup 1 and blade upside down" in " ".join(made.printing)
+    assert "unitcad build array.toml --slice" in " ".join(made.printing)

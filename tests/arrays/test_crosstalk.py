@@ -1,0 +1,228 @@
+"""Crosstalk of arrays: every pair by the solver alone, sums by hand, figures known before, files and pictures."""
+
+import csv
+import io
+import json
+import math
+from itertools import pairwise
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from unitcad.arrays.array import Array
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.circuit.outline import outline
+from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
+from unitcad.arrays.crosstalk_matrix import BAND_HZ, MOST_LOADED, SHAPE, crosstalk, pairs
+from unitcad.arrays.crosstalk_table import crosstalk_csv
+from unitcad.attenuation import UniformDisc
+from unitcad.attenuation.crosstalk import crosstalk_ratio
+from unitcad.attenuation.inputs import body
+from unitcad.attenuation.receivers import neighbours_block
+from unitcad.errors import Refusal
+from unitcad.estimating import estimate_input, estimate_spec
+
+UNIT = {"like": "encapsulating", "fpcb": {"tail_length_mm": 1.0}}
+
+
+def array(layout: dict, **tables: object) -> Array:
+    return load_array({"name": "test", "array": "pockets", "unit": UNIT, "layout": layout, **tables})
+
+
+def grid(columns: int, rows: int, pitch: float, **tables: object) -> Array:
+    return array({"kind": "grid", "columns": columns, "rows": rows, "pitch_mm": pitch}, **tables)
+
+
+NINE = grid(3, 3, 20.0)
+DATA = crosstalk(NINE, masses=True)
+
+
+def _scattered(seed: int, count: int, other: str = "") -> Array:
+    rng, points = np.random.default_rng(seed), []
+    while len(points) < count:
+        at = rng.uniform(0, 26 * math.sqrt(count), 2).tolist()
+        if all(math.dist(at, known) > 19.0 for known in points):
+            points.append(at)
+    place = [{"at": f"P{i + 1}", "unit": {"like": other, "fpcb": {"tail_length_mm": 1.0}}} for i in (1, 4)]
+    return array({"kind": "list", "points_mm": points}, place=place if other else [], sheet={"thickness_mm": 1.5})
+
+
+@pytest.mark.parametrize(("seed", "other"), [(1, ""), (2, "motor-10mm"), (3, "single-embedded")])
+def test_every_pair_is_what_the_solver_gives_it_alone(seed: int, other: str) -> None:
+    """The motion as a vector: two forces in quadrature along x and y, each component in Cartesian axes."""
+    made = _scattered(seed, 7, other)
+    data = crosstalk(made, band=())
+    for i, one in enumerate(made.places):
+        variant = estimate_input(one.unit)
+        medium, omega = body(variant.tissue), 2 * np.pi * variant.frequency.middle
+        for drive in ("flat", "axial"):
+            for j, to in enumerate(made.places):
+                if i == j:
+                    assert data["matrix"][drive]["centre"][i][j] is None
+                    continue
+                dx, dy = to.x - one.x, to.y - one.y
+                away, theta = math.hypot(dx, dy), math.atan2(dy, dx)
+                reach = {"centre": away, "nearest_edge": away - to.unit.diameter_mm / 2}
+                for target, r in reach.items():
+                    size = []
+                    for at in (r, variant.diameter * 500):
+                        load_ = UniformDisc(variant.motor_diameter / 2, "tangential" if drive == "flat" else "normal")
+                        found = medium.response(load_, omega, 1e-3 * at, rtol=1e-5)
+                        if drive == "axial":
+                            size.append(math.sqrt(abs(found.u_r) ** 2 + abs(found.u_z) ** 2))
+                            continue
+                        u = np.zeros(3, complex)
+                        for phase, axis in ((1.0, 0.0), (-1j, math.pi / 2)):
+                            c, s = math.cos(theta - axis), math.sin(theta - axis)
+                            out, round_, up = found.u_r * c, found.u_theta * s, found.u_z * c
+                            u += phase * np.array(
+                                [
+                                    out * math.cos(theta) - round_ * math.sin(theta),
+                                    out * math.sin(theta) + round_ * math.cos(theta),
+                                    up,
+                                ]
+                            )
+                        size.append(float(np.linalg.norm(u)))
+                    assert data["matrix"][drive][target][i][j] == pytest.approx(size[0] / size[1], abs=1e-3)
+
+
+def test_the_middle_of_ten_by_ten_is_as_once_worked_out() -> None:
+    """|u_z| of an axial drive at 16 mm and 125 Hz: 2.5 edge levels in phase, 0.73 as the root of the squares' sum."""
+    data = crosstalk(grid(10, 10, 16.0), band=())
+    middle = [place["name"] for place in data["places"]].index("E5")
+    assert data["places"][middle]["frequency_hz"] == 125
+    assert data["sums"]["axial_u_z"]["sum"][middle] == pytest.approx(2.5, abs=0.05)
+    assert data["sums"]["axial_u_z"]["root_sum_of_squares"][middle] == pytest.approx(0.73, abs=0.005)
+    assert data["sums"]["axial"]["sum"][middle] > data["sums"]["axial_u_z"]["sum"][middle]
+    assert data["worst"]["place"] == "E5"
+
+
+def test_sums_are_those_of_the_matrix() -> None:
+    matrix = np.array(DATA["matrix"]["flat"]["centre"], float)
+    for j in range(9):
+        column = [matrix[i, j] for i in range(9) if i != j]
+        assert DATA["sums"]["own_drive"]["sum"][j] == pytest.approx(sum(column), abs=1e-5)
+        root = math.sqrt(sum(value**2 for value in column))
+        assert DATA["sums"]["own_drive"]["root_sum_of_squares"][j] == pytest.approx(root, abs=1e-5)
+    assert DATA["worst"]["place"] == "B2"
+    assert DATA["worst"]["sum"]["value"] == DATA["sums"]["flat"]["sum"][4]
+
+
+def test_the_nearest_neighbour_is_the_ratio_of_two_units_with_its_range() -> None:
+    alone = crosstalk_ratio(estimate_input(NINE.unit), 20e-3)
+    nearest = DATA["nearest"]
+    assert nearest["distance_mm"] == 20
+    assert nearest["centre"]["value"] == pytest.approx(alone.middle, abs=1e-6)
+    assert nearest["centre"]["low"] == pytest.approx(SHAPE[0] * alone.ends[0], abs=1e-6)
+    assert nearest["centre"]["high"] == pytest.approx(SHAPE[1] * alone.ends[1], abs=1e-6)
+    assert nearest["centre"]["value"] < nearest["nearest_edge"]["value"] < 1
+
+
+def test_absolute_values_are_only_a_range_over_the_models() -> None:
+    levels = estimate_spec(NINE.unit)["models"]
+    absolute = DATA["absolute"]
+    assert set(absolute["sum"]) == {"low", "high"}
+    for key in ("sum", "root_sum_of_squares"):
+        nominal = DATA["worst"][key]["value"]
+        ends = [levels[model]["edge_level"][end] * nominal for model in levels for end in ("low", "high")]
+        assert absolute[key] == pytest.approx({"low": min(ends), "high": max(ends)}, rel=1e-3)
+
+
+def test_the_band_at_a_frequency_is_the_array_at_that_frequency() -> None:
+    at = crosstalk(grid(3, 3, 20.0, estimate={"frequency_hz": 200.0}), band=())
+    row = DATA["band"][BAND_HZ.index(200.0)]
+    assert row["flat"]["sum"] == pytest.approx(at["sums"]["flat"]["sum"][4], abs=1e-4)
+    assert row["axial"]["nearest_centre"] == pytest.approx(at["matrix"]["axial"]["centre"][0][1], abs=1e-4)
+
+
+def test_round_a_limb_distances_are_arcs_and_the_ends_of_a_ring_are_neighbours() -> None:
+    ring = array({"kind": "ring", "count": 8}, body={"radius_mm": 40.0})
+    arc = 2 * math.pi * 40 / 8
+    found = pairs(ring).centre
+    assert found[0, 7] == pytest.approx(arc, abs=2e-3)
+    assert found[0, 4] == pytest.approx(4 * arc, abs=2e-3)
+    assert found.max() <= math.pi * 40 + 1e-3
+    assert "arc" in crosstalk(ring, band=())["distances"]
+
+
+def test_masses_are_those_of_a_row_that_was_worked_out_unit_by_unit() -> None:
+    row = grid(3, 1, 18.0)
+    variant = estimate_input(row.unit)
+    block = neighbours_block([variant] * 3, 18e-3, [variant.frequency.middle])
+    first, second = block["transfer"]
+    # What the outer units do to the middle one, by symmetry, and what the first two do to the third.
+    data = crosstalk(row, band=(), masses=True)["masses"]
+    assert len(data["mass_g"]) == 3
+    assert data["mass_g"][0] == pytest.approx(block["units"][0]["mass_g"]["value"], rel=1e-5)
+    assert data["sum_changes_by"][1] == pytest.approx(first["masses_change_it_by"], rel=5e-3)
+    assert data["sum_changes_by"][0] == data["sum_changes_by"][2]
+    assert second["masses_change_it_by"] > 0
+
+
+def test_more_units_than_their_masses_can_be_worked_out_for_are_refused() -> None:
+    with pytest.raises(Refusal, match=str(MOST_LOADED)):
+        crosstalk(grid(11, 10, 20.0), band=(), masses=True)
+
+
+def test_units_on_two_bodies_or_without_an_estimate_are_refused() -> None:
+    place = [{"at": "A2", "unit": {**UNIT, "estimate": {"tissue": "gel-50kpa"}}}]
+    with pytest.raises(Refusal) as refused:
+        crosstalk(grid(2, 1, 20.0, place=place))
+    assert refused.value.field == "estimate.tissue"
+
+
+def test_a_single_unit_has_no_neighbour() -> None:
+    single = grid(1, 1, 20.0)
+    data = crosstalk(single)
+    assert data["nearest"] is None
+    assert data["worst"]["sum"]["value"] == 0
+    json.dumps(data, allow_nan=False)
+    for svg in (heat_map_svg(data), patch_map_svg(single, data)):
+        assert "A1" in svg
+        assert "nan" not in svg
+
+
+def test_the_table_holds_the_matrix_and_the_band() -> None:
+    rows = list(csv.DictReader(io.StringIO(crosstalk_csv(NINE).decode())))
+    assert len(rows) == 72
+    names = [place["name"] for place in DATA["places"]]
+    for row in rows:
+        i, j = names.index(row["from"]), names.index(row["to"])
+        for drive in ("flat", "axial"):
+            assert float(row[f"{drive}_centre"]) == DATA["matrix"][drive]["centre"][i][j]
+            assert float(row[f"{drive}_edge"]) == DATA["matrix"][drive]["nearest_edge"][i][j]
+    first = next(row for row in rows if (row["from"], row["to"]) == ("A1", "A2"))
+    for one in DATA["band"]:
+        assert float(first[f"flat_edge_{one['frequency_hz']:g}hz"]) == one["flat"]["nearest_edge"]
+    assert crosstalk_csv(NINE) == crosstalk_csv(load_array(NINE.asked))
+
+
+def test_the_heat_map_shows_every_pair_and_the_map_every_unit() -> None:
+    svg = heat_map_svg(DATA)
+    texts = [text.text for text in ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")]
+    assert texts.count("35") == 24
+    assert {"drives", "moved", "A1", "C3"} <= set(texts)
+    assert heat_map_svg(crosstalk(load_array(NINE.asked))) == svg
+    patch = patch_map_svg(NINE, DATA, outline(NINE))
+    drawn = ElementTree.fromstring(patch)
+    assert len(list(drawn.iter("{http://www.w3.org/2000/svg}circle"))) == 9
+    assert "<title>circuit</title>" in patch
+    assert "A1" in patch_map_svg(NINE)
+
+
+def test_a_heat_map_of_many_units_draws_each_cell_once() -> None:
+    many = crosstalk(grid(7, 7, 20.0), band=())
+    drawn = ElementTree.fromstring(heat_map_svg(many, "axial", "nearest_edge"))
+    area = 0.0
+    for path in drawn.iter("{http://www.w3.org/2000/svg}path"):
+        for run in path.get("d", "").split("z")[:-1]:
+            _, wide, tall = run.replace("v", "h").split("h")[:3]
+            area += float(wide) * float(tall)
+    cell = 640 / 49
+    assert area == pytest.approx((49 * cell) ** 2, rel=2e-3)
+
+
+def test_a_wider_pitch_hears_less() -> None:
+    sums = [crosstalk(grid(3, 3, pitch), band=())["worst"]["sum"]["value"] for pitch in (17.0, 20.0, 25.0, 30.0)]
+    assert all(a > b for a, b in pairwise(sums))

@@ -1,0 +1,136 @@
+"""`unitcad estimate` of arrays: the answer first, tables behind --details, layouts compared, what is refused."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from unitcad.arrays.array_extras import extras
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.circuit.circuit_files import circuit_files, has_circuit
+from unitcad.arrays.circuit.outline import outline
+from unitcad.arrays.crosstalk_files import crosstalk_files
+from unitcad.arrays.crosstalk_matrix import crosstalk
+from unitcad.arrays.crosstalk_words import crosstalk_lines, ratios
+from unitcad.cli import app
+from unitcad.errors import Refusal
+
+NINE, WIDE = "forearm-pockets", "--set=layout.pitch_mm=28"
+
+
+def run(*words: str) -> tuple[int, str, str]:
+    found = CliRunner().invoke(app, ["estimate", *words], env={"COLUMNS": "200"})
+    return found.exit_code, found.stdout, found.stderr
+
+
+def test_the_answer_comes_first_and_the_tables_behind_details() -> None:
+    code, out, _ = run(NINE)
+    assert code == 0
+    first, answer, *_ = out.splitlines()
+    assert first.startswith("forearm-pockets: 9 units (encapsulating 14 mm), 125 Hz, flat drive, forearm")
+    data = crosstalk(load_array(NINE))
+    assert answer.strip() == crosstalk_lines(data)[0]
+    assert "35 % (23 to 45) reaches the middle of its nearest neighbour (A1 to A2, 20 mm apart)" in answer
+    assert "B2 gets the most" in out
+    assert "%" not in out.splitlines()[-1]
+    _, more, _ = run(NINE, "--details", "--frequency", "100:200:50", "--masses")
+    assert more.count("consistent") == 1
+    assert "150" in more
+    assert "change what B2 gets by x 1.0" in more
+
+
+def test_json_is_the_data_and_several_are_compared_with_the_first(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    code, out, _ = run(NINE, "--json")
+    assert code == 0
+    assert json.loads(out) == json.loads(json.dumps(crosstalk(load_array(NINE))))
+    code, out, _ = run(NINE, "hex-19", "--json")
+    both = json.loads(out)
+    assert [one["array"] for one in both["arrays"]] == ["forearm-pockets", "hex-19"]
+    (ratio,) = both["ratios"]
+    one, other = both["arrays"]
+    assert ratio["sum"] == pytest.approx(other["worst"]["sum"]["value"] / one["worst"]["sum"]["value"], rel=1e-5)
+    assert ratio["nearest_centre"] == pytest.approx(1, abs=1e-4)
+    _, text, _ = run(NINE, "hex-19")
+    assert "hex-19 over forearm-pockets: nearest neighbour x 1.00" in text
+
+
+def test_a_ratio_with_a_single_unit_is_none() -> None:
+    one = load_array(NINE, ["layout.columns=1", "layout.rows=1", "sheet.strap_slot_mm=[3, 8]"])
+    (ratio,) = ratios([crosstalk(one), crosstalk(load_array(NINE))])
+    assert ratio["nearest_centre"] is None
+    assert ratio["sum"] is None
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((NINE, "encapsulating"), "SPEC = 'encapsulating': is a unit"),
+        ((NINE, "--pitch", "20"), "--pitch = 20: an array has its own"),
+        ((NINE, "--model", "paper"), "--model = 'paper'"),
+        (("encapsulating", "--masses"), "--masses: is for arrays"),
+        ((NINE, "--set", "layout.pitch_mm=14"), "nearest accepted"),
+        ((NINE, "--frequency", "0"), "--frequency"),
+    ],
+)
+def test_what_an_array_has_not_is_refused(words: tuple[str, ...], said: str) -> None:
+    found = CliRunner().invoke(app, ["estimate", *words])
+    assert isinstance(found.exception, Refusal)
+    assert said in str(found.exception)
+
+
+def test_a_wider_pitch_is_less_in_every_sentence() -> None:
+    _, near, _ = run(NINE, "--json")
+    _, far, _ = run(NINE, WIDE, "--json")
+    a, b = json.loads(near), json.loads(far)
+    assert b["nearest"]["centre"]["high"] < a["nearest"]["centre"]["value"]
+    assert b["absolute"]["sum"]["high"] < a["absolute"]["sum"]["high"]
+
+
+def test_the_files_of_crosstalk_and_circuit() -> None:
+    array = load_array(NINE)
+    assert not has_circuit(array)
+    assert circuit_files(array) == ({}, {})
+    files = crosstalk_files(array)
+    assert set(files) == {
+        "crosstalk.json",
+        "crosstalk.csv",
+        "crosstalk.svg",
+        "crosstalk-edge.svg",
+        "crosstalk-patch.svg",
+    }
+    joined = load_array("forearm-patch")
+    made, why = circuit_files(joined)
+    assert set(made) == {"circuit.dxf", "circuit.svg", "circuit.kicad_pcb", "circuit-pads.csv"}
+    assert why == {}
+    assert b"<title>circuit</title>" in crosstalk_files(joined, outline(joined))["crosstalk-patch.svg"]
+
+
+def test_without_ezdxf_the_other_files_are_made_and_the_dxf_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "ezdxf", None)
+    made, why = circuit_files(load_array("forearm-patch"))
+    assert "circuit.svg" in made
+    assert "ezdxf" in why["circuit.dxf"]
+
+
+def test_the_files_beside_the_units_follow_what_is_asked_for() -> None:
+    joined = load_array("forearm-patch", ['output.formats=["stl"]'])
+    files, lacking = extras(joined, ["unit"])
+    assert set(files) == {"circuit.dxf", "circuit.svg", "circuit.kicad_pcb", "circuit-pads.csv"}
+    assert lacking == {}
+    assert set(extras(joined, ["estimate"])[0]) == set(crosstalk_files(joined))
+    assert extras(joined, ["casting"]) == ({}, {})
+
+
+def test_units_without_an_estimate_have_no_crosstalk_and_the_reason_is_told() -> None:
+    place = [{"at": "A1", "unit": {"like": "encapsulating", "estimate": {"tissue": "gel-50kpa"}}}]
+    files, lacking = extras(load_array({**load_array(NINE).asked, "place": place}), ["estimate"])
+    assert files == {}
+    assert "one body" in lacking["crosstalk.json"]
+
+
+def test_the_circuit_as_step_has_the_same_bytes_again() -> None:
+    pytest.importorskip("OCP")
+    joined = load_array("forearm-patch", ['output.formats=["step"]'])
+    files, _ = extras(joined, ["unit"])
+    assert files["circuit.step"].startswith(b"ISO-10303-21")
+    assert extras(joined, ["unit"])[0]["circuit.step"] == files["circuit.step"]

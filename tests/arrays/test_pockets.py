@@ -1,0 +1,97 @@
+"""Pockets: every mould check holds on the tray, and a fault drawn into it is caught."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.construction import constructions
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.check import Options, check_bytes
+from unitcad.errors import Refusal
+from unitcad.export import stl
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays
+from unitcad.mould_checks import check_moulds
+from unitcad.moulds.cavities import BALANCE
+from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, union
+from unitcad.shape.tree import Revolve
+from unitcad.spec import printer_of
+
+POCKETS = ["forearm-pockets", "hex-19"]
+
+
+@pytest.mark.parametrize("name", POCKETS)
+def test_every_mould_check_holds(name: str) -> None:
+    moulds = patch_moulds(load_array(name))
+    findings = check_moulds(moulds)
+    assert [f for f in findings if not f.ok] == []
+    assert {f.code for f in findings} >= {"C000", "C100", "C200", "C300", "C310", "C400", "C410"}
+    (cavity,) = moulds.cavities
+    assert cavity.reached.volume() == pytest.approx(moulds.mesh(moulds.unit[0]).volume(), rel=BALANCE)
+
+
+@pytest.mark.parametrize("name", POCKETS)
+def test_every_tool_prints_without_support(name: str) -> None:
+    moulds = patch_moulds(load_array(name))
+    for tool in moulds.plan.tools:
+        content = stl.content(*print_ready(*arrays(moulds.mesh(tool)), tool.upside_down), tool.name)
+        report = check_bytes(content, f"{tool.name}.stl", Options(printer=printer_of(moulds.spec)))
+        assert [f for f in report.findings if f.severity != "info"] == []
+
+
+def test_a_pocket_is_smaller_than_its_unit_by_the_hold() -> None:
+    array = load_array("forearm-pockets", ["sheet.hold_mm=0.35"])
+    moulds = patch_moulds(array)
+    held = [f for f in check_moulds(moulds) if f.where.startswith("pocket")]
+    assert [f.value for f in held] == [pytest.approx(100 * (7 / 6.65 - 1))]
+    solid = moulds.mesh(moulds.unit[0])
+    assert solid.genus() == 9 + 2
+    free = cylinder(6.64, -1, 9)
+    for place in array.places:
+        x, y = place.x, place.y
+        assert (solid ^ moulds.meshes([moved(free, x, y)])[0]).volume() == 0
+        assert (solid ^ moulds.meshes([moved(cylinder(6.7, -1, 9), x, y)])[0]).volume() > 1
+
+
+_FAULTS = [
+    ("C100", "a core 0.1 too wide", lambda base: union((base, moved(cylinder(6.9, -1, 2), 20, 20)))),
+    ("C100", "no core of a strap slot", lambda base: cut(base, [box(29, 34, -14, 14, 0, 3)])),
+    ("C100", "a hole in the wall", lambda base: cut(base, [box(35, 60, -1, 1, 0.5, 1.5)])),
+    ("C200", "a core that widens", lambda base: union((base, Revolve(polygon((0, 0.5), (7.2, 2), (0, 2)))))),
+    ("C000", "a loose piece", lambda base: union((base, box(-1, 1, 60, 62, 0, 2)))),
+    ("C400", "a hollow roof", lambda base: union((base, cut(box(-4, 4, 6, 14, 1, 2), [box(-3, 3, 9, 11, 0.9, 1.6)])))),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("code", "what", "change"), _FAULTS, ids=[what for _, what, _ in _FAULTS])
+def test_a_fault_in_the_tray_is_caught(code: str, what: str, change: Any) -> None:
+    array = load_array("forearm-pockets")
+    plan = constructions()["pockets"].plan(array)
+    base: Shape = change(plan.tools[0].shape)
+    altered = replace(plan, tools=(replace(plan.tools[0], shape=base), *plan.tools[1:]))
+    assert code in {f.code for f in check_moulds(patch_moulds(array, altered)) if not f.ok}
+
+
+@pytest.mark.parametrize("thickness", [0.6, 0.8, 1.0, 1.5])
+def test_the_groove_of_a_low_tray_is_whole(thickness: float) -> None:
+    array = load_array("forearm-pockets", [f"sheet.thickness_mm={thickness}", "unit='single-embedded'"])
+    assert [f for f in check_moulds(patch_moulds(array)) if not f.ok] == []
+
+
+def test_a_tray_larger_than_the_bed_is_refused_with_the_bed_that_fits() -> None:
+    array = load_array("forearm-pockets", ["layout.columns=12"])
+    with pytest.raises(Refusal) as refused:
+        patch_moulds(array).plan  # noqa: B018
+    assert refused.value.field == "moulds.bed_x_mm"
+    assert patch_moulds(load_array(array, [f"moulds.bed_x_mm={refused.value.nearest}"])).plan
+
+
+def test_a_unit_with_an_open_notch_is_held_under_its_tail() -> None:
+    array = load_array("forearm-pockets", ['unit="single-embedded"', "sheet.thickness_mm=1.2"])
+    low, high = array.sheet.low, array.sheet.high
+    assert high - low == pytest.approx(1.2, abs=1e-3)
+    assert [f for f in check_moulds(patch_moulds(array)) if not f.ok] == []

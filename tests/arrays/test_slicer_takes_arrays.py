@@ -1,0 +1,31 @@
+"""PrusaSlicer slices every tool of every shipped array, and repairs none of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from unitcad.arrays.array_file import array_templates, load_array
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.export import slicer, stl
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays
+from unitcad.spec import printer_of
+
+pytestmark = [
+    pytest.mark.slicer,
+    pytest.mark.skipif(slicer.program() is None, reason="PrusaSlicer is not installed"),
+]
+
+
+@pytest.mark.parametrize("name", array_templates())
+def test_every_tool_of_an_array_is_sliced(name: str, tmp_path: Path) -> None:
+    moulds = patch_moulds(load_array(name))
+    for tool in moulds.plan.tools:
+        if tool.made != "printed":
+            continue
+        path = tmp_path / f"{tool.name}.stl"
+        path.write_bytes(stl.content(*print_ready(*arrays(moulds.mesh(tool)), tool.upside_down), tool.name))
+        assert not slicer.needs_repair(path), tool.name
+        assert slicer.slice_file(path, printer_of(moulds.spec)).print_s > 60, tool.name

@@ -1,0 +1,136 @@
+"""Cells of a gang in like surroundings: found from the drawing, judged once, with the findings of the whole plate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from faulty_sets import set_of, with_fault
+from manifold3d import Manifold, OpType
+
+from unitcad.kernels.mesh import realise
+from unitcad.mould_checks import check_moulds
+from unitcad.moulds.congruence import column_round, cropped
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.shape import Shape, box, cut, union
+from unitcad.shape.column import Column, Standing
+
+BED = ("moulds.bed_x_mm=1000", "moulds.bed_y_mm=1000")
+GANGS = [
+    ("no-fpcb", "moulds.cavities=[3,3]"),
+    ("encapsulating", "moulds.cavities=[2,3]"),
+    ("encapsulating", "moulds.cavities=[2,2]", "moulds.pour=injected"),
+    ("embedded", "moulds.cavities=[1,3]", "fpcb.tail=both"),
+    ("three-layer", "moulds.cavities=[2,2]"),
+    ("encapsulating", "moulds.cavities=[2,2]", "moulds.printer=sla"),
+    ("custom/strap-lugs", "moulds.cavities=[2,1]"),
+]
+
+
+def each_cell_alone(moulds: MouldSet) -> MouldSet:
+    """Return the same set, every cell of which counts as one of its own."""
+    alone = MouldSet(moulds.spec, moulds.altered)
+    alone.__dict__["cells"] = tuple(range(len(moulds.plan.layout.cells)))
+    return alone
+
+
+def whole_plate_cavity(moulds: MouldSet, step: int) -> list[Manifold]:
+    """Return what silicone can reach in a pour of the whole plate: block less all tools, seals and cured layers."""
+    pour = moulds.plan.steps[step]
+    tools = [moulds.solids[name] for name in pour.tools]
+    filled = [*tools, *moulds.meshes((*pour.earlier, *(body.shape for body in pour.inserts), *pour.seals))]
+    x0, y0, z0, x1, y1, _ = Manifold.compose(tools).bounding_box()
+    block = realise(box(x0 - 5, x1 + 5, y0 - 5, y1 + 5, z0 - 5, pour.top), 4)
+    return Manifold.batch_boolean([block, *filled], OpType.Subtract).decompose()
+
+
+@pytest.mark.parametrize("gang", GANGS, ids=[" ".join(gang) for gang in GANGS])
+def test_a_cell_s_cavity_is_that_of_the_whole_plate(gang: tuple[str, ...]) -> None:
+    moulds = set_of(*gang)
+    for step in range(len(moulds.plan.steps)):
+        there = whole_plate_cavity(moulds, step)
+        for cavity in (c for c in moulds.cavities if c.step is moulds.plan.steps[step]):
+            whole = max(there, key=lambda part: (part ^ cavity.drawn).volume())
+            differ = whole.volume() + cavity.reached.volume() - 2 * (whole ^ cavity.reached).volume()
+            assert abs(differ) < 1e-9 * whole.volume()
+
+
+@pytest.mark.parametrize(
+    "gang",
+    [
+        GANGS[0],
+        ("no-fpcb", "moulds.cavities=[4,2]"),
+        pytest.param(("no-fpcb", "moulds.cavities=[6,6]"), marks=pytest.mark.long),
+    ],
+)
+def test_like_cells_have_the_findings_that_each_has_alone(gang: tuple[str, ...]) -> None:
+    moulds = set_of(*gang)
+    assert len(set(moulds.cells)) < len(moulds.cells)
+    assert [shown(f) for f in check_moulds(moulds)] == [shown(f) for f in check_moulds(each_cell_alone(moulds))]
+
+
+def shown(finding):
+    """A finding, its value to six decimals; of overlaps that hold the largest is one of rounding, whichever it is."""
+    where = finding.where.split(":")[0] if finding.code == "C200" and finding.ok else finding.where
+    return finding.code, where, finding.ok, round(finding.value, 6), round(finding.limit, 6)
+
+
+FAULTS: list[tuple[str, str, Callable[[Shape], Shape]]] = [
+    ("C100", "base", lambda shape: cut(shape, [box(15, 16, 0, 1, 1.5, 9)])),
+    ("C100", "cup2", lambda shape: union((shape, box(-19, -17, 6.5, 7.2, 1, 2)))),
+    ("C300", "cup2", lambda shape: union((shape, box(16, 18, 24.9, 25.1, 1, 2)))),
+    ("C200", "stub5", lambda shape: union((shape, box(0, 1.2, -0.5, 0.5, 0, 1)))),
+]
+
+
+@pytest.mark.parametrize(("code", "tool", "change"), FAULTS)
+def test_a_fault_in_one_cell_is_found_there(code: str, tool: str, change: Callable[[Shape], Shape]) -> None:
+    faulty = with_fault(set_of("no-fpcb", "moulds.cavities=[3,3]"), tool, change)
+    found = {(f.code, f.where) for f in check_moulds(faulty) if not f.ok}
+    alone = {(f.code, f.where) for f in check_moulds(each_cell_alone(faulty)) if not f.ok}
+    assert code in {code for code, _ in found}
+    assert found == alone
+    cells = {where for code, where in found if code == "C100"}
+    assert len(cells) <= 2  # pours of that one cell
+
+
+def test_a_hundred_cells_have_three_surroundings() -> None:
+    """Front row, inner rows, back row: they differ in the ways of the filaments. Numbers lie outside the columns."""
+    moulds = set_of("no-fpcb", "moulds.cavities=[10,10]", *BED)
+    rows = [set(moulds.cells[10 * row : 10 * row + 10]) for row in range(10)]
+    assert all(len(row) == 1 for row in rows)
+    assert len(set(moulds.cells)) == 3
+    assert rows[0] != rows[1] == rows[8] != rows[9]
+
+
+@pytest.mark.parametrize("gang", GANGS, ids=[" ".join(gang) for gang in GANGS])
+def test_what_a_column_is_told_to_hold_is_what_the_meshes_have_there(gang: tuple[str, ...]) -> None:
+    """The reduced trees, made into meshes of their own, fill the column as the whole tools do."""
+    moulds = set_of(*gang)
+    for cell in (moulds.plan.layout.cells[0], moulds.plan.layout.cells[-1]):
+        for radius in (6.0, 9.0, 14.0):
+            column = Column(cell.x, cell.y, radius)
+            for tool in moulds.plan.tools:
+                whole = cropped(moulds.solids[tool.name], column).translate((-column.x, -column.y, 0))
+                parts = [realise(part, moulds.segments) for part in Standing([tool.shape]).within(column)]
+                told = cropped(Manifold.compose(parts), Column(0, 0, radius)) if parts else Manifold()
+                differ = whole.volume() + told.volume() - 2 * (whole ^ told).volume()
+                assert abs(differ) < 1e-6, (tool.name, radius)
+
+
+def test_a_mesh_that_lacks_a_wedge_makes_a_cell_of_its_own() -> None:
+    moulds = set_of("no-fpcb", "moulds.cavities=[3,3]")
+    cell = moulds.plan.layout.cells[4]
+    wedge = Manifold.cube((0.5, 0.02, 0.5)).translate((cell.x + 4.2, cell.y, 1.0))
+    damaged = MouldSet(moulds.spec, replace(moulds.plan))
+    damaged.__dict__["solids"] = {**moulds.solids, "base": moulds.solids["base"] - wedge}
+    assert damaged.cells.count(damaged.cells[4]) == 1
+    assert moulds.cells.count(moulds.cells[4]) == 3
+
+
+def test_a_column_goes_round_what_it_is_drawn_for() -> None:
+    column = column_round([Manifold.cube((2, 2, 1)).translate((4, 6, 0))], 0.5)
+    assert (column.x, column.y) == (5, 7)
+    assert column.radius == pytest.approx(2**0.5 + 0.5)
+    assert (column.low, column.high) == (-0.5, 1.5)

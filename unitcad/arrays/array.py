@@ -1,0 +1,107 @@
+"""An array with everything settled: what `array_file` makes of a file and what the rest of this room sees.
+
+The flat frame, in mm: z = 0 at the skin and upwards away from it, x along the columns and round the limb, y along the
+rows' axis and the limb's. Seen from outside, rows are lettered from the top (the largest y), columns numbered along x.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from unitcad.arrays.array_tables import Cast, CircuitTable, Construction
+from unitcad.spec import Spec
+
+Box = tuple[float, float, float, float]
+"""(x0, y0, x1, y1), mm."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placed:
+    """A unit at its place (mm), turned about its axis counter-clockwise as seen from outside: its tail leaves there."""
+
+    name: str
+    x: float
+    y: float
+    angle_deg: float
+    unit: Spec
+
+    @property
+    def radius(self) -> float:
+        """Half the unit's diameter, mm."""
+        return self.unit.diameter_mm / 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sheet:
+    """The silicone between the units, mm: from `low` to `high` above the skin, rounded corners, slots for straps.
+
+    `hold_mm`: how much smaller than its unit's a pocket's radius is.
+    """
+
+    material: str
+    low: float
+    high: float
+    margin_mm: float
+    corner_mm: float
+    outline: Box
+    strap_slots: tuple[Box, ...]
+    hold_mm: float
+
+    @property
+    def thickness_mm(self) -> float:
+        """From the skin's side to the back."""
+        return self.high - self.low
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Array:
+    """Units at their places on one sheet. `radius_mm`: of the limb, None where it is flat.
+
+    `layout`: the table that the places came from. `asked`: plain data that gives the same array when read again.
+    """
+
+    name: str
+    construction: Construction
+    cast: Cast
+    radius_mm: float | None
+    layout: dict[str, Any]
+    places: tuple[Placed, ...]
+    sheet: Sheet
+    circuit: CircuitTable | None
+    asked: dict[str, Any]
+
+    @cached_property
+    def units(self) -> tuple[Spec, ...]:
+        """The distinct units, the most frequent kind of place first among equals in the order of places."""
+        found: list[Spec] = []
+        for place in self.places:
+            if not any(place.unit == unit for unit in found):
+                found.append(place.unit)
+        return tuple(found)
+
+    @property
+    def unit(self) -> Spec:
+        """The unit of the places that name no other."""
+        return self.units[0]
+
+    @cached_property
+    def pitch_mm(self) -> float:
+        """The least distance between two places' centres, mm; infinite for one place."""
+        at = sorted((place.x, place.y) for place in self.places)
+        least = math.inf
+        for i, (x, y) in enumerate(at):
+            for other_x, other_y in at[i + 1 :]:
+                if other_x - x >= least:
+                    break
+                least = min(least, math.hypot(other_x - x, other_y - y))
+        return least
+
+    def placed(self, name: str) -> Placed:
+        """Return the place of that name. Raises KeyError."""
+        return {place.name: place for place in self.places}[name]
+
+    def __repr__(self) -> str:
+        return f"Array({self.name!r}: {self.construction}, {len(self.places)} units of {self.unit.diameter_mm:g} mm)"

@@ -1,0 +1,328 @@
+"""Array files: a template, a file or plain data to an array with everything settled, or one refusal.
+
+`is_array` tells an array file from a spec: it has the key `array`. A unit is a template, a spec file beside the array
+file, or a table of a spec's keys in which `like` names where the others come from.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from unitcad.arrays.array import Array, Placed
+from unitcad.arrays.array_tables import AskedArray, PlaceTable
+from unitcad.arrays.construction import Construction, constructions
+from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
+from unitcad.arrays.sheet_outline import sheet_of
+from unitcad.arrays.tail_ways import Blocked, angles
+from unitcad.designs.limits import up
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
+from unitcad.files import read_text
+from unitcad.shape import mm
+from unitcad.spec import Spec, convert, read_toml, to_data
+from unitcad.spec.custom_code import with_source
+from unitcad.spec.toml import text_of
+from unitcad.validation import custom_templates, from_data, templates
+from unitcad.validation.dotted import ABSENT, at
+from unitcad.validation.faults import line_of
+from unitcad.validation.load import override
+from unitcad.validation.shipped_files import is_path, named_file, shipped_files
+
+_OVERRIDES = ("moulds", "casting", "estimate", "output")
+"""Tables of an array file that override those of its units."""
+ArraySource = str | os.PathLike[str] | Mapping[str, object] | Array
+
+
+def array_templates() -> dict[str, Path]:
+    """Return the shipped arrays by name."""
+    return shipped_files("arrays")
+
+
+def is_array(source: object) -> bool:
+    """Tell whether a name, a file or plain data means an array. A file that can't be read means none."""
+    if isinstance(source, Array):
+        return True
+    if isinstance(source, Mapping):
+        return "array" in source
+    if not isinstance(source, str | os.PathLike):
+        return False
+    text = os.fspath(source)
+    if text in array_templates():
+        return text not in templates()
+    if not is_path(text):
+        return False
+    try:
+        return "array" in read_toml(Path(text))
+    except (UnitcadError, OSError):
+        return False
+
+
+def confirm_known(name: str, field: str = "spec", kind: type[Refusal] = WrongArgument) -> None:
+    """Raise `kind`, of that field, for a name of neither a unit's template nor an array's, and no file's path."""
+    named_file(name, templates() | custom_templates() | array_templates(), field, kind)
+
+
+def load_array(source: ArraySource, set: Iterable[str] = ()) -> Array:
+    """Return the array of a template's name, a file, plain data, or another array; `set` are texts "path=value".
+
+    Raises Refusal or UnitcadError, naming the field, for the first value that is not valid.
+    """
+    path = None
+    if isinstance(source, Array):
+        data, folder = copy.deepcopy(source.asked), Path()
+    elif isinstance(source, Mapping):
+        data, folder = copy.deepcopy(dict(source)), Path()
+    else:
+        path = named_file(os.fspath(source), array_templates(), "array", WrongArgument)
+        data, folder = read_toml(path), path.parent
+    whole = override(expanded(data, folder), set)
+    try:
+        return array_of(whole)
+    except Refusal as refusal:
+        if path is not None:
+            _locate(refusal, path, data, whole)
+        raise
+
+
+def _locate(refusal: Refusal, path: Path, written: Mapping[str, Any], whole: Mapping[str, Any]) -> None:
+    """Name the file and the line of a refused value that stands in an array file, and not in an option."""
+    if refusal.value is None or at(written, refusal.field) == at(whole, refusal.field) is not ABSENT:
+        refusal.file, refusal.line = os.fspath(path), line_of(read_text(path), refusal.field)
+
+
+def expanded(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, Any]:
+    """Return an array's plain data with the whole spec of each unit in it. Raises Refusal for a unit not found."""
+    whole = copy.deepcopy(dict(data))
+    if "unit" in whole:
+        whole["unit"] = _unit_data(whole["unit"], "unit", folder)
+    places = whole.get("place")
+    for i, place in enumerate(places if isinstance(places, list) else ()):
+        if isinstance(place, dict) and "unit" in place:
+            place["unit"] = _unit_data(place["unit"], f"place.{i}.unit", folder)
+    return whole
+
+
+def _unit_data(given: Any, field: str, folder: Path) -> Any:
+    """Return the plain data of a unit's spec: what `like` names, with the other keys in place of its own."""
+    if isinstance(given, str):
+        given = {"like": given}
+    if not isinstance(given, dict) or "like" not in given:
+        return with_source(given, folder) if isinstance(given, dict) else given
+    own = {key: value for key, value in given.items() if key != "like"}
+    if not isinstance(given["like"], str):
+        return given
+    at_field = field if not own else f"{field}.like"
+    known = templates() | custom_templates()
+    if given["like"] in array_templates() and given["like"] not in known:
+        raise Refusal(at_field, given["like"], "is an array; a unit is a single one")
+    path = named_file(given["like"], known, at_field)
+    if path not in known.values():
+        path = folder / path
+    base = with_source(read_toml(path), path.parent)
+    return _merged(base, with_source(own, folder))
+
+
+def _merged(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in own.items():
+        there = merged.get(key)
+        merged[key] = _merged(there, value) if isinstance(there, dict) and isinstance(value, dict) else value
+    return merged
+
+
+def array_of(data: Mapping[str, Any]) -> Array:
+    """Return the array of plain data whose units are whole specs. Raises Refusal for the first unfit value."""
+    if at(data, "body.cast") == "curved":
+        raise Refusal("body.cast", "curved", "curved moulds are not made yet: cast flat and bend", "flat")
+    try:
+        asked = convert(data, AskedArray)
+        table, kind = _layout(asked)
+    except UnknownKey as key:
+        limit = key.limit.replace("`unitcad schema`", "`unitcad schema array`")
+        raise UnknownKey(key.field, key.value, limit, key.nearest) from None
+    way = constructions()[asked.array]
+    if asked.circuit is not None and way.own_tails:
+        limit = "its units are held with their own circuits; [circuit] is one for all, laid into notches"
+        raise Refusal("array", asked.array, limit, "back-sheet")
+    points = [Point(p.name, mm(p.x), mm(p.y), p.row, p.column) for p in kind.points(table, asked.body.radius_mm)]
+    if len(points) > MOST_PLACES:
+        raise Refusal("layout", len(points), f"an array has at most {MOST_PLACES} units")
+    places = _places(asked, points)
+    unit = _unit(asked.unit, "unit", data)
+    units = [unit] * len(points)
+    for index, i in places.items():
+        given = asked.place[i].unit
+        if given is not None:
+            if not way.mixed:
+                limit = f"{asked.array} casts all units in one pour, so they are of one kind; pockets hold others"
+                raise Refusal(f"place.{i}.unit", "...", limit)
+            units[index] = _unit(given, f"place.{i}.unit", data)
+    _check_apart(way, points, units, kind, table, asked)
+    sheet = sheet_of(asked, way, points, units)
+    return Array(
+        name=asked.name,
+        construction=asked.array,
+        cast=asked.body.cast,
+        radius_mm=asked.body.radius_mm,
+        layout=dict(asked.layout),
+        places=tuple(
+            Placed(name=p.name, x=p.x, y=p.y, angle_deg=angle, unit=each)
+            for p, each, angle in zip(
+                points, units, _angles(asked, way, points, units, places, sheet.strap_slots), strict=True
+            )
+        ),
+        sheet=sheet,
+        circuit=asked.circuit,
+        asked=_settled(data, unit, asked, units, places),
+    )
+
+
+def with_formats(array: Array, formats: Iterable[str]) -> Array:
+    """Return the array with other formats for the files of its units, patch and tools."""
+    data = copy.deepcopy(array.asked)
+    for unit in _unit_tables(data):
+        unit["output"]["formats"] = list(formats)
+    return array_of(data)
+
+
+def array_hash(array: Array) -> str:
+    """Return the SHA-256 of an array's settled data without names and formats."""
+    data = copy.deepcopy(array.asked)
+    del data["name"]
+    for unit in _unit_tables(data):
+        del unit["name"], unit["output"]["formats"]
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+
+
+def to_toml(array: Array) -> str:
+    """Return the array as TOML, its units' specs whole in it: the same array when read again."""
+    return text_of(array.asked)
+
+
+def _unit_tables(settled: Mapping[str, Any]) -> list[dict[str, Any]]:
+    return [settled["unit"], *(place["unit"] for place in settled.get("place", ()) if "unit" in place)]
+
+
+def _layout(asked: AskedArray) -> tuple[Any, LayoutKind]:
+    """Return the layout's table and kind."""
+    name = asked.layout.get("kind")
+    if name is None:
+        raise Refusal("layout.kind", None, f"is required: one of {', '.join(layouts())}")
+    if not isinstance(name, str) or name not in layouts():
+        raise unknown_name("layout.kind", str(name), layouts())
+    kind = layouts()[name]
+    return convert(asked.layout, kind.table, "layout"), kind
+
+
+def _places(asked: AskedArray, points: list[Point]) -> dict[int, int]:
+    """Return the number of each point that a [[place]] speaks of, with that table's number."""
+    found: dict[int, int] = {}
+    for i, place in enumerate(asked.place):
+        index = _number(place, i, points)
+        if index in found:
+            raise Refusal(f"place.{i}.at", _shown(place), f"place.{found[index]} speaks of it too")
+        found[index] = i
+    return found
+
+
+def _number(place: PlaceTable, i: int, points: list[Point]) -> int:
+    """Return the number of the point that a place speaks of."""
+    if isinstance(place.at, str):
+        names = [p.name for p in points]
+        if place.at not in names:
+            raise unknown_name(f"place.{i}.at", place.at, names)
+        return names.index(place.at)
+    column, row = place.at
+    there = {(p.column + 1, p.row + 1): n for n, p in enumerate(points)}
+    if (column, row) not in there:
+        nearest = min(there, key=lambda at: (abs(at[0] - column) + abs(at[1] - row), at))
+        raise Refusal(f"place.{i}.at", [column, row], "there is no such column and row", list(nearest))
+    return there[column, row]
+
+
+def _shown(place: PlaceTable) -> object:
+    return place.at if isinstance(place.at, str) else list(place.at)
+
+
+def _unit(given: str | dict[str, Any], field: str, data: Mapping[str, Any]) -> Spec:
+    """Return a unit's spec, with the array's tables over its own; refusals name the field in the array's file."""
+    if isinstance(given, str):  # not expanded: plain data that names a template
+        given = _unit_data(given, field, Path())
+        assert isinstance(given, dict)
+    whole = {"name": f"{data['name']}-unit", **given}
+    for table in _OVERRIDES:
+        if data.get(table):
+            whole[table] = _merged(whole.get(table) or {}, data[table])
+    try:
+        return from_data(with_source(whole, Path()))
+    except Refusal as refusal:
+        own = at(data, refusal.field) is not ABSENT and refusal.field.split(".")[0] in _OVERRIDES
+        place = refusal.field if own else f"{field}.{refusal.field}"
+        kind = UnknownKey if isinstance(refusal, UnknownKey) else Refusal
+        raise kind(place, refusal.value, refusal.limit, refusal.nearest) from None
+
+
+def _check_apart(
+    way: Construction, points: list[Point], units: list[Spec], kind: LayoutKind, table: Any, asked: AskedArray
+) -> None:
+    """Raise Refusal, with the pitch that fits, for two units nearer to each other than the construction can make."""
+    order = sorted(range(len(points)), key=lambda i: points[i].x)
+    apart = {id(unit): way.apart(unit) for unit in units}
+    reach = max(unit.diameter_mm for unit in units) + max(gap for gap, _ in apart.values())
+    worst: tuple[float, Point, Point, float, str] | None = None
+    for n, i in enumerate(order):
+        for j in order[n + 1 :]:
+            p, q = points[i], points[j]
+            if q.x - p.x >= reach:
+                break
+            gap, why = max(apart[id(units[i])], apart[id(units[j])])
+            needed = (units[i].diameter_mm + units[j].diameter_mm) / 2 + gap
+            short = needed - ((p.x - q.x) ** 2 + (p.y - q.y) ** 2) ** 0.5
+            # What snapping two centres to the grid may take.
+            if short > 2 / 1024 and (worst is None or short > worst[0] + 1e-9):
+                one, other = sorted((p, q), key=lambda point: (point.row, point.column))
+                worst = short, one, other, needed, why
+    if worst:
+        refusal = kind.wider(table, asked.body.radius_mm, (worst[1], worst[2]), up(worst[3]))
+        raise Refusal(refusal.field, refusal.value, f"{refusal.limit}: {worst[4]}", refusal.nearest)
+
+
+def _angles(
+    asked: AskedArray, way: Construction, points: list[Point], units: list[Spec], places: dict[int, int], slots: Any
+) -> list[float]:
+    """Return the units' angles, degrees. Raises Refusal for a tail that finds no way."""
+    given = {n: asked.place[i].angle_deg for n, i in places.items() if asked.place[i].angle_deg is not None}
+    wanted = {n: float(angle or 0.0) for n, angle in given.items()}
+    if not way.own_tails:
+        return [wanted.get(n, 0.0) for n in range(len(points))]
+    try:
+        return angles(points, units, wanted, slots)
+    except Blocked as blocked:
+        n, unit = blocked.owner, units[blocked.owner]
+        name, i = points[n].name, places.get(blocked.owner)
+        at_unit = f"place.{i}.unit" if i is not None and asked.place[i].unit is not None else "unit"
+        table = "fpcb.tail_length_mm" if unit.fpcb else "wires.length_mm"
+        length = unit.fpcb.tail_length_mm if unit.fpcb else unit.wires.length_mm if unit.wires else 0.0
+        if n in wanted:
+            limit = f"at this angle the tail of {name} runs into {blocked.by}; it may be {blocked.longest:g} mm long"
+            raise Refusal(f"place.{i}.angle_deg", wanted[n], limit) from None
+        limit = f"the tail of {name} finds no straight way between the units; it may be at most"
+        nearest = blocked.longest if blocked.longest >= 0.1 else None
+        raise Refusal(f"{at_unit}.{table}", length, f"{limit} {blocked.longest:g} mm", nearest) from None
+
+
+def _settled(
+    data: Mapping[str, Any], unit: Spec, asked: AskedArray, units: list[Spec], places: dict[int, int]
+) -> dict[str, Any]:
+    """Return plain data that gives the same array again, each unit's spec whole in it."""
+    settled = {key: copy.deepcopy(value) for key, value in data.items() if key not in _OVERRIDES}
+    settled["unit"] = to_data(unit)
+    for n, i in places.items():
+        if asked.place[i].unit is not None:
+            settled["place"][i]["unit"] = to_data(units[n])
+    return settled

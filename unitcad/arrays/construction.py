@@ -1,0 +1,58 @@
+"""A way to make an array: what it demands of the units and how its sheet lies on them; found by its name."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from typing import NamedTuple
+
+from unitcad.arrays.array import Array
+from unitcad.moulds.plan import Plan
+from unitcad.shape.body import Body
+from unitcad.spec import Spec
+
+
+class Level(NamedTuple):
+    """Where a sheet lies, mm over the skin, and the thickest that would fit there."""
+
+    low: float
+    high: float
+    most: float
+
+
+@dataclass(frozen=True)
+class Construction:
+    """A construction by its name in a file.
+
+    mixed         whether single places may hold another unit
+    own_tails     whether units are cast whole by their own moulds, each with the tail of its own circuit
+    thickness_mm  of the sheet where the file gives none
+    apart         least distance between the edges of two units, mm, and why
+    level         from the distinct units and a thickness to where the sheet lies
+    bodies        the silicone that an array has besides its units, as cast
+    plan          tools and pours of those bodies; raises Refusal where they can't be made
+    assembly      how motors and circuit go into what was cast, a sentence each; () where they are in the units
+    """
+
+    name: str
+    about: str
+    mixed: bool
+    own_tails: bool
+    thickness_mm: float
+    apart: Callable[[Spec], tuple[float, str]]
+    level: Callable[[tuple[Spec, ...], float], Level]
+    bodies: Callable[[Array], tuple[Body, ...]]
+    plan: Callable[[Array], Plan]
+    assembly: Callable[[Array], tuple[str, ...]] = lambda _: ()
+
+
+@cache
+def constructions() -> dict[str, Construction]:
+    """Return the constructions by name: every file of this room that defines CONSTRUCTION is one."""
+    room = import_module(__package__ or "")
+    modules = (import_module(f"{room.__name__}.{file.name}") for file in pkgutil.iter_modules(room.__path__))
+    found = (module.CONSTRUCTION for module in modules if hasattr(module, "CONSTRUCTION"))
+    return {construction.name: construction for construction in found}

@@ -1,0 +1,360 @@
+"""Crosstalk of an array: how much of each unit's motion at its edge reaches each other unit, and what adds up there.
+
+The amplitude that unit i makes at p is level_i g(p) / g(D/2): its level at the edge, times the decay of the bare skin
+from there under the unit's own motor (`attenuation.crosstalk.decay`). What is given first is the decay, which the
+units' levels are not in. Amplitudes of several units are summed as if all were in phase, the worst case, and as the
+root of the sum of squares: motors are not synchronous, so their phases are unknown.
+
+One radial response serves all pairs of a distinct unit, frequency and drive.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from unitcad.arrays.array import Array
+from unitcad.arrays.crosstalk_words import crosstalk_lines
+from unitcad.attenuation.crosstalk import Reading, decay, ends
+from unitcad.attenuation.edge.estimates import not_of_this_drive
+from unitcad.attenuation.inputs import Drive, EstimateInput, body
+from unitcad.attenuation.receivers import FORCES, Patch, influence, motion, unit_mass
+from unitcad.errors import Refusal
+from unitcad.estimating import estimate_input, estimate_spec
+
+BAND_HZ = (50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
+SHAPE = (0.82, 1.14)
+"""Finite elements of eight units follow the bare disc's decay within these factors, from 9 to 30 mm, axial drive."""
+MOST_LOADED = 100
+"""Units whose masses are taken into account at once."""
+DIGITS = 6
+RANGE = (
+    "body's moduli, damping and thicknesses and the frequency to either end of their ranges, one kind at a time; and "
+    f"times {SHAPE[0]:g} to {SHAPE[1]:g}, within which finite elements of eight units follow the decay from 9 to 30 mm "
+    "under an axial drive (nearer, farther and under a sideways drive that is not checked)"
+)
+ASSUMPTIONS = [
+    "The decay is that of the bare, laterally uniform skin under each unit's own motor; the other units, the sheet and "
+    "the circuit are not on it.",
+    "A flat motor's force turns in the plane of the skin: |u| is then alike at every angle, and needs no direction.",
+    "|u| is the root of the sum of the squares of the three components' amplitudes. `axial_u_z` is |u_z| alone under "
+    "an axial drive, which some print.",
+    "Sums are in one unit's level at its edge, as if every unit were driven to that level.",
+]
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Who drives whom in an array: distances along the skin (mm), shape (n, n), rows the unit that drives.
+
+    `centre` is to the other unit's middle, `edge` to the point of its edge that is nearest. On a limb, x goes round it:
+    distances are those along the unrolled skin, the shorter way round.
+    """
+
+    centre: np.ndarray
+    edge: np.ndarray
+
+    @property
+    def count(self) -> int:
+        return len(self.centre)
+
+
+def pairs(array: Array) -> Pairs:
+    """Return the distances of an array's units."""
+    at = np.array([(place.x, place.y) for place in array.places])
+    radii = np.array([place.radius for place in array.places])
+    across = np.abs(at[:, None] - at[None])
+    if array.radius_mm is not None:
+        half = math.pi * array.radius_mm
+        across[..., 0] = np.abs((across[..., 0] + half) % (2 * half) - half)
+    centre = np.hypot(across[..., 0], across[..., 1])
+    return Pairs(centre, np.maximum(centre - radii[None, :], radii[:, None]))
+
+
+@dataclass(frozen=True)
+class Decays:
+    """An array's units, their estimate's inputs, and the decays between them."""
+
+    array: Array
+
+    @cached_property
+    def inputs(self) -> tuple[EstimateInput, ...]:
+        """Of each distinct unit. Raises Refusal for a unit without an estimate."""
+        found = tuple(estimate_input(unit) for unit in self.array.units)
+        for one in found:
+            if one.tissue != found[0].tissue:
+                limit = f"units side by side are on one body, {found[0].tissue_name}"
+                raise Refusal("estimate.tissue", one.tissue_name, limit, found[0].tissue_name)
+        return found
+
+    @cached_property
+    def kind(self) -> np.ndarray:
+        """The number of each place's distinct unit, shape (n,)."""
+        return np.array([self.array.units.index(place.unit) for place in self.array.places])
+
+    @cached_property
+    def pairs(self) -> Pairs:
+        """The distances."""
+        return pairs(self.array)
+
+    def decays(
+        self,
+        drivers: np.ndarray,
+        distances: np.ndarray,
+        drive: Drive | None = None,
+        hertz: float | None = None,
+        end: dict[str, int] | None = None,
+        reading: Reading = "u",
+    ) -> np.ndarray:
+        """Return |u| at distances (mm, (k, ...)) from the units of numbers `drivers`, (k,), over that at their edges.
+
+        `drive`, `hertz`: else each unit's own.
+        """
+        found = np.zeros(distances.shape)
+        for number, one in enumerate(self.inputs):
+            rows = self.kind[drivers] == number
+            if np.any(rows):
+                found[rows] = decay(one, 1e-3 * distances[rows], drive, hertz, end, reading)
+        return found
+
+    def matrix(
+        self, distances: np.ndarray, drive: Drive, hertz: float | None = None, reading: Reading = "u"
+    ) -> np.ndarray:
+        """Return the decays at distances of shape (n, n) or (n, n, k), rows the unit that drives; 0 for itself."""
+        found = np.zeros(distances.shape)
+        drivers, moved = np.nonzero(~np.eye(self.pairs.count, dtype=bool))
+        found[drivers, moved] = self.decays(drivers, distances[drivers, moved], drive, hertz, reading=reading)
+        return found
+
+    def both(self, drive: Drive, hertz: float | None = None) -> np.ndarray:
+        """Return the matrices to the centre and to the nearest edge, shape (n, n, 2)."""
+        return self.matrix(np.stack([self.pairs.centre, self.pairs.edge], axis=-1), drive, hertz)
+
+
+@dataclass(frozen=True)
+class Told:
+    """The pairs that the answer is about: the nearest two units, and all others with the place that gets the most."""
+
+    units: Decays
+    nearest: tuple[int, int] | None
+    worst: int
+
+    def of(
+        self, drive: Drive | None = None, hertz: float | None = None, end: dict[str, int] | None = None
+    ) -> dict[str, float]:
+        """Return the nearest neighbour's decay to centre and edge, and the sums at the worst place."""
+        if self.nearest is None:
+            return {"nearest_centre": 0.0, "nearest_edge": 0.0, "sum": 0.0, "root_sum_of_squares": 0.0}
+        pairs, (i, j) = self.units.pairs, self.nearest
+        others = np.delete(np.arange(pairs.count), self.worst)
+        distances = np.append(pairs.centre[others, self.worst], [pairs.centre[i, j], pairs.edge[i, j]])
+        found = self.units.decays(np.append(others, [i, i]), distances, drive, hertz, end)
+        return {
+            "nearest_centre": float(found[-2]),
+            "nearest_edge": float(found[-1]),
+            "sum": float(found[:-2].sum()),
+            "root_sum_of_squares": float(np.linalg.norm(found[:-2])),
+        }
+
+
+def crosstalk(
+    array: Array,
+    band: Sequence[float] = BAND_HZ,
+    masses: bool = False,
+    say: Callable[[str], None] = lambda line: None,
+) -> dict[str, Any]:
+    """Return an array's crosstalk as JSON-ready data.
+
+    `matrix`: the decay between each two units by drive, rows the unit that drives, to the other's centre and nearest
+    edge, null for itself, at the units' own frequencies; `sums`: what adds up at each place; `band`: the same at the
+    nearest neighbour and the worst place over frequencies (Hz); `absolute`: a range over the models; `masses`: with the
+    masses of the others on the skin. Raises Refusal for a unit without an estimate, a frequency that no body takes,
+    and for masses of more than `MOST_LOADED` units.
+    """
+    units = Decays(array)
+    n = len(array.places)
+    say("crosstalk: decay")
+    matrices: dict[Drive, np.ndarray] = {"flat": units.both("flat"), "axial": units.both("axial")}
+    drives = [units.inputs[kind].drive for kind in units.kind]
+    own = np.array([matrices[drive][i] for i, drive in enumerate(drives)])
+    sums = {
+        "own_drive": _sums(own[..., 0]),
+        **{drive: _sums(one[..., 0]) for drive, one in matrices.items()},
+        "axial_u_z": _sums(units.matrix(units.pairs.centre, "axial", reading="u_z")),
+    }
+    told = Told(units, _nearest(units, own), int(np.argmax(np.round(sums["own_drive"]["sum"], 9))))
+    say("crosstalk: range")
+    varied = {str(end): end for one in units.inputs for end in ends(one)}.values()
+    answers = [told.of(), *(told.of(end=end) for end in varied)]
+    ranged = {key: _quantity(*[one[key] for one in answers]) for key in answers[0]}
+    names = [place.name for place in array.places]
+    data: dict[str, Any] = {
+        "array": array.name,
+        "units": n,
+        "tissue": units.inputs[0].tissue_name,
+        "what": "|u| of the skin at a unit over |u| at the edge of the unit that drives, under its motor's force",
+        "range": RANGE,
+        "distances": _along(array),
+        "places": [
+            {
+                "name": place.name,
+                "x_mm": place.x,
+                "y_mm": place.y,
+                "unit": place.unit.name,
+                "diameter_mm": place.unit.diameter_mm,
+                "drive": drives[i],
+                "frequency_hz": units.inputs[units.kind[i]].frequency.middle,
+            }
+            for i, place in enumerate(array.places)
+        ],
+        "nearest": told.nearest
+        and {
+            "from": names[told.nearest[0]],
+            "to": names[told.nearest[1]],
+            "distance_mm": round(float(units.pairs.centre[told.nearest]), DIGITS),
+            "centre": ranged["nearest_centre"],
+            "nearest_edge": ranged["nearest_edge"],
+        },
+        "worst": {
+            "place": names[told.worst],
+            **{key: ranged[key] for key in ("sum", "root_sum_of_squares")},
+        },
+        "sums": {name: {key: _rounded(one) for key, one in both.items()} for name, both in sums.items()},
+        "matrix": {
+            drive: {"centre": _table(one[..., 0]), "nearest_edge": _table(one[..., 1])}
+            for drive, one in matrices.items()
+        },
+        "assumptions": ASSUMPTIONS,
+    }
+    say("crosstalk: band")
+    data["band"] = [
+        {
+            "frequency_hz": hertz,
+            **{drive: {key: round(one, DIGITS) for key, one in told.of(drive, hertz).items()} for drive in matrices},
+        }
+        for hertz in band
+    ]
+    data["absolute"] = _absolute(units, own[..., 0], told.worst)
+    if masses:
+        say("crosstalk: masses")
+        data["masses"] = _masses(units)
+    return {**data, "answer": crosstalk_lines(data)}
+
+
+def _sums(matrix: np.ndarray) -> dict[str, np.ndarray]:
+    """Return what all other units make at each place, in phase and as the root of the sum of squares, shape (n,)."""
+    return {"sum": matrix.sum(axis=0), "root_sum_of_squares": np.sqrt((matrix**2).sum(axis=0))}
+
+
+def _quantity(value: float, *others: float) -> dict[str, float]:
+    """Return a value with its range: the least and largest of it and `others`, times `SHAPE`."""
+    every = (value, *others)
+    low, high = SHAPE[0] * min(every), SHAPE[1] * max(every)
+    return {key: round(float(one), DIGITS) for key, one in (("value", value), ("low", low), ("high", high))}
+
+
+def _nearest(units: Decays, own: np.ndarray) -> tuple[int, int] | None:
+    """Return the numbers of the two units nearest to each other, of several the loudest; None for a single unit."""
+    if units.pairs.count < 2:
+        return None
+    apart = np.where(np.eye(units.pairs.count, dtype=bool), np.inf, np.round(units.pairs.centre, 6))
+    nearest = np.argwhere(apart == apart.min()).tolist()
+    i, j = max(nearest, key=lambda pair: (round(float(own[pair[0], pair[1], 0]), 9), -pair[0], -pair[1]))
+    return i, j
+
+
+def _absolute(units: Decays, own: np.ndarray, worst: int) -> dict[str, Any]:
+    """Return what the others make at the worst place in parts of the motors' amplitude: a range over the models.
+
+    The models' levels at the edge, each to the ends of its inputs' ranges, times the nominal decay.
+    """
+    blocks = [estimate_spec(unit, layered=lambda variant: {})["models"] for unit in units.array.units]
+    by_model: dict[str, dict[str, float]] = {}
+    for model in blocks[0]:
+        levels = [block[model]["edge_level"] for block in blocks]
+        if any(not_of_this_drive(one, [model]) for one in units.inputs) or any(one["low"] is None for one in levels):
+            continue
+        low, high = (np.array([levels[kind][key] for kind in units.kind]) for key in ("low", "high"))
+        by_model[model] = {
+            f"{name}_{key}": round(float(_sums(own * level[:, None])[name][worst]), DIGITS)
+            for name in ("sum", "root_sum_of_squares")
+            for key, level in (("low", low), ("high", high))
+        }
+    block: dict[str, Any] = {
+        "place": units.array.places[worst].name,
+        "unit": "of the motor's amplitude",
+        "range": "models' levels at the edge to the ends of their inputs' ranges; nominal decay",
+    }
+    for name in ("sum", "root_sum_of_squares"):
+        if not by_model:
+            block[name] = None
+            continue
+        low = min(one[f"{name}_low"] for one in by_model.values())
+        high = max(one[f"{name}_high"] for one in by_model.values())
+        block[name] = {"low": low, "high": high}
+    if not by_model:
+        block["reason"] = "no model gives a level for every unit"
+    return {**block, "by_model": by_model}
+
+
+def _masses(units: Decays) -> dict[str, Any]:
+    """Return by what factor the units' masses on the skin change the sums at each place, own drives and frequency.
+
+    By the model of `attenuation.receivers`: every unit loads the skin under it, those between two others too.
+    """
+    n = units.pairs.count
+    if n > MOST_LOADED:
+        raise Refusal("--masses", n, f"are worked out for at most {MOST_LOADED} units at once")
+    frequencies = {one.frequency.middle for one in units.inputs}
+    if len(frequencies) > 1:
+        shown = " and ".join(f"{hertz:g}" for hertz in sorted(frequencies))
+        limit = "units that load each other's skin are worked out at one frequency (estimate.frequency_hz)"
+        raise Refusal("--masses", f"{shown} Hz", limit)
+    omega = 2.0 * math.pi * frequencies.pop()
+    weights = np.array([unit_mass(one).middle for one in units.inputs])[units.kind]
+    patches = [
+        Patch(1e-3 * place.x, 1e-3 * place.y, 1e-3 * place.radius, float(mass))
+        for place, mass in zip(units.array.places, weights, strict=True)
+    ]
+    g = influence(body(units.inputs[0].tissue), patches, omega, rtol=1e-3)
+    forces = np.zeros((n, 3, n), dtype=np.complex128)
+    for i, kind in enumerate(units.kind):
+        forces[i, :, i] = FORCES[units.inputs[kind].drive]
+
+    def transfer(masses: np.ndarray) -> np.ndarray:
+        size = np.linalg.norm(motion(g, masses, forces, omega), axis=1)  # (receiver, driver)
+        found = (size / np.diag(size)).T
+        np.fill_diagonal(found, 0.0)
+        return found
+
+    bare, loaded = _sums(transfer(np.zeros(n))), _sums(transfer(weights))
+    return {
+        "what": "sums with the units' masses on the skin over those without, by means over each unit's disc",
+        "mass_g": _rounded(1e3 * weights),
+        **{f"{name}_changes_by": _rounded(loaded[name] / np.maximum(bare[name], 1e-300)) for name in bare},
+    }
+
+
+def _along(array: Array) -> str:
+    if array.radius_mm is None:
+        return "along the skin, taken as flat"
+    return (
+        f"along the skin, unrolled: round the limb of radius {array.radius_mm:g} mm a distance is the arc, the shorter "
+        "way round; the decay is that of flat skin"
+    )
+
+
+def _table(matrix: np.ndarray) -> list[list[float | None]]:
+    rounded = np.round(matrix, DIGITS).tolist()
+    for i, row in enumerate(rounded):
+        row[i] = None
+    return rounded
+
+
+def _rounded(values: np.ndarray) -> list[float]:
+    return [round(float(value), DIGITS) for value in values]

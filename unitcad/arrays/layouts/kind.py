@@ -1,0 +1,59 @@
+"""A kind of layout: the table that a file gives, and the points that follow from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from unitcad.errors import Refusal
+from unitcad.spec.asked import Table
+
+
+class Point(NamedTuple):
+    """A place's name and centre, mm; rows and columns are numbered from 0 where the kind has them."""
+
+    name: str
+    x: float
+    y: float
+    row: int = 0
+    column: int = 0
+
+
+@dataclass(frozen=True)
+class LayoutKind:
+    """A kind by its name in a file.
+
+    points   from the table and the limb's radius (mm, None where it is flat) to the points, the origin in their middle;
+             raises Refusal for a table that gives none
+    wider    from the table, the radius, the numbers of two points and the distance that they need (mm) to the refusal
+             that names the value which would give it
+    """
+
+    name: str
+    about: str
+    table: type[Table]
+    points: Callable[[Any, float | None], tuple[Point, ...]]
+    wider: Callable[[Any, float | None, tuple[Point, Point], float], Refusal]
+
+
+def row_letters(row: int) -> str:
+    """Return the letters of a row from 0: A to Z, then AA, AB ..."""
+    letters = ""
+    row += 1
+    while row:
+        row, rest = divmod(row - 1, 26)
+        letters = chr(ord("A") + rest) + letters
+    return letters
+
+
+def named(row: int, column: int) -> str:
+    """Return a place's name from its row and column, both from 0."""
+    return f"{row_letters(row)}{column + 1}"
+
+
+def needs(distance: float, pair: tuple[Point, Point]) -> str:
+    """Say how near two points are and what they need (mm)."""
+    one, other = pair
+    there = ((one.x - other.x) ** 2 + (one.y - other.y) ** 2) ** 0.5
+    return f"{one.name} and {other.name} stand {there:.4g} mm apart and need {distance:.4g} mm"

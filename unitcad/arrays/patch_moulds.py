@@ -1,0 +1,140 @@
+"""The moulds of an array's sheet as a mould set, so that mould checks, exports and procedure serve it as they are."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from msgspec import structs
+
+from unitcad.arrays.array import Array
+from unitcad.arrays.circuit.outline import circuit_body
+from unitcad.arrays.construction import Construction, constructions
+from unitcad.designs import Dimensions, unit_bodies
+from unitcad.moulds.mould_set import MouldSet, geometric
+from unitcad.moulds.plan import Plan
+from unitcad.shape import moved
+from unitcad.shape.body import Body
+from unitcad.spec import Spec, to_json, with_formats
+from unitcad.spec.effective import CastLayer
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+
+@dataclass(frozen=True, eq=False)
+class PatchMoulds(MouldSet):
+    """The silicone of an array besides its units, as it is cast, and the tools and pours of it.
+
+    `spec` is that of the array's unit with the patch's own layers (see `patch_moulds`): what checks and procedure read
+    of lengths, silicones and lab. Frame of the tools, mm.
+    """
+
+    array: Array | None = None
+
+    @property
+    def arranged(self) -> Array:
+        """The array."""
+        assert self.array is not None
+        return self.array
+
+    @cached_property
+    def construction(self) -> Construction:
+        """The way that the array is made."""
+        return constructions()[self.arranged.construction]
+
+    @cached_property
+    def blank(self) -> PatchMoulds:
+        """The same set with everything blank that the geometry does not read."""
+        spec = geometric(self.spec)
+        return self if spec == self.spec else PatchMoulds(spec, self.altered, array=self.array)
+
+    @cached_property
+    def geometry(self) -> str:
+        """What the geometry reads, as a text: places, sheet and lengths, no silicone and no name."""
+        array = self.arranged
+        distinct = [to_json(with_formats(geometric(unit))) for unit in array.units]
+        places = [(p.name, p.x, p.y, p.angle_deg, array.units.index(p.unit)) for p in array.places]
+        sheet = replace(array.sheet, material="")
+        reads = (array.construction, array.cast, array.radius_mm, distinct, places, sheet, array.circuit)
+        return f"{to_json(with_formats(geometric(self.spec)))} {reads!r}"
+
+    @cached_property
+    def unit(self) -> tuple[Body, ...]:
+        """The silicone as it is cast."""
+        return self.construction.bodies(self.arranged)
+
+    @cached_property
+    def laid_later(self) -> tuple[Body, ...]:
+        """The motors at their places and the common circuit, of units that are cast in one pour with the sheet."""
+        if self.construction.own_tails:
+            return ()
+        array, motors = self.arranged, [body for body in unit_bodies(self.arranged.unit) if body.kind == "motor"]
+        placed = [
+            replace(body, name=f"{p.name}-{body.name}", shape=moved(body.shape, p.x, p.y))
+            for p in array.places
+            for body in motors
+        ]
+        return (*placed, circuit_body(array))
+
+    @property
+    def makes(self) -> str:
+        """What comes out of the mould."""
+        return "sheet" if self.construction.own_tails else "patch"
+
+    @property
+    def source(self) -> str:
+        """The file in a result's folder that makes the result again."""
+        return "array.toml"
+
+    @property
+    def assembly(self) -> tuple[str, ...]:
+        """How motors and circuit go in, in the construction's words."""
+        return self.construction.assembly(self.arranged)
+
+    def pieces(self, name: str) -> int:
+        """Return the number of solids that a body is drawn of: a layer of all units has one for each."""
+        return next((len(step.layer) for step in self.plan.steps if step.name == name), 1)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Tools and pours. Raises Refusal where the moulds can't be made."""
+        return self.altered or self.construction.plan(self.arranged)
+
+    @cached_property
+    def dimensions(self) -> Dimensions:
+        """The lengths that the tools are drawn to."""
+        return self.plan.dimensions
+
+    @cached_property
+    def segments(self) -> int:
+        """Sides of every full turn: as fine as the largest round of units and corners needs."""
+        from unitcad.kernels.mesh import segment_count
+
+        array = self.arranged
+        radius = max(array.sheet.corner_mm, *(unit.diameter_mm / 2 for unit in array.units))
+        return segment_count(radius + math.sqrt(radius), self.spec.output.tolerance_mm)
+
+    @cached_property
+    def rib_spaces(self) -> Manifold:
+        """Empty: no cup of a patch is centred by ribs on a plinth."""
+        from manifold3d import Manifold
+
+        return Manifold()
+
+
+def patch_moulds(array: Array, altered: Plan | None = None) -> PatchMoulds:
+    """Return the mould set of an array's sheet; `altered` stands in for its plan: a set with a fault, for tests."""
+    return PatchMoulds(patch_spec(array), altered, array=array)
+
+
+def patch_spec(array: Array) -> Spec:
+    """Return the spec that stands for the sheet: the unit's lengths, silicones and lab, and the sheet as its layers."""
+    unit, way = array.unit, constructions()[array.construction]
+    layers = (CastLayer(material=array.sheet.material, wall_mm=array.sheet.margin_mm, cap_mm=array.sheet.thickness_mm),)
+    if not way.own_tails:
+        layers = (*unit.layers[:-1], structs.replace(unit.layers[-1], material=array.sheet.material))
+    entries = {name: entry for each in array.units for name, entry in each.materials.items()}
+    return structs.replace(unit, name=array.name, layers=layers, fpcb=None, wires=None, materials=entries)

@@ -1,0 +1,85 @@
+"""Pictures of an array: the patch from both sides, its tools taken apart, each pour cut open. The same bytes again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from unitcad.arrays.patch import patch_bodies
+from unitcad.arrays.patch_moulds import PatchMoulds
+from unitcad.export import composite
+from unitcad.kernels.mesh import arrays, bounds
+from unitcad.shape.body import Body
+
+SIZE = (960, 640)
+"""Of a picture, px."""
+FOLDER = "pictures"
+GAP = 8.0
+"""Between two pieces taken apart, mm."""
+_Solid = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
+_Eye = tuple[float, float, float]
+SKIN_SIDE, BACK, ABOVE = (0.45, -0.8, -0.9), (0.45, -0.8, 0.9), (0.45, -1.0, 0.55)
+
+
+def picture_names(moulds: PatchMoulds) -> dict[str, str]:
+    """Return what each picture shows, by its path: from the skin's side, from the back, the tools, each pour."""
+    names = {
+        f"{FOLDER}/patch-skin-side.png": "The patch from the skin's side",
+        f"{FOLDER}/patch-back.png": "The patch from its back",
+        f"{FOLDER}/tools.png": "The tools and what is cast, taken apart",
+    }
+    return names | {f"{FOLDER}/pour{s.index}.png": f"Pour {s.index}, cut open" for s in moulds.plan.steps}
+
+
+def pictures(moulds: PatchMoulds) -> dict[str, bytes]:
+    """Return the PNG of each picture by its path."""
+    patch = [_solid(moulds, body) for body in patch_bodies(moulds.arranged)]
+    drawn = {
+        f"{FOLDER}/patch-skin-side.png": _picture(patch, SKIN_SIDE),
+        f"{FOLDER}/patch-back.png": _picture(patch, BACK),
+        f"{FOLDER}/tools.png": _picture(list(_apart(moulds)), ABOVE),
+    }
+    cuts = [_picture(list(_cut_open(moulds, step.index)), ABOVE) for step in moulds.plan.steps]
+    return drawn | {f"{FOLDER}/pour{i + 1}.png": picture for i, picture in enumerate(cuts)}
+
+
+def _solid(moulds: PatchMoulds, body: Body, up: float = 0.0) -> _Solid:
+    vertices, faces = arrays(moulds.mesh(body))
+    return np.asarray(vertices, float) + np.array([0.0, 0.0, up]), np.asarray(faces, np.int64), body.colour
+
+
+def _apart(moulds: PatchMoulds) -> Iterator[_Solid]:
+    """Yield tools and cast layers, one over the other in the order of the pours."""
+    plan, top = moulds.plan, -np.inf
+    order: list[Body] = [tool for tool in plan.tools if tool.step is None and tool.kind != "blade"]
+    base = len(order)
+    for step in plan.steps:
+        order += plan.standing(step, "cup") + plan.standing(step, "lid")
+        order += [body for body in moulds.unit if body.step == step.index]
+    order += plan.of_kind("blade")
+    for i, body in enumerate(order):
+        _, _, low, _, _, high = bounds(moulds.mesh(body))
+        up = 0.0 if i < base else max(0.0, top + GAP - low)
+        top = max(top, high + up)
+        yield _solid(moulds, body, up)
+
+
+def _cut_open(moulds: PatchMoulds, index: int) -> Iterator[_Solid]:
+    """Yield a pour as it is struck off, without its nearer half: cut through a row of units."""
+    step = moulds.plan.steps[index - 1]
+    y = min((place.y for place in moulds.arranged.places), key=abs) + 1 / 512
+    solids = [(moulds.solids[name], moulds.plan.tool(name).colour) for name in step.tools]
+    colours = {body.step: body.colour for body in moulds.unit}
+    for shapes, pour in ((step.earlier, 1), (step.layer, index)):
+        solids += [(solid, colours[pour]) for solid in moulds.meshes(shapes)]
+    for solid, colour in solids:
+        half = solid.trim_by_plane((0, 1, 0), y)
+        if not half.is_empty():
+            vertices, faces = arrays(half)
+            yield np.asarray(vertices, float), np.asarray(faces, np.int64), colour
+
+
+def _picture(solids: list[_Solid], eye: _Eye) -> bytes:
+    camera = composite.view(eye, np.concatenate([vertices for vertices, _, _ in solids]), SIZE)
+    return composite.together([composite.drawn(*solid, camera) for solid in solids], camera)

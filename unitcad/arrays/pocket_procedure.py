@@ -1,0 +1,294 @@
+"""The casting of an array with pockets: the units by their own procedures, the sheet in its tray, the units put in."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from itertools import groupby
+
+from unitcad import catalogue
+from unitcad.arrays.array import Array
+from unitcad.arrays.patch_moulds import PatchMoulds
+from unitcad.arrays.tray import hold_strain
+from unitcad.casting import figures as fig
+from unitcad.casting.bench_step import BenchStep
+from unitcad.casting.bill import Item
+from unitcad.casting.figures import STRIKE_AGAIN_MIN, at_room
+from unitcad.casting.finishing import shown
+from unitcad.casting.instructions import TACK, mixed
+from unitcad.casting.needs import needs
+from unitcad.casting.preparation import cleaning, in_resin
+from unitcad.casting.procedure import Pour, Procedure, bubbles, pour_figures
+from unitcad.casting.time_line import duration, phases
+from unitcad.catalogue import Material
+from unitcad.moulds.dents import DENT
+from unitcad.text import listed, number
+
+PUSH_MIN = 1.0
+"""To push one unit into its pocket and turn it (assumed)."""
+TOOLS, SKIN_SIDE = "pictures/tools.png", "pictures/patch-skin-side.png"
+
+
+def pocket_procedure(
+    moulds: PatchMoulds, sheet_mm3: float, printed_mm3: float, units: Mapping[str, Procedure]
+) -> Procedure:
+    """Return the procedure of an array whose units are cast apart.
+
+    `sheet_mm3`: volume of the sheet. `printed_mm3`: of tray and blade. `units`: the procedure of each distinct unit
+    by its folder, in the order of `Array.units`.
+    """
+    array, spec, (step,) = moulds.arranged, moulds.spec, moulds.plan.steps
+    silicone = catalogue.materials(spec.materials)[step.material]
+    mix = fig.mix(spec, silicone, sheet_mm3)
+    verdict = bubbles(spec, step, silicone, mix, 1)
+    cast = tuple(_units(array, units))
+    prepared = (
+        BenchStep("Sort the pieces", _sort(moulds), TOOLS, minutes=fig.SORT_MIN),
+        *cleaning(moulds, [silicone]),
+        BenchStep("Level the bench", _level(array), minutes=fig.LEVEL_MIN),
+    )
+    poured = tuple(_pour(moulds, silicone, mix, verdict))
+    out = tuple(_out(moulds))
+    together = tuple(_together(array, moulds))
+    stages = [("units", cast), ("preparation", prepared), ("pour 1", poured), ("out of the mould", out)]
+    until, line = phases(stages), phases([*stages, ("units in", together)])
+    room = spec.casting.room_c
+    pour = Pour(
+        index=1,
+        layer="sheet",
+        material=silicone.name,
+        figures=pour_figures(moulds, step, silicone, mix, sheet_mm3),
+        verdict=verdict,
+        agent=(),
+        degassing_min=fig.DEGASSING_MIN if spec.casting.vacuum else 0.0,
+        part_a_g=mix.part_a_g,
+        part_b_g=mix.part_b_g,
+        pot_life_min=at_room(float(silicone.pot_life_min), room),
+        cure_h=at_room(float(silicone.cure_h), room),
+        steps=poured,
+        drawing="step1-section.svg",
+    )
+    grams = sheet_mm3 * float(silicone.density_g_cm3) / 1000
+    named = needs([*prepared, *poured, *out, *together])
+    own = [
+        *_pieces(moulds),
+        Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", f"sheet, {number(mix.net_g, 3)} g net"),
+        Item(f"{silicone.name} part B", mix.part_b_g, "g", "bought", f"sheet, {number(mix.net_g, 3)} g net"),
+        *(Item(need.item, need.quantity, need.unit, need.made, need.note) for need in named),
+    ]
+    return Procedure(
+        name=array.name,
+        label=moulds.plan.label,
+        cells=1,
+        vacuum=spec.casting.vacuum,
+        tunnels=(),
+        earliest_finish_min=until[-1].end_min,
+        bench_min=sum(phase.bench_min for phase in until),
+        time_line=line,
+        printing=tuple(_printing(moulds, printed_mm3, units)),
+        preparation=(*cast, *prepared),
+        off_grid=(),
+        unit_heights=(),
+        pours=(pour,),
+        bonds=(),
+        release=out,
+        assembly=together,
+        measure=tuple(_measure(array, grams, units)),
+        eccentricity=None,
+        without_ribs=None,
+        walls=(),
+        bill=tuple(_added([*_scaled(array, units), *own])),
+        makes="sheet",
+        last="Units in",
+    )
+
+
+def counts(array: Array) -> list[int]:
+    """Return how many places hold each distinct unit, in the order of `Array.units`."""
+    held = Counter(array.units.index(place.unit) for place in array.places)
+    return [held[i] for i in range(len(array.units))]
+
+
+def _castings(count: int, unit: Procedure) -> int:
+    return math.ceil(count / unit.cells)
+
+
+def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
+    """Say how the units are made first: by their own procedures, as often as their mould has to be filled."""
+    for count, (folder, unit) in zip(counts(array), units.items(), strict=True):
+        times = _castings(count, unit)
+        cavities = "one cavity" if unit.cells == 1 else f"{unit.cells} cavities"
+        castings = "one casting" if times == 1 else f"{times} castings, one after the other,"
+        take = "takes" if times == 1 else "take"
+        whole, bench = unit.time_line[-1].end_min, sum(phase.bench_min for phase in unit.time_line)  # motors in
+        more = "" if unit.cells >= count else " More cavities (moulds.cavities) or a second set of moulds save days."
+        yield BenchStep(
+            "Cast the units",
+            f"Cast {count} of {unit.name} by {folder}/casting.md, motors in: {castings} in moulds of {cavities} {take} "
+            f"{duration(times * whole)}, of which {duration(times * bench)} at the bench. "
+            f"The sheet can cure beside them.{more} Try every motor.",
+            kind="cure",
+            minutes=times * bench,
+            wait_min=times * (whole - bench),
+        )
+
+
+def _sort(moulds: PatchMoulds) -> str:
+    return (
+        f"Print tray (moulds/base.stl) and blade as they lie in moulds/moulds.3mf, without supports. The tray is "
+        f"engraved B{moulds.plan.label}."
+    )
+
+
+def _printing(moulds: PatchMoulds, solid_mm3: float, units: Iterable[str]) -> Iterator[str]:
+    lengths, what = moulds.spec.moulds, "resin" if in_resin(moulds) else "filament"
+    yield "Plate: moulds/moulds.3mf (tray and blade, as they are printed; moulds/ has them singly as STL too)."
+    yield f"Printer {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm, no supports."
+    yield f"At most {number(solid_mm3 / 1000, 2)} cm3 of {what} (computed: the pieces, solid)."
+    yield f"The units' moulds: {listed(f'{folder}/moulds/moulds.3mf' for folder in units)}, as their casting.md says."
+
+
+def _level(array: Array) -> str:
+    """Say how level the tray must lie: the sheet must not get thinner at one end by more than a dent."""
+    box = array.sheet.outline
+    length = max(box[2] - box[0], box[3] - box[1])
+    tilt = math.degrees(math.atan(DENT / length))
+    return (
+        f"Silicone stays level while it cures: at {number(tilt, 2)} degrees {number(DENT, 2)} mm more stand on the low "
+        f"side of a sheet {number(length, 3)} mm long (computed); the blade takes most of it off. Lay a phone with its "
+        "level, or a small spirit level, on the tray's wall, along it and across, and put paper under a corner until "
+        "it shows less. The tray stays there: it is poured and cured on this spot."
+    )
+
+
+def _pour(moulds: PatchMoulds, silicone: Material, mix: fig.Mix, verdict: str) -> Iterator[BenchStep]:
+    spec, (step,) = moulds.spec, moulds.plan.steps
+    yield from mixed(moulds, silicone, mix, verdict)
+    rests = fig.rest_min(spec, step.rim, silicone)
+    if not spec.casting.vacuum and not rests:
+        yield BenchStep("Brush a first coat", verdict, minutes=fig.BRUSH_MIN)
+    yield BenchStep(
+        "Pour",
+        "Pour in a thin thread, first along the wall and round every core, until the tray stands over its rim and the "
+        "cores are covered. Prick the bubbles that you see with a pin.",
+        kind="pour",
+        minutes=fig.pouring_min(len(moulds.arranged.places)) - fig.STRIKE_MIN,
+    )
+    if rests and not spec.casting.vacuum:
+        yield BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=rests)
+    yield BenchStep(
+        "Strike off",
+        "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke from end to end: "
+        "it runs on rim and cores. What it takes goes into the groove.",
+        "pictures/pour1.png",
+        minutes=fig.STRIKE_MIN,
+    )
+    yield BenchStep(
+        "Wait, strike again",
+        f"Wipe it. Top up and strike again after {number(STRIKE_AGAIN_MIN, 3)} min (assumed). The film that it leaves "
+        "on the cores cures too and is trimmed at the end.",
+        kind="rest",
+        minutes=fig.STRIKE_MIN,
+        wait_min=STRIKE_AGAIN_MIN - fig.STRIKE_MIN,
+    )
+    hours = at_room(float(silicone.cure_h), spec.casting.room_c)
+    yield BenchStep(
+        "Cure",
+        f"Let it cure, level, for {number(hours, 2)} h. Touch the silicone in the groove, not the sheet, to see "
+        f"whether it is done: {TACK}.",
+        kind="cure",
+        wait_min=60 * hours,
+    )
+
+
+def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
+    thick = number(moulds.arranged.sheet.thickness_mm, 3)
+    yield BenchStep(
+        "Peel off",
+        "Cut the sheet free from the groove's silicone along the land. Loosen a corner with a blunt spatula and peel "
+        f"the sheet off slowly, up over the cores: it is {thick} mm thick and tears at a notch. Trim the flash round "
+        "the pockets and strap slots with small scissors.",
+        TOOLS,
+        minutes=fig.PEEL_MIN * 2,
+    )
+
+
+def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
+    """Say how the units go in, and which way each one's tail points."""
+    widest = max(unit.diameter_mm for unit in array.units) / 2
+    strain = max(hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units)
+    ordered = sorted(array.places, key=lambda place: place.angle_deg)
+    ways = listed(
+        f"{number(angle, 3)} degrees: {' '.join(place.name for place in places)}"
+        for angle, places in groupby(ordered, key=lambda place: place.angle_deg)
+    )
+    turned = (
+        " Turn each one until its tail points where it belongs, counter-clockwise from the sheet's long way to the "
+        f"right, seen from the back: {ways}."
+        if any(unit.fpcb or unit.wires for unit in array.units)
+        else ""
+    )
+    over = number(array.sheet.low, 3)
+    yield BenchStep(
+        "Units in",
+        f"Lay the sheet down with its back up, as it came out of the tray. Push each unit up into its pocket from "
+        f"below, back first, until the pocket's lower edge stands {over} mm over the unit's skin side all round: the "
+        f"pocket stretches by {number(100 * strain, 2)} % round {number(2 * widest, 3)} mm and holds it. Water with "
+        f"a drop of soap helps; it dries.{turned} Rows are lettered from the top, columns numbered from the left.",
+        SKIN_SIDE,
+        minutes=PUSH_MIN * len(array.places),
+    )
+
+
+def _measure(array: Array, grams: float, units: Mapping[str, Procedure]) -> Iterator[str]:
+    sheet = array.sheet
+    yield f"Thickness of the sheet: {shown(sheet.thickness_mm, 2)} mm, at the middle and at the corners."
+    for size in sorted({unit.diameter_mm for unit in array.units}):
+        yield f"A pocket for a unit of {shown(size, 2)} mm: {shown(size - 2 * sheet.hold_mm, 2)} mm across."
+    yield f"Weigh the sheet, trimmed: {shown(grams)} g. Less means air or a low strike."
+    yield "Each unit as its own procedure says, before it goes in."
+
+
+def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
+    lengths = moulds.spec.moulds
+    note = f"{lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
+    for tool in moulds.plan.tools:
+        name, attitude = (
+            ("tray" if tool.kind == "base" else tool.name),
+            "upside down" if tool.upside_down else "as drawn",
+        )
+        yield Item(name, 1, "piece", f"printed {attitude}", note)
+
+
+def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
+    """Yield the lines of the units' bills for all units: their pieces once, what goes in as often as it is used."""
+    for spec, count, (folder, unit) in zip(array.units, counts(array), units.items(), strict=True):
+        times = _castings(count, unit)
+        inside = {spec.motor.part or "motor", "flexible circuit", "wire"}
+        for item in unit.bill:
+            if item.made.startswith(("printed", "cut")):
+                yield replace(item, note=f"{item.note} ({folder})" if item.note else folder)
+            elif item.unit == "g":
+                yield replace(item, quantity=times * item.quantity, note=f"{times} x, {item.note}")
+            elif item.item in inside:
+                yield replace(item, quantity=count * item.quantity / unit.cells)
+            else:
+                yield item
+
+
+def _added(items: Iterable[Item]) -> list[Item]:
+    """Return a bill in which each thing stands once: grams added, of tools and consumables the most."""
+    found: dict[tuple[str, str, str], Item] = {}
+    for item in items:
+        key = item.item, item.unit, "" if item.unit == "g" or item.made in ("tool", "bought") else item.note
+        there = found.get(key)
+        if there is None:
+            found[key] = item
+        elif item.unit == "g":
+            quantity, note = there.quantity + item.quantity, f"{there.note}; {item.note}"
+            found[key] = replace(there, quantity=quantity, note=note)
+        else:
+            found[key] = replace(there, quantity=max(there.quantity, item.quantity))
+    return list(found.values())

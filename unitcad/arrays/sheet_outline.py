@@ -1,0 +1,101 @@
+"""The sheet of an array from its table and the places: level, outline, corners and strap slots (mm)."""
+
+from __future__ import annotations
+
+import math
+
+from unitcad import catalogue
+from unitcad.arrays.array import Box, Sheet
+from unitcad.arrays.array_tables import AskedArray
+from unitcad.arrays.construction import Construction
+from unitcad.arrays.layouts import Point
+from unitcad.designs.limits import down
+from unitcad.errors import Refusal
+from unitcad.shape import mm
+from unitcad.spec import Spec
+
+BESIDE_SLOT = 2.0
+"""From a strap slot to a round corner, at least, mm."""
+
+
+def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: list[Spec]) -> Sheet:
+    """Return the sheet. Raises Refusal for a thickness, corner or slot that does not fit."""
+    table, distinct = asked.sheet, tuple({id(unit): unit for unit in units}.values())
+    known = catalogue.materials({name: entry for unit in distinct for name, entry in unit.materials.items()})
+    material = table.material or distinct[0].layers[-1].material
+    catalogue.choose("sheet.material", material, known)
+    thickness = way.thickness_mm if table.thickness_mm is None else table.thickness_mm
+    level = way.level(distinct, thickness)
+    if thickness > level.most + 1e-9:
+        limit = f"beside the units' tails and backs there is room for a sheet of {level.most:.4g} mm"
+        raise Refusal("sheet.thickness_mm", thickness, limit, down(level.most) if level.most >= 0.5 else None)
+    if way.own_tails:
+        _check_hold(table.hold_mm, distinct, float(known[material].elongation_pct))
+    margin = table.margin_mm
+    radii = [unit.diameter_mm / 2 for unit in units]
+    x0 = min(p.x - r for p, r in zip(points, radii, strict=True)) - margin
+    x1 = max(p.x + r for p, r in zip(points, radii, strict=True)) + margin
+    y0 = min(p.y - r for p, r in zip(points, radii, strict=True)) - margin
+    y1 = max(p.y + r for p, r in zip(points, radii, strict=True)) + margin
+    slots: tuple[Box, ...] = ()
+    if table.strap_slot_mm:
+        width, length = table.strap_slot_mm
+        most = y1 - y0 - 2 * table.strap_web_mm
+        if length > most + 1e-9:
+            limit = f"across the sheet of {y1 - y0:.4g} mm, with webs of {table.strap_web_mm:g} mm, a slot is at most"
+            nearest = down(most) if most >= 0.1 else None
+            raise Refusal("sheet.strap_slot_mm.1", length, f"{limit} {max(most, 0):.4g} mm long", nearest)
+        middle = (y0 + y1) / 2
+        ends = mm(middle - length / 2), mm(middle + length / 2)
+        slots = (
+            (mm(x0 - width), ends[0], mm(x0), ends[1]),
+            (mm(x1), ends[0], mm(x1 + width), ends[1]),
+        )
+        x0, x1 = x0 - width - table.strap_web_mm, x1 + width + table.strap_web_mm
+    outline = mm(x0), mm(y0), mm(x1), mm(y1)
+    return Sheet(
+        material=material,
+        low=mm(level.low),
+        high=mm(level.high),
+        margin_mm=margin,
+        corner_mm=_corner(table.corner_mm, min(radii) + margin, outline, slots),
+        outline=outline,
+        strap_slots=slots,
+        hold_mm=table.hold_mm,
+    )
+
+
+def _check_hold(hold: float, units: tuple[Spec, ...], elongation_pct: float) -> None:
+    """Raise Refusal for pockets that would stretch beyond the margin on the sheet's elongation."""
+    for unit in units:
+        allowed = unit.casting.strain_margin * elongation_pct / 100
+        most = unit.diameter_mm / 2 * allowed / (1 + allowed)
+        if hold > most + 1e-9:
+            limit = (
+                f"round a unit of {unit.diameter_mm:g} mm a pocket may stretch by {allowed:.0%} (casting.strain_margin "
+                f"of the elongation at break), so it is smaller in radius by at most {down(most):g} mm"
+            )
+            raise Refusal("sheet.hold_mm", hold, limit, down(most))
+
+
+def _corner(asked: float | None, most: float, outline: Box, slots: tuple[Box, ...]) -> float:
+    """Return the radius of the corners: at most concentric with a corner's unit, and clear of a strap slot."""
+    radius = min(most, asked) if asked is not None else most
+    while radius > 0.5 and _to_corner(radius, outline, slots) < BESIDE_SLOT:
+        radius -= 1 / 16
+    radius = down(radius)
+    if asked is not None and asked > radius + 1e-9:
+        limit = f"keeping the margin round the units and the strap slots, corners are at most {radius:g} mm round"
+        raise Refusal("sheet.corner_mm", asked, limit, radius)
+    return radius
+
+
+def _to_corner(radius: float, outline: Box, slots: tuple[Box, ...]) -> float:
+    """Return the least distance from a strap slot's corner to a round corner of the sheet, mm."""
+    least = math.inf
+    for slot in slots:
+        x = outline[2] - slot[2] if slot[0] > (outline[0] + outline[2]) / 2 else slot[0] - outline[0]
+        y = slot[1] - outline[1]
+        if x < radius and y < radius:
+            least = min(least, radius - math.hypot(radius - x, radius - y))
+    return least

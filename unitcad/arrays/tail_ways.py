@@ -1,0 +1,170 @@
+"""The ways that the units' own tails take in an array: straight from each unit, clear of units, tails and strap slots.
+
+A tail that no angle was asked for leaves at a quarter turn where one is free, nearest to the way out of the array, else
+at a multiple of 15 degrees.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from unitcad.arrays.array import Box
+from unitcad.arrays.layouts.kind import Point
+from unitcad.designs import dimensions
+from unitcad.designs.dimensions import WIRE_GAP
+from unitcad.geometry.segments import between_segments, to_box, to_segment
+from unitcad.spec import Spec
+
+CLEAR = 0.5
+"""From a tail to a unit, a strap slot or another tail, at least, mm (assumed: a hand lays the tails)."""
+STEP_DEG = 15
+
+
+class Tail(NamedTuple):
+    """A straight strip from (x0, y0) to (x1, y1), mm, of half the width `half`; `owner` is its unit's number."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    half: float
+    owner: int
+
+
+class Blocked(Exception):
+    """A unit whose tail finds no way: its number, and the longest tail that would find one (mm beyond its edge)."""
+
+    def __init__(self, owner: int, longest: float, by: str) -> None:
+        super().__init__(by)
+        self.owner, self.longest, self.by = owner, longest, by
+
+
+def tails(unit: Spec, x: float, y: float, angle_deg: float, owner: int, length: float | None = None) -> list[Tail]:
+    """Return the tails of a unit at its place; `length` in place of its own, mm beyond its edge."""
+    dims, half = dimensions(unit), tail_half_width(unit)
+    reach = dims.outer_radius + (tail_length(unit) if length is None else length)
+    found = []
+    for side in dims.sides if half else ():
+        turn = math.radians(angle_deg + (0 if side > 0 else 180))
+        found.append(Tail(x, y, x + reach * math.cos(turn), y + reach * math.sin(turn), half, owner))
+    return found
+
+
+def tail_half_width(unit: Spec) -> float:
+    """Return half the width of a unit's tail or bundle of wires, mm; 0 without one."""
+    if unit.fpcb:
+        return max(unit.fpcb.tail_width_mm, unit.fpcb.tail_end_width_mm) / 2
+    return (unit.wires.count * (unit.wires.diameter_mm + WIRE_GAP) - WIRE_GAP) / 2 if unit.wires else 0.0
+
+
+def tail_length(unit: Spec) -> float:
+    """Return how far a unit's tail or wires stand out of it, mm."""
+    return unit.fpcb.tail_length_mm if unit.fpcb else unit.wires.length_mm if unit.wires else 0.0
+
+
+def angles(
+    points: Sequence[Point], units: Sequence[Spec], asked: Mapping[int, float], slots: Sequence[Box]
+) -> list[float]:
+    """Return each unit's angle, degrees: what was `asked` for, by its number, else the nearest free way.
+
+    Raises Blocked for the first unit whose tail finds none.
+    """
+    radii = [unit.diameter_mm / 2 for unit in units]
+    near = _neighbours(points, units, radii)
+    laid: list[list[Tail]] = [[] for _ in points]
+    chosen = [asked.get(i, 0.0) for i in range(len(points))]
+    for i in asked:
+        laid[i] = tails(units[i], points[i].x, points[i].y, chosen[i], i)
+    for i in asked:
+        if why := _in_the_way(laid[i], i, points, radii, near[i], laid, slots):
+            raise Blocked(i, _longest(i, (chosen[i],), points, units, radii, near[i], laid, slots), why)
+    for i in (i for i in range(len(points)) if i not in asked):
+        why = ""
+        for angle in _candidates(points[i]):
+            drawn = tails(units[i], points[i].x, points[i].y, angle, i)
+            why = _in_the_way(drawn, i, points, radii, near[i], laid, slots)
+            if not why:
+                chosen[i], laid[i] = angle, drawn
+                break
+        else:
+            longest = _longest(i, _candidates(points[i]), points, units, radii, near[i], laid, slots)
+            raise Blocked(i, longest, why)
+    return chosen
+
+
+def _neighbours(points: Sequence[Point], units: Sequence[Spec], radii: Sequence[float]) -> list[list[int]]:
+    """Return for each unit the numbers of those that its tail, or a tail of theirs, could meet."""
+    reach = [radius + tail_length(unit) for unit, radius in zip(units, radii, strict=True)]
+    far = 2 * max(reach) + 2 * max(tail_half_width(unit) for unit in units) + CLEAR
+    return [
+        [j for j, q in enumerate(points) if j != i and abs(q.x - p.x) <= far and abs(q.y - p.y) <= far]
+        for i, p in enumerate(points)
+    ]
+
+
+def _candidates(point: Point) -> list[float]:
+    """Return the angles to try, degrees: quarter turns first, each group from the way outwards on."""
+    outwards = math.degrees(math.atan2(point.y, point.x)) if math.hypot(point.x, point.y) > 1e-6 else 0.0
+
+    def away(angle: float) -> float:
+        return round(abs((angle - outwards + 180) % 360 - 180), 6)
+
+    every = [float(angle) for angle in range(0, 360, STEP_DEG)]
+    return sorted(every, key=lambda angle: (angle % 90 != 0, angle % 45 != 0, away(angle), angle))
+
+
+def _in_the_way(
+    drawn: Sequence[Tail],
+    owner: int,
+    points: Sequence[Point],
+    radii: Sequence[float],
+    near: Sequence[int],
+    laid: Sequence[Sequence[Tail]],
+    slots: Sequence[Box],
+) -> str:
+    """Return what a unit's tails run into; "" for nothing."""
+    for tail in drawn:
+        start, end = (tail.x0, tail.y0), (tail.x1, tail.y1)
+        for j in near:
+            if to_segment((points[j].x, points[j].y), start, end) < radii[j] + tail.half + CLEAR - 1e-9:
+                return f"the unit {points[j].name}"
+        for j in near:
+            for other in laid[j]:
+                apart = between_segments(start, end, (other.x0, other.y0), (other.x1, other.y1))
+                if apart < tail.half + other.half + CLEAR - 1e-9:
+                    return f"the tail of {points[j].name}"
+        for slot in slots:
+            if to_box(start, end, slot) < tail.half + CLEAR - 1e-9:
+                return "a strap slot"
+    return ""
+
+
+def _longest(
+    owner: int,
+    tried: Sequence[float],
+    points: Sequence[Point],
+    units: Sequence[Spec],
+    radii: Sequence[float],
+    near: Sequence[int],
+    laid: Sequence[Sequence[Tail]],
+    slots: Sequence[Box],
+) -> float:
+    """Return the longest tail that finds a way at one of the angles, mm in steps of 0.1; 0 where none does."""
+    free = [tails_of if j != owner else [] for j, tails_of in enumerate(laid)]
+
+    def fits(tenths: int) -> bool:
+        return any(
+            not _in_the_way(
+                tails(units[owner], points[owner].x, points[owner].y, angle, owner, tenths / 10),
+                owner, points, radii, near, free, slots,
+            )
+            for angle in tried
+        )  # fmt: skip
+
+    low, high = 0, int(tail_length(units[owner]) * 10)
+    while low < high:
+        middle = (low + high + 1) // 2
+        low, high = (middle, high) if fits(middle) else (low, middle - 1)
+    return low / 10

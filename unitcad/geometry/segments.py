@@ -1,0 +1,36 @@
+"""Distances of points and straight segments in the plane."""
+
+from __future__ import annotations
+
+import math
+
+Point = tuple[float, float]
+
+
+def to_segment(at: Point, start: Point, end: Point) -> float:
+    """Return the distance of a point from a segment, which may be a point itself."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    square = dx * dx + dy * dy
+    along = ((at[0] - start[0]) * dx + (at[1] - start[1]) * dy) / square if square else 0.0
+    along = min(1.0, max(0.0, along))
+    return math.hypot(at[0] - start[0] - along * dx, at[1] - start[1] - along * dy)
+
+
+def between_segments(a: Point, b: Point, c: Point, d: Point) -> float:
+    """Return the distance of the segments a b and c d; 0 where they cross."""
+
+    def side(p: Point, q: Point, r: Point) -> float:
+        return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+
+    if side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0:
+        return 0.0
+    return min(to_segment(a, c, d), to_segment(b, c, d), to_segment(c, a, b), to_segment(d, a, b))
+
+
+def to_box(start: Point, end: Point, box: tuple[float, float, float, float]) -> float:
+    """Return the distance of a segment from a box (x0, y0, x1, y1); 0 where it ends in it or crosses it."""
+    x0, y0, x1, y1 = box
+    if x0 <= end[0] <= x1 and y0 <= end[1] <= y1:
+        return 0.0
+    corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+    return min(between_segments(start, end, *side) for side in zip(corners, [*corners[1:], corners[0]], strict=True))

@@ -1,0 +1,109 @@
+"""C230: what overflows stays in the groove. Floor and walls of a cup's overflow groove are whole.
+
+Measured on the meshes: a groove is what is hollow in a cup, open at its rim, and holds no silicone of the pour. The
+distance from it to any other hollow (a hole for a pin, a window, a notch) is its wall. Engraved letters, which are
+shallower than a groove, don't count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from manifold3d import CrossSection, JoinType, Manifold, OpType
+from scipy.spatial import KDTree
+
+from unitcad.mould_checks.check import MouldCheck
+from unitcad.mould_checks.finding import MouldFinding, at_least
+from unitcad.mould_checks.hollows import GRID, SLIVER, hollows, least_wall
+from unitcad.moulds.congruence import Congruence, cropped, once_each
+from unitcad.moulds.cup import groove_depth_of
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
+from unitcad.shape.column import Column
+
+SLACK = 0.1
+"""How much wider than what a groove reaches from its cell the part is that it is looked at in, mm."""
+
+
+def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
+    """Measure floor and walls of the groove of every cup."""
+    for step in moulds.plan.steps:
+        if step.groove:
+            yield _of_cup(moulds, step)
+
+
+def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
+    """Compare the thinnest wall of a cup's groove with the least wall; under a low rim the floor may be thinner."""
+    bottom, letters = step.rim - groove_depth_of(moulds.spec, step.rim), moulds.spec.moulds.engraving_depth_mm
+    under_letters = step.rim - letters - GRID
+    top = under_letters if under_letters > bottom + GRID else step.rim
+    pieces, level = hollows(moulds, moulds.plan.walled(step)), (bottom + top) / 2
+    hollow, rim = Manifold.compose(pieces), step.rim - GRID
+    high = [piece.trim_by_plane((0, 0, 1), bottom) for piece in pieces if piece.bounding_box()[5] > rim]
+    above = [part for piece in high for part in piece.decompose() if part.bounding_box()[5] > rim]
+    sections = [part for solid in above for part in solid.slice(level).decompose()]
+    regions = _without(sections, moulds.meshes((*step.layer, *step.earlier)), level)
+    limit = min(least_wall(moulds), bottom - GRID)
+    thinnest = farthest = 2 * limit
+    if regions:
+        groove = CrossSection.batch_boolean(regions, OpType.Add)
+        tiles = _tiles(moulds, groove, farthest, (bottom - farthest, top))
+
+        def wall(i: int) -> float:
+            """Return the distance from the groove in a tile to the nearest other hollow, mm, `farthest` at most."""
+            near, there, beside = groove, groove, hollow
+            if tiles:
+                there = groove ^ _circle(tiles[i], farthest)
+                near = there ^ _circle(tiles[i], -farthest)
+                beside = cropped(hollow, tiles[i])
+            around = Manifold.extrude(near.offset(farthest, JoinType.Round), top - bottom + farthest)
+            inside = Manifold.extrude(there.offset(GRID, JoinType.Miter), step.rim - bottom + 2 * GRID)
+            others = beside ^ (around.translate((0, 0, bottom - farthest)) - inside.translate((0, 0, bottom - GRID)))
+            if others.volume() <= SLIVER:
+                return farthest
+            return float(Manifold.extrude(near, top - bottom).translate((0, 0, bottom)).min_gap(others, farthest))
+
+        piece = moulds.plan.tool(moulds.plan.walled(step))
+        alike = Congruence([piece.shape], [moulds.solids[piece.name]]) if tiles else None
+        numbers = [alike.number(tile) for tile in tiles] if alike else [0]
+        thinnest = min(value for _, value in once_each(numbers, wall))
+    advice = "a hole, a window or a notch breaks into the groove, or leaves too thin a wall: move one of the two"
+    return at_least("C230", f"{moulds.plan.walled(step)}: wall of the groove", float(thinnest), limit, "mm", advice)
+
+
+def _without(sections: list[CrossSection], silicone: list[Manifold], level: float) -> list[CrossSection]:
+    """Return the sections that hold no silicone."""
+    cast = [part for solid in silicone if not (part := solid.slice(level)).is_empty()]
+    grown = [part.offset(GRID, JoinType.Miter) for part in cast]
+    boxes = np.array([part.bounds() for part in grown]).reshape(-1, 4)
+    free = []
+    for section in sections:
+        x0, y0, x1, y1 = section.bounds()
+        meet = (boxes[:, 0] <= x1) & (boxes[:, 2] >= x0) & (boxes[:, 1] <= y1) & (boxes[:, 3] >= y0)
+        if all((section ^ grown[i]).is_empty() for i in np.flatnonzero(meet)):
+            free.append(section)
+    return free
+
+
+def _tiles(moulds: MouldSet, groove: CrossSection, beside: float, ends: tuple[float, float]) -> list[Column]:
+    """Return a column about each of several cells, wider by `beside` than its part of the plate; none for the whole.
+
+    The whole is looked at where the cells' parts don't cover the groove.
+    """
+    lay = moulds.plan.layout
+    if len(lay.cells) == 1:
+        return []
+    corners = np.concatenate(groove.to_polygons())
+    middles = np.array([(cell.x, cell.y) for cell in lay.cells])
+    reach = float(KDTree(middles).query(corners)[0].max()) + SLACK
+    tiles = [Column(cell.x, cell.y, reach + beside, *ends) for cell in lay.cells]
+    covered = CrossSection.batch_boolean([_circle(tile, -beside) for tile in tiles], OpType.Add)
+    return tiles if (groove - covered).is_empty() else []
+
+
+def _circle(column: Column, more: float) -> CrossSection:
+    return CrossSection.circle(column.radius + more, 48).translate((column.x, column.y))
+
+
+CHECK = MouldCheck("C230", "groove: floor and walls of an overflow groove are whole", findings)

@@ -1,0 +1,28 @@
+"""The hollows of a cup or a tray: bores, windows, grooves, holes for pins; each a solid."""
+
+from __future__ import annotations
+
+from manifold3d import Manifold
+
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.shape.profile import GRID_PER_MM
+
+GRID = 3 / GRID_PER_MM
+"""What snapping two faces to the grid may take from the wall between them, mm."""
+SLIVER = 1e-4
+"""Volume of a piece that rounding leaves along a face, mm3."""
+
+
+def hollows(moulds: MouldSet, piece: str) -> list[Manifold]:
+    """Return what is missing of a piece's convex hull, in connected pieces."""
+    solid = moulds.solids[piece]
+    return moulds.once(
+        f"hollows of {piece}",
+        lambda: [piece for piece in (solid.hull() - solid).decompose() if piece.volume() > SLIVER],
+    )
+
+
+def least_wall(moulds: MouldSet) -> float:
+    """Return the least wall between two hollows, mm: what the printer prints, or a narrower land that is asked for."""
+    lengths = moulds.spec.moulds
+    return min(lengths.least_wall_mm, lengths.land_mm) - GRID

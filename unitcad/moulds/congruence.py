@@ -1,0 +1,89 @@
+"""Places of a mould that hold the same: what is worked out at one of them holds at all.
+
+A place is an upright column. Two places are alike where the drawn shapes reach into them in the same way
+(`shape/column.py`), and where the meshes have the same corners there: a kernel that loses a wedge at one of a hundred
+cells makes that cell one of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from typing import TypeVar
+
+import numpy as np
+from manifold3d import Manifold
+
+from unitcad.kernels.mesh import arrays
+from unitcad.shape import Shape
+from unitcad.shape.column import Column, Standing
+
+_T = TypeVar("_T")
+
+SAME = 1e-6
+"""Distance up to which two corners of meshes are one, mm."""
+MARGIN = 0.2
+"""How much wider than what is looked at a column is, mm: less than the thinnest wall."""
+_DIRECTIONS = np.array([[0.3217, 0.5931, 0.7381], [0.8017, -0.2713, 0.5326]])
+_SIDES = 48
+
+
+def column_round(solids: Sequence[Manifold], margin: float, *, endless: bool = False) -> Column:
+    """Return the column round solids, `margin` (mm) larger than they are about their box's middle, or `endless`."""
+    boxes = np.array([solid.bounding_box() for solid in solids])
+    low, high = boxes[:, :2].min(axis=0), boxes[:, 3:5].max(axis=0)
+    x, y = (low + high) / 2
+    column = Column(float(x), float(y), 0.0)
+    corners = np.concatenate([arrays(solid)[0][:, :2] for solid in solids]) - (column.x, column.y)
+    if endless:
+        return Column(column.x, column.y, float(np.hypot(*corners.T).max()) + margin)
+    ends = float(boxes[:, 2].min()) - margin, float(boxes[:, 5].max()) + margin
+    return Column(column.x, column.y, float(np.hypot(*corners.T).max()) + margin, *ends)
+
+
+def cropped(solid: Manifold, column: Column) -> Manifold:
+    """Return what of a solid stands in a column, whose round wall is a polygon about it."""
+    low, high = max(solid.bounding_box()[2] - 1, column.low), min(solid.bounding_box()[5] + 1, column.high)
+    if low >= high:
+        return Manifold()
+    outer = column.radius / np.cos(np.pi / _SIDES)
+    wall = Manifold.cylinder(high - low, outer, outer, _SIDES)
+    return solid ^ wall.translate((column.x, column.y, low))
+
+
+class Congruence:
+    """Tells which columns through the same shapes and meshes are alike."""
+
+    def __init__(self, shapes: Sequence[Shape], meshes: Sequence[Manifold] = ()) -> None:
+        self.standing = Standing(shapes)
+        corners = np.concatenate([np.empty((0, 3)), *(arrays(mesh)[0] for mesh in meshes)])
+        self._corners = corners[np.argsort(corners[:, 0], kind="stable")]
+        self._known: dict[Hashable, list[tuple[int, np.ndarray]]] = {}
+        self._count = 0
+
+    def number(self, column: Column) -> int:
+        """Return a number that is the same for columns that are alike."""
+        drawn = self.standing.within(column), *(round(v, 6) for v in (column.radius, column.low, column.high))
+        corners, known = self._about(column), self._known.setdefault(drawn, [])
+        for number, other in known:
+            if corners.shape == other.shape and np.all(np.abs(corners - other) <= SAME):
+                return number
+        self._count += 1
+        known.append((self._count, corners))
+        return self._count
+
+    def _about(self, column: Column) -> np.ndarray:
+        """Return the meshes' corners in a column as sorted lists of their heights along slanted directions, mm."""
+        first, last = np.searchsorted(self._corners[:, 0], (column.x - column.radius, column.x + column.radius))
+        near = self._corners[first:last] - (column.x, column.y, 0.0)
+        inside = (near[:, 2] > column.low) & (near[:, 2] < column.high)
+        near = near[inside & (np.hypot(near[:, 0], near[:, 1]) < column.radius)]
+        return np.sort(near @ _DIRECTIONS.T, axis=0)
+
+
+def once_each(keys: Sequence[int], make: Callable[[int], _T]) -> list[tuple[int, _T]]:
+    """Return for every number the place of the first equal one and what `make` gave there."""
+    first: dict[int, tuple[int, _T]] = {}
+    for i, key in enumerate(keys):
+        if key not in first:
+            first[key] = (i, make(i))
+    return [first[key] for key in keys]

@@ -1,0 +1,271 @@
+"""An array made whole, in memory and a store: its units, the patch, its tools, circuit, crosstalk and procedure.
+
+array.toml  manifest.json  casting.md  casting.json  bom.csv  step1-section.svg
+patch/      the patch as it is worn: STL of the sheet, STEP and GLB of all
+moulds/     the tools of the sheet
+units/NAME/ a unit's own result, as `unitcad build` makes it: with moulds where units are cast apart
+pictures/   patch, tools, pours
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any
+
+from unitcad import __version__
+from unitcad.arrays.array import Array
+from unitcad.arrays.array_extras import extras
+from unitcad.arrays.array_file import array_hash, to_toml
+from unitcad.arrays.construction import constructions
+from unitcad.arrays.patch import patch_bodies
+from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.arrays.patch_pictures import picture_names, pictures
+from unitcad.cache import Store, digest
+from unitcad.casting.procedure import Procedure
+from unitcad.casting.procedure import procedure as unit_procedure
+from unitcad.casting.written import files as written
+from unitcad.casting.written import step_section
+from unitcad.mould_checks.finding import FindingRecord
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline import folder as folders
+from unitcad.pipeline.artifacts import OUTPUTS, geometry_key
+from unitcad.pipeline.bodies import body_key, file_stem, glb_content, joint_key, record, step_asked, stl_content
+from unitcad.pipeline.geometry import Geometry, geometry, mesh_findings
+from unitcad.pipeline.json_text import json_bytes
+from unitcad.pipeline.manifest_records import ArrayManifest, BodyFile, FileRecord, LeftOut, MeshFinding, PartRecord
+from unitcad.pipeline.product import NO_KERNEL, Product, make, mould_findings, printed_mm3
+from unitcad.pipeline.stages import Stages
+from unitcad.pipeline.versions import kernel_versions
+from unitcad.spec import Spec
+
+if TYPE_CHECKING:
+    from unitcad.export.step_process import StepProcess
+
+ARRAY = "array.toml"
+"""The file that makes a folder the result of an array."""
+
+
+def make_array(array: Array, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
+    """Return everything asked for of an array, nothing written yet. Raises Refusal where the moulds can't be made."""
+    moulds = patch_moulds(array)
+    moulds.plan  # noqa: B018  # refuses before the long work begins
+    units = {folder: _unit(array, unit, only, check, store, stages) for folder, unit in unit_folders(array).items()}
+    own: dict[str, bytes] = {ARRAY: to_toml(array).encode()}
+    shared: dict[str, str] = {}
+    for folder, product in units.items():
+        own |= {f"{folder}/{path}": content for path, content in product.own.items()}
+        shared |= {f"{folder}/{path}": sha256 for path, sha256 in product.shared.items()}
+    parts: list[PartRecord] = []
+    shape: Geometry | None = None
+    if {"moulds", "casting"} & set(only):
+        shape = geometry(moulds, ["moulds"], check and "moulds" in only, store, stages)
+        if "moulds" in only:
+            shared |= shape["files"]
+            parts += shape["parts"]
+    if "unit" in only:
+        with stages("patch"):
+            made, files = _patch(moulds, store, stages.step)
+        parts, shared = [*parts, *made], shared | files
+    drawn: list[str] = []
+    if {"unit", "moulds"} & set(only):
+        with stages("pictures"):
+            shown = _pictures(moulds, store)
+        drawn, shared = list(shown), shared | shown
+    if "casting" in only and shape:
+        with stages("casting"):
+            for step in moulds.plan.steps:
+                draw = partial(step_section, moulds, step)
+                key = geometry_key(moulds, f"section of pour {step.index}")
+                shared[f"step{step.index}-section.svg"] = store.file(key, lambda draw=draw: draw().encode())
+            own |= _casting(moulds, shape, units)
+    with stages("circuit and crosstalk"):
+        beside, lacking = extras(array, only)
+        own |= beside
+    listed = {path: FileRecord(bytes=len(content), sha256=digest(content)) for path, content in own.items()}
+    listed |= {path: FileRecord(bytes=store.size(sha256), sha256=sha256) for path, sha256 in shared.items()}
+    manifest = _manifest(array, moulds, only, check, shape, units, parts, drawn, own)
+    manifest["left_out"] += [LeftOut(what=what, why=why) for what, why in lacking.items()]
+    manifest["files"] = dict(sorted(listed.items()))
+    return Product(manifest, {**own, "manifest.json": json_bytes(manifest)}, shared)
+
+
+def unit_folders(array: Array) -> dict[str, Spec]:
+    """Return each distinct unit by the folder of its own result."""
+    named: dict[str, Spec] = {}
+    for i, unit in enumerate(array.units):
+        slug = re.sub(r"[^a-z0-9]+", "-", unit.name.lower()).strip("-")[:40].rstrip("-") or "unit"
+        named[f"units/{slug}" if f"units/{slug}" not in named else f"units/{slug}-{i + 1}"] = unit
+    return named
+
+
+def _unit(array: Array, unit: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
+    """Return a unit's own result; where it is cast with the sheet, without moulds and casting."""
+    apart = constructions()[array.construction].own_tails
+    wanted = [name for name in only if apart or name not in ("moulds", "casting")] or ["unit"]
+    of_unit = Stages(lambda stage: stages.say(f"unit: {stage}"), None, stages.step, stages.seconds)
+    return make(unit, wanted, check, store, of_unit)
+
+
+def _patch(moulds: PatchMoulds, store: Store, process: StepProcess | None) -> tuple[list[PartRecord], dict[str, str]]:
+    """Return records and files of the silicone that the units share, and the files of the whole patch."""
+    forms = moulds.spec.output.formats
+    blank = moulds.blank
+    files: dict[str, str] = {}
+    parts: list[PartRecord] = []
+    for body in blank.unit:
+        part: PartRecord = {**record(blank, body), "material": _material(moulds, body.step), "files": {}}
+        if "stl" in forms:
+            path = f"patch/{file_stem(body)}.stl"
+            files[path] = store.file(body_key(blank, body, "stl"), partial(stl_content, blank, body))
+            part["files"]["stl"] = BodyFile(path=path, sha256=files[path])
+        parts.append(part)
+    bodies = patch_bodies(moulds.arranged)
+    together: dict[str, Callable[[], bytes]] = {
+        "glb": lambda: glb_content(blank, bodies),
+        "step": lambda: step_asked(bodies, "patch", process)(),
+    }
+    for form, content in together.items():
+        if form in forms:
+            versions = sorted(kernel_versions((form,)).items())
+            key = joint_key(
+                blank, bodies, form, os.environ.get("SOURCE_DATE_EPOCH") if form == "step" else None, versions
+            )
+            files[f"patch/patch.{form}"] = store.file(key, content)
+    return parts, files
+
+
+def _pictures(moulds: PatchMoulds, store: Store) -> dict[str, str]:
+    blank = moulds.blank
+    together = cache(lambda: pictures(blank))
+    return {
+        path: store.file(geometry_key(blank, path), lambda path=path: together()[path]) for path in picture_names(blank)
+    }
+
+
+def _casting(moulds: PatchMoulds, shape: Geometry, units: dict[str, Product]) -> dict[str, bytes]:
+    """Return the procedure's files: the construction's own procedure, or that of any mould set."""
+    way, volumes = moulds.construction, [step["layer_volume_mm3"] for step in shape["steps"]]
+    if way.own_tails:
+        from unitcad.arrays.pocket_procedure import pocket_procedure
+
+        of_units = {folder: _of_unit(unit, units[folder]) for folder, unit in unit_folders(moulds.arranged).items()}
+        made = pocket_procedure(moulds, volumes[0], printed_mm3(shape["parts"]), of_units)
+    else:
+        from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
+
+        made = back_sheet_procedure(moulds, volumes, printed_mm3(shape["parts"]))
+    return {path: text.encode() for path, text in written(made).items()}
+
+
+def _of_unit(unit: Spec, product: Product) -> Procedure:
+    manifest = product.manifest
+    volumes = [step["layer_volume_mm3"] for step in manifest["steps"]]
+    return unit_procedure(MouldSet(unit), volumes, printed_mm3(manifest["parts"]))
+
+
+def _material(moulds: PatchMoulds, step: int | None) -> str | None:
+    return moulds.plan.steps[step - 1].material if step else None
+
+
+def _manifest(
+    array: Array,
+    moulds: PatchMoulds,
+    only: Sequence[str],
+    check: bool,
+    shape: Geometry | None,
+    units: dict[str, Product],
+    parts: list[PartRecord],
+    drawn: list[str],
+    own: dict[str, bytes],
+) -> ArrayManifest:
+    """Return the manifest but for its files: the array's own records, and those of its units under their folders."""
+    first = next(iter(units.values())).manifest
+    findings = mould_findings(moulds.spec, shape) if shape and check and "moulds" in only else []
+    meshes: list[MeshFinding] = list(shape["check"]) if shape and check and "moulds" in only else []
+    every = [*parts]
+    for folder, product in units.items():
+        manifest = product.manifest
+        findings += [FindingRecord(**{**each, "where": f"{folder}: {each['where']}"}) for each in manifest["laws"]]
+        meshes += [
+            MeshFinding(**{**each, "path": f"{folder}/{each['path']}"}) for each in manifest["check"]["findings"]
+        ]
+        every += [_under(folder, part) for part in manifest["parts"]]
+    unit_warnings = [f"{folder}: {line}" for folder, product in units.items() for line in product.manifest["warnings"]]
+    return ArrayManifest(
+        name=array.name,
+        design=array.unit.design,
+        printer=array.unit.moulds.printer,
+        hash=array_hash(array)[:12],
+        outputs=list(only),
+        label=moulds.plan.label if shape else None,
+        warnings=unit_warnings,
+        air_ring_mm=first["air_ring_mm"],
+        mesh={**first["mesh"], "segments": moulds.segments},
+        parts=every,
+        steps=[
+            {**step, "material": moulds.plan.steps[step["index"] - 1].material}
+            for step in (shape["steps"] if shape else [])
+        ],
+        laws=findings,
+        estimate=first["estimate"],
+        check=mesh_findings(meshes),
+        pictures=drawn,
+        casting=sorted(path for path in own if path in ("bom.csv", "casting.json", "casting.md")) or None,
+        left_out=list(_left_out(array, only, check, first["left_out"])),
+        versions={"unitcad": __version__, **kernel_versions(array.unit.output.formats)},
+        files={},
+        array=_record(array, units),
+    )
+
+
+def _record(array: Array, units: dict[str, Product]) -> dict[str, Any]:
+    """Return what the manifest says of the array itself."""
+    folders_of = list(units)
+    sheet = array.sheet
+    return {
+        "construction": array.construction,
+        "cast": array.cast,
+        "radius_mm": array.radius_mm,
+        "layout": array.layout,
+        "pitch_mm": round(array.pitch_mm, 3) if len(array.places) > 1 else None,
+        "sheet": {
+            "material": sheet.material,
+            "low_mm": sheet.low,
+            "high_mm": sheet.high,
+            "outline_mm": list(sheet.outline),
+            "corner_mm": sheet.corner_mm,
+            "strap_slots_mm": [list(slot) for slot in sheet.strap_slots],
+        },
+        "units": folders_of,
+        "places": [
+            {
+                "name": p.name,
+                "x_mm": p.x,
+                "y_mm": p.y,
+                "angle_deg": p.angle_deg,
+                "unit": folders_of[array.units.index(p.unit)],
+            }
+            for p in array.places
+        ],
+    }
+
+
+def _under(folder: str, part: PartRecord) -> PartRecord:
+    """Return a unit's part as the array's manifest has it: name and files under the unit's folder."""
+    files = {
+        form: BodyFile(path=f"{folder}/{file['path']}", sha256=file["sha256"]) for form, file in part["files"].items()
+    }
+    return {**part, "name": f"{folder}: {part['name']}", "files": files}
+
+
+def _left_out(array: Array, only: Sequence[str], check: bool, of_unit: list[LeftOut]) -> Iterator[LeftOut]:
+    if not check:
+        yield LeftOut(what="mould checks", why=folders.UNCHECKED)
+        yield LeftOut(what="mesh checks", why=folders.UNCHECKED)
+    for name in OUTPUTS:
+        if name not in only:
+            yield LeftOut(what=name, why="not asked for (--only)")
+    yield from (each for each in of_unit if each["why"] == NO_KERNEL)

@@ -1,0 +1,221 @@
+"""The page of an array: patch, crosstalk, tools, circuit, places, casting and units; no script, no connection."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from unitcad import files
+from unitcad.arrays.crosstalk_words import crosstalk_lines
+from unitcad.casting.time_line import duration
+from unitcad.check.findings import counted
+from unitcad.errors import UnitcadError
+from unitcad.pipeline.array_product import ARRAY
+from unitcad.pipeline.folder import BENCH, PAGE
+from unitcad.pipeline.manifest_records import ArrayManifest
+from unitcad.report.plain_page import drawing, picture, plain_page
+from unitcad.report.records import expect
+from unitcad.text import number
+
+CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg", "crosstalk-edge.svg"), "circuit.svg"
+LARGEST = 8_000_000
+"""Bytes of a drawing or picture, at most."""
+WORDS = {
+    "patch-skin-side.png": "The patch from the skin's side",
+    "patch-back.png": "The patch from its back",
+    "patch-worn.png": "The patch round its limb",
+    "tools.png": "Tools and what is cast, taken apart",
+    "crosstalk-patch.svg": "What reaches each unit from the others, on the patch",
+    "crosstalk.svg": "Crosstalk from each unit (row) to each other one (column)",
+    "crosstalk-edge.svg": "The same, at the nearest edge of the other unit",
+    "circuit.svg": "Outline of the circuit, pads and rows",
+}
+
+
+def is_array_folder(folder: Path) -> bool:
+    """Tell whether a folder is the result of an array."""
+    return (folder / ARRAY).is_file() and not (folder / ARRAY).is_symlink()
+
+
+def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
+    """Write `folder`/report.html of an array and return its path. Raises UnitcadError for a damaged manifest."""
+    manifest = files.read_json(folder / "manifest.json", links=False)
+    expect(manifest, ArrayManifest, folder / "manifest.json")
+    target = folder / PAGE
+    files.write(target, _page(folder, manifest, warn).encode("utf-8", "replace"))
+    return target
+
+
+def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) -> str:
+    shown = _Shown(folder, warn)
+    array = manifest["array"]
+    parts = [
+        '<div class="top"><div>',
+        f"<h1>{escape(manifest['name'])}</h1>",
+        f'<p class="line">{escape(_line(array))}</p>',
+        _chips(manifest),
+        "</div></div>",
+        *_section("Patch", [shown.of(f"pictures/patch-{side}.png") for side in ("skin-side", "worn", "back")]),
+        *_section("Crosstalk", [_answer(shown.json("crosstalk.json")), *(shown.of(name) for name in CROSSTALK)]),
+        *_section("Tools", [shown.of(f"pictures/{name}") for name in ("tools.png", *_pours(manifest))]),
+        *_section("Circuit", [shown.of(CIRCUIT)]),
+        *_section("Casting", list(_casting(folder, shown.json("casting.json")))),
+        *_section("Units", [_units(folder, manifest)]),
+        *_section("Places", [_places(array)]),
+        *_section("Checks", [_checks(manifest)]),
+        *_section("Files", [_files(manifest)]),
+    ]
+    return plain_page(manifest["name"], "\n".join(parts))
+
+
+class _Shown:
+    """What the page shows of a folder's files; a file that is not there shows nothing, a damaged one is warned of."""
+
+    def __init__(self, folder: Path, warn: Callable[[str], None]) -> None:
+        self.folder, self.warn = folder, warn
+
+    def of(self, path: str) -> str:
+        """Return a drawing or picture with its caption."""
+        try:
+            content = files.read(self.folder / path, largest=LARGEST, links=False)
+        except files.NotThere:
+            return ""
+        except UnitcadError as error:
+            self.warn(f"warning: {error}")
+            return ""
+        words = WORDS.get(Path(path).name) or f"Pour {Path(path).stem.removeprefix('pour')}, cut open"
+        image = drawing(content.decode("utf-8", "replace"), words) if path.endswith(".svg") else picture(content, words)
+        return f"<figure>{image}<figcaption>{escape(words)}</figcaption></figure>"
+
+    def json(self, path: str) -> dict[str, Any]:
+        """Return a JSON file's table; empty without one."""
+        try:
+            data = files.read_json(self.folder / path, links=False)
+            expect(data, dict[str, Any], self.folder / path)
+            return data
+        except files.NotThere:
+            return {}
+        except UnitcadError as error:
+            self.warn(f"warning: {error}")
+            return {}
+
+
+def _line(array: Mapping[str, Any]) -> str:
+    x0, y0, x1, y1 = array["sheet"]["outline_mm"]
+    thick = array["sheet"]["high_mm"] - array["sheet"]["low_mm"]
+    pitch = f", {number(array['pitch_mm'], 3)} mm from unit to unit" if array["pitch_mm"] else ""
+    limb = f", for a limb of radius {number(array['radius_mm'], 3)} mm" if array["radius_mm"] else ""
+    return (
+        f"{counted(len(array['places']), 'unit')}, {array['construction']}{pitch}, on a sheet of "
+        f"{number(x1 - x0, 3)} x {number(y1 - y0, 3)} x {number(thick, 3)} mm of {array['sheet']['material']}{limb}"
+    )
+
+
+def _chips(manifest: ArrayManifest) -> str:
+    findings, check = manifest["laws"], manifest["check"]
+    held = sum(each["ok"] for each in findings)
+    good = held == len(findings) and not check["errors"]
+    chips = [f"{held} of {len(findings)} mould checks hold"] if findings else ["not checked"]
+    chips.append(f"{check['errors']} errors and {check['warnings']} warnings in the files")
+    marked = "".join(f'<li class="chip {"good" if good else "bad"}">{escape(text)}</li>' for text in chips)
+    return f'<ul class="chips">{marked}</ul>'
+
+
+def _section(title: str, content: Iterable[str]) -> Iterator[str]:
+    there = [part for part in content if part]
+    if there:
+        yield from (f"<section><h2>{escape(title)}</h2>", *there, "</section>")
+
+
+def _answer(crosstalk: Mapping[str, Any]) -> str:
+    if not crosstalk:
+        return ""
+    try:
+        first, *others = crosstalk_lines(dict(crosstalk))
+    except (KeyError, TypeError, ValueError, IndexError):  # another program's file
+        return ""
+    return f'<p class="lead">{escape(first)}</p>' + "".join(f"<p>{escape(line)}</p>" for line in others)
+
+
+def _pours(manifest: ArrayManifest) -> list[str]:
+    return [Path(path).name for path in manifest["pictures"] if Path(path).name.startswith("pour")]
+
+
+def _casting(folder: Path, casting: Mapping[str, Any]) -> Iterator[str]:
+    if not casting:
+        return
+    total, bench = duration(casting["earliest_finish_min"]), duration(casting["bench_min"])
+    also = ', <a href="bench.html">bench page</a>' if (folder / BENCH).is_file() else ""
+    yield (
+        f"<p>{escape(total)} from the printed pieces on, of which {escape(bench)} at the bench. "
+        f'<a href="casting.md">Procedure</a>{also}, <a href="bom.csv">bill</a>.</p>'
+    )
+    rows = [
+        (phase["name"], duration(phase["start_min"]), duration(phase["bench_min"]), duration(phase["wait_min"]))
+        for phase in casting["time_line"]
+    ]
+    yield _table(("what", "begins after", "at the bench", "then wait"), rows)
+    grams = [(item["item"], f"{number(item['quantity'], 3)} g") for item in casting["bill"] if item["unit"] == "g"]
+    yield _table(("silicone", "to mix"), grams)
+
+
+def _units(folder: Path, manifest: ArrayManifest) -> str:
+    array = manifest["array"]
+    count = Counter(place["unit"] for place in array["places"])
+    rows = []
+    for unit in array["units"]:
+        page = f"{unit}/{PAGE}" if (folder / unit / PAGE).is_file() else f"{unit}/casting.md"
+        rows.append(f'<tr><td><a href="{escape(page)}">{escape(unit)}</a></td><td>{count[unit]}</td></tr>')
+    level = manifest["estimate"]
+    said = f"<p>{escape(level['answer'])}</p>" if level else ""
+    return f"<table><thead><tr><th>unit</th><th>places</th></tr></thead><tbody>{''.join(rows)}</tbody></table>{said}"
+
+
+def _places(array: Mapping[str, Any]) -> str:
+    rows = [
+        (p["name"], number(p["x_mm"], 4), number(p["y_mm"], 4), number(p["angle_deg"], 4), p["unit"].rpartition("/")[2])
+        for p in array["places"]
+    ]
+    note = (
+        '<p class="note">Seen from the back: rows lettered from the top, columns numbered along x. The angle is that '
+        "of the tail, counter-clockwise from x.</p>"
+    )
+    return note + _table(("place", "x, mm", "y, mm", "angle, degrees", "unit"), rows)
+
+
+def _checks(manifest: ArrayManifest) -> str:
+    findings = manifest["laws"]
+    if not findings:
+        return ""
+    held = Counter(each["code"] for each in findings if each["ok"])
+    every = Counter(each["code"] for each in findings)
+    table = _table(("code", "held"), [(code, f"{held[code]} of {count}") for code, count in sorted(every.items())])
+    broken = "".join(
+        f"<li>{escape(each['code'])} {escape(each['where'])}: {each['value']:.3g} {escape(each['unit'])}, limit "
+        f"{each['limit']:.3g}. {escape(each['advice'])}</li>"
+        for each in findings
+        if not each["ok"]
+    )
+    meshes = "".join(
+        f"<li>{escape(each['path'])}: {escape(each['code'])} {escape(each['message'])}</li>"
+        for each in manifest["check"]["findings"]
+    )
+    return table + (f"<ul>{broken}{meshes}</ul>" if broken or meshes else "")
+
+
+def _files(manifest: ArrayManifest) -> str:
+    own = [(path, entry["bytes"]) for path, entry in manifest["files"].items() if not path.startswith("units/")]
+    rows = "".join(
+        f'<tr><td><a href="{escape(path)}">{escape(path)}</a></td><td>{number(size / 1000, 3)} kB</td></tr>'
+        for path, size in own
+    )
+    return f"<details><summary>{len(own)} files</summary><table><tbody>{rows}</tbody></table></details>"
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    top = "".join(f"<th>{escape(text)}</th>" for text in head)
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    return f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
