@@ -88,11 +88,11 @@ def base(n: dict) -> Manifold:
     wide = hole + n["flare"]
     flare = Manifold.cylinder(n["flare"], wide * SWELL, hole * SWELL, SEGMENTS).translate((0, 0, roof))
     tools = [
-        box(inner, outer, -4, 4, top - 1.5, top + 0.25),
-        box(-outer, -inner, -4, 4, top - 1.5, top + 0.25),
-        cylinder(hole, roof - 0.5, n["core_height"] + 1),
+        box(inner, outer, -4, 4, n["pry_floor"], top + 0.25),
+        box(-outer, -inner, -4, 4, n["pry_floor"], top + 0.25),
+        cylinder(hole, n["flare_floor"], n["core_height"] + 1),
         flare,
-        cylinder(wide, roof - 0.5, roof),
+        cylinder(wide, n["flare_floor"], roof),
         box(-depth / 2, depth / 2, -(n["plate"] + 1), wide, bottom - 1, roof),
         slot(n, n["ledge"], n["cavity"] + 1, half, n["slot_z"][0], n["slot_z"][1] + 1),
         *text(n["base_text"], top - n["engraving"], top + 1),

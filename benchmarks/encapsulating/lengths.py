@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.designs.limits import filament_groove
+from unitcad.moulds.base import plate_bottom, pry_floor
 from unitcad.moulds.blade import BLADE_EDGE, BLADE_THICKNESS
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.filament import FLARE, STUB_TAIL
@@ -55,6 +56,7 @@ def lengths() -> dict:
         "skirt_end": -moulds.plinth_height_mm + moulds.seat_relief_mm,
         "cup": lay.cup[0],
         "plate": lay.plate[0],
+        "pry_floor": pry_floor(spec),
         "plate_thickness": moulds.plate_mm,
         "land": moulds.land_mm,
         "groove": [moulds.groove_width_mm, moulds.groove_depth_mm],
@@ -65,6 +67,9 @@ def lengths() -> dict:
         "filament": moulds.filament_mm / 2,
         "filament_groove": filament_groove(spec),
         "flare": FLARE,
+        "flare_floor": plate_bottom(spec)
+        + filament_groove(spec)
+        - math.ceil(0.5 / moulds.layer_mm - 1e-6) * moulds.layer_mm,
         "stub_tail": STUB_TAIL,
         "grip": [GRIP_GAP, GRIP_LENGTH, GRIP_WIDTH],
         "blade": [BLADE_THICKNESS, BLADE_EDGE, 12.0],

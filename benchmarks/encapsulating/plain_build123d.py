@@ -108,14 +108,14 @@ def base(n: dict) -> Any:
         + cylinder(n["cavity"], -1, n["core_height"])
     )
     inner, outer = n["cup"] - 1.5, n["plate"] + 1
-    body -= box(inner, outer, -4, 4, top - 1.5, top + 0.25)
-    body -= box(-outer, -inner, -4, 4, top - 1.5, top + 0.25)
+    body -= box(inner, outer, -4, 4, n["pry_floor"], top + 0.25)
+    body -= box(-outer, -inner, -4, 4, n["pry_floor"], top + 0.25)
     hole, depth = n["hole"], n["filament_groove"]
     roof = bottom + depth
-    body -= cylinder(hole, roof - 0.5, n["core_height"] + 1)
+    body -= cylinder(hole, n["flare_floor"], n["core_height"] + 1)
     profile = Polygon(
-        (0, roof - 0.5),
-        (hole + n["flare"], roof - 0.5),
+        (0, n["flare_floor"]),
+        (hole + n["flare"], n["flare_floor"]),
         (hole + n["flare"], roof),
         (hole, roof + n["flare"]),
         (0, roof + n["flare"]),

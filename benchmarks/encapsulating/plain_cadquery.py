@@ -81,13 +81,13 @@ def base(n: dict) -> cq.Workplane:
     body = marked(n, cq.Workplane().workplane(offset=bottom).rect(side, side).extrude(top - bottom))
     body = body.union(plinth(n, 0, top)).union(cylinder(n["cavity"], -1, n["core_height"]))
     inner, outer = n["cup"] - 1.5, n["plate"] + 1
-    body = body.cut(box(inner, outer, -4, 4, top - 1.5, top + 0.25))
-    body = body.cut(box(-outer, -inner, -4, 4, top - 1.5, top + 0.25))
+    body = body.cut(box(inner, outer, -4, 4, n["pry_floor"], top + 0.25))
+    body = body.cut(box(-outer, -inner, -4, 4, n["pry_floor"], top + 0.25))
     hole, depth = n["hole"], n["filament_groove"]
     roof = bottom + depth
-    body = body.cut(cylinder(hole, roof - 0.5, n["core_height"] + 1))
+    body = body.cut(cylinder(hole, n["flare_floor"], n["core_height"] + 1))
     wide, up = hole + n["flare"], roof + n["flare"]
-    profile = [(0, roof - 0.5), (wide, roof - 0.5), (wide, roof), (hole, up), (0, up)]
+    profile = [(0, n["flare_floor"]), (wide, n["flare_floor"]), (wide, roof), (hole, up), (0, up)]
     flare = cq.Workplane("XZ").polyline(profile).close().revolve(360, (0, 0, 0), (0, 1, 0))
     body = body.cut(flare)
     body = body.cut(box(-depth / 2, depth / 2, -(n["plate"] + 1), hole + n["flare"], bottom - 1, roof))

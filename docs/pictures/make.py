@@ -22,6 +22,10 @@ sys.path.insert(0, str(HERE.parents[1] / "tests" / "report"))
 import chromium  # noqa: E402
 from PIL import Image  # noqa: E402
 
+from unitcad.arrays.array_file import load_array  # noqa: E402
+from unitcad.arrays.crosstalk_files import crosstalk_files  # noqa: E402
+from unitcad.arrays.patch_moulds import patch_moulds  # noqa: E402
+from unitcad.arrays.patch_pictures import pictures as patch_pictures  # noqa: E402
 from unitcad.cache import MemoryStore  # noqa: E402
 from unitcad.export.picture import draw  # noqa: E402
 from unitcad.pipeline import Variant  # noqa: E402
@@ -30,6 +34,7 @@ from unitcad.pipeline.scenes import exploded, step_in_section, unit_cut_open  # 
 from unitcad.report import write_report  # noqa: E402
 from unitcad.validation import load  # noqa: E402
 
+ARRAY_PICTURES = {"skin-side": "patch-skin-side", "tools": "tools"}
 MOST_BYTES = 250_000
 LOOKS = (("light", 1280, 900, False), ("dark", 1280, 900, True), ("narrow", 390, 844, False))
 
@@ -40,7 +45,7 @@ def main() -> None:
     parser.add_argument("--look", type=Path, metavar="DIR", help="screenshots of both pages, whole, into DIR")
     look = parser.parse_args().look
     with tempfile.TemporaryDirectory() as scratch:
-        made = screenshots(look, Path(scratch)) if look else {**pictures(), **pages(Path(scratch))}
+        made = screenshots(look, Path(scratch)) if look else {**pictures(), **arrays(), **pages(Path(scratch))}
     for name, content in sorted(made.items()):
         target = (look or HERE) / name
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -64,6 +69,25 @@ def pictures() -> dict[str, bytes]:
     scenes["dome-unit.png"] = unit_cut_open(dome)
     scenes["encapsulating-pour2.png"] = step_in_section(variants["encapsulating"], 2)
     return {name: small(image) for name, image in zip(scenes, draw(list(scenes.values())), strict=True)}
+
+
+def arrays() -> dict[str, bytes]:
+    """A patch with pockets from the skin's side, and its tools taken apart."""
+    array = load_array("forearm-pockets")
+    drawn = {
+        kind: patch_pictures(patch_moulds(load_array(name)))
+        for kind, name in (("pockets", array), ("patch", "forearm-patch"))
+    }
+    maps = crosstalk_files(array)
+    return {
+        **{
+            f"array-{kind}-{name}.png": files[f"pictures/{path}.png"]
+            for kind, files in drawn.items()
+            for name, path in ARRAY_PICTURES.items()
+        },
+        "array-crosstalk.svg": maps["crosstalk.svg"],
+        "array-crosstalk-patch.svg": maps["crosstalk-patch.svg"],
+    }
 
 
 def pages(scratch: Path) -> dict[str, bytes]:
