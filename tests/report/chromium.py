@@ -95,6 +95,17 @@ class Visit:
             }"""
         )
 
+    def picture(self, selector: str) -> bytes:
+        """Take a picture (PNG) of where a part stands; one that is drawn again meanwhile may be another element."""
+        self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        clip = self.page.locator(selector).evaluate(
+            """(node) => {
+              const { x, y, width, height } = node.getBoundingClientRect();
+              return { x: x + scrollX, y: y + scrollY, width, height };
+            }"""
+        )
+        return self.page.screenshot(full_page=True, clip=clip)
+
     def close(self) -> None:
         """End the visit."""
         self.context.close()

@@ -108,7 +108,7 @@ def test_the_plot_shows_what_the_table_shows_and_opens_a_variant(visit: Visit) -
     assert "1 of 1 points" in visit.page.inner_text("#plot .tip")
     over = visit.page.locator("#plot .u-over")
     over.scroll_into_view_if_needed()
-    image = np.asarray(Image.open(io.BytesIO(over.screenshot())).convert("RGB")).astype(int)
+    image = np.asarray(Image.open(io.BytesIO(visit.picture("#plot .u-over"))).convert("RGB")).astype(int)
     accent = visit.page.evaluate("() => window.unitcad.theme.colour('series-1')")
     rgb = np.array([int(accent[i : i + 2], 16) for i in (1, 3, 5)])
     spots = np.argwhere(np.abs(image - rgb).max(axis=2) < 70)
@@ -171,7 +171,7 @@ def test_back_from_a_variant_all_is_as_it_was_left(visit: Visit, way: str) -> No
         visit.page.click("a.back")
     visit.page.wait_for_selector(".variants")
     assert left(visit) == before
-    image = Image.open(io.BytesIO(visit.page.locator("#plot canvas").screenshot())).convert("RGB")
+    image = Image.open(io.BytesIO(visit.picture("#plot canvas"))).convert("RGB")
     assert np.asarray(image).mean() < 80
 
 
@@ -221,7 +221,7 @@ def test_the_table_prints_with_its_heads_on_white(running: Any, sweep: Path, dar
     assert seen.page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     assert seen.page.evaluate("() => getComputedStyle(document.body).color") == "rgb(0, 0, 0)"
     # The plot is a picture: it must have been drawn again in the colours of paper.
-    image = np.asarray(Image.open(io.BytesIO(seen.page.locator("#plot canvas").screenshot())).convert("RGB"))
+    image = np.asarray(Image.open(io.BytesIO(seen.picture("#plot canvas"))).convert("RGB"))
     assert image.mean() > 230
     assert (np.abs(image.astype(int) - (0x0A, 0x6B, 0x62)).max(axis=2) < 8).sum() > 30
     for across, down in re.findall(rb"/MediaBox ?\[0 0 ([\d.]+) ([\d.]+)\]", seen.page.pdf(prefer_css_page_size=True)):

@@ -71,8 +71,7 @@ def test_both_drives_are_drawn_and_stand_in_the_table(visit: Visit, estimate: di
     legend = " ".join(visit.page.locator("#estimate ul.key").all_inner_texts())
     assert "Force turning in the skin's plane (this motor)" in legend
     assert "Force along the motor's axis" in legend
-    canvas = visit.page.locator("#estimate .plot canvas")
-    image = np.asarray(Image.open(io.BytesIO(canvas.screenshot())).convert("RGB")).astype(int)
+    image = np.asarray(Image.open(io.BytesIO(visit.picture("#estimate .plot canvas"))).convert("RGB")).astype(int)
     colours = [visit.page.evaluate(f"() => window.unitcad.theme.colour('series-{n}')") for n in (1, 3)]
     assert all(pixels(image, colour) > 150 for colour in colours), colours
     head, *rows = cells(visit, "The curve as numbers")

@@ -211,8 +211,7 @@ def test_the_estimate_shows_models_and_the_measured_value(visit: Visit) -> None:
         "12 of 12",
     ):
         assert words in text
-    plot = visit.page.locator("#estimate .plot canvas")
-    image = np.asarray(Image.open(io.BytesIO(plot.screenshot())).convert("RGB")).astype(int)
+    image = np.asarray(Image.open(io.BytesIO(visit.picture("#estimate .plot canvas"))).convert("RGB")).astype(int)
     accent = visit.page.evaluate("() => window.unitcad.theme.colour('series-1')")
     rgb = [int(accent[i : i + 2], 16) for i in (1, 3, 5)]
     assert (np.abs(image - rgb).max(axis=2) < 30).sum() > 150

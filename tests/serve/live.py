@@ -9,7 +9,6 @@ from typing import Any
 from running import Server
 
 WALL = 'input[name="layers.0.wall_mm"]'
-STATES = ("checks passed", "checks failed", "refused", "no moulds")
 
 
 class Live:
@@ -46,8 +45,8 @@ class Live:
             self.page.wait_for_timeout(30)
 
     def settled(self) -> None:
-        """Wait until nothing is under way."""
-        self.until(lambda: any(word in self.state for word in STATES))
+        """Wait until nothing is under way: unit, moulds and estimate are those of the newest change."""
+        self.until(lambda: self.page.get_attribute("#page", "aria-busy") == "false")
 
     def choose(self, selector: str, value: str) -> None:
         """Type a value, and wait until all of it has been seen."""

@@ -126,11 +126,13 @@
       buttons();
       clearTimeout(state.later);
       chip.textContent = "working";
+      page.setAttribute("aria-busy", "true");
       const sent = state.pending.length;
       const answer = await server.ask("unit", state.text, state.pending);
       if (!answer || mine !== state.asked) return;
       if (answer.lost || answer.text === undefined) {
         said("bad", answer.faults[0].message);
+        page.setAttribute("aria-busy", "false");
         return;
       }
       state.text = answer.text;
@@ -153,6 +155,7 @@
       document.documentElement.dataset.ready = "yes";
       if (faults.length) {
         said("bad", faults.length === 1 ? "1 value is refused" : `${faults.length} values are refused`);
+        page.setAttribute("aria-busy", "false");
         return;
       }
       // While a number is being dragged the moulds wait; the estimate and the moulds then come side by side.
@@ -189,7 +192,9 @@
           time("moulds", answer);
         }),
       ]);
-      if (mine === state.asked) pinned.show();
+      if (mine !== state.asked) return;
+      pinned.show();
+      page.setAttribute("aria-busy", "false");
     }
 
     function showEstimate(answer) {
