@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-from typing import Any
 
 from unitcad.arrays.array import Array, Placed
 from unitcad.arrays.circuit.circuit_files import has_circuit
 from unitcad.arrays.circuit.outline import circuit_body
 from unitcad.arrays.construction import constructions
 from unitcad.designs import unit_bodies
-from unitcad.shape import Place, Shape, moved, turned
+from unitcad.shape import Shape, moved, rotated
 from unitcad.shape.body import Body
 
 SHEET = "sheet"
@@ -39,9 +37,4 @@ def patch_bodies(array: Array) -> tuple[Body, ...]:
 
 def at_place(shape: Shape, place: Placed) -> Shape:
     """Return a unit's solid turned and moved to its place."""
-    quarters, rest = divmod(place.angle_deg, 90.0)
-    if not rest:
-        return moved(turned(shape, "z", int(quarters)), place.x, place.y)
-    c, s = math.cos(math.radians(place.angle_deg)), math.sin(math.radians(place.angle_deg))
-    turn: Any = ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))
-    return Place(shape, turn, (place.x, place.y, 0.0))
+    return moved(rotated(shape, "z", place.angle_deg), place.x, place.y)

@@ -12,6 +12,7 @@ from manifold3d import CrossSection, Manifold
 
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
 from unitcad.shape.profile import GRID_PER_MM, Profile, points
+from unitcad.shape.tree import by_quarters
 
 FINEST, COARSEST = 4096, 24
 
@@ -70,7 +71,11 @@ def _realise(shape: Shape, segments: int, swell: float) -> Manifold:
         case Below(inner, bottom):
             return _below(_realise(inner, segments, swell), bottom)
         case Place(inner, turn, move):
-            return _realise(inner, segments, swell).transform(np.column_stack([turn, move]))
+            solid = _realise(inner, segments, swell)
+            if not by_quarters(turn):
+                # Evaluated first, in its own frame: equal points there stay equal to the last bit when they are turned.
+                solid.num_tri()
+            return solid.transform(np.column_stack([turn, move]))
     raise TypeError(f"not a shape: {shape!r}")
 
 

@@ -26,6 +26,7 @@ from unitcad.shape.tree import (
     exact_volume,
     moved,
     ring,
+    rotated,
     turned,
     union,
 )
@@ -53,6 +54,7 @@ __all__ = [
     "polygon",
     "rectangle",
     "ring",
+    "rotated",
     "rounded_rectangle",
     "turned",
     "union",

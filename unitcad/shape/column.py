@@ -17,6 +17,7 @@ import numpy as np
 
 from unitcad.shape.profile import GRID_PER_MM, Profile, mm, points
 from unitcad.shape.tree import (
+    UNTURNED,
     Below,
     Common,
     Component,
@@ -29,13 +30,13 @@ from unitcad.shape.tree import (
     Turn,
     Union,
     box,
+    by_quarters,
 )
 
 Point = tuple[float, float, float]
 Extent = tuple[float, float, float, float, float, float]
 """The low corner of a box, then the high one, mm."""
 
-_IDENTITY: Turn = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 _ORIGIN: Point = (0.0, 0.0, 0.0)
 _ARC_SIDES = 96
 _OUTSIDE = 1.0
@@ -85,7 +86,7 @@ class _Node:
         kind: type,
         children: Sequence[_Node] = (),
         leaf: Shape | None = None,
-        place: tuple[Turn, Point] = (_IDENTITY, _ORIGIN),
+        place: tuple[Turn, Point] = (UNTURNED, _ORIGIN),
         extent: Extent | None = None,
     ) -> None:
         self.kind, self.children, self.leaf, self.turn, self.move = kind, children, leaf, *place
@@ -141,10 +142,10 @@ class _Nodes:
     def __init__(self) -> None:
         self._made: dict[tuple[int, Turn, Point], _Node] = {}
 
-    def of(self, shape: Shape, turn: Turn = _IDENTITY, move: Point = _ORIGIN) -> _Node:
+    def of(self, shape: Shape, turn: Turn = UNTURNED, move: Point = _ORIGIN) -> _Node:
         while isinstance(shape, Place):
             move = _carried(turn, shape.move, move)
-            if shape.turn != _IDENTITY:
+            if shape.turn != UNTURNED:
                 turn = _both(turn, shape.turn)
             shape = shape.shape
         key = id(shape), turn, move
@@ -167,7 +168,7 @@ def _both(turn: Turn, first: Turn) -> Turn:
     return tuple((_dot(row, a), _dot(row, b), _dot(row, c)) for row in turn)
 
 
-def _dot(row: Sequence[int], column: Sequence[int]) -> int:
+def _dot(row: Sequence[float], column: Sequence[float]) -> float:
     return sum(one * other for one, other in zip(row, column, strict=True))
 
 
@@ -197,11 +198,15 @@ def _box_of(shape: Shape) -> Extent:
 
 
 def _placed_box(extent: Extent, turn: Turn, move: Point) -> Extent:
-    if turn == _IDENTITY:
+    if turn == UNTURNED:
         x, y, z = move
         return extent[0] + x, extent[1] + y, extent[2] + z, extent[3] + x, extent[4] + y, extent[5] + z
-    one, other = _carried(turn, extent[:3], move), _carried(turn, extent[3:], move)
-    (x0, x1), (y0, y1), (z0, z1) = (sorted(ends) for ends in zip(one, other, strict=True))
+    # Along each axis the two corners that reach least and farthest: exact for quarter turns, a bound for others.
+    ends = [
+        [sum(pick(row[k] * extent[k], row[k] * extent[k + 3]) for k in range(3)) + by for pick in (min, max)]
+        for row, by in zip(turn, move, strict=True)
+    ]
+    (x0, x1), (y0, y1), (z0, z1) = ends
     return x0, y0, z0, x1, y1, z1
 
 
@@ -213,7 +218,8 @@ def _carried(turn: Turn, point: Point, move: Point) -> Point:
 
 def _leaf_within(node: _Node, leaf: Shape, column: Column) -> Shape | None:
     reach = mm(column.radius) + _OUTSIDE
-    if isinstance(leaf, Extrude) and leaf.top is None and not leaf.holes and _is_rectangle(leaf.profile):
+    on_grid = by_quarters(node.turn)
+    if on_grid and isinstance(leaf, Extrude) and leaf.top is None and not leaf.holes and _is_rectangle(leaf.profile):
         x0, y0, z0, x1, y1, z1 = node.extent
         left, right = max(x0 - column.x, -reach), min(x1 - column.x, reach)
         return box(left, right, max(y0 - column.y, -reach), min(y1 - column.y, reach), z0, z1)
@@ -226,7 +232,11 @@ def _leaf_within(node: _Node, leaf: Shape, column: Column) -> Shape | None:
         if leaf.top is None and outside[0] > 0:
             return None
     x, y, z = node.move
-    return Place(leaf, node.turn, (x - column.x, y - column.y, z))
+    placed = Place(leaf, node.turn, (x - column.x, y - column.y, z))
+    if not on_grid:
+        # Off the grid: snapped, two leaves that stand differently could become equal.
+        object.__setattr__(placed, "move", tuple(round(v, 9) for v in (x - column.x, y - column.y, z)))
+    return placed
 
 
 def _is_rectangle(profile: Profile) -> bool:

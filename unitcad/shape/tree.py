@@ -1,4 +1,8 @@
-"""Solids as data: a small frozen tree that three kernels realise. Lengths in mm on the grid, angles by quarter turns.
+"""Solids as data: a small frozen tree that three kernels realise. Lengths in mm on the grid.
+
+Quarter turns keep everything on the grid. What is turned by another angle has its grid in the turned frame: a solid is
+drawn and cut there, then turned as a whole. Points that are equal in that frame stay equal; faces that lie on each
+other do so but for a rounding, so the joint of two such pieces beside a cavity takes a seal that reaches into both.
 
 A tree is hashable, picklable and costs nothing to import; `content_hash` is stable over processes and machines.
 """
@@ -102,19 +106,24 @@ class Below:
         object.__setattr__(self, "bottom", mm(self.bottom))
 
 
-Turn = tuple[tuple[int, int, int], ...]
-"""A proper rotation as a signed axis permutation, by rows."""
+Turn = tuple[tuple[float, float, float], ...]
+"""A proper rotation, by rows; made of quarter turns, it is a signed permutation of the axes in whole numbers."""
+UNTURNED: Turn = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+_ROUNDING = 1e-12
+"""How far rows of a rotation may be off unit length and off square to each other."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """`shape` turned by `turn`, then moved by `move` (mm)."""
+    """`shape` turned by `turn`, then moved by `move` (mm). Raises ProfileError where `turn` is no proper rotation."""
 
     shape: Shape
-    turn: Turn = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+    turn: Turn = UNTURNED
     move: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
+        if self.turn is not UNTURNED and not _is_rotation(self.turn):
+            raise ProfileError(f"is no rotation: {self.turn}")
         x, y, z = self.move
         object.__setattr__(self, "move", (mm(x), mm(y), mm(z)))
 
@@ -154,20 +163,38 @@ def moved(shape: Shape, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Shape
     return Place(shape, move=(x, y, z)) if (x, y, z) != (0.0, 0.0, 0.0) else shape
 
 
-_QUARTERS = {
-    "x": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
-    "y": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
-    "z": ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
-}
-
-
 def turned(shape: Shape, axis: str, quarters: int) -> Shape:
     """`shape` turned about an axis through the origin by a number of quarter turns, counter-clockwise."""
-    turn = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-    for _ in range(quarters % 4):
-        q = _QUARTERS[axis]
-        turn = tuple(tuple(sum(q[i][k] * turn[k][j] for k in range(3)) for j in range(3)) for i in range(3))
-    return Place(shape, turn=turn) if quarters % 4 else shape  # type: ignore[arg-type]
+    return rotated(shape, axis, 90.0 * quarters)
+
+
+def rotated(shape: Shape, axis: str, degrees: float) -> Shape:
+    """`shape` turned about an axis through the origin by any angle, counter-clockwise; not wrapped for a full turn."""
+    quarters = round(degrees / 90)
+    rest = math.radians(degrees - 90.0 * quarters)
+    c, s = (math.cos(rest), math.sin(rest)) if rest else (1, 0)
+    # By the nearest quarter turn and what is left: quarter turns are exact, opposite angles mirror each other.
+    c, s = ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
+    turns: dict[str, Turn] = {
+        "x": ((1, 0, 0), (0, c, -s), (0, s, c)),
+        "y": ((c, 0, s), (0, 1, 0), (-s, 0, c)),
+        "z": ((c, -s, 0), (s, c, 0), (0, 0, 1)),
+    }
+    return Place(shape, turn=turns[axis]) if (c, s) != (1, 0) else shape
+
+
+def by_quarters(turn: Turn) -> bool:
+    """Tell whether a rotation is made of quarter turns, so that it keeps a solid on the grid."""
+    return all(entry in (-1, 0, 1) for row in turn for entry in row)
+
+
+def _is_rotation(turn: Turn) -> bool:
+    """Tell whether the rows are of unit length, square to each other, and right-handed."""
+    a, b, c = turn
+    third = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    off = [abs(x - y) for x, y in zip(third, c, strict=True)]
+    off += [abs(sum(x * y for x, y in zip(a, b, strict=True))), *(abs(math.hypot(*row) - 1) for row in turn)]
+    return max(off) < _ROUNDING
 
 
 def content_hash(shape: Shape, *more: object) -> str:
