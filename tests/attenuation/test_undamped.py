@@ -30,12 +30,16 @@ def _components(found):
 @pytest.mark.parametrize("rtol", [0.1, 1e-3, 1e-5, 1e-7, 1e-9])
 @pytest.mark.parametrize("reference", REFERENCES, ids=[reference["kind"] for reference in REFERENCES])
 def test_the_error_of_each_component_holds_without_damping(reference, rtol):
-    """A polynomial through six small losses was off by up to 2.3 times the error of one component."""
+    """A polynomial through six small losses was off by up to 2.3 times the error of one component.
+
+    Where a detour was put off for a better one until rounding spoilt all, the bound at rtol 1e-9 was 0.27.
+    """
     one = trial(reference["kind"], reference["seed"])
     found = one.medium.response(one.load, one.omega, one.r, z=one.z, rtol=rtol)
     exact, doubt = np.array(reference["u"]) @ [1, 1j], np.array(reference["doubt"])
-    u, error = np.array([found.u_r, found.u_z]), np.array([found.error_r, found.error_z])
-    assert np.all(np.abs(u - exact) <= error + doubt)
+    u, error = _components(found)
+    sideways = one.load.direction == "tangential"
+    assert np.all(np.abs(u - exact if sideways else u[::2] - exact) <= (error if sideways else error[::2]) + doubt)
     assert found.error <= rtol * np.max(np.abs(exact))
     assert found.wavenumbers < 500_000
 

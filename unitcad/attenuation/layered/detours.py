@@ -30,7 +30,8 @@ residues, and the waves over the panel weigh 2.
 """
 _SURE = 10.0  # times its uncertainty that an imaginary part must be to count
 _PROBE = 1e-3  # of the panel's half over its wavenumber: the loss that shows where a pole belongs
-_LOST = 4e-15  # of a wavenumber: its rounding in the kernel's pole
+LOST = 4e-15
+"""Of a wavenumber: its rounding in the kernel's pole."""
 
 
 class Poles(NamedTuple):
@@ -52,7 +53,7 @@ def poles(kernel: w.Array, nodes: np.ndarray, to_legendre: np.ndarray, k: np.nda
     safe = np.where(size > 0, size, 1.0)
     at = np.sum(np.conj(plain) * turned, axis=(0, 2)) / safe
     left = np.abs(turned - at[:, None] * plain)
-    uncertainty = np.sqrt(np.sum(left**2, axis=(0, 2)) / safe) + _LOST * k
+    uncertainty = np.sqrt(np.sum(left**2, axis=(0, 2)) / safe) + LOST * k
     return Poles(np.where(size > 0, at, np.inf), uncertainty, left.sum(axis=-1))
 
 

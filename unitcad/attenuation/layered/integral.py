@@ -15,7 +15,7 @@ from scipy.special import factorial2
 
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.bessel import bessel_bound, bessels
-from unitcad.attenuation.layered.detours import HIDDEN, Poles, around, poles
+from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, around, poles
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.path import MAX_PANELS, PHASE, cut, from_origin, onwards, pieced, wavenumbers
 from unitcad.attenuation.layered.stack import Stack
@@ -29,8 +29,8 @@ _ODD_FACTORIALS = np.array([float(factorial2(2 * (2 * _NODES.size - j) - 1)) for
 ROUNDING = 1e-15
 """Of a wavenumber, as the kernel feels it next to a pole."""
 _MAX_ROUNDS = 40
-_FLOOR = 1e-12
-"""Of a panel's error, times 4 a halving: what its detour may leave out where less is rounding's and not to be had."""
+_SINGLE = 1e-7
+"""Uncertainty of a pole below which a panel has no other, or one that is next to nothing beside it."""
 _CHUNK = 200_000  # integrand values held at once
 
 
@@ -105,7 +105,8 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     count, done, exhausted, gained = 0, 0, False, 0.0
     stop = tail.start(tail.scale, rtol)
     pending = from_origin(end, stop, span, materials)
-    for halvings in range(_MAX_ROUNDS):
+    put_off = _PutOff.none(len(pending), known.shape)
+    for _ in range(_MAX_ROUNDS):
         found = _evaluate(problem, pending)
         if not np.all(np.isfinite(found.parts)):
             raise overflow(bare.omega)
@@ -116,26 +117,33 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         bad = found.gains > limit
         if np.max(quadrature + found.errors.sum(0)) <= 0.4 * rtol * scale:
             bad[:] = False
+        due = put_off.due(found, bad)
+        dropped = np.isin(put_off.of, due)
+        bad &= ~dropped
         room = (MAX_PANELS - done) // 4  # quarters of them are what is left
         exhausted |= np.count_nonzero(bad) > room
         bad = _worst(found.gains, bad, room)
-        total = total + found.parts[~bad].sum(0)
-        quadrature += found.errors[~bad].sum(0)
-        gained += float(found.gains[~bad].sum())
-        size += found.sizes[~bad].sum(0)
-        if np.any(bad):
-            far_off = bad & (found.gains > 1e3 * limit)
-            enough = np.maximum(limit, _FLOOR * 4.0**halvings * found.gains)
-            turned, pieces = _around(problem, pending, found, bad, enough, span)
-            quadrature += found.hidden[turned].sum(0)
-            bad, far_off = bad & ~turned, far_off & ~turned
-            pending = np.concatenate([cut(pending[bad & ~far_off], 2), cut(pending[far_off], 4), pieces])
+        good = ~(bad | dropped)
+        total = total + found.parts[good].sum(0)
+        quadrature += found.errors[good].sum(0)
+        gained += float(found.gains[good].sum())
+        size += found.sizes[good].sum(0)
+        if not np.all(good):
+            now, later, pieces = _detours(problem, pending, found, bad, limit, span)
+            quadrature += found.hidden[now].sum(0) + put_off.hidden[due].sum(0)
+            turned = np.concatenate([pieces[now], put_off.pieces[due]]).reshape(-1, 4)
+            halved, of = _halved(pending, bad & ~now, found.gains > 1e3 * limit, later)
+            pending = np.concatenate([halved, turned])
+            put_off = _PutOff(np.append(of, np.full(len(turned), -1)), pieces[later], found.hidden[later])
             continue
         wanted = tail.start(min(float(np.max(np.abs(known + total))), largest), rtol)
-        exhausted |= wanted > stop and done > MAX_PANELS
-        if wanted <= stop or exhausted:
+        # Panels that do not suffice for halving may still do for a tail that leaves more.
+        spent = done > MAX_PANELS or (exhausted and tail.bound(stop).max() <= quadrature.max())
+        exhausted |= wanted > stop and spent
+        if wanted <= stop or spent:
             break
         pending = onwards(stop, wanted, span)
+        put_off = _PutOff.none(len(pending), known.shape)
         stop = wanted
     else:
         found = _evaluate(problem, pending)
@@ -165,7 +173,7 @@ class _Evaluated(NamedTuple):
     """Of each panel, row and radius: the integral, a bound of its error, its absolute size.
 
     gains: of each panel, the largest part of its error that halving it would lessen; poles: the one of each panel;
-    hidden (panels, rows, radii): what a detour around it may leave out.
+    hidden (panels, rows, radii): what a detour around it may leave out; blurred: where that may be rounding's alone.
     """
 
     parts: np.ndarray
@@ -174,16 +182,54 @@ class _Evaluated(NamedTuple):
     gains: np.ndarray
     poles: Poles
     hidden: np.ndarray
+    blurred: np.ndarray
 
 
-def _around(
-    problem: Problem, panels: w.Array, found: _Evaluated, bad: np.ndarray, enough: np.ndarray, span: float
-) -> tuple[np.ndarray, w.Array]:
-    """Return which of the `bad` panels go around a pole, and all their pieces.
+class _PutOff(NamedTuple):
+    """Detours that would leave out more than is wanted: their panels were cut instead.
 
-    enough: what the detour of each may leave out.
+    of (panels,): the detour in whose place a panel is, or -1; pieces (detours, 4, 4); hidden (detours, rows, radii).
     """
-    clear = bad & (found.hidden.max(axis=(1, 2)) <= enough) & (panels[:, :2].imag == 0).all(axis=1)
+
+    of: np.ndarray
+    pieces: w.Array
+    hidden: np.ndarray
+
+    @classmethod
+    def none(cls, panels: int, shape: tuple[int, ...]) -> _PutOff:
+        return cls(np.full(panels, -1), np.empty((0, 4, 4)), np.empty((0, *shape)))
+
+    def due(self, found: _Evaluated, bad: np.ndarray) -> np.ndarray:
+        """Return those to take after all: the worst panel in their place is bad and would leave out no less.
+
+        What is left of its last coefficients is rounding, which grows with each halving.
+        """
+        most = found.hidden.max(axis=(1, 2))
+        worst = [np.argmax(np.where(self.of == i, found.gains, -1.0)) for i in range(len(self.hidden))]
+        no_less = [bad[i] and most[i] >= hidden.max() for i, hidden in zip(worst, self.hidden, strict=True)]
+        return np.flatnonzero(no_less)
+
+
+def _halved(panels: w.Array, bad: np.ndarray, far_off: np.ndarray, put_off: np.ndarray) -> tuple[w.Array, np.ndarray]:
+    """Return halves of the `bad` panels, quarters of those that are far off too, and the number of each one's detour.
+
+    put_off: which have one; -1 without.
+    """
+    near, far = bad & ~far_off, bad & far_off
+    number = np.where(put_off, np.cumsum(put_off) - 1, -1)
+    of = np.concatenate([np.repeat(number[near], 2), np.repeat(number[far], 4)])
+    return np.concatenate([cut(panels[near], 2), cut(panels[far], 4)]), of
+
+
+def _detours(
+    problem: Problem, panels: w.Array, found: _Evaluated, bad: np.ndarray, enough: float, span: float
+) -> tuple[np.ndarray, np.ndarray, w.Array]:
+    """Return which of the `bad` panels go around a pole, which only if halving does not help, and the pieces of both.
+
+    enough: what a detour may leave out; pieces: shape (panels, 4, 4).
+    """
+    now = found.hidden.max(axis=(1, 2)) <= enough
+    clear = bad & (now | found.blurred) & (panels[:, :2].imag == 0).all(axis=1)
 
     def lossier(panel: w.Array, loss: float) -> Poles:
         return _poles(replace(problem, medium=problem.medium.with_loss(loss)), panel[None])
@@ -193,7 +239,9 @@ def _around(
     turned, corners = around(panels[at], of, 1.0 / span if span > 0 else np.inf, lossier)
     which = np.zeros_like(bad)
     which[at[turned]] = True
-    return which, pieced(panels[which], corners)
+    pieces = np.zeros((len(panels), 4, 4), dtype=np.complex128)
+    pieces[which] = pieced(panels[which], corners).reshape(-1, 4, 4)
+    return which & now, which & ~now, pieces
 
 
 def _poles(problem: Problem, panels: w.Array) -> Poles:
@@ -232,6 +280,7 @@ def _evaluate(problem: Problem, panels: w.Array) -> _Evaluated:
         np.empty(len(panels)),
         Poles(np.empty(len(panels), dtype=np.complex128), np.empty(len(panels)), np.empty((len(orders), len(panels)))),
         np.empty(shape),
+        np.empty(len(panels), dtype=bool),
     )
     for part in chunks:
         nodes, slope, half = _nodes(panels[part])
@@ -240,14 +289,35 @@ def _evaluate(problem: Problem, panels: w.Array) -> _Evaluated:
         waves = bessels(orders, real[:, None] * problem.r) * problem.load.transform(real)[:, None]
         waves = waves.reshape(len(orders), half.size, _NODES.size, -1) * half[:, None, None]
         kernel = problem.kernel(k).reshape(len(orders), half.size, _NODES.size) * slope
-        out.parts[part] = ((kernel * _WEIGHTS)[:, :, None] @ waves)[:, :, 0].swapaxes(0, 1)
-        found = poles(kernel, _NODES, _TO_LEGENDRE, _closeness(panels[part]))
+        out.parts[part] = _products(kernel * _WEIGHTS, waves)
+        closeness = _closeness(panels[part])
+        found = poles(kernel, _NODES, _TO_LEGENDRE, closeness)
         for whole, values in zip(out.poles, found, strict=True):
             whole[..., part] = values
+        out.blurred[part] = found.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * closeness)
         sizes, errors, gains, covered = _sizes_and_errors(problem, panels[part], kernel, np.abs(waves))
         out.sizes[part], out.errors[part], out.gains[part] = sizes, errors, gains
         out.hidden[part] = HIDDEN * found.rest.T[..., None] * covered
     return out
+
+
+def _products(kernel: w.Array, waves: w.Array) -> w.Array:
+    """Sum kernel (rows, panels, nodes) times waves (rows, panels, nodes, radii) over the nodes; (panels, rows, radii).
+
+    By products of real matrices with two rows. A complex row by a matrix is a matrix by a vector to BLAS, which starts
+    its threads for each of them from 256 radii on.
+    """
+    if np.iscomplexobj(waves):
+        (re, im), (re_of_i, im_of_i) = (np.moveaxis(_pair(kernel) @ part, 2, 0) for part in (waves.real, waves.imag))
+        re, im = re - im_of_i, im + re_of_i
+    else:
+        re, im = np.moveaxis(_pair(kernel) @ waves, 2, 0)
+    return (re + 1j * im).swapaxes(0, 1)
+
+
+def _pair(values: w.Array) -> np.ndarray:
+    """Return the real and the imaginary part, one more axis before the last."""
+    return np.stack([values.real, values.imag], axis=2)
 
 
 def _sizes_and_errors(

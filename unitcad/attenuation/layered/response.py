@@ -127,8 +127,7 @@ def _solve(bare: Problem, end: float, rtol: float) -> Integrals:
     for _ in range(_MOST_ATTEMPTS):
         integrals = integrate(bare, end, rtol, size)
         count += integrals.wavenumbers
-        if best is None or np.max(integrals.error) < np.max(best.error):
-            best = integrals
+        best = _better(best, integrals) if best else integrals
         before, size = size, float(np.max(np.abs(best.total))) or 1.0
         reached = float(np.max(best.error)) / size
         if reached <= rtol or integrals.cut_short or count + integrals.wavenumbers > _MOST_WAVENUMBERS:
@@ -139,6 +138,13 @@ def _solve(bare: Problem, end: float, rtol: float) -> Integrals:
             break
     assert best is not None
     return replace(best, wavenumbers=count)
+
+
+def _better(one: Integrals, other: Integrals) -> Integrals:
+    """Return each row at each radius from the one that has the lower bound there."""
+    lower = other.error < one.error
+    total, error = np.where(lower, other.total, one.total), np.minimum(other.error, one.error)
+    return replace(other, total=total, error=error)
 
 
 def _check_size(end: float, span: float, omega: float) -> None:
