@@ -72,12 +72,13 @@ def pictures() -> dict[str, bytes]:
 
 
 def arrays() -> dict[str, bytes]:
-    """A patch with pockets from the skin's side, and its tools taken apart."""
+    """Patches from the skin's side, and their tools taken apart."""
     array = load_array("forearm-pockets")
     drawn = {
         kind: patch_pictures(patch_moulds(load_array(name)))
         for kind, name in (("pockets", array), ("patch", "forearm-patch"))
     }
+    band = patch_pictures(patch_moulds(load_array("wrist-band")))
     maps = crosstalk_files(array)
     return {
         **{
@@ -85,6 +86,7 @@ def arrays() -> dict[str, bytes]:
             for kind, files in drawn.items()
             for name, path in ARRAY_PICTURES.items()
         },
+        "array-band-tools.png": band["pictures/tools.png"],
         "array-crosstalk.svg": maps["crosstalk.svg"],
         "array-crosstalk-patch.svg": maps["crosstalk-patch.svg"],
     }

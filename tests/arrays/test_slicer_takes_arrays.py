@@ -1,4 +1,4 @@
-"""PrusaSlicer slices every tool of every shipped array, and repairs none of them."""
+"""PrusaSlicer slices every piece of every tool of every shipped array, and repairs none of them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ pytestmark = [
 @pytest.mark.parametrize("name", array_templates())
 def test_every_tool_of_an_array_is_sliced(name: str, tmp_path: Path) -> None:
     moulds = patch_moulds(load_array(name))
-    for tool in moulds.plan.tools:
+    for tool in moulds.plan.pieces:
         if tool.made != "printed":
             continue
         path = tmp_path / f"{tool.name}.stl"

@@ -117,6 +117,7 @@ FAULTS: list[Fault] = [
     ("C230", "cup2", "a slot beside the groove", less(box(-2, 2, 9.9, 10.5, 2.0, 9))),
     ("C240", "cup1", "a hole 0.5 from the bore", less(moved(cylinder(0.3, 0.5, 2.5), -6.55, 0))),
     ("C240", "cup2", "a hole 0.6 from the groove", less(moved(cylinder(0.3, 3.5, 9), -10.4, 0))),
+    ("C250", "base", "larger than the bed", more(box(-120, 120, -5, 5, -4, -3))),
     ("C300", "cup1", "a lip of 0.05 in the bore", more(ring(5.7, 5.8, 1.0, 1.2))),
     ("C300", "cup1", "a lip of 0.01 in the bore", more(ring(5.74, 5.8, 1.0, 1.2))),
     ("C300", "cup2", "a bore that narrows upwards", more(Revolve(polygon((7.1, 0.2), (7.1, 4), (6.95, 4))))),

@@ -15,25 +15,27 @@ lifted past the sheet. Then the patch is pushed up out of that cup.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.circuit.wiring import wiring
 from unitcad.arrays.fins import Fin, fins
+from unitcad.arrays.larger_than_bed import across, pieces, taken
 from unitcad.arrays.outlines import rounded, slot_profile
 from unitcad.designs import Dimensions, dimensions
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.errors import Refusal
 from unitcad.moulds import filament
-from unitcad.moulds.base import core, outline, plate_top, pry_slot
+from unitcad.moulds.base import PRY_UNDER, core, outline, plate_top, pry_slot
 from unitcad.moulds.blade import blade
 from unitcad.moulds.cup import groove_depth_of
-from unitcad.moulds.labels import base_label, corner_labels, engraved
-from unitcad.moulds.layout import MARK
+from unitcad.moulds.dovetails import BESIDE, Interval, Split, cuts, seams, split
+from unitcad.moulds.labels import corner_labels, engraved, row, row_width
+from unitcad.moulds.layout import MARK, TEXT_MARGIN
 from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, stub_pieces
-from unitcad.moulds.pins import PIN_RADIUS, Pins, pin_holes, standing_pins
+from unitcad.moulds.pins import CHAMFER, PIN_RADIUS, Pins, pin_holes, standing_pins
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Common, Extrude, Shape, Union, box, content_hash, cut, cylinder, moved, ring, union
@@ -50,7 +52,7 @@ UP, DOWN = (0, 0, 1), (0, 0, -1)
 
 @dataclass(frozen=True)
 class Drawing:
-    """What all tools of an array are drawn to."""
+    """What all tools of an array are drawn to; where the base and the cups are cut that are larger than the bed."""
 
     array: Array
     spec: Spec
@@ -58,6 +60,8 @@ class Drawing:
     fins: tuple[Fin, ...]
     lay: Layout
     pins: Pins
+    base_cuts: tuple[float, ...] = ()
+    cup_cuts: tuple[float, ...] = ()
 
 
 def core_top(spec: Spec) -> float:
@@ -73,7 +77,7 @@ def slot_roof(spec: Spec) -> float:
 def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
     """Return tools and pours of an array whose silicone is drawn as `cast`, pour by pour.
 
-    Raises Refusal for tools that are larger than the bed, and for lids.
+    Tools larger than the bed are cut. Raises Refusal where they can't be, and for lids.
     """
     drawing = _drawing(array)
     spec, dims, lay = drawing.spec, drawing.dims, drawing.lay
@@ -82,11 +86,10 @@ def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
     pours = range(1, len(cast) + 1)
     blanks = [_base(drawing), *(_cup(drawing, pour - 1, last=pour == len(cast)) for pour in pours)]
     label = content_hash(Union((*blanks, *(shape for shapes in cast for shape in shapes))))[:4].upper()
-    base = replace(base_piece(engraved(blanks[0], base_label(spec, lay, f"B{label}", 0.0))), removal=DOWN)
+    base = replace(base_piece(engraved(blanks[0], _base_letters(drawing, f"B{label}"))), removal=DOWN)
     cups = []
     for pour, blank in zip(pours, blanks[1:], strict=True):
-        letters = corner_labels(spec, lay, dims.heights[pour - 1], (f"C{pour:X}", label[:2], label[2:]))
-        cup = cup_piece(pour, engraved(blank, letters))
+        cup = cup_piece(pour, engraved(blank, _cup_letters(drawing, pour, label)))
         # The last cup is a tray for the sheet: printed as it stands, and the patch leaves it, not it the patch.
         cups.append(replace(cup, upside_down=False, removal=None) if pour == len(cast) else cup)
     stubs = stub_pieces([filament.stub(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
@@ -101,7 +104,43 @@ def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
         concentric=False,
         pins=drawing.pins,
         genus=tuple(holes),
+        splits=tuple(_splits(drawing, base, cups)),
     )
+
+
+def _splits(drawing: Drawing, base: Body, cups: Sequence[Body]) -> Iterator[Split]:
+    """Yield the tools that are larger than the bed, cut."""
+    for tool, where in ((base, drawing.base_cuts), *((cup, drawing.cup_cuts) for cup in cups)):
+        if where:
+            yield split(tool, seams(where, across(drawing.array), drawing.pins.clearance))
+
+
+def _base_letters(drawing: Drawing, label: str) -> list[Shape]:
+    """Draw the base's label; on a base that is cut, on each piece with its number."""
+    spec, lay = drawing.spec, drawing.lay
+    stroke, y = spec.moulds.engraving_stroke_mm, (lay.cup[1] + lay.plate[1]) / 2 - lay.label_height / 2
+    letters: list[Shape] = []
+    for i, (low, high) in enumerate(pieces((-lay.plate[0], lay.plate[0]), drawing.base_cuts)):
+        texts = [label, str(i + 1)][: 1 + bool(drawing.base_cuts)]
+        letters += row(texts, stroke, ((low + high - row_width(texts, stroke)) / 2, y), _engraving(spec, 0.0))
+    return letters
+
+
+def _cup_letters(drawing: Drawing, pour: int, label: str) -> list[Shape]:
+    """Draw a cup's letters in its corners; the pieces of one that is cut have its name and their number at the left."""
+    spec, lay, rim = drawing.spec, drawing.lay, drawing.dims.heights[pour - 1]
+    own, y = f"C{pour:X}", lay.cup[1] - TEXT_MARGIN - lay.label_height
+    letters = corner_labels(spec, lay, rim, (own, label[:2], label[2:]))
+    if not drawing.cup_cuts:
+        return letters
+    starts = [TEXT_MARGIN - lay.cup[0], *(low + BESIDE for low, _ in pieces((0, 0), drawing.cup_cuts)[1:])]
+    heights = _engraving(spec, rim)
+    rows = [row([own, str(i + 1)], spec.moulds.engraving_stroke_mm, (x, y), heights) for i, x in enumerate(starts)]
+    return [*letters[1:], *(shape for shapes in rows for shape in shapes)]
+
+
+def _engraving(spec: Spec, top: float) -> tuple[float, float]:
+    return top - spec.moulds.engraving_depth_mm, top + BEYOND
 
 
 def _step(
@@ -124,7 +163,7 @@ def _step(
 
 
 def _drawing(array: Array) -> Drawing:
-    """Return what the tools are drawn to. Raises Refusal for plates that are larger than the bed."""
+    """Return what the tools are drawn to. Raises Refusal for plates larger than the bed that can't be cut."""
     spec, moulds = array.unit, array.unit.moulds
     dims = replace(dimensions(spec), exit=None, sides=())
     height = min(dims.heights[0] - moulds.least_wall_mm - 0.4, 3.0)
@@ -135,21 +174,48 @@ def _drawing(array: Array) -> Drawing:
     box_, beside = array.sheet.outline, moulds.land_mm + moulds.groove_width_mm + wall
     cup = max(abs(box_[0]), box_[2]) + beside, max(abs(box_[1]), box_[3]) + beside
     plate = cup[0] + label + 2 * LABEL_MARGIN, cup[1] + label + 2 * LABEL_MARGIN
-    _check_bed(spec, plate)
+    if 2 * plate[1] > moulds.bed_y_mm + 1e-9:
+        limit = f"the base of {2 * plate[0]:.4g} x {2 * plate[1]:.4g} mm exceeds the bed; tools are cut across x alone"
+        raise Refusal("moulds.bed_y_mm", moulds.bed_y_mm, limit, math.ceil(20 * plate[1] - 1e-6) / 10)
     x, y = cup[0] / 2, cup[1] - wall / 2
-    pins = Pins(((-x, -y), (x, -y), (-x, y), (x - OFF_SQUARE, y)), height, moulds.plinth_clearance_mm)
+    places = (-x, -y), (x, -y), (-x, y), (x - OFF_SQUARE, y)
     cells = tuple(Cell(place.x, place.y, (), place.name) for place in array.places)
     pitch = min(array.pitch_mm, 2 * cup[1])
     # No plinth, so no ribs on it.
     lay = Layout(cells, MARK, pitch, (0.0, 0.0), cup, plate, label)
-    return Drawing(array, spec, dims, fins(array, wiring(array)), lay, pins)
+    drawn = Drawing(
+        array, spec, dims, fins(array, wiring(array)), lay, Pins(places, height, moulds.plinth_clearance_mm)
+    )
+    return _cut(drawn) if 2 * plate[0] > moulds.bed_x_mm + 1e-9 else drawn
 
 
-def _check_bed(spec: Spec, plate: tuple[float, float]) -> None:
-    for axis, (half, bed) in enumerate(zip(plate, (spec.moulds.bed_x_mm, spec.moulds.bed_y_mm), strict=True)):
-        if 2 * half > bed + 1e-9:
-            limit = f"the base of {2 * plate[0]:.4g} x {2 * plate[1]:.4g} mm exceeds the bed"
-            raise Refusal(f"moulds.bed_{'xy'[axis]}_mm", bed, limit, math.ceil(2 * half * 10) / 10)
+def _cut(drawn: Drawing) -> Drawing:
+    """Return the drawing with its cuts, and with as many pins that each piece of base and cups stands on two."""
+    moulds, lay, array, (cup, y) = drawn.spec.moulds, drawn.lay, drawn.array, drawn.lay.cup
+    across(array)
+    bore = drawn.dims.outer_radius + moulds.land_mm + moulds.groove_width_mm
+    reach = [max([bore, *(_slot(drawn, f) for f in drawn.fins if f.place == i)]) for i in range(len(array.places))]
+    pin = drawn.pins.hole_radius + CHAMFER
+    label = row_width(["C1", "1"], moulds.engraving_stroke_mm) + TEXT_MARGIN
+    ends: list[Interval] = [(-lay.plate[0], -cup + max(PRY_UNDER, label)), (cup - max(PRY_UNDER, label), lay.plate[0])]
+    there = list(taken(array, reach, [*ends, *((x - pin, x + pin) for x, _ in drawn.pins.places)]))
+    plate = -lay.plate[0], lay.plate[0]
+    base = cuts(plate, there, moulds.bed_x_mm, f"the base of {2 * lay.plate[0]:.4g} x {2 * lay.plate[1]:.4g} mm")
+    cups = base if 2 * cup > moulds.bed_x_mm + 1e-9 else []
+    if cups:
+        cups = cuts((-cup, cup), there, moulds.bed_x_mm, f"a cup of {2 * cup:.4g} x {2 * y:.4g} mm", base)
+    places = list(drawn.pins.places)
+    for low, high in pieces((-cup, cup), sorted({*base, *cups})):
+        if sum(low < x < high for x, _ in places) < 2:
+            middle = min((place.x for place in array.places), key=lambda x: abs(x - (low + high) / 2))
+            places += [(middle, side * drawn.pins.places[-1][1]) for side in (-1, 1)]
+    return replace(drawn, pins=replace(drawn.pins, places=tuple(places)), base_cuts=tuple(base), cup_cuts=tuple(cups))
+
+
+def _slot(drawn: Drawing, fin: Fin) -> float:
+    """Return how far a fin and its slot reach along x from the unit's middle, mm."""
+    clearance = drawn.spec.moulds.plinth_clearance_mm
+    return fin.reach + clearance if fin.direction[0] else fin.half + clearance
 
 
 def _bottom(spec: Spec) -> float:

@@ -44,13 +44,13 @@ def pictures(moulds: PatchMoulds) -> dict[str, bytes]:
     return drawn | {f"{FOLDER}/pour{i + 1}.png": picture for i, picture in enumerate(cuts)}
 
 
-def _solid(moulds: PatchMoulds, body: Body, up: float = 0.0) -> _Solid:
+def _solid(moulds: PatchMoulds, body: Body, up: float = 0.0, aside: float = 0.0) -> _Solid:
     vertices, faces = arrays(moulds.mesh(body))
-    return np.asarray(vertices, float) + np.array([0.0, 0.0, up]), np.asarray(faces, np.int64), body.colour
+    return np.asarray(vertices, float) + np.array([aside, 0.0, up]), np.asarray(faces, np.int64), body.colour
 
 
 def _apart(moulds: PatchMoulds) -> Iterator[_Solid]:
-    """Yield tools and cast layers, one over the other in the order of the pours."""
+    """Yield tools and cast layers, one over the other in the order of the pours, and the pieces of a tool apart."""
     plan, top = moulds.plan, -np.inf
     order: list[Body] = [tool for tool in plan.tools if tool.step is None and tool.kind != "blade"]
     base = len(order)
@@ -62,7 +62,9 @@ def _apart(moulds: PatchMoulds) -> Iterator[_Solid]:
         _, _, low, _, _, high = bounds(moulds.mesh(body))
         up = 0.0 if i < base else max(0.0, top + GAP - low)
         top = max(top, high + up)
-        yield _solid(moulds, body, up)
+        pieces = plan.pieces_of(body.name) if body.role == "tool" else (body,)
+        for k, piece in enumerate(pieces):
+            yield _solid(moulds, piece, up, (k - (len(pieces) - 1) / 2) * GAP)
 
 
 def _cut_open(moulds: PatchMoulds, index: int) -> Iterator[_Solid]:

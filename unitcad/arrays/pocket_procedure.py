@@ -18,8 +18,9 @@ from unitcad.casting.bill import Item
 from unitcad.casting.figures import STRIKE_AGAIN_MIN, at_room
 from unitcad.casting.finishing import shown
 from unitcad.casting.instructions import TACK, mixed
+from unitcad.casting.joining import joining
 from unitcad.casting.needs import needs
-from unitcad.casting.preparation import cleaning, in_resin
+from unitcad.casting.preparation import MORE_PLATES, cleaning, in_resin
 from unitcad.casting.procedure import Pour, Procedure, bubbles, pour_figures
 from unitcad.casting.time_line import duration, phases
 from unitcad.catalogue import Material
@@ -47,6 +48,7 @@ def pocket_procedure(
     prepared = (
         BenchStep("Sort the pieces", _sort(moulds), TOOLS, minutes=fig.SORT_MIN),
         *cleaning(moulds, [silicone]),
+        *joining(moulds, {"base": "tray"}, TOOLS),
         BenchStep("Level the bench", _level(array), minutes=fig.LEVEL_MIN),
     )
     poured = tuple(_pour(moulds, silicone, mix, verdict))
@@ -136,15 +138,18 @@ def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
 
 
 def _sort(moulds: PatchMoulds) -> str:
+    tray = listed(f"moulds/{piece.name}.stl" for piece in moulds.plan.pieces_of("base"))
     return (
-        f"Print tray (moulds/base.stl) and blade as they lie in moulds/moulds.3mf, without supports. The tray is "
-        f"engraved B{moulds.plan.label}."
+        f"Print tray ({tray}) and blade as they lie in moulds/moulds.3mf, without supports. The tray is engraved "
+        f"B{moulds.plan.label}."
     )
 
 
 def _printing(moulds: PatchMoulds, solid_mm3: float, units: Iterable[str]) -> Iterator[str]:
     lengths, what = moulds.spec.moulds, "resin" if in_resin(moulds) else "filament"
     yield "Plate: moulds/moulds.3mf (tray and blade, as they are printed; moulds/ has them singly as STL too)."
+    if moulds.plan.splits:
+        yield MORE_PLATES
     yield f"Printer {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm, no supports."
     yield f"At most {number(solid_mm3 / 1000, 2)} cm3 of {what} (computed: the pieces, solid)."
     yield f"The units' moulds: {listed(f'{folder}/moulds/moulds.3mf' for folder in units)}, as their casting.md says."
@@ -254,9 +259,9 @@ def _measure(array: Array, grams: float, units: Mapping[str, Procedure]) -> Iter
 def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
     lengths = moulds.spec.moulds
     note = f"{lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
-    for tool in moulds.plan.tools:
+    for tool in moulds.plan.pieces:
         name, attitude = (
-            ("tray" if tool.kind == "base" else tool.name),
+            (tool.name.replace("base", "tray") if tool.kind == "base" else tool.name),
             "upside down" if tool.upside_down else "as drawn",
         )
         yield Item(name, 1, "piece", f"printed {attitude}", note)

@@ -8,18 +8,20 @@ from __future__ import annotations
 import math
 
 from unitcad.arrays.array import Array, Box
+from unitcad.arrays.larger_than_bed import across, pieces, taken
 from unitcad.arrays.outlines import rounded, slot_profile
 from unitcad.designs import Dimensions
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.errors import Refusal
 from unitcad.moulds.blade import bar
 from unitcad.moulds.cup import groove_depth_of
-from unitcad.moulds.labels import engraved
+from unitcad.moulds.dovetails import cuts, seams, split
+from unitcad.moulds.labels import engraved, row, row_width
 from unitcad.moulds.pieces import base_piece, blade_piece
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Extrude, Shape, Union, content_hash, cut, cylinder, moved, union
-from unitcad.shape.lettering import HEIGHT, engraving, text_width
+from unitcad.shape.lettering import HEIGHT
 from unitcad.text import number
 
 BEYOND = 1.0
@@ -31,24 +33,24 @@ MARGIN = 1.0
 def tray_plan(array: Array, cast: Shape) -> Plan:
     """Return tray, blade and the one pour of an array whose sheet is drawn as `cast`.
 
-    Raises Refusal for a tray that is larger than the printer's bed.
+    A tray that is longer than the printer's bed is cut. Raises Refusal where it can't be.
     """
     sheet, spec = array.sheet, array.unit
     outer = _outer(array)
-    _check_bed(array, outer)
+    cut_at = _cuts(array, outer)
     drawn = tray(array)
     label = content_hash(Union((drawn, cast)))[:4].upper()
     # Under a low rim no deeper than the groove.
     stroke = spec.moulds.engraving_stroke_mm
     depth = min(spec.moulds.engraving_depth_mm, groove_depth_of(spec, sheet.thickness_mm))
     wall = (outer[3] - sheet.outline[3] - spec.moulds.land_mm - spec.moulds.groove_width_mm - HEIGHT * stroke) / 2
-    letters = moved(
-        engraving(f"B{label}", stroke, sheet.thickness_mm - depth, sheet.thickness_mm + BEYOND),
-        -text_width(f"B{label}", stroke) / 2,
-        outer[1] + wall,
-    )
+    heights, y = (sheet.thickness_mm - depth, sheet.thickness_mm + BEYOND), outer[1] + wall
+    letters: list[Shape] = []
+    for i, (low, high) in enumerate(pieces((outer[0], outer[2]), cut_at)):
+        texts = [f"B{label}", str(i + 1)][: 1 + bool(cut_at)]
+        letters += row(texts, stroke, ((low + high - row_width(texts, stroke)) / 2, y), heights)
     half = (outer[2] - outer[0]) / 2, (outer[3] - outer[1]) / 2
-    tools = (base_piece(engraved(drawn, [letters])), blade_piece(bar(half[1], sheet.thickness_mm)))
+    tools = (base_piece(engraved(drawn, letters)), blade_piece(bar(half[1], sheet.thickness_mm)))
     layout = Layout((Cell(0.0, 0.0, ()),), 0.0, 0.0, half, half, half, HEIGHT * stroke)
     step = Step(
         index=1,
@@ -76,7 +78,9 @@ def tray_plan(array: Array, cast: Shape) -> Plan:
     )
     held = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, sheet.hold_mm) for unit in array.units}
     stretches = tuple((f"pocket round a unit of {number(size, 3)} mm", 100 * strain) for size, strain in held.items())
-    return Plan(tools, (step,), layout, label, dims, stretches=stretches)
+    joined = seams(cut_at, across(array), spec.moulds.plinth_clearance_mm) if cut_at else ()
+    splits = (split(tools[0], joined),) if joined else ()
+    return Plan(tools, (step,), layout, label, dims, stretches=stretches, splits=splits)
 
 
 def hold_strain(radius: float, hold: float) -> float:
@@ -112,11 +116,16 @@ def _outer(array: Array) -> Box:
     return box[0] - by, box[1] - by, box[2] + by, box[3] + by
 
 
-def _check_bed(array: Array, outer: Box) -> None:
-    """Raise Refusal for a tray that is larger than the bed."""
-    moulds = array.unit.moulds
-    size = outer[2] - outer[0], outer[3] - outer[1]
-    for axis, (length, bed) in enumerate(zip(size, (moulds.bed_x_mm, moulds.bed_y_mm), strict=True)):
-        if length > bed + 1e-9:
-            limit = f"the tray of {size[0]:.4g} x {size[1]:.4g} mm exceeds the bed"
-            raise Refusal(f"moulds.bed_{'xy'[axis]}_mm", bed, limit, math.ceil(length * 10) / 10)
+def _cuts(array: Array, outer: Box) -> list[float]:
+    """Return where the tray is cut. Raises Refusal for one that stays larger than the bed."""
+    moulds, sheet = array.unit.moulds, array.sheet
+    length, depth = outer[2] - outer[0], outer[3] - outer[1]
+    what = f"the tray of {length:.4g} x {depth:.4g} mm"
+    if depth > moulds.bed_y_mm + 1e-9:
+        limit = f"{what} exceeds the bed; tools are cut across x alone"
+        raise Refusal("moulds.bed_y_mm", moulds.bed_y_mm, limit, math.ceil(depth * 10 - 1e-6) / 10)
+    if length <= moulds.bed_x_mm + 1e-9:
+        return []
+    across(array)
+    there = taken(array, (place.radius - sheet.hold_mm for place in array.places))
+    return cuts((outer[0], outer[2]), there, moulds.bed_x_mm, what)

@@ -48,7 +48,7 @@ def _pieces(moulds: MouldSet) -> Iterator[Item]:
     spec, plan = moulds.spec, moulds.plan
     dims = plan.dimensions
     kinds: dict[str, list[Body]] = {}
-    for tool in plan.tools:
+    for tool in plan.pieces:
         # Tongues and stubs are numbered by cell and otherwise alike; cups and lids are not.
         kinds.setdefault(tool.kind if tool.kind in ("tongue", "stub") else tool.name, []).append(tool)
     for name, (tool, *more) in kinds.items():

@@ -39,6 +39,7 @@ NEEDS = (
     Need(
         r"release agent, if any", "release agent", 1, "dab", "bought", "for the last cup's bore only; may be left out"
     ),
+    Need(r"tape over the underside", "wide adhesive tape", 1, "roll", "bought", "under the seams of split tools"),
     Need(r"petroleum jelly|\bgrease the", "petroleum jelly", 1, "dab", "bought", "only where a step says so"),
     Need(
         r"isopropanol", "isopropanol and lint-free wipes", 1, "set", "bought", "cleans cured layers and printed resin"

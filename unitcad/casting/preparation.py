@@ -9,6 +9,7 @@ from unitcad.casting import figures as fig
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bench_views import View, level_on, picture_path
 from unitcad.casting.figures import at_room, window_length
+from unitcad.casting.joining import joining
 from unitcad.casting.time_line import duration
 from unitcad.catalogue import Material
 from unitcad.moulds.cup import window_section
@@ -22,12 +23,16 @@ from unitcad.text import listed, number, spaced
 
 PERIMETERS = 3
 FOOT_MM = 0.2
+MORE_PLATES = (
+    "Together the pieces are larger than the bed; each one fits it. Let the slicer arrange them on as many plates as "
+    "they need, turned about the vertical alone."
+)
 
 
 def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
     """Say which file to print and how, a sentence or two each. `solid_mm3`: volume of all printed pieces, solid."""
     spec, plan = moulds.spec, moulds.plan
-    printed = [tool for tool in plan.tools if tool.made == "printed"]
+    printed = [tool for tool in plan.pieces if tool.made == "printed"]
     mixed = {tool.kind for tool in printed if not tool.upside_down}
     names = (
         spaced(t.name) if t.kind in mixed else f"{t.kind}s" if t.step else t.kind for t in printed if t.upside_down
@@ -39,6 +44,8 @@ def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
         f"{turned} upside down, the rest as drawn. Turn none of them.",
         f"Printer {spec.moulds.printer}, layers of {number(spec.moulds.layer_mm, 3)} mm, no supports.",
     ]
+    if plan.splits:
+        lines.append(MORE_PLATES)
     standing = spec.moulds.plinth_height_mm + spec.moulds.plate_mm + plan.dimensions.core_height
     time = fig.print_min(spec, solid_mm3, max(standing, BLADE_HEIGHT if plan.of_kind("blade") else 0.0))
     takes = f"Takes about {duration(5 * max(round(time / 5), 1))}"
@@ -86,6 +93,7 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
     )
     yield from _cut_tongues(moulds)
     yield from cleaning(moulds, silicones)
+    yield from joining(moulds, picture=picture_path("pieces"))
     lids = " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
     on = "Put each cup on the plinth once, dry: its cut corner lets it on one way only. It must sit down"
     if standing := ribs(moulds.spec, plan.layout):

@@ -11,13 +11,21 @@ from unitcad.moulds.plan import Plan
 
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
-    """Look at every body of unit and tooling; genus only where the drawing means one."""
+    """Look at every body of unit and tooling and the pieces of split tools; genus only where the drawing means one."""
     genus = expected_genus(moulds.plan)
     for name, solid in moulds.solids.items():
         yield exactly("C000", f"{name} components", len(solid.decompose()), moulds.pieces(name), "")
         yield MouldFinding("C000", f"{name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3")
         if name in genus:
             yield exactly("C000", f"{name} genus", solid.genus(), genus[name], "")
+    for split in moulds.plan.splits:
+        pieces = {piece.name: moulds.mesh(piece) for piece in split.pieces}
+        for name, solid in pieces.items():
+            yield exactly("C000", f"{name} components", len(solid.decompose()), 1, "")
+            yield MouldFinding("C000", f"{name} volume", solid.volume() > 0, solid.volume(), 0.0, "mm3")
+        # A seam that meets no hole leaves as many of them.
+        holes, whole = sum(solid.genus() for solid in pieces.values()), moulds.solids[split.tool].genus()
+        yield exactly("C000", f"{split.tool} genus, all pieces", holes, whole, "")
 
 
 def expected_genus(plan: Plan) -> dict[str, int]:

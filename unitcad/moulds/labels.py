@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Layout
 from unitcad.moulds.layout import TEXT_MARGIN
 from unitcad.shape import Cut, Shape, cut, moved
-from unitcad.shape.lettering import HEIGHT, engraving, text_width
+from unitcad.shape.lettering import HEIGHT, PITCH, engraving, text_width
 from unitcad.spec import Spec
 
 
@@ -23,6 +24,17 @@ def base_label(spec: Spec, lay: Layout, label: str, top: float) -> list[Shape]:
     text = engraving(label, stroke, top - depth, top + BEYOND)
     width = text_width(label, stroke)
     return [moved(text, -width / 2, (lay.cup[1] + lay.plate[1]) / 2 - lay.label_height / 2)]
+
+
+def row(texts: Sequence[str], stroke: float, at: tuple[float, float], heights: tuple[float, float]) -> list[Shape]:
+    """Draw texts one after the other, a character's width between them, from `at` (the lower left corner) on."""
+    starts = [sum(len(text) + 1 for text in texts[:i]) * PITCH * stroke for i in range(len(texts))]
+    return [moved(engraving(text, stroke, *heights), at[0] + x, at[1]) for text, x in zip(texts, starts, strict=True)]
+
+
+def row_width(texts: Sequence[str], stroke: float) -> float:
+    """Return the width of such a row, mm."""
+    return text_width("0".join(texts), stroke)
 
 
 def corner_labels(spec: Spec, lay: Layout, rim: float, label: tuple[str, str, str]) -> list[Shape]:

@@ -11,6 +11,7 @@ from unitcad.errors import Refusal, UnitcadError
 from unitcad.moulds import lid
 from unitcad.moulds.base import plate_top
 from unitcad.moulds.concentric import concentric
+from unitcad.moulds.dovetails import Split
 from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved
 from unitcad.moulds.pins import Pins
 from unitcad.moulds.removal import Removal, customary
@@ -68,6 +69,7 @@ class Plan:
     `pins` centre the cups on the base in place of plinth and skirt; `genus`: the through holes of a tool, by its name,
     where neither is told by dimensions of rings.
     `stretches`: where the silicone stretches after casting, and by how many percent, beside what the tools ask for.
+    `splits`: the tools that are printed in pieces; everything but the pieces' files and C250 sees them joined.
     """
 
     tools: tuple[Body, ...]
@@ -79,6 +81,7 @@ class Plan:
     stretches: tuple[tuple[str, float], ...] = ()
     pins: Pins | None = None
     genus: tuple[tuple[str, int], ...] = ()
+    splits: tuple[Split, ...] = ()
 
     def __repr__(self) -> str:
         pours = f"{len(self.steps)} {'pour' if len(self.steps) == 1 else 'pours'}"
@@ -87,6 +90,15 @@ class Plan:
     def tool(self, name: str) -> Body:
         """Return the tool of that name. Raises KeyError."""
         return {tool.name: tool for tool in self.tools}[name]
+
+    @property
+    def pieces(self) -> tuple[Body, ...]:
+        """All tools as they are made: in the place of a split one its pieces."""
+        return tuple(piece for tool in self.tools for piece in self.pieces_of(tool.name))
+
+    def pieces_of(self, name: str) -> tuple[Body, ...]:
+        """Return the pieces of a tool by its name: itself where it is not split. Raises KeyError."""
+        return next((split.pieces for split in self.splits if split.tool == name), None) or (self.tool(name),)
 
     def walled(self, step: Step) -> str:
         """Return the name of the piece that has a pour's wall and rim: its cup, else the piece that stays."""

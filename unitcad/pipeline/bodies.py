@@ -39,7 +39,7 @@ class BodyGroup:
 def groups(moulds: MouldSet, only: Sequence[str]) -> list[BodyGroup]:
     """Return the groups of bodies that `only` asks for."""
     unit = [BodyGroup("unit", moulds.unit, "unit")] if "unit" in only else []
-    return [*unit, BodyGroup("moulds", moulds.plan.tools, "moulds/moulds")] if "moulds" in only else unit
+    return [*unit, BodyGroup("moulds", moulds.plan.pieces, "moulds/moulds")] if "moulds" in only else unit
 
 
 def is_printed(body: Body) -> bool:
@@ -49,7 +49,7 @@ def is_printed(body: Body) -> bool:
 
 def file_stem(body: Body) -> str:
     """Return a body's file name without suffix: cups begin with their step, so that a folder lists them in order."""
-    return f"step{body.step}-cup" if body.kind == "cup" else body.name
+    return body.name.replace(f"cup{body.step}", f"step{body.step}-cup") if body.kind == "cup" else body.name
 
 
 def body_key(moulds: MouldSet, body: Body, form: str) -> str:

@@ -169,7 +169,7 @@ def _pours(moulds: MouldSet) -> list[PourRecord]:
             index=step.index,
             layer=step.name,
             material="",
-            tools=list(step.tools),
+            tools=[piece.name for name in step.tools for piece in moulds.plan.pieces_of(name)],
             cavity_volume_mm3=_rounded(sum(c.reached.volume() for c in moulds.cavities if c.step is step)),
             layer_volume_mm3=_rounded(moulds.solids[step.name].volume()),
         )

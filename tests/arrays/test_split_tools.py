@@ -1,0 +1,172 @@
+"""Tools larger than the bed: cut between features, joined by dovetails with the play square to the flank, judged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
+from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.check import Options, check_bytes
+from unitcad.errors import Refusal
+from unitcad.export import stl
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays, realise
+from unitcad.mould_checks import check_moulds, mould_checks
+from unitcad.moulds.dovetails import DEPTH, FLANK_DEG, NECK, ROUND, cuts, seams, split
+from unitcad.moulds.pieces import base_piece
+from unitcad.pipeline.bodies import file_stem
+from unitcad.shape import Shape, box, cut, moved, union
+from unitcad.spec import printer_of
+
+
+@cache
+def band() -> PatchMoulds:
+    return patch_moulds(load_array("wrist-band"))
+
+
+def test_every_mould_check_holds_on_a_band_of_eight() -> None:
+    findings = check_moulds(band())
+    assert [f for f in findings if not f.ok] == []
+    assert {f.code for f in findings} == set(mould_checks())
+    assert max(f.value for f in findings if f.code == "C100") < 1e-6
+    plan = band().plan
+    assert {s.tool: len(s.pieces) for s in plan.splits} == {"base": 2, "cup1": 2, "cup2": 2}
+    # No seam of a cup lies over the base's; every piece of either stands on two pins or more.
+    base, *cups = ([seam.x for seam in s.seams] for s in plan.splits)
+    assert not set(base) & {x for each in cups for x in each}
+    assert plan.pins is not None
+    for each in plan.splits:
+        for piece in each.pieces:
+            x0, _, _, x1, _, _ = band().mesh(piece).bounding_box()
+            assert sum(x0 < x < x1 for x, _ in plan.pins.places) >= 2
+
+
+def test_every_piece_prints_without_support() -> None:
+    for body in band().plan.pieces:
+        if body.made == "printed":
+            content = stl.content(*print_ready(*arrays(band().mesh(body)), body.upside_down), body.name)
+            found = check_bytes(content, f"{body.name}.stl", Options(printer=printer_of(band().spec))).findings
+            assert found == (), body.name
+    stems = [file_stem(body) for body in band().plan.pieces]
+    assert stems[:6] == ["base-1", "base-2", "step1-cup-1", "step1-cup-2", "step2-cup-1", "step2-cup-2"]
+
+
+def test_the_gap_is_the_play_times_the_line() -> None:
+    """A plate with two seams: the pieces have its volume but for the line's length x play x height."""
+    play, height, width = 0.15, 5.0, 40.0
+    plate = base_piece(box(-150, 150, -width / 2, width / 2, 0, height))
+    made = split(plate, seams([-80, 70.5], (-19, 19), play))
+    assert len(made.seams[0].teeth) == 3
+    flank, turn = DEPTH / math.cos(math.radians(FLANK_DEG)), math.radians(90 + FLANK_DEG)
+    tip = NECK + 2 * DEPTH * math.tan(math.radians(FLANK_DEG))
+    rounded = 4 * ROUND * (turn - 2 * math.tan(turn / 2))
+    length = width + 3 * (tip - NECK + 2 * flank + rounded)
+    solids = [realise(piece.shape, 96) for piece in made.pieces]
+    gap = 300 * width * height - sum(solid.volume() for solid in solids)
+    assert gap == pytest.approx(2 * length * play * height, rel=2e-3)
+    # Moved along x by the play, a flank would be nearer by its slope: 0.075 mm.
+    for one, other in pairwise(solids):
+        assert one.min_gap(other, 1) == pytest.approx(play, abs=2 / 1024)
+
+
+Change = Callable[[Shape], Shape]
+FAULTS: list[tuple[str, str, float, Change]] = [
+    ("narrowest gap", "no play", 0.0, lambda shape: shape),
+    ("narrowest gap", "the play along x, not square to the flank", 0.0, lambda shape: moved(shape, 0.15)),
+    ("overlap", "a piece 0.5 too far in", 0.15, lambda shape: moved(shape, -0.5)),
+    ("widest gap", "a piece without a corner", 0.15, lambda shape: cut(shape, [box(30, 33, -99, -17, -9, 99)])),
+    ("slide together", "a knob over and under a tooth", 0.15, lambda shape: knobs(shape)),
+    ("beyond it", "a piece with a burr", 0.15, lambda shape: union((shape, box(60, 62, 18, 19, 1, 2)))),
+    ("on the bed", "a piece with a bar", 0.15, lambda shape: union((shape, box(0, 230, 0, 1, -9, -8)))),
+]
+
+
+def knobs(shape: Shape) -> Shape:
+    return union((shape, box(28, 35, -0.5, 0.5, 9, 9.5), box(28, 35, -0.5, 0.5, -3, -2.5), box(35, 36, -1, 1, -3, 9.5)))
+
+
+@pytest.mark.parametrize(("where", "what", "play", "change"), FAULTS, ids=[fault[1] for fault in FAULTS])
+def test_a_faulty_seam_is_caught(where: str, what: str, play: float, change: Change) -> None:
+    plan = band().plan
+    sound = plan.splits[-1]
+    drawn = split(plan.tool("cup2"), [replace(seam, play=play) for seam in sound.seams])
+    pieces = (drawn.pieces[0], replace(drawn.pieces[1], shape=change(drawn.pieces[1].shape)))
+    faulty = replace(plan, splits=(*plan.splits[:-1], replace(drawn, pieces=pieces)))
+    found = [f.where for f in mould_checks()["C250"].findings(patch_moulds(band().arranged, faulty)) if not f.ok]
+    assert any(where in each for each in found), (what, found)
+
+
+def test_too_many_seams_weep_too_much() -> None:
+    """Six seams in place of one: what they hold is more than a hundredth of the layer."""
+    plan = band().plan
+    sound = plan.splits[-1].seams[0]
+    many = split(plan.tool("cup2"), [replace(sound, x=-15.0 + 10 * i) for i in range(6)])
+    faulty = replace(plan, splits=(*plan.splits[:-1], many))
+    found = [f for f in mould_checks()["C250"].findings(patch_moulds(band().arranged, faulty)) if "silicone" in f.where]
+    assert [f.ok for f in found] == [True, False]
+
+
+def test_cuts_are_few_and_clear_and_a_bed_too_small_names_the_least() -> None:
+    features = [(x - 6.0, x + 6.0) for x in range(-100, 101, 20)]
+    assert cuts((-110, 110), features, 250, "it") == []
+    for bed in (230, 120, 80, 50, 35):
+        where = cuts((-110, 110), features, bed, "it")
+        assert all(abs((x - 10) % 20) < 1e-9 for x in where)
+        ends = [-110 + DEPTH / 2, *where, 110 - DEPTH / 2]
+        assert max(b - a + DEPTH for a, b in pairwise(ends)) <= bed
+        assert len(where) >= math.ceil(220 / bed) - 1
+    assert cuts((-110, 110), features, 150, "it", other=[-10.0]) == [10.0]
+    with pytest.raises(Refusal) as refused:
+        cuts((-110, 110), features, 20, "it")
+    assert isinstance(refused.value.nearest, float)
+    assert cuts((-110, 110), features, refused.value.nearest, "it")
+    with pytest.raises(Refusal):
+        cuts((-110, 110), features, refused.value.nearest - 0.2, "it")
+
+
+@pytest.mark.parametrize(
+    ("template", "overrides", "field"),
+    [
+        ("wrist-band", ["moulds.bed_x_mm=40"], "moulds.bed_x_mm"),
+        ("wrist-band", ["moulds.bed_y_mm=40"], "moulds.bed_y_mm"),
+        ("hex-19", ["moulds.bed_x_mm=100"], "moulds.bed_x_mm"),
+        ("forearm-pockets", ["moulds.bed_y_mm=60"], "moulds.bed_y_mm"),
+    ],
+)
+def test_what_can_not_be_split_is_refused_with_the_bed_that_would_do(
+    template: str, overrides: list[str], field: str
+) -> None:
+    with pytest.raises(Refusal) as refused:
+        patch_moulds(load_array(template, overrides)).plan  # noqa: B018
+    assert refused.value.field == field
+    kept = [each for each in overrides if not each.startswith(field)]
+    assert patch_moulds(load_array(template, [*kept, f"{field}={refused.value.nearest}"])).plan
+
+
+def test_a_long_tray_is_split_too() -> None:
+    moulds = patch_moulds(
+        load_array("forearm-pockets", ["layout.columns=12", "layout.rows=1", "sheet.strap_slot_mm=[3,8]"])
+    )
+    (made,) = moulds.plan.splits
+    assert [piece.name for piece in made.pieces] == ["base-1", "base-2"]
+    assert [f for f in mould_checks()["C250"].findings(moulds) if not f.ok] == []
+    assert [f for f in mould_checks()["C000"].findings(moulds) if not f.ok] == []
+
+
+def test_the_procedure_joins_and_seals_before_the_first_pour() -> None:
+    made = back_sheet_procedure(band(), [1590.0, 7356.0], 100e3)
+    titles = [step.title for step in made.preparation]
+    assert titles.index("Join the pieces") < titles.index("Try every cup, dry")
+    (step,) = [step for step in made.preparation if step.title == "Join the pieces"]
+    for word in ("base in 2 pieces", "cup 1 in 2 pieces", "cup 2 in 2 pieces", "tape", "petroleum jelly", "0.15 mm"):
+        assert word in step.text
+    items = {item.item for item in made.bill}
+    assert {"base-1", "base-2", "cup1-1", "cup2-2", "wide adhesive tape", "petroleum jelly"} <= items
+    assert not {"base", "cup1", "cup2"} & items

@@ -1,0 +1,38 @@
+"""The step that joins the pieces of tools which are larger than the printer's bed, before the first pour."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from unitcad.casting.bench_step import BenchStep
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.text import listed, number, spaced
+
+JOIN_MIN = 3.0
+"""To join two pieces and seal their seam (assumed)."""
+
+
+def joining(moulds: MouldSet, names: dict[str, str] | None = None, picture: str = "") -> Iterator[BenchStep]:
+    """Say how the pieces of split tools go together and how their seams are sealed. `names`: of tools, where others."""
+    plan = moulds.plan
+    if not plan.splits:
+        return
+    called = {split.tool: (names or {}).get(split.tool, spaced(split.tool)) for split in plan.splits}
+    parts = listed(f"{called[split.tool]} in {len(split.pieces)} pieces" for split in plan.splits)
+    below = called[plan.splits[0].tool]
+    upper = [name for tool, name in called.items() if plan.tool(tool).kind == "cup"]
+    play = number(plan.splits[0].seams[0].play, 2)
+    text = (
+        f"Printed in pieces, since they are larger than the bed: {parts}, each engraved with its number from the left. "
+        "Cut off the bulge of the first layer along their dovetails. Lay a piece flat on the bench, hold the next one "
+        "over it and push it straight down, dovetail into dovetail, until a fingernail feels no step between their "
+        f"faces. They have {play} mm of play all round; scrape dovetails that jam. Then seal each seam from outside, "
+        f"never on a face that silicone touches: tape over the underside of the {below} and over the ends of the seam"
+    )
+    if upper:
+        text += (
+            f"; petroleum jelly rubbed into the underside of {listed(upper)} and wiped off flush, since tape would "
+            "keep a cup off its seat. The pins hold the pieces of each cup in line"
+        )
+    text += f". Silicone that gets into a seam cures to a fin {play} mm thick: pull it off with the flash."
+    yield BenchStep("Join the pieces", text, picture, minutes=JOIN_MIN * sum(len(s.seams) for s in plan.splits))
