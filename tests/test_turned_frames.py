@@ -8,6 +8,7 @@ slant in eleven.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -17,11 +18,13 @@ from manifold3d import Manifold
 
 from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
-from unitcad.mould_checks import balance, overlap
+from unitcad.mould_checks import balance, draw, overlap
+from unitcad.mould_checks.draw import blocked
 from unitcad.moulds.congruence import cropped
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pieces import base_piece
 from unitcad.moulds.plan import Step
+from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Common, Shape, box, cut, cylinder, exact_volume, moved, ring, rotated, union
 from unitcad.shape.body import Body
 from unitcad.shape.column import Column, Standing
@@ -44,6 +47,12 @@ def placed(shape: Shape, slant: Slant, at: tuple[float, float]) -> Shape:
     """The solid at a slant, where its unit stands."""
     first, tilt, second = slant
     return moved(rotated(rotated(rotated(shape, "z", first), "y", tilt), "z", second), *at)
+
+
+def axis_of(slant: Slant) -> tuple[float, float, float]:
+    """The unit's axis, by mathematics of its own: the first turn is about it."""
+    _, tilt, second = (math.radians(degrees) for degrees in slant)
+    return math.sin(tilt) * math.cos(second), math.sin(tilt) * math.sin(second), math.cos(tilt)
 
 
 def block(at: tuple[float, float]) -> Shape:
@@ -88,6 +97,29 @@ def test_a_mould_balances_and_nothing_overlaps_at_any_slant(slant: Slant, at: tu
 def test_a_move_of_one_thousandth_is_seen_at_a_slant() -> None:
     assert "C200" in faults(mould((12.0, 28.6, 40.0), (3.0, 2.0), moved(INSERT, z=-1 / 1024)))
     assert "C100" in faults(mould((12.0, 28.6, 40.0), (3.0, 2.0), moved(INSERT, z=1 / 1024)))
+
+
+@settings(max_examples=10, deadline=None, phases=WITHOUT_SHRINKING)
+@given(SLANTS)
+def test_what_blocks_a_piece_along_its_own_axis_is_the_same_area_at_any_slant(slant: Slant) -> None:
+    collar = moved(cylinder(8, 0, 0.5), z=3)
+    for piece, area in ((INSERT, 0.0), (union((INSERT, collar)), math.pi * (8**2 - 7**2))):
+        stays = cut(cylinder(9, -3, 20), [union((MOAT, piece))])
+        one, other = (mesh.realise(placed(shape, slant, (0, 0)), SEGMENTS) for shape in (piece, stays))
+        assert blocked(one, other, axis_of(slant)) == pytest.approx(area, abs=1e-9)
+
+
+def test_a_cast_comes_out_of_a_slanted_moat_along_its_axis_and_not_straight_up() -> None:
+    slant = (12.0, 28.6, 40.0)
+    moulds = mould(slant, (3.0, 2.0))
+    for way, comes in ((axis_of(slant), True), ((0, 0, 1), False), (axis_of((12.0, 24.0, 40.0)), False)):
+        (step,) = moulds.plan.steps
+        ordered = MouldSet(
+            moulds.spec, replace(moulds.plan, steps=(replace(step, removals=(Removal(CAST, way),), inserts=()),))
+        )
+        ordered.__dict__["rib_spaces"] = Manifold()
+        found = list(draw.findings(ordered))
+        assert [finding.ok for finding in found] == [comes]
 
 
 @settings(max_examples=4, deadline=None, phases=WITHOUT_SHRINKING)

@@ -10,6 +10,7 @@ is sampled.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from functools import cache
 
@@ -24,7 +25,7 @@ from unitcad.mould_checks.finding import MouldFinding, at_most
 from unitcad.moulds.cavities import boxes_meet, united
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.moulds.removal import CAST
+from unitcad.moulds.removal import CAST, Way
 
 BLOCKED = 1e-5
 """Largest area of facing faces, mm2: what rounding leaves of faces that only touch along an edge."""
@@ -96,10 +97,10 @@ def _out_of_order(where: str, why: str) -> MouldFinding:
     return at_most("C300", where, 1, 0, "", f"the order of removal is impossible: {why}")
 
 
-def blocked(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -> float:
+def blocked(piece: Manifold, stays: Manifold, direction: Way) -> float:
     """Return the area, mm2, of upward faces of `piece` that lie below downward faces of `stays` along `direction`.
 
-    `direction` is a signed axis. A face that several others lie above counts once for each of them. Where the two
+    `direction` is any vector but 0. A face that several others lie above counts once for each of them. Where the two
     overlap at the start, the piece is cut out of what stays.
     """
     return _meeting(_facing(piece, direction, True), _facing(stays - piece, direction, False))
@@ -146,7 +147,7 @@ def _boxed(triangles: np.ndarray, frame: Frame, higher: float) -> tuple[np.ndarr
     return triangles[order], boxes_of(steps, *corners[order].T)
 
 
-def _in_the_way(piece: Manifold, stays: Manifold, direction: tuple[int, int, int]) -> bool:
+def _in_the_way(piece: Manifold, stays: Manifold, direction: Way) -> bool:
     """Tell whether the boxes let the piece meet what stays at all."""
     p, q = piece.bounding_box(), stays.bounding_box()
     for axis, way in enumerate(direction):
@@ -157,16 +158,20 @@ def _in_the_way(piece: Manifold, stays: Manifold, direction: tuple[int, int, int
     return True
 
 
-def _facing(solid: Manifold, direction: tuple[int, int, int], upwards: bool) -> np.ndarray:
+def _facing(solid: Manifold, direction: Way, upwards: bool) -> np.ndarray:
     """Return the triangles (n, 3, 3) that face along the direction (or against it), in a frame where it is +z."""
     vertices, faces = arrays(solid)
-    axis = int(np.argmax(np.abs(direction)))
-    sign = float(np.sign(direction[axis]))
-    u, v = [(1, 2), (2, 0), (0, 1)][axis]
-    # A turn for +, a mirror for -: only the side that a face turns to matters, and `sign` keeps that.
-    corners = np.stack([vertices[:, u], vertices[:, v], sign * vertices[:, axis]], axis=1)[faces]
-    doubled = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * sign
+    corners = (vertices @ _upright(direction).T)[faces]
+    doubled = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return corners[doubled > 1e-9] if upwards else corners[doubled < -1e-9]
+
+
+def _upright(direction: Way) -> np.ndarray:
+    """Return a rotation that turns a direction to +z, by rows; for a signed axis it is exact."""
+    up = np.asarray(direction, float) / math.hypot(*direction)
+    across = np.cross(np.roll(np.eye(3)[np.argmax(np.abs(up))], 1), up)
+    across /= np.linalg.norm(across)
+    return np.stack([across, np.cross(up, across), up])
 
 
 def _overlap(first: np.ndarray, second: np.ndarray) -> np.ndarray:

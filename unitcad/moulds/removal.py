@@ -9,14 +9,16 @@ from unitcad.shape.body import Body
 
 CAST = "cast"
 """Stands for the silicone of all pours so far, bonded, in the place of a tool's name."""
+Way = tuple[float, float, float]
+"""A direction of any length but 0."""
 
 
 @dataclass(frozen=True)
 class Removal:
-    """One movement: a tool's name, or `CAST`, and the signed axis along which it is taken away."""
+    """One movement: a tool's name, or `CAST`, and the direction in which it is taken away."""
 
     piece: str
-    direction: tuple[int, int, int]
+    direction: Way
 
 
 def customary(standing: Sequence[Body], *, last: bool) -> Iterator[Removal]:

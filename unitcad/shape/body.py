@@ -33,8 +33,8 @@ class Body:
     `name` comes from role and layer number alone ("layer1", "cup2", "base"), never from a material or a variant, since
     files of equal bodies are shared. `made` is "cast", "printed", "cut" (from film or filament) or "bought".
     `step` is the pour that it belongs to. `upside_down`: how it lies on the printer's bed, turned by 180 degrees about
-    x. `removal` is the signed axis along which a piece of tooling is taken away, None for one that stays; the
-    plan has the order.
+    x. `removal` is the direction in which a piece of tooling is taken away, None for one that stays; the plan
+    has the order.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Body:
     made: Literal["cast", "printed", "cut", "bought"] = "printed"
     step: int | None = None
     upside_down: bool = False
-    removal: tuple[int, int, int] | None = None
+    removal: tuple[float, float, float] | None = None
 
     def __repr__(self) -> str:
         return f"Body({self.name!r}: {self.kind}, {self.made}, {type(self.shape).__name__})"
