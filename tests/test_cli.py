@@ -119,6 +119,15 @@ def test_a_wrong_command_line_is_one_plain_line_and_json_where_asked(words: str)
     assert f"error: {json.loads(as_json.stdout)['error']['message']}" == line
 
 
+def test_a_command_loads_no_other_command() -> None:
+    code = (
+        "import sys\nfrom unitcad.cli import main\nsys.argv = ['unitcad', 'list']\ntry:\n    main()\n"
+        "except SystemExit:\n    print([name for name in sys.modules if name.endswith('_command')], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "['unitcad.cli.list_command']"
+
+
 def _commands() -> dict[str, Any]:
     commands = get_command(app).commands  # pyright: ignore
     return {

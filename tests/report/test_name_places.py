@@ -5,13 +5,13 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
-from itertools import combinations
+from itertools import combinations, product, starmap
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from unitcad.export.name_places import EDGE_PX, Box, Label, overlap, place
+from unitcad.export.name_places import EDGE_PX, Box, Label, nearest_free, overlap, place
 from unitcad.pipeline.scenes import exploded, unit_cut_open
 from unitcad.pipeline.variant import Variant
 from unitcad.validation import templates
@@ -124,3 +124,23 @@ def test_names_in_the_pictures_of_all_templates() -> None:
         # As the letters are drawn, by VTK's own count.
         lettering = {i: drawn[name] for i, name in names.items()}
         assert faults(owner, lettering, {i: label.end for i, label in labels.items()}) == [], names
+
+
+@pytest.mark.parametrize("parts", [0, 3, 9, 200])
+def test_a_name_takes_the_nearest_place_that_covers_least(parts):
+    """Counted pixel by pixel over every place, in pictures from empty to full."""
+    rng = np.random.default_rng(parts)
+    height, width = rng.integers(80, 400, 2)
+    drawn = np.zeros((height, width), bool)
+    for _ in range(parts):
+        y, x = rng.integers(0, height), rng.integers(0, width)
+        drawn[y : y + rng.integers(1, height), x : x + rng.integers(1, width)] = True
+    x, y = rng.uniform(0, width), rng.uniform(0, height)
+    wide, high = rng.integers(10, 60, 2)
+
+    def cost(left, top):
+        covered = drawn[top - 6 : top + high + 6, left - 6 : left + wide + 6].sum()
+        return np.hypot(max(left - x, x - left - wide, 0.0), max(top - y, y - top - high, 0.0)) + 1e6 * covered
+
+    places = product(range(8, width - 8 - wide + 1, 2), range(8, height - 8 - high + 1, 2))
+    assert cost(*nearest_free(drawn, (x, y), (wide, high))) == min(starmap(cost, places))

@@ -9,17 +9,12 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 
-from unitcad import children
 from unitcad.check.findings import FileReport
 from unitcad.check.one_file import check_file
 from unitcad.check.options import Options
-from unitcad.check.readers import read_step
 from unitcad.check.readers.sniff import kind_of
 from unitcad.check.rules.f_file import F012
 from unitcad.check.rules.f_limits import F011, OutOfTime, Unreadable
@@ -44,8 +39,8 @@ def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
             if not inside:
                 empty.append(FileReport(name, (F012.finding("no mesh file in this folder"),)))
             for file in inside:
-                if kind_of(file) == "step" and not read_step.installed():
-                    warning = F012.finding(f"{read_step.NEEDS}; not checked", severity="warning")
+                if kind_of(file) == "step" and (needs := _step_needs()):
+                    warning = F012.finding(f"{needs}; not checked", severity="warning")
                     empty.append(FileReport(file, (warning,)))
                 else:
                     files.append(file)
@@ -57,6 +52,13 @@ def expand(names: Sequence[str]) -> tuple[list[str], list[FileReport]]:
         else:
             files.append(name)
     return _once(files), empty
+
+
+def _step_needs() -> str:
+    """Return what STEP files need and is not there, or nothing."""
+    from unitcad.check.readers import read_step
+
+    return "" if read_step.installed() else read_step.NEEDS
 
 
 def _walked(folder: Path) -> Iterator[str]:
@@ -129,6 +131,13 @@ def _stopped(path: str, why: str) -> FileReport:
 def _in_processes(
     work: Sequence[tuple[str, Options]], jobs: int, memory_mb: int | None, then: Then | None
 ) -> Iterator[FileReport]:
+    # One file needs no processes.
+    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
+    from multiprocessing import get_context
+
+    from unitcad import children
+
     left = list(work)
     while left:
         with children.safe_path():

@@ -8,43 +8,36 @@ from __future__ import annotations
 
 import os
 import sys
+from importlib import import_module
 from typing import Annotated, Any, cast
 
 import typer
 
 from unitcad import __version__
-from unitcad.cli.accuracy_command import accuracy
-from unitcad.cli.batch_command import batch
-from unitcad.cli.build_command import build
-from unitcad.cli.cache_command import cache
-from unitcad.cli.check_command import check
-from unitcad.cli.coupon_command import coupon
-from unitcad.cli.design_command import design
-from unitcad.cli.estimate_command import estimate
-from unitcad.cli.experiments_command import experiments
-from unitcad.cli.fit_command import fit
-from unitcad.cli.init_command import init
-from unitcad.cli.list_command import list_
-from unitcad.cli.material_command import material
-from unitcad.cli.measure_command import measure
 from unitcad.cli.output import say_error, speak_anywhere
-from unitcad.cli.phantom_command import phantom
-from unitcad.cli.report_command import report
-from unitcad.cli.schema_command import schema
-from unitcad.cli.serve_command import serve
 from unitcad.errors import UnitcadError
 
-app = typer.Typer(
-    name="unitcad",
-    help="Haptic units, their casting moulds and an attenuation estimate, from a short TOML spec.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,  # boxes cut long option names, and markup swallows square brackets
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-
+COMMANDS = {
+    "build": "build",
+    "batch": "batch",
+    "check": "check",
+    "design": "design",
+    "estimate": "estimate",
+    "experiments": "experiments",
+    "accuracy": "accuracy",
+    "coupon": "coupon",
+    "fit": "fit",
+    "init": "init",
+    "list": "list_",
+    "material": "material",
+    "measure": "measure",
+    "phantom": "phantom",
+    "report": "report",
+    "schema": "schema",
+    "serve": "serve",
+    "cache": "cache",
+}
+"""The commands in the order of --help, and what each is called in its module."""
 INTERRUPTED = 130
 WrongArguments = cast(type[typer.BadParameter], typer.BadParameter.__mro__[2])
 """Typer's error of the command line itself, such as an unknown option: ClickException, its own or click's."""
@@ -56,27 +49,35 @@ def _version(wanted: bool) -> None:
         raise typer.Exit()
 
 
-app.command("build")(build)
-app.command("batch")(batch)
-app.command("check")(check)
-app.command("design")(design)
-app.command("estimate")(estimate)
-app.command("experiments")(experiments)
-app.command("accuracy")(accuracy)
-app.command("coupon")(coupon)
-app.command("fit")(fit)
-app.command("init")(init)
-app.command("list")(list_)
-app.command("material")(material)
-app.command("measure")(measure)
-app.command("phantom")(phantom)
-app.command("report")(report)
-app.command("schema")(schema)
-app.command("serve")(serve)
-app.add_typer(cache, name="cache")
+def application(*commands: str) -> typer.Typer:
+    """Return the command line with these commands alone: reading the arguments of one does not load the others."""
+    app = typer.Typer(
+        name="unitcad",
+        help="Haptic units, their casting moulds and an attenuation estimate, from a short TOML spec.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,  # boxes cut long option names, and markup swallows square brackets
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    for name in commands:
+        command = getattr(import_module(f"unitcad.cli.{name}_command"), COMMANDS[name])
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name)
+        else:
+            app.command(name)(command)
+    app.callback()(_root)
+    return app
 
 
-@app.callback()
+def __getattr__(name: str) -> typer.Typer:
+    """Return `app`, the whole command line. Raises AttributeError for any other name."""
+    if name != "app":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = application(*COMMANDS)
+    return globals()[name]
+
+
 def _root(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
@@ -90,7 +91,8 @@ def main() -> None:
     as_json = "--json" in sys.argv
     speak_anywhere()
     try:
-        code = app(standalone_mode=False)
+        named = [word for word in sys.argv[1:2] if word in COMMANDS]
+        code = application(*(named or COMMANDS))(standalone_mode=False)
         if code == INTERRUPTED:
             typer.echo("interrupted", err=True)
         sys.exit(code or 0)

@@ -206,9 +206,11 @@ def _reports(
 
 
 def _printer(field: str, name: str | None) -> Printer | None:
+    if not name:
+        return None
     from unitcad import catalogue
 
-    return catalogue.choose(field, name, catalogue.printers()) if name else None
+    return catalogue.choose(field, name, catalogue.printers())
 
 
 def _limits(max_faces: int | None, field: str, seconds: float | None) -> Limits:

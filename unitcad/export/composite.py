@@ -23,8 +23,9 @@ CREASE_DEG = 25.0
 """Faces that meet at more than this angle have a line between them."""
 SHARPER = 2
 """Pixels of the view along a pixel of the picture, along either side."""
-_INK = 0.28
-"""What a line leaves of the colour under it."""
+_INKED = (np.arange(256) * 0.28).astype(np.uint8)
+"""What a line leaves of each of the 256 brightnesses under it."""
+_WHITE = 0xFFFFFFFF
 _TIE_MM = 1e-4
 MARGIN_PX = 6
 """White above and below what a picture shows, pixels."""
@@ -60,15 +61,14 @@ def drawn(vertices: np.ndarray, faces: np.ndarray, colour: tuple[float, float, f
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     towards = np.flatnonzero(normal @ of.eye > 0)  # nothing else of a closed mesh is seen
-    seen = raster.look(vertices, faces[towards], of)
-    pixel = np.flatnonzero(seen.face.reshape(-1) >= 0)
-    face = towards[seen.face.reshape(-1)[pixel]]
+    pixel, seen, depth = raster.nearest(vertices, faces[towards], of)
+    face = towards[seen]
     light = of.eye + 0.45 * of.up - 0.35 * of.right
     bright = 0.45 + 0.55 * np.abs(normal @ (light / np.linalg.norm(light)))
     tints = np.full((len(faces), 4), 255, np.uint8)
     tints[:, :3] = np.clip(np.round(bright[:, None] * np.array(colour) * 255), 0, 255)
-    depth = seen.depth.reshape(-1)[pixel].astype(np.float32)
-    return DrawnBody(pixel, depth, tints.view(np.uint32).reshape(-1)[face], _patches(faces, normal)[face])
+    tint = tints.view(np.uint32).reshape(-1)[face]
+    return DrawnBody(pixel, depth.astype(np.float32), tint, _patches(faces, normal)[face])
 
 
 def _patches(faces: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -92,7 +92,7 @@ def together(bodies: Sequence[DrawnBody], of: Camera, names: Sequence[Name] = ()
     """
     width, height = of.size
     depth = np.full(width * height, -np.inf, np.float32)
-    colour = np.full(width * height, 0xFFFFFFFF, np.uint32)
+    colour = np.full(width * height, _WHITE, np.uint32)
     patch = np.zeros(width * height, np.int32)
     before = 0
     for body in bodies:
@@ -106,17 +106,19 @@ def together(bodies: Sequence[DrawnBody], of: Camera, names: Sequence[Name] = ()
         differs = field[one] != field[other]
         line[one] |= differs
         line[other] |= differs
-    pixels = colour.view(np.uint8).reshape(height, width, 4)[:, :, :3]
-    pixels[line] = (pixels[line] * _INK).astype(np.uint8)
-    _write(pixels, np.isfinite(depth).reshape(height, width), names, of)
-    rows = np.flatnonzero((pixels < 255).any(axis=(1, 2)))
+    channels = colour.view(np.uint8).reshape(-1, 4)
+    inked = np.flatnonzero(line)
+    channels[inked, :3] = _INKED[channels[inked, :3]]
+    pixels = channels.reshape(height, width, 4)
+    _write(pixels, field > 0, names, of)
+    rows = np.flatnonzero((colour != _WHITE).reshape(height, width).any(axis=1))
     top, bottom = (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (0, height)
     top, bottom = max(top // SHARPER - MARGIN_PX, 0), min(-(-bottom // SHARPER) + MARGIN_PX, height // SHARPER)
     return raster.png(_shrunk(pixels[SHARPER * top : SHARPER * bottom]), _EFFORT)
 
 
 def _write(pixels: np.ndarray, drawn: np.ndarray, names: Sequence[Name], of: Camera) -> None:
-    """Write names into a picture (height, width, 3), black on a white border, beside what is `drawn`."""
+    """Write names into a picture (height, width, 4), black on a white border, beside what is `drawn`."""
     taken = drawn.copy()
     for name in names:
         ink = picture_letters.written(name.text, SHARPER * LETTER_PX)
@@ -141,7 +143,7 @@ def _write(pixels: np.ndarray, drawn: np.ndarray, names: Sequence[Name], of: Cam
             mask[_disc(window, (x, y), dot - 1.2 * SHARPER)] = False
         mask[top - up : top - up + rows, left - side : left - side + columns] |= ink
         pixels[window][_grown(mask, SHARPER)] = 255
-        pixels[window][mask] = 0
+        pixels[window][mask, :3] = 0
         taken[window] |= _grown(mask, 3 * SHARPER)
         taken[max(top - _APART, 0) : top + rows + _APART, max(left - _APART, 0) : left + columns + _APART] = True
 
@@ -156,9 +158,9 @@ def _disc(window: tuple[slice, slice], middle: tuple[float, float], radius: floa
 
 
 def _shrunk(picture: np.ndarray) -> np.ndarray:
-    """Return a picture of bytes of which every pixel is the mean of SHARPER by SHARPER."""
-    total = np.zeros((picture.shape[0] // SHARPER, picture.shape[1] // SHARPER, 3), np.uint16)
-    for i in range(SHARPER):
-        for j in range(SHARPER):
-            total += picture[i::SHARPER, j::SHARPER]
-    return ((total + SHARPER**2 // 2) // SHARPER**2).astype(np.uint8)
+    """Return a picture (h, w, 4) of bytes as (h', w', 3): every pixel is the mean of SHARPER by SHARPER."""
+    rows = sum(picture[i::SHARPER].astype(np.uint16) for i in range(SHARPER))
+    # The four sums of a pixel are added as one number: none is larger than its sixteen bits.
+    whole = np.ascontiguousarray(rows).view(np.uint64)[:, :, 0]
+    total = np.ascontiguousarray(sum(whole[:, j::SHARPER] for j in range(SHARPER))).view(np.uint16)
+    return ((total.reshape(*whole[:, ::SHARPER].shape, 4)[:, :, :3] + SHARPER**2 // 2) // SHARPER**2).astype(np.uint8)

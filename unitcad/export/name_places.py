@@ -20,6 +20,9 @@ _WELL_INSIDE = 7.0
 _ASIDE = 0.6
 """A part whose visible middle lies beyond this share of the drawing's width is named beside itself."""
 
+_REACH_PX = 128.0
+"""How far from what it names a free place is looked for first."""
+
 Box = tuple[float, float, float, float]
 
 
@@ -116,20 +119,36 @@ def nearest_free(drawn: np.ndarray, at: tuple[float, float], size: tuple[int, in
     `drawn` (height, width), row 0 the highest: the pixels that the box, with a gap round it, keeps clear of; where no
     place is clear it covers as few of them as it can.
     """
-    gap, edge = round(GAP_PX), round(EDGE_PX)
+    edge = round(EDGE_PX)
     height, width = drawn.shape
-    total = np.zeros((height + 1, width + 1), np.int32)  # enough for every picture's pixels
-    np.cumsum(np.cumsum(drawn, axis=1, dtype=np.int32), axis=0, out=total[1:, 1:])
     left = np.arange(edge, max(width - edge - size[0], edge) + 1, 2)
     top = np.arange(edge, max(height - edge - size[1], edge) + 1, 2)
-    x0, x1 = left - gap, np.minimum(left + size[0] + gap, width)
-    y0, y1 = top - gap, np.minimum(top + size[1] + gap, height)
-    covered = total[np.ix_(y1, x1)] - total[np.ix_(y0, x1)] - total[np.ix_(y1, x0)] + total[np.ix_(y0, x0)]
     across = np.maximum(np.maximum(left - at[0], at[0] - left - size[0]), 0.0)
     down = np.maximum(np.maximum(top - at[1], at[1] - top - size[1]), 0.0)
-    cost = np.hypot(across[None, :], down[:, None]) + 1e6 * covered
-    row, column = np.unravel_index(int(cost.argmin()), cost.shape)
-    return int(left[column]), int(top[row])
+    farthest = float(np.hypot(across.max(), down.max()))
+    reach = _REACH_PX
+    while True:  # most names stand near: places within `reach` first
+        near, below = across <= reach, down <= reach
+        if near.any() and below.any():
+            cost = np.hypot(across[near][None, :], down[below][:, None])
+            cost += 1e6 * _covered(drawn, left[near], top[below], size)
+            row, column = np.unravel_index(int(cost.argmin()), cost.shape)
+            if cost[row, column] <= reach or reach >= farthest:
+                return int(left[near][column]), int(top[below][row])
+        reach *= 4
+
+
+def _covered(drawn: np.ndarray, left: np.ndarray, top: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Return how many pixels drawn a box of `size`, with a gap round it, covers at each top row and left column."""
+    gap = round(GAP_PX)
+    height, width = drawn.shape
+    x0, x1 = left - gap, np.minimum(left + size[0] + gap, width)
+    y0, y1 = top - gap, np.minimum(top + size[1] + gap, height)
+    part = drawn[y0[0] : y1[-1], x0[0] : x1[-1]]
+    total = np.zeros((part.shape[0] + 1, part.shape[1] + 1), np.int32)  # enough for every picture's pixels
+    np.cumsum(np.cumsum(part, axis=1, dtype=np.int32), axis=0, out=total[1:, 1:])
+    x0, x1, y0, y1 = x0 - x0[0], x1 - x0[0], y0 - y0[0], y1 - y0[0]
+    return total[np.ix_(y1, x1)] - total[np.ix_(y0, x1)] - total[np.ix_(y1, x0)] + total[np.ix_(y0, x0)]
 
 
 def overlap(one: Box, other: Box) -> bool:

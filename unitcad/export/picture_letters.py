@@ -91,11 +91,15 @@ def written(text: str, unit: float) -> np.ndarray:
     )
     column = (np.arange(width) + 0.5) / unit - PEN
     row = ABOVE + PEN - (np.arange(height) + 0.5) / unit
-    at = np.stack(np.meshgrid(column, row), axis=2)
     ink = np.zeros((height, width), bool)
     for points in strokes:
         for start, end in pairwise(points):
+            # A stroke reaches the pixels of its own box alone; a pixel more for the rounding.
+            (x0, y0), (x1, y1) = np.minimum(start, end) - PEN, np.maximum(start, end) + PEN
+            across = slice(max(math.floor((x0 + PEN) * unit) - 1, 0), math.ceil((x1 + PEN) * unit) + 1)
+            down = slice(max(math.floor((ABOVE + PEN - y1) * unit) - 1, 0), math.ceil((ABOVE + PEN - y0) * unit) + 1)
+            right, up = column[across] - start[0], (row[down] - start[1])[:, None]
             along = end - start
-            share = np.clip(((at - start) @ along) / max(float(along @ along), 1e-12), 0, 1)
-            ink |= np.hypot(*np.moveaxis(at - start - share[..., None] * along, 2, 0)) <= PEN
+            share = np.clip((right * along[0] + up * along[1]) / max(float(along @ along), 1e-12), 0, 1)
+            ink[down, across] |= np.hypot(right - share * along[0], up - share * along[1]) <= PEN
     return ink

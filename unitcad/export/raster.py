@@ -83,19 +83,37 @@ def look(
     Faces that `first` (m,) marks are seen before others of the same depth.
     """
     width, height = view.size
-    nearest = np.full(width * height, -np.inf)
-    shown = np.full(width * height, -1, np.int64)
+    seen = Seen(np.full((height, width), -1, np.int64), np.full((height, width), -np.inf))
+    pixel, face, depth = nearest(vertices, faces, view, cut, first)
+    seen.face.reshape(-1)[pixel], seen.depth.reshape(-1)[pixel] = face, depth
+    return seen
+
+
+def nearest(
+    vertices: np.ndarray, faces: np.ndarray, view: Camera, cut: float = np.inf, first: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the pixels (k,) in which a mesh is seen, row by row, with each one's face and depth in mm, as `look`."""
+    width, height = view.size
     points = view.project(vertices)
+    if not len(faces):
+        return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+    rows = points[:, 1]  # only the rows that the mesh reaches are kept
+    top, bottom = np.clip([np.floor(rows.min()), np.ceil(rows.max()) + 1], 0, height).astype(int)
+    before = top * width
+    least = np.full((bottom - top) * width, -np.inf)
+    shown = np.full((bottom - top) * width, -1, np.int64)
     for face, pixel, depth in _fragments(points, faces, width, height):
+        pixel = pixel - before
         kept = depth <= cut
         if first is not None:
             depth = depth + first[face] * (0.25 / view.scale)
-        kept &= depth > nearest[pixel]
+        kept &= depth > least[pixel]
         face, pixel, depth = face[kept], pixel[kept], depth[kept]
-        np.maximum.at(nearest, pixel, depth)
-        seen = depth == nearest[pixel]
+        np.maximum.at(least, pixel, depth)
+        seen = depth == least[pixel]
         shown[pixel[seen]] = face[seen]
-    return Seen(shown.reshape(height, width), nearest.reshape(height, width))
+    pixel = np.flatnonzero(shown >= 0)
+    return pixel + before, shown[pixel], least[pixel]
 
 
 def _fragments(
