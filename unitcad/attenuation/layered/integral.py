@@ -289,7 +289,7 @@ def _evaluate(problem: Problem, panels: w.Array) -> _Evaluated:
         waves = bessels(orders, real[:, None] * problem.r) * problem.load.transform(real)[:, None]
         waves = waves.reshape(len(orders), half.size, _NODES.size, -1) * half[:, None, None]
         kernel = problem.kernel(k).reshape(len(orders), half.size, _NODES.size) * slope
-        out.parts[part] = _products(kernel * _WEIGHTS, waves)
+        out.parts[part] = products(kernel * _WEIGHTS, waves)
         closeness = _closeness(panels[part])
         found = poles(kernel, _NODES, _TO_LEGENDRE, closeness)
         for whole, values in zip(out.poles, found, strict=True):
@@ -301,7 +301,7 @@ def _evaluate(problem: Problem, panels: w.Array) -> _Evaluated:
     return out
 
 
-def _products(kernel: w.Array, waves: w.Array) -> w.Array:
+def products(kernel: w.Array, waves: w.Array) -> w.Array:
     """Sum kernel (rows, panels, nodes) times waves (rows, panels, nodes, radii) over the nodes; (panels, rows, radii).
 
     By products of real matrices with two rows. A complex row by a matrix is a matrix by a vector to BLAS, which starts

@@ -78,10 +78,14 @@ def measure_tail(
         if material.shear != 0
     ]
 
-    def left(tail: Tail) -> tuple[float, float]:
-        """Return what it leaves where it stops, nothing below the tolerance being better, and how far that is."""
+    def left(tail: Tail) -> tuple[float, float, float]:
+        """Return what it leaves where it stops, nothing below the tolerance being better, and how far that is.
+
+        Among equals the one that leaves the least: the scale may have been guessed too large.
+        """
         stop = tail.start(scale, rtol)
-        return max(float(tail.bound(stop).max()), 0.4 * rtol * scale), stop
+        rest = float(tail.bound(stop).max())
+        return max(rest, 0.4 * rtol * scale), stop, rest
 
     return min(tails, key=left)
 
