@@ -61,7 +61,9 @@ def test_a_ring_goes_once_round_the_limb() -> None:
     array = _array({"kind": "ring", "count": 4, "bands": 3, "band_pitch_mm": 50}, body={"radius_mm": 40})
     assert len(array.places) == 12
     assert array.radius_mm == 40
-    assert 4 * (array.placed("A2").x - array.placed("A1").x) == pytest.approx(2 * math.pi * 40, abs=4 / 1024)
+    # Round the middle of the sheet, which is bent and keeps its length there: from 2.61 to 4.61 over the skin.
+    assert array.middle_radius_mm == pytest.approx(40 + 3.61, abs=1e-3)
+    assert 4 * (array.placed("A2").x - array.placed("A1").x) == pytest.approx(2 * math.pi * 43.61, abs=8 / 1024)
     assert array.placed("A1").y - array.placed("B1").y == 50
 
 
@@ -78,7 +80,7 @@ REFUSED = [
     ({"layout": {**_GRID, "pitch_mm": [20, 12]}}, "layout.pitch_mm.1", 16),
     ({"layout": {**_GRID, "pitch_mm": -3}}, "layout.pitch_mm", 16),
     ({"layout": {"kind": "hex", "pitch_mm": 10}}, "layout.pitch_mm", 16),
-    ({"layout": {"kind": "ring", "count": 30}, "body": {"radius_mm": 40}}, "layout.count", 15),
+    ({"layout": {"kind": "ring", "count": 30}, "body": {"radius_mm": 40}}, "layout.count", 13),
     ({"layout": {"kind": "ring", "count": 4}}, "body.radius_mm", 40),
     ({"layout": {"kind": "ring", "count": 4, "bands": 2}, "body": {"radius_mm": 40}}, "layout.band_pitch_mm", 40),
     ({"layout": {"kind": "list", "points_mm": [[0, 0], [10, 0]]}}, "layout.points_mm.1", [16, 0]),

@@ -87,6 +87,11 @@ class Array:
         """The unit of the places that name no other."""
         return self.units[0]
 
+    @property
+    def middle_radius_mm(self) -> float | None:
+        """Radius of the sheet's middle round the limb, which keeps its length as the sheet is bent; None: worn flat."""
+        return None if self.radius_mm is None else self.radius_mm + (self.sheet.low + self.sheet.high) / 2
+
     @cached_property
     def pitch_mm(self) -> float:
         """The least distance between two places' centres, mm; infinite for one place."""

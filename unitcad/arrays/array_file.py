@@ -9,16 +9,18 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
+import math
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from unitcad.arrays.array import Array, Placed
+from unitcad.arrays.array import Array, Placed, Sheet
 from unitcad.arrays.array_tables import AskedArray, PlaceTable
 from unitcad.arrays.construction import Construction, constructions
 from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
-from unitcad.arrays.sheet_outline import sheet_of
+from unitcad.arrays.layouts.ring import RingTable
+from unitcad.arrays.sheet_outline import middle_radius, sheet_of
 from unitcad.arrays.tail_ways import Blocked, angles
 from unitcad.designs.limits import up
 from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
@@ -149,7 +151,7 @@ def array_of(data: Mapping[str, Any]) -> Array:
     if asked.circuit is not None and way.own_tails:
         limit = "its units are held with their own circuits; [circuit] is one for all, laid into notches"
         raise Refusal("array", asked.array, limit, "back-sheet")
-    points = [Point(p.name, mm(p.x), mm(p.y), p.row, p.column) for p in kind.points(table, asked.body.radius_mm)]
+    points = _points(kind, table, asked.body.radius_mm)
     if len(points) > MOST_PLACES:
         raise Refusal("layout", len(points), f"an array has at most {MOST_PLACES} units")
     places = _places(asked, points)
@@ -162,8 +164,14 @@ def array_of(data: Mapping[str, Any]) -> Array:
                 limit = f"{asked.array} casts all units in one pour, so they are of one kind; pockets hold others"
                 raise Refusal(f"place.{i}.unit", "...", limit)
             units[index] = _unit(given, f"place.{i}.unit", data)
-    _check_apart(way, points, units, kind, table, asked)
+    middle = middle_radius(asked, way, units)
+    if middle is not None:
+        points = _points(kind, table, middle)
     sheet = sheet_of(asked, way, points, units)
+    if middle is not None:
+        apart = max(unit.diameter_mm + way.apart(unit)[0] for unit in units)
+        _check_closes(asked, table, sheet, middle, apart)
+    _check_apart(way, points, units, kind, table, middle)
     return Array(
         name=asked.name,
         construction=asked.array,
@@ -180,6 +188,32 @@ def array_of(data: Mapping[str, Any]) -> Array:
         circuit=asked.circuit,
         asked=_settled(data, unit, asked, units, places),
     )
+
+
+def _points(kind: LayoutKind, table: Any, radius: float | None) -> list[Point]:
+    """Return a layout's points on the length grid; `radius`: that round which a ring's pitch is measured, mm."""
+    return [Point(p.name, mm(p.x), mm(p.y), p.row, p.column) for p in kind.points(table, radius)]
+
+
+def _check_closes(asked: AskedArray, table: Any, sheet: Sheet, middle: float, apart: float) -> None:
+    """Raise Refusal for a sheet that is longer than its way round the limb, with what would fit.
+
+    `middle`: radius of the sheet's middle; `apart`: what two units of a band need from middle to middle (mm).
+    """
+    length, closed = sheet.outline[2] - sheet.outline[0], 2 * math.pi * middle
+    if length <= closed + 2 / 1024:
+        return
+    limit = (
+        f"round the limb the sheet's middle has {closed:.4g} mm, and the sheet is {length:.4g} mm long: its ends would "
+        "lie over each other. Fewer units, narrower margins and slots, or a wider limb"
+    )
+    if isinstance(table, RingTable):
+        # One pitch is left for what the sheet is longer than from the first unit to the last.
+        needed = max(length - (table.count - 1) * closed / table.count, apart)
+        fits = int(closed / needed + 1e-9)
+        raise Refusal("layout.count", table.count, limit, fits if fits > 1 else None)
+    radius = asked.body.radius_mm or 0.0
+    raise Refusal("body.radius_mm", radius, limit, up(length / (2 * math.pi) - (middle - radius)))
 
 
 def with_formats(array: Array, formats: Iterable[str]) -> Array:
@@ -268,7 +302,7 @@ def _unit(given: str | dict[str, Any], field: str, data: Mapping[str, Any]) -> S
 
 
 def _check_apart(
-    way: Construction, points: list[Point], units: list[Spec], kind: LayoutKind, table: Any, asked: AskedArray
+    way: Construction, points: list[Point], units: list[Spec], kind: LayoutKind, table: Any, middle: float | None
 ) -> None:
     """Raise Refusal, with the pitch that fits, for two units nearer to each other than the construction can make."""
     order = sorted(range(len(points)), key=lambda i: points[i].x)
@@ -288,7 +322,7 @@ def _check_apart(
                 one, other = sorted((p, q), key=lambda point: (point.row, point.column))
                 worst = short, one, other, needed, why
     if worst:
-        refusal = kind.wider(table, asked.body.radius_mm, (worst[1], worst[2]), up(worst[3]))
+        refusal = kind.wider(table, middle, (worst[1], worst[2]), up(worst[3]))
         raise Refusal(refusal.field, refusal.value, f"{refusal.limit}: {worst[4]}", refusal.nearest)
 
 

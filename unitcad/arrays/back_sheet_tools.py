@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.arrays.array import Array
+from unitcad.arrays.bending import bent_stretches
 from unitcad.arrays.circuit.wiring import wiring
 from unitcad.arrays.fins import Fin, fins
 from unitcad.arrays.larger_than_bed import across, pieces, taken
@@ -104,6 +105,7 @@ def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
         concentric=False,
         pins=drawing.pins,
         genus=tuple(holes),
+        stretches=bent_stretches(array),
         splits=tuple(_splits(drawing, base, cups)),
     )
 

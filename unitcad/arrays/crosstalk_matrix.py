@@ -53,7 +53,7 @@ class Pairs:
     """Who drives whom in an array: distances along the skin (mm), shape (n, n), rows the unit that drives.
 
     `centre` is to the other unit's middle, `edge` to the point of its edge that is nearest. On a limb, x goes round it:
-    distances are those along the unrolled skin, the shorter way round.
+    distances are those along the unrolled skin, the shorter way round, and shorter than on the flat sheet.
     """
 
     centre: np.ndarray
@@ -69,7 +69,9 @@ def pairs(array: Array) -> Pairs:
     at = np.array([(place.x, place.y) for place in array.places])
     radii = np.array([place.radius for place in array.places])
     across = np.abs(at[:, None] - at[None])
-    if array.radius_mm is not None:
+    if array.radius_mm is not None and array.middle_radius_mm is not None:
+        # Cast flat, places are as far apart as they are in the sheet's middle; the skin under it has the shorter arc.
+        across[..., 0] *= array.radius_mm / array.middle_radius_mm
         half = math.pi * array.radius_mm
         across[..., 0] = np.abs((across[..., 0] + half) % (2 * half) - half)
     centre = np.hypot(across[..., 0], across[..., 1])

@@ -18,13 +18,28 @@ BESIDE_SLOT = 2.0
 """From a strap slot to a round corner, at least, mm."""
 
 
+def middle_radius(asked: AskedArray, way: Construction, units: list[Spec]) -> float | None:
+    """Return the radius of the sheet's middle round the limb, mm; None where the array is worn flat."""
+    if asked.body.radius_mm is None:
+        return None
+    level = way.level(_distinct(units), _thickness(asked, way))
+    return asked.body.radius_mm + (mm(level.low) + mm(level.high)) / 2
+
+
+def _distinct(units: list[Spec]) -> tuple[Spec, ...]:
+    return tuple({id(unit): unit for unit in units}.values())
+
+
+def _thickness(asked: AskedArray, way: Construction) -> float:
+    return way.thickness_mm if asked.sheet.thickness_mm is None else asked.sheet.thickness_mm
+
+
 def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: list[Spec]) -> Sheet:
     """Return the sheet. Raises Refusal for a thickness, corner or slot that does not fit."""
-    table, distinct = asked.sheet, tuple({id(unit): unit for unit in units}.values())
+    table, distinct, thickness = asked.sheet, _distinct(units), _thickness(asked, way)
     known = catalogue.materials({name: entry for unit in distinct for name, entry in unit.materials.items()})
     material = table.material or distinct[0].layers[-1].material
     catalogue.choose("sheet.material", material, known)
-    thickness = way.thickness_mm if table.thickness_mm is None else table.thickness_mm
     level = way.level(distinct, thickness)
     if thickness > level.most + 1e-9:
         limit = f"beside the units' tails and backs there is room for a sheet of {level.most:.4g} mm"

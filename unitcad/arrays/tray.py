@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from unitcad.arrays.array import Array, Box
+from unitcad.arrays.bending import bent_stretches
 from unitcad.arrays.larger_than_bed import across, pieces, taken
 from unitcad.arrays.outlines import rounded, slot_profile
 from unitcad.designs import Dimensions
@@ -78,6 +79,7 @@ def tray_plan(array: Array, cast: Shape) -> Plan:
     )
     held = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, sheet.hold_mm) for unit in array.units}
     stretches = tuple((f"pocket round a unit of {number(size, 3)} mm", 100 * strain) for size, strain in held.items())
+    stretches += bent_stretches(array)
     joined = seams(cut_at, across(array), spec.moulds.plinth_clearance_mm) if cut_at else ()
     splits = (split(tools[0], joined),) if joined else ()
     return Plan(tools, (step,), layout, label, dims, stretches=stretches, splits=splits)

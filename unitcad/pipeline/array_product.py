@@ -19,6 +19,7 @@ from unitcad import __version__
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_extras import extras
 from unitcad.arrays.array_file import array_hash, to_toml
+from unitcad.arrays.bending import bending_record
 from unitcad.arrays.construction import constructions
 from unitcad.arrays.patch import patch_bodies
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
@@ -230,6 +231,7 @@ def _record(array: Array, units: dict[str, Product]) -> dict[str, Any]:
         "cast": array.cast,
         "radius_mm": array.radius_mm,
         "layout": array.layout,
+        "bending": bending_record(array),
         "pitch_mm": round(array.pitch_mm, 3) if len(array.places) > 1 else None,
         "sheet": {
             "material": sheet.material,

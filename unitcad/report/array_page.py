@@ -23,6 +23,7 @@ from unitcad.text import number
 CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg", "crosstalk-edge.svg"), "circuit.svg"
 LARGEST = 8_000_000
 """Bytes of a drawing or picture, at most."""
+SIDES = ("skin-side", "worn", "back")
 WORDS = {
     "patch-skin-side.png": "The patch from the skin's side",
     "patch-back.png": "The patch from its back",
@@ -58,7 +59,7 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
         f'<p class="line">{escape(_line(array))}</p>',
         _chips(manifest),
         "</div></div>",
-        *_section("Patch", [shown.of(f"pictures/patch-{side}.png") for side in ("skin-side", "worn", "back")]),
+        *_section("Patch", [*(shown.of(f"pictures/patch-{side}.png") for side in SIDES), _worn(array)]),
         *_section("Crosstalk", [_answer(shown.json("crosstalk.json")), *(shown.of(name) for name in CROSSTALK)]),
         *_section("Tools", [shown.of(f"pictures/{name}") for name in ("tools.png", *_pours(manifest))]),
         *_section("Circuit", [shown.of(CIRCUIT)]),
@@ -111,6 +112,22 @@ def _line(array: Mapping[str, Any]) -> str:
     return (
         f"{counted(len(array['places']), 'unit')}, {array['construction']}{pitch}, on a sheet of "
         f"{number(x1 - x0, 3)} x {number(y1 - y0, 3)} x {number(thick, 3)} mm of {array['sheet']['material']}{limb}"
+    )
+
+
+def _worn(array: Mapping[str, Any]) -> str:
+    """Say how the array bends round its limb."""
+    bent = array.get("bending")
+    if not bent:
+        return ""
+    flat = bent["strain_units_flat"]
+    between = f", {number(100 * flat, 2)} % between units that stay flat" if flat else ""
+    return (
+        f"<p>Cast flat and bent: the sheet's middle, at a radius of {number(bent['middle_radius_mm'], 4)} mm, keeps "
+        f"its length. A whole turn is {number(bent['closed_length_mm'], 4)} mm, which leaves "
+        f"{number(bent['between_ends_mm'], 3)} mm between the ends. The sheet's faces are stretched by "
+        f"{number(100 * bent['strain'], 2)} %{between}. At its edge a unit that stays flat stands "
+        f"{number(bent['sagitta_mm'], 2)} mm off the skin (computed).</p>"
     )
 
 

@@ -24,8 +24,8 @@ class Point(NamedTuple):
 class LayoutKind:
     """A kind by its name in a file.
 
-    points   from the table and the limb's radius (mm, None where it is flat) to the points, the origin in their middle;
-             raises Refusal for a table that gives none
+    points   from the table and the radius round which a ring is measured (mm, None where it is flat) to the points, the
+             origin in their middle; raises Refusal for a table that gives none
     wider    from the table, the radius, the numbers of two points and the distance that they need (mm) to the refusal
              that names the value which would give it
     """

@@ -24,7 +24,7 @@ class RingTable(Table, frozen=True, kw_only=True):
 
 
 def points(table: RingTable, radius: float | None) -> tuple[Point, ...]:
-    """Return the points by bands from the top, unrolled at the skin: x is the way round the limb."""
+    """Return the points by bands from the top, unrolled: x is the way round, at the radius that keeps its length."""
     if radius is None:
         raise Refusal("body.radius_mm", None, "a ring needs the radius of the limb that it goes round", 40.0)
     if table.bands > 1 and table.band_pitch_mm is None:

@@ -1,0 +1,71 @@
+"""An array round its limb: which length is kept, how the ring closes, what is stretched."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.bending import bending
+from unitcad.arrays.crosstalk_matrix import pairs
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.errors import Refusal
+
+
+def test_the_middle_of_the_sheet_keeps_its_length() -> None:
+    """Wrapped about the limb, the middle plane is as long as it was flat, and eight pitches go round once."""
+    array = load_array("wrist-band")
+    bent = bending(array)
+    assert bent is not None
+    middle = 40 + (3.36 + 4.61) / 2
+    assert bent.middle_radius == pytest.approx(middle, abs=1e-3)
+    angles = [place.x / bent.middle_radius for place in array.places]
+    assert np.diff(angles) == pytest.approx([2 * math.pi / 8] * 7, abs=1e-4)
+    assert bent.closed == pytest.approx(2 * math.pi * middle, abs=1e-2)
+    x0, _, x1, _ = array.sheet.outline
+    assert bent.ends == pytest.approx(bent.closed - (x1 - x0))
+    # The skin under it has the shorter arc.
+    assert pairs(array).centre[0, 1] == pytest.approx(2 * math.pi * 40 / 8, abs=2e-3)
+
+
+def test_strains_and_sagitta_are_those_of_the_geometry() -> None:
+    """A face at the middle's radius +- t/2 has the arc's length times that ratio; a flat unit is a tangent."""
+    array = load_array("wrist-band")
+    bent = bending(array)
+    assert bent is not None
+    arc, outer = bent.middle_radius, bent.middle_radius + 1.25 / 2
+    assert bent.strain == pytest.approx(outer / arc - 1)
+    # Flat units of 14 mm leave 20.5 of 34.5 mm to bend: the sheet there has the smaller radius of the same angle.
+    pitch = 2 * math.pi * bent.middle_radius / 8
+    radius = (pitch - 14) / (2 * math.pi / 8)
+    assert bent.strain_between == pytest.approx(1.25 / 2 / radius, rel=1e-3)
+    assert math.hypot(40 - bent.sagitta, 7) == pytest.approx(40)
+    assert bending(load_array("forearm-patch")) is None
+
+
+@pytest.mark.parametrize(
+    ("template", "overrides", "field"),
+    [
+        ("wrist-band", ["sheet.margin_mm=8"], "layout.count"),
+        ("wrist-band", ["body.radius_mm=30"], "layout.count"),
+        ("forearm-patch", ["layout.columns=4", "body.radius_mm=10"], "body.radius_mm"),
+    ],
+)
+def test_a_sheet_longer_than_its_way_round_is_refused(template: str, overrides: list[str], field: str) -> None:
+    with pytest.raises(Refusal) as refused:
+        load_array(template, overrides)
+    assert refused.value.field == field
+    kept = [each for each in overrides if not each.startswith(field)]
+    bent = bending(load_array(template, [*kept, f"{field}={refused.value.nearest}"]))
+    assert bent is not None
+    assert bent.ends > -1e-2
+
+
+def test_a_bent_sheet_stretches_and_c310_compares_it() -> None:
+    array = load_array("wrist-band")
+    bent = bending(array)
+    assert bent is not None
+    (stretch,) = patch_moulds(array).plan.stretches
+    assert stretch == ("sheet bent round 40 mm", pytest.approx(100 * bent.most))
