@@ -29,6 +29,12 @@ SETS = [
 ]
 
 
+def titles(casting: Procedure) -> list[list[str]]:
+    """The titles of each part of a procedure."""
+    parts = (casting.preparation, *(pour.steps for pour in casting.pours), casting.release, casting.assembly)
+    return [[step.title for step in part] for part in parts]
+
+
 def planned(*source: str) -> tuple[MouldSet, Procedure]:
     moulds = MouldSet(load(source[0], list(source[1:])))
     return moulds, procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
@@ -40,6 +46,8 @@ def test_every_picture_is_asked_for_and_every_one_asked_for_is_drawn(source: tup
     steps = [*casting.preparation, *(step for pour in casting.pours for step in pour.steps)]
     steps += [*casting.release, *casting.assembly]
     assert {step.picture for step in steps if step.picture} == {picture_path(name) for name in views(moulds)}
+    for part in titles(casting):
+        assert len(set(part)) == len(part)
 
 
 @pytest.mark.parametrize("source", SETS, ids=" ".join)
@@ -272,3 +280,31 @@ def _moment(loop: np.ndarray) -> float:
     x, y = loop.T
     u, v = np.roll(x, -1), np.roll(y, -1)
     return float(((x + u) * (x * v - u * y)).sum() / 6)
+
+
+def test_a_tail_is_drawn_through_its_slot_while_the_motor_waits() -> None:
+    """As the step says: the tail is out through the slot, pad and motor before the mouth; no silicone is cut."""
+    moulds, _ = planned("encapsulating")
+    view, dims = views(moulds)["motor-in"], moulds.dimensions
+    circuit = next(body for body in moulds.unit if body.kind == "circuit")
+    led = realise(next(extra.shape for extra in view.extras if extra.colour == circuit.colour), 64)
+    assert len(led.decompose()) == 1
+    assert all(part.name != circuit.name for part in view.parts)
+    assert max(part.moved[2] for part in view.parts if not part.half) < -dims.core_height + 1
+    low, high = led.bounding_box()[2], led.bounding_box()[5]
+    assert low < 0 < dims.exit.low < high < dims.exit.high
+    outside = led.trim_by_plane((1, 0, 0), dims.outer_radius)
+    assert outside.volume() > 0
+    cast = [realise(body.shape, 64) for body in moulds.unit if body.made == "cast"]
+    assert all((led ^ layer).volume() < 0.02 * led.volume() for layer in cast)
+
+
+def test_a_cut_tongue_is_drawn_as_the_strip_that_its_step_describes() -> None:
+    moulds, casting = planned("encapsulating", "moulds.printer=sla")
+    tongue = moulds.solids["tongue"].bounding_box()
+    exit = moulds.dimensions.exit
+    assert tongue[4] - tongue[1] == pytest.approx(exit.width, abs=0.01)
+    steps = {step.title: step.picture for step in casting.preparation}
+    assert steps["Cut the tongues"] == picture_path("cut-tongue")
+    printed = planned("encapsulating")[0].solids["tongue"].bounding_box()
+    assert printed[4] - printed[1] == pytest.approx(10.0, abs=0.01)

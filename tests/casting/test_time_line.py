@@ -66,7 +66,7 @@ def test_a_gang_takes_longer_at_the_bench() -> None:
         times = {"Tongue home": 4, "Wipe Layer 1": 4, "Tongue out FIRST": 4, "Weigh": 1, "Cup 2 off": 1}
         if step.title in times:
             assert minutes[step.title] == times[step.title] * step.minutes, step.title
-    assert len([step for step in four.assembly if step.title == "Motor in"]) == 2
+    assert len([step for step in four.assembly if step.title.startswith("Motor in, ")]) == 2
     assert four.bench_min > 1.5 * one.bench_min
 
 

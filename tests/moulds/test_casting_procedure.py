@@ -409,7 +409,15 @@ def test_each_layer_but_the_first_lies_between_two_cup_positions() -> None:
     for source in (("three-layer",), ("custom/strap-lugs",), ("embedded", "moulds.cavities=[2,2]")):
         assert "push it to no side" in words(*source)
         assert "towards the cut corner" not in words(*source)
-    assert "towards the cut corner" in words("encapsulating", "moulds.printer=sla")
+    assert "towards the cut corner" in words("encapsulating", "moulds.rib_interference_mm=0")
+
+
+def test_leaves_of_resin_bend_and_the_seat_bears() -> None:
+    said = words("encapsulating", "moulds.printer=sla")
+    assert "leaves 0.5 mm thick, which bend and centre it; the seat bears it" in said
+    assert "crushed" not in said
+    assert "in a vice" not in said
+    assert "towards the cut corner" not in said
 
 
 def test_walls_vary_by_what_the_ribs_leave() -> None:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
-from faulty_sets import broken, set_of
+from faulty_sets import broken, set_of, with_fault
 
 from unitcad.casting.eccentricity import UNEVEN, eccentricity, shift_per_depth
 from unitcad.catalogue import printers
 from unitcad.errors import Refusal
 from unitcad.mould_checks import check_moulds
+from unitcad.moulds.base import tapered
+from unitcad.moulds.cup import skirt_end
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.ribs import rib_shapes, ribs
+from unitcad.moulds.ribs import rib_shapes, ribs, slot_shapes
+from unitcad.shape import Common, Shape, box, cut, union
 from unitcad.validation import templates
 
 SETS = [
@@ -23,6 +27,9 @@ SETS = [
     ("encapsulating", "moulds.pour=injected"),
     ("custom/strap-lugs",),
     ("custom/film-closed",),
+    ("encapsulating", "moulds.printer=sla"),
+    ("embedded", "moulds.printer=sla", "moulds.cavities=[2,2]"),
+    ("custom/strap-lugs", "moulds.printer=sla"),
 ]
 
 
@@ -79,7 +86,7 @@ def test_the_shift_of_unequal_ribs_is_that_of_a_simulated_press() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(templates()))
-@pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25"])
+@pytest.mark.parametrize("printer", ["fdm-0.4", "fdm-0.25", "sla"])
 def test_ribs_leave_a_fifth_of_the_eccentricity(name: str, printer: str) -> None:
     moulds = set_of(name, f"moulds.printer={printer}")
     without, made = eccentricity(moulds, with_ribs=False), eccentricity(moulds)
@@ -93,9 +100,10 @@ def test_ribs_too_low_for_the_play_leave_the_rest_of_it() -> None:
     assert made.at_worst_mm == pytest.approx(math.sqrt(2) * 0.13)
 
 
-def test_no_ribs_in_resin_or_where_none_are_asked_for() -> None:
-    for more in ("moulds.printer=sla", "moulds.rib_interference_mm=0"):
-        moulds = set_of("encapsulating", more)
+def test_no_ribs_where_none_are_asked_for() -> None:
+    for printer in ("sla", "fdm-0.4"):
+        moulds = set_of("encapsulating", "moulds.rib_interference_mm=0", f"moulds.printer={printer}")
+        assert moulds.spec.moulds.plinth_height_mm == 2.0
         assert rib_shapes(moulds.spec, moulds.plan.layout) == []
         assert broken(moulds) == set()
         assert all("play" in f.where for f in check_moulds(moulds) if f.code == "C220")
@@ -107,6 +115,49 @@ def test_a_rib_wider_into_the_plinth_than_half_a_line_is_refused() -> None:
         set_of("encapsulating", "moulds.rib_interference_mm=0.25")
     assert (refused.value.field, refused.value.nearest) == ("moulds.rib_interference_mm", 0.2)
     assert broken(set_of("encapsulating", "moulds.rib_interference_mm=0.2")) == set()
+
+
+def test_a_resin_cup_s_leaves_bend_within_the_limit_and_into_their_slots() -> None:
+    """By the beam's closed formula: 1.5 x 0.5 x 0.13 / 3.06^2, the arm from the crest's measured top to the seat."""
+    moulds = set_of("encapsulating", "moulds.printer=sla")
+    rib = ribs(moulds.spec, moulds.plan.layout)[0]
+    found = {f.where: f for f in check_moulds(moulds) if f.code == "C220" and "leaf" in f.where}
+    assert len(found) == 4
+    for cup in ("cup1", "cup2"):
+        strain, room = found[f"{cup}: strain at the root of a rib's leaf"], found[f"{cup}: room behind a rib's leaf"]
+        least, most = (150 * 0.5 * 0.13 / arm**2 for arm in (-rib.top, -rib.head))
+        assert least * 0.98 < strain.value < most * 1.02 < 1.2
+        assert room.value == pytest.approx(0.5, abs=0.005)
+
+
+def _leaf_broken(change: Callable[[Shape], Shape]) -> set[str]:
+    moulds = with_fault(set_of("encapsulating", "moulds.printer=sla"), "cup1", change)
+    return {f.where for f in check_moulds(moulds) if f.code == "C220" and not f.ok}
+
+
+def test_faults_of_a_leaf_are_found() -> None:
+    """A slot that ends low, one that a flaw fills, a leaf twice as thick, and one that is not freed at one side."""
+    moulds = set_of("encapsulating", "moulds.printer=sla")
+    slots, rib = slot_shapes(moulds.spec, moulds.plan.layout)[0], ribs(moulds.spec, moulds.plan.layout)[0]
+    strain, room = "cup1: strain at the root of a rib's leaf", "cup1: room behind a rib's leaf"
+    x, y = rib.x, rib.y
+    recess = tapered(moulds.plan.layout, moulds.spec.moulds.plinth_clearance_mm, skirt_end(moulds.spec))
+
+    def filled(*space: float) -> Callable[[Shape], Shape]:
+        return lambda shape: union((shape, cut(Common((slots, box(*space))), [recess])))
+
+    assert _leaf_broken(filled(-20, 20, -20, 20, -1.0, 0.0)) == {strain}
+    assert _leaf_broken(filled(x - 0.2, x + 2, y - 1, y + 2, -9, 0.0)) == {strain, room}
+    assert _leaf_broken(filled(x, x + 1.1, y - 1.2, y + 1.2, -9, 0.0)) == {strain}
+    assert _leaf_broken(filled(x - 0.2, x + 2, y + 1.2, y + 2, -9, 0.0)) == {strain, room}
+
+
+def test_a_plinth_too_low_for_the_leaves_is_refused() -> None:
+    with pytest.raises(Refusal) as refused:
+        set_of("encapsulating", "moulds.printer=sla", "moulds.plinth_height_mm=2")
+    assert refused.value.field == "moulds.plinth_height_mm"
+    nearest = f"moulds.plinth_height_mm={refused.value.nearest}"
+    assert broken(set_of("encapsulating", "moulds.printer=sla", nearest)) == set()
 
 
 def test_a_printer_of_ones_own_without_the_key_has_none() -> None:

@@ -115,6 +115,18 @@ def test_the_record_is_saved_and_shown(running: Any, page_of_one: Path) -> None:
     page.get_by_role("button", name="Save the cast record").click()
     assert "Not saved" in page.locator("#save [role=status]").inner_text()
     page.locator('[name="u1.mass"]').fill("0.61")
+    for name, wrong, limit in (
+        ("u1.w1.1", "125", "must be 0.417 to 3.75 mm: 1.25 mm is asked"),
+        ("u1.height", "46", "must be 1.54 to 13.8 mm: 4.61 mm is asked"),
+        ("u1.mass", "6.1", "must be 0.203 to 1.83 g: 0.609 g is asked"),
+        ("u1.d1", "1.4", "must be 4.67 to 42 mm: 14 mm is asked"),
+    ):
+        before = page.locator(f'[name="{name}"]').input_value()
+        page.locator(f'[name="{name}"]').fill(wrong)
+        assert page.locator(f'label:has([name="{name}"]) .limit').inner_text() == limit
+        page.get_by_role("button", name="Save the cast record").click()
+        assert "Not saved: 1 field" in page.locator("#save [role=status]").inner_text()
+        page.locator(f'[name="{name}"]').fill(before)
     page.locator('textarea[name="notes"]').fill("first try\nwarm room")
     with page.expect_download() as download:
         page.get_by_role("button", name="Save the cast record").click()

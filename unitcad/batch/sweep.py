@@ -27,7 +27,7 @@ from unitcad.arrays.array_file import array_templates, confirm_known, expanded, 
 from unitcad.batch.paths import check_path
 from unitcad.cache import digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
-from unitcad.files import names_device
+from unitcad.files import names_device, read_text
 from unitcad.pipeline.subjects import Made, of_data
 from unitcad.spec import check_plain, convert, read_toml
 from unitcad.spec.fields import fields_of
@@ -102,13 +102,18 @@ class Axis:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A validated sweep: `bases` as (name, data); values by path for each case, or axes."""
+    """A validated sweep: `bases` as (name, data); values by path for each case, or axes.
+
+    `written` are the bases that stand in a file; `fixed` the paths that the sweep, or an option, sets in every base.
+    """
 
     name: str
     bases: tuple[tuple[str, dict[str, Any]], ...]
     mode: str
     axes: tuple[Axis, ...]
     cases: tuple[tuple[str, dict[str, Any]], ...] = ()
+    written: tuple[tuple[str, Path], ...] = ()
+    fixed: tuple[str, ...] = ()
 
     @property
     def slug(self) -> str:
@@ -123,7 +128,9 @@ class Sweep:
         for text in overrides:
             for _, data in self.bases:
                 check_path(text.partition("=")[0].strip(), data)
-        return replace(self, bases=tuple((name, override(data, overrides)) for name, data in self.bases))
+        bases = tuple((name, override(data, overrides)) for name, data in self.bases)
+        set_here = (text.partition("=")[0].strip() for text in overrides)
+        return replace(self, bases=bases, fixed=(*self.fixed, *set_here))
 
     @cached_property
     def count(self) -> int:
@@ -173,7 +180,14 @@ class Sweep:
         """Return what is wrong with a refused variant in one line, `first` being what it was refused for."""
         if index >= EXPLAINED or not isinstance(first, Refusal) or self.of_arrays:
             return str(first)
-        return "; and ".join(map(str, all_faults(first, self._data(index), "")))
+        base, values = self.values(index)
+        file = dict(self.written).get(base)
+        text = read_text(file) if file else ""
+        every = all_faults(first, self._data(index), text)
+        for fault in every:
+            if file and fault.field not in (*values, *self.fixed):
+                fault.file = str(file)
+        return "; and ".join(fault.located for fault in every)
 
     @property
     def of_arrays(self) -> bool:
@@ -234,7 +248,8 @@ def from_file(data: dict[str, Any], folder: Path, name: str) -> Sweep:
     for base, values in cases or [(base, {axis.path: None for axis in axes}) for base in bases]:
         for path in values:
             check_path(path, bases[base])
-    return Sweep(file.name or name, tuple(bases.items()), table.mode, axes, cases)
+    written = tuple((base, folder / base) for base in bases if is_path(base))
+    return Sweep(file.name or name, tuple(bases.items()), table.mode, axes, cases, written, tuple(file.fixed))
 
 
 def _parted(data: dict[str, Any], kind: type[T], field: str) -> tuple[T, dict[str, Any]]:

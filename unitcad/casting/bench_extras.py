@@ -9,10 +9,12 @@ from unitcad.moulds.cup import skirt_end
 from unitcad.moulds.layout import CORNER_RADIUS, MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.shape import Extrude, Revolve, Shape, box, cut, moved, polygon, turned, union
+from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
+from unitcad.shape import Extrude, Revolve, Shape, box, cut, moved, polygon, ring, turned, union
 
 ARROW, TAPE, BAND, TOOL = (0.10, 0.36, 0.86), (0.47, 0.78, 0.86), (0.35, 0.33, 0.38), (0.80, 0.86, 0.90)
 CARD, PAPER, GREASE, INK = (0.45, 0.72, 0.38), (0.96, 0.93, 0.62), (0.98, 0.72, 0.16), (0.10, 0.10, 0.12)
+TAB = (0.93, 0.90, 0.78)
 CLEAR = 5.0
 """Between a piece that is lifted off and what it was on, mm."""
 TAPE_WIDTH, TAPE_THICKNESS, BELOW_RIM = 8.0, 0.4, 0.8
@@ -105,6 +107,36 @@ def grease(moulds: MouldSet, step: Step, length: float) -> tuple[Extra, ...]:
         for cell in lay.cells
         for side in cell.sides
     )
+
+
+def tabs(moulds: MouldSet, out: float = 0.0) -> tuple[Extra, ...]:
+    """Draw the folded tape on every tongue that is cut, where it is pulled out by `out` mm; none on printed ones."""
+    lay, exit = moulds.plan.layout, moulds.dimensions.exit
+    if not exit or all(tool.made != "cut" for tool in moulds.plan.of_kind("tongue")):
+        return ()
+    half, edge = exit.width / 2 + 0.5, max(lay.cup[0] - abs(cell.x) for cell in lay.cells) + GRIP_GAP
+    return tuple(
+        Extra(
+            _between(
+                cell.x + side * (edge + out),
+                cell.x + side * (edge + out + GRIP_LENGTH + 0.5),
+                cell.y,
+                half,
+                exit.low - _FILM,
+                exit.high + _FILM,
+            ),
+            TAB,
+        )
+        for cell in lay.cells
+        for side in cell.sides
+    )
+
+
+def punched_hole(moulds: MouldSet) -> Extra:
+    """Draw the edge of the hole that makes the hollow end of the first cell's tongue, on its upper face."""
+    cell, exit, radius = moulds.plan.layout.cells[0], moulds.dimensions.exit, moulds.dimensions.ledge_radius
+    high = exit.high if exit else 0.0
+    return Extra(moved(ring(radius - 0.1, radius, high - 0.05, high + 0.05), cell.x, cell.y), INK)
 
 
 def pen_marks(moulds: MouldSet) -> tuple[Extra, ...]:

@@ -7,14 +7,14 @@ A view's name is the name of its file.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from unitcad.casting import bench_extras as draw
 from unitcad.casting.bench_extras import CARD, CLEAR, Extra
+from unitcad.casting.bench_view import ABOVE, LOW, OVER, UNDER, Offset, Placed, View
 from unitcad.casting.figures import window_length
+from unitcad.casting.piece_views import fed_through, resin_views
 from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.designs import layer_colour
 from unitcad.designs.tooling import Cell
@@ -30,35 +30,6 @@ from unitcad.text import number
 
 FOLDER = "steps"
 """The pictures' folder in a result."""
-ABOVE, UNDER, OVER, LOW = (0.55, -1.0, 0.62), (0.55, -1.0, -0.6), (0.25, -1.0, 1.2), (0.55, -1.0, 0.3)
-"""Directions towards the eye."""
-
-Offset = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A piece by its name, moved from its place (mm); `half`: without its half nearer the eye."""
-
-    name: str
-    moved: Offset = (0.0, 0.0, 0.0)
-    half: bool = False
-
-
-@dataclass(frozen=True)
-class View:
-    """One picture. Views of one `eye` and `group` share their scale.
-
-    `syringe_on`: channels that one stands on. `names` stand beside the points that they name; pieces laid out side by
-    side are named by their own names.
-    """
-
-    parts: tuple[Placed, ...]
-    extras: tuple[Extra, ...] = ()
-    eye: Offset = ABOVE
-    group: Literal["moulds", "under", "pieces", "unit"] = "moulds"
-    syringe_on: Shape | None = None
-    names: tuple[Name, ...] = ()
 
 
 def views(moulds: MouldSet) -> dict[str, View]:
@@ -77,6 +48,7 @@ def _views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
     base = tuple(Placed(tool.name) for tool in plan.of_kind("base"))
     yield "pieces", View(tuple(Placed(tool.name) for tool in plan.tools), eye=OVER, group="pieces")
     first, (cup_x, cup_y) = plan.steps[0], plan.layout.cup
+    yield from resin_views(moulds)
     paper, low = draw.paper_in_slit(moulds), plate_top(spec)
     pressed = tuple(
         draw.downward(x * 0.8 * cup_x, y * 0.8 * cup_y, first.rim + 5, 8.0) for x in (1, -1) for y in (1, -1)
@@ -121,7 +93,8 @@ def _views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
         at = moulds.dimensions.outer_radius * 0.8
         arrow = (draw.upward if below else draw.downward)(-at, -2.0, away / 2 + moulds.dimensions.heights[-1] / 2, 5.0)
         eye = UNDER if below else LOW
-        yield "motor-in", View((*cast, *laid), (arrow,), eye, "unit")
+        fed = fed_through(moulds)
+        yield "motor-in", fed or View((*cast, *laid), (arrow,), eye, "unit")
         yield "motor-home", View((*cast, *(Placed(body.name) for body in inside)), eye=eye, group="unit")
 
 
@@ -149,6 +122,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
     home = tuple(Placed(tool.name) for tool in tongues)
     exits, prop = moulds.dimensions.exit, tongue_prop(moulds) if tongues else None
     pads = tuple(Extra(pad, CARD) for pad in prop.pads) if prop else ()
+    tabs = draw.tabs(moulds) if tongues else ()
     if tongues and exits:
         seat = window_length(moulds, step)
         out = tuple(
@@ -163,11 +137,12 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
         cell, side = _nearest_exit(moulds)
         wall = side * lay.cup[0], cell.y - exits.width / 2, exits.high
         greased = Name(f"grease {number(seat, 2)} mm", (wall[0] + side * seat / 2, *wall[1:]))
-        yield "tongue-in", View((*cured, opened, *out), (*arrows, *draw.grease(moulds, step, seat)), names=(greased,))
+        pushed = *arrows, *draw.grease(moulds, step, seat), *draw.tabs(moulds, seat)
+        yield "tongue-in", View((*cured, opened, *out), pushed, names=(greased,))
         marks = draw.pen_marks(moulds) if len(plan.steps) > 1 else ()
         marked = (Name("pen mark", (wall[0] + side * 0.3, *wall[1:])),) if marks else ()
         card = (Name("card", _on_pad(moulds, side)),) if pads else ()
-        yield "tongue-home", View((*cured, opened, *home), (*pads, *marks), names=(*marked, *card))
+        yield "tongue-home", View((*cured, opened, *home), (*pads, *marks, *tabs), names=(*marked, *card))
     closed = (*cured, cup, *home)
     poured, colour = Placed(step.name), layer_colour(step.index - 1)
     if step.lid:
@@ -176,22 +151,30 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
             "lid-on",
             View(
                 (*closed, Placed(step.lid, (0.0, 0.0, lift))),
-                (*pads, draw.grease_on_rim(moulds, step), draw.downward(0.0, beside[1], step.rim + lift / 2, lift)),
+                (
+                    *pads,
+                    *tabs,
+                    draw.grease_on_rim(moulds, step),
+                    draw.downward(0.0, beside[1], step.rim + lift / 2, lift),
+                ),
                 names=(Name("grease", (0.4 * lay.cup[0], 0.8 - lay.cup[1], step.rim)),),
             ),
         )
         closed, held = (*closed, Placed(step.lid)), (*pads, *draw.bands(moulds, step))
         filled = Extra(union(step.channels), colour)
         band = Name("rubber band", (lay.cup[0] - 2.0, 0.0, step.top + 1))
-        yield "lid-held", View(closed, held, names=(band,))
+        yield "lid-held", View(closed, (*held, *tabs), names=(band,))
         sprue, vent = _sprue_and_vent(moulds, step)
         names = Name("sprue", sprue), Name("vent", vent, ring=True)
-        yield "inject", View((*closed, poured), (*held, filled), syringe_on=step.channels[0], names=names)
-        yield "filled", View((*closed, poured), (*held, filled), names=(Name("touch here", vent, ring=True),))
+        yield "inject", View((*closed, poured), (*held, *tabs, filled), syringe_on=step.channels[0], names=names)
+        yield "filled", View((*closed, poured), (*held, *tabs, filled), names=(Name("touch here", vent, ring=True),))
         held = (*held, filled)
     else:
         held = (*pads, *draw.tape(moulds, step))
-        yield "hold", View(closed, held, names=(Name("tape", (6.0 - lay.cup[0], -lay.plate[1], plate_top(spec))),))
+        yield (
+            "hold",
+            View(closed, (*held, *tabs), names=(Name("tape", (6.0 - lay.cup[0], -lay.plate[1], plate_top(spec))),)),
+        )
         thread = cylinder(0.6, step.rim - 1.0, step.rim + 14.0)
         cell = min(lay.cells, key=lambda each: (each.y, each.x))
         reach = (
@@ -214,17 +197,19 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
         )
         yield (
             "pour",
-            View((*closed, poured), (*held, *mounds, Extra(moved(thread, cell.x - 0.5 * reach, cell.y), colour))),
+            View(
+                (*closed, poured), (*held, *tabs, *mounds, Extra(moved(thread, cell.x - 0.5 * reach, cell.y), colour))
+            ),
         )
         blades, strips = _strikers(moulds, step)
         yield (
             "strike",
             View(
                 (*closed, poured, *blades),
-                (*held, *strips, draw.sideways(1, -0.2 * lay.cup[0], 0.0, step.rim + 9.0, lay.cup[0])),
+                (*held, *tabs, *strips, draw.sideways(1, -0.2 * lay.cup[0], 0.0, step.rim + 9.0, lay.cup[0])),
             ),
         )
-        yield "filled", View((*closed, poured), held, names=_touched(moulds, step))
+        yield "filled", View((*closed, poured), (*held, *tabs), names=_touched(moulds, step))
     if tongues:
         out = tuple(Placed(t.name, (t.removal[0] * lay.cup[0], 0.0, 0.0)) for t in tongues if t.removal is not None)
         arrows = tuple(
@@ -234,9 +219,12 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
             for cell in lay.cells
             for side in cell.sides
         )
-        lid = (Placed(step.lid),) if step.lid else ()
+        lid, pulled = (Placed(step.lid),) if step.lid else (), draw.tabs(moulds, lay.cup[0])
         card = (Name("card", _on_pad(moulds, _nearest_exit(moulds)[1])),) if pads else ()
-        yield "tongue-out", View((*cured, cup, *lid, poured, *out), (*held, *arrows), names=card)
+        yield (
+            "tongue-out",
+            View((*cured, cup, *lid, poured, *out), (*held, *arrows, *pulled), names=card),
+        )
     if step.lid:
         lift = step.top - step.rim + 2 * CLEAR
         off = Placed(step.lid, (0.0, 0.0, lift))

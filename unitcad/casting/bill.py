@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Mix
 from unitcad.casting.needs import Need
-from unitcad.casting.tongue_prop import tongue_prop
+from unitcad.casting.tongue_prop import grip_of, tongue_prop
 from unitcad.catalogue import Material, motors
 from unitcad.moulds.base import PRY_HALF_WIDTH
 from unitcad.moulds.mould_set import MouldSet
@@ -118,7 +118,9 @@ def _consumables(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> I
     yield from (Item(need.item, need.quantity, need.unit, need.made, need.note) for need in named)
     if prop := tongue_prop(moulds):
         size = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm, {number(prop.thickness_mm, 3)} mm thick"
-        yield Item("pad of stacked card", len(prop.pads), "piece", "cut", f"{size}: bears the tongues' grips")
+        yield Item(
+            "pad of stacked card", len(prop.pads), "piece", "cut", f"{size}: bears the tongues' {grip_of(moulds)}s"
+        )
     if moulds.spec.casting.vacuum:
         size = f"at least {number(CONTAINER * max(mix.millilitres for mix in mixes), 2)} ml, since silicone foams up"
         yield Item(

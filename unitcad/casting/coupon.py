@@ -19,8 +19,8 @@ import math
 from dataclasses import dataclass
 
 from unitcad.catalogue import Printer
-from unitcad.moulds.layout import PLINTH_DRAFT_DEG
-from unitcad.moulds.ribs import drawn, placed
+from unitcad.designs.rib_leaves import LEAF_WIDTH, farthest_push, leaf_mm, least_skirt
+from unitcad.moulds.ribs import ROOT, SLOPE, SQUARE, drawn, leaf_slots, placed
 from unitcad.shape import Extrude, Profile, Shape, box, cut, cylinder, moved, rounded_rectangle, turned, union
 from unitcad.shape.body import Body
 from unitcad.shape.lettering import HEIGHT, engraving, text_width
@@ -28,19 +28,53 @@ from unitcad.text import number
 
 SHARES = (0.5, 0.75, 1.0, 1.25, 1.5)
 """Of the catalogue's value, station by station."""
-PLUG, PLUG_HEIGHT, CORNER = 4.0, 2.0, 1.0
-"""Half side of the plug at its top, its height, the radius of its corners, mm."""
+CORNER = 1.0
+"""Radius of the plug's corners, mm."""
 RELIEF = 0.5
 """Of a recess below the plug's top: the plug's handle bears, as a cup's seat does."""
-PLATE, PITCH, MARGIN = 6.0, 16.0, 4.0
+PLATE, MARGIN = 6.0, 4.0
 WINDOW_DEPTH, WINDOW_Z = 6.0, 2.0
 TAIL_WIDTH, WALL_LENGTH, WALL_HEIGHT, FILAMENT = 3.0, 8.0, 5.0, 1.75
 _COLOUR, _PLUG_COLOUR, _TONGUE_COLOUR = (0.76, 0.76, 0.76), (0.96, 0.83, 0.66), (0.90, 0.30, 0.30)
-HANDLE, BOSS = 6.0, 3.0
-"""Half side of the plug's handle, and of the boss round a ribbed recess; that boss's height, mm."""
 _ROWS = {"recess": 13.0, "ribs": 30.0, "hole": 22.0, "wall": 28.0, "number": 35.0}
-RIBBED_ROW = 18.0
-"""How much farther back the rows behind the ribbed recesses lie, mm."""
+JAWS = 4.0
+"""Between two plugs' handles, for a caliper's jaws, mm."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """What follows from the ribs' kind, mm: leaves under them need a deeper recess and longer faces.
+
+    `plug` is the half side of the plug at its top, `height` its taper's; `handle` the half side of its handle and of
+    the boss round a ribbed recess, which is `boss` high.
+    """
+
+    plug: float = 4.0
+    height: float = 2.0
+    handle: float = 6.0
+    boss: float = 3.0
+
+    @property
+    def pitch(self) -> float:
+        """Between two stations, mm."""
+        return 2 * self.handle + JAWS
+
+
+def sizes(printer: Printer) -> Sizes:
+    """Return the sizes of the plug, and of what it goes into."""
+    leaf = leaf_mm(printer)
+    if not leaf or not _ribbed(printer):
+        return Sizes()
+    deepest, clearance = SHARES[-1] * float(printer.rib_interference_mm or 0.0), float(printer.plinth_clearance_mm)
+    height = _half_up(least_skirt(leaf, farthest_push(deepest, float(printer.xy_play_mm), clearance)))
+    plug = _half_up(CORNER + LEAF_WIDTH + 2 * leaf)
+    handle = _half_up(plug + height * SLOPE + clearance + 2 * leaf + float(printer.least_wall_mm))
+    return Sizes(plug, height, handle, height + 1.0)
+
+
+def _half_up(length: float) -> float:
+    """Return the next half millimetre beyond a length."""
+    return math.floor(2 * length + 1) / 2
 
 
 @dataclass(frozen=True)
@@ -64,7 +98,8 @@ def fits(printer: Printer) -> tuple[Fit, ...]:
         nominal = float(getattr(printer, key) or 0.0)
         return Fit(feature, key, choose, tuple(round(least + (nominal - least) * share, 4) for share in SHARES))
 
-    ribs = fit("ribs", "rib_interference_mm", "most that the plug is pressed through by hand until it sits")
+    bears = "until it sits, no leaf cracked" if leaf_mm(printer) else "until it sits"
+    ribs = fit("ribs", "rib_interference_mm", f"most that the plug is pressed through by hand {bears}")
     return (
         fit("recess", "plinth_clearance_mm", "least where the plug drops in"),
         *([ribs] if _ribbed(printer) else []),
@@ -80,7 +115,7 @@ def bodies(printer: Printer) -> tuple[Body, ...]:
     made = "cut" if _resin(printer) else "printed"
     return (
         Body("coupon-plate", "tool", "coupon", _plate(printer), _COLOUR),
-        Body("coupon-plug", "tool", "coupon", _plug(), _PLUG_COLOUR),
+        Body("coupon-plug", "tool", "coupon", _plug(sizes(printer)), _PLUG_COLOUR),
         Body("coupon-tongue", "tool", "coupon", _tongue(printer), _TONGUE_COLOUR, made=made),
     )
 
@@ -122,7 +157,7 @@ def to_markdown(printer: Printer) -> str:
         play = number(float(printer.plinth_clearance_mm), 3)
         lines += [
             "",
-            "Ribs: press the plug into each station until its handle lies on the boss; a rib is crushed once only.",
+            f"Ribs: press the plug into each station until its handle lies on the boss; {_once(printer)}.",
             "Then measure across handle and boss together, along x and along y. What exceeds the handle alone is how",
             f"far the plug stands off the middle; without ribs up to {play} mm.",
         ]
@@ -135,6 +170,10 @@ def to_markdown(printer: Printer) -> str:
         "rim, so its window is as high as station 3's or one layer higher, never lower.",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _once(printer: Printer) -> str:
+    return "the leaves under the ribs spring back" if leaf_mm(printer) else "a rib is crushed once only"
 
 
 def _windows(printer: Printer) -> list[tuple[float, float]]:
@@ -156,21 +195,21 @@ def _resin(printer: Printer) -> bool:
 
 def _plate(printer: Printer) -> Shape:
     stroke = float(printer.engraving_stroke_mm)
-    length = PITCH * len(SHARES) + 2 * MARGIN
+    made = sizes(printer)
+    length = made.pitch * len(SHARES) + 2 * MARGIN
     depth = row(printer, "number") + HEIGHT * stroke * SHARES[-1] / 2 + MARGIN
     solids: list[Shape] = [box(0, length, 0, depth, 0, PLATE)]
     tools: list[Shape] = []
     by_feature, windows = {fit.feature: fit.values_mm for fit in fits(printer)}, _windows(printer)
     for i in range(len(SHARES)):
-        x = MARGIN + PITCH * (i + 0.5)
-        tools.append(
-            moved(_taper(by_feature["recess"][i], RELIEF, 0.25), x, row(printer, "recess"), PLATE - PLUG_HEIGHT)
-        )
+        x = station_x(printer, i)
+        recess = _taper(made, by_feature["recess"][i], RELIEF, 0.25)
+        tools.append(moved(recess, x, row(printer, "recess"), PLATE - made.height))
         tools.append(moved(cylinder(by_feature["hole"][i] / 2, -1, PLATE + 1), x, row(printer, "hole")))
         if "ribs" in by_feature:
-            y = row(printer, "ribs")
-            solids.append(box(x - HANDLE, x + HANDLE, y - HANDLE, y + HANDLE, PLATE - 1, PLATE + BOSS))
-            tools.append(moved(_ribbed_recess(printer, by_feature["ribs"][i]), x, y, PLATE + BOSS - PLUG_HEIGHT))
+            y, half, top = row(printer, "ribs"), made.handle, PLATE + made.boss
+            solids.append(box(x - half, x + half, y - half, y + half, PLATE - 1, top))
+            tools.append(moved(_ribbed_recess(printer, made, by_feature["ribs"][i]), x, y, top - made.height))
         half = _tongue_width(printer) / 2 + by_feature["window"][i]
         tools.append(box(x - half, x + half, -1, WINDOW_DEPTH, *windows[i]))
         wall = by_feature["wall"][i] / 2
@@ -182,42 +221,50 @@ def _plate(printer: Printer) -> Shape:
     return cut(union(solids), tools)
 
 
-def _taper(clearance: float, relief: float = 0.0, beyond: float = 0.0) -> Shape:
+def _taper(made: Sizes, clearance: float, relief: float = 0.0, beyond: float = 0.0) -> Shape:
     """Draw the plug's taper upside down, its top at z = 0, wider by `clearance` all round, longer by `relief` below."""
-    square, slope = clearance / math.cos(math.radians(PLINTH_DRAFT_DEG)), math.tan(math.radians(PLINTH_DRAFT_DEG))
 
     def section(height: float) -> Profile:
-        grow = square + height * slope
-        return rounded_rectangle(PLUG + grow, PLUG + grow, CORNER + grow)
+        grow = clearance * SQUARE + height * SLOPE
+        return rounded_rectangle(made.plug + grow, made.plug + grow, CORNER + grow)
 
-    high = PLUG_HEIGHT + beyond
+    high = made.height + beyond
     return Extrude(section(-relief), -relief, high, top=section(high))
 
 
-def _ribbed_recess(printer: Printer, interference: float) -> Shape:
-    """Draw a recess of the catalogue's clearance less its ribs, its mouth at z = `PLUG_HEIGHT`."""
-    clearance, crest = float(printer.plinth_clearance_mm), float(printer.least_feature_mm)
-    standing = placed((PLUG, PLUG), CORNER, -PLUG_HEIGHT, clearance, interference, crest)
-    # As in a cup the ribs are drawn mouth downwards.
-    return cut(
-        _taper(clearance, RELIEF, 0.25), [turned(s, "x", 2) for s in drawn(standing, clearance, interference, crest)]
-    )
+def _ribbed_recess(printer: Printer, made: Sizes, interference: float) -> Shape:
+    """Draw a recess of the catalogue's clearance less its ribs, with their leaves' slots; its mouth is at z = `height`.
+
+    As in a cup, ribs and slots are drawn mouth downwards.
+    """
+    clearance, crest, leaf = float(printer.plinth_clearance_mm), float(printer.least_feature_mm), leaf_mm(printer)
+    half = made.plug, made.plug
+    standing = placed(half, CORNER, -made.height, clearance, interference, crest, leaf)
+    drawings = drawn(standing, clearance, interference, crest, leaf / 2 or ROOT)
+    room = cut(_taper(made, clearance, RELIEF, 0.25), [turned(shape, "x", 2) for shape in drawings])
+    return union((room, *(turned(slot, "x", 2) for slot in leaf_slots(standing, clearance, leaf))))
+
+
+def station_x(printer: Printer, station: int) -> float:
+    """Return where a station (from 0) lies along x, mm."""
+    return MARGIN + sizes(printer).pitch * (station + 0.5)
 
 
 def row(printer: Printer, feature: str) -> float:
     """Return where the stations of a feature lie along y, mm."""
     behind = _ribbed(printer) and feature not in ("recess", "ribs")
-    return _ROWS[feature] + (RIBBED_ROW if behind else 0.0)
+    return _ROWS[feature] + (2 * sizes(printer).handle + 6.0 if behind else 0.0)
 
 
 def _ribbed(printer: Printer) -> bool:
     return float(printer.rib_interference_mm or 0.0) > 0
 
 
-def _plug() -> Shape:
+def _plug(made: Sizes) -> Shape:
     """Draw a plinth on a handle, printed plinth up, as the base's is."""
-    handle = box(-HANDLE, HANDLE, -HANDLE, HANDLE, 0, 4)
-    return union((handle, moved(turned(_taper(0.0), "x", 2), 0, 0, 4 + PLUG_HEIGHT)))
+    half = made.handle
+    handle = box(-half, half, -half, half, 0, 4)
+    return union((handle, moved(turned(_taper(made, 0.0), "x", 2), 0, 0, 4 + made.height)))
 
 
 def _tongue(printer: Printer) -> Shape:

@@ -2,8 +2,9 @@
 
 Without ribs a cup of the clearance c lies anywhere in a square of c to either side: up to c sqrt(2) off, in a gang too,
 since every cell lies between the plinth's faces. With ribs it stands where their forces balance: rib i, at p_i with
-the outward normal n_i, is crushed by d - n_i . u, and its force is that depth times its strength. The balance of forces
-and moments gives the shift u and the turn of the cup; the worst choice of strengths gives the bound. None of this has
+the outward normal n_i, is crushed, or pushed back on its leaf, by d - n_i . u; its force is that times its strength.
+The balance of forces and moments gives the shift u and the turn of the cup; the worst choice of strengths gives the
+bound. None of this has
 been measured: the strengths' spread is assumed, and what the printer makes of the clearance is taken from its play.
 """
 
@@ -19,7 +20,10 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.ribs import Rib, ribs
 
 UNEVEN = 0.3
-"""By how much a rib may be stronger or weaker than the others, as a share (assumed: a line more or less)."""
+"""By how much a rib may be stronger or weaker than the others, as a share.
+
+Assumed: a line more or less; of a leaf, a tenth of its thickness.
+"""
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,8 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     texts = assembly(moulds)
     for i, text in enumerate(texts):
         minutes = fig.LAY_IN_MIN * len(moulds.plan.layout.cells)
-        yield BenchStep("Motor in", text, picture_path("motor-in" if i == 0 else "motor-home"), minutes=minutes)
+        title = f"Motor in, {i + 1} of {len(texts)}" if len(texts) > 1 else "Motor in"
+        yield BenchStep(title, text, picture_path("motor-in" if i == 0 else "motor-home"), minutes=minutes)
     room = moulds.spec.casting.room_c
     cures = {silicone.name: at_room(float(silicone.cure_h), room) for silicone in smeared(texts, silicones)}
     hours = ", ".join(f"{name} {number(hour, 2)} h" for name, hour in cures.items())

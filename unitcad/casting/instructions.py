@@ -10,7 +10,7 @@ from unitcad.casting.bench_views import View, picture_path
 from unitcad.casting.figures import MOST_ERROR_PCT, STRIKE_AGAIN_MIN, Mix, at_room, window_length
 from unitcad.casting.finishing import assembly, holds, lead, shown
 from unitcad.casting.release_agent import agent_faces
-from unitcad.casting.tongue_prop import tongue_prop
+from unitcad.casting.tongue_prop import grip_of, tongue_prop
 from unitcad.catalogue import Material
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -58,7 +58,8 @@ def pour_steps(
     for i, text in enumerate(laid):
         if "the mix" in text and not any("the mix" in each for each in laid[:i]):
             yield from mixed(moulds, silicone, mix, verdict)
-        yield BenchStep("Lay in", text, picture("laid-in") if i == 0 else "", minutes=fig.LAY_IN_MIN * cells)
+        title = f"Lay in, {i + 1} of {len(laid)}" if len(laid) > 1 else "Lay in"
+        yield BenchStep(title, text, picture("laid-in") if i == 0 else "", minutes=fig.LAY_IN_MIN * cells)
     if any(body.kind in ("circuit", "wire") for body in step.inserts):
         yield BenchStep(
             "Grease the lead",
@@ -219,9 +220,10 @@ def _tongue_home(moulds: MouldSet, step: Step, picture: str) -> BenchStep:
     if prop:
         size = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm"
         pads = "a pad" if len(prop.pads) == 1 else "a pad on each side"
+        grip = grip_of(moulds)
         bears = (
-            f" Its grip hangs free: put {pads} of stacked card {number(prop.thickness_mm, 3)} mm thick under "
-            f"{'it' if len(tongues) == 1 else 'the grips'} ({size}; {number(prop.tolerance_mm, 2)} mm more or less "
+            f" Its {grip} hangs free: put {pads} of stacked card {number(prop.thickness_mm, 3)} mm thick under "
+            f"{'it' if len(tongues) == 1 else f'the {grip}s'} ({size}; {number(prop.tolerance_mm, 2)} mm more or less "
             "does no harm: computed, the window's clearance), on the plate, against the cup. It must neither lift the "
             "tongue nor leave air under it. Nothing may lean on its outer end."
         )
@@ -278,8 +280,8 @@ def _cure_and_open(
         yield BenchStep(
             "Tongue out FIRST",
             f"Pull {'the tongue' if len(tongues) == 1 else 'every tongue'} out FIRST, straight along "
-            "itself, by its grip, over the card, with a steady pull. A cup lifted over a tongue tears the layer. Then "
-            "take the card away: it covers the pry slot.",
+            f"itself, by its {grip_of(moulds)}, over the card, with a steady pull. A cup lifted over a tongue tears "
+            "the layer. Then take the card away: it covers the pry slot.",
             picture("tongue-out"),
             minutes=fig.PULL_MIN * len(tongues),
         )

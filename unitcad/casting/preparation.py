@@ -12,16 +12,21 @@ from unitcad.casting.figures import at_room, window_length
 from unitcad.casting.joining import joining
 from unitcad.casting.time_line import duration
 from unitcad.catalogue import Material
+from unitcad.designs.rib_leaves import leaf_mm
+from unitcad.moulds.base import plate_bottom
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.dents import DENT, TILT_DEG
 from unitcad.moulds.layout import BLADE_HEIGHT
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.ribs import ribs
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
+from unitcad.shape.lettering import seen
 from unitcad.spec import printer_of
 from unitcad.text import listed, number, spaced
 
 PERIMETERS = 3
+SPARE = 2.0
+"""What a piece of filament is longer than its way through base and core, mm."""
 FOOT_MM = 0.2
 MORE_PLATES = (
     "Together the pieces are larger than the bed; each one fits it. Let the slicer arrange them on as many plates as "
@@ -79,14 +84,14 @@ def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
 def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Material]) -> Iterator[BenchStep]:
     """Describe the way from the printer to an empty mould; `silicones` are those that a resin may keep from curing."""
     plan, lengths = moulds.plan, moulds.spec.moulds
-    cups, cells = len(plan.steps), len(plan.layout.cells)
+    cups, cells, label = len(plan.steps), len(plan.layout.cells), seen(plan.label)
     marked = listed(["base", "cups", *(["lids"] if plan.of_kind("lid") else [])])
     own = [f"C{step.index:X} is {spaced(step.cup)}" for step in plan.steps]
     own += [f"L{step.index:X} is {spaced(step.lid)}" for step in plan.steps if step.lid]
     yield BenchStep(
         "Sort the pieces",
         f"Print the pieces as they lie in their files, without supports. {marked.capitalize()} are engraved "
-        f"{plan.label}: the base with a B before it, the others with {plan.label[:2]} and {plan.label[2:]} in two "
+        f"{label}: the base with a b before it, the others with {label[:2]} and {label[2:]} in two "
         f"corners and their own number in the third: {listed(own)}.",
         picture_path("pieces"),
         minutes=fig.SORT_MIN,
@@ -102,6 +107,12 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
             f"corners, in a vice between two boards where the hand is too weak: its {len(standing)} ribs are crushed "
             "and centre it from then on. It must sit down"
         )
+        if leaf := leaf_mm(printer_of(moulds.spec)):
+            on = (
+                "Press each cup onto the plinth once, dry, by hand, evenly at all corners: its cut corner lets it on "
+                f"one way only. Its {len(standing)} ribs stand on leaves {number(leaf, 2)} mm thick, which bend and "
+                "centre it; the seat bears it. A leaf that has broken off: print the cup again. It must sit down"
+            )
     if plan.pins:
         fits = (
             "Put each cup over the pins once, dry: one pin stands off the square of the others, which lets the cup on "
@@ -124,14 +135,25 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
         each = "the" if len(plan.layout.cells) == 1 else "each"
         yield BenchStep(
             "Filament in",
-            f"Push {each} straight piece of filament up through the core from below until its end is flush "
-            "with the core's top, and bend what stands out below by a right angle into the groove under the plate: it "
-            "lies on the bench and can't sink. Trim the upper end flush with a knife, so that a fingernail drawn "
-            "across does not catch: what it stands low or proud is a knob or a dent in the cavity.",
+            f"{_bend(moulds)} Push the long leg of {each} piece up through the core from below until the bent end "
+            "lies wholly in the groove under the plate: it rests on the bench and can't sink. Trim the upper end flush "
+            "with the core's top with a knife, so that a fingernail drawn across does not catch: what it stands low or "
+            "proud is a knob or a dent in the cavity.",
             picture_path("filament"),
             minutes=fig.FILAMENT_MIN * cells,
         )
     yield BenchStep("Level the bench", level_text(moulds), picture_path("level"), minutes=fig.LEVEL_MIN)
+
+
+def _bend(moulds: MouldSet) -> str:
+    """Say how a piece of filament gets its bent end."""
+    leg = moulds.plan.dimensions.core_height - plate_bottom(moulds.spec) + SPARE
+    between = " Of a groove that ends under the plate, cut the bent end to its length."
+    inner = between if len({cell.y for cell in moulds.plan.layout.cells}) > 1 else ""
+    return (
+        f"Bend each piece of filament by a right angle {number(leg, 2)} mm from one end, warmed in hot water so that "
+        f"it does not crack ({number(SPARE, 2)} mm of that end are cut off later).{inner}"
+    )
 
 
 def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
@@ -146,7 +168,12 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
             wait_min=fig.DRY_MIN,
         )
         if tunnels(moulds):
-            yield BenchStep("Clear the windows", _clear_tunnels(moulds), minutes=fig.CLEAR_MIN * len(tunnels(moulds)))
+            yield BenchStep(
+                "Clear the windows",
+                _clear_tunnels(moulds),
+                picture_path("clear-windows"),
+                minutes=fig.CLEAR_MIN * len(tunnels(moulds)),
+            )
         yield BenchStep(
             "Post-cure, bake",
             "Resin keeps many platinum silicones from curing: post-cure, bake in an oven (60 degC for "
@@ -237,5 +264,6 @@ def _cut_tongues(moulds: MouldSet) -> Iterator[BenchStep]:
             "of that radius, punched or drilled at the strip's end and cut through its middle, makes it. No burr. Fold "
             f"tape over the last {number(GRIP_LENGTH, 2)} mm of the other end: this tab is what you pull by, with "
             "fingers or flat pliers.",
+            picture_path("cut-tongue"),
             minutes=fig.CUT_MIN * len(tongues),
         )

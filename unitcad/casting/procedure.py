@@ -13,6 +13,7 @@ from unitcad.casting.bill import Item, bill
 from unitcad.casting.eccentricity import UNEVEN, Eccentricity, eccentricity
 from unitcad.casting.figures import Figure, Mix, sourced
 from unitcad.casting.finishing import measurements, motor_in, release
+from unitcad.casting.in_short import STAY
 from unitcad.casting.instructions import pour_steps
 from unitcad.casting.layer_grid import OffGrid, UnitHeight, off_grid, unit_heights
 from unitcad.casting.needs import needs
@@ -20,10 +21,11 @@ from unitcad.casting.preparation import preparation, printing, tunnels
 from unitcad.casting.release_agent import BondFace, Face, agent_faces, bond_faces
 from unitcad.casting.time_line import Phase, phases
 from unitcad.catalogue import Material
+from unitcad.designs.rib_leaves import leaf_mm
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.shape import exact_volume
-from unitcad.spec import Spec
+from unitcad.spec import Spec, printer_of
 from unitcad.text import number
 
 
@@ -256,7 +258,7 @@ def bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix, cells: int) ->
         clears = f"Such bubbles should rise out: {where} for {number(rise, 2)} min."
         brush = "brush a thin coat of the mix now onto all that it will touch, then pour in a thread from one side"
         stand = f"stand the syringe up, its tip up, for {number(allowed, 2)} min, push out the air, and inject slowly"
-        stays = f"Such bubbles stay: get a vacuum, or {stand if step.lid else brush}."
+        stays = f"{STAY}: get a vacuum, or {stand if step.lid else brush}."
         said = f"{stokes} {clears if rise <= allowed else stays}"
     late = work - pot
     slower = f" All this ends {number(late, 2)} min after the pot life: cool the room, or take a slower silicone."
@@ -281,7 +283,8 @@ def _walls(spec: Spec, without: Eccentricity, made: Eccentricity) -> list[Figure
     clearance = number(spec.moulds.plinth_clearance_mm, 3)
     figures = [at_most("without ribs", without, f"clearance of {clearance} mm a side x sqrt 2")]
     if made.ribs:
-        how = f"balance of {made.ribs} ribs that are crushed by {number(spec.moulds.rib_interference_mm, 3)} mm, "
+        pressed = "pushed back on leaves" if leaf_mm(printer_of(spec)) else "crushed"
+        how = f"balance of {made.ribs} ribs that are {pressed} by {number(spec.moulds.rib_interference_mm, 3)} mm, "
         figures.append(at_most("with ribs", made, f"{how}each up to {UNEVEN:.0%} stronger or weaker (assumed)"))
     times = "1 x for Layer 1, 2 x beyond it" if len(spec.layers) > 1 else "1 x"
     source = f"computed: cups up to {number(made.at_worst_mm, 2)} mm off the axis, {times}"

@@ -120,7 +120,7 @@ def _propped(procedure: Procedure) -> Iterator[str]:
     """Bear the grip of every tongue that stands, and look at the ledge only where nothing covers it."""
     for pour in procedure.pours:
         for step in pour.steps:
-            if step.title == "Tongue home" and "Its grip hangs free: put" not in step.text:
+            if step.title == "Tongue home" and " hangs free: put" not in step.text:
                 yield f"pour {pour.index}: nothing bears the tongue's grip"
             if pour.index > 1 and "none under it on the ledge" in step.text:
                 yield f"pour {pour.index}: asks to look at a ledge that Layer 1 covers"

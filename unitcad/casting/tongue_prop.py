@@ -29,6 +29,11 @@ class Prop:
     pads: tuple[Shape, ...]
 
 
+def grip_of(moulds: MouldSet) -> str:
+    """Return what a tongue is pulled by: a printed one's grip, or the tab of tape on one that is cut."""
+    return "tab" if any(tool.made == "cut" for tool in moulds.plan.of_kind("tongue")) else "grip"
+
+
 def tongue_prop(moulds: MouldSet) -> Prop | None:
     """Return the pad under the tongues' grips, one on each side that tongues leave to; None without tongues."""
     lay, exit = moulds.plan.layout, moulds.dimensions.exit

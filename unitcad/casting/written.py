@@ -103,7 +103,7 @@ def _appendix(procedure: Procedure) -> Iterator[str]:
         yield from (f"![pour {pour.index} in section]({pour.drawing})", "", *_figures(pour.figures), "")
     if procedure.walls:
         yield from ("### Walls", "", "How far the cups stand off the core's axis is the largest error of all:", "")
-        yield from (*_figures(procedure.walls), "")
+        yield from (*_figures(procedure.walls, decimals=2), "")
     if procedure.off_grid:
         yield from ("### Edges between two layers", "")
         yield from ("These edges fall between two of the printer's layers; the slicer moves them to the nearest.", "")
@@ -138,8 +138,13 @@ def _merged(regions: list[svg.Region]) -> list[svg.Region]:
     return list(merged.values())
 
 
-def _figures(figures: tuple[Figure, ...]) -> list[str]:
-    rows = [(markdown(f.name), f"{number(f.value, 3)} {f.unit}", markdown(f.source)) for f in figures]
+def _figures(figures: tuple[Figure, ...], decimals: int | None = None) -> list[str]:
+    """Write figures as a table, to three digits each, or to so many `decimals` where they are compared."""
+
+    def value(figure: Figure) -> str:
+        return number(figure.value, 3) if decimals is None else f"{figure.value:.{decimals}f}"
+
+    rows = [(markdown(f.name), f"{value(f)} {f.unit}", markdown(f.source)) for f in figures]
     return _table(("figure", "value", "source"), rows)
 
 

@@ -99,10 +99,11 @@ def _built(
     from unitcad.arrays.array_file import confirm_known, is_array, load_array
     from unitcad.cli.build_summary import array_summary, summary
     from unitcad.cli.output import print_json, progress
-    from unitcad.pipeline.array_build import array_subject, build_array
+    from unitcad.pipeline.array_build import build_array
     from unitcad.pipeline.build import Built
     from unitcad.pipeline.build import build as build_spec
-    from unitcad.pipeline.folder import PAGE, held, subject
+    from unitcad.pipeline.folder import PAGE, held
+    from unitcad.pipeline.subjects import subject_of, unit_of
     from unitcad.validation import load
 
     with _step_process(only, formats) as step:
@@ -118,14 +119,13 @@ def _built(
             from unitcad.pipeline.slicing import begin, check_slicing, finish, take
 
             for spec in wanted:
-                check_slicing(spec.unit if isinstance(spec, Array) else spec, chosen)
+                check_slicing(unit_of(spec), chosen)
         for i, spec in enumerate(wanted):
-            of = array_subject(spec) if isinstance(spec, Array) else subject(spec)
             run = partial(build_array, spec) if isinstance(spec, Array) else partial(build_spec, spec)
             with progress(spec.name) as say:
                 made = partial(run, out, only=chosen, check=not no_check, say=say, step=step)
                 if slicing:
-                    with begin(spec.unit if isinstance(spec, Array) else spec, out / of.folder_name, say) as pieces:
+                    with begin(unit_of(spec), out / subject_of(spec).folder_name, say) as pieces:
                         results.append(made(take=take(pieces)))
                         printing[i] = finish(pieces, results[-1].folder, results[-1].manifest)
                 else:

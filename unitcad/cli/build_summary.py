@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections import defaultdict
+import shlex
 from collections.abc import Iterator
-from pathlib import Path
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_extras import CROSSTALK
 from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.batch.row import row
-from unitcad.casting.time_line import duration
+from unitcad.casting.in_short import in_short
 from unitcad.check.findings import counted
 from unitcad.pipeline.build import Built
 from unitcad.pipeline.folder import PAGE
@@ -32,7 +31,7 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         each = f"{cells} units, each " if cells > 1 else ""
         yield f"{each}{number(spec.diameter_mm, 3)} mm across, {number(height, 3)} mm high{silicone}"
     if manifest["casting"]:
-        yield from _casting(built.folder)
+        yield from in_short(json.loads((built.folder / "casting.json").read_bytes()))
     checks, check = manifest["laws"], manifest["check"]
     if checks:
         passed = sum(entry["ok"] for entry in checks)
@@ -41,7 +40,7 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
     if level := manifest["estimate"]:
         yield level["answer"]
     if (built.folder / PAGE).is_file():
-        yield f"open {built.folder / PAGE}"
+        yield f"open {shlex.quote(str(built.folder / PAGE))}"
 
 
 def array_summary(array: Array, built: Built) -> Iterator[str]:
@@ -50,7 +49,7 @@ def array_summary(array: Array, built: Built) -> Iterator[str]:
     size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
     yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {number(array.sheet.thickness_mm, 3)} mm thick"
     if manifest["casting"]:
-        yield from _casting(built.folder)
+        yield from in_short(json.loads((built.folder / "casting.json").read_bytes()))
     if checks := manifest["laws"]:
         check, passed = manifest["check"], sum(entry["ok"] for entry in checks)
         files = f"{check['errors']} errors and {check['warnings']} warnings in the files"
@@ -59,16 +58,4 @@ def array_summary(array: Array, built: Built) -> Iterator[str]:
     if "estimate" in manifest["outputs"] and crosstalk.is_file():
         yield from crosstalk_lines(json.loads(crosstalk.read_bytes()))[:2]
     if (built.folder / PAGE).is_file():
-        yield f"open {built.folder / PAGE}"
-
-
-def _casting(folder: Path) -> Iterator[str]:
-    procedure = json.loads((folder / "casting.json").read_bytes())
-    grams: dict[str, float] = defaultdict(float)
-    for item in procedure["bill"]:  # the pours' own, and of an array with pockets those of the units
-        if item["unit"] == "g":
-            grams[item["item"].removesuffix(" part A").removesuffix(" part B")] += item["quantity"]
-    total, bench = duration(procedure["earliest_finish_min"]), duration(procedure["bench_min"])
-    pours = len(procedure["pours"])
-    yield f"{pours} pour{'s' if pours > 1 else ''}, ready {total} after the print, of which {bench} at the bench"
-    yield "to mix: " + ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams.items())
+        yield f"open {shlex.quote(str(built.folder / PAGE))}"

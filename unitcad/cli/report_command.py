@@ -18,9 +18,11 @@ def report(
     """Write one offline page for what a folder holds. The last line printed is the page."""
     from unitcad.cli.output import print_json, progress, warn
     from unitcad.report import write_report
+    from unitcad.report.read_results import check_casts
 
     allow_code(code)
     with progress(str(folder)) as say:
+        check_casts(folder)
         say("page")
         page = write_report(folder, warn)
     if as_json:

@@ -10,8 +10,9 @@ from collections.abc import Callable
 
 from unitcad import catalogue
 from unitcad.designs.dimensions import MOTOR_CLEARANCE, WIRE_GAP, Dimensions, Exit
+from unitcad.designs.rib_leaves import farthest_push, leaf_mm, least_skirt
 from unitcad.errors import Refusal
-from unitcad.spec import Spec
+from unitcad.spec import Spec, printer_of
 from unitcad.spec.asked import FpcbTable, WiresTable
 from unitcad.spec.effective import Circuit
 
@@ -129,14 +130,23 @@ def check_seat(spec: Spec) -> None:
 
 
 def check_ribs(spec: Spec) -> None:
-    """Raise Refusal for ribs that reach so far into the plinth that they would hold the cup off its seat."""
-    line = float(catalogue.printers(spec.printers)[spec.moulds.printer].least_feature_mm)
+    """Raise Refusal for ribs that would hold the cup off its seat, and for leaves under them too short to bend."""
+    moulds, printer = spec.moulds, printer_of(spec)
+    line, leaf = float(printer.least_feature_mm), leaf_mm(printer)
     at_most(
         "moulds.rib_interference_mm",
         spec.moulds.rib_interference_mm,
         line / 2,
-        f"a rib is as wide as a printed line of {line:g} mm and is crushed by half of that",
+        f"a rib is as wide as a printed line of {line:g} mm and reaches into the plinth by half of that",
     )
+    if leaf and moulds.rib_interference_mm:
+        pushed = farthest_push(moulds.rib_interference_mm, moulds.xy_play_mm, moulds.plinth_clearance_mm)
+        at_least(
+            "moulds.plinth_height_mm",
+            moulds.plinth_height_mm,
+            least_skirt(leaf, pushed) + moulds.seat_relief_mm,
+            f"leaves of resin {leaf:g} thick, pushed aside by up to {pushed:.3g} mm by ribs, need a plinth of",
+        )
 
 
 def check_filament(spec: Spec, dims: Dimensions) -> None:

@@ -1,9 +1,9 @@
-"""C220: what centres a cup on its plinth bears on three faces or more, crushes as little as is asked for, and stays
-off the seat.
+"""C220: what centres a cup on its plinth bears on three faces or more, as deep as is asked for, and stays off the seat.
 
 Measured on the meshes: the patches in which cup and base overlap halfway up the ribs' crests. A patch's narrowest
 extent is the interference, and its direction that of the face that the rib bears on. Where the directions leave less
-than half a turn between any two neighbours, no way is left for the cup to slip aside. A cup without ribs has a play.
+than half a turn between any two neighbours, no way is left for the cup to slip aside. Ribs of resin stand on leaves:
+these must bend without breaking, and into the slot behind them. A cup without ribs has a play.
 """
 
 from __future__ import annotations
@@ -15,11 +15,14 @@ from itertools import pairwise
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
+from unitcad.designs.rib_leaves import MOST_STRAIN, farthest_push, leaf_mm, leaf_strain
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least, at_most
+from unitcad.mould_checks.leaves import thickest_leaf
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.ribs import SQUARE, ribs
 from unitcad.shape.profile import GRID_PER_MM
+from unitcad.spec import printer_of
 
 FACES = 3
 """Faces that ribs bear on, at least: fewer leave a way to slip aside."""
@@ -65,6 +68,21 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         room = -shared.bounding_box()[5] if not shared.is_empty() else -standing[0].head
         advice = "what is crushed there lifts the cup off its seat"
         yield at_least("C220", f"{where}: from the seat down to a rib", room, -standing[0].head - GRID, "mm", advice)
+        if leaf_mm(printer_of(moulds.spec)):
+            yield from _bending(moulds, step.cup, max(depths), -room)
+
+
+def _bending(moulds: MouldSet, cup: str, depth: float, contact: float) -> Iterator[MouldFinding]:
+    """Measure how far a cup's leaves are strained, and whether they find room, where ribs bear up to z = `contact`."""
+    lengths, standing = moulds.spec.moulds, ribs(moulds.spec, moulds.plan.layout)
+    leaf = thickest_leaf(moulds.solids[cup], standing, lengths.plinth_clearance_mm)
+    pushed, arm = farthest_push(depth, lengths.xy_play_mm, lengths.plinth_clearance_mm), leaf.root - contact
+    strain = leaf_strain(leaf.thickness, pushed, arm) if arm > 0 else math.inf
+    advice = "the leaf under a rib breaks: it is too thick, or its slot too short"
+    yield at_most("C220", f"{cup}: strain at the root of a rib's leaf", 100 * strain, 100 * MOST_STRAIN, "%", advice)
+    # The straight part below the contact turns with it.
+    end = pushed * (1 + 1.5 * (contact - standing[0].foot) / arm) if arm > 0 else math.inf
+    yield at_least("C220", f"{cup}: room behind a rib's leaf", leaf.room, end, "mm")
 
 
 def _patches(cup: Manifold, base: Manifold, level: float) -> list[tuple[float, float]]:
@@ -121,5 +139,5 @@ def _travel(wall: CrossSection, plinth: CrossSection, way: tuple[int, int]) -> f
 
 
 CHECK = MouldCheck(
-    "C220", "centring: ribs bear on three faces, are crushed as asked for and stay off the seat", findings
+    "C220", "centring: ribs bear on three faces, as deep as asked for, stay off the seat and break no leaf", findings
 )

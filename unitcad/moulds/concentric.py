@@ -33,7 +33,8 @@ def concentric(spec: Spec, cast: Sequence[Shape]) -> Tooling:
         tools.append(cup_piece(i + 1, cup(spec, dims, lay, i)))
         if injected:
             tools.append(lid_piece(i + 1, lid.lid(spec, dims, lay, i)))
-    tools += tongue_pieces(tongues(dims, lay), brittle=printer_of(spec).technology.value == "sla")
+    brittle = printer_of(spec).technology.value == "sla"
+    tools += tongue_pieces(tongues(dims, lay, cut=brittle), brittle)
     if design.suction:
         tools += stub_pieces([filament.stub(spec, dims, lay, cell, plate_bottom(spec)) for cell in lay.cells])
     if not injected:

@@ -10,8 +10,8 @@ from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.moulds.base import outline, plate_bottom, plate_top, tapered
 from unitcad.moulds.layout import MARK
-from unitcad.moulds.ribs import SQUARE, rib_shapes
-from unitcad.shape import Extrude, Shape, box, cut, cylinder, moved, ring
+from unitcad.moulds.ribs import SQUARE, rib_shapes, slot_shapes
+from unitcad.shape import Extrude, Shape, box, cut, cylinder, moved, ring, union
 from unitcad.spec import Spec, printer_of
 
 EPS = 1e-6
@@ -39,9 +39,10 @@ def skirt_end(spec: Spec) -> float:
 
 def recess(spec: Spec, lay: Layout) -> Shape:
     """Draw the cup's recess: the plinth's taper, wider by the printer's clearance measured square to its sides, less
-    the ribs that centre the cup.
+    the ribs that centre the cup, and the slots round the leaves that ribs of resin stand on.
     """
-    return cut(tapered(lay, spec.moulds.plinth_clearance_mm * SQUARE, skirt_end(spec)), rib_shapes(spec, lay))
+    room = cut(tapered(lay, spec.moulds.plinth_clearance_mm * SQUARE, skirt_end(spec)), rib_shapes(spec, lay))
+    return union((room, *slots)) if (slots := slot_shapes(spec, lay)) else room
 
 
 def grooves(spec: Spec, dims: Dimensions, lay: Layout, layer: int) -> list[Shape]:

@@ -1,4 +1,4 @@
-r"""Crush ribs: what centres a cup on its plinth. Two stand on each face of its recess, level with those opposite.
+r"""Ribs: what centres a cup on its plinth. Two stand on each face of its recess, level with those opposite.
 
       plan, from above                  section of a rib
     .--v-----------v--.                      seat
@@ -12,6 +12,16 @@ r"""Crush ribs: what centres a cup on its plinth. Two stand on each face of its 
 The plinth is tapered, so a rib meets it only when the cup is nearly down, along its whole crest at once. Opposite ribs
 are crushed alike, which leaves the cup in the middle; pairs hold it against turning too. They stand as far from the
 axes as the cut corner lets them: for leverage, and clear of tails, which leave along x.
+
+Ribs of resin would chip. Each stands low on a leaf of the skirt, which a slot from below frees behind and on both
+sides; the leaf bends, and nothing is crushed:
+
+      plan of a face, from above
+    ----.  .---.  .----
+    wall|  |   |  |wall      slot, open downwards
+        |  '---'  |
+        |  leaf   |          its thickness and the slot's width: the printer's least wall
+    ----'----v----'----      recess
 """
 
 from __future__ import annotations
@@ -19,9 +29,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from unitcad.designs.parts import BEYOND
+from unitcad.designs.rib_leaves import CREST, LEAF_WIDTH, leaf_mm
 from unitcad.designs.tooling import Layout
 from unitcad.moulds.layout import CORNER_RADIUS, PLINTH_DRAFT_DEG
-from unitcad.shape import Extrude, Profile, Shape, box, polygon
+from unitcad.shape import Extrude, Profile, Shape, box, polygon, union
 from unitcad.spec import Spec, printer_of
 
 ROOF = 1.5
@@ -57,19 +69,29 @@ def ribs(spec: Spec, lay: Layout) -> tuple[Rib, ...]:
     crest = float(printer_of(spec).least_feature_mm)
     end = -moulds.plinth_height_mm + moulds.seat_relief_mm
     corner = max(lay.key, CORNER_RADIUS)
-    return placed(lay.plinth, corner, end, moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest)
+    leaf = leaf_mm(printer_of(spec))
+    return placed(lay.plinth, corner, end, moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest, leaf)
 
 
 def placed(
-    half: tuple[float, float], corner: float, end: float, clearance: float, interference: float, crest: float
+    half: tuple[float, float],
+    corner: float,
+    end: float,
+    clearance: float,
+    interference: float,
+    crest: float,
+    leaf: float = 0.0,
 ) -> tuple[Rib, ...]:
     """Return the ribs round a plinth of half sizes `half` at z = 0 whose cup's skirt ends at z = `end`, mm.
 
-    `corner` is how much of a face a corner takes; () where the corners leave no room.
+    `corner` is how much of a face a corner takes; () where the corners leave no room. `leaf`: the thickness of what
+    carries a rib, 0 for the wall itself.
     """
     proud, skirt = (clearance + interference) * SQUARE, -end
-    beside = crest / 2 + proud + ROOT
+    beside = LEAF_WIDTH / 2 + leaf if leaf else crest / 2 + proud + ROOT
     ramp, roof, head = min(proud, skirt / 4), min(ROOF * proud, skirt / 4), -skirt / 5
+    if leaf:
+        ramp, roof, head = min(ramp, CREST / 4), min(roof, CREST / 2), end + CREST
     x, y = (size - corner - beside for size in half)
     if not interference or min(x, y) <= beside:
         return ()
@@ -102,10 +124,41 @@ def _section(rib: Rib, tip: float, back: float, narrow: float, wide: float, z: f
     return polygon(*((rib.x + nx * (d + face) - ny * t, rib.y + ny * (d + face) + nx * t) for d, t in corners))
 
 
+def leaf_slots(standing: tuple[Rib, ...], clearance: float, leaf: float, top: float = 0.0) -> list[Shape]:
+    """Draw the slots that free a leaf of thickness `leaf` behind each rib, up to z = `top`; none without leaves."""
+    if not leaf:
+        return []
+    face, side, shapes = -clearance * SQUARE, LEAF_WIDTH / 2, []
+    back, behind = face - leaf * SQUARE, face - 2 * leaf * SQUARE
+    for rib in standing:
+        low = rib.foot - BEYOND
+        for near, far, t0, t1 in (
+            (back, behind, -side - leaf, side + leaf),
+            (face + BEYOND, behind, -side - leaf, -side),
+            (face + BEYOND, behind, side, side + leaf),
+        ):
+            lower, upper = (_strip(rib, near, far, t0, t1, z) for z in (low, top))
+            shapes.append(Extrude(lower, low, top, top=upper))
+    return shapes
+
+
+def _strip(rib: Rib, near: float, far: float, t0: float, t1: float, z: float) -> Profile:
+    """Draw a strip along a rib's face at z, `near` to `far` inwards of the plinth, `t0` to `t1` along it."""
+    (nx, ny), face = rib.inwards, z * SLOPE
+    corners = ((near, t0), (near, t1), (far, t1), (far, t0))
+    return polygon(*((rib.x + nx * (d + face) - ny * t, rib.y + ny * (d + face) + nx * t) for d, t in corners))
+
+
+def slot_shapes(spec: Spec, lay: Layout) -> list[Shape]:
+    """Draw the slots round the leaves of every cup of a set; none where its ribs stand on the wall itself."""
+    slots = leaf_slots(ribs(spec, lay), spec.moulds.plinth_clearance_mm, leaf_mm(printer_of(spec)))
+    return [union(slots)] if slots else []
+
+
 def rib_shapes(spec: Spec, lay: Layout) -> list[Shape]:
     """Draw the ribs of every cup of a set, reaching into plinth and wall."""
     moulds = spec.moulds
-    root = min(ROOT, moulds.skirt_wall_mm / 2)
+    root = min(ROOT, moulds.skirt_wall_mm / 2, (leaf_mm(printer_of(spec)) or moulds.skirt_wall_mm) / 2)
     crest = float(printer_of(spec).least_feature_mm)
     return drawn(ribs(spec, lay), moulds.plinth_clearance_mm, moulds.rib_interference_mm, crest, root)
 

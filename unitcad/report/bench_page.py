@@ -19,7 +19,7 @@ from unitcad.report.html_page import html_page
 from unitcad.report.records import expect
 from unitcad.report.step_pictures import step_pictures
 from unitcad.report.viewer_models import spec_in
-from unitcad.spec import spec_hash, to_data
+from unitcad.spec import Spec, spec_hash, to_data
 
 PROGRAMS = ("dom.js", "glb.js", "bench.js")
 STYLES = ("app/page.css", "app/bench.css")
@@ -36,11 +36,19 @@ class ListedStep(msgspec.Struct):
     wait_min: float
 
 
+class ListedFigure(msgspec.Struct):
+    """A figure of a pour."""
+
+    name: str
+    value: float
+
+
 class ListedPour(msgspec.Struct):
     """A pour of casting.json."""
 
     index: int
     material: str
+    figures: list[ListedFigure]
     part_a_g: float
     part_b_g: float
     pot_life_min: float
@@ -107,6 +115,7 @@ def write_bench(folder: Path) -> Path | None:
         "hash": spec_hash(spec)[:HASH_DIGITS] if spec else _hash(folder),
         "room_c": spec.casting.room_c if spec else None,
         "scale_g": spec.casting.scale_resolution_g if spec else None,
+        "asked": _asked(folder, casting, spec),
         "record": {"format": FORMAT, "version": 1, "ending": ENDING},
         "pictures": step_pictures(folder, _paths(casting)),
         "slicer": _slicer(folder),
@@ -115,6 +124,23 @@ def write_bench(folder: Path) -> Path | None:
     text = html_page(content, f"{casting.name}: bench", PROGRAMS, STYLES, (), "Without a script, read casting.md.")
     files.write(target, text.encode("utf-8", "replace"))
     return target
+
+
+def _asked(folder: Path, casting: CastingFile, spec: Spec | None) -> dict[str, Any]:
+    """Return what a unit should measure, mm and g: the page refuses what lies far from it. {} where it is not known."""
+    if spec is None:
+        return {}
+    manifest = files.read_json(folder / "manifest.json", links=False)
+    expect(manifest, Manifest, folder / "manifest.json")
+    cast = [part["bbox_mm"] for part in manifest["parts"] if part["role"] == "unit" and part["made"] == "cast"]
+    figures = [{figure.name: figure.value for figure in pour.figures} for pour in casting.pours]
+    grams = [each.get("volume of one layer", 0.0) * each.get("density", 0.0) / 1000 for each in figures]
+    return {
+        "height_mm": max(box[5] for box in cast) - min(box[2] for box in cast) if cast else None,
+        "diameter_mm": spec.diameter_mm,
+        "mass_g": sum(grams) if all(grams) else None,
+        "walls_mm": [layer.wall_mm for layer in spec.layers],
+    }
 
 
 def _hash(folder: Path) -> str:

@@ -126,6 +126,16 @@ def _casts(listed: list[str]) -> list[str]:
     return [path for path in listed if path.endswith(ENDING) and "/" not in path][:MOST_CASTS]
 
 
+def check_casts(folder: Path) -> None:
+    """Raise UnitcadError, a line for each, for damaged cast records in a result, or in those of a batch."""
+    damage: list[str] = []
+    for path in [*sorted(folder.glob(f"*{ENDING}")), *sorted(folder.glob(f"*/*{ENDING}"))]:
+        if is_variant(path.parent):
+            _sound(lambda file=path: _cast(file), damage)
+    if damage:
+        raise UnitcadError("\n".join(damage))
+
+
 def _cast(path: Path) -> dict[str, Any]:
     """Read a cast record, without the spec in it: the page has the variant's own."""
     try:

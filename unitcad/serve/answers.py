@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import time
 import tomllib
-from collections import defaultdict
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,6 @@ from unitcad.serve.form import groups
 from unitcad.serve.messages import Answer, Ask, Fault, Trusted
 from unitcad.spec import Spec, to_data, to_toml
 from unitcad.spec.custom_code import files_named, is_allowed, is_body_file
-from unitcad.text import number
 from unitcad.validation import from_data
 from unitcad.validation.load import all_faults
 
@@ -128,8 +127,8 @@ def _grams(spec: Spec, volumes: list[float]) -> list[float]:
 
 
 def _moulds(spec: Spec, answer: Answer) -> None:
+    from unitcad.casting.in_short import in_short
     from unitcad.casting.procedure import procedure
-    from unitcad.casting.time_line import duration
     from unitcad.mould_checks import check_moulds
     from unitcad.moulds.mould_set import MouldSet
     from unitcad.pipeline.bodies import glb_content, is_printed
@@ -147,15 +146,7 @@ def _moulds(spec: Spec, answer: Answer) -> None:
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
     printed = sum(solids[tool.name].volume() for tool in plan.tools if is_printed(tool))
     made = procedure(moulds, [solids[step.name].volume() for step in plan.steps], printed)
-    grams: dict[str, float] = defaultdict(float)
-    for pour in made.pours:
-        grams[pour.material] += pour.part_a_g + pour.part_b_g
-    pours = len(made.pours)
-    total, bench = duration(made.earliest_finish_min), duration(made.bench_min)
-    answer.lines = [
-        f"{pours} pour{'s' if pours > 1 else ''}, ready {total} after the print, of which {bench} at the bench",
-        "to mix: " + ", ".join(f"{number(mass, 3)} g of {name}" for name, mass in grams.items()),
-    ]
+    answer.lines = list(in_short(asdict(made)))
 
 
 def _estimate(spec: Spec, answer: Answer) -> None:

@@ -56,6 +56,11 @@ def engraving(text: str, stroke: float, z0: float, z1: float) -> Shape:
     )
 
 
+def seen(text: str) -> str:
+    """Return a text as its bars look: B and D are those of small letters, or they would be 8 and 0."""
+    return text.replace("B", "b").replace("D", "d")
+
+
 def text_width(text: str, stroke: float) -> float:
     """Width of the engraved text in mm."""
     return (len(text) * PITCH - 1) * stroke

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from importlib.util import find_spec
+from typing import Any
 
 from msgspec import structs
 
@@ -11,6 +12,7 @@ from unitcad import catalogue
 from unitcad.catalogue.entries import Drive
 from unitcad.designs import Design, design_of
 from unitcad.designs.limits import check_ribs, least_slot
+from unitcad.designs.rib_leaves import farthest_push, leaf_mm, least_skirt
 from unitcad.errors import Refusal
 from unitcad.spec import Spec
 from unitcad.spec.asked import DEFAULT_MOTOR, AskedSpec, Format
@@ -23,7 +25,7 @@ UNKNOWN_MOTOR = {"frequency_hz": 125.0, "amplitude_um": 300.0}
 UNKNOWN_DRIVE: Drive = "flat"
 """A coin ERM's, as the paper's motor is."""
 _BASE = {"plinth_height_mm": 2.0, "plate_mm": 4.0}
-"""The base's heights, before they end whole layers, mm."""
+"""The base's heights, before they end whole layers, mm; a plinth is higher where the leaves of resin cups need it."""
 _PRINTER_LENGTHS = tuple(f for f in Moulds.__struct_fields__ if f in catalogue.Printer.__struct_fields__)
 
 
@@ -108,9 +110,20 @@ def _moulds(asked: AskedSpec, design: Design) -> Moulds:
         lengths["slot_height_mm"] = max(lengths["slot_height_mm"], least)
     layer = asked.moulds.layer_mm or lengths["layer_mm"]
     lengths |= {name: least for name, least in _BASE.items() if given[name] is None}
+    if "plinth_height_mm" in lengths:
+        lengths["plinth_height_mm"] = max(lengths["plinth_height_mm"], _for_leaves(printer, {**given, **lengths}))
     for name in {"slot_height_mm", *_BASE} & lengths.keys():
         lengths[name] = round(math.ceil(lengths[name] / layer - 1e-6) * layer, 9)
     return Moulds(**{**given, **lengths})
+
+
+def _for_leaves(printer: catalogue.Printer, lengths: dict[str, Any]) -> float:
+    """Return the plinth that leaves of resin need to bend as far as they must, mm; 0 without any."""
+    leaf, depth = leaf_mm(printer) and lengths["least_wall_mm"], lengths["rib_interference_mm"]
+    if not leaf or not depth:
+        return 0.0
+    pushed = farthest_push(depth, lengths["xy_play_mm"], lengths["plinth_clearance_mm"])
+    return least_skirt(leaf, pushed) + lengths["seat_relief_mm"]
 
 
 def _circuit(asked: AskedSpec, design: Design, motor: MotorSize) -> Circuit | None:

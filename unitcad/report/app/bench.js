@@ -7,6 +7,8 @@
   // Of two printed pages in mm²: all, a letter, a step's title, a pour's lines to write on, a unit's, head and schedule; and widths in mm.
   const PAPER = { mm2: 2 * 190 * 277 * 0.86, letter: 5, title: 220, pour: 1500, unit: 900, page: 5000, most: 36, least: 22 };
   const LIMITS = { grams: [1e-4, 1e5], mm: [0.01, 1000] };
+  // How far from what is asked a measured length or mass may lie: beyond it a digit or a point is wrong.
+  const FACTOR = 3;
   let data, key, state;
 
   // What a person has entered, kept in the browser: a reload and a locked screen lose nothing, since every time is absolute.
@@ -45,21 +47,45 @@
     return `${day(time)}T${two(at.getHours())}:${two(at.getMinutes())}:${two(at.getSeconds())}${off < 0 ? "-" : "+"}${two(Math.floor(size / 60))}:${two(size % 60)}`;
   }
 
+  // What a field's value should be, where the spec says it.
+  function asked(name) {
+    const [, what, layer] = name.match(/^u\d+\.(height|mass|d|w)(\d*)/) || [];
+    const known = { height: data.asked.height_mm, mass: data.asked.mass_g, d: data.asked.diameter_mm, w: (data.asked.walls_mm || [])[layer - 1] };
+    return known[what] || null;
+  }
+
+  function limits(name, kind) {
+    const [least, most] = LIMITS[kind], near = asked(name);
+    return near ? [Math.max(least, near / FACTOR), Math.min(most, near * FACTOR)] : [least, most];
+  }
+
   // A decimal comma is a point. Nothing is null, what is no number within the limits undefined.
   function value(name, kind) {
     const text = (state.fields[name] || "").trim().replace(",", ".");
     if (!text) return null;
-    const given = Number(text), [least, most] = LIMITS[kind];
+    const given = Number(text), [least, most] = limits(name, kind);
     return Number.isFinite(given) && given >= least && given <= most ? given : undefined;
   }
 
+  function wrongWords(name, kind, unit) {
+    const [least, most] = limits(name, kind), near = asked(name);
+    return `must be ${number(least, 3)} to ${number(most, 3)} ${unit}${near ? `: ${number(near, 3)} ${unit} is asked` : ""}`;
+  }
+
   function field(name, label, unit, kind) {
+    const said = el("span", { className: "limit" });
+    const judge = () => {
+      const wrong = value(name, kind) === undefined;
+      input.setAttribute("aria-invalid", String(wrong));
+      said.textContent = wrong ? wrongWords(name, kind, unit) : "";
+    };
     const input = el("input", { type: "text", inputmode: "decimal", name, autocomplete: "off", value: state.fields[name] || "", oninput: () => {
       state.fields[name] = input.value;
-      input.setAttribute("aria-invalid", String(value(name, kind) === undefined));
+      judge();
       keep();
     } });
-    return el("label", { className: "field" }, el("span", {}, label), el("span", { className: "value" }, input, ` ${unit}`));
+    judge();
+    return el("label", { className: "field" }, el("span", {}, label), el("span", { className: "value" }, input, ` ${unit}`), said);
   }
 
   function words(name, label) {

@@ -7,11 +7,12 @@
 
   // Three digits: what a scale, a caliper or a clock on the bench shows.
   const shown = (value) => (typeof value === "number" ? number(value, 3) : value);
-  const quantity = (figure) => `${number(figure.value, 3)} ${figure.unit || ""}`.trim();
+  const quantity = (figure, decimals) => `${decimals === undefined ? number(figure.value, 3) : figure.value.toFixed(decimals)} ${figure.unit || ""}`.trim();
 
-  function figures(list, summary) {
+  // So many decimals where lengths are compared.
+  function figures(list, summary, decimals) {
     if (!list || !list.length) return null;
-    const rows = list.map((figure) => [figure.name, quantity(figure), figure.source]);
+    const rows = list.map((figure) => [figure.name, quantity(figure, decimals), figure.source]);
     const sources = table(["Figure", "Value", "Source"], rows, { label: summary });
     return el("details", {}, el("summary", {}, summary), sources);
   }
@@ -93,7 +94,7 @@
       (data.pours || []).map(pour),
       titled("Out of the mould", steps(data.release)),
       titled("Motor in", steps(data.assembly)),
-      titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text))), figures(data.walls, "What the cups' play does to the walls")),
+      titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text))), figures(data.walls, "What the cups' play does to the walls", 2)),
       titled("Printing", printing(variant.slicer)),
       titled("Needed", data.bill && table(["Item", "Quantity", "Made", "Note"], data.bill.map((row) => [partName(row.item), `${number(row.quantity, 3)} ${row.unit}`, row.made, row.note]), { label: "Bill of materials" })));
   }
