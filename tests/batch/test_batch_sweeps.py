@@ -231,3 +231,18 @@ def test_asked_wrongly(words: list[str], message: str, tmp_path: Path) -> None:
     assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.glob("out*"))
+
+
+def test_a_fault_of_a_base_s_file_is_said_with_file_and_line(tmp_path: Path) -> None:
+    """Not that of a swept value, nor of one that --set gives."""
+    text = 'name = "x"\ndiameter_mm = 14\n[moulds]\nland_mm = -1\n[motor]\nthickness_mm = "thick"\n'
+    layers = '[[layers]]\nmaterial = "ecoflex-00-10"\nwall_mm = 1.25\ncap_mm = 1.25\n'
+    (tmp_path / "base.toml").write_text(text + 2 * layers)
+    (tmp_path / "s.toml").write_text('base = "base.toml"\n[sweep]\ndiameter_mm = [-3, 14]\n')
+    sweep = load_sweep(tmp_path / "s.toml").overridden(["moulds.land_mm=-2"])
+    with pytest.raises(Refusal) as refused:
+        sweep.spec(0)
+    said = sweep.faults(0, refused.value)
+    assert f"{tmp_path / 'base.toml'}:6: motor.thickness_mm = 'thick'" in said
+    assert "; and moulds.land_mm = -2" in said
+    assert said.startswith("diameter_mm = -3") or "; and diameter_mm = -3" in said

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from unitcad.casting.cast_record import FORMAT, cast_record, read_cast_record, spec_of, to_json
-from unitcad.cli import app
+from unitcad.cli import app, main
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.spec import spec_hash, to_data
 from unitcad.validation import load
@@ -117,3 +117,20 @@ def test_the_schema_is_offered() -> None:
     schema = json.loads(done.stdout)
     assert schema["title"] == "unitcad cast record"
     assert {"part_a_g", "pot_life_min", "cure_h"} <= schema["$defs"]["CastPour"]["properties"].keys()
+
+
+@pytest.mark.parametrize(("text", "said"), [("{", "JSON"), ('{"format": "x"}', "format"), ("[]", "no table")])
+def test_report_refuses_a_folder_with_a_damaged_record(
+    text: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The record is what somebody put there: its fault is an error that names it, and no page is written."""
+    (tmp_path / "manifest.json").write_text("{}")
+    (tmp_path / "a-2026-03-14.cast.json").write_text(text)
+    monkeypatch.setattr("sys.argv", ["unitcad", "report", str(tmp_path)])
+    with pytest.raises(SystemExit) as left:
+        main()
+    error = capsys.readouterr().err
+    assert left.value.code == 2
+    assert "a-2026-03-14.cast.json" in error
+    assert said in error
+    assert not (tmp_path / "report.html").exists()

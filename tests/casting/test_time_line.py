@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import pytest
 
 from unitcad.casting.bench_step import BenchStep
+from unitcad.casting.in_short import in_short
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.time_line import duration, phases
 from unitcad.moulds.mould_set import MouldSet
@@ -88,3 +91,16 @@ def test_bubbles_rise_in_the_mould_before_it_is_struck_off() -> None:
 )
 def test_durations_in_words(minutes: float, text: str) -> None:
     assert duration(minutes) == text
+
+
+def test_in_short_names_the_pours_whose_bubbles_stay() -> None:
+    """Ecoflex 00-10 and Dragon Skin 30 as the verdicts of their pours have it; nothing is said with a vacuum."""
+    made = casting("encapsulating", "casting.vacuum=false")
+    *_, last = in_short(asdict(made))
+    stay = [pour for pour in made.pours if "Such bubbles stay" in pour.verdict]
+    assert stay
+    assert last.startswith("warning: without a vacuum bubbles stay in pour ")
+    assert all(f"pour {pour.index} ({pour.material})" in last for pour in stay)
+    lines = list(in_short(asdict(casting("encapsulating"))))
+    assert lines[1:] == ["to mix: 2 g of ecoflex-00-10, 2 g of dragon-skin-30"]
+    assert lines[0].startswith("2 pours, ready ")
