@@ -86,6 +86,7 @@ def arrays() -> dict[str, bytes]:
             for kind, files in drawn.items()
             for name, path in ARRAY_PICTURES.items()
         },
+        "array-band-worn.png": band["pictures/patch-worn.png"],
         "array-band-tools.png": band["pictures/tools.png"],
         "array-crosstalk.svg": maps["crosstalk.svg"],
         "array-crosstalk-patch.svg": maps["crosstalk-patch.svg"],

@@ -11,7 +11,11 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.bending import bending
 from unitcad.arrays.crosstalk_matrix import pairs
 from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch_pictures import picture_names
+from unitcad.arrays.worn import FINEST, worn, wrapped
 from unitcad.errors import Refusal
+from unitcad.kernels.mesh import realise
+from unitcad.shape import box
 
 
 def test_the_middle_of_the_sheet_keeps_its_length() -> None:
@@ -61,6 +65,27 @@ def test_a_sheet_longer_than_its_way_round_is_refused(template: str, overrides: 
     bent = bending(load_array(template, [*kept, f"{field}={refused.value.nearest}"]))
     assert bent is not None
     assert bent.ends > -1e-2
+
+
+def test_the_worn_sheet_has_the_flat_ones_volume() -> None:
+    """Pappus: round its own middle a plate keeps its volume. The ends meet but for what is left between them."""
+    moulds = patch_moulds(load_array("wrist-band"))
+    array, drawn = moulds.arranged, moulds.arranged.sheet
+    x0, y0, x1, y1 = drawn.outline
+    plate = realise(box(x0, x1, y0, y1, drawn.low, drawn.high), 24)
+    vertices, faces = worn(array, plate)
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    volume = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+    bent = bending(array)
+    assert bent is not None
+    # A chord of a step s cuts s^2 / 6 R^2 off the sector under it.
+    assert 1 - (FINEST / bent.middle_radius) ** 2 / 6 < volume / plate.volume() < 1
+    middle = (drawn.low + drawn.high) / 2
+    ends = wrapped(np.array([[x0, 0, middle], [x1, 0, middle]]), 40, bent.middle_radius)
+    chord = 2 * bent.middle_radius * math.sin(bent.ends / 2 / bent.middle_radius)
+    assert math.dist(*ends) == pytest.approx(chord, rel=1e-6)
+    assert "pictures/patch-worn.png" in picture_names(moulds)
+    assert "pictures/patch-worn.png" not in picture_names(patch_moulds(load_array("forearm-patch")))
 
 
 def test_a_bent_sheet_stretches_and_c310_compares_it() -> None:

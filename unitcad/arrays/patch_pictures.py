@@ -8,6 +8,7 @@ import numpy as np
 
 from unitcad.arrays.patch import patch_bodies
 from unitcad.arrays.patch_moulds import PatchMoulds
+from unitcad.arrays.worn import limb, worn
 from unitcad.export import composite
 from unitcad.kernels.mesh import arrays, bounds
 from unitcad.shape.body import Body
@@ -15,10 +16,14 @@ from unitcad.shape.body import Body
 SIZE = (960, 640)
 """Of a picture, px."""
 FOLDER = "pictures"
+WORN = f"{FOLDER}/patch-worn.png"
 GAP = 8.0
 """Between two pieces taken apart, mm."""
 _Solid = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
 _Eye = tuple[float, float, float]
+SKIN = (0.93, 0.80, 0.72)
+ALONG = (0.35, -0.9, 0.45)
+"""Along the limb, from the outside: sheet, units and skin are seen."""
 SKIN_SIDE, BACK, ABOVE = (0.45, -0.8, -0.9), (0.45, -0.8, 0.9), (0.45, -1.0, 0.55)
 
 
@@ -29,6 +34,8 @@ def picture_names(moulds: PatchMoulds) -> dict[str, str]:
         f"{FOLDER}/patch-back.png": "The patch from its back",
         f"{FOLDER}/tools.png": "The tools and what is cast, taken apart",
     }
+    if moulds.arranged.radius_mm is not None:
+        names[WORN] = "The patch round its limb"
     return names | {f"{FOLDER}/pour{s.index}.png": f"Pour {s.index}, cut open" for s in moulds.plan.steps}
 
 
@@ -40,6 +47,8 @@ def pictures(moulds: PatchMoulds) -> dict[str, bytes]:
         f"{FOLDER}/patch-back.png": _picture(patch, BACK),
         f"{FOLDER}/tools.png": _picture(list(_apart(moulds)), ABOVE),
     }
+    if moulds.arranged.radius_mm is not None:
+        drawn[WORN] = _picture(list(_worn(moulds)), ALONG)
     cuts = [_picture(list(_cut_open(moulds, step.index)), ABOVE) for step in moulds.plan.steps]
     return drawn | {f"{FOLDER}/pour{i + 1}.png": picture for i, picture in enumerate(cuts)}
 
@@ -47,6 +56,15 @@ def pictures(moulds: PatchMoulds) -> dict[str, bytes]:
 def _solid(moulds: PatchMoulds, body: Body, up: float = 0.0, aside: float = 0.0) -> _Solid:
     vertices, faces = arrays(moulds.mesh(body))
     return np.asarray(vertices, float) + np.array([aside, 0.0, up]), np.asarray(faces, np.int64), body.colour
+
+
+def _worn(moulds: PatchMoulds) -> Iterator[_Solid]:
+    """Yield the limb, and the patch's bodies as they lie round it."""
+    array = moulds.arranged
+    vertices, faces = arrays(limb(array))
+    yield np.asarray(vertices, float), np.asarray(faces, np.int64), SKIN
+    for body in patch_bodies(array):
+        yield (*worn(array, moulds.mesh(body)), body.colour)
 
 
 def _apart(moulds: PatchMoulds) -> Iterator[_Solid]:
