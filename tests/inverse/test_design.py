@@ -185,10 +185,11 @@ def _changed(wish: dict[str, Any], refused: Refusal) -> dict[str, Any]:
     return {"edge_max": 0.06, **wish} | {one.field.split(".")[1]: one.nearest for one in (refused, *refused.others)}
 
 
-def test_what_is_offered_for_several_impossible_wishes_is_accepted_together() -> None:
+@pytest.mark.parametrize("wishes", [18, pytest.param(60, marks=pytest.mark.long)])
+def test_what_is_offered_for_several_impossible_wishes_is_accepted_together(wishes: int) -> None:
     """Wishes drawn at random over and under what there is: each refusal's offers are accepted, all at once."""
     rng, refusals, several = np.random.default_rng(17), 0, 0
-    for i in range(60):
+    for i in range(wishes):
         ends = {
             "diameter_max_mm": (9, 16),
             "height_max_mm": (1.8, 5),
@@ -208,8 +209,8 @@ def test_what_is_offered_for_several_impossible_wishes_is_accepted_together() ->
         except Refusal as refused:
             refusals, several = refusals + 1, several + bool(refused.others)
             assert invert(_target(models, **_changed(wish, refused)), check=False).data["proposals"], wish
-    assert refusals > 30
-    assert several > 10
+    assert refusals > wishes / 2
+    assert several > wishes / 6
 
 
 def test_three_per_cent_is_answered_with_the_least_that_is_possible() -> None:
