@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from unitcad.api.build_call import build as build
     from unitcad.api.estimate_call import EdgeEstimate as EdgeEstimate
     from unitcad.api.estimate_call import estimate as estimate
+    from unitcad.arrays.array import Array as Array
+    from unitcad.arrays.array_file import load_array as load_array
     from unitcad.batch.batch_call import BatchResult as BatchResult
     from unitcad.batch.batch_call import batch as batch
     from unitcad.catalogue import MaterialEntry as Material
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Array",
     "BatchResult",
     "BuildResult",
     "Casting",
@@ -76,6 +79,7 @@ __all__ = [
     "check",
     "estimate",
     "load",
+    "load_array",
     "materials",
     "motors",
     "printers",
@@ -85,6 +89,7 @@ __all__ = [
 ]
 
 _PLACES = {
+    "Array": "arrays.array:Array",
     "BatchResult": "batch.batch_call:BatchResult",
     "BuildResult": "api.build_call:BuildResult",
     "Casting": "spec.asked:CastingTable",
@@ -109,6 +114,7 @@ _PLACES = {
     "check": "check",
     "estimate": "api.estimate_call:estimate",
     "load": "validation:load",
+    "load_array": "arrays.array_file:load_array",
     "materials": "catalogue:materials",
     "motors": "catalogue:motors",
     "printers": "catalogue:printers",

@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 import pytest
 
+import unitcad
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_templates, expanded, is_array, load_array
 from unitcad.arrays.array_tables import AskedArray
@@ -91,7 +92,7 @@ REFUSED = [
     ({"place": [{"at": "B4"}]}, "place.0.at", None),
     ({"place": [{"at": "B2", "angle_deg": 0}]}, "place.0.angle_deg", None),
     ({"sheet": {"thickness_mm": 4}}, "sheet.thickness_mm", 2.41),
-    ({"sheet": {"hold_mm": 5}}, "sheet.hold_mm", 4.517),
+    ({"sheet": {"hold_mm": 5}}, "sheet.hold_mm", 1.4),
     ({"sheet": {"corner_mm": 30}}, "sheet.corner_mm", 10),
     ({"sheet": {"strap_slot_mm": [3, 60]}}, "sheet.strap_slot_mm.1", 50),
     ({"sheet": {"material": "ecoflex-00-33"}}, "sheet.material", "ecoflex-00-30"),
@@ -162,3 +163,24 @@ def test_no_table_lets_the_decoder_read_beyond_its_memory() -> None:
         for pitch in (20.0, [20.0, 21.0]):
             assert msgspec.convert({**_GRID, "pitch_mm": pitch}, layouts()["grid"].table)
         gc.collect()
+
+
+def test_an_option_that_changes_the_kind_is_not_blamed_on_the_file() -> None:
+    with pytest.raises(Refusal) as refused:
+        load_array("forearm-pockets", ["layout.kind=ring"])
+    assert refused.value.field.startswith("layout")
+    assert refused.value.file is None
+
+
+def test_a_back_sheet_has_no_pockets_to_hold_by() -> None:
+    with pytest.raises(Refusal, match="leave it out") as refused:
+        load_array("forearm-patch", ["sheet.hold_mm=0.2"])
+    assert refused.value.field == "sheet.hold_mm"
+
+
+def test_python_takes_changes_as_a_dict_and_names_the_function_for_arrays() -> None:
+    array = unitcad.load_array("forearm-pockets", {"layout.pitch_mm": 25.0})
+    assert array.places[1].x - array.places[0].x == 25
+    for source in ("forearm-pockets", {"array": "pockets"}):
+        with pytest.raises(unitcad.UnitcadError, match="load_array"):
+            unitcad.load(source)

@@ -50,3 +50,19 @@ def test_words_speak_of_the_pieces_that_are_there(made: Procedure) -> None:
     assert circuit.quantity == 1
     assert "cup 1 and blade upside down" in " ".join(made.printing)
     assert "unitcad build array.toml --slice" in " ".join(made.printing)
+
+
+def test_every_step_has_its_own_title_and_what_joins_all_units_counts_once(made: Procedure) -> None:
+    assert [step.title for step in made.assembly] == ["Solder the motors", "Lay the circuit in", "Let the smear cure"]
+    assert made.time_line[-1].name == "motors and circuit in"
+    weighed = [next(step.text for step in pour.steps if step.title == "Weigh") for pour in made.pours]
+    assert "go into 9 cavities" in weighed[0]
+    assert "go into 1 cavity" in weighed[1]
+    for pour in made.pours:
+        volume, density, net = (
+            next(f for f in pour.figures if f.name == name)
+            for name in ("volume of this pour", "density", "in the cavities, net")
+        )
+        assert net.value == pytest.approx(volume.value * density.value / 1000)
+        assert net.source == "computed: volume x density"
+    assert "The sheet: 76.00 x 60.00 mm" in " ".join(made.measure)

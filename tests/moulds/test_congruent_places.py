@@ -9,8 +9,8 @@ import pytest
 from faulty_sets import set_of, with_fault
 from manifold3d import Manifold, OpType
 
-from unitcad.kernels.mesh import realise
-from unitcad.mould_checks import check_moulds
+from unitcad.kernels.mesh import realise, shells
+from unitcad.mould_checks import check_moulds, groove_walls
 from unitcad.moulds.congruence import column_round, cropped
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, box, cut, union
@@ -68,6 +68,51 @@ def test_like_cells_have_the_findings_that_each_has_alone(gang: tuple[str, ...])
     moulds = set_of(*gang)
     assert len(set(moulds.cells)) < len(moulds.cells)
     assert [shown(f) for f in check_moulds(moulds)] == [shown(f) for f in check_moulds(each_cell_alone(moulds))]
+
+
+@pytest.mark.parametrize(
+    "gang",
+    [
+        pytest.param(("no-fpcb", f"moulds.cavities=[{columns},{rows}]"), marks=[] if cells <= 6 else [pytest.mark.long])
+        for columns in range(1, 7)
+        for rows in range(1, 7)
+        if (cells := columns * rows) in (4, 6, 9, 16, 25, 36)
+    ],
+)
+def test_a_gang_s_groove_walls_are_those_of_the_whole_plate(
+    gang: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moulds = set_of(*gang)
+    in_parts = [shown(finding) for finding in groove_walls.findings(moulds)]
+    monkeypatch.setattr(groove_walls, "_tiles", lambda *_: [])
+    assert in_parts == [shown(finding) for finding in groove_walls.findings(MouldSet(moulds.spec))]
+
+
+def test_a_groove_that_joins_its_cells_is_looked_at_cell_by_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ends of the joints' sides lie nearer to the cells than their middles do."""
+    made = []
+    tiles = groove_walls._tiles
+
+    def counted(*given):
+        made.append(len(tiles(*given)))
+        return tiles(*given)
+
+    monkeypatch.setattr(groove_walls, "_tiles", counted)
+    assert len(list(groove_walls.findings(set_of("no-fpcb", "moulds.cavities=[10,2]", *BED)))) == len(made)
+    assert made == [20] * len(made)
+
+
+def test_shells_are_what_manifold_tells_apart() -> None:
+    hollow = Manifold.sphere(3, 16) - Manifold.cube((1, 1, 1), True)
+    parts = [Manifold.cube((1, 2, 1)).translate((3 * i, 0, 0)) for i in range(40)] + [hollow.translate((0, 50, 0))]
+    solid = Manifold.compose(parts)
+    found, known = shells(solid), solid.decompose()
+    assert len(found) == len(known) == 42  # a cavity is a shell, with a volume below 0
+    assert sorted(map(sizes, found)) == sorted(map(sizes, known))
+
+
+def sizes(solid: Manifold) -> tuple[float, ...]:
+    return tuple(round(value, 9) for value in (*solid.bounding_box(), solid.volume()))
 
 
 def shown(finding):

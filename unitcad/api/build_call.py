@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from unitcad import notebook
 from unitcad.arguments import path, texts
+from unitcad.arrays.array import Array
+from unitcad.arrays.array_file import is_array, load_array, with_formats
 from unitcad.pipeline import Variant
+from unitcad.pipeline.array_build import build_array
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.build import Built
 from unitcad.pipeline.build import build as build_spec
@@ -22,12 +25,14 @@ from unitcad.validation import Changes, Source, load
 
 @dataclass(frozen=True, repr=False)
 class BuildResult(Built):
-    """A built variant: its folder, its manifest and its spec.
+    """A built variant or array: its folder, its manifest and its spec.
 
-    `manifest` is manifest.json as data: parts, mould checks, mesh checks, what was left out; mm, mm2 and mm3.
+    `manifest` is manifest.json as data: parts, mould checks, mesh checks, what was left out; mm, mm2 and mm3. Of an
+    array `spec` is its unit's, and `array` the whole; of a single unit `array` is None.
     """
 
     spec: Spec
+    array: Array | None = None
 
     @property
     def volumes(self) -> dict[str, float]:
@@ -47,7 +52,8 @@ class BuildResult(Built):
             if not finding["ok"]
         ]
         checks = notebook.table(("mould check", "place", "value", "limit"), broken, "broken") if broken else ""
-        drawn = notebook.drawing(Variant(self.spec).section(), f"section of {self.spec.name}")
+        of = f"the unit of {self.array.name}" if self.array else self.spec.name
+        drawn = notebook.drawing(Variant(self.spec).section(), f"section of {of}")
         return drawn + bodies + checks + notebook.table((), self._counts)
 
     @property
@@ -63,7 +69,7 @@ class BuildResult(Built):
 
 
 def build(
-    source: Source,
+    source: Source | Array,
     out: str | os.PathLike[str] = "out",
     *,
     set: Changes = (),
@@ -73,24 +79,36 @@ def build(
     report: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> BuildResult:
-    """Build a unit and its moulds into a folder below `out`, and return what was built.
+    """Build a unit and its moulds, or an array of units, into a folder below `out`, and return what was built.
 
-    `source` and `set` are as for `unitcad.load`. `formats` ("stl", "3mf", "step", "svg", "png", "glb") and `only`
-    ("unit", "moulds", "estimate", "casting") choose what is made. Without `check` mould checks and mesh checks are
-    left out. `report` writes report.html, one offline page. `progress` is called with the name of each step.
+    `source` and `set` are as for `unitcad.load`, or as for `unitcad.load_array` where `source` is an array: its
+    template's name, its file, data with the key `array`, or an `Array`. `formats` ("stl", "3mf", "step", "svg", "png",
+    "glb") and `only` ("unit", "moulds", "estimate", "casting") choose what is made. Without `check` mould checks and
+    mesh checks are left out. `report` writes report.html, one offline page. `progress` is called with the name of each
+    step.
     `BuildResult.ok` tells whether every check passed; volumes and sizes of the result are in mm3 and mm.
     Raises Refusal or UnitcadError before anything is written.
     """
-    spec = load(source, set)
-    if formats is not None:
-        spec = load(spec, {"output.formats": texts("formats", formats)})
-    built = build_spec(spec, Path(path("out", out)), only=texts("only", only), check=check, say=progress or _silent)
+    into, say = Path(path("out", out)), progress or _silent
+    named = isinstance(source, str | os.PathLike | Mapping | Array)
+    array = load_array(source, set) if named and is_array(source) else None
+    if array:
+        if formats is not None:
+            array = with_formats(array, texts("formats", formats))
+        spec = array.unit
+        built = build_array(array, into, only=texts("only", only), check=check, say=say)
+    else:
+        assert not isinstance(source, Array)
+        spec = load(source, set)
+        if formats is not None:
+            spec = load(spec, {"output.formats": texts("formats", formats)})
+        built = build_spec(spec, into, only=texts("only", only), check=check, say=say)
     if report or (built.folder / PAGE).is_file():  # a page that is there would show the result before this one
         from unitcad.report import write_report
 
         with held(built.folder):
             write_report(built.folder)
-    return BuildResult(built.folder, built.manifest, spec)
+    return BuildResult(built.folder, built.manifest, spec, array)
 
 
 def _silent(step: str) -> None:

@@ -32,8 +32,9 @@ from unitcad.spec.toml import text_of
 from unitcad.validation import custom_templates, from_data, templates
 from unitcad.validation.dotted import ABSENT, at
 from unitcad.validation.faults import line_of
-from unitcad.validation.load import override
+from unitcad.validation.load import changed, override
 from unitcad.validation.shipped_files import is_path, named_file, shipped_files
+from unitcad.validation.tables import Changes, changes_of
 
 _OVERRIDES = ("moulds", "casting", "estimate", "output")
 """Tables of an array file that override those of its units."""
@@ -69,8 +70,10 @@ def confirm_known(name: str, field: str = "spec", kind: type[Refusal] = WrongArg
     named_file(name, templates() | custom_templates() | array_templates(), field, kind)
 
 
-def load_array(source: ArraySource, set: Iterable[str] = ()) -> Array:
-    """Return the array of a template's name, a file, plain data, or another array; `set` are texts "path=value".
+def load_array(source: ArraySource, set: Changes = ()) -> Array:
+    """Return the array of a template's name, a file, plain data, or another array.
+
+    `set` changes values as for `unitcad.load`: texts "path=value", or a dict by dotted path such as "layout.pitch_mm".
 
     Raises Refusal or UnitcadError, naming the field, for the first value that is not valid.
     """
@@ -82,18 +85,28 @@ def load_array(source: ArraySource, set: Iterable[str] = ()) -> Array:
     else:
         path = named_file(os.fspath(source), array_templates(), "array", WrongArgument)
         data, folder = read_toml(path), path.parent
-    whole = override(expanded(data, folder), set)
+    written = expanded(data, folder)
+    whole = changed(override(written, ()), changes_of(set))
     try:
         return array_of(whole)
     except Refusal as refusal:
         if path is not None:
-            _locate(refusal, path, data, whole)
+            _locate(refusal, path, data, written, whole)
         raise
 
 
-def _locate(refusal: Refusal, path: Path, written: Mapping[str, Any], whole: Mapping[str, Any]) -> None:
-    """Name the file and the line of a refused value that stands in an array file, and not in an option."""
-    if refusal.value is None or at(written, refusal.field) == at(whole, refusal.field) is not ABSENT:
+def _locate(
+    refusal: Refusal, path: Path, file: Mapping[str, Any], written: Mapping[str, Any], whole: Mapping[str, Any]
+) -> None:
+    """Name the file and the line of a refused value that stands in an array file, and not in an option.
+
+    Nor where an option changed its table: another `layout.kind` has other keys. `written` is the file's data with the
+    whole spec of each unit, `whole` that with the options in it.
+    """
+    table = refusal.field.rpartition(".")[0]
+    if table and at(written, table) != at(whole, table):
+        return
+    if refusal.value is None or at(file, refusal.field) == at(whole, refusal.field) is not ABSENT:
         refusal.file, refusal.line = os.fspath(path), line_of(read_text(path), refusal.field)
 
 

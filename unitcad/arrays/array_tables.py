@@ -53,8 +53,9 @@ class SheetTable(Table, frozen=True, kw_only=True):
     ] = None
     strap_web_mm: Annotated[float, Meta(ge=1, le=200, description="from a strap slot to the end of the sheet")] = 5.0
     hold_mm: Annotated[
-        float, Meta(ge=0.01, le=5, description="how much smaller than the unit's a pocket's radius is")
-    ] = 0.2
+        Annotated[float, Meta(ge=0.01, le=5)] | None,
+        Meta(description="how much smaller than the unit's a pocket's radius is; left out, 0.2 for pockets"),
+    ] = None
 
 
 class CircuitTable(Table, frozen=True, kw_only=True):

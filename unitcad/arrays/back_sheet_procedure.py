@@ -25,8 +25,19 @@ def back_sheet_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float]
         preparation=_shown(made.preparation),
         pours=tuple(replace(pour, steps=_shown(pour.steps)) for pour in made.pours),
         release=_shown(made.release),
-        assembly=_shown(made.assembly),
+        assembly=_motors_in(made.assembly),
+        time_line=(*made.time_line[:-1], replace(made.time_line[-1], name="motors and circuit in")),
         last="Motors and circuit in",
+    )
+
+
+def _motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
+    """Return the steps of the assembly, each with its own title; the picture stands by the circuit that goes in."""
+    solder, lay_in, cure = steps
+    return (
+        replace(solder, title="Solder the motors", picture=""),
+        replace(lay_in, title="Lay the circuit in", picture=SKIN_SIDE),
+        replace(cure, picture=""),
     )
 
 
@@ -38,4 +49,4 @@ def _shown(steps: Iterable[BenchStep]) -> tuple[BenchStep, ...]:
 def _picture(path: str) -> str:
     if pour := re.fullmatch(re.escape(picture_path("pour")).replace("pour", r"pour(\d+)-strike"), path):
         return f"pictures/pour{pour[1]}.png"
-    return {picture_path("pieces"): TOOLS, picture_path("motor-in"): SKIN_SIDE}.get(path, "")
+    return {picture_path("pieces"): TOOLS}.get(path, "")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 from msgspec import structs
@@ -83,6 +84,19 @@ class PatchMoulds(MouldSet):
     def makes(self) -> str:
         """What comes out of the mould."""
         return "sheet" if self.construction.own_tails else "patch"
+
+    @property
+    def across(self) -> str:
+        """What to measure across."""
+        x0, y0, x1, y1 = self.arranged.sheet.outline
+        middles = f" Between the middles of neighbouring units: {pitch:.2f} mm." if (pitch := self._pitch) else ""
+        return f"The sheet: {x1 - x0:.2f} x {y1 - y0:.2f} mm, before it is bent.{middles}"
+
+    @property
+    def _pitch(self) -> float:
+        """The least distance between two units' middles, mm; 0 of a single one."""
+        places = self.arranged.places
+        return min((math.dist((p.x, p.y), (q.x, q.y)) for p, q in combinations(places, 2)), default=0.0)
 
     @property
     def source(self) -> str:

@@ -170,7 +170,7 @@ def _level(array: Array) -> str:
 
 def _pour(moulds: PatchMoulds, silicone: Material, mix: fig.Mix, verdict: str) -> Iterator[BenchStep]:
     spec, (step,) = moulds.spec, moulds.plan.steps
-    yield from mixed(moulds, silicone, mix, verdict)
+    yield from mixed(moulds, step, silicone, mix, verdict)
     rests = fig.rest_min(spec, step.rim, silicone)
     if not spec.casting.vacuum and not rests:
         yield BenchStep("Brush a first coat", verdict, minutes=fig.BRUSH_MIN)

@@ -17,6 +17,12 @@ from unitcad.spec import Spec
 BESIDE_SLOT = 2.0
 """From a strap slot to a round corner, at least, mm."""
 
+HOLD_MM = 0.2
+"""How much smaller than its unit's a pocket's radius is where nothing else is asked for, mm."""
+MOST_HOLD = 0.25
+"""Hoop strain of a pocket round its unit, at most (assumed)."""
+BUCKLES = "assumed: a sheet stretched further buckles, and squeezes the unit out of round"
+
 
 def middle_radius(asked: AskedArray, way: Construction, units: list[Spec]) -> float | None:
     """Return the radius of the sheet's middle round the limb, mm; None where the array is worn flat."""
@@ -40,12 +46,15 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
     known = catalogue.materials({name: entry for unit in distinct for name, entry in unit.materials.items()})
     material = table.material or distinct[0].layers[-1].material
     catalogue.choose("sheet.material", material, known)
+    hold = HOLD_MM if table.hold_mm is None else table.hold_mm
     level = way.level(distinct, thickness)
     if thickness > level.most + 1e-9:
         limit = f"beside the units' tails and backs there is room for a sheet of {level.most:.4g} mm"
         raise Refusal("sheet.thickness_mm", thickness, limit, down(level.most) if level.most >= 0.5 else None)
     if way.own_tails:
-        _check_hold(table.hold_mm, distinct, float(known[material].elongation_pct))
+        _check_hold(hold, distinct, float(known[material].elongation_pct))
+    elif table.hold_mm is not None:
+        raise Refusal("sheet.hold_mm", table.hold_mm, f"{asked.array} has no pockets that hold units: leave it out")
     margin = table.margin_mm
     radii = [unit.diameter_mm / 2 for unit in units]
     x0 = min(p.x - r for p, r in zip(points, radii, strict=True)) - margin
@@ -76,19 +85,21 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
         corner_mm=_corner(table.corner_mm, min(radii) + margin, outline, slots),
         outline=outline,
         strap_slots=slots,
-        hold_mm=table.hold_mm,
+        hold_mm=hold,
     )
 
 
 def _check_hold(hold: float, units: tuple[Spec, ...], elongation_pct: float) -> None:
     """Raise Refusal for pockets that would stretch beyond the margin on the sheet's elongation."""
     for unit in units:
-        allowed = unit.casting.strain_margin * elongation_pct / 100
+        torn = unit.casting.strain_margin * elongation_pct / 100
+        allowed = min(torn, MOST_HOLD)
         most = unit.diameter_mm / 2 * allowed / (1 + allowed)
         if hold > most + 1e-9:
+            why = "casting.strain_margin of the elongation at break" if torn <= MOST_HOLD else BUCKLES
             limit = (
-                f"round a unit of {unit.diameter_mm:g} mm a pocket may stretch by {allowed:.0%} (casting.strain_margin "
-                f"of the elongation at break), so it is smaller in radius by at most {down(most):g} mm"
+                f"round a unit of {unit.diameter_mm:g} mm a pocket may stretch by {allowed:.0%} ({why}), so it is "
+                f"smaller in radius by at most {down(most):g} mm"
             )
             raise Refusal("sheet.hold_mm", hold, limit, down(most))
 

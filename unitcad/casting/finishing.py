@@ -75,11 +75,12 @@ def motor_in(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
     room = moulds.spec.casting.room_c
     cures = {silicone.name: at_room(float(silicone.cure_h), room) for silicone in smeared(texts, silicones)}
     hours = ", ".join(f"{name} {number(hour, 2)} h" for name, hour in cures.items())
+    mouth, motor = ("cavity's mouth", "motor") if moulds.makes == "unit" else ("cavities' mouths", "motors")
     yield BenchStep(
         "Let the smear cure",
         f"A smear of silicone is mixed like any batch ({number(moulds.spec.casting.minimum_mix_g, 3)} g at least) and "
-        f"spread as thin as butter. It needs its whole cure ({hours}): lay the unit down with the cavity's mouth up, "
-        "level, and don't run the motor before. Without a smear there is nothing to wait for.",
+        f"spread as thin as butter. It needs its whole cure ({hours}): lay the {moulds.makes} down with the {mouth} "
+        f"up, level, and don't run the {motor} before. Without a smear there is nothing to wait for.",
         picture_path("motor-home"),
         kind="cure",
         wait_min=60 * max(cures.values()),
@@ -118,7 +119,7 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
             f"{number(off.at_worst_mm, 2)} mm either way{further if len(masses_g) > 1 else ''}."
         )
     else:
-        yield f"Farthest corner from the motor's axis: {shown(dims.outer_radius, 2)} mm."
+        yield moulds.across
     if dims.exit:
         opening = "notch" if dims.exit.high >= dims.heights[0] else "slot"
         layers = f"in layers of {number(spec.moulds.layer_mm, 3)}"
@@ -133,7 +134,8 @@ def measurements(moulds: MouldSet, masses_g: Sequence[float], slot_height: float
             f"Less means air{low}."
         )
     else:
-        yield f"Weigh one {moulds.makes}, trimmed, without motor and circuit: {weights} g. Less means air{low}."
+        motor = "motor" if moulds.makes == "unit" else "motors"
+        yield f"Weigh one {moulds.makes}, trimmed, without {motor} and circuit: {weights} g. Less means air{low}."
 
 
 def assembly(moulds: MouldSet) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ def pour_steps(
     """Describe one pour, from an empty mould to a cured layer on the core."""
     plan, first, tongues = moulds.plan, step.index == 1, moulds.plan.standing(step, "tongue")
     cells, each_tongue = len(plan.layout.cells), "the tongue" if len(tongues) == 1 else "each tongue"
-    groove = _groove(moulds)
+    groove = _groove(step)
 
     def picture(name: str) -> str:
         path = f"pour{step.index}-{name}"
@@ -57,7 +57,7 @@ def pour_steps(
     wet = any("the mix" in text for text in laid)
     for i, text in enumerate(laid):
         if "the mix" in text and not any("the mix" in each for each in laid[:i]):
-            yield from mixed(moulds, silicone, mix, verdict)
+            yield from mixed(moulds, step, silicone, mix, verdict)
         title = f"Lay in, {i + 1} of {len(laid)}" if len(laid) > 1 else "Lay in"
         yield BenchStep(title, text, picture("laid-in") if i == 0 else "", minutes=fig.LAY_IN_MIN * cells)
     if any(body.kind in ("circuit", "wire") for body in step.inserts):
@@ -118,7 +118,7 @@ def pour_steps(
             minutes=fig.HOLD_MIN,
         )
     if not wet:
-        yield from mixed(moulds, silicone, mix, verdict)
+        yield from mixed(moulds, step, silicone, mix, verdict)
     rests = BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=fig.rest_min(moulds.spec, step.rim, silicone))
     if step.lid:
         yield _draw_up(mix)
@@ -131,8 +131,7 @@ def pour_steps(
         taken = f"into {groove}" if step.groove else "onto a scrap, since this cup has no groove"
         yield BenchStep(
             "Pour",
-            f"Pour in a thin thread at one place until {'the' if cells == 1 else 'every'} cavity stands over its rim. "
-            "Prick the bubbles that you see with a pin.",
+            f"{_poured(step, cells)} Prick the bubbles that you see with a pin.",
             picture("pour"),
             kind="pour",
             minutes=fig.pouring_min(cells) - fig.STRIKE_MIN,
@@ -166,14 +165,26 @@ def pour_steps(
     yield from _cure_and_open(moulds, step, silicone, picture)
 
 
-def _groove(moulds: MouldSet) -> str:
+def _groove(step: Step) -> str:
     """Return what to call the overflow grooves: each cavity has one, which stops beside a window."""
-    return "the groove" if len(moulds.plan.layout.cells) == 1 else "the grooves round the cavities"
+    return "the groove" if len(step.layer) == 1 else "the grooves round the cavities"
 
 
-def mixed(moulds: MouldSet, silicone: Material, mix: Mix, verdict: str) -> Iterator[BenchStep]:
+def _poured(step: Step, cells: int) -> str:
+    """Say how the cavities are filled: one, each by itself, or one that joins all cells."""
+    if len(step.layer) > 1:
+        return "Pour in a thin thread, one cavity after the other, each at one place until it stands over its rim."
+    if cells > 1:
+        return (
+            "Pour in a thin thread, first beside each cell's earlier layer until that is covered, so that no air stays "
+            "in the deep places, then from there outwards until the whole cavity stands over its rim."
+        )
+    return "Pour in a thin thread at one place until the cavity stands over its rim."
+
+
+def mixed(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, verdict: str) -> Iterator[BenchStep]:
     """Describe the way from the bottles to a mix without air."""
-    cells = len(moulds.plan.layout.cells)
+    cells = len(step.layer)
     yield BenchStep(
         "Weigh",
         f"Weigh {shown(mix.part_a_g)} g of {silicone.name} part A and {shown(mix.part_b_g)} g of part B "
@@ -264,7 +275,7 @@ def _cure_and_open(
     touched = (
         "the bead on a vent"
         if step.lid
-        else f"the silicone in {_groove(moulds)}"
+        else f"the silicone in {_groove(step)}"
         if step.groove
         else "what was struck off"
     )

@@ -167,11 +167,15 @@ def pour_figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, vol
     digit = f"half of {number(casting.scale_resolution_g, 3)} g"
     practice = "assumed: usual practice"
     channels = " + sprue and vents" if step.channels else ""
+    # An array's layers are drawn of all units together.
+    whole = len(step.layer) // moulds.pieces(step.name) != len(moulds.plan.layout.cells)
+    what, times = ("volume of this pour", "volume") if whole else ("volume of one layer", "volume x cavities")
+    taken = f"({times}{channels})" if channels or not whole else times
     figures = [
-        Figure("volume of one layer", volume, "mm3", "computed: the drawn layer's mesh"),
+        Figure(what, volume, "mm3", "computed: the drawn layer's mesh"),
         *([Figure("sprue and vents", _channels_mm3(step), "mm3", "computed: as drawn")] if channels else []),
         Figure("density", float(silicone.density_g_cm3), "g/cm3", sourced(silicone.density_g_cm3)),
-        Figure("in the cavities, net", mix.net_g, "g", f"computed: (volume x cavities{channels}) x density"),
+        Figure("in the cavities, net", mix.net_g, "g", f"computed: {taken} x density"),
         Figure(
             "to mix",
             mix.mix_g,

@@ -48,6 +48,8 @@ def to_markdown(procedure: Procedure) -> str:
                 yield from ("", f"   ![{markdown(step.title)}]({step.picture})", "")
 
     cavities = f"{procedure.cells} cavit{'y' if procedure.cells == 1 else 'ies'}"
+    if procedure.cells > 1 and procedure.makes != "unit":
+        cavities = f"{procedure.cells} units in one {procedure.makes}"
     lines = [f"# Casting {markdown(procedure.name)}", ""]
     lines += [f"Mould set {procedure.label}, {cavities}. {UNPRINTED}", ""]
     lines += ["## Time", "", *_times(procedure), ""]

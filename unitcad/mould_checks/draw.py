@@ -57,23 +57,30 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             else:
                 yield _out_of_order(where, "it is not there: it was taken away before, or does not stand in this pour")
                 continue
-            areas, way, cells = [], removal.direction, []
+            areas, way, apart = [], removal.direction, []
             for name, solid in (*there.items(), *silicone):
                 if overlapping and boxes_meet(piece, solid):
                     # Silicone has taken the tool's shape, whichever of the two moves.
                     areas.append((blocked(piece - solid, solid, way) if cast else blocked(piece, solid, way), name))
-                elif _in_the_way(piece, solid, way) and name == "layer":
-                    cells.append(facing(solid, way, False))
                 elif _in_the_way(piece, solid, way):
-                    areas.append((_meeting(facing(piece, way, True), facing(solid, way, False)), name))
-            if cells:
-                # All at once: one after the other they would take the square of the cells' number.
-                areas.append((_meeting(facing(piece, way, True), np.concatenate(cells)), "layer"))
+                    apart.append((name, facing(solid, way, False)))
+            areas += _areas(facing(piece, way, True), apart) if apart else []
             largest, name = max(areas, default=(0.0, ""))
             where += f" against {name}" if largest > BLOCKED else ""
             advice = f"something of the piece lies under {name}: the two are drawn with an undercut"
             yield at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", advice)
         yield from _left(moulds, step, after, there, cast=bool(silicone))
+
+
+def _areas(piece: np.ndarray, others: list[tuple[str, np.ndarray]]) -> list[tuple[float, str]]:
+    """Return the area that is blocked, by name: of all others at once where it is none.
+
+    One after the other they would take the square of the cells' number.
+    """
+    total = _meeting(piece, np.concatenate([faces for _, faces in others]))
+    if total <= BLOCKED:
+        return [(total, "")]
+    return [(_meeting(piece, faces), name) for name, faces in others]
 
 
 def _left(

@@ -13,6 +13,7 @@ import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold, OpType
 from scipy.spatial import KDTree
 
+from unitcad.kernels.mesh import shells
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
 from unitcad.mould_checks.hollows import GRID, SLIVER, hollows, least_wall
@@ -38,8 +39,7 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
     bottom, letters = step.rim - groove_depth_of(moulds.spec, step.rim), moulds.spec.moulds.engraving_depth_mm
     under_letters = step.rim - letters - GRID
     top = under_letters if under_letters > bottom + GRID else step.rim
-    pieces, level = hollows(moulds, moulds.plan.walled(step)), (bottom + top) / 2
-    hollow, rim = Manifold.compose(pieces), step.rim - GRID
+    pieces, level, rim = hollows(moulds, moulds.plan.walled(step)), (bottom + top) / 2, step.rim - GRID
     high = [piece.trim_by_plane((0, 0, 1), bottom) for piece in pieces if piece.bounding_box()[5] > rim]
     above = [part for piece in high for part in piece.decompose() if part.bounding_box()[5] > rim]
     sections = [part for solid in above for part in solid.slice(level).decompose()]
@@ -49,6 +49,9 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
     if regions:
         groove = CrossSection.batch_boolean(regions, OpType.Add)
         tiles = _tiles(moulds, groove, farthest, (bottom - farthest, top))
+        # What joins the cells, such as the recess over the plinth, mostly lies lower.
+        hollow = Manifold.compose(pieces).trim_by_plane((0, 0, 1), bottom - farthest)
+        apart = shells(hollow) if tiles else [hollow]
 
         def wall(i: int) -> float:
             """Return the distance from the groove in a tile to the nearest other hollow, mm, `farthest` at most."""
@@ -56,7 +59,7 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
             if tiles:
                 there = groove ^ _circle(tiles[i], farthest)
                 near = there ^ _circle(tiles[i], -farthest)
-                beside = cropped(hollow, tiles[i])
+                beside = cropped(Manifold.compose(_reaching(apart, tiles[i])), tiles[i])
             around = Manifold.extrude(near.offset(farthest, JoinType.Round), top - bottom + farthest)
             inside = Manifold.extrude(there.offset(GRID, JoinType.Miter), step.rim - bottom + 2 * GRID)
             others = beside ^ (around.translate((0, 0, bottom - farthest)) - inside.translate((0, 0, bottom - GRID)))
@@ -94,12 +97,28 @@ def _tiles(moulds: MouldSet, groove: CrossSection, beside: float, ends: tuple[fl
     lay = moulds.plan.layout
     if len(lay.cells) == 1:
         return []
-    corners = np.concatenate(groove.to_polygons())
     middles = np.array([(cell.x, cell.y) for cell in lay.cells])
-    reach = float(KDTree(middles).query(corners)[0].max()) + SLACK
+    reach = float(KDTree(middles).query(_border(groove))[0].max()) + SLACK
     tiles = [Column(cell.x, cell.y, reach + beside, *ends) for cell in lay.cells]
     covered = CrossSection.batch_boolean([_circle(tile, -beside) for tile in tiles], OpType.Add)
     return tiles if (groove - covered).is_empty() else []
+
+
+def _reaching(pieces: list[Manifold], column: Column) -> list[Manifold]:
+    """Return the pieces whose boxes reach into a column's."""
+    boxes = np.array([piece.bounding_box() for piece in pieces])
+    apart = np.maximum(boxes[:, :2] - (column.x, column.y), (column.x, column.y) - boxes[:, 3:5])
+    return [pieces[i] for i in np.flatnonzero((apart < column.radius + SLACK).all(axis=1))]
+
+
+def _border(section: CrossSection) -> np.ndarray:
+    """Return points (n, 2) of a section's border, SLACK apart at most: between two cells a side's ends lie nearest."""
+    loops = section.to_polygons()
+    starts = np.concatenate(loops)
+    sides = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops]) - starts
+    parts = np.ceil(np.hypot(*sides.T) / SLACK).astype(int).clip(1)
+    share = (np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)) / np.repeat(parts, parts)
+    return np.repeat(starts, parts, axis=0) + share[:, None] * np.repeat(sides, parts, axis=0)
 
 
 def _circle(column: Column, more: float) -> CrossSection:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from manifold3d import Manifold
 
+from unitcad.kernels.mesh import shells
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.profile import GRID_PER_MM
 
@@ -18,7 +19,7 @@ def hollows(moulds: MouldSet, piece: str) -> list[Manifold]:
     solid = moulds.solids[piece]
     return moulds.once(
         f"hollows of {piece}",
-        lambda: [piece for piece in (solid.hull() - solid).decompose() if piece.volume() > SLIVER],
+        lambda: [piece for piece in shells(solid.hull() - solid) if piece.volume() > SLIVER],
     )
 
 

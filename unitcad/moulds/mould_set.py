@@ -130,6 +130,11 @@ class MouldSet:
         return "unit"
 
     @property
+    def across(self) -> str:
+        """What to measure across, where the tooling is not concentric."""
+        return f"Farthest corner from the motor's axis: {self.plan.dimensions.outer_radius:.2f} mm."
+
+    @property
     def source(self) -> str:
         """The file in a result's folder that makes the result again."""
         return "spec.toml"

@@ -49,6 +49,8 @@ def load(source: Source, set: Changes = ()) -> Spec:
     """
     changes = list(changes_of(set))
     if isinstance(source, str | os.PathLike):
+        if os.fspath(source) in shipped_files("arrays"):
+            raise _is_array(source)
         data = read(source)
     elif isinstance(source, Mapping):
         data = plain(source)
@@ -60,16 +62,31 @@ def load(source: Source, set: Changes = ()) -> Spec:
         if not changes:
             return spec
         data = asked_of(spec, from_data)
-    for change in changes:
-        if isinstance(change, str):
-            data = override(data, [change])
-        else:
-            data = override(data, ())
-            put(data, *change)
+    if "array" in data:
+        raise _is_array(source)
+    data = changed(data, changes)
     try:
         return from_data(data, Path())
     except Refusal as refusal:
         raise _explained(refusal, data, source) from None
+
+
+def changed(data: Mapping[str, Any], changes: Iterable[str | tuple[str, Any]]) -> dict[str, Any]:
+    """Return `data` with changes by `changes_of` put in."""
+    result = dict(data)
+    for change in changes:
+        if isinstance(change, str):
+            result = override(result, [change])
+        else:
+            result = override(result, ())
+            put(result, *change)
+    return result
+
+
+def _is_array(source: object) -> UnitcadError:
+    """Return the error for an array where a single unit's spec is asked for."""
+    named = f"{os.fspath(source)} is" if isinstance(source, str | os.PathLike) else "this is"
+    return UnitcadError(f"{named} an array of units: unitcad.load_array reads it, and unitcad.build makes it")
 
 
 def from_tables(keys: Mapping[str, object]) -> Spec:
