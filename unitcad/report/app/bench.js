@@ -303,7 +303,7 @@
       casting.pours.map((pour) => list(`pour${pour.index}`, `Pour ${pour.index}: layer ${pour.index}, ${pour.material}`, pour.steps, pour,
         el("div", { className: "screen" }, el("label", { className: "field" }, el("span", {}, "Lot on the bottles"), lot(pour)), words(`p${pour.index}.notes`, "Notes on this pour")))),
       list("release", "Out of the mould", casting.release, null),
-      list("assembly", "Motor in", casting.assembly, null),
+      list("assembly", casting.last, casting.assembly, null),
       measure(), written(), saving(),
       el("footer", {}, el("p", {}, `Made by unitcad ${data.version}. This page contacts nothing; what you enter stays in this browser.`)));
     mark();

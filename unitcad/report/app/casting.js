@@ -93,7 +93,7 @@
         table(["Piece", "Edge", "Height as printed (mm)", "Moved by (mm)"], offGrid.map((row) => [partName(row.piece), row.edge, shown(row.height_mm), number(row.nearest_mm - row.height_mm, 2)]), { label: "Edges off the layer grid" })),
       (data.pours || []).map(pour),
       titled("Out of the mould", steps(data.release)),
-      titled("Motor in", steps(data.assembly)),
+      titled(data.last, steps(data.assembly)),
       titled("Measure on the first part", data.measure && el("ul", {}, data.measure.map((text) => el("li", {}, text))), figures(data.walls, "What the cups' play does to the walls", 2)),
       titled("Printing", printing(variant.slicer)),
       titled("Needed", data.bill && table(["Item", "Quantity", "Made", "Note"], data.bill.map((row) => [partName(row.item), `${number(row.quantity, 3)} ${row.unit}`, row.made, row.note]), { label: "Bill of materials" })));
