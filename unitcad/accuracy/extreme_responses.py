@@ -24,8 +24,9 @@ TOLERANCES = (0.1, 1e-3, 1e-5, 1e-7, 1e-9)
 LEAST_GAIN = 1.25
 """The most that a tighter rtol's bound may be over a looser one's.
 
-It is above 1 only where neither rtol is met: the panels are then spent differently, or rounding next to the poles
-enters at other wavenumbers.
+It is above 1 where neither rtol is met: the panels are then spent differently, or rounding next to the poles enters at
+other wavenumbers. And where the looser one reaches far more than it asks for, on other panels: 2.0e-5 at rtol 1e-3 and
+3.0e-5 at 1e-4 on one of 400 media.
 """
 _LEAST = 1e-15
 """Where a true error of 0 is drawn."""

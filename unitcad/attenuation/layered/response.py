@@ -118,7 +118,7 @@ def _radii(r: Any) -> w.Array:
 
 
 def _solve(bare: Problem, end: float, rtol: float) -> Integrals:
-    """Return the best that is reached, in a few attempts.
+    """Return the best that is reached in a few attempts, for each row and radius.
 
     What was integrated first may have been accepted beside a largest |u| that the rest then took away: again, beside
     the one that came out. Where the panels do not suffice for rtol, a larger one may spend them better.
