@@ -30,7 +30,7 @@ SPARE = 2.0
 FOOT_MM = 0.2
 MORE_PLATES = (
     "Together the pieces are larger than the bed; each one fits it. Let the slicer arrange them on as many plates as "
-    "they need, turned about the vertical alone."
+    "they need, none of them tilted."
 )
 
 
@@ -40,7 +40,9 @@ def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
     printed = [tool for tool in plan.pieces if tool.made == "printed"]
     mixed = {tool.kind for tool in printed if not tool.upside_down}
     names = (
-        spaced(t.name) if t.kind in mixed else f"{t.kind}s" if t.step else t.kind for t in printed if t.upside_down
+        spaced(t.name.partition("-")[0]) if t.kind in mixed else f"{t.kind}s" if t.step else t.kind
+        for t in printed
+        if t.upside_down
     )
     turned = listed(dict.fromkeys(names))
     count = "one piece" if len(printed) == 1 else f"{len(printed)} pieces"

@@ -116,7 +116,7 @@ def cuts(ends: Interval, taken: Iterable[Interval], bed: float, what: str, other
     found = _fewest(ends, places, bed)
     if found is None:
         needed = min(length for length in (max(_lengths(ends, places)), ends[1] - ends[0]))
-        limit = f"{what} of {ends[1] - ends[0]:.4g} mm exceeds the bed, and no cut between its features is near enough"
+        limit = f"{what} exceeds the bed, and the cuts between its features leave longer pieces"
         raise Refusal("moulds.bed_x_mm", bed, limit, math.ceil(needed * 10 - 1e-6) / 10)
     return staggered if staggered is not None and len(staggered) == len(found) else found
 
