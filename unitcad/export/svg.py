@@ -293,18 +293,22 @@ def _anchors(regions: Sequence[Region], widths: Sequence[float]) -> list[Point]:
     ends = [point[0] for region in regions for loop in region.loops for point in loop]
     low, span = min(ends, default=0.0), max(ends, default=0.0) - min(ends, default=0.0)
     room, total, anchors = 0.0, sum(widths) or 1.0, []
+    room_needed = 0.02 * span
     for region, width in zip(regions, widths, strict=True):
         wanted = low + span * (room + width / 2) / total
         room += width
         starts = np.array([point for loop in region.loops for point in loop])
         stops = np.array([point for loop in region.loops for point in (*loop[1:], loop[0])])
-        best, least = region.loops[0][0], math.inf
-        for x in np.linspace(low, low + span, 241)[1:-1]:
+        best, least = region.loops[0][0], (math.inf, 0.0)
+        places = np.linspace(low, low + span, 241)[1:-1]
+        for x in places[np.argsort(abs(places - wanted), kind="stable")]:
+            if abs(x - wanted) - 20 * room_needed > least[0]:
+                break  # no place farther away can be better
             for z in _middles(starts, stops, x):
                 # Room counts up to what a dot needs; beyond that, nearness to the wanted place does.
-                clear = min(_distance(starts, stops, np.array([x, z])), 0.02 * span)
-                if abs(x - wanted) - 20 * clear < least:
-                    best, least = (float(x), float(z)), abs(x - wanted) - 20 * clear
+                clear = min(_distance(starts, stops, np.array([x, z])), room_needed)
+                if (abs(x - wanted) - 20 * clear, x) < least:
+                    best, least = (float(x), float(z)), (abs(x - wanted) - 20 * clear, x)
         anchors.append(best)
     return anchors
 
