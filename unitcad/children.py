@@ -14,6 +14,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
+from typing import IO
 
 GRACE_S = 2.0
 """Seconds from the request that a program end until it is killed."""
@@ -92,6 +93,16 @@ def end_with_parent() -> None:
             import ctypes
 
             ctypes.CDLL(None, use_errno=True).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+
+
+def message_pipes() -> tuple[IO[bytes], IO[bytes]]:
+    """Return this process's standard input and output, for messages alone: what a kernel prints goes to the errors."""
+    messages, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    os.dup2(2, 1)
+    return messages, answers
 
 
 def _write(pipe, content: bytes) -> None:

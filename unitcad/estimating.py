@@ -108,7 +108,7 @@ def estimate_input(spec: Spec, frequency_hz: float | None = None) -> EstimateInp
         design=spec.design,
         passes=CONTROL_PASSES if len(spec.layers) == 1 else passes,
         diameter=spec.diameter_mm * 1e-3,
-        geometry=_geometry(spec, _motor_mass(spec, motor)),
+        geometry=_geometry(spec, motor_mass(spec, motor)),
         layers=tuple(
             silicone_layer(
                 choose(f"layers.{i}.material", layer.material, silicones),
@@ -142,7 +142,7 @@ def _geometry(spec: Spec, motor_mass: Quantity) -> Geometry:
     )
 
 
-def _motor_mass(spec: Spec, motor: Motor | None) -> Quantity:
+def motor_mass(spec: Spec, motor: Motor | None) -> Quantity:
     """Return the motor's mass in kg: its entry's, or that of a can of its size."""
     if motor and motor.mass_g:
         return _quantity(motor.mass_g, 1e-3)

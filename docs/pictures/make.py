@@ -1,9 +1,9 @@
-"""Make the README's pictures, and with --look every screenshot of both pages for a person to look at.
+"""Make the README's pictures, and with --look every screenshot of the pages for a person to look at.
 
-    python docs/pictures/make.py              unit, moulds and two pages, into this folder
-    python docs/pictures/make.py --look DIR   both pages in light, dark and 390 pixels wide, into DIR
+    python docs/pictures/make.py              unit, moulds and three pages, into this folder
+    python docs/pictures/make.py --look DIR   the pages in light, dark and 390 pixels wide, into DIR
 
-Needs the extras `cadquery` and `test`, and Chromium.
+Needs the extras `cadquery`, `serve` and `test`, and Chromium.
 """
 
 from __future__ import annotations
@@ -12,15 +12,17 @@ import argparse
 import io
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[1] / "tests" / "report"))
+sys.path[:0] = [str(HERE.parents[1] / "tests" / room) for room in ("report", "serve")]
 
 import chromium  # noqa: E402
+from live import WALL, Live  # noqa: E402
 from PIL import Image  # noqa: E402
+from running import serving  # noqa: E402
 
 from unitcad.arrays.array_file import load_array  # noqa: E402
 from unitcad.arrays.crosstalk_files import crosstalk_files  # noqa: E402
@@ -42,7 +44,7 @@ LOOKS = (("light", 1280, 900, False), ("dark", 1280, 900, True), ("narrow", 390,
 def main() -> None:
     """Make what was asked for; prints each file with its size."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--look", type=Path, metavar="DIR", help="screenshots of both pages, whole, into DIR")
+    parser.add_argument("--look", type=Path, metavar="DIR", help="screenshots of the pages into DIR")
     look = parser.parse_args().look
     with tempfile.TemporaryDirectory() as scratch:
         made = screenshots(look, Path(scratch)) if look else {**pictures(), **arrays(), **pages(Path(scratch))}
@@ -103,13 +105,26 @@ def pages(scratch: Path) -> dict[str, bytes]:
                 seen.drawn()
             found[f"page-{name}.png"] = small(seen.page.screenshot(full_page=name == "batch"))
             seen.close()
+        found["page-live.png"] = small(dict(live_page(running, scratch, LOOKS[:1]))["light"])
     return found
 
 
+def live_page(running: Any, scratch: Path, looks: Sequence[tuple[str, int, int, bool]]) -> Iterator[tuple[str, bytes]]:
+    """The live page in each look: its top, with a wall that the diameter has no room for."""
+    with serving(scratch, "encapsulating") as server:
+        for scheme, width, height, dark in looks:
+            seen = Live(running, server, width, height, dark)
+            seen.choose(WALL, "2.5")
+            seen.page.evaluate("() => document.activeElement.blur()")
+            yield scheme, seen.page.screenshot()
+            seen.close()
+
+
 def screenshots(look: Path, scratch: Path) -> dict[str, bytes]:
-    """Both pages whole, in every look; the variant's with the unit, the set taken apart, and as printed."""
+    """The pages in every look, two of them whole; the variant's with the unit, the set taken apart, and as printed."""
     found = {}
     with chromium.browser() as running:
+        found |= {f"live-{scheme}.png": image for scheme, image in live_page(running, scratch, LOOKS)}
         for name, page in written(scratch):
             for scheme, width, height, dark in LOOKS:
                 seen = chromium.Visit(running, page, width, height, dark)

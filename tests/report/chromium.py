@@ -1,4 +1,4 @@
-"""Debian's Chromium, driven by Playwright; pages come from file:// and may ask for nothing else."""
+"""Debian's Chromium, driven by Playwright."""
 
 from __future__ import annotations
 
@@ -57,16 +57,24 @@ def launched(kind: Any, *flags: str) -> Iterator[Any]:
 
 
 class Visit:
-    """A page opened from a file: what it said on the console, what it asked for, what it threw."""
+    """A page opened from a file or at an address: what it said on the console, what it asked for, what it threw."""
 
     def __init__(
-        self, running: Any, file: Path, width: int = 1280, height: int = 900, dark: bool = False, fragment: str = ""
+        self,
+        running: Any,
+        at: Path | str,
+        width: int = 1280,
+        height: int = 900,
+        dark: bool = False,
+        fragment: str = "",
+        script: str = "",
     ) -> None:
         scheme = "dark" if dark else "light"
         self.context = running.new_context(
             viewport={"width": width, "height": height}, color_scheme=scheme, reduced_motion="reduce"
         )
-        self.context.add_init_script(LISTEN)
+        if script:
+            self.context.add_init_script(script)
         self.page = self.context.new_page()
         self.console: list[str] = []
         self.requests: list[str] = []
@@ -74,7 +82,8 @@ class Visit:
         self.page.on("console", lambda message: self.console.append(f"{message.type}: {message.text}"))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.goto(file.resolve().as_uri() + (f"#{fragment}" if fragment else ""))
+        address = at.resolve().as_uri() if isinstance(at, Path) else at
+        self.page.goto(address + (f"#{fragment}" if fragment else ""))
         self.page.wait_for_selector("html[data-ready=yes]", timeout=60_000)
 
     def drawn(self) -> None:

@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlparse
 
 import numpy as np
 import pytest
-from chromium import Visit, launched
+from chromium import LISTEN, Visit, launched
 
 from unitcad.pipeline.build import build
 from unitcad.pipeline.scenes import moments
@@ -25,7 +25,7 @@ Image = pytest.importorskip("PIL.Image", reason="reading the screenshots needs P
 
 @pytest.fixture
 def visit(running: Any, page: Path) -> Iterator[Visit]:
-    seen = Visit(running, page)
+    seen = Visit(running, page, script=LISTEN)
     seen.drawn()
     yield seen
     assert seen.errors == []

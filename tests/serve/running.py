@@ -26,14 +26,20 @@ class Server:
         self.port = int(self.base.rpartition(":")[2])
 
     def send(
-        self, path: str, message: Any = None, *, headers: dict[str, str] | None = None, body: bytes | None = None
+        self,
+        path: str,
+        message: Any = None,
+        *,
+        headers: dict[str, str] | None = None,
+        body: bytes | None = None,
+        method: str | None = None,
     ) -> tuple[int, bytes, dict[str, str]]:
         """Send a message as the page does; `headers` replace the page's, "" leaves one out."""
         if message is not None:
             body = json.dumps(message).encode()
         given = {"X-Unitcad-Token": self.token, **(MESSAGE if body is not None else {}), **(headers or {})}
         request = urllib.request.Request(
-            self.base + path, body, {name: value for name, value in given.items() if value != ""}
+            self.base + path, body, {name: value for name, value in given.items() if value != ""}, method=method
         )
         try:
             with urllib.request.urlopen(request, timeout=120) as answer:

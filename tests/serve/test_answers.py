@@ -7,11 +7,13 @@ import json
 import os
 import signal
 import time
+import tomllib
 from pathlib import Path
 
 import pytest
 from running import Server, serving
 
+from unitcad.batch.sweep import from_file
 from unitcad.estimating import estimate_spec
 from unitcad.mould_checks import check_moulds
 from unitcad.moulds.mould_set import MouldSet
@@ -53,7 +55,12 @@ def test_every_fault_is_told_with_its_line_and_what_would_do(server: Server, tex
 def test_a_text_that_is_no_toml_is_told_with_its_line(server: Server, text: str) -> None:
     answer = server.ask(text.replace("diameter_mm =", "diameter_mm = ="))
     assert len(answer["faults"]) == 1
-    assert "no TOML" in answer["faults"][0]["message"]
+    assert "not TOML" in answer["faults"][0]["message"]
+    assert answer["faults"][0]["line"] == next(
+        i for i, line in enumerate(answer["text"].splitlines(), 1) if "= =" in line
+    )
+    longest = server.ask(text + "\nlong = " + "9" * 5000)
+    assert "thousands of digits" in longest["faults"][0]["message"]
 
 
 def test_the_form_has_every_key_of_the_schema_with_its_range(server: Server, text: str) -> None:
@@ -108,7 +115,8 @@ def test_a_build_is_that_of_the_command_and_can_be_cancelled(tmp_path: Path, tex
         assert len(list((tmp_path / "made").glob("encapsulating-*"))) == 1
 
 
-def test_a_sweep_makes_a_batch_with_its_page(tmp_path: Path, text: str) -> None:
+def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path: Path, text: str) -> None:
+    (tmp_path / "out" / "sweep-1").mkdir(parents=True)
     with serving(tmp_path) as own:
         quick = text + "\n[output]\nformats = []\n"
         message = {"text": quick, "key": "layers.0.wall_mm", "low": 1.0, "high": 1.5, "count": 2}
@@ -117,4 +125,9 @@ def test_a_sweep_makes_a_batch_with_its_page(tmp_path: Path, text: str) -> None:
             time.sleep(0.2)
             state = json.loads(own.send(f"/job/{state['job']}")[1])
         assert state["code"] == 0, state
+        assert state["page"] == "sweep-2/results/report.html"
         assert own.send(f"/files/{state['page']}")[0] == 200
+    folder = tmp_path / "out" / "sweep-2"
+    assert sorted(path.name for path in folder.iterdir()) == ["results", "spec.toml", "sweep.toml"]
+    swept = from_file(tomllib.loads((folder / "sweep.toml").read_text()), folder, "sweep")
+    assert [(axis.path, axis.values) for axis in swept.axes] == [("layers.0.wall_mm", [1.0, 1.5])]

@@ -74,5 +74,5 @@ def test_a_path_that_leads_nowhere_is_refused(path: str) -> None:
 
 
 def test_a_text_that_is_no_toml_is_refused() -> None:
-    with pytest.raises(UnitcadError, match="no TOML"):
+    with pytest.raises(UnitcadError, match="not TOML"):
         edited("a = [", [Edit(path="b", value=1)])

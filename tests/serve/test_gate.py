@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import time
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ import pytest
 from running import Server, serving
 
 from unitcad.serve.gate import BODY_S, LARGEST_BODY
+from unitcad.validation import templates
 
-HOSTS = ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example", "0.0.0.0", "[::]", ""]
+HOSTS = ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example", "0.0.0.0", "[::]"]
 ORIGINS = ["http://evil.example", "https://127.0.0.1", "null", "http://localhost", "file://", "http://127.0.0.1:1"]
 TOKENS = ["", "x", "0" * 32, "é" * 16, "a" * 5000]
 PATHS = [
@@ -28,37 +30,73 @@ MESSAGES: list[Any] = [
 ]  # fmt: skip
 
 
-def test_pages_of_other_sites_and_rebound_names_are_refused(server: Server, text: str) -> None:
-    """Every pair of a wrong Host, a wrong Origin or a wrong token, on every route."""
-    ask = {"text": text}
-    refused = 0
-    for path, host in itertools.product(("/ask", "/save", "/build", "/"), HOSTS):
-        if not host:
-            continue
-        status, content, headers = server.send(path, None if path == "/" else ask, headers={"Host": host})
-        assert status == 421, (path, host, content)
-        assert "Access-Control-Allow-Origin" not in headers
-        refused += 1
-    for path, origin in itertools.product(("/ask", "/save", "/build", "/sweep", "/cancel", "/"), ORIGINS):
-        status, _, headers = server.send(path, None if path == "/" else ask, headers={"Origin": origin})
-        assert status == 403, (path, origin)
-        assert "Access-Control-Allow-Origin" not in headers
-        refused += 1
-    for path, token in itertools.product(
-        ("/ask", "/save", "/build", "/sweep", "/cancel", "/", "/files/x.json", "/job/0"), TOKENS
-    ):
-        message = None if path.startswith(("/files", "/job")) or path == "/" else ask
-        status, content, _ = server.send(path, message, headers={"X-Unitcad-Token": token.encode().decode("latin-1")})
-        assert status == 403, (path, token, content)
-        refused += 1
-    for site in ("cross-site", "same-site"):
-        assert server.send("/ask", ask, headers={"Sec-Fetch-Site": site})[0] == 403
-        refused += 1
-    # A cookie alone, which a form of another site could make the browser send, is enough to read, not to act.
+ROUTES = ["/ask", "/save", "/build", "/sweep", "/cancel", "/"]
+NAMES = [
+    "../x.toml", "/tmp/x.toml", "a/b.toml", ".x.toml", "x.py", "x.toml\n", "", "x" * 200 + ".toml", "..toml/",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Hostile:
+    """A request that is refused with `status`: a route with a message or a body, and headers in place of the page's."""
+
+    path: str
+    status: int
+    message: Any = None
+    headers: dict[str, str] = field(default_factory=dict)
+    body: bytes | None = None
+
+
+def _with(status: int, name: str, values: list[str], routes: list[str]) -> list[Hostile]:
+    """Every value of a header on every route, with a message that would be answered."""
+    ask = {"text": templates()["embedded"].read_text("utf-8")}
+    return [
+        Hostile(route, status, None if route == "/" or "x" in route else ask, {name: value.encode().decode("latin-1")})
+        for route, value in itertools.product(routes, values)
+    ]
+
+
+FORM = {"Content-Type": "application/x-www-form-urlencoded"}
+HOSTILE = {
+    "other Host": _with(421, "Host", HOSTS, ROUTES),
+    "other Origin": _with(403, "Origin", ORIGINS, ROUTES),
+    "other site": _with(403, "Sec-Fetch-Site", ["cross-site", "same-site"], ROUTES),
+    "no token": _with(403, "X-Unitcad-Token", TOKENS, [*ROUTES, "/files/x.json", "/job/x", "/variant/x"]),
+    "no message": [
+        *(Hostile(route, 400, body=json.dumps(message).encode()) for route in ROUTES[:5] for message in MESSAGES),
+        *(Hostile("/ask", 400, body=body) for body in (b"{", b"\xff\xfe", b"[" * 100_000)),
+        Hostile("/ask", 415, body=b"text=x", headers=FORM),
+        Hostile("/ask", 415, body=b"{}", headers={"Content-Type": "text/plain"}),
+    ],
+    "file name": [Hostile("/save", 400, {"text": "", "name": name}) for name in NAMES],
+    "other method": [
+        Hostile(route, 405, headers={"Method": method}) for route in ROUTES for method in ("PUT", "DELETE", "OPTIONS")
+    ],
+}
+"""Requests by what is hostile in them. Paths, huge and slow bodies and code have tests of their own, below."""
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_requests_are_refused(server: Server, kind: str) -> None:
+    for one in HOSTILE[kind]:
+        headers = dict(one.headers)
+        method = headers.pop("Method", None)
+        status, content, answered = server.send(one.path, one.message, headers=headers, body=one.body, method=method)
+        assert status == one.status, (one.path, headers, str(one.message)[:80], content[:80])
+        assert "Access-Control-Allow-Origin" not in answered
+
+
+def test_hostile_requests_are_many() -> None:
+    others = len(PATHS) + len(CODE) * len(ASKED_OF_CODE) + 2 + 1  # huge bodies, told and not; a slow one
+    assert sum(map(len, HOSTILE.values())) + others >= 200
+    assert min(map(len, HOSTILE.values())) > 5
+
+
+def test_a_cookie_is_enough_to_read_alone(server: Server, text: str) -> None:
+    """A form of another site could make the browser send it."""
     cookie = {"X-Unitcad-Token": "", "Cookie": f"unitcad-{server.port}={server.token}"}
     assert server.send("/", headers=cookie)[0] == 200
-    assert server.send("/ask", ask, headers=cookie)[0] == 403
-    assert refused > 100
+    assert server.send("/ask", {"text": text}, headers=cookie)[0] == 403
 
 
 def test_a_request_has_one_host(server: Server) -> None:
@@ -92,21 +130,6 @@ def test_paths_are_refused_by_the_server(server: Server) -> None:
         assert answer.split(b" ")[1] in (b"404", b"400"), (path, answer[:200])
 
 
-@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: repr(message)[:40])
-def test_messages_that_the_page_never_sends_are_refused(server: Server, message: Any) -> None:
-    status, content, _ = server.send("/ask", body=json.dumps(message).encode())
-    assert status == 400, content
-
-
-def test_a_body_is_json_and_says_so(server: Server) -> None:
-    assert server.send("/ask", body=b"{", headers={})[0] == 400
-    assert server.send("/ask", body=b"\xff\xfe")[0] == 400
-    assert server.send("/ask", body=b"[" * 100_000)[0] == 400
-    form = {"Content-Type": "application/x-www-form-urlencoded"}
-    assert server.send("/ask", body=b"text=x", headers=form)[0] == 415
-    assert server.send("/ask", body=b"{}", headers={"Content-Type": "text/plain"})[0] == 415
-
-
 def test_a_huge_body_is_refused_before_it_is_read(server: Server) -> None:
     head = f"POST /ask HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nX-Unitcad-Token: {server.token}\r\n"
     told = head + f"Content-Type: application/json\r\nContent-Length: {LARGEST_BODY + 1}\r\n\r\n"
@@ -125,26 +148,31 @@ def test_a_slow_body_is_given_up(server: Server) -> None:
     assert time.monotonic() - begun >= BODY_S - 1
 
 
-def test_code_in_a_text_does_not_run(server: Server, text: str, tmp_path: Path) -> None:
-    """A design of the page's own: by its file's path, by its source in the text, by an edit."""
+CODE = [
+    'design = "{file}:evil"',
+    'design = "evil.py:evil"\ndesign_source = {source}',
+    'design = "{file}:evil"\ndesign_source = {source}',
+]
+ASKED_OF_CODE = ["unit", "moulds", "estimate", "/build", "/sweep"]
+
+
+@pytest.mark.parametrize("design", CODE)
+def test_code_in_a_text_does_not_run(server: Server, text: str, tmp_path: Path, design: str) -> None:
+    """A design of the page's own, by its file's path or by its source in the text."""
     marker = tmp_path / "ran"
     file = tmp_path / "evil.py"
     file.write_text(f"open({str(marker)!r}, 'w').close()\ndef evil(spec): return {{}}\n")
-    source = json.dumps(file.read_text())
-    texts = [
-        text.replace('design = "encapsulating"', f'design = "{file}:evil"'),
-        text.replace('design = "encapsulating"', f'design = "evil.py:evil"\ndesign_source = {source}'),
-    ]
-    for one in texts:
-        for what in ("unit", "moulds", "estimate"):
-            answer = server.ask(one, what)
-            assert "model" not in answer
-            assert "estimate" not in answer
-            assert "faults" in answer or what == "estimate", one
-        assert server.send("/build", {"text": one})[0] == 422
-        assert server.send("/sweep", {"text": one, "key": "diameter_mm", "low": 13, "high": 14, "count": 2})[0] == 422
-    edits = [{"path": "design", "value": "evil.py:evil"}, {"path": "design_source", "value": file.read_text()}]
-    assert server.ask(text, "unit", edits)["faults"]
+    one = text.replace('design = "encapsulating"', design.format(file=file, source=json.dumps(file.read_text())))
+    assert one != text
+    for what in ASKED_OF_CODE:
+        if what.startswith("/"):
+            sweep = {"key": "diameter_mm", "low": 13, "high": 14, "count": 2} if what == "/sweep" else {}
+            assert server.send(what, {"text": one, **sweep})[0] == 422
+            continue
+        answer = server.ask(one, what)
+        assert "model" not in answer
+        assert "estimate" not in answer
+        assert "faults" in answer or what == "estimate"
     assert not marker.exists()
 
 
@@ -162,19 +190,6 @@ def test_files_that_a_text_names_are_not_read(server: Server, text: str, tmp_pat
 
 def test_specs_are_saved_in_the_folder_alone(tmp_path: Path, text: str) -> None:
     with serving(tmp_path, "embedded") as own:
-        for name in (
-            "../x.toml",
-            "/tmp/x.toml",
-            "a/b.toml",
-            ".x.toml",
-            "x.py",
-            "x.toml\n",
-            "",
-            "x" * 200 + ".toml",
-            "..toml/",
-        ):
-            status, _, _ = own.send("/save", {"text": text, "name": name})
-            assert status == 400, name
         assert own.send("/save", {"text": text, "name": "mine.toml"})[0] == 200
         assert (tmp_path / "mine.toml").read_text() == text
         status, content, _ = own.send("/save", {"text": text + "# more\n", "name": "mine.toml"})

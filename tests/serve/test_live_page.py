@@ -57,7 +57,7 @@ def test_form_and_text_are_in_step_and_changes_are_undone(live: Live) -> None:
     assert live.page.input_value(WALL) == "1.5"
     live.page.wait_for_timeout(1000)  # typing without a pause is one step
     live.choose("#text", text + "\n[[")
-    assert "no TOML" in live.page.inner_text("#text-fault")
+    assert live.page.inner_text("#page").count("not TOML") == 1
     for wanted in ("1.5", "1.4", "1.25"):
         live.page.click("text=Undo")
         live.until(lambda wanted=wanted: live.page.input_value(WALL) == wanted)
@@ -95,6 +95,59 @@ def test_every_control_changes_the_spec(live: Live) -> None:
         assert "refused" not in live.state, (path, live.page.inner_text("#faults"))
     live.page.get_by_label("with circuit").click()
     live.until(lambda: "[fpcb]" not in live.page.input_value("#text"))
+    live.settled()
+
+
+def test_a_change_that_another_field_refuses_is_refused_where_it_was_made(live: Live) -> None:
+    live.choose(WALL, "9")
+    assert live.page.get_attribute(WALL, "aria-invalid") == "true"
+    assert live.page.get_attribute('input[name="diameter_mm"]', "aria-invalid") != "true"
+    fault = live.page.locator('.field[data-path="layers.0.wall_mm"] .refusal')
+    assert "walls of 10.25 a side need 27.7 mm" in fault.inner_text()
+    buttons = [button.inner_text() for button in fault.get_by_role("button").all()]
+    assert buttons == ["Use 2.15", "Use diameter_mm = 27.7"]
+    live.pressed(fault.get_by_role("button").nth(1))
+    assert live.page.input_value('input[name="diameter_mm"]') == "27.7"
+    assert "passed" in live.state
+
+
+def test_wires_take_the_circuit_s_place_and_a_cap_is_left_out(live: Live) -> None:
+    live.page.click("summary:text-is('Wires')")
+    live.pressed(live.page.get_by_label("with wires"))
+    assert "passed" in live.state
+    assert "[fpcb]" not in live.page.input_value("#text")
+    live.start_from("embedded")
+    live.choose('input[name="layers.0.cap_mm"]', "1")
+    live.pressed(live.page.get_by_role("button", name="Leave it out"))
+    assert "passed" in live.state
+
+
+def test_a_slider_has_the_documented_range(live: Live) -> None:
+    slider = live.page.locator('.field[data-path="layers.0.wall_mm"] input[type="range"]')
+    for key, value in (("End", "1000"), ("Home", "0.5")):
+        slider.focus()
+        live.pressed(slider, key)
+        assert live.page.input_value(WALL) == value
+    live.choose(WALL, "1.25")
+    slider.focus()
+    live.pressed(slider, "ArrowRight")
+    assert live.page.input_value(WALL) == "1.26"
+
+
+def test_the_state_stays_in_sight_and_the_unit_s_mass_is_shown(live: Live) -> None:
+    assert "with its motor 0.9" in live.page.inner_text("#figures")
+    live.page.evaluate("() => scrollTo(0, document.body.scrollHeight)")
+    assert live.page.evaluate("() => document.getElementById('state').getBoundingClientRect().top") >= 0
+
+
+def test_changes_that_are_not_saved_outlast_a_reload(live: Live) -> None:
+    live.choose(WALL, "1.4")
+    live.page.reload()
+    live.page.wait_for_selector("html[data-ready=yes]", timeout=60_000)
+    live.settled()
+    assert live.page.input_value(WALL) == "1.4"
+    live.page.click("text=Start from encapsulating.toml again")
+    live.until(lambda: live.page.input_value(WALL) == "1.25")
     live.settled()
 
 

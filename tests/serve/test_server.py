@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from running import serving
+from running import Server, serving
 
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.serve.server import serve
@@ -32,9 +32,16 @@ def test_a_design_that_is_code_needs_a_word(tmp_path: Path) -> None:
     text = custom_templates()["custom/dome"].read_text("utf-8")
     with serving(tmp_path, "custom/dome", "--allow-code") as own:
         assert "faults" not in own.ask(text)
-        # A change of the numbers is no new code; another design's name is.
-        assert "faults" not in own.ask(text, "unit", [{"path": "layers.0.wall_mm", "value": 2.5}]) or True
+        # A change of the numbers is no new code, nor is another shipped design; a name that no spec gives is.
+        assert "faults" not in own.ask(text, "unit", [{"path": "name", "value": "mine"}])
+        lugs = custom_templates()["custom/strap-lugs"].read_text("utf-8")
+        assert "faults" not in own.ask(lugs)
         assert own.ask(text, "unit", [{"path": "design", "value": "strap-lugs.py:strap_lugs"}])["faults"]
+
+
+def test_shipped_code_runs_with_a_word_alone(server: Server) -> None:
+    lugs = custom_templates()["custom/strap-lugs"].read_text("utf-8")
+    assert server.ask(lugs)["faults"]
 
 
 def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:

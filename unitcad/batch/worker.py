@@ -14,7 +14,7 @@ import signal
 import threading
 from typing import IO
 
-from unitcad.children import end_with_parent
+from unitcad.children import end_with_parent, message_pipes
 
 
 def serve(preload: tuple[str, ...]) -> None:
@@ -22,9 +22,7 @@ def serve(preload: tuple[str, ...]) -> None:
     end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
     faulthandler.enable()
-    tasks, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-    os.dup2(2, 1)  # what a kernel prints must not get between the answers
+    tasks, answers = message_pipes()
     for name in preload:
         importlib.import_module(name)
     coming: queue.SimpleQueue[bytes] = queue.SimpleQueue()

@@ -13,7 +13,7 @@ from unitcad.cli.shared_options import AllowCode
 def serve(
     source: Annotated[
         str | None,
-        typer.Argument(metavar="SPEC", help="A spec file, a template's name, or a folder of results."),
+        typer.Argument(metavar="SPEC", help="A spec, array or campaign file, a template, or a folder of results."),
     ] = None,
     out: Annotated[Path, typer.Option("-o", "--out", help="Where builds and sweeps from the page go.")] = Path("out"),
     port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = 0,

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import pickle
-import sys
 
-from unitcad.children import end_with_parent
+from unitcad.children import end_with_parent, message_pipes
 from unitcad.errors import UnitcadError
 
 
 def main() -> None:
     """Answer each (bodies, name) with the file, or with the sentence of an error, until there are no more requests."""
     end_with_parent()
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # OCCT's own words are no answers
+    requests, answers = message_pipes()
     from unitcad.export import step
 
-    requests = sys.stdin.buffer
     while True:
         try:
             bodies, name = pickle.load(requests)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hashlib
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass
+from html import escape
+from itertools import count
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
@@ -28,8 +30,10 @@ from unitcad.serve.messages import Ask, Build, Cancel, Fault, JobId, Save, Sweep
 from unitcad.text import toml
 
 T = TypeVar("T", bound=msgspec.Struct)
-ANSWER_S = {"unit": 10.0, "moulds": 60.0, "estimate": 30.0}
+ANSWER_S = {"unit": 20.0, "moulds": 60.0, "estimate": 30.0}
 """Seconds that a question may take, by what is asked."""
+CAMPAIGN_S = 300.0
+"""Seconds that the records of a campaign may take."""
 FILE_TYPES = {
     ".html": "text/html; charset=utf-8", ".svg": "image/svg+xml", ".png": "image/png", ".json": "application/json",
     ".md": "text/plain; charset=utf-8", ".csv": "text/csv; charset=utf-8", ".toml": "text/plain; charset=utf-8",
@@ -42,10 +46,10 @@ _SANDBOX = "sandbox allow-scripts allow-downloads allow-popups; frame-ancestors 
 
 @dataclass(frozen=True)
 class Setting:
-    """What a server works on: the first text and its file's name, where files go, and what texts may name.
+    """What a server works on: the first text and its file's name, where files go, what texts may name and start from.
 
     `folder`: where specs are saved; `out`: where results go, whose files are served. `batch`: a folder of variants that
-    the page lists.
+    the page lists. `campaign`: a file of recordings, whose page is shown instead.
     """
 
     text: str
@@ -53,10 +57,12 @@ class Setting:
     folder: Path
     out: Path
     trusted: Trusted
+    starts: Mapping[str, str | None]
     token: str
     hosts: frozenset[str]
     port: int
     batch: Path | None = None
+    campaign: Path | None = None
 
 
 class Superseded(Exception):
@@ -95,7 +101,8 @@ class Live:
     @contextlib.asynccontextmanager
     async def lifespan(self, app: Starlette) -> AsyncIterator[None]:
         """Warm the workers up at the start, end workers and jobs at the end."""
-        warming = [asyncio.create_task(self._warm(what)) for what in self.workers]
+        warm = () if self.setting.campaign else self.workers
+        warming = [asyncio.create_task(self._warm(what)) for what in warm]
         try:
             yield
         finally:
@@ -105,12 +112,28 @@ class Live:
     async def page(self, request: Request) -> Response:
         """Answer with the page, and let the browser keep the token for files."""
         setting = self.setting
+        if setting.campaign:
+            return await self._campaign(setting.campaign)
         batch = page_data(setting.batch, with_models=False)[0] if setting.batch else None
-        html = live_page(setting.text, setting.name, setting.token, str(setting.folder), batch)
+        html = live_page(setting.text, setting.name, setting.token, str(setting.folder), setting.starts, batch)
+        return self._html(html)
+
+    def _html(self, html: str, status: int = 200) -> Response:
         headers = {"content-security-policy": HEADER_POLICY}
-        response = Response(html, media_type="text/html; charset=utf-8", headers=headers)
+        response = Response(html, status, media_type="text/html; charset=utf-8", headers=headers)
         response.set_cookie(self.cookie, self.setting.token, httponly=True, samesite="strict")
         return response
+
+    async def _campaign(self, path: Path) -> Response:
+        """Answer with the page of a campaign, measured anew; a change of its file is seen by loading it again."""
+        worker = self.workers["estimate"]
+        async with worker.turn:
+            try:
+                of = "unitcad.serve.answers:campaign_page"
+                given = msgspec.json.decode(await worker.ask(of, str(path).encode(), seconds=CAMPAIGN_S))
+            except WorkerLost as error:
+                return self._html(escape(str(error)), 500)
+        return self._html(given["page"]) if "page" in given else self._html(escape(given["refused"]), 422)
 
     async def ask(self, request: Request) -> Response:
         """Answer a question about a text by the worker for it."""
@@ -169,9 +192,15 @@ class Live:
         step = (sweep.high - sweep.low) / (sweep.count - 1)
         values = [round(sweep.low + i * step, 6) for i in range(sweep.count)]
         asked = f'base = "spec.toml"\n\n[sweep]\nmode = "product"\n{toml(sweep.key)} = {toml(values)}\n'
-        arguments = ["batch", "{sweep}", "-o", _plain(self.setting.out / "sweep"), "--report", *code]
-        state = await self.jobs.start("the sweep", arguments, {"spec.toml": text, "sweep.toml": asked})
+        # A folder of its own, in which the sweep file stays beside the results.
+        folder = self._free_folder("sweep")
+        arguments = ["batch", "{sweep}", "-o", _plain(folder / "results"), "--report", *code]
+        state = await self.jobs.start("the sweep", arguments, {"spec.toml": text, "sweep.toml": asked}, folder)
         return msgspec.json.encode(state)
+
+    def _free_folder(self, name: str) -> Path:
+        """Return the first of NAME-1, NAME-2, ... that is not there."""
+        return next(path for i in count(1) if not (path := self.setting.out / f"{name}-{i}").exists())
 
     async def _effective(self, text: str) -> tuple[str, list[str]]:
         """Return the effective spec of a text, which names no file, and the option that its code needs.

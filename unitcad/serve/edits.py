@@ -10,6 +10,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.serve.messages import Edit
+from unitcad.spec import parse_toml
 from unitcad.spec.fields import index_in
 
 
@@ -22,8 +23,9 @@ def edited(text: str, edits: Sequence[Edit]) -> str:
         return text
     try:
         document = tomlkit.parse(text)
-    except (TOMLKitError, RecursionError) as error:
-        raise UnitcadError(f"the text is no TOML: {error}") from None
+    except (TOMLKitError, RecursionError, ValueError):
+        parse_toml(text, "the text")  # whose words the page shows without an edit too
+        raise UnitcadError("the text: holds TOML that can't be edited value by value; change the text") from None
     for edit in edits:
         _apply(document, edit)
     return tomlkit.dumps(document)
@@ -72,7 +74,7 @@ def _value(edit: Edit) -> Any:
         return edit.value
     try:
         return tomlkit.value(str(edit.value))
-    except (TOMLKitError, RecursionError):
+    except (TOMLKitError, RecursionError, ValueError):
         raise Refusal(edit.path, edit.value, "is no TOML value; a list is [2, 3], a word in quotes") from None
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal
 
 import msgspec
+from msgspec.structs import replace
 
 from unitcad.catalogue import Material, materials, motors, printers, tissue
 from unitcad.designs import shipped
@@ -32,34 +33,46 @@ _TABLES = (
     ("motor", "Motor", MotorTable),
     ("fpcb", "Circuit", FpcbTable),
     ("wires", "Wires", WiresTable),
+)
+LAST_TABLES = (
     ("moulds", "Moulds", MouldsTable),
     ("casting", "Casting", CastingTable),
     ("estimate", "Estimate", EstimateTable),
     ("output", "Output", OutputTable),
 )
-_OPTIONAL = ("fpcb", "wires")
+_OPTIONAL = {"fpcb": "wires", "wires": "fpcb"}
+"""Tables that may be left out, each with the one whose place it takes."""
+_NEEDS = {"wires": {"diameter_mm": 0.3}}
+"""What a table begins with: the wire of a small motor, across its insulation."""
 _TEXTS_OF_FILES = ("estimate.fit_source",)
-SPAN = 4.0
-"""A slider goes from the first value over this to the first value times this, within the documented range."""
 
 
 def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
     """Return the form of a spec's plain data; `spec` is the effective one, None where the data is refused."""
     holds = to_data(spec) if spec else {}
     choices = _choices(data)
-    made = [Group("", "Unit", [*_fields(AskedSpec, "", data, holds, choices, ("name", "design", "diameter_mm"))])]
+    made = [Group("", "Unit", [*fields(AskedSpec, "", data, holds, choices, ("name", "design", "diameter_mm"))])]
     layers = data.get("layers")
     for i in range(len(layers) if isinstance(layers, list) else 0):
-        made.append(Group(f"layers.{i}", f"Layer {i + 1}", [*_fields(LayerTable, f"layers.{i}", data, holds, choices)]))
-    for path, title, table in _TABLES:
+        made.append(Group(f"layers.{i}", f"Layer {i + 1}", [*fields(LayerTable, f"layers.{i}", data, holds, choices)]))
+    return [*made, *table_groups((*_TABLES, *LAST_TABLES), data, holds, choices)]
+
+
+def table_groups(
+    tables: Sequence[tuple[str, str, type[msgspec.Struct]]],
+    data: Mapping[str, Any],
+    holds: Mapping[str, Any],
+    choices: Choices,
+) -> Iterator[Group]:
+    """Yield a group for each of the tables (path, title, type); arguments as of `fields`."""
+    for path, title, table in tables:
         optional = path in _OPTIONAL
         present = not optional or isinstance(data.get(path), dict)
-        fields = [*_fields(table, path, data, holds, choices)] if present else []
-        made.append(Group(path, title, fields, present, optional))
-    return made
+        shown = [*fields(table, path, data, holds, choices)] if present else []
+        yield Group(path, title, shown, present, optional, _NEEDS.get(path, {}), _OPTIONAL.get(path, ""))
 
 
-def _fields(
+def fields(
     table: type[msgspec.Struct],
     path: str,
     data: Mapping[str, Any],
@@ -67,6 +80,10 @@ def _fields(
     choices: Choices,
     only: tuple[str, ...] = (),
 ) -> Iterator[Field]:
+    """Yield a field for each key of a table at a path.
+
+    `data` is what the text gives, `holds` the settled data, `choices` the words by path, `only` the keys meant.
+    """
     for name, info in fields_of(table).items():
         where = f"{path}.{name}" if path else name
         if (only and name not in only) or where in _TEXTS_OF_FILES:
@@ -74,7 +91,8 @@ def _fields(
         given = at(data, where)
         default = None if info.default is msgspec.NODEFAULT else info.default
         value = next((one for one in (given, at(holds, where)) if one is not ABSENT and one is not None), default)
-        yield _field(where, name, info.type, value, given is not ABSENT, choices.get(_place(where), []))
+        made = _field(where, name, info.type, value, given is not ABSENT, choices.get(_place(where), []))
+        yield replace(made, required=info.required)
 
 
 def _place(path: str) -> str:
@@ -100,18 +118,8 @@ def _field(path: str, name: str, kind: Any, value: Any, given: bool, choices: li
         how = "integer"
     else:
         how = "word" if choices or words else "text"
-    least, most = (None, None) if how != "number" else _slider(value, low, high)
     label = name.removesuffix("_mm").replace("_", " ")
-    return Field(path, label, how, value, given, low, high, choices or words, meaning(kind), least, most)
-
-
-def _slider(value: Any, low: float | None, high: float | None) -> tuple[float | None, float | None]:
-    """Return the ends of a number's slider: about its value, within the documented range."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or low is None or high is None:
-        return None, None
-    if value <= 0:
-        return low, min(high, max(1.0, low * SPAN))
-    return max(low, value / SPAN), min(high, value * SPAN)
+    return Field(path, label, how, value, given, low, high, choices or words, meaning(kind))
 
 
 def _choices(data: Mapping[str, Any]) -> Choices:

@@ -25,9 +25,9 @@ MOST_LINES = 200
 class Job:
     """A command under way or ended: `state` is what the page is told."""
 
-    def __init__(self, title: str, folder: Path) -> None:
+    def __init__(self, title: str, scratch: Path | None) -> None:
         self.state = JobState(job=secrets.token_hex(8), title=title, lines=[])
-        self.scratch = folder
+        self.scratch = scratch
         self.child: asyncio.subprocess.Process | None = None
         self.watching: asyncio.Task[None] | None = None
 
@@ -39,20 +39,23 @@ class Jobs:
         self.out = out
         self.known: dict[str, Job] = {}
 
-    async def start(self, title: str, arguments: Sequence[str], files: dict[str, str]) -> JobState:
+    async def start(
+        self, title: str, arguments: Sequence[str], files: dict[str, str], folder: Path | None = None
+    ) -> JobState:
         """Run `unitcad` with arguments in which {NAME} stands for the path of a file of `files`.
 
-        Raises UnitcadError while another job runs.
+        The files stay in `folder`, or go with the job without one. Raises UnitcadError while another job runs, OSError.
         """
         running = next((job for job in self.known.values() if not job.state.ended), None)
         if running:
             raise UnitcadError(f"{running.state.title} is under way; wait for it or cancel it")
-        job = Job(title, Path(tempfile.mkdtemp(prefix="unitcad-serve-")))
+        job = Job(title, None if folder else Path(tempfile.mkdtemp(prefix="unitcad-serve-")))
+        there = folder or job.scratch
+        assert there
+        there.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
-            (job.scratch / name).write_text(text, encoding="utf-8")
-        given = [
-            argument.format(**{Path(name).stem: str(job.scratch / name) for name in files}) for argument in arguments
-        ]
+            (there / name).write_text(text, encoding="utf-8")
+        given = [argument.format(**{Path(name).stem: str(there / name) for name in files}) for argument in arguments]
         # PYTHONUNBUFFERED: progress comes as it is made.
         job.child = await asyncio.create_subprocess_exec(
             sys.executable, "-P", "-m", "unitcad", *given,
@@ -113,4 +116,5 @@ class Jobs:
             if page.is_file() and page.resolve().is_relative_to(self.out.resolve()):
                 job.state.page = page.resolve().relative_to(self.out.resolve()).as_posix()
         job.state.ended = True
-        shutil.rmtree(job.scratch, ignore_errors=True)
+        if job.scratch:
+            shutil.rmtree(job.scratch, ignore_errors=True)

@@ -4,28 +4,36 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from typing import Any
 
 from unitcad import __version__
 from unitcad.report.html_page import asset, document
-from unitcad.validation import templates
 
 SHARED = (
     "dom.js", "glb.js", "viewer.js", "controls.js", "plots.js", "estimate.js", "sections.js", "filters.js", "rows.js",
     "compare.js", "table.js", "batch.js",
 )  # fmt: skip
 """Programs of the report that the page runs."""
-PROGRAMS = ("server.js", "form.js", "pinned.js", "jobs.js", "live.js")
+PROGRAMS = ("server.js", "kept.js", "form.js", "pinned.js", "jobs.js", "live.js")
 HEADER_POLICY = "frame-ancestors 'none'"
 """What a policy in the page itself can't say."""
 
 
-def live_page(text: str, name: str, token: str, folder: str, batch: dict[str, Any] | None = None) -> str:
+def live_page(
+    text: str,
+    name: str,
+    token: str,
+    folder: str,
+    starts: Mapping[str, str | None],
+    batch: dict[str, Any] | None = None,
+) -> str:
     """Return the HTML of the page that starts with a spec's `text`, the file `name` of `folder`.
 
-    `batch`: the data of a batch's page, whose rows then open live.
+    `starts` are the texts to start from by their names, None for one that may not be used. `batch`: the data of a
+    batch's page, whose rows then open live.
     """
     data: dict[str, Any] = {
         "text": text,
@@ -34,7 +42,7 @@ def live_page(text: str, name: str, token: str, folder: str, batch: dict[str, An
         "folder": folder,
         "version": __version__,
         "batch": batch,
-        "templates": {key: path.read_text("utf-8") for key, path in templates().items()},
+        "templates": starts,
     }
     packed = base64.b64encode(json.dumps(data, ensure_ascii=False).encode("utf-8", "replace")).decode()
     scripts = [

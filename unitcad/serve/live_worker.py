@@ -10,11 +10,13 @@ import signal
 import sys
 import traceback
 
-from unitcad.children import end_with_parent
+from unitcad.children import end_with_parent, message_pipes
 
 _START = "import sys; sys.path[:] = {path!r}; from unitcad.serve.live_worker import work; work({memory!r}, {preload!r})"
 MEMORY = 4 << 30
 """Bytes of address space that a worker may take."""
+START_S = 60.0
+"""Seconds that a worker may take to start, besides those of its first question."""
 LARGEST = 64 << 20
 """Bytes of a question or an answer."""
 PRELOAD = (
@@ -50,9 +52,10 @@ class Worker:
 
         Raises WorkerLost where the worker hangs or ends; the next question gets another one.
         """
+        fresh = self.pid is None
         child = await self._running()
         try:
-            async with asyncio.timeout(seconds):
+            async with asyncio.timeout(seconds + START_S * fresh):
                 return await self._exchange(child, (function.encode(), *parts))
         except TimeoutError:
             await self._end()
@@ -114,9 +117,7 @@ def work(memory: int, preload: tuple[str, ...]) -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-    os.dup2(2, 1)  # what a kernel prints must not get between the answers
+    questions, answers = message_pipes()
     for name in preload:
         importlib.import_module(name)
     while count := int.from_bytes(questions.read(4), "little"):

@@ -32,11 +32,15 @@ class Edit(Message, frozen=True, kw_only=True):
 
 
 class Ask(Message, frozen=True, kw_only=True):
-    """A question about a spec's text, after `edits`. `page` names the asker: its newer question drops an older one."""
+    """A question about a spec's text, after `edits`. `page` names the asker: its newer question drops an older one.
+
+    `since` takes back what was changed since the text was last accepted, newest first.
+    """
 
     text: Text
     what: What = "unit"
     edits: Annotated[list[Edit], Meta(max_length=50)] = []
+    since: Annotated[list[Edit], Meta(max_length=5)] = []
     page: Annotated[str, Meta(pattern=r"^[0-9a-z]{1,32}\Z")] = "0"
 
 
@@ -70,20 +74,27 @@ class Cancel(Message, frozen=True, kw_only=True):
     job: JobId
 
 
-class Fault(Struct, frozen=True):
-    """A value that is refused: the sentence, its field, a value that would be accepted, and its line in the text."""
+class Fault(Struct, frozen=True, omit_defaults=True):
+    """A value that is refused: the sentence, its field, a value that would be accepted, and its line in the text.
+
+    `at` is the field whose change is to blame, where that is another one, and `at_nearest` a value accepted there.
+    `leave_out`: without the key the text is accepted.
+    """
 
     message: str
     field: str = ""
     nearest: Any = None
     line: int | None = None
+    at: str = ""
+    at_nearest: float | None = None
+    leave_out: bool = False
 
 
 class Field(Struct, frozen=True, omit_defaults=True):
     """A control of the form.
 
-    `value` is what holds now, `given` tells whether the text says it. A number has its documented range from `low` to
-    `high`; its slider goes from `least` to `most`. `choices` are words, each with what it means.
+    `value` is what holds now, `given` tells whether the text says it, `required` whether it must. A number has its
+    documented range from `low` to `high`. `choices` are words, each with what it means.
     """
 
     path: str
@@ -95,24 +106,28 @@ class Field(Struct, frozen=True, omit_defaults=True):
     high: float | None = None
     choices: list[tuple[str, str]] = []
     meaning: str = ""
-    least: float | None = None
-    most: float | None = None
+    required: bool = False
 
 
 class Group(Struct, frozen=True, omit_defaults=True):
-    """A table of the form; `optional`: it may be put in and left out, as `present` tells."""
+    """A table of the form; `optional`: it may be put in and left out, as `present` tells.
+
+    `needs` are the values that it begins with, `instead` the table whose place it takes.
+    """
 
     path: str
     title: str
     fields: list[Field]
     present: bool = True
     optional: bool = False
+    needs: dict[str, Any] = {}
+    instead: str = ""
 
 
 class Answer(Struct, kw_only=True, omit_defaults=True):
     """What a question gets: the text after its edits, the faults, and what was asked for where there is none.
 
-    `groups` are the form's; `spec` the effective spec; `figures` are (name, value, unit).
+    `groups` are the form's; `spec` the effective spec; `figures` are (name, value, unit), `drawings` (caption, SVG).
     """
 
     text: str
@@ -125,6 +140,7 @@ class Answer(Struct, kw_only=True, omit_defaults=True):
     lines: list[str] = []
     warnings: list[str] = []
     checks: list[dict[str, Any]] = []
+    drawings: list[tuple[str, str]] = []
     estimate: dict[str, Any] | None = None
     layers: int = 0
     milliseconds: float = 0.0
@@ -142,11 +158,14 @@ class JobState(Struct, kw_only=True):
     page: str | None = None
 
 
+class Source(Struct, frozen=True):
+    """A spec's folder, and its values that name files, by their paths."""
+
+    folder: str
+    named: dict[str, str]
+
+
 class Trusted(Struct, frozen=True):
-    """What the page's texts may name besides data: the folder of the server's own spec, and its values that name files.
+    """What the page's texts may name besides data: all the files of one of these specs, and no other."""
 
-    `folder` None: no file at all.
-    """
-
-    folder: str | None = None
-    named: dict[str, str] = {}
+    sources: list[Source] = []

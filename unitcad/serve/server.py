@@ -7,15 +7,20 @@ import contextlib
 import ipaddress
 import secrets
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+from unitcad.arrays.array_file import array_templates, expanded, is_array
 from unitcad.errors import Missing, Refusal, UnitcadError, WrongArgument
 from unitcad.files import read_text
+from unitcad.pipeline.array_product import ARRAY
+from unitcad.report.array_page import is_array_folder
 from unitcad.report.page import page_data
 from unitcad.report.read_results import is_variant
-from unitcad.serve.messages import Trusted
-from unitcad.spec import read_toml
+from unitcad.serve.array_answers import array_files
+from unitcad.serve.messages import Source, Trusted
+from unitcad.spec import parse_toml, read_toml
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
 from unitcad.validation import custom_templates, default_template, templates
 from unitcad.validation.shipped_files import is_path, named_file
@@ -36,8 +41,8 @@ def serve(
 ) -> None:
     """Serve the live page of a spec until it is interrupted; `ready` is told its address, the token in it.
 
-    `source` is a spec file, a template's name, a result's folder, or a batch's, whose rows open live; None: the default
-    template. `port` 0: any that is free.
+    `source` is a file of a spec, an array or a campaign, a template's name, a result's folder, or a batch's, whose rows
+    open live; None: the default template. `port` 0: any that is free.
     Raises Missing without the extra, WrongArgument for an address beyond the loopback without a `token`, Refusal for a
     spec whose design is code unless `code`, and UnitcadError for a port that is taken.
     """
@@ -48,15 +53,29 @@ def serve(
     token = token or secrets.token_urlsafe(24)
     source, batch = _source(source)
     if batch and out == DEFAULT_OUT:
-        out = batch
-    path, text, folder = _first(source)
-    trusted = _trusted(text, path, code)
+        out = batch.resolve().with_name(f"{batch.resolve().name}-live")
+    known = templates() | custom_templates() | array_templates()
+    path = named_file(source or default_template(), known, "spec", WrongArgument)
+    text = read_text(path)
+    data = parse_toml(text, str(path))  # a file that is no TOML is refused at once
+    folder = path.parent.resolve() if is_own(source) else Path.cwd()
+    campaign = path if {"sensor", "unit"} <= set(data) else None
+    trusted = [_trusted(data, path, code)]
+    plain = templates() | array_templates()
+    starts: dict[str, str | None] = {name: read_text(each) for name, each in plain.items()}
+    for name, each in custom_templates().items():
+        try:
+            trusted.append(_trusted(read_toml(each), each, code))
+            starts[name] = read_text(each)
+        except Refusal:
+            starts[name] = None
     with _listening(host, port) as listening:
         bound = listening.getsockname()[1]
         hosts = frozenset(f"{name}:{bound}" for name in _names(host))
         setting = Setting(
-            text, path.name if is_own(source) else f"{path.stem}.toml", folder, out, trusted, token, hosts, bound, batch
-        )
+            text, path.name if is_own(source) else f"{path.stem}.toml", folder, out,
+            Trusted([source for source in trusted if source.named]), starts, token, hosts, bound, batch, campaign,
+        )  # fmt: skip
         shown = f"[{host}]" if ":" in host else host
         config = uvicorn.Config(
             application(setting), log_level="error", access_log=False, server_header=False, date_header=False,
@@ -81,11 +100,11 @@ async def _told(server, listening: socket.socket, ready: Callable[[], None]) -> 
 
 def _source(source: str | None) -> tuple[str | None, Path | None]:
     """Return the first spec and the folder of a batch. Raises UnitcadError for a folder that holds no result."""
-    if source is None or source in templates() or not Path(source).is_dir():
+    if source is None or source in templates() | array_templates() or not Path(source).is_dir():
         return source, None
     folder = Path(source)
     if is_variant(folder):
-        return str(folder / "spec.toml"), None
+        return str(folder / (ARRAY if is_array_folder(folder) else "spec.toml")), None
     page_data(folder, with_models=False)
     return None, folder
 
@@ -136,20 +155,26 @@ def _listening(host: str, port: int) -> socket.socket:
     return listening
 
 
-def _first(source: str | None) -> tuple[Path, str, Path]:
-    """Return the file of the first spec, its text, and the folder where specs are saved."""
-    path = named_file(source or default_template(), templates() | custom_templates(), "spec", WrongArgument)
-    text = read_text(path)
-    read_toml(path)  # a file that is no TOML is refused at once
-    return path, text, path.parent.resolve() if is_own(source) else Path.cwd()
+def _trusted(data: Mapping[str, Any], path: Path, code: bool) -> Source:
+    """Return a spec's files, which a page's texts may name. Raises Refusal for a design that is code, unless `code`."""
+    named = array_files(data) if is_array(data) else files_named(data)
+    for field, unit in _units(data, path.parent):
+        design = files_named(unit).get("design")
+        if design and is_custom(design) and not is_body_file(design) and not code:
+            raise Refusal(field, design, "is code; it runs in the live page with --allow-code alone: read it first")
+    return Source(str(path.parent.resolve()), named)
 
 
-def _trusted(text: str, path: Path, code: bool) -> Trusted:
-    """Return what the page's texts may name. Raises Refusal for a design that is code, unless that is allowed."""
-    import tomllib
+def _units(data: Mapping[str, Any], folder: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the plain data of each unit, with the field of its design. Raises Refusal for a unit that is not found."""
+    if not is_array(data):
+        yield "design", data
+        return
+    whole = expanded(data, folder)
+    units = {"unit": whole.get("unit")} | {f"place.{i}.unit": one.get("unit") for i, one in enumerate(_places(whole))}
+    yield from ((f"{field}.design", unit) for field, unit in units.items() if isinstance(unit, dict))
 
-    named = files_named(tomllib.loads(text))
-    design = named.get("design")
-    if design and is_custom(design) and not is_body_file(design) and not code:
-        raise Refusal("design", design, "is code; it runs in the live page with --allow-code alone: read it first")
-    return Trusted(str(path.parent.resolve()), named) if named else Trusted()
+
+def _places(data: Mapping[str, Any]) -> list[dict[str, Any]]:
+    places = data.get("place")
+    return [place if isinstance(place, dict) else {} for place in places] if isinstance(places, list) else []

@@ -3,13 +3,14 @@
 from unitcad.spec.convert import check_plain, convert
 from unitcad.spec.effective import Spec, with_formats
 from unitcad.spec.printer import printer_of
-from unitcad.spec.toml import from_json, read_toml, spec_hash, to_data, to_json, to_toml
+from unitcad.spec.toml import from_json, parse_toml, read_toml, spec_hash, to_data, to_json, to_toml
 
 __all__ = [
     "Spec",
     "check_plain",
     "convert",
     "from_json",
+    "parse_toml",
     "printer_of",
     "read_toml",
     "spec_hash",

@@ -23,15 +23,19 @@ def read_toml(path: Path, links: bool = True) -> dict[str, Any]:
     Raises UnitcadError with line and column where it does not parse, for a special file, and for one that is larger
     than `unitcad.files.LARGEST`; without `links` for a symbolic link too.
     """
-    text = read_text(path, links=links)
+    return parse_toml(read_text(path, links=links), str(path))
+
+
+def parse_toml(text: str, name: str) -> dict[str, Any]:
+    """Return a TOML text's data. Raises UnitcadError, which says `name`, and the place where it does not parse."""
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise UnitcadError(f"{path}: not TOML: {error}") from None
+        raise UnitcadError(f"{name}: not TOML: {error}") from None
     except RecursionError:
-        raise UnitcadError(f"{path}: nests too deeply") from None
+        raise UnitcadError(f"{name}: nests too deeply") from None
     except ValueError:
-        raise UnitcadError(f"{path}: holds a number of thousands of digits") from None
+        raise UnitcadError(f"{name}: holds a number of thousands of digits") from None
 
 
 def to_data(spec: Spec) -> dict[str, Any]:

@@ -97,7 +97,11 @@ window.unitcad = {};
     // Calls `paint` now and whenever the colours change, until `node` has left the page.
     watch(node, paint) {
       paint();
-      watchers.add({ node, paint });
+      for (const watcher of watchers) {
+        if (watcher.node.isConnected) watcher.shown = true;
+        else if (watcher.shown) watchers.delete(watcher);
+      }
+      watchers.add({ node, paint, shown: false });
     },
     colour(name) {
       return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

@@ -3,34 +3,58 @@
   "use strict";
   const { el, clear, number } = window.unitcad;
   const UNITS = { mm: "mm", hz: "Hz", um: "µm", g: "g", c: "°C", kpa: "kPa" };
-  const OPEN = ["Unit", "Motor", "Circuit"];
+  const OPEN = ["Unit", "Motor", "Circuit", "Array", "Layout", "Sheet"];
   let serial = 0;
 
   const unitOf = (path) => UNITS[path.split(".").pop().split("_").pop()] || "";
-  const wide = (field) => field.least > 0 && field.most / field.least > 50;
+  const STEPS = 200;
 
-  // options: change(path, value, {toml, coalesce}), remove(path), table(path, present).
+  // A slider's track over a documented range of decades: fine about `middle`, the value that was there first, and coarse
+  // towards the ends. `at` gives the value at a place from 0 to 1, `place` the place of a value.
+  function track(low, high, middle) {
+    const ratio = low > 0;
+    const onto = (value) => (ratio ? Math.log(value) : value);
+    const [from, centre, to] = [low, Math.min(high, Math.max(low, middle)), high].map(onto);
+    const half = centre === from ? 0 : centre === to ? 1 : 0.5;
+    const bent = (t) => 0.1 * t + 0.9 * t ** 3;
+    const exact = (place) => {
+      const value = place < half ? centre - bent((half - place) / half) * (centre - from) : centre + bent((place - half) / (1 - half || 1)) * (to - centre);
+      return ratio ? Math.exp(value) : value;
+    };
+    const at = (place) => {
+      const value = exact(place);
+      const step = 10 ** Math.floor(Math.log10(Math.max(Math.abs(value), (high - low) / 1000) / 100));
+      return Math.min(high, Math.max(low, Number((Math.round(value / step) * step).toPrecision(6))));
+    };
+    const place = (value) => {
+      let [least, most] = [0, 1];
+      for (let i = 0; i < 30; i += 1) {
+        const between = (least + most) / 2;
+        if (exact(between) < value) least = between;
+        else most = between;
+      }
+      return least;
+    };
+    return { at, place };
+  }
+
+  // options: change(path, value, {toml, coalesce}), remove(path), table(group, present), layers(), addLayer(), unread(path, why).
   function createForm(options) {
     const node = el("form", { className: "spec-form", autocomplete: "off", onsubmit: (event) => event.preventDefault() });
     const controls = new Map();
     const opened = new Map();
     let shape = "";
 
-    // A number's field and its slider; a slider over a wide range is logarithmic.
+    // A number's field and its slider.
     function numeric(field, id) {
-      const state = { ...field };
+      let way = null;
       const input = el("input", { type: "number", id, step: field.kind === "integer" ? "1" : "any", inputmode: "decimal" });
-      const slider = field.least !== undefined && field.most > field.least
-        ? el("input", { type: "range", min: 0, max: 1000, step: 1, tabindex: "0", "aria-label": `${field.label}, slider` }) : null;
-      const scale = (value) => (wide(state) ? Math.log(value / state.least) / Math.log(state.most / state.least) : (value - state.least) / (state.most - state.least));
-      const value = (at) => {
-        const raw = wide(state) ? state.least * (state.most / state.least) ** at : state.least + at * (state.most - state.least);
-        const step = 10 ** Math.floor(Math.log10((state.most - state.least) / 100));
-        return Number((Math.round(raw / step) * step).toPrecision(6));
-      };
+      const slider = field.kind === "number" && typeof field.value === "number" && field.high > field.low
+        ? el("input", { type: "range", min: 0, max: STEPS, step: 1, tabindex: "0", "aria-label": `${field.label}, slider` }) : null;
       const place = (now) => {
         if (!slider || typeof now !== "number") return;
-        slider.value = String(Math.round(1000 * Math.min(1, Math.max(0, scale(now)))));
+        way = way || track(field.low, field.high, now);
+        slider.value = String(Math.round(STEPS * way.place(now)));
         slider.setAttribute("aria-valuetext", `${number(now)} ${unitOf(field.path)}`);
       };
       input.addEventListener("input", () => {
@@ -43,7 +67,7 @@
         options.change(field.path, input.valueAsNumber, { coalesce: true });
       });
       if (slider) slider.addEventListener("input", () => {
-        const now = value(Number(slider.value) / 1000);
+        const now = way.at(Number(slider.value) / STEPS);
         input.value = String(now);
         slider.setAttribute("aria-valuetext", `${number(now)} ${unitOf(field.path)}`);
         options.change(field.path, now, { coalesce: true });
@@ -51,7 +75,6 @@
       return {
         main: input, others: slider ? [slider] : [],
         set(next) {
-          if (document.activeElement !== input && document.activeElement !== slider) Object.assign(state, { least: next.least ?? state.least, most: next.most ?? state.most });
           const text = next.value === null || next.value === undefined ? "" : String(next.value);
           if (document.activeElement !== input || Number(input.value) !== next.value) input.value = text;
           input.placeholder = text ? "" : "default";
@@ -62,7 +85,11 @@
 
     function word(field, id) {
       const select = el("select", { id, onchange: () => options.change(field.path, select.value) });
+      let offered = "";
       const set = (next) => {
+        const now = JSON.stringify([next.choices, next.value]);
+        if (now === offered && select.value === (next.value ?? "")) return;
+        offered = now;
         const words = (next.choices || []).map(([name]) => name);
         const known = words.includes(next.value) ? next.choices : [[next.value ?? "", ""], ...(next.choices || [])];
         clear(select, known.map(([name, meaning]) => el("option", { value: name, title: meaning || undefined }, meaning ? `${name}: ${meaning}` : name || "default")));
@@ -84,6 +111,16 @@
       return { main: box, others: [], set: (next) => { box.checked = Boolean(next.value); } };
     }
 
+    // What would make a refused text accepted, as words and what they do: a value here, one in another field, none.
+    function remedies(one, path) {
+      const use = (at, value, where) => value !== undefined && value !== null && [`Use ${where}${typeof value === "number" ? number(value, 6) : value}`, () => options.change(at, value)];
+      return [
+        one.at && use(one.at, one.at_nearest, ""),
+        use(one.field || path, one.nearest, one.at ? `${one.field} = ` : ""),
+        one.leave_out && ["Leave it out", () => options.remove(one.field)],
+      ].filter(Boolean);
+    }
+
     function control(field) {
       const id = `field-${(serial += 1)}`;
       const make = { number: numeric, integer: numeric, word, switch: toggle }[field.kind] || typed;
@@ -97,21 +134,20 @@
       const row = el("div", { className: `field of-${field.kind}`, "data-path": field.path },
         el("label", { for: id, title: help || undefined }, field.label, unitOf(field.path) && el("span", { className: "unit" }, ` ${unitOf(field.path)}`)),
         made.main, made.others, reset, help && el("p", { className: "help" }, help), fault);
-      const needed = /^(name|design|diameter_mm|layers\.\d+\.(material|wall_mm))$/.test(field.path);
       return {
         row,
         set(next) {
           made.set(next);
-          reset.hidden = needed || !next.given;
+          reset.hidden = next.required || !next.given;
           row.classList.toggle("by-default", !next.given);
         },
         // A refused value stays where it was typed, with the reason and what would be accepted.
         refuse(one) {
           made.main.setAttribute("aria-invalid", String(Boolean(one)));
-          clear(fault, one && [one.message, one.nearest !== undefined && one.nearest !== null && el("button", { type: "button", onclick: () => {
-            options.change(field.path, one.nearest);
+          clear(fault, one && [one.message, remedies(one, field.path).map(([words, act]) => el("button", { type: "button", onclick: () => {
+            act();
             made.main.focus();
-          } }, `Use ${typeof one.nearest === "number" ? number(one.nearest, 6) : one.nearest}`)]);
+          } }, words))]);
         },
       };
     }
@@ -121,7 +157,7 @@
       const body = el("div", { className: "fields" });
       const details = el("details", { "data-group": each.path || "unit", open: opened.get(each.path) ?? (OPEN.includes(each.title) || each.path.startsWith("layers.")) }, summary, body);
       details.addEventListener("toggle", () => opened.set(each.path, details.open));
-      if (each.optional) body.append(el("label", { className: "present" }, el("input", { type: "checkbox", checked: each.present, onchange: (event) => options.table(each.path, event.target.checked) }), `with ${each.title.toLowerCase()}`));
+      if (each.optional) body.append(el("label", { className: "present" }, el("input", { type: "checkbox", checked: each.present, onchange: (event) => options.table(each, event.target.checked) }), `with ${each.title.toLowerCase()}`));
       const layer = /^layers\.(\d+)$/.exec(each.path);
       for (const field of each.fields) {
         const made = control(field);
@@ -155,7 +191,8 @@
       const left = [];
       const at = new Map();
       for (const one of faults) {
-        const place = controls.has(one.field) ? one.field : controls.has(one.field.replace(/\.\d+$/, "")) ? one.field.replace(/\.\d+$/, "") : "";
+        const field = one.field || "";
+        const place = [one.at, field, field.replace(/\.\d+$/, "")].find((path) => controls.has(path));
         if (place && !at.has(place)) at.set(place, one);
         else left.push(one);
       }

@@ -71,9 +71,10 @@
     function keys() {
       const chosen = key.value;
       clear(key, numbers().map((each) => el("option", { value: each.path }, each.path)));
-      if (chosen) key.value = chosen;
-      else {
-        key.value = "layers.0.wall_mm";
+      key.value = chosen;
+      if (!chosen || key.value !== chosen) {
+        const usual = ["layers.0.wall_mm", "layout.pitch_mm"].find((path) => numbers().some((each) => each.path === path));
+        if (usual) key.value = usual;
         offer();
       }
     }

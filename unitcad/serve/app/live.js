@@ -6,6 +6,7 @@
   const page = document.getElementById("page");
   const APART_MS = 900;
   const AFTER_MS = 120;
+  const UNWRITTEN = "A change is shown at once. Nothing is written until you save, build or sweep.";
 
   function start() {
     const packed = Uint8Array.from(atob(document.getElementById("data").textContent), (c) => c.charCodeAt(0));
@@ -13,14 +14,18 @@
     // The token stands in no address that is copied, bookmarked or kept as history.
     history.replaceState(null, "", location.pathname + location.hash);
     const server = U.createServer(data.token);
-    const state = { text: data.text, pending: [], past: [], future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], later: 0, asked: 0 };
+    const kept = U.keepText(data.text);
+    const state = { text: kept.text, pending: [], past: [], future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], accepted: new Map(), changed: [], opened: "", later: 0, asked: 0 };
     window.unitcad.timings = [];
 
     const form = U.createForm({
       change: (path, value, how = {}) => edit({ path, value, ...(how.toml ? { toml: true } : {}) }, how.coalesce),
       remove: (path) => edit({ path, remove: true }),
       unread: (path, why) => form.unread(path, why),
-      table: (path, present) => edit(present ? { path, value: {} } : { path, remove: true }),
+      table: (group, present) => {
+        if (present && group.instead) edit({ path: group.instead, remove: true });
+        edit(present ? { path: group.path, value: group.needs || {} } : { path: group.path, remove: true });
+      },
       layers: () => state.layers,
       addLayer: () => {
         const last = `layers.${state.layers - 1}`;
@@ -34,9 +39,10 @@
     const textFault = el("p", { className: "refusal", id: "text-fault", role: "status" });
     const undo = el("button", { type: "button", onclick: () => step(state.past, state.future) }, "Undo");
     const redo = el("button", { type: "button", onclick: () => step(state.future, state.past) }, "Redo");
-    const template = el("select", { name: "template", "aria-label": "Start from a template", onchange: () => { if (template.value) replaceText(data.templates[template.value]); template.value = ""; } },
-      el("option", { value: "" }, "Start from ..."), Object.keys(data.templates).map((name) => el("option", { value: name }, name)));
+    const template = el("select", { name: "template", "aria-label": "Start from a template", onchange: () => { if (template.value) startFrom(data.templates[template.value]); template.value = ""; } },
+      el("option", { value: "" }, "Start from ..."), Object.entries(data.templates).map(([name, text]) => el("option", { value: name, disabled: text === null }, text === null ? `${name}: its code needs --allow-code` : name)));
     const title = el("h1", { tabindex: "-1" }, data.name);
+    const opened = el("p", { className: "line" }, UNWRITTEN);
     const chip = el("span", { className: "chip", role: "status", id: "state" }, "starting");
     const host = el("div", { className: "stage-host" });
     const figures = el("div", { className: "chips", id: "figures" });
@@ -50,7 +56,8 @@
     const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers });
     const tabs = el("details", { className: "as-text" }, el("summary", {}, "As TOML text"), el("label", { for: "text", className: "hidden" }, "The spec as TOML"), text, textFault);
     clear(page,
-      el("header", { className: "top" }, el("div", {}, title, el("p", { className: "line" }, "A change is shown at once. Nothing is written until you save, build or sweep.")), el("div", { className: "chips" }, chip, theme.button())),
+      el("header", { className: "top" }, el("div", {}, title, opened), el("div", { className: "chips" }, chip, theme.button())),
+      kept.back && el("p", { className: "note", id: "kept" }, "Your changes from before the page was loaded again are back. ", el("button", { type: "button", onclick: () => startFrom(data.text) }, `Start from ${data.name} again`)),
       batch && batch.node,
       el("div", { className: "columns" },
         el("section", { id: "spec", "aria-label": "Spec" }, el("div", { className: "buttons" }, template, undo, redo), form.node, tabs),
@@ -94,7 +101,21 @@
       // Only the newest value of a key that is being dragged is worth sending.
       state.pending = state.pending.filter((one) => one.path !== change.path || one.remove || change.remove);
       state.pending.push(change);
+      state.changed = [change.path, ...state.changed.filter((path) => path !== change.path)].slice(0, 5);
       ask();
+    }
+
+    // Edits that take back what was changed since the text was last accepted, newest first.
+    function since() {
+      return state.changed.filter((path) => state.accepted.has(path)).map((path) => {
+        const field = state.accepted.get(path);
+        return field.given ? { path, value: field.value, ...(field.kind === "toml" ? { toml: true } : {}) } : { path, remove: true };
+      });
+    }
+
+    function startFrom(text) {
+      state.opened = "";
+      replaceText(text);
     }
 
     function typed() {
@@ -128,7 +149,7 @@
       chip.textContent = "working";
       page.setAttribute("aria-busy", "true");
       const sent = state.pending.length;
-      const answer = await server.ask("unit", state.text, state.pending);
+      const answer = await server.ask("unit", state.text, state.pending, since());
       if (!answer || mine !== state.asked) return;
       if (answer.lost || answer.text === undefined) {
         said("bad", answer.faults[0].message);
@@ -137,6 +158,7 @@
       }
       state.text = answer.text;
       state.pending = state.pending.slice(sent);
+      kept.keep(state.text);
       const faults = answer.faults || [];
       state.layers = answer.layers || 0;
       if (answer.groups) {
@@ -144,8 +166,15 @@
         form.show(answer.groups);
       }
       if (document.activeElement !== text) text.value = answer.text;
-      const homeless = form.refuse(faults);
-      textFault.textContent = faults.map((one) => (one.line ? `line ${one.line}: ${one.message}` : one.message)).join("\n");
+      if (!faults.length) {
+        state.accepted = new Map(answer.groups.flatMap((group) => group.fields || []).map((field) => [field.path, field]));
+        state.changed = [];
+      }
+      // What is wrong with the text itself stands under it alone; a value's fault at its field, and here by its line.
+      const unread = faults.filter((one) => !one.field);
+      const homeless = form.refuse(faults.filter((one) => one.field));
+      textFault.textContent = faults.map((one) => (one.field && one.line ? `line ${one.line}: ${one.message}` : one.message)).join("\n");
+      if (unread.length) tabs.open = true;
       clear(others, homeless.map((one) => el("p", { className: "refusal" }, one.message)), faults.length > 0 && el("p", { className: "note" }, state.unit.section ? "What is shown is the last unit that could be made." : "Nothing could be made yet."));
       page.dataset.stale = String(faults.length > 0);
       buttons();
@@ -154,7 +183,7 @@
       window.unitcad.timings.push({ what: "unit", ms: performance.now() - begun, server: answer.milliseconds, faults: faults.length });
       document.documentElement.dataset.ready = "yes";
       if (faults.length) {
-        said("bad", faults.length === 1 ? "1 value is refused" : `${faults.length} values are refused`);
+        said("bad", unread.length ? "the text can't be read" : faults.length === 1 ? "1 value is refused" : `${faults.length} values are refused`);
         page.setAttribute("aria-busy", "false");
         return;
       }
@@ -165,9 +194,10 @@
     async function shown(answer) {
       state.unit = answer;
       title.textContent = (answer.spec && answer.spec.name) || data.name;
-      document.title = `${title.textContent} - unitcad`;
-      clear(figures, (answer.figures || []).map(([name, value, unit]) => el("span", { className: "chip" }, `${name} ${number(value, 3)} ${unit}`)));
-      clear(drawn, U.framed(answer.section, "The unit cut along its tail, with its main dimensions", "Section drawing"));
+      opened.textContent = state.opened ? `Opened from ${state.opened}. ${UNWRITTEN}` : UNWRITTEN;
+      document.title = `${[state.opened, title.textContent].filter(Boolean).join(": ")} - unitcad`;
+      clear(figures, (answer.figures || []).map(([name, value, unit]) => el("span", { className: "chip" }, `${name} ${number(value, 3)} ${unit}`.trim())));
+      clear(drawn, answer.section ? U.framed(answer.section, "The unit cut along its tail, with its main dimensions", "Section drawing") : el("p", { className: "absent" }, "The patch's plan stands with its crosstalk, below."));
       jobs.keys();
       state.model = { ...(state.model || {}), ...answer.model };
       if (stage) await stage.update(state.model).catch(() => {});
@@ -200,6 +230,8 @@
     function showEstimate(answer) {
       const refused = (answer.faults || []).map((one) => el("p", { className: "refusal" }, one.message));
       if (answer.estimate) clear(estimated, U.estimate({ estimate: answer.estimate, manifest: {} }));
+      else if (answer.drawings) clear(estimated, section("estimate", "Crosstalk", answer.lines.map((line, i) => el("p", { className: i ? undefined : "lead" }, line)),
+        answer.drawings.map(([caption, svg]) => el("figure", {}, U.framed(svg, caption, caption), el("figcaption", {}, caption)))));
       else clear(estimated, section("estimate", "Attenuation estimate", refused, (answer.lines || []).map((line) => el("p", { className: "absent" }, line))));
     }
 
@@ -252,6 +284,7 @@
         clear(others, el("p", { className: "refusal" }, answer.faults[0].message));
         return;
       }
+      state.opened = folder;
       replaceText(answer.text);
       // The same row may be opened again.
       history.replaceState(null, "", location.pathname);

@@ -4,7 +4,8 @@
 
   function createServer(token) {
     const page = Math.random().toString(36).slice(2, 14);
-    const waiting = {};
+    const newest = {};
+    const underWay = {};
 
     const LOST = { faults: [{ message: "The server does not answer. Was unitcad serve ended?" }], lost: true };
 
@@ -17,9 +18,9 @@
       }
     }
 
-    async function sent(path, message, signal) {
+    async function sent(path, message) {
       const response = await fetch(path, {
-        method: message === undefined ? "GET" : "POST", signal, cache: "no-store", redirect: "error",
+        method: message === undefined ? "GET" : "POST", cache: "no-store", redirect: "error",
         headers: { "X-Unitcad-Token": token, ...(message === undefined ? {} : { "Content-Type": "application/json" }) },
         body: message === undefined ? undefined : JSON.stringify(message),
       });
@@ -27,17 +28,18 @@
       return { status: response.status, faults: [{ message: (await response.text()).trim() }] };
     }
 
-    // The answer to a question about a text, or null where a newer question of that kind has been put meanwhile.
-    async function ask(what, text, edits = []) {
-      if (waiting[what]) waiting[what].abort();
-      const mine = (waiting[what] = new AbortController());
-      try {
-        const answer = await sent("/ask", { text, what, edits, page }, mine.signal);
-        return waiting[what] === mine && answer.status !== 409 ? answer : null;
-      } catch (error) {
-        if (error.name === "AbortError" || waiting[what] !== mine) return null;
-        return LOST;
+    // The answer to a question about a text, or null where a newer question of that kind has been put meanwhile. One of a
+    // kind is under way; of those put meanwhile the newest follows it. A drag so never fills the server's line.
+    async function ask(what, text, edits = [], since = []) {
+      const mine = (newest[what] = (newest[what] || 0) + 1);
+      while (underWay[what]) {
+        await underWay[what];
+        if (mine !== newest[what]) return null;
       }
+      underWay[what] = sent("/ask", { text, what, edits, since, page }).catch(() => LOST);
+      const answer = await underWay[what];
+      underWay[what] = null;
+      return mine === newest[what] && answer.status !== 409 ? answer : null;
     }
 
     return { ask, send };

@@ -1,0 +1,116 @@
+"""An array and a campaign in the live page: the patch, its crosstalk, edits of it; the decay that was measured."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from live import Live
+from running import Server, serving
+
+from unitcad.arrays.array_file import array_templates, load_array
+from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
+from unitcad.arrays.crosstalk_matrix import crosstalk
+from unitcad.arrays.patch import patch_bodies
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.errors import Refusal
+from unitcad.lab.campaign import read_campaign
+from unitcad.lab.measured_charts import charts_of
+from unitcad.lab.measuring import measure
+from unitcad.mould_checks import check_moulds
+from unitcad.pipeline.bodies import glb_content
+from unitcad.serve.server import serve
+from unitcad.validation import templates
+
+TEXT = array_templates()["forearm-pockets"].read_text("utf-8")
+UNIT = re.compile(r"^unit = .*$", re.MULTILINE)
+CAMPAIGN = Path(__file__).parents[2] / "templates" / "lab" / "campaign.toml"
+
+
+@pytest.fixture(scope="module")
+def pockets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with serving(tmp_path_factory.mktemp("array"), "forearm-pockets") as running:
+        yield running
+
+
+def test_answers_are_those_of_the_commands(pockets: Server) -> None:
+    array = load_array("forearm-pockets", ["layout.pitch_mm=22.0"])
+    edit = [{"path": "layout.pitch_mm", "value": 22.0}]
+    patch = pockets.ask(TEXT, "unit", edit)
+    assert base64.b64decode(patch["model"]["unit"]) == glb_content(patch_moulds(array).blank, patch_bodies(array))
+    drawn = dict(pockets.ask(TEXT, "estimate", edit)["drawings"])
+    data = crosstalk(array)
+    assert list(drawn.values()) == [patch_map_svg(array, data), heat_map_svg(data)]
+    checks = [check["code"] for check in pockets.ask(TEXT, "moulds", edit)["checks"]]
+    assert checks == [finding.code for finding in check_moulds(patch_moulds(array))]
+
+
+def test_a_pitch_that_is_too_small_gets_the_nearest_that_its_own_limits_accept(pockets: Server) -> None:
+    fault = pockets.ask(TEXT, "unit", [{"path": "layout.pitch_mm", "value": 2.0}])["faults"][0]
+    assert fault["field"] == "layout.pitch_mm"
+    after = pockets.ask(TEXT, "unit", [{"path": fault["field"], "value": fault["nearest"]}])["faults"]
+    assert [one["field"] for one in after] == ["unit.fpcb.tail_length_mm"]  # which the tails' ways then limit
+    below = pockets.ask(TEXT, "unit", [{"path": fault["field"], "value": fault["nearest"] - 0.1}])["faults"]
+    assert below[0]["field"] == "layout.pitch_mm"
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [
+        '"{file}"', '"custom/dome"', '{{ like = "{file}" }}', '{{ like = "encapsulating", design = "evil.py:evil" }}',
+        '{{ like = "encapsulating", design = "{folder}/evil.py:evil" }}',
+        '{{ like = "encapsulating", estimate = {{ fit = "{file}" }} }}',
+    ],
+)  # fmt: skip
+def test_files_that_an_array_names_are_not_read(pockets: Server, unit: str, tmp_path: Path) -> None:
+    (tmp_path / "evil.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w').close()\n")
+    secret = tmp_path / "secret.toml"
+    secret.write_text('password = "hunter2"')
+    text = UNIT.sub(lambda _: "unit = " + unit.format(file=secret, folder=tmp_path), TEXT)
+    assert text != TEXT
+    for what in ("unit", "moulds", "estimate"):
+        answer = pockets.ask(text, what)
+        assert "names only files" in answer["faults"][0]["message"]
+        assert "hunter2" not in str(answer)
+    assert pockets.send("/build", {"text": text})[0] == 422
+    assert not (tmp_path / "ran").exists()
+
+
+def test_a_file_that_the_server_s_own_array_names_is_read(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(templates()["encapsulating"].read_text("utf-8"))
+    (tmp_path / "patch.toml").write_text(UNIT.sub('unit = "mine.toml"', TEXT))
+    with serving(tmp_path, "patch.toml") as own:
+        answer = own.ask((tmp_path / "patch.toml").read_text(), "unit", [{"path": "layout.pitch_mm", "value": 23.0}])
+        assert "faults" not in answer
+    (tmp_path / "evil.py").write_text("def evil(spec): return {}\n")
+    (tmp_path / "mine.toml").write_text('design = "evil.py:evil"\n')
+    with pytest.raises(Refusal, match="--allow-code"):
+        serve(str(tmp_path / "patch.toml"))
+
+
+def test_a_patch_is_shown_and_changed(running: Any, pockets: Server) -> None:
+    live = Live(running, pockets)
+    assert live.state == "18 mould checks passed"
+    assert live.page.inner_text("h1") == "forearm-pockets"
+    assert "sheet" in (live.page.get_attribute(".stage-host", "data-shown") or "")
+    assert live.page.locator("#estimate img").count() == 2
+    before = live.page.locator("#estimate img").first.get_attribute("src")
+    live.choose('input[name="sheet.margin_mm"]', "5")
+    assert "sheet along x 80 mm" in live.page.inner_text("#figures")
+    assert live.page.locator("#estimate img").first.get_attribute("src") != before
+    live.close()
+
+
+def test_a_campaign_opens_its_decay(tmp_path: Path) -> None:
+    with serving(tmp_path, str(CAMPAIGN)) as own:
+        status, content, headers = own.send("/")
+    assert status == 200
+    charts = charts_of(measure(read_campaign(CAMPAIGN), CAMPAIGN.parent))
+    decay = next(svg for name, svg in charts.items() if name.startswith("decay"))
+    assert decay[decay.index("<svg") :].strip() in content.decode()
+    assert "frame-ancestors 'none'" in headers["content-security-policy"]
+    assert list(tmp_path.iterdir()) == []

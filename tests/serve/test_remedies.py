@@ -1,0 +1,64 @@
+"""What a refusal offers is accepted, and stands at the field that was changed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+pytest.importorskip("tomlkit", reason="the extra serve is not installed")
+from unitcad.serve.answers import answered
+from unitcad.serve.messages import Ask, Edit, Fault, Trusted
+from unitcad.validation import templates
+
+
+def faults(template: str, edits: list[Edit], since: list[Edit]) -> list[Fault]:
+    """The faults of a template after edits."""
+    text = templates()[template].read_text("utf-8")
+    return answered(Ask(text=text, edits=edits, since=since), Trusted()).faults
+
+
+@pytest.mark.parametrize(
+    ("path", "accepted", "refused", "other"),
+    [
+        ("layers.0.wall_mm", 1.25, 9.0, "diameter_mm"),
+        ("layers.1.wall_mm", 1.25, 400, "diameter_mm"),
+        ("motor.diameter_mm", 7.0, 13.9, "diameter_mm"),
+    ],
+)
+def test_a_refusal_stands_where_the_change_was(path: str, accepted: float, refused: float, other: str) -> None:
+    edit = Edit(path=path, value=refused)
+    assert faults("encapsulating", [edit], [])[0].field == other
+    fault = faults("encapsulating", [edit], [Edit(path="name", value="x"), Edit(path=path, value=accepted)])[0]
+    assert (fault.field, fault.at) == (other, path)
+    assert fault.at_nearest is not None
+    assert accepted < fault.at_nearest < refused
+    assert faults("encapsulating", [Edit(path=path, value=fault.at_nearest)], []) == []
+    # A hundredth beyond it nothing is accepted any more.
+    assert faults("encapsulating", [Edit(path=path, value=fault.at_nearest + 0.011)], []) != []
+    assert faults("encapsulating", [edit, Edit(path=other, value=fault.nearest)], []) == []
+
+
+def test_a_change_that_is_not_to_blame_is_not_blamed() -> None:
+    edits = [Edit(path="layers.0.wall_mm", value=9.0), Edit(path="moulds.plate_mm", value=5.0)]
+    assert faults("encapsulating", edits, [Edit(path="moulds.plate_mm", value=4.0)])[0].at == ""
+    path = "layers.0.wall_mm"
+    own = faults("encapsulating", [Edit(path=path, value=0.1)], [Edit(path=path, value=1.25)])
+    assert [(fault.field, fault.at) for fault in own] == [("layers.0.wall_mm", "")]
+
+
+def test_a_key_that_has_to_go_is_offered_to_be_left_out() -> None:
+    edit = Edit(path="layers.0.cap_mm", value=1.0)
+    fault = faults("embedded", [edit], [])[0]
+    assert fault.leave_out
+    assert faults("embedded", [edit, Edit(path=fault.field, remove=True)], []) == []
+    assert not faults("embedded", [Edit(path="layers.0.material", value="cheese")], [])[0].leave_out
+
+
+def test_wires_begin_with_what_they_need_in_place_of_the_circuit() -> None:
+    text = templates()["encapsulating"].read_text("utf-8")
+    groups: dict[str, Any] = {group.path: group for group in answered(Ask(text=text), Trusted()).groups}
+    wires = groups["wires"]
+    assert not wires.present
+    edits = [Edit(path=wires.instead, remove=True), Edit(path="wires", value=wires.needs)]
+    assert faults("encapsulating", edits, []) == []

@@ -1,0 +1,134 @@
+"""What the page is told about an array: its form, the patch, its tools judged, its crosstalk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from msgspec.structs import replace
+
+from unitcad.arrays.array import Array
+from unitcad.arrays.array_file import array_of, expanded, to_toml
+from unitcad.arrays.array_tables import AskedArray, BodyTable, CircuitTable, SheetTable
+from unitcad.arrays.layouts import layouts
+from unitcad.catalogue import materials
+from unitcad.errors import Refusal
+from unitcad.serve.form import LAST_TABLES, fields, table_groups
+from unitcad.serve.messages import Answer, Field, Group, Trusted
+from unitcad.serve.unit_answers import holds_code as unit_holds_code
+from unitcad.spec.custom_code import files_named
+from unitcad.text import number
+from unitcad.validation import templates
+from unitcad.validation.dotted import at
+
+as_toml = to_toml
+
+
+def settled(data: Mapping[str, Any], trusted: Trusted) -> Array:
+    """Return the array of a text's plain data. Raises Refusal, also for a file that a page's text may not name."""
+    named = array_files(data)
+    values = set(named.values())
+    folders = [Path(source.folder) for source in trusted.sources if values <= set(source.named.values())]
+    if named and not folders:
+        field, value = next(iter(named.items()))
+        raise Refusal(field, value, "a page's text names only files that the server's own array names")
+    return array_of(expanded(data, folders[0] if named else Path()))
+
+
+def array_files(data: Mapping[str, Any]) -> dict[str, str]:
+    """Return the values of an array's plain data that name files, by their paths; a shipped unit's name is none."""
+    found = files_named({key: value for key, value in data.items() if key != "design"})
+    places = data.get("place")
+    units = {"unit": data.get("unit")}
+    for i, place in enumerate(places if isinstance(places, list) else ()):
+        units[f"place.{i}.unit"] = place.get("unit") if isinstance(place, dict) else None
+    for field, unit in units.items():
+        own = unit if isinstance(unit, dict) else {}
+        like = own.get("like") if own else unit
+        if isinstance(like, str) and like not in templates():
+            found[f"{field}.like" if own else field] = like
+        found |= {f"{field}.{key}": value for key, value in files_named(own).items()}
+    return found
+
+
+def holds_code(array: Array) -> bool:
+    """Tell whether a unit of an array holds code. Raises Refusal where it may not run."""
+    return any([unit_holds_code(unit) for unit in array.units])
+
+
+def as_data(array: Array) -> dict[str, Any]:
+    """Return an array's plain data, everything settled."""
+    return array.asked
+
+
+def form(data: Mapping[str, Any], array: Array | None) -> list[Group]:
+    """Return the form of an array's plain data; `array` None where the data is refused."""
+    holds = array.asked if array else {}
+    choices = {
+        "sheet.material": [(name, "") for name in materials()],
+        "layout.kind": [(name, kind.about) for name, kind in layouts().items()],
+        "unit": [(name, "") for name in templates()],
+    }
+    kind = at(data, "layout.kind")
+    table = layouts()[kind].table if isinstance(kind, str) and kind in layouts() else None
+    unit = data.get("unit")
+    first = [*fields(AskedArray, "", data, holds, choices, ("name", "array"))]
+    if isinstance(unit, str):
+        first.append(Field("unit", "unit", "word", unit, given=True, required=True, choices=choices["unit"]))
+    made = [Group("", "Array", first)]
+    if table is not None:
+        made.append(Group("layout", "Layout", [*_with_kinds(fields(table, "layout", data, holds, choices), choices)]))
+    made.append(Group("sheet", "Sheet", [*fields(SheetTable, "sheet", data, holds, choices)]))
+    made.append(Group("body", "Body", [*fields(BodyTable, "body", data, holds, choices)]))
+    there = isinstance(data.get("circuit"), dict)
+    rows = [*fields(CircuitTable, "circuit", data, holds, choices)] if there else []
+    made.append(Group("circuit", "Common circuit", rows, there, optional=True))
+    return [*made, *table_groups(LAST_TABLES, data, holds, choices)]
+
+
+def _with_kinds(rows: Iterator[Field], choices: Mapping[str, list[tuple[str, str]]]) -> Iterator[Field]:
+    """Yield a layout's fields; its kind may be any of the kinds."""
+    for row in rows:
+        known = row.path == "layout.kind"
+        yield replace(row, kind="word", required=True, choices=choices[row.path]) if known else row
+
+
+def _patch(array: Array, answer: Answer) -> None:
+    from unitcad.arrays.patch import patch_bodies
+    from unitcad.arrays.patch_moulds import patch_moulds
+    from unitcad.pipeline.bodies import glb_content
+
+    bodies = patch_bodies(array)
+    content = glb_content(patch_moulds(array).blank, bodies)
+    answer.model = {"unit": content, "unit_apart": {body.name: [0, 0, 0] for body in bodies}, "moulds": None}
+    x0, y0, x1, y1 = array.sheet.outline
+    answer.figures = [("units", float(len(array.places)), ""), ("sheet along x", x1 - x0, "mm")]
+    answer.figures += [("along y", y1 - y0, "mm"), ("thick", array.sheet.thickness_mm, "mm")]
+
+
+def _tools(array: Array, answer: Answer) -> None:
+    from unitcad.arrays.patch_moulds import patch_moulds
+    from unitcad.mould_checks import check_moulds
+
+    moulds = patch_moulds(array)
+    answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
+    poured = sum(solid.volume() for step in moulds.plan.steps for solid in moulds.meshes(step.layer)) / 1000
+    names = ", ".join(tool.name for tool in moulds.plan.tools)
+    answer.lines = [f"Tools of the sheet: {names}", f"To pour: {number(poured, 3)} cm3"]
+
+
+def _crosstalk(array: Array, answer: Answer) -> None:
+    from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
+    from unitcad.arrays.crosstalk_matrix import crosstalk
+    from unitcad.arrays.crosstalk_words import crosstalk_lines
+
+    data = crosstalk(array)
+    answer.lines = crosstalk_lines(data)
+    answer.drawings = [
+        ("What reaches each unit from the others, on the patch", patch_map_svg(array, data)),
+        ("Crosstalk from each unit (row) to each other one (column)", heat_map_svg(data)),
+    ]
+
+
+ANSWERS = {"unit": _patch, "moulds": _tools, "estimate": _crosstalk}

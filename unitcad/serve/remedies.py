@@ -1,0 +1,87 @@
+"""What makes a refused text accepted: a value for the field that was changed, or leaving a key out."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeGuard
+
+import tomlkit
+from msgspec.structs import replace
+from tomlkit.exceptions import TOMLKitError
+
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.serve.messages import Edit, Fault
+from unitcad.spec import convert
+from unitcad.spec.asked import AskedSpec
+from unitcad.validation import put
+from unitcad.validation.defaults import effective
+from unitcad.validation.dotted import ABSENT, at, drop
+
+_HALVINGS = 24
+
+
+def remedied(faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[Edit]) -> list[Fault]:
+    """Return the faults of a spec's plain data, each with its remedies.
+
+    `since` takes back what was changed since the data was accepted, newest first. Where one of these changes alone is
+    to blame for a fault of another field, the fault stands `at` the changed one.
+    """
+    changed = {edit.path for edit in since}
+    blamed = None
+    if any(fault.field not in changed for fault in faults):
+        blamed = next((edit for edit in since if _accepted(_after(data, edit))), None)
+    return [_remedied(fault, data, None if fault.field in changed else blamed) for fault in faults]
+
+
+def _remedied(fault: Fault, data: Mapping[str, Any], blamed: Edit | None) -> Fault:
+    if blamed is not None:
+        return replace(fault, at=blamed.path, at_nearest=_nearest(data, blamed))
+    if fault.nearest is None and at(data, fault.field) is not ABSENT:
+        without = copy.deepcopy(dict(data))
+        if drop(without, fault.field) and _accepted(without):
+            return replace(fault, leave_out=True)
+    return fault
+
+
+def _nearest(data: Mapping[str, Any], edit: Edit) -> float | None:
+    """Return the accepted number nearest to the refused one, on the way from the one that was accepted before."""
+    refused, accepted = at(data, edit.path), edit.value
+    if not _is_float(refused) or not _is_float(accepted):
+        return None
+
+    def taken(value: float) -> bool:
+        return _accepted(_after(data, Edit(path=edit.path, value=value)))
+
+    least, most = sorted((accepted, refused))
+    low, high = float(accepted), float(refused)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if taken(middle) else (low, middle)
+    rounded = (round(low + shift, digits) for digits in (2, 3, 4) for shift in (0.0, -(10.0**-digits), 10.0**-digits))
+    return next((value for value in rounded if least <= value <= most and taken(value)), low)
+
+
+def _is_float(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _after(data: Mapping[str, Any], edit: Edit) -> dict[str, Any]:
+    """Return plain data after an edit; unchanged where its path leads nowhere."""
+    changed = copy.deepcopy(dict(data))
+    try:
+        if edit.remove:
+            drop(changed, edit.path)
+        else:
+            put(changed, edit.path, tomlkit.value(str(edit.value)).unwrap() if edit.toml else edit.value)
+    except (Refusal, TOMLKitError, ValueError, RecursionError):
+        pass
+    return changed
+
+
+def _accepted(data: dict[str, Any]) -> bool:
+    try:
+        effective(convert(data, AskedSpec))
+    except UnitcadError:
+        return False
+    return True

@@ -1,0 +1,121 @@
+"""What the page is told about a unit's spec: its form, the unit itself, the moulds judged, the estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from unitcad.errors import Refusal
+from unitcad.serve.form import groups
+from unitcad.serve.messages import Answer, Trusted
+from unitcad.spec import Spec, to_data, to_toml
+from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, with_source
+from unitcad.validation import from_data
+
+form = groups
+as_data = to_data
+as_toml = to_toml
+
+
+def settled(data: Mapping[str, Any], trusted: Trusted) -> Spec:
+    """Return the effective spec of a text's plain data. Raises Refusal."""
+    return from_data(data, folder_for(data, trusted))
+
+
+def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
+    """Return plain data with the texts of the files that it may name."""
+    folder = folder_for(data, trusted)
+    return with_source(dict(data), folder) if folder else dict(data)
+
+
+def holds_code(spec: Spec) -> bool:
+    """Tell whether a spec holds code. Raises Refusal where it may not run."""
+    code = spec.design_source is not None and not is_body_file(spec.design)
+    if code and not is_allowed(spec.design, spec.design_source or ""):
+        raise Refusal("design", spec.design, "code from a page does not run")
+    return code
+
+
+def folder_for(data: Mapping[str, Any], trusted: Trusted) -> Path | None:
+    """Return the folder that a text's files start at; None unless it names those of a trusted spec alone."""
+    named = files_named(data)
+    return next((Path(source.folder) for source in trusted.sources if source.named == named), None) if named else None
+
+
+def _unit(spec: Spec, answer: Answer) -> None:
+    from unitcad import catalogue
+    from unitcad.estimating import motor_mass
+    from unitcad.export.svg import unit_section
+    from unitcad.moulds.mould_set import MouldSet
+    from unitcad.pipeline.bodies import glb_content
+    from unitcad.pipeline.scenes import unit_apart
+    from unitcad.validation import warnings
+
+    moulds = MouldSet(spec)
+    solids = {body.name: moulds.mesh(body) for body in moulds.unit}
+    answer.model = {
+        "unit": glb_content(moulds, moulds.unit),
+        "unit_apart": {name: list(offset) for name, offset in unit_apart(moulds).items()},
+    }
+    concentric = moulds.design.tooling == "concentric"
+    answer.section = unit_section(moulds.unit, moulds.dimensions, moulds.segments, concentric=concentric)
+    answer.warnings = warnings(spec)
+    boxes = [solid.bounding_box() for solid in solids.values()]
+    height = max(box[5] for box in boxes) - min(box[2] for box in boxes)
+    answer.figures = [("diameter", spec.diameter_mm, "mm"), ("height", height, "mm")]
+    grams = _grams(
+        spec, [solids[f"layer{i + 1}"].volume() for i in range(len(spec.layers)) if f"layer{i + 1}" in solids]
+    )
+    if grams:
+        answer.figures.append(("silicone", sum(grams), "g"))
+        motor = catalogue.motors(spec.motors)[spec.motor.part] if spec.motor.part else None
+        answer.figures.append(("with its motor", sum(grams) + 1e3 * motor_mass(spec, motor).middle, "g"))
+
+
+def _grams(spec: Spec, volumes: list[float]) -> list[float]:
+    from unitcad import catalogue
+
+    known = catalogue.materials(spec.materials)
+    if len(volumes) != len(spec.layers):
+        return []
+    pairs = zip(spec.layers, volumes, strict=True)
+    return [float(known[layer.material].density_g_cm3) * volume / 1000 for layer, volume in pairs]
+
+
+def _moulds(spec: Spec, answer: Answer) -> None:
+    from unitcad.casting.in_short import in_short
+    from unitcad.casting.procedure import procedure
+    from unitcad.mould_checks import check_moulds
+    from unitcad.moulds.mould_set import MouldSet
+    from unitcad.pipeline.bodies import glb_content, is_printed
+    from unitcad.pipeline.scenes import moments, taken_apart
+    from unitcad.report.viewer_models import cells
+
+    moulds = MouldSet(spec)
+    plan, solids = moulds.plan, moulds.solids
+    answer.model = {
+        "moulds": glb_content(moulds, plan.tools),
+        "cells": cells(moulds),
+        "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(moulds)],
+        "moulds_apart": {name: list(offset) for name, offset in taken_apart(moulds).items()},
+    }
+    answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
+    printed = sum(solids[tool.name].volume() for tool in plan.tools if is_printed(tool))
+    made = procedure(moulds, [solids[step.name].volume() for step in plan.steps], printed)
+    answer.lines = list(in_short(asdict(made)))
+
+
+def _estimate(spec: Spec, answer: Answer) -> None:
+    from unitcad.designs import design_of, no_estimate
+    from unitcad.estimating import closed_forms, estimate_spec
+
+    if not design_of(spec).passes:
+        answer.lines = [f"{spec.design} has no estimate: {no_estimate()}"]
+        return
+    # The elements take seconds: the page shows the formulas, `unitcad estimate` has the rest.
+    answer.estimate = estimate_spec(spec, closed_forms(spec.estimate.models))
+
+
+ANSWERS = {"unit": _unit, "moulds": _moulds, "estimate": _estimate}
