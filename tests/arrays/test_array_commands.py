@@ -85,7 +85,7 @@ def test_build_writes_an_array_and_its_page(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", ["build", "estimate"])
 def test_an_unknown_name_is_told_the_arrays_too(command: str) -> None:
-    done = run.invoke(app, [command, "wrist-band"])
+    done = run.invoke(app, [command, "ankle-cuff"])
     assert isinstance(done.exception, Refusal)
     assert all(name in done.exception.limit for name in ("encapsulating", "forearm-patch", "hex-19"))
     near = run.invoke(app, [command, "forearm-pocket"])
