@@ -87,7 +87,9 @@ class Bench:
         """Seconds of a batch, with a fresh cache if none is given."""
         self.count += 1
         self.last = self.scratch / f"out{self.count}"
-        options = BatchOptions(self.only, cache=cache or self.scratch / f"cache{self.count}", cache_mb=1e6)
+        options = BatchOptions(
+            self.only, cache=cache or self.scratch / f"cache{self.count}", cache_mb=1e6, folders=True
+        )
         with self._warm() as executor:
             start = time.perf_counter()
             summary = run(sweep, self.last, options, executor, workers=self.workers)
@@ -197,7 +199,13 @@ def costs(scratch: Path, variants: int) -> dict[str, Any]:
 
     def spent(sweep: Sweep, out: str, executor: Executor, only: tuple[str, ...] = ONLY) -> float:
         start = time.process_time()
-        run(sweep, scratch / out, BatchOptions(only, cache=scratch / "cache", cache_mb=1e6), executor, workers=1)
+        run(
+            sweep,
+            scratch / out,
+            BatchOptions(only, cache=scratch / "cache", cache_mb=1e6, folders=True),
+            executor,
+            workers=1,
+        )
         return time.process_time() - start
 
     everything = ("unit", "moulds", "estimate", "casting")

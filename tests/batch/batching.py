@@ -110,7 +110,7 @@ def environment() -> dict[str, str]:
 
 def bytes_of(out: Path) -> dict[str, str]:
     """Everything in a batch's folder that is promised to be the same from run to run."""
-    apart = ("timings.json", "journal.jsonl", "batch.lock")
+    apart = ("timings.json", "journal.jsonl", "batch.lock", "store.json")
     return {
         str(file.relative_to(out)): hashlib.sha256(file.read_bytes()).hexdigest()
         for file in sorted(out.rglob("*"))

@@ -8,8 +8,9 @@ import sys
 from types import ModuleType
 
 from unitcad.batch.batch_call import BatchResult, batch
+from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import Summary
-from unitcad.batch.run import BatchOptions, run
+from unitcad.batch.run import run
 from unitcad.batch.sweep import Sweep, load_sweep
 
 __all__ = ["BatchOptions", "BatchResult", "Summary", "Sweep", "load_sweep", "run"]

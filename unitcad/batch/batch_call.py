@@ -6,17 +6,23 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from unitcad import notebook
 from unitcad.arguments import check_number, path, texts
+from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import Summary
 from unitcad.batch.estimate_table import write_estimates
 from unitcad.batch.executors import Workers
-from unitcad.batch.run import BatchOptions, Watch, run, trim
+from unitcad.batch.parquet_table import read_parquet
+from unitcad.batch.result_folders import STORE
+from unitcad.batch.results import TABLES
+from unitcad.batch.run import Watch, run, trim
+from unitcad.batch.shards import shard_of
 from unitcad.batch.sweep import Sweep, load_sweep
+from unitcad.errors import WrongArgument, unknown_name
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.spec.asked import Format
 from unitcad.text import toml
@@ -42,6 +48,8 @@ class BatchResult:
 
         Raises OSError where the folder has gone.
         """
+        if not (self.folder / TABLES["json"]).is_file() and (self.folder / TABLES["parquet"]).is_file():
+            return read_parquet(self.folder / TABLES["parquet"])
         return json.loads((self.folder / "batch.json").read_text("utf-8"))["variants"]
 
     def __repr__(self) -> str:
@@ -67,6 +75,11 @@ def make(
 
     Raises Refusal or UnitcadError where nothing can be run.
     """
+    if options.shard:
+        if options.only == ("estimate",):
+            raise WrongArgument("shard", str(options.shard), "estimates alone are one table: leave it out")
+        store = options.store or str((folder / STORE).absolute())
+        folder, options = folder / options.shard.folder, replace(options, store=store, folders=bool(options.folders))
     if options.only == ("estimate",) and not sweep.of_arrays:
         return write_estimates(sweep, folder, options)
     with workers.executor(options.timeout) as (executor, number):
@@ -90,14 +103,21 @@ def batch(
     keep_going: bool = False,
     cache: str | os.PathLike[str] | None = None,
     report: bool = False,
+    store: str | os.PathLike[str] | None = None,
+    folders: bool | None = None,
+    tables: Sequence[str] | str | None = None,
+    shard: str | None = None,
 ) -> BatchResult:
     """Make every variant of a sweep in the folder `out` (out/<name> by default), each distinct part once.
 
     `sweep` is a file, the name of a shipped sweep, or a `unitcad.batch.Sweep`. `set` changes values of every variant,
     `formats` and `only` choose what is made, as for `unitcad.build`. `jobs` is the number of worker processes, one a
-    core by default, with 0 this process. `limit` makes the first variants only; `timeout` is in seconds a variant. The
-    same call again goes on where an earlier one ended. What becomes of a variant is in the result. Raises Refusal or
-    UnitcadError where nothing can be run.
+    core by default, with 0 this process. `limit` makes the first variants only; `timeout` is in seconds a variant.
+    `store` is a folder or an address (s3://bucket/path) that workers put content into; `folders` says whether each
+    variant has a folder, by default below 1,000 variants. `tables` are any of csv, json, parquet; by default the
+    first two, from 10,000 variants on the last one. `shard`, such as "3/16", makes one part of the sweep. The same call
+    again goes on where an earlier one ended. What becomes of a variant is in the result. Raises Refusal or UnitcadError
+    where nothing can be run.
     """
     check_number("jobs", jobs, 0, 1024, whole=True)
     check_number("timeout", timeout, 0.001, 1e9)
@@ -111,10 +131,30 @@ def batch(
     )
     folder = Path("out") / wanted.slug if out is None else Path(path("out", out))
     where = None if cache is None else Path(path("cache", cache))
-    options = BatchOptions(tuple(texts("only", only)), check, keep_going, timeout, limit, where)
+    stored = None if store is None else os.fspath(store)
+    options = BatchOptions(
+        tuple(texts("only", only)),
+        check,
+        keep_going,
+        timeout,
+        limit,
+        where,
+        store=stored,
+        folders=True if report else folders,
+        tables=checked_tables(None if tables is None else texts("tables", tables), report),
+        shard=None if shard is None else shard_of(shard),
+    )
     summary = make(wanted, folder, options, Workers(jobs))
     if report:
         from unitcad.report import write_report
 
         write_report(folder)
-    return BatchResult(folder, summary)
+    return BatchResult(folder / options.shard.folder if options.shard else folder, summary)
+
+
+def checked_tables(names: Sequence[str] | None, report: bool = False) -> tuple[str, ...] | None:
+    """Return names of tables; with `report` the page's is among them. Raises WrongArgument for an unknown one."""
+    for name in names or ():
+        if name not in TABLES:
+            raise unknown_name("tables", name, TABLES, WrongArgument)
+    return None if names is None and not report else (*(names or ("csv",)), *(("json",) if report else ()))

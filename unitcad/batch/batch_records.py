@@ -21,10 +21,20 @@ class BatchHead(Struct, frozen=True, kw_only=True):
     versions: dict[str, str] = {}
 
 
+class RecordPlace(Struct, frozen=True):
+    """Place of a variant's record in a store: bytes `start` to `end` of a pack, and their own SHA-256."""
+
+    pack: str
+    start: int
+    end: int
+    sha256: str
+
+
 class JournalEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Result of one variant; `same_as` is the index of an earlier, equal variant, whose result it shares.
 
     `values` are those that were swept, `row` those that came out; `manifest` is the SHA-256 of its manifest.json.
+    `record` is where a store has its files.
     """
 
     index: int
@@ -35,6 +45,7 @@ class JournalEntry(Struct, frozen=True, kw_only=True, omit_defaults=True):
     row: Values = {}
     manifest: str = ""
     same_as: int | None = None
+    record: RecordPlace | None = None
 
 
 class Failure(Struct, frozen=True):

@@ -21,10 +21,11 @@ from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import edge_levels, stored
 from unitcad.attenuation.inputs import Geometry
 from unitcad.batch import task as tasks
+from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import Failure, JournalEntry, Summary
 from unitcad.batch.journal import Journal
 from unitcad.batch.results import FIRST, write_results, write_timings
-from unitcad.batch.run import MOST_FAILURES, BatchOptions, batch_head, counted
+from unitcad.batch.run import MOST_FAILURES, batch_head, counted
 from unitcad.batch.sweep import Sweep
 from unitcad.batch.task import OK
 from unitcad.batch.unread_keys import swept_estimate
@@ -88,7 +89,7 @@ def write_estimates(sweep: Sweep, out: Path, options: BatchOptions) -> Summary:
         columns = list(dict.fromkeys([*FIRST, *paths, "name", "design", "diameter_mm", *(f"edge_{m}" for m in models)]))
         found = swept_estimate(sweep, count)
         summary.warnings += unread_warnings(found)
-        write_results(out, columns, lambda: _entries(sweep, blocks), head, found)
+        write_results(out, columns, lambda: _entries(sweep, blocks), head, found, options.tables, count)
         _count(summary, blocks)
         summary.seconds = round(time.perf_counter() - start, 3)
         write_timings(out, summary, 1)

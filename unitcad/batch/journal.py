@@ -13,7 +13,7 @@ import json
 import os
 import zlib
 from array import array
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -36,16 +36,19 @@ LONGEST = 1 << 26
 class Journal:
     """The journal of one output folder, open and locked; `damaged` counts the lines that were left out.
 
+    `first` is the least index that there may be; `beside` are names that the folder may have from before.
     Raises UnitcadError for a folder that isn't ours, that holds another batch, or in which a batch is running.
     """
 
-    def __init__(self, out: Path, head: BatchHead, code: str | None = None) -> None:
-        self.out = out
+    def __init__(
+        self, out: Path, head: BatchHead, code: str | None = None, *, first: int = 0, beside: Collection[str] = ()
+    ) -> None:
+        self.out, self._first = out, first
         self.head = {"format": FORMAT, **to_builtins(head), "code": code or code_version()}
         self._seed = zlib.crc32(_text(self.head))
         self._lines = array("q")
         self.damaged = 0
-        self._lock = _lock(out, head)
+        self._lock = _lock(out, head, beside)
         try:
             self._file = self._open(out / JOURNAL)
         except BaseException:
@@ -61,33 +64,43 @@ class Journal:
 
     def entry(self, index: int) -> JournalEntry | None:
         """Return the last entry of a variant; a variant equal to another one gets that one's entry."""
-        own = self._own(index)
+        own = self.own(index)
         if own is None or own.same_as is None:
             return own
-        other = self._own(own.same_as)
+        other = self.own(own.same_as)
         if other is None or other.same_as is not None:
             return None
         return structs.replace(other, index=index, values=own.values)
 
     def entries(self) -> Iterator[JournalEntry]:
         """Yield every variant's entry in the sweep's order, read one by one."""
-        return (entry for index in range(len(self._lines)) if (entry := self.entry(index)) is not None)
+        indices = range(self._first, self._first + len(self._lines))
+        return (entry for index in indices if (entry := self.entry(index)) is not None)
 
     def close(self) -> None:
         """Let go of the folder."""
         self._file.close()
         self._lock.release()
 
-    def _own(self, index: int) -> JournalEntry | None:
-        if index >= len(self._lines) or self._lines[index] == NOT_THERE:
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def own(self, index: int) -> JournalEntry | None:
+        """Return the last line of a variant as it was written; None where there is none."""
+        place = index - self._first
+        if not 0 <= place < len(self._lines) or self._lines[place] == NOT_THERE:
             return None
-        self._file.seek(self._lines[index])
+        self._file.seek(self._lines[place])
         return _entry(self._file.readline(LONGEST), self._seed)
 
     def _note(self, index: int, offset: int) -> None:
-        while len(self._lines) <= index:
+        place = index - self._first
+        while len(self._lines) <= place:
             self._lines.append(NOT_THERE)
-        self._lines[index] = offset
+        self._lines[place] = offset
 
     def _open(self, path: Path) -> IO[bytes]:
         """Open the journal's file with whole lines only: those of this batch, or just a head."""
@@ -199,12 +212,12 @@ def _another(out: Path, name: str) -> UnitcadError:
     )
 
 
-def _lock(out: Path, head: BatchHead) -> FileLock:
+def _lock(out: Path, head: BatchHead, beside: Collection[str]) -> FileLock:
     lock = FileLock(out / LOCK, blocking=False, thread_local=False)
     try:
         out.mkdir(parents=True, exist_ok=True)
         if not (out / JOURNAL).exists():
-            _check_free(out, head)
+            _check_free(out, head, beside)
         lock.acquire()
     except (FileExistsError, NotADirectoryError):
         raise UnitcadError(f"{out}: is a file, not a folder; choose another with -o") from None
@@ -217,9 +230,9 @@ def _lock(out: Path, head: BatchHead) -> FileLock:
     return lock
 
 
-def _check_free(out: Path, head: BatchHead) -> None:
+def _check_free(out: Path, head: BatchHead, beside: Collection[str]) -> None:
     """Refuse a folder that is not empty and has no journal, unless its table says that it is this batch's."""
-    if all(path.name == LOCK for path in out.iterdir()):
+    if all(path.name == LOCK or path.name in beside for path in out.iterdir()):
         return
     if not (out / LOCK).exists():
         raise UnitcadError(f"{out}: holds something that is no batch's result; choose another folder with -o")

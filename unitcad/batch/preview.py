@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import Preview, RefusedVariant
-from unitcad.batch.run import BatchOptions, counted
+from unitcad.batch.run import counted
 from unitcad.batch.sweep import Sweep
 from unitcad.batch.unread_keys import swept_estimate
 from unitcad.batch.unread_keys import warnings as unread_warnings

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 from unitcad.batch import task as tasks
-from unitcad.batch.task import VariantOutcome
-from unitcad.cache import Bundle, DiskStore, digest
+from unitcad.batch.destination import Folders
+from unitcad.batch.task import Task, VariantOutcome
+from unitcad.cache import Bundle, digest
 from unitcad.files import write_new
 from unitcad.pipeline.folder import replacing, sync
 from unitcad.pipeline.versions import code_version
 
 
-class Receiver:
-    """A store of what remote workers return: contents once each, and by geometry what need not be made again."""
+class Receiver(Folders):
+    """Folders of what remote workers return: contents once each, and by geometry what need not be made again."""
 
-    def __init__(self, out: Path, store: DiskStore) -> None:
-        self.out, self.store = out, store
+    def task(self, task: Task) -> Task:
+        return replace(task, known=self.known(task.geometry))
 
     def known(self, geometry: str) -> Bundle | None:
         """Return the bundle of a geometry, or None where any of it is missing."""
@@ -27,9 +27,10 @@ class Receiver:
             return None
         return Bundle(bundle["data"], bundle["files"], bundle["sizes"])
 
-    def place(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
+    def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
         """Put a variant's files into its folder; return the outcome without them. Raises OSError."""
-        assert outcome.product is not None
+        if outcome.product is None:
+            return outcome
         try:
             for content in outcome.contents.values():
                 self.store.keep(content)

@@ -1,4 +1,4 @@
-"""The batch's tables: variants.csv and batch.json, the same bytes however many workers made them."""
+"""The batch's tables: variants.csv, batch.json, variants.parquet, the same bytes however many workers made them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import contextlib
 import csv
 import io
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -15,10 +15,14 @@ from msgspec import to_builtins
 from unitcad import files
 from unitcad.batch.batch_records import BatchHead, JournalEntry, Summary, Values
 from unitcad.batch.journal import Journal
+from unitcad.batch.parquet_table import can_write, write_parquet
 from unitcad.batch.sweep import Sweep
 from unitcad.batch.unread_keys import SweptEstimate
 from unitcad.text import cell
 
+TABLES = {"csv": "variants.csv", "json": "batch.json", "parquet": "variants.parquet"}
+MOST_ROWS = 10_000
+"""Rows from which on CSV and JSON are written only if asked for."""
 FIRST = ("index", "status", "reason", "folder")
 
 
@@ -28,11 +32,25 @@ def write_results(
     entries: Callable[[], Iterable[JournalEntry]],
     head: BatchHead,
     estimate: SweptEstimate | None,
+    asked: Collection[str] | None = None,
+    variants: int = 0,
 ) -> None:
-    """Write both tables; `entries` gives the variants in the sweep's order, one at a time. Raises OSError."""
-    _write_csv(out / "variants.csv", columns, entries())
+    """Write the tables `asked` for (names of TABLES), and those that are there from before.
+
+    With None these are CSV and JSON below MOST_ROWS `variants`, else Parquet where its extra is installed. `entries`
+    gives the variants in the sweep's order, one at a time. Raises Missing for Parquet without the extra, OSError.
+    """
+    if asked is None:
+        asked = ("csv", "json") if variants < MOST_ROWS or not can_write() else ("parquet",)
+    wanted = {name for name, file in TABLES.items() if name in asked or (out / file).is_file()}
     levels = {"estimate": to_builtins(estimate)} if estimate else {}
-    _write_json(out / "batch.json", {**to_builtins(head), **levels, "columns": columns}, entries())
+    whole = {**to_builtins(head), **levels, "columns": columns}
+    if "parquet" in wanted:
+        write_parquet(out / TABLES["parquet"], whole, columns, lambda: map(flat, entries()))
+    if "csv" in wanted:
+        _write_csv(out / TABLES["csv"], columns, entries())
+    if "json" in wanted:
+        _write_json(out / TABLES["json"], whole, entries())
 
 
 def write_timings(out: Path, summary: Summary, workers: int) -> None:

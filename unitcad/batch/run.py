@@ -9,28 +9,30 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from unitcad import __version__
 from unitcad.batch import task as tasks
+from unitcad.batch.batch_options import BatchOptions
 from unitcad.batch.batch_records import BatchHead, Failure, JournalEntry, Summary
+from unitcad.batch.destination import Destination, InStore
 from unitcad.batch.journal import JOURNAL, Journal
-from unitcad.batch.remote import Receiver
+from unitcad.batch.result_folders import absolute, destination_of, folders_wanted, make_folders
 from unitcad.batch.results import columns_of, write_results, write_timings
+from unitcad.batch.shards import Shard, ShardRecord, write_shard
 from unitcad.batch.sweep import MOST, Sweep
 from unitcad.batch.task import Job, Task, VariantOutcome
 from unitcad.batch.unread_keys import swept_estimate
 from unitcad.batch.unread_keys import warnings as unread_warnings
-from unitcad.cache import DEFAULT_LIMIT_MB, DiskStore, collect, default_root, digest
+from unitcad.cache import DiskStore, collect, default_root, digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
-from unitcad.pipeline.artifacts import OUTPUTS
-from unitcad.pipeline.folder import clear_leftovers, whole
+from unitcad.pipeline.folder import clear_leftovers
 from unitcad.pipeline.product import checked_outputs
 from unitcad.pipeline.subjects import key_of, subject_of, to_text
-from unitcad.pipeline.versions import kernel_versions
+from unitcad.pipeline.versions import code_version, kernel_versions
 
 WINDOW = 2048
 """Variants held in memory: enough to group those that share a geometry."""
@@ -38,24 +40,6 @@ FIRST, NEXT = 4, 16
 """Variants in the task that makes a geometry, and in those after it."""
 COLLECT_EVERY = 500
 """Geometries made between two checks of the cache's size."""
-
-
-@dataclass(frozen=True)
-class BatchOptions:
-    """Options of a run.
-
-    `timeout` in seconds a variant; `limit` variants at most; `cache_mb` kept at the end; `verify` compares the hashes
-    of finished variants, not only their sizes.
-    """
-
-    only: Sequence[str] = OUTPUTS
-    check: bool = True
-    keep_going: bool = False
-    timeout: float | None = None
-    limit: int | None = None
-    cache: Path | None = None
-    cache_mb: float = DEFAULT_LIMIT_MB
-    verify: bool = False
 
 
 Watch = Callable[[Summary, VariantOutcome | None], None]
@@ -79,11 +63,17 @@ def run(
     nothing can be run; whatever happens to a variant is in the summary.
     """
     head = batch_head(sweep, checked_outputs(options.only), options)
-    summary = Summary(counted(sweep, options.limit))
-    store = DiskStore(options.cache or default_root())
-    journal = Journal(out, head)
-    receiver = Receiver(out, store) if remote else None
-    batch = _Batch(sweep, out, options, executor, 2 * workers, watch, journal, store, receiver, summary)
+    count = counted(sweep, options.limit)
+    indices = options.shard.indices(count) if options.shard else range(count)
+    summary = Summary(len(indices))
+    cache = DiskStore(options.cache or default_root())
+    journal = Journal(out, head, first=indices.start)
+    try:
+        destination = destination_of(out, options, summary.variants, cache, remote)
+    except BaseException:
+        journal.close()
+        raise
+    batch = _Batch(sweep, options, executor, 2 * workers, watch, journal, destination, summary, indices)
     if journal.damaged:
         summary.warnings.append(
             f"{out / JOURNAL}: damaged in {journal.damaged} lines; their variants were checked again"
@@ -91,22 +81,28 @@ def run(
     start = time.perf_counter()
     try:
         clear_leftovers(out)
+        if options.shard:
+            write_shard(out, shard_record(sweep, head, options, count))
         batch.all()
-        found = swept_estimate(sweep, summary.variants) if "estimate" in head.outputs else None
+        if isinstance(destination, InStore) and folders_wanted(options, summary.variants):
+            make_folders(out, journal.entries(), destination.store, cache)
+        estimated = "estimate" in head.outputs and not options.shard  # of a shard nothing can be said
+        found = swept_estimate(sweep, summary.variants) if estimated else None
         summary.warnings += unread_warnings(found)
-        write_results(out, columns_of(sweep, journal), journal.entries, head, found)
+        columns = columns_of(sweep, journal)
+        write_results(out, columns, journal.entries, head, found, options.tables, summary.variants)
         summary.seconds = round(time.perf_counter() - start, 3)
         write_timings(out, summary, workers)
         watch(summary, None)
     except OSError as error:
-        raise _no_room(tasks.failure(0, error), out, summary) from error
+        raise _ended(tasks.failure(0, error), out, summary) from error
     except KeyboardInterrupt:
         for future in batch.running:
             future.cancel()
         raise
     finally:
         journal.close()
-        store.close()
+        cache.close()
     return summary
 
 
@@ -118,8 +114,9 @@ def trim(options: BatchOptions) -> None:
 
 def batch_head(sweep: Sweep, only: tuple[str, ...], options: BatchOptions) -> BatchHead:
     """Return the batch's identity, for its journal and its tables."""
+    parts = () if options.shard is None else (options.shard, counted(sweep, options.limit))
     return BatchHead(
-        batch=digest(repr((sweep.hash, only, options.check)).encode())[:16],
+        batch=digest(repr((sweep.hash, only, options.check, *parts)).encode())[:16],
         name=sweep.name,
         mode=sweep.mode,
         bases=[base for base, _ in sweep.bases],
@@ -151,11 +148,12 @@ class _Batch:
     """One run of one sweep; at most `room` tasks are submitted at a time."""
 
     def __init__(
-        self, sweep: Sweep, out: Path, options: BatchOptions, executor: Executor, room: int,
-        watch: Watch, journal: Journal, store: DiskStore, receiver: Receiver | None, summary: Summary,
+        self, sweep: Sweep, options: BatchOptions, executor: Executor, room: int,
+        watch: Watch, journal: Journal, destination: Destination, summary: Summary, indices: range,
     ) -> None:  # fmt: skip
-        self.sweep, self.out, self.options, self.executor, self.room = sweep, out, options, executor, room
-        self.watch, self.journal, self.store, self.receiver, self.summary = watch, journal, store, receiver, summary
+        self.sweep, self.options, self.executor, self.room = sweep, options, executor, room
+        self.watch, self.journal, self.destination, self.summary = watch, journal, destination, summary
+        self.indices, self.turn = indices, _turn(options.shard)
         self.only = checked_outputs(options.only)
         self.coming = self._to_make()
         self.groups: dict[str, _GeometryJobs] = {}
@@ -164,7 +162,7 @@ class _Batch:
         self.tried: set[int] = set()
         self.made: set[int] = set()
         self.seen: dict[int, int] = {}
-        self.running: dict[Future[list[VariantOutcome]], Task] = {}
+        self.running: dict[Future[tasks.Answer], Task] = {}
 
     def all(self) -> None:
         while not self.summary.stopped:
@@ -182,9 +180,9 @@ class _Batch:
         What failed before comes last: a batch that stops at a failure has made all others by then.
         """
         failed: list[int] = []
-        for index in range(self.summary.variants):
+        for index in self.indices:
             entry = self.journal.entry(index)
-            if entry is not None and self._stands(entry):
+            if entry is not None and self.destination.stands(entry):
                 self._finished(VariantOutcome(index, entry.status), fresh=False)
             elif entry is not None and entry.status == tasks.FAILED:
                 failed.append(index)
@@ -211,18 +209,9 @@ class _Batch:
                 continue
             key = key_of(spec, self.only, self.options.check)
             self.groups.setdefault(key, _GeometryJobs()).jobs.append(
-                Job(index, to_text(spec), entry.manifest if entry else "")
+                Job(index, to_text(spec), self.destination.damaged(entry) if entry else "")
             )
             self.waiting += 1
-
-    def _stands(self, entry: JournalEntry) -> bool:
-        """Check whether a variant is finished, with or without a broken mould check, and its folder is whole."""
-        if entry.status not in (tasks.OK, tasks.BROKEN):
-            return False
-        folder, hashes = self.out / entry.folder, self.options.verify
-        if whole(folder, hashes=hashes) is None:
-            return False
-        return not hashes or digest((folder / "manifest.json").read_bytes()) == entry.manifest
 
     def _submit(self) -> None:
         """Submit tasks: one for every worker, and one ahead."""
@@ -231,24 +220,16 @@ class _Batch:
             if chosen is None:
                 return
             key, jobs = chosen
-            task = Task(
-                tuple(jobs),
-                key,
-                self.only,
-                self.options.check,
-                self.options.timeout,
-                None if self.receiver else self.out.absolute(),
-                None if self.receiver else self.store.root.absolute(),
-                self.receiver.known(key) if self.receiver else None,
-            )
-            self.running[self.executor.submit(tasks.work, task)] = task
+            task = Task(tuple(jobs), key, self.only, self.options.check, self.options.timeout)
+            self.running[self.executor.submit(tasks.work, self.destination.task(task))] = task
 
     def _next(self) -> tuple[str, list[Job]] | None:
         """Choose a variant to try again alone; else a geometry not yet made; else more of one that is."""
         if self.again:
             key, job = self.again.popleft()
             return key, [job]
-        new = next((k for k, g in self.groups.items() if g.jobs and not g.making and _short(k) not in self.made), None)
+        fresh = [k for k, g in self.groups.items() if g.jobs and not g.making and _short(k) not in self.made]
+        new = fresh[int(len(fresh) * self.turn)] if fresh else None
         key = new or next((k for k, g in self.groups.items() if g.jobs and not g.making), None)
         if key is None:
             return None
@@ -263,7 +244,7 @@ class _Batch:
             task = self.running.pop(future)
             group = self.groups.get(task.geometry)
             try:
-                outcomes = future.result()
+                outcomes = tasks.outcomes(future.result())
             except UnitcadError:
                 raise
             except (Exception, CancelledError) as error:
@@ -307,9 +288,7 @@ class _Batch:
             self.again.append((key, job))
             return
         self.tried.discard(outcome.index)
-        if self.receiver and outcome.product:
-            outcome = self.receiver.place(outcome, key)
-        self._finished(outcome)
+        self._finished(self.destination.take(outcome, key))
 
     def _finished(self, outcome: VariantOutcome, fresh: bool = True) -> None:
         summary = self.summary
@@ -323,23 +302,49 @@ class _Batch:
                     values=self.sweep.values(outcome.index)[1],
                     row=outcome.row,
                     manifest=outcome.manifest,
+                    record=outcome.record,
                 )
             )
-        summary.done += 1
         summary.resumed += not fresh
         summary.reused += bool(fresh and outcome.reused and not outcome.built)
-        if outcome.status == tasks.OK:
-            summary.ok += 1
-        else:
-            summary.failed += 1
-            if len(summary.failures) < MOST_FAILURES:
-                entry = self.journal.entry(outcome.index)
-                if entry is not None:
-                    summary.failures.append(Failure(entry.index, entry.status, entry.reason, entry.folder))
-            # A refusal concerns one variant only; a failure may happen to each.
-            if fresh and outcome.status != tasks.REFUSED and not self.options.keep_going:
-                summary.stopped = summary.stopped or f"variant {outcome.index}: {outcome.reason}"
+        count_entry(summary, outcome.status, lambda: self.journal.entry(outcome.index))
+        # A refusal concerns one variant only; a failure may happen to each.
+        stops = outcome.status not in (tasks.OK, tasks.REFUSED) and not self.options.keep_going
+        if fresh and stops:
+            summary.stopped = summary.stopped or f"variant {outcome.index}: {outcome.reason}"
         self.watch(summary, outcome)
+
+
+def count_entry(summary: Summary, status: str, entry: Callable[[], JournalEntry | None]) -> None:
+    """Count a variant that has ended; the first ones that are not ok are named by their `entry`."""
+    summary.done += 1
+    if status == tasks.OK:
+        summary.ok += 1
+        return
+    summary.failed += 1
+    if len(summary.failures) < MOST_FAILURES and (found := entry()) is not None:
+        summary.failures.append(Failure(found.index, found.status, found.reason, found.folder))
+
+
+def shard_record(sweep: Sweep, head: BatchHead, options: BatchOptions, count: int) -> ShardRecord:
+    """Return what the folder of a shard says of it: the head is that of the batch without shards."""
+    assert options.shard
+    whole = batch_head(sweep, checked_outputs(options.only), replace(options, shard=None))
+    return ShardRecord(
+        number=options.shard.number,
+        of=options.shard.of,
+        variants=count,
+        head=whole,
+        shard_head=head,
+        code=code_version(),
+        store=absolute(options.store or ""),
+        sweep=sweep,
+    )
+
+
+def _turn(shard: Shard | None) -> float:
+    """Return where in the window a shard begins: shards that begin together then make different geometries."""
+    return (shard.number - 1) / shard.of if shard else 0.0
 
 
 def _short(key: str) -> int:
@@ -347,7 +352,7 @@ def _short(key: str) -> int:
     return int(key[:16], 16)
 
 
-def _no_room(outcome: VariantOutcome, out: Path, summary: Summary) -> UnitcadError:
+def _ended(outcome: VariantOutcome, out: Path, summary: Summary) -> UnitcadError:
     error = UnitcadError(f"{out}: {outcome.reason}; {summary.done} variants are done, the same command resumes")
     error.exit_code = 1
     return error

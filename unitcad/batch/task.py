@@ -5,21 +5,24 @@ from __future__ import annotations
 import contextlib
 import errno
 import faulthandler
+import pickle
 import sys
 import time
+import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
 
 from unitcad import files
-from unitcad.batch.batch_records import Values
+from unitcad.batch import record_packs
+from unitcad.batch.batch_records import RecordPlace, Values
 from unitcad.batch.row import row
-from unitcad.cache import Bundle, DiskStore, MemoryStore, digest
+from unitcad.cache import Bundle, DiskStore, MemoryStore, MissingContent, SharedStore, digest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import folder as folders
-from unitcad.pipeline.build import build_into
+from unitcad.pipeline.build import TRIES, build_into
 from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import Manifest, failed_codes
 from unitcad.pipeline.product import Product
@@ -48,9 +51,10 @@ class Job:
 class Task:
     """Variants of one geometry, and how to make them.
 
-    With `out` and `cache` (folders that the worker reaches) results go there. Without, they are in the outcomes, and
-    `known` is what the caller has of this geometry. `allowed` is the code that the caller may run, and so
-    may the worker.
+    With `store` (an address) results go there, and `specs` are the jobs' specs by `record_packs.packed_specs`; work is
+    then shared by `cache` where there is one, else by the store. With `out` and `cache` (folders that the worker
+    reaches) results go there. Without, they are in the outcomes, and `known` is what the caller has of this geometry.
+    `allowed` is the code that the caller may run, and so may the worker.
     """
 
     jobs: tuple[Job, ...]
@@ -61,6 +65,8 @@ class Task:
     out: Path | None = None
     cache: Path | None = None
     known: Bundle | None = None
+    store: str | None = None
+    specs: bytes | str = b""
     code: str = field(default_factory=code_version)
     allowed: frozenset[str] = field(default_factory=custom_code.allowed)
 
@@ -69,7 +75,8 @@ class Task:
 class VariantOutcome:
     """Outcome of one variant; `manifest` is the SHA-256 of its manifest.json.
 
-    `product`, `contents` and `bundle` are set only where the caller places the files.
+    `record` is where a store has the files. `product`, `contents` and `bundle` are set only where the caller places the
+    files.
     """
 
     index: int
@@ -81,31 +88,92 @@ class VariantOutcome:
     built: int = 0
     reused: int = 0
     manifest: str = ""
+    record: RecordPlace | None = None
     product: Product | None = None
     contents: dict[str, bytes] = field(default_factory=dict)
     bundle: Bundle | None = None
 
 
-def work(task: Task) -> list[VariantOutcome]:
-    """Make a task's variants. An error of one of them is in its outcome."""
+Answer = list[VariantOutcome] | bytes
+
+
+def work(task: Task) -> Answer:
+    """Make a task's variants; return what `outcomes` takes. An error of one of them is in its outcome."""
     if task.code != code_version():
         raise UnitcadError(f"this worker runs unitcad {code_version()}, the batch {task.code}; install the same one")
     custom_code.allow(task.allowed)
-    outcomes = []
-    known = task.known
-    for job in task.jobs:
+    if task.store:
+        return zlib.compress(pickle.dumps(_into_store(task, record_packs.store_at(task.store))))
+    if task.out is None:
+        return _each(task.jobs, task, lambda job, known: _remotely(job, task, known))
+    done = _each(task.jobs, task, lambda job, known: _locally(job, task))
+    # Before the journal notes them: what is noted is on the disk.
+    folders.sync(task.out / outcome.folder for outcome in done if outcome.folder)
+    return done
+
+
+def outcomes(answer: Answer) -> list[VariantOutcome]:
+    """Return the outcomes in a task's answer. It is a pickle of a worker's, as all that the executor brings."""
+    return pickle.loads(zlib.decompress(answer)) if isinstance(answer, bytes) else answer
+
+
+def _each(
+    jobs: Sequence[Job], task: Task, make: Callable[[Job, Bundle | None], VariantOutcome], known: Bundle | None = None
+) -> list[VariantOutcome]:
+    """Make each variant; an error is its outcome. `make` gets what is known of the geometry by then."""
+    done, known = [], known or task.known
+    for job in jobs:
         start = time.perf_counter()
         try:
             with _watch(task.timeout):
-                outcome = _locally(job, task) if task.out else _remotely(job, task, known)
+                outcome = make(job, known)
         except Exception as error:
             outcome = failure(job.index, error)
-        outcomes.append(replace(outcome, seconds=time.perf_counter() - start))
+        done.append(replace(outcome, seconds=time.perf_counter() - start))
         known = outcome.bundle or known
-    if task.out:
-        # Before the journal notes them: what is noted is on the disk.
-        folders.sync(task.out / outcome.folder for outcome in outcomes if outcome.folder)
-    return outcomes
+    return done
+
+
+def _into_store(task: Task, store: SharedStore) -> list[VariantOutcome]:
+    """Make a task's variants, put what is new into the store, and return rows: when they return, all is there."""
+    anew = any(job.damaged for job in task.jobs)
+    try:
+        specs = record_packs.unpacked_specs(store, task.specs)
+        known = None if anew or task.cache else record_packs.known_bundle(store, task.geometry)
+    except Exception as error:
+        return [failure(job.index, error) for job in task.jobs]
+    jobs = [replace(job, spec=spec) for job, spec in zip(task.jobs, specs, strict=True)]
+    done = _each(jobs, task, lambda job, known: _delivered(job, task, known, store, anew), known)
+    try:
+        places = record_packs.pack(store, [outcome.product for outcome in done if outcome.product])
+    except Exception as error:
+        return [failure(outcome.index, error) if outcome.product else outcome for outcome in done]
+    left = iter(places)
+    return [
+        replace(outcome, product=None, bundle=None, record=next(left)) if outcome.product else outcome
+        for outcome in done
+    ]
+
+
+def _delivered(job: Job, task: Task, known: Bundle | None, store: SharedStore, anew: bool) -> VariantOutcome:
+    """Make a variant in memory, and put the contents that it shares into the store; its own files are still here."""
+    spec = of_text(job.spec)
+    maker = _store(task.cache) if task.cache else MemoryStore(known)
+    for left in reversed(range(TRIES)):
+        before = Counter(maker.counts)
+        try:
+            product = product_of(spec, task.only, task.check, maker, Stages())
+            shared = sorted(set(product.shared.values()))
+            store.keep_all([maker.content(sha) for sha in shared if anew or not store.noted(sha)], anew=anew)
+            break
+        except MissingContent:  # the cache is cleared meanwhile
+            if not left:
+                raise
+    outcome = _outcome(job, spec, subject_of(spec).folder_name, product.manifest, maker.counts - before)
+    bundle = maker.bundle() if isinstance(maker, MemoryStore) and outcome.built else None
+    if bundle:
+        record_packs.offer_bundle(store, task.geometry, bundle, anew=anew)
+    return replace(outcome, product=product, bundle=bundle)
 
 
 def failure(index: int, error: BaseException) -> VariantOutcome:

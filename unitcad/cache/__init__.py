@@ -1,7 +1,8 @@
 """Content kept under a key, so that each distinct piece of work is done once.
 
 A key is a hash of all that the work reads. It names either data (JSON) or the SHA-256 of a file's content; equal
-contents are kept once. `MemoryStore` keeps them for one build, `DiskStore` for all who share a folder:
+contents are kept once. `MemoryStore` keeps them for one build, `SharedStore` for several machines, `DiskStore` for
+all who share a folder:
 
     <root>/unitcad-cache          marks the folder as a cache of unitcad
     <root>/data/ab/<key>          checksum, newline, JSON
@@ -15,6 +16,7 @@ contents are kept once. `MemoryStore` keeps them for one build, `DiskStore` for 
 
 from unitcad.cache.collect import DEFAULT_LIMIT_MB, Usage, collect, usage
 from unitcad.cache.disk import DiskStore, default_root, free, held
+from unitcad.cache.shared_store import SharedStore
 from unitcad.cache.store import Bundle, MemoryStore, MissingContent, Store, digest
 
 __all__ = [
@@ -23,6 +25,7 @@ __all__ = [
     "DiskStore",
     "MemoryStore",
     "MissingContent",
+    "SharedStore",
     "Store",
     "Usage",
     "collect",

@@ -19,17 +19,24 @@ from unitcad.cli.shared_options import (
     Sets,
     allow_code,
     finite,
+    listed,
     outputs,
     overrides,
 )
 
 if TYPE_CHECKING:
-    from unitcad.batch import Summary
+    from unitcad.batch import BatchOptions, Summary
     from unitcad.batch.batch_records import Preview
 
 
 def batch(
-    sweep: Annotated[str, typer.Argument(metavar="SWEEP", help="A sweep file, or the name of a shipped one.")],
+    sweep: Annotated[
+        str, typer.Argument(metavar="SWEEP", help="A sweep file, or the name of a shipped one; or merge, and shards.")
+    ],
+    shards: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[SHARD]...", help="After merge: the shards' folders, or the one that holds them."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="The batch's own folder; else out/<the sweep's name>.")
     ] = None,
@@ -68,6 +75,19 @@ def batch(
     cache_limit: Annotated[
         float, typer.Option(metavar="MB", min=0, max=1e12, callback=finite, help="What the cache keeps at the end.")
     ] = 4096,
+    store: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Workers put content there: a folder, s3://bucket/path."),
+    ] = None,
+    folders: Annotated[
+        bool | None, typer.Option("--folders/--no-folders", help="A folder a variant; else below 1,000 variants.")
+    ] = None,
+    table: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="csv,json,parquet; else the first two below 10,000 variants.")
+    ] = None,
+    shard: Annotated[
+        str | None, typer.Option(metavar="K/N", help="Make part K of N of the sweep; unitcad batch merge joins them.")
+    ] = None,
     sets: Sets = None,
     formats: Formats = None,
     only: Only = None,
@@ -81,42 +101,72 @@ def batch(
     from msgspec import to_builtins
 
     from unitcad.batch import BatchOptions, load_sweep
-    from unitcad.batch.batch_call import make
+    from unitcad.batch.batch_call import checked_tables, make
     from unitcad.batch.cluster import Certificates
     from unitcad.batch.executors import Workers
     from unitcad.batch.preview import preview
+    from unitcad.batch.shards import shard_of
     from unitcad.cli.batch_progress import watching
     from unitcad.cli.output import print_json
     from unitcad.errors import Refusal
     from unitcad.pipeline.folder import PAGE
 
+    named = listed(table) if table is not None else None
+    if sweep == "merge":
+        _merge(shards or [], out, BatchOptions(folders=folders, cache=cache, tables=checked_tables(named)), as_json)
+        return
+    if shards:
+        raise typer.BadParameter(f"one sweep a batch; {shards[0]} is one too many.", param_hint="SWEEP")
     chosen = outputs(only)
     wanted = load_sweep(sweep).overridden(overrides(sets, formats))
     allow_code(code, nothing_else=dry_run)
-    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify)
+    options = BatchOptions(chosen, not no_check, keep_going, timeout, limit, cache, cache_limit, verify, store,
+        True if page else folders, checked_tables(named, page), None if shard is None else shard_of(shard))  # fmt: skip
     if dry_run:
         size = preview(wanted, options)
         print_json(to_builtins(size)) if as_json or json_lines else _print_preview(size)
         return
     if chosen == ("estimate",) and scheduler is not None:
         raise Refusal("--scheduler", scheduler, "estimates alone are computed in this process: leave it out")
+    if chosen == ("estimate",) and store is not None:
+        raise Refusal("--store", store, "estimates alone are one table and no files: leave it out")
     folder = out or Path("out") / wanted.slug
+    made = folder / options.shard.folder if options.shard else folder
     workers = Workers(jobs, scheduler, Certificates(tls_ca_file, tls_cert, tls_key))
     try:
         with watching(json_lines) as watch:
             summary = make(wanted, folder, options, workers, watch)
     except KeyboardInterrupt:
-        typer.echo(f"interrupted: finished variants stay in {folder}; the same command resumes", err=True)
+        typer.echo(f"interrupted: finished variants stay in {made}; the same command resumes", err=True)
         sys.exit(130)
-    if page or (folder / PAGE).is_file():
+    if page or (made / PAGE).is_file():
         from unitcad.report import write_report
 
-        write_report(folder, warn)
+        write_report(made, warn)
     if as_json:
-        print_json({"folder": str(folder), **to_builtins(summary)})
+        print_json({"folder": str(made), **to_builtins(summary)})
     elif not json_lines:
-        _print_summary(summary, folder)
+        _print_summary(summary, made)
     if summary.failed or summary.stopped:
+        sys.exit(1)
+
+
+def _merge(named: list[Path], out: Path | None, options: BatchOptions, as_json: bool) -> None:
+    """Join shards as one batch: in the folder that holds them, or in `out`."""
+    from msgspec import to_builtins
+
+    from unitcad.batch.merging import merge
+    from unitcad.batch.shards import shard_folders
+    from unitcad.cli.output import print_json
+
+    folders = [each for path in named for each in (shard_folders(path) or [path])]
+    whole = out or (folders[0].parent if folders else Path())
+    summary = merge(whole, folders, options)
+    if as_json:
+        print_json({"folder": str(whole), **to_builtins(summary)})
+    else:
+        _print_summary(summary, whole)
+    if summary.failed:
         sys.exit(1)
 
 

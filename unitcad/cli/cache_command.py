@@ -40,6 +40,28 @@ def gc(
     _print_usage(text, root, vars(gone), as_json)
 
 
+@cache.command("export")
+def export(
+    hashes: Annotated[
+        list[str], typer.Argument(metavar="HASH...", help="The end of a variant's folder, or its begin.")
+    ],
+    batch: Annotated[Path, typer.Option("--batch", help="The batch's folder.")] = Path(),
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Where the folders go; else to the batch.")] = None,
+    store: Annotated[str | None, typer.Option(metavar="ADDRESS", help="The store; else the batch's.")] = None,
+    where: Where = None,
+) -> None:
+    """Make the folders of some variants of a batch, from its store. Each is a line printed."""
+    from unitcad.batch.result_folders import export_variant
+    from unitcad.cache import DiskStore, default_root
+
+    kept = DiskStore(where or default_root())
+    try:
+        for wanted in hashes:
+            typer.echo(str(export_variant(batch, wanted, out or batch, kept, store)))
+    finally:
+        kept.close()
+
+
 def _print_usage(text: str, root: Path, data: dict, as_json: bool) -> None:
     from unitcad.cli.output import print_json
 

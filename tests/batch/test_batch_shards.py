@@ -1,0 +1,212 @@
+"""Shards with a parent each, run at once, stopped, merged; tables as Parquet; folders made when asked for."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from batching import bytes_of, calls, command, environment, ring_sweep, rows, unitcad
+
+from unitcad.batch import BatchOptions, Summary, load_sweep, record_packs, result_folders, results
+from unitcad.batch.batch_call import make
+from unitcad.batch.batch_records import BatchHead, JournalEntry
+from unitcad.batch.executors import Workers
+from unitcad.batch.merging import merge
+from unitcad.batch.parquet_table import read_parquet
+from unitcad.batch.result_folders import export_variant
+from unitcad.batch.results import write_results
+from unitcad.batch.shards import Shard, shard_folders, shard_of
+from unitcad.cache import DiskStore
+from unitcad.errors import UnitcadError, WrongArgument
+
+
+def made(sweep: Path, out: Path, **options: Any) -> Summary:
+    record_packs.store_at.cache_clear()
+    return make(load_sweep(sweep), out, BatchOptions(("unit",), **options), Workers(jobs=0))
+
+
+@pytest.fixture(autouse=True)
+def no_store_is_kept() -> Iterator[None]:
+    yield
+    record_packs.store_at.cache_clear()
+
+
+@pytest.mark.parametrize("count", [0, 1, 15, 16, 17, 1000])
+def test_shards_are_the_whole_sweep_in_order(count: int) -> None:
+    for of in (1, 3, 16):
+        parts = [Shard(number, of).indices(count) for number in range(1, of + 1)]
+        assert [index for part in parts for index in part] == list(range(count))
+        assert max(map(len, parts)) - min(map(len, parts)) <= 1
+    assert [Shard(n, 16).folder for n in (3, 16)] == ["shard-03-of-16", "shard-16-of-16"]
+
+
+@pytest.mark.parametrize(
+    ("text", "nearest"), [("17/16", "16/16"), ("0/4", "1/4"), ("3", "1/2"), ("-1/4", "1/2"), ("1/0", "1/1")]
+)
+def test_a_shard_that_is_none(text: str, nearest: str) -> None:
+    with pytest.raises(WrongArgument) as refused:
+        shard_of(text)
+    assert (refused.value.field, refused.value.value, refused.value.nearest) == ("shard", text, nearest)
+
+
+def test_shards_merged_are_the_batch_without_shards(tmp_path: Path) -> None:
+    # The geometry runs fastest: every shard has all of them.
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=5)
+    text = sweep.read_text().splitlines()
+    sweep.write_text("\n".join([*text[:-2], text[-1], text[-2]]) + "\n")
+    out = tmp_path / "out"
+    for number in (1, 2, 3):
+        summary = made(sweep, out, shard=Shard(number, 3))
+        assert summary.ok == summary.variants == len(Shard(number, 3).indices(10))
+    assert len(calls(tmp_path / "s")) == 2  # each geometry once across shards
+    assert [path.name for path in out.iterdir() if path.name != "store"] != []
+    assert not list(out.glob("ring-*"))
+
+    summary = merge(out, shard_folders(out), BatchOptions(cache=tmp_path / "fresh"))
+    assert (summary.ok, summary.failed) == (10, 0)
+    made(sweep, tmp_path / "plain", cache=tmp_path / "other")
+    merged = {p: sha for p, sha in bytes_of(out).items() if not p.startswith(("store/", "shard-"))}
+    assert merged == bytes_of(tmp_path / "plain")
+
+    folder = rows(out)[7]["folder"]
+    assert export_variant(out, folder[-12:], tmp_path / "one", DiskStore(tmp_path / "fresh")).name == folder
+
+    # The merged folder is a batch: the same command without --shard has nothing left to do.
+    again = made(sweep, out, store=str(out / "store"))
+    assert (again.resumed, again.ok) == (10, 10)
+    assert made(sweep, out, shard=Shard(2, 3)).resumed == 3
+
+
+def test_two_shards_at_once(tmp_path: Path) -> None:
+    """Processes of their own, on one store: what is made twice was in flight in both, so at most once in each."""
+    import subprocess
+
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0, 4.0], materials=2), tmp_path / "out"
+    words = [command("batch", sweep, "-o", out, "--shard", f"{n}/2", "-j", 0, "--json") for n in (1, 2)]
+    with ThreadPoolExecutor(2) as pool:
+        run = lambda line: subprocess.run(line, capture_output=True, text=True, env=environment(), check=False)  # noqa: E731
+        done = list(pool.map(run, words))
+    assert [each.returncode for each in done] == [0, 0], done
+    assert sum(json.loads(each.stdout)["ok"] for each in done) == 6
+    assert max(Counter(calls(tmp_path / "s")).values()) <= 2
+    merged = unitcad("batch", "merge", out, "--json")
+    assert merged.returncode == 0, merged.stderr
+    assert json.loads(merged.stdout)["ok"] == 6
+    assert len(list(out.glob("ring-*"))) == 6
+
+
+def test_shards_that_do_not_fit_together(tmp_path: Path) -> None:
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2), tmp_path / "out"
+    with pytest.raises(UnitcadError, match="there are no shards"):
+        merge(out, [], BatchOptions())
+    made(sweep, out, shard=Shard(1, 2))
+    with pytest.raises(UnitcadError, match="of 2 shards 1 are missing: 2/2"):
+        merge(out, shard_folders(out), BatchOptions())
+    with pytest.raises(UnitcadError, match=r"is not a shard of a batch \(no shard.json\)"):
+        merge(out, [out], BatchOptions())
+    first = out / "shard-1-of-2"
+    with pytest.raises(UnitcadError, match="is shard 1/2, as is"):
+        merge(out, [first, first], BatchOptions())
+    other = ring_sweep(tmp_path / "s", heights=[2.0, 5.0], materials=2)
+    made(other, tmp_path / "others", shard=Shard(2, 2))
+    with pytest.raises(UnitcadError, match="is a shard of another batch than"):
+        merge(out, [first, tmp_path / "others" / "shard-2-of-2"], BatchOptions())
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=2)
+    made(sweep, out, shard=Shard(2, 2))
+    journal = out / "shard-2-of-2" / "journal.jsonl"
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:-1]))
+    with pytest.raises(UnitcadError, match="1 of 2 variants are not made yet, the first is variant 3"):
+        merge(out, shard_folders(out), BatchOptions())
+    assert not (out / "batch.json").exists()
+    assert not (out / "journal.jsonl").exists()
+    with pytest.raises(UnitcadError, match="holds another batch"):  # another shard in a shard's folder
+        made(ring_sweep(tmp_path / "s", heights=[2.0, 5.0], materials=2), out, shard=Shard(1, 2))
+
+
+def test_the_command_line_refuses_what_is_no_shard(tmp_path: Path) -> None:
+    sweep = ring_sweep(tmp_path / "s")
+    for words, message in (
+        (
+            ("batch", sweep, "--shard", "17/16"),
+            "--shard = 17/16: of 16 shards the first one is 1; nearest accepted: 16/16",
+        ),
+        (("batch", "merge", tmp_path / "nothing"), "is not a shard of a batch"),
+    ):
+        done = unitcad(*words, cwd=tmp_path)
+        assert done.returncode == 2, done.stdout
+        assert message.replace('"', "") in done.stderr.replace('"', "").replace("'", "")
+        assert "Traceback" not in done.stderr
+
+
+def test_without_folders_one_is_made_when_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(result_folders, "FOLDERS_BELOW", 5)
+    sweep, out = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=3), tmp_path / "out"
+    made(sweep, out)  # six variants: too many for folders
+    assert not list(out.glob("ring-*"))
+    made(sweep, tmp_path / "plain", folders=True)
+    wanted = rows(out)[4]["folder"]
+    cache = DiskStore(tmp_path / "fresh")
+    assert export_variant(out, wanted[-12:-6], tmp_path / "some", cache) == tmp_path / "some" / wanted
+    plain = {path: sha for path, sha in bytes_of(tmp_path / "plain").items() if path.startswith(wanted)}
+    assert bytes_of(tmp_path / "some") == plain != {}
+    for wrong, words in (("ffffffffffff", "no variant"), ("nonsense", "needs 4 to 12"), ("../x", "needs 4 to 12")):
+        with pytest.raises(WrongArgument, match=words):
+            export_variant(out, wrong, tmp_path / "some", cache)
+    with pytest.raises(UnitcadError, match="is not in a store, its folder is its result"):
+        export_variant(tmp_path / "plain", wanted[-12:], tmp_path / "some", cache)
+    with pytest.raises(UnitcadError, match="is it a batch"):
+        export_variant(tmp_path, wanted[-12:], tmp_path / "some", cache)
+
+
+def test_parquet_has_the_rows_of_the_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    sweep = ring_sweep(tmp_path / "s", heights=[2.0, 3.0], materials=3)
+    made(sweep, tmp_path / "out", tables=("json", "parquet"))
+    rows_there = read_parquet(tmp_path / "out" / "variants.parquet")
+    assert [{key: value for key, value in row.items() if value is not None} for row in rows_there] == rows(
+        tmp_path / "out"
+    )
+    schema = parquet.read_schema(tmp_path / "out" / "variants.parquet")
+    head = json.loads((tmp_path / "out" / "batch.json").read_text())
+    assert json.loads(schema.metadata[b"unitcad"]) == {k: v for k, v in head.items() if k != "variants"}
+    assert (str(schema.field("index").type), str(schema.field("layer1_mass_g").type)) == ("int64", "double")
+    # By default from MOST_ROWS on, and then alone; the same bytes again.
+    monkeypatch.setattr(results, "MOST_ROWS", 6)
+    made(sweep, tmp_path / "many")
+    tables = [(tmp_path / "many" / name).is_file() for name in ("variants.csv", "batch.json", "variants.parquet")]
+    assert tables == [False, False, True]
+    assert (tmp_path / "many" / "variants.parquet").read_bytes() == (tmp_path / "out" / "variants.parquet").read_bytes()
+    made(sweep, tmp_path / "many", tables=("csv",))
+    assert (tmp_path / "many" / "variants.csv").is_file()
+
+
+def test_a_column_of_several_kinds_is_text(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    values = [1, 2.5, None, True, "a", [1, 2], 1 << 70]
+    entries = [
+        JournalEntry(index=i, status="ok", values={"mixed": v, "number": i + 0.5 * (i % 2)})
+        for i, v in enumerate(values)
+    ]
+    columns = ["index", "status", "reason", "folder", "mixed", "number"]
+    write_results(tmp_path, columns, lambda: entries, BatchHead(batch="a", name="b"), None, ("parquet",))
+    there = read_parquet(tmp_path / "variants.parquet")
+    assert [row["mixed"] for row in there] == ["1", "2.5", None, "true", '"a"', "[1, 2]", str(1 << 70)]
+    assert [row["number"] for row in there] == [0.0, 1.5, 2.0, 3.5, 4.0, 5.5, 6.0]
+
+
+def test_without_the_extra_parquet_is_refused_and_tables_are_as_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(results, "can_write", lambda: False)
+    monkeypatch.setattr("unitcad.batch.parquet_table.can_write", lambda: False)
+    monkeypatch.setattr(results, "MOST_ROWS", 1)
+    head, entries = BatchHead(batch="a", name="b"), [JournalEntry(index=0, status="ok")]
+    write_results(tmp_path, ["index"], lambda: entries, head, None, None, 1)
+    assert (tmp_path / "variants.csv").read_text() == "index\n0\n"
+    with pytest.raises(UnitcadError, match=r"pip install 'unitcad\[parquet\]'"):
+        write_results(tmp_path, ["index"], lambda: entries, head, None, ("parquet",), 1)

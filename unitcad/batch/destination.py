@@ -1,0 +1,96 @@
+"""Where a batch's results go, as its parent sees it: folders on this disk, or a store that workers write to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Protocol
+
+from unitcad.batch import task as tasks
+from unitcad.batch.batch_records import JournalEntry
+from unitcad.batch.record_packs import intact, packed_specs
+from unitcad.batch.task import Task, VariantOutcome
+from unitcad.cache import DiskStore, SharedStore, digest
+from unitcad.pipeline.folder import whole
+
+
+class Destination(Protocol):
+    """The place of a batch's results."""
+
+    def stands(self, entry: JournalEntry) -> bool:
+        """Check whether what the journal says of a variant is still there."""
+        ...
+
+    def damaged(self, entry: JournalEntry) -> str:
+        """Return the SHA-256 of the manifest of a result that does not stand any more, if it is to be replaced here."""
+        ...
+
+    def task(self, task: Task) -> Task:
+        """Return a task that says where its results go."""
+        ...
+
+    def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
+        """Return an outcome whose files are in place. Raises OSError."""
+        ...
+
+
+class Folders:
+    """Folders on this disk, which the workers share; `verify` compares hashes, not only sizes."""
+
+    def __init__(self, out: Path, store: DiskStore, verify: bool) -> None:
+        self.out, self.store, self.verify = out, store, verify
+
+    def stands(self, entry: JournalEntry) -> bool:
+        folder = self.out / entry.folder
+        if not made(entry) or whole(folder, hashes=self.verify) is None:
+            return False
+        return not self.verify or digest((folder / "manifest.json").read_bytes()) == entry.manifest
+
+    def damaged(self, entry: JournalEntry) -> str:
+        return entry.manifest
+
+    def task(self, task: Task) -> Task:
+        return replace(task, out=self.out.absolute(), cache=self.store.root.absolute())
+
+    def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
+        return outcome
+
+
+class InStore:
+    """A store that workers write to; only rows pass through the parent.
+
+    With `cache`, a folder on the disk of workers and parent, work is shared by it, else by the store.
+    """
+
+    def __init__(self, store: SharedStore, verify: bool, cache: DiskStore | None) -> None:
+        self.store, self.verify, self.cache = store, verify, cache
+        store.claim()
+
+    @cached_property
+    def packs(self) -> dict[str, int]:
+        """Return the packs that were there when the batch began, with their bytes."""
+        return self.store.sizes("packs")
+
+    def stands(self, entry: JournalEntry) -> bool:
+        place = entry.record
+        if place is None or not made(entry) or self.packs.get(place.pack, 0) < place.end:
+            return False
+        return not self.verify or intact(self.store, place, entry.manifest)
+
+    def damaged(self, entry: JournalEntry) -> str:
+        return entry.manifest if entry.record else ""
+
+    def task(self, task: Task) -> Task:
+        specs = packed_specs(self.store, [job.spec for job in task.jobs])
+        jobs = tuple(replace(job, spec="") for job in task.jobs)
+        cache = self.cache.root.absolute() if self.cache else None
+        return replace(task, jobs=jobs, specs=specs, store=self.store.address, cache=cache)
+
+    def take(self, outcome: VariantOutcome, geometry: str) -> VariantOutcome:
+        return outcome
+
+
+def made(entry: JournalEntry) -> bool:
+    """Check whether a variant was made, with or without a broken mould check."""
+    return entry.status in (tasks.OK, tasks.BROKEN)

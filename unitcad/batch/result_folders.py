@@ -1,0 +1,119 @@
+"""Which destination a batch has, and folders made from what is in a store."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from msgspec import MsgspecError
+from msgspec.json import decode
+
+from unitcad import files
+from unitcad.batch.batch_options import BatchOptions
+from unitcad.batch.batch_records import JournalEntry
+from unitcad.batch.destination import Destination, Folders, InStore, made
+from unitcad.batch.journal import JOURNAL
+from unitcad.batch.record_packs import export
+from unitcad.batch.remote import Receiver
+from unitcad.cache import DiskStore, MissingContent, SharedStore
+from unitcad.errors import UnitcadError, WrongArgument
+from unitcad.pipeline.folder import whole
+
+ADDRESS = "store.json"
+"""File of a batch that names its store, if that is not its own."""
+STORE = "store"
+"""Folder of a batch's own store."""
+FOLDERS_BELOW = 1000
+"""Variants below which each has a folder, unless asked otherwise."""
+
+
+def destination_of(out: Path, options: BatchOptions, variants: int, cache: DiskStore, remote: bool) -> Destination:
+    """Return where the results of a batch in `out` go. Raises UnitcadError for a store that can't be used."""
+    if options.store is not None:
+        address = absolute(options.store)
+        store = InStore(SharedStore(address), options.verify, None)
+        note_store(out, address)
+        return store
+    if remote:
+        return Receiver(out, cache, options.verify)
+    if folders_wanted(options, variants):
+        return Folders(out, cache, options.verify)
+    return InStore(SharedStore(str((out / STORE).absolute())), options.verify, cache)
+
+
+def note_store(out: Path, address: str) -> None:
+    """Write into a batch's folder where its store is. Raises OSError."""
+    files.write(out / ADDRESS, json.dumps({"store": address}).encode() + b"\n")
+
+
+def folders_wanted(options: BatchOptions, variants: int) -> bool:
+    """Tell whether each variant of a batch has a folder: if asked for, or below FOLDERS_BELOW variants."""
+    return variants < FOLDERS_BELOW if options.folders is None else options.folders
+
+
+def make_folders(out: Path, entries: Iterable[JournalEntry], store: SharedStore, cache: DiskStore) -> None:
+    """Make the folders in `out` that are not there, or not whole, of variants that are in a store.
+
+    Raises UnitcadError for what the store has lost, OSError.
+    """
+    done: set[str] = set()
+    for entry in entries:
+        if entry.record is None or not made(entry) or entry.folder in done:
+            continue
+        done.add(entry.folder)
+        if whole(out / entry.folder) is not None:
+            continue
+        try:
+            export(store, entry.record, out / entry.folder, cache)
+        except MissingContent as error:
+            raise UnitcadError(
+                f"variant {entry.index}: {error}; the same batch with --verify makes again what is missing"
+            ) from None
+
+
+def export_variant(batch: Path, wanted: str, out: Path, cache: DiskStore, address: str | None = None) -> Path:
+    """Make the folder of one variant of a batch below `out`; `wanted` is its hash, or how that begins.
+
+    The store is that of the batch, else the one at `address`. Raises WrongArgument for a hash that no variant has, or
+    several; UnitcadError for a batch without a store, and for what the store has lost; OSError.
+    """
+    entry = _entry_of(batch, wanted)
+    if entry.record is None:
+        raise UnitcadError(f"{batch / entry.folder}: this variant is not in a store, its folder is its result")
+    if address is None and (batch / ADDRESS).is_file():
+        address = str(files.read_json(batch / ADDRESS)["store"])
+    store = SharedStore(absolute(address or str(batch / STORE)))
+    out.mkdir(parents=True, exist_ok=True)
+    export(store, entry.record, out / entry.folder, cache)
+    return out / entry.folder
+
+
+def _entry_of(batch: Path, wanted: str) -> JournalEntry:
+    if not re.fullmatch(r"[0-9a-f]{4,12}", wanted):
+        raise WrongArgument("hash", wanted, "needs 4 to 12 of the digits 0-9 and a-f at the end of a variant's folder")
+    begins, found = re.compile(rb'"folder": "[^"]*-' + wanted.encode()), {}
+    try:
+        with open(batch / JOURNAL, "rb") as journal:
+            for line in journal:
+                if begins.search(line):
+                    with contextlib.suppress(MsgspecError):
+                        entry = decode(line, type=JournalEntry)
+                        found[entry.folder] = entry
+    except OSError as error:
+        raise UnitcadError(f"{batch / JOURNAL}: {(error.strerror or 'unreadable').lower()}; is it a batch?") from None
+    if not found:
+        raise WrongArgument("hash", wanted, f"no variant in {batch} has a hash that begins so")
+    if len(found) > 1:
+        several = sorted(found)
+        raise WrongArgument(
+            "hash", wanted, f"{len(found)} variants begin so, {several[0]} and {several[1]}", several[0][-12:]
+        )
+    return next(iter(found.values()))
+
+
+def absolute(address: str) -> str:
+    """Return a store's address as every process may use it: a path from the root."""
+    return address if "://" in address else str(Path(address).absolute())

@@ -1,0 +1,118 @@
+"""Shards of a sweep: consecutive parts with a parent and a journal each, and one batch put together of them.
+
+<out>/store                   the store of all shards, unless another one is named
+<out>/shard-03-of-16/         a batch of its own, and shard.json, which says of what it is a part
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from unitcad import files
+from unitcad.batch.batch_records import BatchHead
+from unitcad.batch.sweep import Sweep
+from unitcad.errors import UnitcadError, WrongArgument
+
+RECORD = "shard.json"
+MOST_SHARDS = 9999
+_SHARD = re.compile(r"(\d{1,9})/(\d{1,9})")
+_FOLDER = re.compile(r"shard-\d+-of-\d+")
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Part `number` (from 1 on) of `of` parts of a sweep."""
+
+    number: int
+    of: int
+
+    @property
+    def folder(self) -> str:
+        """Name of the shard's folder below the batch's."""
+        width = len(str(self.of))
+        return f"shard-{self.number:0{width}}-of-{self.of}"
+
+    def indices(self, count: int) -> range:
+        """Return the indices of its variants, of `count`: as many in each shard as in the others, or one less."""
+        return range(count * (self.number - 1) // self.of, count * self.number // self.of)
+
+
+def shard_of(text: str) -> Shard:
+    """Return the shard of a text such as "3/16". Raises WrongArgument."""
+    found = _SHARD.fullmatch(text.strip())
+    if not found:
+        raise WrongArgument("shard", text, "needs a number of all shards, as in 3/16", "1/2")
+    number, of = int(found[1]), int(found[2])
+    if not 1 <= of <= MOST_SHARDS:
+        raise WrongArgument("shard", text, f"needs 1 to {MOST_SHARDS} shards", f"1/{min(max(of, 1), MOST_SHARDS)}")
+    if not 1 <= number <= of:
+        raise WrongArgument("shard", text, f"of {of} shards the first one is 1", f"{min(max(number, 1), of)}/{of}")
+    return Shard(number, of)
+
+
+class ShardRecord(msgspec.Struct, frozen=True, kw_only=True):
+    """Content of shard.json: which part of which batch it is. `variants` are all of the batch's, `head` is its head."""
+
+    number: int
+    of: int
+    variants: int
+    head: BatchHead
+    shard_head: BatchHead
+    code: str
+    store: str
+    sweep: Sweep
+
+    @property
+    def indices(self) -> range:
+        """Return the indices of the shard's variants."""
+        return Shard(self.number, self.of).indices(self.variants)
+
+
+def write_shard(folder: Path, record: ShardRecord) -> None:
+    """Write a shard's record into its folder. Raises OSError."""
+    files.write(folder / RECORD, msgspec.json.encode(record) + b"\n")
+
+
+def shard_folders(out: Path) -> list[Path]:
+    """List the shards' folders below a batch's folder."""
+    return sorted(path for path in out.glob("shard-*-of-*") if _FOLDER.fullmatch(path.name) and path.is_dir())
+
+
+def read_shards(folders: Sequence[Path]) -> list[tuple[Path, ShardRecord]]:
+    """Return the records of all shards of one batch, in order.
+
+    Raises UnitcadError where one is missing, there twice, or of another batch.
+    """
+    if not folders:
+        raise UnitcadError("there are no shards to merge: name their folders, or the folder that holds them")
+    records: dict[int, tuple[Path, ShardRecord]] = {}
+    for folder in folders:
+        try:
+            record = msgspec.json.decode(
+                files.read(folder / RECORD, largest=files.LARGEST_TABLE, links=False), type=ShardRecord
+            )
+        except files.NotThere:
+            raise UnitcadError(f"{folder}: is not a shard of a batch (no {RECORD})") from None
+        except msgspec.MsgspecError as error:
+            raise UnitcadError(
+                f"{folder / RECORD}: damaged: {error}; the shard's own command writes it again"
+            ) from None
+        first_folder, first = next(iter(records.values()), (folder, record))
+        if (record.head.batch, record.of, record.variants) != (first.head.batch, first.of, first.variants):
+            raise UnitcadError(f"{folder}: is a shard of another batch than {first_folder} (sweep, options or number)")
+        if record.code != first.code:
+            raise UnitcadError(f"{folder}: was made by unitcad {record.code}, {first_folder} by {first.code}")
+        if record.number in records:
+            raise UnitcadError(f"{folder}: is shard {record.number}/{record.of}, as is {records[record.number][0]}")
+        records[record.number] = folder, record
+    of = next(iter(records.values()))[1].of
+    missing = [number for number in range(1, of + 1) if number not in records]
+    if missing:
+        named = ", ".join(f"{number}/{of}" for number in missing[:5]) + (" ..." if len(missing) > 5 else "")
+        raise UnitcadError(f"of {of} shards {len(missing)} are missing: {named}; run them with --shard, then merge")
+    return [records[number] for number in sorted(records)]

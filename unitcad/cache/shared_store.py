@@ -1,0 +1,156 @@
+"""A store that several machines share: content by SHA-256, and entries by key, of which the first writer's stays.
+
+    <address>/unitcad-store           marks the place as a store of unitcad
+    <address>/content/ab/<sha256>     the bytes
+    <address>/entries/ab/<key>        checksum, newline, JSON
+    <address>/packs/ab/<sha256>       records of several variants in a row
+
+Whatever is read is compared with its SHA-256. What was cut on the way is read again.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+from unitcad.cache.objects import FolderObjects, objects_at
+from unitcad.cache.store import MissingContent, digest
+from unitcad.errors import UnitcadError
+
+T = TypeVar("T")
+MARK = "unitcad-store"
+_MARKED = b"unitcad keeps content and results of batches here\n"
+TRIES = 4
+"""How often a read or a write is tried, with pauses of PAUSE_S, twice that, and so on between."""
+PAUSE_S = 0.2
+_FINAL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EISDIR)
+_AT_ONCE = 8
+"""Contents that are written at the same time."""
+
+
+class SharedStore:
+    """A store at an address that any number of processes on any number of machines use at once.
+
+    `claim` makes the place a store, or refuses one that holds something else. All methods raise OSError where the place
+    can't be reached after TRIES tries.
+    """
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        self.objects = objects_at(address)
+        self._there: set[str] = set()
+
+    def claim(self) -> None:
+        """Make the place a store. Raises UnitcadError where it can't be reached, or holds something else."""
+        try:
+            if _tried(lambda: self.objects.size(MARK), 2) is None:
+                if isinstance(self.objects, FolderObjects) and self.objects.root.is_dir():
+                    others = {path.name for path in self.objects.root.iterdir()} - {"tmp"}
+                    if others and self.objects.size(MARK) is None:
+                        raise UnitcadError(f"{self.address}: is not a store of unitcad, and not empty; choose another")
+                _tried(lambda: self.objects.create(MARK, _MARKED), 2)
+        except (FileExistsError, NotADirectoryError):
+            raise UnitcadError(f"{self.address}: is a file, not a folder; choose another for --store") from None
+        except OSError as error:
+            raise UnitcadError(f"--store {self.address}: can't be reached ({_line(error)})") from None
+
+    def keep(self, content: bytes, *, kind: str = "content", anew: bool = False) -> str:
+        """Keep content; return its SHA-256 (hex). What is there is not written again, unless `anew`."""
+        sha256 = digest(content)
+        name = _name(kind, sha256)
+        if anew:
+            _tried(lambda: self.objects.put(name, content))
+        elif name not in self._there:
+            _tried(lambda: self.objects.create(name, content))
+        self._there.add(name)
+        return sha256
+
+    def noted(self, sha256: str) -> bool:
+        """Tell whether this process knows that content is there, without asking."""
+        return _name("content", sha256) in self._there
+
+    def note(self, sha256s: Iterable[str]) -> None:
+        """Take it as known that contents are there."""
+        self._there.update(_name("content", sha256) for sha256 in sha256s)
+
+    def keep_all(self, contents: Iterable[bytes], *, anew: bool = False) -> None:
+        """Keep several contents, some at the same time."""
+        waiting = list(contents)
+        if waiting:
+            with ThreadPoolExecutor(_AT_ONCE) as pool:
+                list(pool.map(lambda content: self.keep(content, anew=anew), waiting))
+
+    def content(self, sha256: str) -> bytes:
+        """Return content by its SHA-256. Raises MissingContent where it is not there, or damaged."""
+        return self._whole(_name("content", sha256), lambda found: digest(found) == sha256)
+
+    def part(self, pack: str, start: int, end: int, sha256: str) -> bytes:
+        """Return the bytes of a pack from `start` to `end`, whose SHA-256 is known. Raises MissingContent."""
+        return self._whole(_name("packs", pack), lambda found: digest(found) == sha256, start, end)
+
+    def entry(self, key: str) -> Any:
+        """Return the data under a key; None where there are none, or damaged ones."""
+        try:
+            found = self._whole(_name("entries", key), lambda found: _unpacked(key, found) is not None)
+        except MissingContent:
+            return None
+        return _unpacked(key, found)
+
+    def enter(self, key: str, data: Any, *, anew: bool = False) -> bool:
+        """Write data under a key, if there are none: False where another writer was first. `anew` replaces them."""
+        payload = json.dumps(data, ensure_ascii=False, allow_nan=False).encode()
+        packed = digest(f"{key}\n".encode() + payload).encode() + b"\n" + payload
+        name = _name("entries", key)
+        if not anew and _tried(lambda: self.objects.create(name, packed)):
+            return True
+        if anew or self.entry(key) is None:  # what is there is damaged
+            _tried(lambda: self.objects.put(name, packed))
+            return True
+        return False
+
+    def sizes(self, kind: str) -> dict[str, int]:
+        """Return the bytes of all that there is of a kind ("content", "packs") by SHA-256."""
+        return {name.rpartition("/")[2]: size for name, size in _tried(lambda: self.objects.sizes(kind)).items()}
+
+    def _whole(self, name: str, whole: Callable[[bytes], bool], start: int = 0, end: int | None = None) -> bytes:
+        for left in reversed(range(TRIES)):
+            try:
+                found = _tried(lambda: self.objects.get(name, start, end))
+            except FileNotFoundError:
+                break
+            if whole(found):
+                return found
+            if left:
+                time.sleep(PAUSE_S * (TRIES - left))
+        raise MissingContent(f"{name} is not in {self.address}, or damaged there")
+
+
+def _tried(work: Callable[[], T], tries: int = TRIES) -> T:
+    """Return what `work` returns, tried again after an OSError; what is not there, or is full, stays so."""
+    for left in reversed(range(tries)):
+        try:
+            return work()
+        except (FileNotFoundError, NotADirectoryError, PermissionError):
+            raise
+        except OSError as error:
+            if not left or error.errno in _FINAL:
+                raise
+            time.sleep(PAUSE_S * (tries - left))
+    raise AssertionError
+
+
+def _name(kind: str, key: str) -> str:
+    return f"{kind}/{key[:2]}/{key}"
+
+
+def _unpacked(key: str, packed: bytes) -> Any:
+    checksum, _, payload = packed.partition(b"\n")
+    return json.loads(payload) if digest(f"{key}\n".encode() + payload).encode() == checksum else None
+
+
+def _line(error: BaseException) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
