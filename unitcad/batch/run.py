@@ -338,7 +338,7 @@ def shard_record(sweep: Sweep, head: BatchHead, options: BatchOptions, count: in
         shard_head=head,
         code=code_version(),
         store=absolute(options.store or ""),
-        sweep=sweep,
+        sweep=replace(sweep, written=()),  # paths of this machine
     )
 
 
