@@ -111,9 +111,9 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
         )
         if leaf := leaf_mm(printer_of(moulds.spec)):
             on = (
-                "Press each cup onto the plinth once, dry, by hand, evenly at all corners: its cut corner lets it on "
-                f"one way only. Its {len(standing)} ribs stand on leaves {number(leaf, 2)} mm thick, which bend and "
-                "centre it; the seat bears it. A leaf that has broken off: print the cup again. It must sit down"
+                "Press each cup onto the plinth once, dry, by hand: its cut corner lets it on one way only. Its "
+                f"{len(standing)} ribs stand on leaves {number(leaf, 2)} mm thick, which bend and centre it; the seat "
+                "bears it. A leaf broken off: print it again. It must sit down"
             )
     if plan.pins:
         fits = (
@@ -137,10 +137,10 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
         each = "the" if len(plan.layout.cells) == 1 else "each"
         yield BenchStep(
             "Filament in",
-            f"{_bend(moulds)} Push the long leg of {each} piece up through the core from below until the bent end "
-            "lies wholly in the groove under the plate: it rests on the bench and can't sink. Trim the upper end flush "
-            "with the core's top with a knife, so that a fingernail drawn across does not catch: what it stands low or "
-            "proud is a knob or a dent in the cavity.",
+            f"{_bend(moulds)} Push {each} long leg up through the core from below until the bent end lies wholly in "
+            "the groove under the plate: it rests on the bench and can't sink. Trim the upper end flush with the "
+            "core's top with a knife; a fingernail drawn across must not catch: what stands low or proud marks the "
+            "cavity.",
             picture_path("filament"),
             minutes=fig.FILAMENT_MIN * cells,
         )
@@ -152,10 +152,7 @@ def _bend(moulds: MouldSet) -> str:
     leg = moulds.plan.dimensions.core_height - plate_bottom(moulds.spec) + SPARE
     between = " Of a groove that ends under the plate, cut the bent end to its length."
     inner = between if len({cell.y for cell in moulds.plan.layout.cells}) > 1 else ""
-    return (
-        f"Bend each piece of filament by a right angle {number(leg, 2)} mm from one end, warmed in hot water so that "
-        f"it does not crack ({number(SPARE, 2)} mm of that end are cut off later).{inner}"
-    )
+    return f"Warm each piece of filament in hot water and bend it by a right angle {number(leg, 2)} mm from one end.{inner}"
 
 
 def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
@@ -247,8 +244,8 @@ def _clear_tunnels(moulds: MouldSet) -> str:
     return (
         f"Clear the windows of {listed(spaced(step.cup) for step in steps)} now, before the post-cure: resin stays in "
         f"a slot {height} mm high that runs {low if low == high else f'{low} to {high}'} mm through the wall. Rinse "
-        "each with a syringe of isopropanol, push a strip of the tongue's film through until it slides freely, and "
-        "look through it against the light. What is cured in it has to be scraped out, or the cup printed again."
+        "each with a syringe of isopropanol, and push a strip of the tongue's film through until it slides freely. "
+        "What is cured in it has to be scraped out, or the cup printed again."
     )
 
 

@@ -115,7 +115,7 @@ def write_bench(folder: Path) -> Path | None:
         "hash": spec_hash(spec)[:HASH_DIGITS] if spec else _hash(folder),
         "room_c": spec.casting.room_c if spec else None,
         "scale_g": spec.casting.scale_resolution_g if spec else None,
-        "asked": _asked(folder, casting, spec),
+        "asked": _asked(casting, spec),
         "record": {"format": FORMAT, "version": 1, "ending": ENDING},
         "pictures": step_pictures(folder, _paths(casting)),
         "slicer": _slicer(folder),
@@ -126,17 +126,14 @@ def write_bench(folder: Path) -> Path | None:
     return target
 
 
-def _asked(folder: Path, casting: CastingFile, spec: Spec | None) -> dict[str, Any]:
+def _asked(casting: CastingFile, spec: Spec | None) -> dict[str, Any]:
     """Return what a unit should measure, mm and g: the page refuses what lies far from it. {} where it is not known."""
     if spec is None:
         return {}
-    manifest = files.read_json(folder / "manifest.json", links=False)
-    expect(manifest, Manifest, folder / "manifest.json")
-    cast = [part["bbox_mm"] for part in manifest["parts"] if part["role"] == "unit" and part["made"] == "cast"]
     figures = [{figure.name: figure.value for figure in pour.figures} for pour in casting.pours]
     grams = [each.get("volume of one layer", 0.0) * each.get("density", 0.0) / 1000 for each in figures]
     return {
-        "height_mm": max(box[5] for box in cast) - min(box[2] for box in cast) if cast else None,
+        "height_mm": figures[-1].get("depth of this pour"),  # the last rim over the seat
         "diameter_mm": spec.diameter_mm,
         "mass_g": sum(grams) if all(grams) else None,
         "walls_mm": [layer.wall_mm for layer in spec.layers],

@@ -5,7 +5,7 @@
   const page = document.getElementById("page");
   const MINUTE = 60000;
   // Of two printed pages in mm²: all, a letter, a step's title, a pour's lines to write on, a unit's, head and schedule; and widths in mm.
-  const PAPER = { mm2: 2 * 190 * 277 * 0.86, letter: 5, title: 220, pour: 1500, unit: 900, page: 5000, most: 36, least: 22 };
+  const PAPER = { mm2: 2 * 190 * 277 * 0.84, letter: 5, title: 220, pour: 1500, unit: 900, page: 5000, most: 36, least: 17 };
   const LIMITS = { grams: [1e-4, 1e5], mm: [0.01, 1000] };
   // How far from what is asked a measured length or mass may lie: beyond it a digit or a point is wrong.
   const FACTOR = 3;
