@@ -137,7 +137,7 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
         each = "the" if len(plan.layout.cells) == 1 else "each"
         yield BenchStep(
             "Filament in",
-            f"{_bend(moulds)} Push {each} long leg up through the core from below until the bent end lies wholly in "
+            f"{_bend(moulds)} Push {each} leg of that length up through the core from below until the bent end lies wholly in "
             "the groove under the plate: it rests on the bench and can't sink. Trim the upper end flush with the "
             "core's top with a knife; a fingernail drawn across must not catch: what stands low or proud marks the "
             "cavity.",
@@ -152,7 +152,8 @@ def _bend(moulds: MouldSet) -> str:
     leg = moulds.plan.dimensions.core_height - plate_bottom(moulds.spec) + SPARE
     between = " Of a groove that ends under the plate, cut the bent end to its length."
     inner = between if len({cell.y for cell in moulds.plan.layout.cells}) > 1 else ""
-    return f"Warm each piece of filament in hot water and bend it by a right angle {number(leg, 2)} mm from one end.{inner}"
+    bent = f"bend it by a right angle, so that one leg has {number(leg, 2)} mm"
+    return f"Warm each piece of filament in hot water and {bent}.{inner}"
 
 
 def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchStep]:
