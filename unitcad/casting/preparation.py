@@ -137,10 +137,10 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
         each = "the" if len(plan.layout.cells) == 1 else "each"
         yield BenchStep(
             "Filament in",
-            f"{_bend(moulds)} Push {each} leg of that length up through the core from below until the bent end lies wholly in "
-            "the groove under the plate: it rests on the bench and can't sink. Trim the upper end flush with the "
-            "core's top with a knife; a fingernail drawn across must not catch: what stands low or proud marks the "
-            "cavity.",
+            f"{_bend(moulds)} Push {each} leg of that length up through the core from below until the bent end "
+            "lies wholly in the groove under the plate: it rests on the bench and can't sink. Trim the upper end "
+            "flush with the core's top with a knife; a fingernail drawn across must not catch: what stands low or "
+            "proud marks the cavity.",
             picture_path("filament"),
             minutes=fig.FILAMENT_MIN * cells,
         )
