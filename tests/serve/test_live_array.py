@@ -50,7 +50,7 @@ def test_answers_are_those_of_the_commands(pockets: Server) -> None:
 
 
 def test_a_pitch_that_is_too_small_gets_the_nearest_that_its_own_limits_accept(pockets: Server) -> None:
-    fault = pockets.ask(TEXT, "unit", [{"path": "layout.pitch_mm", "value": 2.0}])["faults"][0]
+    fault = pockets.ask(TEXT, "unit", [{"path": "layout.pitch_mm", "value": 15.0}])["faults"][0]
     assert fault["field"] == "layout.pitch_mm"
     after = pockets.ask(TEXT, "unit", [{"path": fault["field"], "value": fault["nearest"]}])["faults"]
     assert [one["field"] for one in after] == ["unit.fpcb.tail_length_mm"]  # which the tails' ways then limit
