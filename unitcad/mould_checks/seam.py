@@ -54,7 +54,8 @@ def _largest(moulds: MouldSet) -> MouldFinding:
     for piece in moulds.plan.pieces:
         if piece.made != "printed":
             continue
-        x0, y0, _, x1, y1, _ = moulds.mesh(piece).bounding_box()
+        solid = moulds.solids.get(piece.name) or moulds.mesh(piece)
+        x0, y0, _, x1, y1, _ = solid.bounding_box()
         size = x1 - x0, y1 - y0
         ways = [max(zip(each, bed, strict=True), key=lambda pair: pair[0] - pair[1]) for each in (size, size[::-1])]
         length, room = min(ways, key=lambda pair: pair[0] - pair[1])
