@@ -82,8 +82,8 @@ def test_the_groove_of_a_low_tray_is_whole(thickness: float) -> None:
     assert [f for f in check_moulds(patch_moulds(array)) if not f.ok] == []
 
 
-def test_a_tray_larger_than_the_bed_is_refused_with_the_bed_that_fits() -> None:
-    array = load_array("forearm-pockets", ["layout.columns=12"])
+def test_a_tray_whose_pieces_exceed_the_bed_is_refused_with_the_bed_that_fits() -> None:
+    array = load_array("forearm-pockets", ["layout.columns=12", "moulds.bed_x_mm=30", "moulds.cavities=[1,1]"])
     with pytest.raises(Refusal) as refused:
         patch_moulds(array).plan  # noqa: B018
     assert refused.value.field == "moulds.bed_x_mm"

@@ -25,7 +25,7 @@ from unitcad.moulds.plan import Step
 from unitcad.shape.profile import GRID_PER_MM
 
 WEEP = 0.01
-"""Silicone in the seams of a pour, at most, as a share of its layer (assumed): a tenth of what is mixed over."""
+"""Silicone in the seams of a pour, at most, as a share of its layer (assumed): far less than what is mixed over."""
 GRID = 3 / GRID_PER_MM
 """What snapping two borders to the grid may take from their gap, or add to it, mm."""
 SLIVER = 1e-6
