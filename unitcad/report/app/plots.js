@@ -24,9 +24,9 @@
     let plot = null;
     let width = 0;
     const paint = () => {
-      if (!width) return;
+      // A plot that is hidden or has left the page has no width; uPlot keeps it, and all round it, until it is destroyed.
       if (plot) plot.destroy();
-      plot = make(host, width, height);
+      plot = width ? make(host, width, height) : null;
     };
     new ResizeObserver(() => {
       const now = Math.floor(host.clientWidth);
