@@ -101,7 +101,7 @@ WRONG = {
     "build": "Missing argument 'SPEC'",
     "bild": "No such command 'bild'",
     "batch x -j abc": "Invalid value for '-j' / '--jobs'",
-    "batch a b": "Got unexpected extra argument",
+    "batch a b": "Invalid value for SWEEP: one sweep a batch; b is one too many",
     "build a --out": "Option '--out' requires an argument",
     "check --jobs 0": "Invalid value for '--jobs' / '-j'",
 }

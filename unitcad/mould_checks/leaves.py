@@ -52,13 +52,15 @@ def _across(section: CrossSection, rib: Rib, level: float, along: float) -> tupl
 
 
 def _all_free(section: CrossSection, standing: Sequence[Rib], level: float, clearance: float) -> bool:
-    """Tell whether a slot runs behind every leaf and on both its sides at a level."""
+    """Tell whether every leaf stands alone at a level: a slot behind it, a slot or an opening on both its sides."""
     depth, wide = -(clearance + LINE) * SQUARE, LEAF_WIDTH
-    return all(
-        len(_runs(section, rib, level, (0.0, -REACH), (BESIDE, BESIDE + LINE))) > 1
-        and len(_runs(section, rib, level, (depth, depth - LINE), (-wide, wide), along=True)) > 2
-        for rib in standing
-    )
+    for rib in standing:
+        if len(_runs(section, rib, level, (0.0, -REACH), (BESIDE, BESIDE + LINE))) < 2:
+            return False
+        across = _runs(section, rib, level, (depth, depth - LINE), (-wide, wide), along=True)
+        if not any(-wide / 2 - LINE < low < 0 < high < wide / 2 + LINE for low, high in across):
+            return False
+    return True
 
 
 def _runs(
