@@ -16,6 +16,8 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from typing import IO
 
+STAGES = "UNITCAD_STAGES"
+"""Environment variable: the text with which a command begins a line on standard error for each stage of its work."""
 GRACE_S = 2.0
 """Seconds from the request that a program end until it is killed."""
 

@@ -9,6 +9,7 @@ import signal
 import time
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from running import Server, serving
@@ -94,16 +95,28 @@ def test_a_worker_that_is_killed_or_hangs_is_replaced(tmp_path: Path, text: str)
         assert "faults" not in json.loads(content)
 
 
+def ended(own: Server, state: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """Wait for a job's end; returns its last state and the stages that it named."""
+    stages = [state["stage"]]
+    while not state["ended"]:
+        time.sleep(0.02)
+        state = json.loads(own.send(f"/job/{state['job']}")[1])
+        stages += [state["stage"]] if state["stage"] != stages[-1] else []
+    return state, stages
+
+
 def test_a_build_is_that_of_the_command_and_can_be_cancelled(tmp_path: Path, text: str) -> None:
     with serving(tmp_path, "encapsulating", "-o", "made") as own:
         quick = text + '\n[output]\nformats = ["stl"]\n'
         state = json.loads(own.send("/build", {"text": quick})[1])
         assert own.send("/build", {"text": quick})[0] == 422  # one at a time
-        while not state["ended"]:
-            time.sleep(0.2)
-            state = json.loads(own.send(f"/job/{state['job']}")[1])
+        state, stages = ended(own, state)
         assert state["code"] == 0
         assert (tmp_path / state["folder"] / "manifest.json").is_file()
+        timed = json.loads((tmp_path / state["folder"] / "timings.json").read_text())["seconds"]
+        assert set(stages) <= {"", "page", *timed}
+        assert {"mould checks", "page"} <= set(stages)
+        assert not any("stage" in line for line in state["lines"])
         status, _, headers = own.send(f"/files/{state['page']}")
         assert status == 200
         assert headers["content-security-policy"].startswith("sandbox ")
@@ -121,10 +134,11 @@ def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path: Path, text: str) 
         quick = text + "\n[output]\nformats = []\n"
         message = {"text": quick, "key": "layers.0.wall_mm", "low": 1.0, "high": 1.5, "count": 2}
         state = json.loads(own.send("/sweep", message)[1])
-        while not state["ended"]:
-            time.sleep(0.2)
-            state = json.loads(own.send(f"/job/{state['job']}")[1])
+        state, stages = ended(own, state)
         assert state["code"] == 0, state
+        assert stages[0] == "0 of 2 variants"
+        assert "1 of 2 variants" in stages or "2 of 2 variants" in stages
+        assert stages[-1] == "page"
         assert state["page"] == "sweep-2/results/report.html"
         assert own.send(f"/files/{state['page']}")[0] == 200
     folder = tmp_path / "out" / "sweep-2"

@@ -210,6 +210,17 @@ def test_nothing_reaches_over_a_phone_s_edge(running: Any, server: Server, dark:
     visit.close()
 
 
+WORDS = """() => {
+  const job = document.querySelector(".job");
+  window.words = new Set();
+  new MutationObserver(() => {
+    const lead = job.querySelector(".lead");
+    if (lead) window.words.add(lead.textContent);
+  }).observe(job, { childList: true, subtree: true });
+}"""
+"""Keeps what the page says of a job."""
+
+
 def test_save_and_build_from_the_page(running: Any, tmp_path: Path) -> None:
     with serving(tmp_path) as own:
         visit = Live(running, own)
@@ -217,8 +228,12 @@ def test_save_and_build_from_the_page(running: Any, tmp_path: Path) -> None:
         visit.choose("#text", visit.page.input_value("#text") + '\n[output]\nformats = ["stl"]\n')
         visit.page.click("text=Save spec")
         visit.until(lambda: (tmp_path / "encapsulating.toml").is_file())
+        visit.page.evaluate(WORDS)
         visit.page.click("text=Build this")
         visit.page.wait_for_selector('.job[data-ended="true"]', timeout=120_000)
+        words = visit.page.evaluate("() => [...window.words]")
+        assert words[0] == "The build is under way: starting"
+        assert len(words) > 2, words
         assert "The build is done." in visit.page.inner_text(".job")
         with visit.context.expect_page() as opened:
             visit.page.click("text=Open its page")

@@ -107,7 +107,7 @@ def batch(
     from unitcad.batch.preview import preview
     from unitcad.batch.shards import shard_of
     from unitcad.cli.batch_progress import watching
-    from unitcad.cli.output import print_json
+    from unitcad.cli.output import print_json, progress
     from unitcad.errors import Refusal
     from unitcad.pipeline.folder import PAGE
 
@@ -142,7 +142,9 @@ def batch(
     if page or (made / PAGE).is_file():
         from unitcad.report import write_report
 
-        write_report(made, warn)
+        with progress(wanted.slug) as say:
+            say("page")
+            write_report(made, warn)
     if as_json:
         print_json({"folder": str(made), **to_builtins(summary)})
     elif not json_lines:

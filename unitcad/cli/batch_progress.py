@@ -12,14 +12,17 @@ from msgspec import to_builtins
 from unitcad.batch.batch_records import Summary
 from unitcad.batch.run import Watch
 from unitcad.batch.task import VariantOutcome
-from unitcad.cli.output import console
+from unitcad.cli.output import console, stage_lines
 
 
 @contextlib.contextmanager
 def watching(json_lines: bool) -> Iterator[Watch]:
     """Yield the function that a batch calls after each variant."""
+    say = stage_lines()
     if json_lines:
         yield _line
+    elif say:
+        yield lambda summary, outcome: say(f"{summary.done} of {summary.variants} variants")
     elif sys.stderr.isatty():
         with _bar() as watch:
             yield watch

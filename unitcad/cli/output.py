@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
@@ -63,11 +64,23 @@ def console(stderr: bool = False) -> Console:
     return Console(markup=False, emoji=False, highlight=False, stderr=stderr)
 
 
+def stage_lines() -> Callable[[str], None] | None:
+    """Return the function that prints a stage as a line for the program that started this one; None where none reads.
+
+    The environment variable UNITCAD_STAGES holds the text that such a line begins with.
+    """
+    from unitcad.children import STAGES
+
+    mark = os.environ.get(STAGES)
+    return (lambda stage: warn(f"{mark}{stage}")) if mark else None
+
+
 @contextlib.contextmanager
 def progress(name: str) -> Iterator[Callable[[str], None]]:
     """Show a spinner with the stage on a terminal, nothing in a pipe; yield the function that sets the stage."""
-    if not sys.stderr.isatty():
-        yield lambda stage: None
+    lines = stage_lines()
+    if lines or not sys.stderr.isatty():
+        yield lines or (lambda stage: None)
         return
     from rich.text import Text
 

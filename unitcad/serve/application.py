@@ -18,9 +18,8 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from unitcad import files
 from unitcad.errors import Refusal, UnitcadError
-from unitcad.files import read_text
+from unitcad.files import read_text, write
 from unitcad.report.page import page_data
 from unitcad.serve.gate import Gate, Limits
 from unitcad.serve.jobs import Jobs
@@ -168,7 +167,7 @@ class Live:
             same = path.is_file() and not path.is_symlink() and path.read_bytes() == content
             if not same:
                 raise Refusal("name", save.name, "is there already; replace it, or choose another name")
-        files.write(path, content)
+        write(path, content)
         return msgspec.json.encode({"path": str(path), "sha256": hashlib.sha256(content).hexdigest()})
 
     async def build(self, request: Request) -> Response:
@@ -195,7 +194,8 @@ class Live:
         # A folder of its own, in which the sweep file stays beside the results.
         folder = self._free_folder("sweep")
         arguments = ["batch", "{sweep}", "-o", _plain(folder / "results"), "--report", *code]
-        state = await self.jobs.start("the sweep", arguments, {"spec.toml": text, "sweep.toml": asked}, folder)
+        files, first = {"spec.toml": text, "sweep.toml": asked}, f"0 of {len(values)} variants"
+        state = await self.jobs.start("the sweep", arguments, files, folder, first)
         return msgspec.json.encode(state)
 
     def _free_folder(self, name: str) -> Path:

@@ -13,11 +13,14 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from unitcad.children import STAGES
 from unitcad.errors import UnitcadError
 from unitcad.serve.messages import JobState
 
 MOST_KEPT = 20
 """Jobs that are remembered."""
+STAGE = "stage: "
+"""What a line of a job begins with that names its stage."""
 MOST_LINES = 200
 """Lines of a job that are kept."""
 
@@ -40,16 +43,18 @@ class Jobs:
         self.known: dict[str, Job] = {}
 
     async def start(
-        self, title: str, arguments: Sequence[str], files: dict[str, str], folder: Path | None = None
+        self, title: str, arguments: Sequence[str], files: dict[str, str], folder: Path | None = None, stage: str = ""
     ) -> JobState:
         """Run `unitcad` with arguments in which {NAME} stands for the path of a file of `files`.
 
-        The files stay in `folder`, or go with the job without one. Raises UnitcadError while another job runs, OSError.
+        The files stay in `folder`, or go with the job without one.
+        `stage` is the first one's name. Raises UnitcadError while another job runs, OSError.
         """
         running = next((job for job in self.known.values() if not job.state.ended), None)
         if running:
             raise UnitcadError(f"{running.state.title} is under way; wait for it or cancel it")
         job = Job(title, None if folder else Path(tempfile.mkdtemp(prefix="unitcad-serve-")))
+        job.state.stage = stage
         there = folder or job.scratch
         assert there
         there.mkdir(parents=True, exist_ok=True)
@@ -60,7 +65,7 @@ class Jobs:
         job.child = await asyncio.create_subprocess_exec(
             sys.executable, "-P", "-m", "unitcad", *given,
             stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-            env={**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "120"}, start_new_session=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "120", STAGES: STAGE}, start_new_session=True,
         )  # fmt: skip
         self.known[job.state.job] = job
         for old in list(self.known)[:-MOST_KEPT]:
@@ -103,9 +108,13 @@ class Jobs:
         printed: list[str] = []
 
         async def read(stream: asyncio.StreamReader, into: list[str]) -> None:
-            while line := await stream.readline():
-                into.append(line.decode("utf-8", "replace").rstrip())
-                del into[:-MOST_LINES]
+            while content := await stream.readline():
+                line = content.decode("utf-8", "replace").rstrip()
+                if stream is child.stderr and line.startswith(STAGE):
+                    job.state.stage = line.removeprefix(STAGE)
+                else:
+                    into.append(line)
+                    del into[:-MOST_LINES]
 
         await asyncio.gather(read(child.stdout, printed), read(child.stderr, job.state.lines))
         job.state.code = await child.wait()

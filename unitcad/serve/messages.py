@@ -147,11 +147,12 @@ class Answer(Struct, kw_only=True, omit_defaults=True):
 
 
 class JobState(Struct, kw_only=True):
-    """How far a job is: the lines it printed, and once it has ended its exit code, its folder and its page."""
+    """How far a job is: its stage, the lines it printed; once it has ended, its exit code, its folder and its page."""
 
     job: str
     title: str
     lines: list[str]
+    stage: str = ""
     ended: bool = False
     code: int | None = None
     folder: str | None = None

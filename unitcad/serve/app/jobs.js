@@ -48,10 +48,12 @@
 
     function show(state) {
       const done = state.ended && (state.code === 0 || state.code === 1);
-      const words = !state.ended ? `${state.title} is under way ...` : state.code === 0 ? `${state.title} is done.` : state.code === 1 ? `${state.title} is done, with findings.` : state.code === 130 || state.code < 0 ? `${state.title} was cancelled.` : `${state.title} failed.`;
+      // A count of variants is a length of the bar.
+      const [, count, of] = /^(\d+) of (\d+) /.exec(state.stage) || [];
+      const words = !state.ended ? `${state.title} is under way: ${state.stage || "starting"}` : state.code === 0 ? `${state.title} is done.` : state.code === 1 ? `${state.title} is done, with findings.` : state.code === 130 || state.code < 0 ? `${state.title} was cancelled.` : `${state.title} failed.`;
       progress.dataset.ended = String(Boolean(state.ended));
       clear(progress, el("p", { className: "lead" }, words[0].toUpperCase() + words.slice(1)),
-        !state.ended && el("progress", { "aria-label": state.title }),
+        !state.ended && el("progress", { "aria-label": state.title, ...(of ? { max: Number(of), value: Number(count) } : {}) }),
         !state.ended && el("button", { type: "button", onclick: () => server.send("/cancel", { job: state.job }) }, "Cancel"),
         done && state.folder && el("p", {}, "In ", el("code", {}, state.folder), ". ", state.page && el("a", { href: `/files/${state.page.split("/").map(encodeURIComponent).join("/")}`, target: "_blank", rel: "noopener" }, "Open its page")),
         state.lines.length > 0 && el("pre", { className: "scroll" }, state.lines.join("\n")));
