@@ -164,6 +164,17 @@ def test_what_a_column_is_told_to_hold_is_what_the_meshes_have_there(gang: tuple
                 assert abs(differ) < 1e-6, (tool.name, radius)
 
 
+def test_what_a_boolean_leaves_on_flat_faces_makes_no_place_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Corners, sides and middle of a plate whose grooves join: the order of the cells' operands tells none apart."""
+    judged = []
+    once_each = groove_walls.once_each
+    monkeypatch.setattr(groove_walls, "once_each", lambda keys, make: judged.append(keys) or once_each(keys, make))
+    assert all(finding.ok for finding in groove_walls.findings(set_of("no-fpcb", "moulds.cavities=[4,4]")))
+    a, b, c, d, e, f, g, h, i = range(1, 10)
+    assert judged[0] == [1] * 16
+    assert judged[1] == [a, b, b, c, d, e, e, f, d, e, e, f, g, h, h, i]
+
+
 def test_a_mesh_that_lacks_a_wedge_makes_a_cell_of_its_own() -> None:
     moulds = set_of("no-fpcb", "moulds.cavities=[3,3]")
     cell = moulds.plan.layout.cells[4]

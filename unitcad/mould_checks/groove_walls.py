@@ -40,8 +40,9 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
     under_letters = step.rim - letters - GRID
     top = under_letters if under_letters > bottom + GRID else step.rim
     pieces, level, rim = hollows(moulds, moulds.plan.walled(step)), (bottom + top) / 2, step.rim - GRID
-    high = [piece.trim_by_plane((0, 0, 1), bottom) for piece in pieces if piece.bounding_box()[5] > rim]
-    above = [part for piece in high for part in piece.decompose() if part.bounding_box()[5] > rim]
+    # Most pieces are letters, which end above the level that is looked at.
+    high = [piece for piece in pieces if (box := piece.bounding_box())[5] > rim and box[2] < level]
+    above = [part for part in shells(_above(bottom, high)) if part.bounding_box()[5] > rim]
     sections = [part for solid in above for part in solid.slice(level).decompose()]
     regions = _without(sections, moulds.meshes((*step.layer, *step.earlier)), level)
     limit = min(least_wall(moulds), bottom - GRID)
@@ -50,7 +51,7 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
         groove = CrossSection.batch_boolean(regions, OpType.Add)
         tiles = _tiles(moulds, groove, farthest, (bottom - farthest, top))
         # What joins the cells, such as the recess over the plinth, mostly lies lower.
-        hollow = Manifold.compose(pieces).trim_by_plane((0, 0, 1), bottom - farthest)
+        hollow = _above(bottom - farthest, pieces)
         apart = shells(hollow) if tiles else [hollow]
 
         def wall(i: int) -> float:
@@ -73,6 +74,11 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
         thinnest = min(value for _, value in once_each(numbers, wall))
     advice = "a hole, a window or a notch breaks into the groove, or leaves too thin a wall: move one of the two"
     return at_least("C230", f"{moulds.plan.walled(step)}: wall of the groove", float(thinnest), limit, "mm", advice)
+
+
+def _above(z: float, pieces: list[Manifold]) -> Manifold:
+    """Return what of pieces that don't touch lies above a height."""
+    return Manifold.compose(pieces).trim_by_plane((0, 0, 1), z)
 
 
 def _without(sections: list[CrossSection], silicone: list[Manifold], level: float) -> list[CrossSection]:

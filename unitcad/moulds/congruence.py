@@ -25,6 +25,8 @@ MARGIN = 0.2
 """How much wider than what is looked at a column is, mm: less than the thinnest wall."""
 _DIRECTIONS = np.array([[0.3217, 0.5931, 0.7381], [0.8017, -0.2713, 0.5326]])
 _SIDES = 48
+_FLAT = 1e-8
+"""Least eigenvalue of the sum of n n' over the normals n of a vertex up to which they lie in one plane."""
 
 
 def column_round(solids: Sequence[Manifold], margin: float, *, endless: bool = False) -> Column:
@@ -55,7 +57,7 @@ class Congruence:
 
     def __init__(self, shapes: Sequence[Shape], meshes: Sequence[Manifold] = ()) -> None:
         self.standing = Standing(shapes)
-        corners = np.concatenate([np.empty((0, 3)), *(arrays(mesh)[0] for mesh in meshes)])
+        corners = np.concatenate([np.empty((0, 3)), *(_corners(*arrays(mesh)) for mesh in meshes)])
         self._corners = corners[np.argsort(corners[:, 0], kind="stable")]
         self._known: dict[Hashable, list[tuple[int, np.ndarray]]] = {}
         self._count = 0
@@ -78,6 +80,19 @@ class Congruence:
         inside = (near[:, 2] > column.low) & (near[:, 2] < column.high)
         near = near[inside & (np.hypot(near[:, 0], near[:, 1]) < column.radius)]
         return np.sort(near @ _DIRECTIONS.T, axis=0)
+
+
+def _corners(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the vertices (n, 3) at which three planes or more meet.
+
+    A boolean leaves others on flat faces and straight edges, which depend on the order of its operands. The normals
+    there are all square to one direction.
+    """
+    across = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
+    normals = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    spread = np.einsum("ni,nj->nij", normals, normals).reshape(-1, 9)
+    sums = np.stack([np.bincount(faces.ravel(), np.repeat(part, 3), len(vertices)) for part in spread.T], axis=1)
+    return vertices[np.linalg.eigvalsh(sums.reshape(-1, 3, 3))[:, 0] > _FLAT]
 
 
 def once_each(keys: Sequence[int], make: Callable[[int], _T]) -> list[tuple[int, _T]]:
