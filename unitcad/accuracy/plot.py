@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import textwrap
-from html import escape
 
 from unitcad.accuracy.result import Plot, frontier
+from unitcad.export.plot_elements import COLOURS, line, round_step, text, upward_name
 
 WIDTH, HEIGHT = 720, 440
 LEFT, RIGHT, TOP, BOTTOM = 70, 190, 36, 52
-COLOURS = ("#1f6fb2", "#c8553d", "#3c8d5a", "#8059a8", "#b8860b", "#4d4d4d", "#d1478c", "#17868c")
 LEGEND_LETTERS = 24
 _CORNERS = (
     (),
@@ -42,20 +41,19 @@ def svg(plot: Plot) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
         'font-family="sans-serif" font-size="12">',
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
-        _text(LEFT, 20, plot.title, size=14),
+        text(LEFT, 20, plot.title, size=14),
     ]
     for value, label in _ticks(x0, x1) if plot.linear_x else _powers(int(x0), int(x1)):
         x, low = at(value, 10.0**y0)
-        parts += [_line(x, low, x, TOP, "#e2e2e2"), _text(x, low + 16, label, "middle")]
+        parts += [line(x, low, x, TOP, "#e2e2e2"), text(x, low + 16, label, "middle")]
     for value, label in _powers(y0, y1):
         left, y = at(x0 if plot.linear_x else 10.0**x0, value)
-        parts += [_line(left, y, WIDTH - RIGHT, y, "#e2e2e2"), _text(left - 6, y + 4, label, "end")]
+        parts += [line(left, y, WIDTH - RIGHT, y, "#e2e2e2"), text(left - 6, y + 4, label, "end")]
     parts += [
-        _line(LEFT, HEIGHT - BOTTOM, WIDTH - RIGHT, HEIGHT - BOTTOM, "#444444"),
-        _line(LEFT, HEIGHT - BOTTOM, LEFT, TOP, "#444444"),
-        _text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 14, plot.x_label, "middle"),
-        f'<text transform="translate(16 {(TOP + HEIGHT - BOTTOM) / 2:.1f}) rotate(-90)" text-anchor="middle">'
-        f"{escape(plot.y_label)}</text>",
+        line(LEFT, HEIGHT - BOTTOM, WIDTH - RIGHT, HEIGHT - BOTTOM, "#444444"),
+        line(LEFT, HEIGHT - BOTTOM, LEFT, TOP, "#444444"),
+        text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 14, plot.x_label, "middle"),
+        upward_name(16, (TOP + HEIGHT - BOTTOM) / 2, plot.y_label),
     ]
     best = {point for point, on in zip(everything, frontier(everything), strict=True) if on} if plot.frontier else None
     drawn, legend, y, marked = [], [], TOP + 12, 0
@@ -69,7 +67,7 @@ def svg(plot: Plot) -> str:
             stroke = 'stroke-width="2"' if curve else 'stroke-opacity="0.5"'
             one.append(f'<polyline points="{path}" fill="none" stroke="{colour}" {stroke}/>')
         if curve:
-            legend.append(_line(WIDTH - RIGHT + 10, y - 4, WIDTH - RIGHT + 22, y - 4, colour))
+            legend.append(line(WIDTH - RIGHT + 10, y - 4, WIDTH - RIGHT + 22, y - 4, colour))
         else:
             size = 3.5 + 1.2 * (marked % 4) + 0.6 * (marked // 4)
             filled = [best is None or point in best for point in points]
@@ -77,14 +75,14 @@ def svg(plot: Plot) -> str:
             legend.append(_marker(marked, WIDTH - RIGHT + 16, y - 4, 4.0, colour, True))
             marked += 1
         drawn.append(one)
-        for line in textwrap.wrap(name, LEGEND_LETTERS):
-            legend.append(_text(WIDTH - RIGHT + 26, y, line))
+        for words in textwrap.wrap(name, LEGEND_LETTERS):
+            legend.append(text(WIDTH - RIGHT + 26, y, words))
             y += 15
         y += 4
     if best is not None:
         legend += [
-            _text(WIDTH - RIGHT + 10, y + 6 + 15 * i, line)
-            for i, line in enumerate(("filled: on the frontier", "hollow: beaten in both"))
+            text(WIDTH - RIGHT + 10, y + 6 + 15 * i, words)
+            for i, words in enumerate(("filled: on the frontier", "hollow: beaten in both"))
         ]
     # The last series has the largest markers: where series coincide, the smaller ones lie on top of it.
     return "\n".join([*parts, *(part for one in reversed(drawn) for part in one), *legend, "</svg>", ""])
@@ -108,9 +106,7 @@ def _powers(low: int, high: int) -> list[tuple[float, str]]:
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:
     """Return six round numbers or fewer between the ends."""
-    rough = max(high - low, 1e-300) / 6
-    unit = 10.0 ** math.floor(math.log10(rough))
-    step = next(unit * k for k in (1, 2, 5, 10) if unit * k >= rough)
+    step = round_step(high - low, 6)
     return [
         (k * step, f"{k * step:g}") for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
     ]
@@ -121,11 +117,3 @@ def _decades(values: list[float]) -> tuple[int, int]:
         return 0, 1
     low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
     return low, max(high, low + 1)
-
-
-def _line(x0: float, y0: float, x1: float, y1: float, colour: str) -> str:
-    return f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}" stroke="{colour}"/>'
-
-
-def _text(x: float, y: float, text: str, anchor: str = "start", size: int = 12) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}">{escape(text)}</text>'

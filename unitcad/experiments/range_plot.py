@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
-from html import escape
 from typing import Any
+
+from unitcad.export.plot_elements import COLOURS, line, text
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 860, 300, 24, 64, 44
 BAR, GAP = 14, 18
-COLOURS = ("#1f6fb2", "#c8553d", "#3c8d5a", "#8059a8", "#b8860b", "#4d4d4d", "#d1478c", "#17868c")
 _LETTERS = 44
 BELOW = "below what can be read"
 
@@ -40,36 +40,35 @@ def svg(experiments: Sequence[Mapping[str, Any]], rivals: Sequence[str]) -> str:
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" font-family="sans-serif" '
         'font-size="12">',
         f'<rect width="{WIDTH}" height="{height}" fill="#ffffff"/>',
-        _text(12, 20, "What each rival predicts: 10 to 90 % of its draws", size=14),
+        text(12, 20, "What each rival predicts: 10 to 90 % of its draws", size=14),
     ]
     at = 12.0
     for name, colour in zip(rivals, _colours(rivals), strict=True):
-        parts += [f'<rect x="{at:.1f}" y="33" width="10" height="10" fill="{colour}"/>', _text(at + 14, 43, name)]
+        parts += [f'<rect x="{at:.1f}" y="33" width="10" height="10" fill="{colour}"/>', text(at + 14, 43, name)]
         at += 26 + 6.6 * len(name)
     bottom = height - BOTTOM
     for ratio in _ticks(low, high):
         x = across(ratio)
         stroke = "#888888" if ratio == 1.0 else "#e2e2e2"
         parts += [
-            f'<line x1="{x:.1f}" y1="{TOP - 8}" x2="{x:.1f}" y2="{bottom}" stroke="{stroke}"/>',
-            _text(x, bottom + 16, f"{ratio:g}", "middle"),
+            line(x, TOP - 8, x, bottom, stroke),
+            text(x, bottom + 16, f"{ratio:g}", "middle"),
         ]
-    parts.append(_text((LEFT + WIDTH - RIGHT) / 2, height - 10, "ratio of the two readings", "middle"))
+    parts.append(text((LEFT + WIDTH - RIGHT) / 2, height - 10, "ratio of the two readings", "middle"))
     for i, one in enumerate(experiments):
         y = TOP + i * row
         lines = [*textwrap.wrap(one["experiment"], _LETTERS), f"{one['bits']:.2f} ± {one['error']:.2f} bits"]
-        parts += [_text(12, y + 12 + 15 * n, line) for n, line in enumerate(lines)]
+        parts += [text(12, y + 12 + 15 * n, words) for n, words in enumerate(lines)]
         for n, (name, colour) in enumerate(zip(rivals, _colours(rivals), strict=True)):
             span, middle = one["predicted"][name], y + BAR * n + BAR / 2
             if is_below(span):
-                parts.append(_text(LEFT, middle + 4, BELOW, size=10, fill=colour))
+                parts.append(text(LEFT, middle + 4, BELOW, size=10, fill=colour))
                 continue
-            x0, x1 = across(span["low"]), across(span["high"])
+            x0, at_middle, x1 = (across(span[part]) for part in ("low", "middle", "high"))
             parts += [
                 f'<rect x="{x0 - 1:.1f}" y="{middle - 4:.1f}" width="{x1 - x0 + 2:.1f}" height="8" fill="{colour}" '
                 'fill-opacity="0.45"/>',
-                f'<line x1="{across(span["middle"]):.1f}" y1="{middle - 5:.1f}" x2="{across(span["middle"]):.1f}" '
-                f'y2="{middle + 5:.1f}" stroke="{colour}" stroke-width="3"/>',
+                line(at_middle, middle - 5, at_middle, middle + 5, colour, ' stroke-width="3"'),
             ]
     return "\n".join([*parts, "</svg>", ""])
 
@@ -83,8 +82,3 @@ def _ticks(low: float, high: float) -> list[float]:
     steps = (1.0, 2.0, 5.0) if high - low < 3.0 else (1.0,)
     every = [step * 10.0**power for power in range(math.floor(low) - 1, math.ceil(high) + 1) for step in steps]
     return [float(f"{ratio:.6g}") for ratio in every if low <= math.log10(ratio) <= high]
-
-
-def _text(x: float, y: float, text: str, anchor: str = "start", size: int = 12, fill: str = "") -> str:
-    style = f' fill="{fill}"' if fill else ""
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}"{style}>{escape(text)}</text>'

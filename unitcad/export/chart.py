@@ -6,13 +6,13 @@ import math
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 
+from unitcad.export.plot_elements import COLOURS, line, round_step, text, upward_name
+
 WIDTH, HEIGHT = 760, 460
 LEFT, RIGHT, TOP, BOTTOM = 72, 210, 40, 52
-COLOURS = ("#1f6fb2", "#c8553d", "#3c8d5a", "#8059a8", "#b8860b", "#4d4d4d", "#d1478c", "#17868c")
 LEGEND_LETTERS = 28
 MOST_POINTS = 2000
 """Points of a series that are drawn: more can't be told apart."""
@@ -63,7 +63,7 @@ def chart(
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
         'font-family="sans-serif" font-size="12">',
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
-        _text(LEFT, 22, title, size=14),
+        text(LEFT, 22, title, size=14),
     ]
     if shaded:
         low, high = (min(max(across.at(end), LEFT), WIDTH - RIGHT) for end in shaded)
@@ -71,16 +71,15 @@ def chart(
         parts.append(f'<rect x="{low:.1f}" y="{TOP}" width="{high - low:.1f}" height="{height}" fill="#f3ead8"/>')
     for value, label in across.ticks:
         x = across.at(value)
-        parts += [_line(x, HEIGHT - BOTTOM, x, TOP, _GREY), _text(x, HEIGHT - BOTTOM + 16, label, "middle")]
+        parts += [line(x, HEIGHT - BOTTOM, x, TOP, _GREY), text(x, HEIGHT - BOTTOM + 16, label, "middle")]
     for value, label in up.ticks:
         y = up.at(value)
-        parts += [_line(LEFT, y, WIDTH - RIGHT, y, _GREY), _text(LEFT - 6, y + 4, label, "end")]
+        parts += [line(LEFT, y, WIDTH - RIGHT, y, _GREY), text(LEFT - 6, y + 4, label, "end")]
     parts += [
-        _line(LEFT, HEIGHT - BOTTOM, WIDTH - RIGHT, HEIGHT - BOTTOM, _DARK),
-        _line(LEFT, HEIGHT - BOTTOM, LEFT, TOP, _DARK),
-        _text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 14, x_label, "middle"),
-        f'<text transform="translate(16 {(TOP + HEIGHT - BOTTOM) / 2:.1f}) rotate(-90)" text-anchor="middle">'
-        f"{escape(y_label)}</text>",
+        line(LEFT, HEIGHT - BOTTOM, WIDTH - RIGHT, HEIGHT - BOTTOM, _DARK),
+        line(LEFT, HEIGHT - BOTTOM, LEFT, TOP, _DARK),
+        text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 14, x_label, "middle"),
+        upward_name(16, (TOP + HEIGHT - BOTTOM) / 2, y_label),
     ]
     y = TOP + 12
     for i, (one, (xs, ys)) in enumerate(kept):
@@ -88,17 +87,17 @@ def chart(
         spots = [(across.at(float(a)), up.at(float(b))) for a, b in zip(xs, ys, strict=True)]
         for (x, _), ends_of_one in zip(spots, one.bars, strict=False):
             low, high = (up.at(float(end)) for end in ends_of_one)
-            parts.append(_line(x, low, x, high, colour))
+            parts.append(line(x, low, x, high, colour))
         parts += _drawn(one, spots, colour)
         parts += _drawn(one, [(WIDTH - RIGHT + 10.0, y - 4.0), (WIDTH - RIGHT + 24.0, y - 4.0)], colour)
-        for line in textwrap.wrap(one.name, LEGEND_LETTERS):
-            parts.append(_text(WIDTH - RIGHT + 30, y, line))
+        for words in textwrap.wrap(one.name, LEGEND_LETTERS):
+            parts.append(text(WIDTH - RIGHT + 30, y, words))
             y += 15
         y += 4
     if shaded and shaded_name:
         parts.append(f'<rect x="{WIDTH - RIGHT + 10}" y="{y - 10}" width="14" height="12" fill="#f3ead8"/>')
-        for line in textwrap.wrap(shaded_name, LEGEND_LETTERS):
-            parts.append(_text(WIDTH - RIGHT + 30, y, line))
+        for words in textwrap.wrap(shaded_name, LEGEND_LETTERS):
+            parts.append(text(WIDTH - RIGHT + 30, y, words))
             y += 15
     return "\n".join([*parts, "</svg>", ""])
 
@@ -127,22 +126,16 @@ def _axis(values: np.ndarray, log: bool, start: float, end: float, whole: tuple[
         return _Axis(lambda v: start + (math.log10(v) - first) / (last - first) * (end - start), ticks)
     if whole is not None and whole[1] > whole[0]:
         low, high = whole
-        step = _step(low, high)
+        step = round_step(high - low, 6)
         inside = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
         ticks = [(k * step, f"{k * step:.6g}") for k in inside]
         return _Axis(lambda v: start + (v - low) / (high - low) * (end - start), ticks)
     low = 0.0 if -_NIL * (high - low) <= low < 0.0 else low
     low, high = min(low, 0.0) if low > 0 and low < 0.3 * high else low, high if high > low else low + 1.0
-    step = _step(low, high)
+    step = round_step(high - low, 6)
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
     ticks = [(k * step, f"{k * step:.6g}") for k in range(first, last + 1)]
     return _Axis(lambda v: start + (v / step - first) / (last - first) * (end - start), ticks)
-
-
-def _step(low: float, high: float) -> float:
-    """Return a round distance of ticks, of which some six fit between the ends."""
-    unit = 10.0 ** math.floor(math.log10((high - low) / 6))
-    return next(unit * k for k in (1, 2, 5, 10) if unit * k >= (high - low) / 6)
 
 
 def _drawn(one: Series, spots: list[tuple[float, float]], colour: str) -> list[str]:
@@ -151,11 +144,3 @@ def _drawn(one: Series, spots: list[tuple[float, float]], colour: str) -> list[s
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in spots)
     dashes = ' stroke-dasharray="5 4"' if one.dashed else ""
     return [f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="{one.width:.3g}"{dashes}/>']
-
-
-def _line(x0: float, y0: float, x1: float, y1: float, colour: str) -> str:
-    return f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}" stroke="{colour}"/>'
-
-
-def _text(x: float, y: float, text: str, anchor: str = "start", size: int = 12) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}">{escape(text)}</text>'

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 
+from unitcad.export.plot_elements import line, round_step, text, upward_name
 from unitcad.inverse.candidates import Candidates
 from unitcad.inverse.ranking_order import front
 from unitcad.text import number
@@ -55,19 +55,19 @@ def front_svg(
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
         'font-family="sans-serif" font-size="12">',
         f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
-        _text(12, 22, f"What pulls apart: {rows.size} candidates, front and proposals", size=14),
+        text(12, 22, f"What pulls apart: {rows.size} candidates, front and proposals", size=14),
         f'<circle cx="16" cy="36" r="2.5" fill="{_GREY}"/>',
-        _text(24, 40, "candidate"),
+        text(24, 40, "candidate"),
         f'<path d="M92 36h22" stroke="{_FRONT}" stroke-width="2" fill="none"/>',
-        _text(120, 40, "front: nothing is better in both"),
+        text(120, 40, "front: nothing is better in both"),
         f'<circle cx="312" cy="36" r="5" fill="{_MARK}"/>',
-        _text(322, 40, "proposal"),
+        text(322, 40, "proposal"),
     ]
     for i, one in enumerate(panels):
         at = (PANEL + 10) * (i % columns), HEAD + HEIGHT * (i // columns)
         parts += _panel(found, rows, one, at, [(label, p, values[i]) for label, p, values in marked])
     if not panels:
-        parts.append(_text(12, HEAD + 30, "Nothing pulls apart: the best is the smallest too."))
+        parts.append(text(12, HEAD + 30, "Nothing pulls apart: the best is the smallest too."))
     return "\n".join([*parts, "</svg>", ""])
 
 
@@ -93,19 +93,18 @@ def _panel(
 
     parts = []
     for p in (0.0, 0.25, 0.5, 0.75, 1.0):
-        parts += [_line(x0, up(p), x1, up(p), _LIGHT), _text(x0 - 6, up(p) + 4, f"{p:g}", "end")]
+        parts += [line(x0, up(p), x1, up(p), _LIGHT), text(x0 - 6, up(p) + 4, f"{p:g}", "end")]
     for value in _ticks(low, high):
-        parts += [_line(across(value), y0, across(value), y0 + 4, _DARK)]
-        parts += [_text(across(value), y0 + 17, number(value, 4), "middle")]
+        parts += [line(across(value), y0, across(value), y0 + 4, _DARK)]
+        parts += [text(across(value), y0 + 17, number(value, 4), "middle")]
     parts += [
-        _line(x0, y0, x1, y0, _DARK),
-        _text((x0 + x1) / 2, y0 + 35, one.name, "middle"),
-        f'<text transform="translate({at[0] + 14:.1f} {(y0 + y1) / 2:.1f}) rotate(-90)" text-anchor="middle">'
-        "probability of the level</text>",
+        line(x0, y0, x1, y0, _DARK),
+        text((x0 + x1) / 2, y0 + 35, one.name, "middle"),
+        upward_name(at[0] + 14, (y0 + y1) / 2, "probability of the level"),
     ]
     if one.limit is not None and low <= one.limit <= high:
-        parts.append(_line(across(one.limit), y0, across(one.limit), y1, _MARK, ' stroke-dasharray="5 4"'))
-        parts.append(_text(across(one.limit) - 4, y1 + 10, "limit", "end"))
+        parts.append(line(across(one.limit), y0, across(one.limit), y1, _MARK, ' stroke-dasharray="5 4"'))
+        parts.append(text(across(one.limit) - 4, y1 + 10, "limit", "end"))
     spots = {(round(across(float(one.values[row])), 1), round(up(float(found.probability[row])), 1)) for row in rows}
     parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2" fill="{_GREY}"/>' for x, y in sorted(spots)]
     best = front(found, rows, one.values)
@@ -116,23 +115,11 @@ def _panel(
     for label, p, value in marked:
         x, y = across(value), up(p)
         parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="8" fill="{_MARK}"/>')
-        parts.append(_text(x, y + 4, label, "middle", fill="#ffffff"))
+        parts.append(text(x, y + 4, label, "middle", fill="#ffffff"))
     return parts
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """Return round values between the ends, some five of them."""
-    rough = (high - low) / 5
-    unit = 10.0 ** np.floor(np.log10(rough))
-    step = float(min((factor * unit for factor in (1, 2, 5, 10)), key=lambda one: abs(one - rough)))
+    """Return round values between the ends, six or fewer."""
+    step = round_step(high - low, 5)
     return [float(f"{i * step:.9g}") for i in range(int(np.ceil(low / step)), int(np.floor(high / step)) + 1)]
-
-
-def _line(x0: float, y0: float, x1: float, y1: float, stroke: str, more: str = "") -> str:
-    return f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}" stroke="{stroke}"{more}/>'
-
-
-def _text(x: float, y: float, text: str, anchor: str = "start", size: int = 12, fill: str = "#1b1f23") -> str:
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}" fill="{fill}">{escape(text)}</text>'
-    )
