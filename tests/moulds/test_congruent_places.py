@@ -11,6 +11,7 @@ from manifold3d import Manifold, OpType
 
 from unitcad.kernels.mesh import realise, shells
 from unitcad.mould_checks import check_moulds, groove_walls
+from unitcad.mould_checks.walls import near
 from unitcad.moulds.congruence import column_round, cropped
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, box, cut, union
@@ -162,6 +163,27 @@ def test_what_a_column_is_told_to_hold_is_what_the_meshes_have_there(gang: tuple
                 told = cropped(Manifold.compose(parts), Column(0, 0, radius)) if parts else Manifold()
                 differ = whole.volume() + told.volume() - 2 * (whole ^ told).volume()
                 assert abs(differ) < 1e-6, (tool.name, radius)
+
+
+def test_a_set_keeps_each_mesh_however_many_there_are() -> None:
+    """Checks tell solids apart by identity, and a mesh made anew may get that of a lost one."""
+    moulds = set_of("no-fpcb", "moulds.cavities=[3,3]")
+    first = moulds.meshes(moulds.plan.steps[0].layer)
+    for size in range(1, 600):
+        moulds.mesh_of(box(0, size, 0, 1, 0, 1))
+    assert [id(mesh) for mesh in moulds.meshes(moulds.plan.steps[0].layer)] == [id(mesh) for mesh in first]
+
+
+def test_pairs_of_boxes_within_a_gap_are_those_found_one_by_one() -> None:
+    cubes = [Manifold.cube((1, 1, 1)).translate((1.5 * (i % 4), 1.7 * (i // 4), 0)) for i in range(12)]
+    for gap in (0.0, 0.4, 0.6, 0.8, 4.0):
+        apart = [
+            (i, k)
+            for i in range(12)
+            for k in range(i + 1, 12)
+            if max(1.5 * abs(i % 4 - k % 4), 1.7 * abs(i // 4 - k // 4)) - 1 <= gap
+        ]
+        assert near(cubes, gap) == apart
 
 
 def test_what_a_boolean_leaves_on_flat_faces_makes_no_place_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,8 +44,19 @@ def realise(shape: Shape, segments: int, swell: float | None = None) -> Manifold
     return _realise(shape, segments, area_true(segments) if swell is None else swell)
 
 
-@lru_cache(maxsize=512)
 def _realise(shape: Shape, segments: int, swell: float) -> Manifold:
+    if not isinstance(shape, Place):
+        return _made(shape, segments, swell)
+    # Not kept: the hundreds of places of a gang's parts would drive out the plates and the parts themselves.
+    solid = _realise(shape.shape, segments, swell)
+    if not by_quarters(shape.turn):
+        # Evaluated first, in its own frame: equal points there stay equal to the last bit when they are turned.
+        solid.num_tri()
+    return solid.transform(np.column_stack([shape.turn, shape.move]))
+
+
+@lru_cache(maxsize=512)
+def _made(shape: Shape, segments: int, swell: float) -> Manifold:
     match shape:
         case Revolve(profile):
             # Scaled after revolving: CrossSection rounds to a grid that the scaled radii would not lie on.
@@ -70,12 +81,6 @@ def _realise(shape: Shape, segments: int, swell: float) -> Manifold:
             return component(_realise(inner, segments, swell), at)
         case Below(inner, bottom):
             return _below(_realise(inner, segments, swell), bottom)
-        case Place(inner, turn, move):
-            solid = _realise(inner, segments, swell)
-            if not by_quarters(turn):
-                # Evaluated first, in its own frame: equal points there stay equal to the last bit when they are turned.
-                solid.num_tri()
-            return solid.transform(np.column_stack([turn, move]))
     raise TypeError(f"not a shape: {shape!r}")
 
 
@@ -87,7 +92,7 @@ def corners_and_faces(shape: Polyhedron) -> tuple[np.ndarray, np.ndarray]:
 
 def forget() -> None:
     """Drop every mesh that is kept for the next call, before a measurement of times."""
-    _realise.cache_clear()
+    _made.cache_clear()
 
 
 def arrays(solid: Manifold) -> tuple[np.ndarray, np.ndarray]:

@@ -42,7 +42,9 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
     pieces, level, rim = hollows(moulds, moulds.plan.walled(step)), (bottom + top) / 2, step.rim - GRID
     # Most pieces are letters, which end above the level that is looked at.
     high = [piece for piece in pieces if (box := piece.bounding_box())[5] > rim and box[2] < level]
-    above = [part for part in shells(_above(bottom, high)) if part.bounding_box()[5] > rim]
+    joined = [piece for piece in high if piece.bounding_box()[2] < bottom - GRID]
+    above = [piece for piece in high if piece not in joined]
+    above += [part for part in shells(_above(bottom, joined)) if part.bounding_box()[5] > rim]
     sections = [part for solid in above for part in solid.slice(level).decompose()]
     regions = _without(sections, moulds.meshes((*step.layer, *step.earlier)), level)
     limit = min(least_wall(moulds), bottom - GRID)
@@ -50,9 +52,7 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
     if regions:
         groove = CrossSection.batch_boolean(regions, OpType.Add)
         tiles = _tiles(moulds, groove, farthest, (bottom - farthest, top))
-        # What joins the cells, such as the recess over the plinth, mostly lies lower.
-        hollow = _above(bottom - farthest, pieces)
-        apart = shells(hollow) if tiles else [hollow]
+        hollow = Manifold() if tiles else _above(bottom - farthest, pieces)
 
         def wall(i: int) -> float:
             """Return the distance from the groove in a tile to the nearest other hollow, mm, `farthest` at most."""
@@ -60,7 +60,7 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
             if tiles:
                 there = groove ^ _circle(tiles[i], farthest)
                 near = there ^ _circle(tiles[i], -farthest)
-                beside = cropped(Manifold.compose(_reaching(apart, tiles[i])), tiles[i])
+                beside = Manifold.compose([cropped(piece, tiles[i]) for piece in _reaching(pieces, tiles[i])])
             around = Manifold.extrude(near.offset(farthest, JoinType.Round), top - bottom + farthest)
             inside = Manifold.extrude(there.offset(GRID, JoinType.Miter), step.rim - bottom + 2 * GRID)
             others = beside ^ (around.translate((0, 0, bottom - farthest)) - inside.translate((0, 0, bottom - GRID)))
@@ -90,7 +90,8 @@ def _without(sections: list[CrossSection], silicone: list[Manifold], level: floa
     for section in sections:
         x0, y0, x1, y1 = section.bounds()
         meet = (boxes[:, 0] <= x1) & (boxes[:, 2] >= x0) & (boxes[:, 1] <= y1) & (boxes[:, 3] >= y0)
-        if all((section ^ grown[i]).is_empty() for i in np.flatnonzero(meet)):
+        there = CrossSection.batch_boolean([grown[i] for i in np.flatnonzero(meet)], OpType.Add)
+        if (section ^ there).is_empty():
             free.append(section)
     return free
 

@@ -5,8 +5,10 @@ Measured on the meshes. Engraved letters don't count: nothing flows through them
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import combinations
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from manifold3d import Manifold
 
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
@@ -22,18 +24,23 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     limit, letters = least_wall(moulds), moulds.spec.moulds.engraving_depth_mm + GRID
     farthest = SHOWN * limit
     for step in moulds.plan.steps:
-        deep = []
-        for piece in hollows(moulds, moulds.plan.walled(step)):
-            box = piece.bounding_box()
-            if box[5] - box[2] > letters:
-                deep.append((piece, box))
+        pieces = hollows(moulds, moulds.plan.walled(step))
+        deep = [piece for piece in pieces if (box := piece.bounding_box())[5] - box[2] > letters]
         thinnest = farthest
-        for (piece, p), (other, q) in combinations(deep, 2):
-            if all(p[i] <= q[i + 3] + thinnest and q[i] <= p[i + 3] + thinnest for i in range(3)):
-                thinnest = min(thinnest, float(piece.min_gap(other, thinnest)))
+        for i, k in near(deep, farthest):
+            thinnest = min(thinnest, float(deep[i].min_gap(deep[k], thinnest)))
         yield at_least(
             "C240", f"{moulds.plan.walled(step)}: wall between two hollows", thinnest, limit, "mm", "move them apart"
         )
+
+
+def near(pieces: Sequence[Manifold], gap: float) -> list[tuple[int, int]]:
+    """Return every two of the pieces, by their places, whose boxes are `gap` (mm) apart at most."""
+    boxes = np.array([piece.bounding_box() for piece in pieces]).reshape(-1, 6)
+    low, high = boxes[:, None, :3], boxes[None, :, 3:]
+    reaches = np.all(low <= high + gap, axis=2)
+    first, second = np.nonzero(np.triu(reaches & reaches.T, 1))
+    return list(zip(first.tolist(), second.tolist(), strict=True))
 
 
 CHECK = MouldCheck("C240", "walls: between any two hollows of a cup stands the least wall or more", findings)

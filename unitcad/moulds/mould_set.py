@@ -66,6 +66,7 @@ class MouldSet:
     spec: Spec
     altered: Plan | None = None
     _kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+    _meshes: dict[Shape, Manifold] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def design(self) -> Design:
@@ -122,7 +123,9 @@ class MouldSet:
         """Return a shape's mesh in the frame of the tools, kept once made."""
         from unitcad.kernels.mesh import realise
 
-        return realise(shape, self.segments)
+        if shape not in self._meshes:
+            self._meshes[shape] = realise(shape, self.segments)
+        return self._meshes[shape]
 
     @property
     def makes(self) -> str:
