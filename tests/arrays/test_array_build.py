@@ -18,7 +18,7 @@ from unitcad.cache import MemoryStore
 from unitcad.casting.procedure import procedure
 from unitcad.casting.time_line import duration
 from unitcad.check import Options, check_bytes
-from unitcad.cli.build_summary import array_summary
+from unitcad.cli.array_summary import array_summary
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
 from unitcad.moulds.mould_set import MouldSet

@@ -13,6 +13,7 @@ from unitcad.check import check_mesh
 from unitcad.check.geometry import edges as mesh_edges
 from unitcad.check.geometry.triangle_mesh import weld_exact
 from unitcad.check.geometry.volumes import winding_number
+from unitcad.geometry.components import components
 
 
 def _random_faces(seed: int, n_vertices: int, n_faces: int) -> np.ndarray:
@@ -50,11 +51,13 @@ def test_edges_are_sorted_alike_by_scipy_and_without(
             assert (array == expected).all()
 
 
+@pytest.mark.parametrize("scipy", [False, True])
 @pytest.mark.parametrize("n", [1, 5, 300, 70_000])
-def test_components_as_a_search_finds_them(n: int) -> None:
+def test_components_as_a_search_finds_them(n: int, scipy: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("unitcad.geometry.components.scipy_pays", lambda n: scipy)
     rng = np.random.default_rng(n)
     left, right = rng.integers(0, n, (2, n // 2 + 1))
-    label = mesh_edges.components(n, left, right)
+    label = components(n, left, right)
     neighbours = defaultdict(list)
     for a, b in zip(left.tolist(), right.tolist(), strict=True):
         neighbours[a].append(b)

@@ -18,7 +18,6 @@ from pathlib import Path
 from unitcad import files
 from unitcad.batch import record_packs
 from unitcad.batch.batch_records import RecordPlace, Values
-from unitcad.batch.row import row
 from unitcad.cache import Bundle, DiskStore, MemoryStore, MissingContent, SharedStore, digest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import folder as folders
@@ -26,6 +25,7 @@ from unitcad.pipeline.build import TRIES, build_into
 from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import Manifest, failed_codes
 from unitcad.pipeline.product import Product
+from unitcad.pipeline.row import row
 from unitcad.pipeline.stages import Stages
 from unitcad.pipeline.subjects import Made, of_text, outputs_of, product_of, subject_of, unit_of
 from unitcad.pipeline.versions import code_version

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
@@ -28,7 +29,9 @@ from unitcad.cli.shared_options import (
 
 if TYPE_CHECKING:
     from unitcad.export.step_process import StepProcess
+    from unitcad.pipeline.build import Built
     from unitcad.pipeline.manifest_records import Manifest
+    from unitcad.pipeline.subjects import Made
 
 
 def build(
@@ -97,10 +100,8 @@ def _built(
     """Build the specs and print what came out; return whether every check passed."""
     from unitcad.arrays.array import Array
     from unitcad.arrays.array_file import confirm_known, is_array, load_array
-    from unitcad.cli.build_summary import array_summary, summary
     from unitcad.cli.output import print_json, progress
     from unitcad.pipeline.array_build import build_array
-    from unitcad.pipeline.build import Built
     from unitcad.pipeline.build import build as build_spec
     from unitcad.pipeline.folder import PAGE, held
     from unitcad.pipeline.subjects import subject_of, unit_of
@@ -142,8 +143,7 @@ def _built(
         for spec, result, prints in zip(wanted, results, printing, strict=True):
             _print_faults(result.manifest)
             # Standard output has the folder alone, for a script to take.
-            lines = array_summary(spec, result) if isinstance(spec, Array) else summary(spec, result)
-            for line in (*lines, *([prints] if prints else ())):
+            for line in (*_summary(spec, result), *([prints] if prints else ())):
                 warn(f"{spec.name}: {line}")
             typer.echo(str(result.folder))
     return all(result.ok for result in results)
@@ -156,6 +156,19 @@ def _step_process(only: str | None, formats: str | None) -> AbstractContextManag
     drawn = only is None or {"unit", "moulds"} & set(listed(only))
     asked = drawn and (formats is None or "step" in listed(formats))
     return StepProcess() if asked and worthwhile() else nullcontext()
+
+
+def _summary(of: Made, built: Built) -> Iterator[str]:
+    """Return the lines of a spec's or an array's result."""
+    from unitcad.arrays.array import Array
+
+    if isinstance(of, Array):
+        from unitcad.cli.array_summary import array_summary
+
+        return array_summary(of, built)
+    from unitcad.cli.build_summary import summary
+
+    return summary(of, built)
 
 
 def _print_faults(manifest: Manifest) -> None:

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections import Counter
 from collections.abc import Iterator
 
-from unitcad.arrays.array import Array
-from unitcad.arrays.array_extras import CROSSTALK
-from unitcad.arrays.construction import constructions
-from unitcad.arrays.crosstalk_words import crosstalk_lines
-from unitcad.batch.row import row
 from unitcad.casting.in_short import in_short
-from unitcad.check.findings import counted
 from unitcad.pipeline.build import Built
 from unitcad.pipeline.folder import PAGE
+from unitcad.pipeline.row import row
 from unitcad.spec import Spec
 from unitcad.text import number
 
@@ -43,30 +37,3 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
         yield level["answer"]
     if (built.folder / PAGE).is_file():
         yield f"open {shlex.quote(str(built.folder / PAGE))}"
-
-
-def array_summary(array: Array, built: Built) -> Iterator[str]:
-    """Yield a line each: units and size, casting, checks, crosstalk, the page."""
-    manifest, box = built.manifest, array.sheet.outline
-    size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
-    yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {number(array.sheet.thickness_mm, 3)} mm thick"
-    if manifest["casting"]:
-        yield from in_short(json.loads((built.folder / "casting.json").read_bytes()))
-        yield from _more_cavities(array)
-    if checks := manifest["laws"]:
-        check, passed = manifest["check"], sum(entry["ok"] for entry in checks)
-        files = f"{check['errors']} errors and {check['warnings']} warnings in the files"
-        yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
-    crosstalk = built.folder / CROSSTALK
-    if "estimate" in manifest["outputs"] and crosstalk.is_file():
-        yield from crosstalk_lines(json.loads(crosstalk.read_bytes()))[:2]
-    if (built.folder / PAGE).is_file():
-        yield f"open {shlex.quote(str(built.folder / PAGE))}"
-
-
-def _more_cavities(array: Array) -> Iterator[str]:
-    """Say that units which are cast one by one may be cast together."""
-    held = Counter(array.units.index(place.unit) for place in array.places)
-    for i, count in held.items() if constructions()[array.construction].own_tails else ():
-        if array.units[i].moulds.cavities == (1, 1) and count > 1:
-            yield f"{count} units one after the other in one cavity: [moulds] cavities = [2, 2] casts four at once"

@@ -10,14 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_dilation
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from unitcad.export import picture_letters, raster
 from unitcad.export.name_places import nearest_free
 from unitcad.export.picture_letters import Name
 from unitcad.export.raster import Camera
+from unitcad.geometry.components import components
 
 CREASE_DEG = 25.0
 """Faces that meet at more than this angle have a line between them."""
@@ -79,8 +77,7 @@ def _patches(faces: np.ndarray, normal: np.ndarray) -> np.ndarray:
     same = np.flatnonzero(key[order][1:] == key[order][:-1])
     one, two = order[same] // 3, order[same + 1] // 3
     smooth = np.einsum("ij,ij->i", normal[one], normal[two]) > math.cos(math.radians(CREASE_DEG))
-    links = coo_array((np.ones(smooth.sum(), np.int8), (one[smooth], two[smooth])), shape=(len(faces), len(faces)))
-    return connected_components(links, directed=False)[1] + 1
+    return components(len(faces), one[smooth], two[smooth]) + 1
 
 
 def together(bodies: Sequence[DrawnBody], of: Camera, names: Sequence[Name] = ()) -> bytes:
@@ -149,7 +146,15 @@ def _write(pixels: np.ndarray, drawn: np.ndarray, names: Sequence[Name], of: Cam
 
 
 def _grown(mask: np.ndarray, pixels: int) -> np.ndarray:
-    return np.asarray(binary_dilation(mask, iterations=pixels), bool)
+    """Return a mask that reaches further by some pixels, counted along rows and columns."""
+    for _ in range(pixels):
+        grown = mask.copy()
+        grown[1:] |= mask[:-1]
+        grown[:-1] |= mask[1:]
+        grown[:, 1:] |= mask[:, :-1]
+        grown[:, :-1] |= mask[:, 1:]
+        mask = grown
+    return mask
 
 
 def _disc(window: tuple[slice, slice], middle: tuple[float, float], radius: float) -> np.ndarray:

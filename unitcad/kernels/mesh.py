@@ -10,6 +10,7 @@ import manifold3d
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
+from unitcad.geometry.components import components
 from unitcad.shape import Below, Common, Component, Cut, Extrude, Place, Polyhedron, Revolve, Shape, Union
 from unitcad.shape.profile import GRID_PER_MM, Profile, points
 from unitcad.shape.tree import by_quarters
@@ -106,13 +107,10 @@ def shells(solid: Manifold) -> list[Manifold]:
 
     `Manifold.decompose` copies all vertices for each piece: with hundreds of pieces that takes longer than a boolean.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     vertices, faces = arrays(solid)
     n = len(vertices)
-    joined = coo_matrix((np.ones(2 * len(faces)), (faces[:, :2].ravel(), faces[:, 1:].ravel())), shape=(n, n))
-    count, label = connected_components(joined, directed=False)
+    label = components(n, faces[:, :2].ravel(), faces[:, 1:].ravel())
+    count = int(label.max(initial=-1)) + 1
     if count < _FEW:
         return solid.decompose()
     order, face_label = np.argsort(label, kind="stable"), label[faces[:, 0]]
@@ -172,30 +170,23 @@ def _plumb(vertices: np.ndarray) -> np.ndarray:
 
     Else two prisms that should share a wall keep a crack between them.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
 
     pairs = KDTree(vertices[:, :2]).query_pairs(_SAME_LINE, output_type="ndarray")
-    n = len(vertices)
-    joined = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    _, first, line = np.unique(connected_components(joined, directed=False)[1], return_index=True, return_inverse=True)
+    label = components(len(vertices), pairs[:, 0], pairs[:, 1])
+    _, first, line = np.unique(label, return_index=True, return_inverse=True)
     return np.column_stack([vertices[first[line], :2], vertices[:, 2]])
 
 
 def _patches(faces: np.ndarray) -> list[np.ndarray]:
     """Return faces (m, 3) in groups that are joined by edges."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     of_face = np.repeat(np.arange(len(faces)), 3)
     order = np.lexsort((edges[:, 1], edges[:, 0]))
     same = np.all(edges[order][1:] == edges[order][:-1], axis=1)
     first, second = of_face[order][:-1][same], of_face[order][1:][same]
-    joined = coo_matrix((np.ones(len(first)), (first, second)), shape=(len(faces), len(faces)))
-    count, labels = connected_components(joined, directed=False)
-    return [faces[labels == i] for i in range(count)]
+    labels = components(len(faces), first, second)
+    return [faces[labels == i] for i in range(int(labels.max(initial=-1)) + 1)]
 
 
 def _prism(vertices: np.ndarray, patch: np.ndarray, bottom: float) -> Manifold:

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from manifold3d import Manifold
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
+from unitcad.geometry.components import components
 from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.each_cavity import each_cavity
@@ -122,7 +121,8 @@ def _pockets(surface: _Boundary, opening: np.ndarray, up: np.ndarray) -> list[tu
     height = surface.vertices @ up
     first, second = surface.edges.T
     level = np.abs(height[first] - height[second]) <= _SAME
-    count, plateau = _components(surface.edges[level], len(height))
+    plateau = components(len(height), *surface.edges[level].T)
+    count = int(plateau.max(initial=-1)) + 1
     rises = np.zeros(count, dtype=bool)
     step = height[second] - height[first]
     rises[plateau[first[step > _SAME]]] = True
@@ -142,18 +142,12 @@ def _depth(edges: np.ndarray, height: np.ndarray, opening: np.ndarray, vertex: i
     low, high = 0, len(levels) - 1
     while low < high:
         middle = (low + high + 1) // 2
-        _, part = _components(edges[lowest >= levels[middle]], len(height))
+        part = components(len(height), *edges[lowest >= levels[middle]].T)
         if np.any(part[opening & (height >= levels[middle])] == part[vertex]):
             low = middle
         else:
             high = middle - 1
     return float(height[vertex] - levels[low])
-
-
-def _components(edges: np.ndarray, count: int) -> tuple[int, np.ndarray]:
-    graph = coo_matrix((np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    number, labels = connected_components(graph, directed=False)
-    return int(number), labels
 
 
 CHECK = MouldCheck("C400", "air: every high region of a cavity meets the rim or a vent, level and tilted", findings)

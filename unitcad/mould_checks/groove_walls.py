@@ -11,7 +11,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold, OpType
-from scipy.spatial import KDTree
 
 from unitcad.kernels.mesh import shells
 from unitcad.mould_checks.check import MouldCheck
@@ -104,6 +103,8 @@ def _tiles(moulds: MouldSet, groove: CrossSection, beside: float, ends: tuple[fl
     lay = moulds.plan.layout
     if len(lay.cells) == 1:
         return []
+    from scipy.spatial import KDTree
+
     middles = np.array([(cell.x, cell.y) for cell in lay.cells])
     reach = float(KDTree(middles).query(_border(groove))[0].max()) + SLACK
     tiles = [Column(cell.x, cell.y, reach + beside, *ends) for cell in lay.cells]

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_hash, array_of, with_formats
 from unitcad.cache import Store
-from unitcad.pipeline.array_product import ARRAY, make_array
 from unitcad.pipeline.artifacts import OUTPUTS
 from unitcad.pipeline.build import Built, build_subject
-from unitcad.pipeline.folder import Subject
+from unitcad.pipeline.folder import ARRAY, Subject
 from unitcad.pipeline.product import checked_outputs
 from unitcad.pipeline.stages import Say, Stages, Take
 
@@ -36,6 +35,8 @@ def build_array(
 
     Arguments, refusals and what is kept from before are those of `unitcad.pipeline.build.build`.
     """
+    from unitcad.pipeline.array_product import make_array
+
     return build_subject(
         out,
         array_subject(array),

@@ -45,7 +45,6 @@ from unitcad.spec import Spec
 if TYPE_CHECKING:
     from unitcad.export.step_process import StepProcess
 
-ARRAY = "array.toml"
 """The file that makes a folder the result of an array."""
 
 
@@ -54,7 +53,7 @@ def make_array(array: Array, only: Sequence[str], check: bool, store: Store, sta
     moulds = patch_moulds(array)
     moulds.plan  # noqa: B018  # refuses before the long work begins
     units = {folder: _unit(array, unit, only, check, store, stages) for folder, unit in unit_folders(array).items()}
-    own: dict[str, bytes] = {ARRAY: to_toml(array).encode()}
+    own: dict[str, bytes] = {folders.ARRAY: to_toml(array).encode()}
     shared: dict[str, str] = {}
     for folder, product in units.items():
         own |= {f"{folder}/{path}": content for path, content in product.own.items()}

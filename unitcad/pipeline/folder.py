@@ -21,10 +21,9 @@ from unitcad.spec import Spec, read_toml, spec_hash
 
 UNCHECKED = "--no-check"
 LOCK = re.compile(r"\.[a-z0-9-]+-[0-9a-f]{12}\.lock")
+ARRAY = "array.toml"
 PAGE = "report.html"
 """The page of a folder, made on request and kept up by every later build into it."""
-
-
 BENCH = "bench.html"
 """The bench page of a variant's procedure, made beside the page."""
 

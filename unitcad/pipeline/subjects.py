@@ -11,7 +11,6 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_hash, array_of
 from unitcad.cache import Store, digest
 from unitcad.pipeline.array_build import array_subject
-from unitcad.pipeline.array_product import make_array
 from unitcad.pipeline.folder import Subject, subject
 from unitcad.pipeline.geometry import build_key
 from unitcad.pipeline.product import Product, make, possible_outputs
@@ -65,5 +64,7 @@ def outputs_of(of: Made, only: Sequence[str]) -> tuple[str, ...]:
 def product_of(of: Made, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
     """Return everything asked for, nothing written yet."""
     if isinstance(of, Array):
+        from unitcad.pipeline.array_product import make_array
+
         return make_array(of, only, check, store, stages)
     return make(of, only, check, store, stages)

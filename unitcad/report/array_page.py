@@ -13,8 +13,7 @@ from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.casting.time_line import duration
 from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
-from unitcad.pipeline.array_product import ARRAY
-from unitcad.pipeline.folder import BENCH, PAGE
+from unitcad.pipeline.folder import ARRAY, BENCH, PAGE
 from unitcad.pipeline.manifest_records import ArrayManifest
 from unitcad.report.plain_page import drawing, picture, plain_page
 from unitcad.report.records import expect

@@ -14,7 +14,7 @@ from typing import Any
 from unitcad.arrays.array_file import array_templates, expanded, is_array
 from unitcad.errors import Missing, Refusal, UnitcadError, WrongArgument
 from unitcad.files import read_text
-from unitcad.pipeline.array_product import ARRAY
+from unitcad.pipeline.folder import ARRAY
 from unitcad.report.array_page import is_array_folder
 from unitcad.report.page import page_data
 from unitcad.report.read_results import is_variant

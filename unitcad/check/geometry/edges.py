@@ -5,14 +5,13 @@ A half-edge is 3 * face + side; side k runs from corner k to corner k + 1. Every
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 
 import numpy as np
 
 from unitcad.geometry.arrays import Bools, Floats, Ints, cross, sorted_with_order
+from unitcad.geometry.components import components, scipy_pays
 
-_SMALL = 60_000
 _SAME_ANGLE = 1e-7  # radian: faces nearer to each other lie in one plane
 
 
@@ -29,11 +28,6 @@ class Edges:
     low: Ints
     high: Ints
     closed: bool
-
-
-def scipy_pays(n: int) -> bool:
-    """Return whether scipy pays for `n` rows: to load it takes longer than to check a small mesh without it."""
-    return n > _SMALL or "scipy.sparse" in sys.modules
 
 
 def half_edges(faces: Ints) -> tuple[Ints, Ints]:
@@ -200,27 +194,3 @@ def _paired(vertices: Floats, faces: Ints, edges: Edges, many: Ints) -> tuple[In
     order = np.lexsort((rank, group))
     half, ends = half[order], ends[order]
     return half[~ends], half[ends]
-
-
-def components(n: int, left: Ints, right: Ints) -> Ints:
-    """Return the component of each of `n` nodes joined by pairs, numbered in the order of their first node."""
-    if scipy_pays(n):
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        graph = coo_array((np.ones(len(left)), (left, right)), shape=(n, n))
-        return connected_components(graph, directed=False)[1]
-    root = np.arange(n)
-    while True:
-        a, b = root[left], root[right]
-        apart = a != b
-        if not apart.any():
-            break
-        left, right, a, b = left[apart], right[apart], a[apart], b[apart]
-        np.minimum.at(root, np.maximum(a, b), np.minimum(a, b))
-        while True:
-            above = root[root]
-            if np.array_equal(above, root):
-                break
-            root = above
-    return np.unique(root, return_inverse=True)[1].reshape(-1)

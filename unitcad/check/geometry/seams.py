@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unitcad.check.geometry.edges import components, half_edges
+from unitcad.check.geometry.edges import half_edges
 from unitcad.check.geometry.triangle_mesh import float32_steps, same_place
 from unitcad.geometry.arrays import Bools, Floats, Ints, extents
+from unitcad.geometry.components import components
 
 WELD = 1e-5  # of the shell's diagonal
 NARROW = 0.1  # of the shortest edge at a vertex

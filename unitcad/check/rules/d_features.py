@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, number
-from unitcad.check.geometry.edges import components
 from unitcad.check.geometry.rays import Rays
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.geometry.triangle_mesh import solid_of
@@ -21,6 +20,7 @@ from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.places import at_region
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Floats, Ints
+from unitcad.geometry.components import components
 from unitcad.geometry.ticks import Tick
 
 if TYPE_CHECKING:

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from unitcad.check.findings import Finding, Location, counted, number, point
-from unitcad.check.geometry.edges import components
 from unitcad.check.geometry.rays import SLACK, Rays, cast, lying
 from unitcad.check.geometry.topology import Topology
 from unitcad.check.rules.inspection import Inspection
 from unitcad.check.rules.rule import Rule
 from unitcad.geometry.arrays import Floats
+from unitcad.geometry.components import components
 
 if TYPE_CHECKING:
     from unitcad.catalogue import Printer

@@ -1,19 +1,20 @@
-"""The columns of one variant in a batch's table."""
+"""The columns of one variant in a table of variants."""
 
 from __future__ import annotations
 
+from typing import Any
+
 from unitcad import catalogue
 from unitcad.arrays.array import Array
-from unitcad.batch.batch_records import Values
 from unitcad.pipeline.manifest_records import Manifest
 from unitcad.pipeline.subjects import Made, unit_of
 
 
-def row(of: Made, manifest: Manifest) -> Values:
+def row(of: Made, manifest: Manifest) -> dict[str, Any]:
     """Return volumes (mm3) and masses (g) of the cast layers, mould checks, mesh checks, and edge level by model."""
     spec = unit_of(of)
     densities = catalogue.materials(spec.materials)
-    columns: Values = {"name": of.name, "design": spec.design, "diameter_mm": spec.diameter_mm}
+    columns: dict[str, Any] = {"name": of.name, "design": spec.design, "diameter_mm": spec.diameter_mm}
     if isinstance(of, Array):
         columns |= {"array": of.construction, "units": len(of.places), "pitch_mm": round(of.pitch_mm, 3)}
     total = 0.0

@@ -1,0 +1,40 @@
+"""Connected components of a graph. Small graphs need no scipy, which takes longer to load than they take."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from unitcad.geometry.arrays import Ints
+
+_SMALL = 60_000
+
+
+def scipy_pays(n: int) -> bool:
+    """Return whether scipy pays for `n` rows: to load it takes longer than a small mesh takes without it."""
+    return n > _SMALL or "scipy.sparse" in sys.modules
+
+
+def components(n: int, left: Ints, right: Ints) -> Ints:
+    """Return the component of each of `n` nodes joined by pairs, numbered in the order of their first node."""
+    if scipy_pays(n):
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        graph = coo_array((np.ones(len(left)), (left, right)), shape=(n, n))
+        return connected_components(graph, directed=False)[1]
+    root = np.arange(n)
+    while True:
+        a, b = root[left], root[right]
+        apart = a != b
+        if not apart.any():
+            break
+        left, right, a, b = left[apart], right[apart], a[apart], b[apart]
+        np.minimum.at(root, np.maximum(a, b), np.minimum(a, b))
+        while True:
+            above = root[root]
+            if np.array_equal(above, root):
+                break
+            root = above
+    return np.unique(root, return_inverse=True)[1].reshape(-1)
