@@ -17,7 +17,7 @@ from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.bessel import bessel_bound, bessels
 from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, around, poles
 from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.path import MAX_PANELS, PHASE, cut, from_origin, onwards, pieced, wavenumbers
+from unitcad.attenuation.layered.path import MAX_PANELS, PHASE, from_origin, halved, onwards, pieced, wavenumbers
 from unitcad.attenuation.layered.stack import Stack
 from unitcad.attenuation.layered.statics import static_kernel
 from unitcad.attenuation.layered.tail import measure_tail
@@ -32,6 +32,14 @@ _MAX_ROUNDS = 40
 _SINGLE = 1e-7
 """Uncertainty of a pole below which a panel has no other, or one that is next to nothing beside it."""
 _CHUNK = 200_000  # integrand values held at once
+_PANELS_SHARE = 0.3
+"""Of the tolerance: what the panels may be off by together. The tail may leave 0.4."""
+_DETOURS_SHARE = 0.25
+"""Of the tolerance: what detours may leave out together beyond the share of their panels.
+
+Panels are only ever halved, so those of a tighter tolerance are pieces of those of a looser one. The tighter one takes
+the looser one's detours too, unless they leave out more than this: its panels then leave 0.3 / 0.25 of that at most.
+"""
 
 
 @dataclass(frozen=True)
@@ -102,6 +110,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     problem = replace(bare, reference=tail.reference)
     known, rounded = problem.static_part()
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
+    skipped = np.zeros(known.shape)  # by the detours
     count, done, exhausted, gained = 0, 0, False, 0.0
     stop = tail.start(tail.scale, rtol)
     pending = from_origin(end, stop, span, materials)
@@ -111,11 +120,12 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         if not np.all(np.isfinite(found.parts)):
             raise overflow(bare.omega)
         count += pending.shape[0] * _NODES.size
-        scale = min(float(np.max(np.abs(known + total + found.parts.sum(0)))) or 1.0, largest)
+        whole, off = np.abs(known + total + found.parts.sum(0)), quadrature + found.errors.sum(0)
+        scale = min(float(np.max(whole)) or 1.0, largest)
         done += pending.shape[0]
-        limit = 0.3 * rtol * scale / max(done, 1)
+        limit = _PANELS_SHARE * rtol * scale / max(done, 1)
         bad = found.gains > limit
-        if np.max(quadrature + found.errors.sum(0)) <= 0.4 * rtol * scale:
+        if np.max(off) <= _PANELS_SHARE * rtol * scale:
             bad[:] = False
         due = put_off.due(found, bad)
         dropped = np.isin(put_off.of, due)
@@ -129,16 +139,20 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         gained += float(found.gains[good].sum())
         size += found.sizes[good].sum(0)
         if not np.all(good):
-            now, later, pieces = _detours(problem, pending, found, bad, limit, span)
-            quadrature += found.hidden[now].sum(0) + put_off.hidden[due].sum(0)
+            sure = min(float(np.max(whole - off - skipped)), scale)  # beside a pole |u| is at first far too large
+            left = _DETOURS_SHARE * rtol * sure - float(skipped.max())
+            now, later, pieces = _detours(problem, pending, found, bad, limit, left, span)
+            skipped += found.hidden[now].sum(0)
+            quadrature += put_off.hidden[due].sum(0)
             turned = np.concatenate([pieces[now], put_off.pieces[due]]).reshape(-1, 4)
-            halved, of = _halved(pending, bad & ~now, found.gains > 1e3 * limit, later)
-            pending = np.concatenate([halved, turned])
+            halves = bad & ~now
+            of = np.repeat(np.where(later, np.cumsum(later) - 1, -1)[halves], 2)
+            pending = np.concatenate([halved(pending[halves]), turned])
             put_off = _PutOff(np.append(of, np.full(len(turned), -1)), pieces[later], found.hidden[later])
             continue
         wanted = tail.start(min(float(np.max(np.abs(known + total))), largest), rtol)
         # Panels that do not suffice for halving may still do for a tail that leaves more.
-        spent = done > MAX_PANELS or (exhausted and tail.bound(stop).max() <= quadrature.max())
+        spent = done > MAX_PANELS or (exhausted and tail.bound(stop).max() <= (quadrature + skipped).max())
         exhausted |= wanted > stop and spent
         if wanted <= stop or spent:
             break
@@ -154,9 +168,9 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             size + found.sizes.sum(0),
         )
     rest = tail.bound(stop)
-    error = quadrature + rest + 4e-15 * size + rounded
+    error = quadrature + skipped + rest + 4e-15 * size + rounded
     most = 0.5 * float(np.max(error))
-    cut_short = least > most or gained + float(rest.max()) - least < most
+    cut_short = least > most or gained + float(skipped.max() + rest.max()) - least < most
     return Integrals(known + total, error, count, cut_short, exhausted)
 
 
@@ -210,26 +224,17 @@ class _PutOff(NamedTuple):
         return np.flatnonzero(no_less)
 
 
-def _halved(panels: w.Array, bad: np.ndarray, far_off: np.ndarray, put_off: np.ndarray) -> tuple[w.Array, np.ndarray]:
-    """Return halves of the `bad` panels, quarters of those that are far off too, and the number of each one's detour.
-
-    put_off: which have one; -1 without.
-    """
-    near, far = bad & ~far_off, bad & far_off
-    number = np.where(put_off, np.cumsum(put_off) - 1, -1)
-    of = np.concatenate([np.repeat(number[near], 2), np.repeat(number[far], 4)])
-    return np.concatenate([cut(panels[near], 2), cut(panels[far], 4)]), of
-
-
 def _detours(
-    problem: Problem, panels: w.Array, found: _Evaluated, bad: np.ndarray, enough: float, span: float
+    problem: Problem, panels: w.Array, found: _Evaluated, bad: np.ndarray, enough: float, left: float, span: float
 ) -> tuple[np.ndarray, np.ndarray, w.Array]:
     """Return which of the `bad` panels go around a pole, which only if halving does not help, and the pieces of both.
 
-    enough: what a detour may leave out; pieces: shape (panels, 4, 4).
+    enough: what a detour may leave out in any case; left: what those may that leave out more, the least ones first;
+    pieces: shape (panels, 4, 4).
     """
-    now = found.hidden.max(axis=(1, 2)) <= enough
-    clear = bad & (now | found.blurred) & (panels[:, :2].imag == 0).all(axis=1)
+    hidden = found.hidden.max(axis=(1, 2))
+    now = hidden <= enough
+    clear = bad & ((hidden <= max(enough, left)) | found.blurred) & (panels[:, :2].imag == 0).all(axis=1)
 
     def lossier(panel: w.Array, loss: float) -> Poles:
         return _poles(replace(problem, medium=problem.medium.with_loss(loss)), panel[None])
@@ -241,7 +246,10 @@ def _detours(
     which[at[turned]] = True
     pieces = np.zeros((len(panels), 4, 4), dtype=np.complex128)
     pieces[which] = pieced(panels[which], corners).reshape(-1, 4, 4)
-    return which & now, which & ~now, pieces
+    beyond = np.flatnonzero(which & ~now)
+    beyond = beyond[np.argsort(hidden[beyond])]
+    now[beyond[np.cumsum(hidden[beyond]) <= left]] = True
+    return which & now, which & ~now & found.blurred, pieces
 
 
 def _poles(problem: Problem, panels: w.Array) -> Poles:

@@ -92,10 +92,9 @@ def _turned(line: np.ndarray, branch_points: list[float], longest: float) -> w.A
     return np.concatenate([plain[~at], np.array(panels, dtype=np.complex128).reshape(-1, 4)])
 
 
-def cut(panels: w.Array, pieces: int) -> w.Array:
-    """Cut each panel in `pieces` equal ones."""
-    edges = panels[:, :1] + (panels[:, 1:2] - panels[:, :1]) * (np.arange(pieces + 1) / pieces)
-    return pieced(panels, edges)
+def halved(panels: w.Array) -> w.Array:
+    """Cut each panel in two equal ones."""
+    return pieced(panels, np.stack([panels[:, 0], panels[:, :2].mean(axis=1), panels[:, 1]], axis=1))
 
 
 def pieced(panels: w.Array, corners: w.Array) -> w.Array:
