@@ -40,18 +40,19 @@ SLIVER = 1e-5
 
 def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     """Measure what centres each cup."""
-    base, lengths = moulds.solids["base"], moulds.spec.moulds
+    lengths = moulds.spec.moulds
     standing = ribs(moulds.spec, moulds.plan.layout)
     for step in moulds.plan.steps:
-        if step.cup not in moulds.solids:
+        where = step.lid if step.pins and step.lid else step.cup
+        if where not in moulds.solids:
             continue
-        cup, where = moulds.solids[step.cup], step.cup
+        cup, base = moulds.solids[where], moulds.solids[moulds.plan.base_of(step)]
         if not standing:
-            pins = moulds.plan.pins
-            level = pins.height / 2 if pins else -(lengths.plinth_height_mm - lengths.seat_relief_mm) / 2
+            pins = step.pins or moulds.plan.pins
+            level = pins.seat + pins.height / 2 if pins else -(lengths.plinth_height_mm - lengths.seat_relief_mm) / 2
             on = "pins" if pins else "plinth, no ribs"
             limit = lengths.plinth_clearance_mm * SQUARE + GRID
-            advice = "the cup slips aside by more than the clearance asked for"
+            advice = "it slips aside by more than the clearance asked for"
             yield at_most("C220", f"{where}: play on the {on}", _play(cup, base, level), limit, "mm", advice)
             continue
         held = _patches(cup, base, (standing[0].bottom + standing[0].top) / 2)

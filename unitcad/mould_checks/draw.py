@@ -25,12 +25,14 @@ from unitcad.mould_checks.finding import MouldFinding, at_most
 from unitcad.moulds.cavities import boxes_meet, united
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.moulds.removal import CAST, Way
+from unitcad.moulds.removal import CAST, Removal, Way
 
 BLOCKED = 1e-5
 """Largest area of facing faces, mm2: what rounding leaves of faces that only touch along an edge."""
 LEVEL = 1e-9
 """Heights nearer than this are equal, mm."""
+SLIVER = 1e-4
+"""Volume of silicone that rounding leaves between two parts of it, mm3."""
 _BLOCK = 100_000  # pairs of triangles clipped together
 
 
@@ -47,11 +49,18 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         layers = moulds.meshes((*step.layer, *step.earlier))
         laid = [(body.name, moulds.mesh(body)) for body in step.inserts]
         silicone = [*(("layer", solid) for solid in layers), *laid]
+        whole: Manifold | None = None
         for removal in step.removals:
-            where = f"pour {step.index}: {removal.piece} out"
+            where = f"pour {step.index}: {removal.piece}{removal.part and f' {removal.part}'} out"
             cast = removal.piece == CAST
             if cast and silicone:
-                piece, silicone = united(layers), []
+                whole = united(layers) if whole is None else whole
+                piece, whole = _parted(moulds, whole, removal)
+                if piece.is_empty():
+                    yield _out_of_order(where, "there is no silicone where this part should be")
+                    continue
+                # Silicone bends: what is still there lets a part go.
+                silicone = [("layer", whole)] if whole.volume() > SLIVER else []
             elif removal.piece in there:
                 piece = there.pop(removal.piece)
             else:
@@ -59,6 +68,8 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
                 continue
             areas, way, apart = [], removal.direction, []
             for name, solid in (*there.items(), *silicone):
+                if cast and name == "layer":
+                    continue
                 if overlapping and boxes_meet(piece, solid):
                     # Silicone has taken the tool's shape, whichever of the two moves.
                     areas.append((blocked(piece - solid, solid, way) if cast else blocked(piece, solid, way), name))
@@ -69,7 +80,18 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             where += f" against {name}" if largest > BLOCKED else ""
             advice = f"something of the piece lies under {name}: the two are drawn with an undercut"
             yield at_most("C300", where, sum(area for area, _ in areas), BLOCKED, "mm2", advice)
+        if whole is not None and silicone:
+            part = f"{whole.volume():.3g} mm3 of the silicone"
+            yield _out_of_order(f"pour {step.index}: {part} stay", "no part that is taken out holds them")
         yield from _left(moulds, step, after, there, cast=bool(silicone))
+
+
+def _parted(moulds: MouldSet, silicone: Manifold, removal: Removal) -> tuple[Manifold, Manifold]:
+    """Return the part of the silicone that a removal takes, and what is left of it."""
+    if removal.within is None:
+        return silicone, Manifold()
+    part, rest = silicone.split(moulds.mesh_of(removal.within))
+    return part, rest
 
 
 def _areas(piece: np.ndarray, others: list[tuple[str, np.ndarray]]) -> list[tuple[float, str]]:
@@ -88,15 +110,18 @@ def _left(
 ) -> Iterator[MouldFinding]:
     """Yield a finding for every piece that the order leaves where the next pour, or the unit, can't have it.
 
-    `cast`: the silicone is still there. It must be for the next pour; after the last, it is peeled off what stays.
+    `cast`: the silicone is still there. It must be for a next pour that is cast on it, and gone before one that it is
+    laid into; after the last, it is peeled off what stays.
     """
     for name in there if after or cast else ():
         if moulds.plan.tool(name).removal and name not in (after.tools if after else ()):
             then = f"pour {after.index} has no place for it" if after else "it holds the unit"
             yield _out_of_order(f"pour {step.index}: {name} stays", f"it is never taken away, and {then}")
-    if after and not cast:
-        why = f"pour {after.index} is cast on it"
-        yield _out_of_order(f"pour {step.index}: {CAST} out", why)
+    stays = after and (*step.earlier, *step.layer) == after.earlier
+    if after and stays and not cast:
+        yield _out_of_order(f"pour {step.index}: {CAST} out", f"pour {after.index} is cast on it")
+    if after and cast and not stays:
+        yield _out_of_order(f"pour {step.index}: {CAST} stays", f"pour {after.index} has it laid in elsewhere")
 
 
 def _out_of_order(where: str, why: str) -> MouldFinding:
@@ -168,12 +193,12 @@ def _in_the_way(piece: Manifold, stays: Manifold, direction: Way) -> bool:
 def _facing(solid: Manifold, direction: Way, upwards: bool) -> np.ndarray:
     """Return the triangles (n, 3, 3) that face along the direction (or against it), in a frame where it is +z."""
     vertices, faces = arrays(solid)
-    corners = (vertices @ _upright(direction).T)[faces]
+    corners = (vertices @ upright(direction).T)[faces]
     doubled = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return corners[doubled > 1e-9] if upwards else corners[doubled < -1e-9]
 
 
-def _upright(direction: Way) -> np.ndarray:
+def upright(direction: Way) -> np.ndarray:
     """Return a rotation that turns a direction to +z, by rows; for a signed axis it is exact."""
     up = np.asarray(direction, float) / math.hypot(*direction)
     across = np.cross(np.roll(np.eye(3)[np.argmax(np.abs(up))], 1), up)

@@ -19,7 +19,7 @@ from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
 from unitcad.moulds.cavities import united
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.moulds.pins import PIN_RADIUS
+from unitcad.moulds.pins import PIN_RADIUS, Pins
 from unitcad.shape import cylinder, moved
 from unitcad.shape.profile import GRID_PER_MM
 
@@ -37,20 +37,20 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     skirt, window = min(lengths.plinth_clearance_mm, lengths.seat_relief_mm), lengths.window_clearance_mm
     play = lengths.plinth_clearance_mm
     for step in moulds.plan.steps:
-        if step.cup not in solids:  # what stands alone slides on nothing
-            continue
+        base = solids[moulds.plan.base_of(step)]
+        if step.cup not in solids:
+            if step.lid and step.pins:
+                yield _on_pins(moulds, step.lid, solids[step.lid], base, step.pins)
+            continue  # what stands alone slides on nothing
         cup = solids[step.cup]
         beside = cup - moulds.rib_spaces
         if pins := moulds.plan.pins:
-            column = cylinder(PIN_RADIUS + play, 0, pins.height)
-            columns = united(moulds.meshes(moved(column, *at) for at in pins.places))
-            gap = _sideways(beside, solids["base"] ^ columns, play + 1)
-            yield at_least("C210", f"{step.cup} holes and pins", gap, pins.clearance * chord - GRID, "mm")
+            yield _on_pins(moulds, step.cup, beside, base, pins)
         else:
-            gap = beside.trim_by_plane((0, 0, -1), skirt).min_gap(solids["base"], skirt + 1)
+            gap = beside.trim_by_plane((0, 0, -1), skirt).min_gap(base, skirt + 1)
             yield at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm")
         if not moulds.plan.concentric:
-            gap = _sideways(beside, solids["base"], window + 1)
+            gap = _sideways(beside, base, window + 1)
             where = f"{step.cup} and what stands on the base"
             yield at_least("C210", where, gap, window * chord - GRID, "mm", KNIFE)
         for tongue in moulds.plan.standing(step, "tongue"):
@@ -61,9 +61,20 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             yield at_least("C210", f"{step.lid} skirt and {step.cup}", gap, play * chord - GRID, "mm")
 
 
-def _sideways(cup: Manifold, base: Manifold, most: float) -> float:
+def _on_pins(moulds: MouldSet, name: str, piece: Manifold, base: Manifold, pins: Pins) -> MouldFinding:
+    """Measure the gap between pins and the holes of the piece that they centre."""
+    play = pins.clearance
+    column = cylinder(PIN_RADIUS + play, pins.seat, pins.seat + pins.height)
+    wider = cylinder(pins.hole_radius + 1, pins.seat, pins.seat + pins.height)
+    columns, rooms = (united(moulds.meshes(moved(shape, *at) for at in pins.places)) for shape in (column, wider))
+    gap = _sideways(piece ^ rooms, base ^ columns, play + 1, pins.seat)
+    limit = play * math.cos(math.pi / moulds.segments) - GRID
+    return at_least("C210", f"{name} holes and pins", gap, limit, "mm")
+
+
+def _sideways(cup: Manifold, base: Manifold, most: float, seat: float = 0.0) -> float:
     """Return the least distance in any section above the seat, at most `most`, mm."""
-    heights = sorted({0.0, *(float(z) for solid in (cup, base) for z in arrays(solid)[0][:, 2] if z > 0)})
+    heights = sorted({seat, *(float(z) for solid in (cup, base) for z in arrays(solid)[0][:, 2] if z > seat)})
     gaps = [most]
     for below, above in pairwise(heights):
         sections = [solid.slice((below + above) / 2) for solid in (cup, base)]

@@ -12,6 +12,7 @@ from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_most
 from unitcad.moulds.congruence import MARGIN, column_round
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
 
 OVERLAP = 1e-6
 """Largest volume two pieces may share, mm3: what rounding leaves where faces touch."""
@@ -36,7 +37,6 @@ _There = Sequence[tuple[str, Sequence[Manifold]]]
 
 
 def _of_pours(moulds: MouldSet, of_unit: _Volumes) -> Iterator[MouldFinding]:
-    cast: list[tuple[str, list[Manifold]]] = []
     # A layer that is cast singly is the unit's own body: what it shares with another such layer is known.
     drawn = {body.name: (body.shape,) for body in moulds.unit}
     single = {step.name for step in moulds.plan.steps if step.layer == drawn.get(step.name)}
@@ -46,10 +46,19 @@ def _of_pours(moulds: MouldSet, of_unit: _Volumes) -> Iterator[MouldFinding]:
         cells = moulds.meshes(step.layer)
         alone = [(f"{step.name}.{i + 1}", [cell]) for i, cell in enumerate(cells)]
         yield from _findings(f"pour {step.index}", alone, volumes)
-        cast.append((step.name, cells))
+        cast = [*_earlier(moulds, step), (step.name, cells)]
         laid = [(body.name, [moulds.mesh(body)]) for body in step.inserts]
         tools = [(name, [moulds.pressed[name]]) for name in step.tools]
         yield from _findings(f"pour {step.index}", [*tools, *cast, *laid], volumes)
+
+
+def _earlier(moulds: MouldSet, step: Step) -> Iterator[tuple[str, list[Manifold]]]:
+    """Yield the cured layers of a pour by name, where they lie in it: a layer that was laid in is another solid."""
+    start = 0
+    for before in moulds.plan.steps[: step.index - 1]:
+        there = step.earlier[start : start + len(before.layer)]
+        start += len(before.layer)
+        yield before.name if there == before.layer else f"{before.name} laid in", moulds.meshes(there)
 
 
 def _surroundings(moulds: MouldSet) -> dict[int, Hashable]:

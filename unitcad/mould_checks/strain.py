@@ -9,19 +9,26 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
+import numpy as np
 from manifold3d import CrossSection, Manifold
 
 from unitcad import catalogue
 from unitcad.designs.stretch import allowed_strain, tail_strain
 from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
+from unitcad.mould_checks.draw import upright
 from unitcad.mould_checks.finding import MouldFinding, at_most
 from unitcad.moulds.cavities import united
 from unitcad.moulds.congruence import once_each
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Step
+from unitcad.moulds.removal import CAST, Way
 from unitcad.spec import Spec
 
+FOOT = 1e-3
+"""How far over its lowest point the foot of a part that is peeled off is looked at, mm."""
 TOUCHING = 1e-6
 """Area of silicone over the core, mm2, up to which nothing has to stretch: rounding where walls mate."""
 SLIVER = 1e-3
@@ -41,15 +48,20 @@ class Strain:
 
 
 def strains(moulds: MouldSet) -> list[Strain]:
-    """Return the strains that the geometry asks for: each unit's peel off its core along +z, the tail's way out."""
+    """Return the strains that the geometry asks for: each unit's peel off its core, the tail's way out."""
     needed = []
-    pulled = peel(moulds)
-    judged = once_each(moulds.cells, lambda i: peel_strain(united(pulled[i][0]), pulled[i][1]))
-    for i, (_, (strain, z, room)) in enumerate(judged):
-        where = "peel off the core" + (f", cell {i + 1}" if len(pulled) > 1 else "")
-        if strain > 0:
-            where += f", at z = {z:.3g} mm"
-        needed.append(Strain(where, 100 * strain, z, room))
+    for step in moulds.plan.steps:
+        last = step is moulds.plan.steps[-1]
+        if not last and not any(removal.piece == CAST for removal in step.removals):
+            continue
+        pulled = peel(moulds, step)
+        judged = once_each(moulds.cells, lambda i, pulled=pulled: peel_strain(*pulled[i]))
+        for i, (_, (strain, z, room)) in enumerate(judged):
+            where = "" if last else f"pour {step.index}: "
+            where += "peel off the core" + (f", cell {i + 1}" if len(pulled) > 1 else "")
+            if strain > 0:
+                where += f", at z = {z:.3g} mm"
+            needed.append(Strain(where, 100 * strain, z, room))
     fpcb, slot = moulds.spec.fpcb, moulds.dimensions.exit
     if fpcb and slot:
         needed.append(Strain("tail through the slot", 100 * tail_strain(fpcb, slot)))
@@ -68,19 +80,43 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
     return strain_findings(moulds.spec, strains(moulds))
 
 
-def peel(moulds: MouldSet) -> list[tuple[list[Manifold], Manifold]]:
-    """Return for each cell what is pulled off at the end (all layers, bonded) and the base that stays.
+class Peel(NamedTuple):
+    """What is pulled off along +z, the base that stays, and the outline within which the base is in its way."""
 
-    Where one layer joins all cells, a cell's part is what lies within half the pitch of it.
+    body: Manifold
+    base: Manifold
+    outline: CrossSection
+
+
+def peel(moulds: MouldSet, step: Step) -> list[Peel]:
+    """Return for each cell what is pulled off after a pour (all layers, bonded), turned so that it leaves along +z.
+
+    Where one layer joins all cells, a cell's part is what lies within half the pitch of it, or what leaves in a way of
+    its own: the parts of cells are the first ones that are taken out.
     """
-    last, lay = moulds.plan.steps[-1], moulds.plan.layout
-    shapes, cells = (*last.earlier, *last.layer), len(lay.cells)
-    if len(last.layer) != cells:
-        whole, half = united(moulds.meshes(shapes)), lay.pitch / 2
-        _, _, low, _, _, high = whole.bounding_box()
-        column = Manifold.cube((2 * half, 2 * half, high - low)).translate((-half, -half, low))
-        return [([whole ^ column.translate((c.x, c.y, 0))], moulds.solids["base"]) for c in lay.cells]
-    return [(moulds.meshes(shapes[i::cells]), moulds.solids["base"]) for i in range(cells)]
+    lay, base = moulds.plan.layout, moulds.solids[moulds.plan.base_of(step)]
+    shapes, cells = (*step.earlier, *step.layer), len(lay.cells)
+    parts = [(removal.within, removal.direction) for removal in step.removals if removal.piece == CAST]
+    ways = [(within, way) for within, way in parts if within]
+    if len(step.layer) == cells and not ways:
+        bodies = [united(moulds.meshes(shapes[i::cells])) for i in range(cells)]
+        return [Peel(body, base, body.project().hull()) for body in bodies]
+    whole = united(moulds.meshes(shapes))
+    if ways:
+        return [_turned(whole ^ moulds.mesh_of(within), base, way) for within, way in ways[:cells]]
+    half = lay.pitch / 2
+    _, _, low, _, _, high = whole.bounding_box()
+    column = Manifold.cube((2 * half, 2 * half, high - low)).translate((-half, -half, low))
+    bodies = [whole ^ column.translate((c.x, c.y, 0)) for c in lay.cells]
+    return [Peel(body, base, body.project().hull()) for body in bodies]
+
+
+def _turned(part: Manifold, base: Manifold, direction: Way) -> Peel:
+    """Return a part that leaves along a direction. The base is in its way within its foot: beside it lies the sheet."""
+    turn = np.column_stack([upright(direction), np.zeros(3)])
+    body = part.transform(turn)
+    foot = body.slice(body.bounding_box()[2] + FOOT)
+    return Peel(body, base.transform(turn), foot.hull())
 
 
 def _advice(strain: Strain, limit: float) -> str:
@@ -90,12 +126,11 @@ def _advice(strain: Strain, limit: float) -> str:
     return f"make what the core carries above z = {strain.z:.3g} mm no more than {largest:.3g} mm round (convex hull)"
 
 
-def peel_strain(body: Manifold, base: Manifold) -> tuple[float, float, float]:
+def peel_strain(body: Manifold, base: Manifold, outline: CrossSection) -> tuple[float, float, float]:
     """Return (largest hoop strain of `body` pulled up off `base`, height there in mm, perimeter of its hole there, mm).
 
-    At each height the hole in the body must pass whatever the base carries above it, within the body's outline.
+    At each height the hole in the body must pass whatever the base carries above it, within the outline.
     """
-    outline = body.project().hull()
     x0, y0, low, x1, y1, high = body.bounding_box()
     base = base ^ Manifold.cube((x1 - x0, y1 - y0, high - low)).translate((x0, y0, low))
     heights = sorted({float(z) for solid in (body, base) for z in arrays(solid)[0][:, 2]})

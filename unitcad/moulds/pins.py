@@ -25,11 +25,12 @@ DEEPER = 0.4
 
 @dataclass(frozen=True)
 class Pins:
-    """Pins at `places` (x, y), all of one `height` over the seat, in holes wider by `clearance` all round (mm)."""
+    """Pins at `places` (x, y), all of one `height` over the `seat`, in holes wider by `clearance` all round (mm)."""
 
     places: tuple[tuple[float, float], ...]
     height: float
     clearance: float
+    seat: float = 0.0
 
     @property
     def hole_radius(self) -> float:
@@ -41,7 +42,7 @@ def standing_pins(pins: Pins) -> list[Shape]:
     """Draw the pins, sunk into the base."""
     r, h = PIN_RADIUS, pins.height
     drawn = Revolve(polygon((0, -BEYOND), (r, -BEYOND), (r, h - CHAMFER), (r - CHAMFER, h), (0, h)))
-    return [moved(drawn, x, y) for x, y in pins.places]
+    return [moved(drawn, x, y, pins.seat) for x, y in pins.places]
 
 
 def pin_holes(pins: Pins) -> list[Shape]:
@@ -49,4 +50,4 @@ def pin_holes(pins: Pins) -> list[Shape]:
     r, h = pins.hole_radius, pins.height + DEEPER
     wide = r + CHAMFER + BEYOND
     drawn = Revolve(polygon((0, -BEYOND), (wide, -BEYOND), (r, CHAMFER), (r, h), (0, h)))
-    return [moved(drawn, x, y) for x, y in pins.places]
+    return [moved(drawn, x, y, pins.seat) for x, y in pins.places]

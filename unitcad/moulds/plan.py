@@ -24,11 +24,13 @@ from unitcad.spec import Spec
 class Step:
     """One pour: the layer it casts, the tools that stand around it (by name), and what is there already.
 
-    `layer` is the cast layer in the frame of the tools, one solid a cell; `earlier` the cured ones; `seals` what
-    silicone is kept from though no tool fills it; `channels` the silicone in sprue and vents, as many a cell.
+    `layer` is the cast layer in the frame of the tools, one solid a cell; `earlier` the cured ones, where they were
+    cast or, taken out since, where they are laid in; `seals` what silicone is kept from though no tool fills it;
+    `channels` the silicone in sprue and vents, as many a cell.
     `inserts` are motor and circuit where they are laid in before this pour, or lie there already: of all cells.
     `rim` is z of the plane that the blade runs on, `top` where the silicone is open: the rim or the lid's upper face.
     `windows` counts the cup's passages for tongues that are closed all round; `groove`: it has an overflow groove.
+    `pins` centre the pour's lid on its base, where no cup does.
     `removals` are what is taken away once the layer has cured, in that order; what is left stands in the next pour.
     """
 
@@ -45,6 +47,7 @@ class Step:
     windows: int = 0
     groove: bool = True
     inserts: tuple[Body, ...] = ()
+    pins: Pins | None = None
     removals: tuple[Removal, ...] = ()
 
     def __repr__(self) -> str:
@@ -103,6 +106,10 @@ class Plan:
     def walled(self, step: Step) -> str:
         """Return the name of the piece that has a pour's wall and rim: its cup, else the piece that stays."""
         return (self.standing(step, "cup") or self.standing(step, "base"))[0].name
+
+    def base_of(self, step: Step) -> str:
+        """Return the name of the base that a pour stands on."""
+        return self.standing(step, "base")[0].name
 
     def of_kind(self, kind: Kind) -> tuple[Body, ...]:
         """Return the tools of a kind."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from unitcad.shape import Shape
 from unitcad.shape.body import Body
 
 CAST = "cast"
@@ -15,10 +16,16 @@ Way = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Removal:
-    """One movement: a tool's name, or `CAST`, and the direction in which it is taken away."""
+    """One movement: a tool's name, or `CAST`, and the direction in which it is taken away.
+
+    Silicone bends, so its parts may leave in ways of their own: `part` names one, `within` is the space that it fills;
+    None is all that is still there.
+    """
 
     piece: str
     direction: Way
+    part: str = ""
+    within: Shape | None = None
 
 
 def customary(standing: Sequence[Body], *, last: bool) -> Iterator[Removal]:
