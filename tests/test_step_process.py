@@ -15,9 +15,10 @@ import pytest
 
 pytest.importorskip("OCP")
 
+from unitcad.children import Lost
 from unitcad.errors import UnitcadError
 from unitcad.export import step
-from unitcad.export.step_process import Lost, StepProcess
+from unitcad.export.step_process import StepProcess
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.build import build
 from unitcad.shape import Revolve, Union, cylinder, polygon, turned
@@ -28,8 +29,8 @@ def test_files_come_in_the_order_of_asking_and_with_the_same_bytes_as_here() -> 
     bodies = MouldSet(load("single-embedded")).unit
     with StepProcess() as process:
         first, second = process.ask(bodies, "unit"), process.ask(bodies[:1], "layer")
-        assert second.result() == step.content(bodies[:1], "layer")
-        assert first.result() == step.content(bodies, "unit")
+        assert second() == step.content(bodies[:1], "layer")
+        assert first() == step.content(bodies, "unit")
 
 
 def test_what_fails_there_is_the_same_error_here_and_the_process_goes_on() -> None:
@@ -39,15 +40,15 @@ def test_what_fails_there_is_the_same_error_here_and_the_process_goes_on() -> No
     with StepProcess() as process:
         wrong, sound = process.ask([replace(bodies[0], shape=shape)], "wrong"), process.ask(bodies, "layer")
         with pytest.raises(UnitcadError, match="OCCT and manifold3d differ: 1 solids"):
-            wrong.result()
-        assert sound.result() == step.content(bodies, "layer")
+            wrong()
+        assert sound() == step.content(bodies, "layer")
 
 
 def test_who_asks_a_process_that_has_ended_is_told() -> None:
     with StepProcess() as process:
         os.kill(process._child.pid, signal.SIGKILL)
         with pytest.raises(Lost):
-            process.ask(MouldSet(load("single-embedded")).unit, "unit").result()
+            process.ask(MouldSet(load("single-embedded")).unit, "unit")()
 
 
 def test_a_build_whose_process_is_lost_writes_its_step_itself(tmp_path: Path) -> None:

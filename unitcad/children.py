@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import contextlib
 import os
+import pickle
 import shutil
 import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Mapping, Sequence
-from typing import IO
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import IO, TYPE_CHECKING, Any, Self
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 STAGES = "UNITCAD_STAGES"
 """Environment variable: the text with which a command begins a line on standard error for each stage of its work."""
@@ -105,6 +109,71 @@ def message_pipes() -> tuple[IO[bytes], IO[bytes]]:
     os.close(nothing)
     os.dup2(2, 1)
     return messages, answers
+
+
+class Lost(Exception):
+    """A process that ended before it answered."""
+
+
+class Answering:
+    """A Python process that answers requests in the order of asking, and ends with the block. See `answer_requests`."""
+
+    def __init__(self, module: str) -> None:
+        from concurrent.futures import ThreadPoolExecutor
+
+        self._child = subprocess.Popen(
+            [sys.executable, "-P", "-m", module],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,  # a signal from a terminal reaches the caller alone
+        )
+        self._thread = ThreadPoolExecutor(1)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self._child.kill()  # it holds nothing that must be written
+        self._thread.shutdown(cancel_futures=True)
+        with contextlib.suppress(BrokenPipeError):
+            self._child.__exit__(None, None, None)
+
+    def answer(self, request: object) -> Future[Any]:
+        """Return the answer to come, which may be cancelled until the request is sent.
+
+        Its result raises Lost where the process ended first.
+        """
+        return self._thread.submit(self._answered, pickle.dumps(request))
+
+    def _answered(self, request: bytes) -> Any:
+        assert self._child.stdin is not None
+        assert self._child.stdout is not None
+        try:
+            self._child.stdin.write(request)
+            self._child.stdin.flush()
+            return pickle.load(self._child.stdout)
+        except (OSError, ValueError, EOFError, pickle.UnpicklingError) as error:
+            raise Lost from error
+
+
+def several_cores() -> bool:
+    """Tell whether a second process can run beside this one."""
+    return (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1) > 1
+
+
+def answer_requests(begin: Callable[[], Callable[[Any], object]]) -> None:
+    """Answer what `Answering.answer` sends to this process until no more comes, by the function that `begin` loads."""
+    end_with_parent()
+    requests, answers = message_pipes()
+    answer = begin()
+    while True:
+        try:
+            request = pickle.load(requests)
+        except EOFError:
+            return
+        pickle.dump(answer(request), answers)
+        answers.flush()
 
 
 def _write(pipe, content: bytes) -> None:

@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 from unitcad.accuracy.result import Plot, Result, markdown
 from unitcad.attenuation.curve import NO_RATIO
 from unitcad.attenuation.edge.closed_form import Section, Units
-from unitcad.attenuation.edge.estimates import SIDEWAYS_FORM, summary
+from unitcad.attenuation.edge.estimate_summary import summary
+from unitcad.attenuation.edge.estimates import SIDEWAYS_FORM
 from unitcad.attenuation.edge.fitted_models import edge_levels
 from unitcad.attenuation.edge.level import corners
 from unitcad.cli import app

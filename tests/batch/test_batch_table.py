@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from batching import bytes_of, unitcad
 
-from unitcad.attenuation.edge.estimates import summary
+from unitcad.attenuation.edge.estimate_summary import summary
 from unitcad.batch import BatchOptions, estimate_table
 from unitcad.batch.sweep import Sweep, from_file
 from unitcad.errors import Refusal, UnitcadError

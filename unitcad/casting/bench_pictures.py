@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
@@ -24,8 +24,8 @@ _GAP = 9.0
 _Solid = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
 
 
-def pictures(moulds: MouldSet) -> dict[str, bytes]:
-    """Return the PNG of every view of a set's procedure by its path in the result's folder."""
+def pictures(moulds: MouldSet, names: Collection[str] | None = None) -> dict[str, bytes]:
+    """Return the PNG of every view of a set's procedure, or of `names`, by its path in the result's folder."""
     shown = views(moulds)
     solids: dict[object, list[_Solid]] = {}
     for view in shown.values():
@@ -38,11 +38,14 @@ def pictures(moulds: MouldSet) -> dict[str, bytes]:
                 solids[extra] = [(*_mesh(moulds, extra.shape), extra.colour)]
         if view.syringe_on is not None and view.syringe_on not in solids:
             solids[view.syringe_on] = [(*_mesh(moulds, _syringe(moulds, view.syringe_on)), TOOL)]
-    return {picture_path(name): content for name, content in _drawn(moulds, shown, solids)}
+    drawn = _drawn(moulds, shown, solids, shown.keys() if names is None else names)
+    return {picture_path(name): content for name, content in drawn}
 
 
-def _drawn(moulds: MouldSet, shown: dict[str, View], solids: dict[object, list[_Solid]]) -> Iterable[tuple[str, bytes]]:
-    for group in dict.fromkeys((view.group, view.eye) for view in shown.values()):
+def _drawn(
+    moulds: MouldSet, shown: dict[str, View], solids: dict[object, list[_Solid]], names: Collection[str]
+) -> Iterable[tuple[str, bytes]]:
+    for group in dict.fromkeys((shown[name].group, shown[name].eye) for name in shown if name in names):
         own = {name: view for name, view in shown.items() if (view.group, view.eye) == group}
         keys = {name: list(_keys(view)) for name, view in own.items()}
         placed = {key: solids[key] for each in keys.values() for key in each}
@@ -50,10 +53,14 @@ def _drawn(moulds: MouldSet, shown: dict[str, View], solids: dict[object, list[_
             placed = _laid_out(placed)
         points = np.concatenate([vertices for each in placed.values() for vertices, _, _ in each])
         camera = composite.view(group[1], points, SIZE)
-        bodies = {key: [composite.drawn(*solid, camera) for solid in each] for key, each in placed.items()}
-        for name, each in keys.items():
-            names = _piece_names(moulds, placed) if group[0] == "pieces" else own[name].names
-            yield name, composite.together([body for key in each for body in bodies[key]], camera, names)
+        wanted = {name: each for name, each in keys.items() if name in names}
+        bodies = {
+            key: [composite.drawn(*solid, camera) for solid in placed[key]]
+            for key in dict.fromkeys(key for each in wanted.values() for key in each)
+        }
+        for name, each in wanted.items():
+            written = _piece_names(moulds, placed) if group[0] == "pieces" else own[name].names
+            yield name, composite.together([body for key in each for body in bodies[key]], camera, written)
 
 
 def _piece_names(moulds: MouldSet, placed: dict[object, list[_Solid]]) -> list[Name]:

@@ -29,6 +29,7 @@ from unitcad.cli.shared_options import (
 
 if TYPE_CHECKING:
     from unitcad.export.step_process import StepProcess
+    from unitcad.pipeline.beside import Beside
     from unitcad.pipeline.build import Built
     from unitcad.pipeline.manifest_records import Manifest
     from unitcad.pipeline.subjects import Made
@@ -107,7 +108,7 @@ def _built(
     from unitcad.pipeline.subjects import subject_of, unit_of
     from unitcad.validation import load
 
-    with _step_process(only, formats) as step:
+    with _step_process(only, formats) as step, _beside(only) as beside:
         changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
         allow_code(code)
         # Every spec is validated before the first one is built.
@@ -124,7 +125,7 @@ def _built(
         for i, spec in enumerate(wanted):
             run = partial(build_array, spec) if isinstance(spec, Array) else partial(build_spec, spec)
             with progress(spec.name) as say:
-                made = partial(run, out, only=chosen, check=not no_check, say=say, step=step)
+                made = partial(run, out, only=chosen, check=not no_check, say=say, step=step, beside=beside)
                 if slicing:
                     with begin(unit_of(spec), out / subject_of(spec).folder_name, say) as pieces:
                         results.append(made(take=take(pieces)))
@@ -156,6 +157,15 @@ def _step_process(only: str | None, formats: str | None) -> AbstractContextManag
     drawn = only is None or {"unit", "moulds"} & set(listed(only))
     asked = drawn and (formats is None or "step" in listed(formats))
     return StepProcess() if asked and worthwhile() else nullcontext()
+
+
+def _beside(only: str | None) -> AbstractContextManager[Beside | None]:
+    """Return a process for estimate and pictures, begun before anything else; None where it has nothing beside it."""
+    from unitcad.children import several_cores
+    from unitcad.pipeline.beside import Beside
+
+    asked = only is None or ({"estimate", "casting"} & set(listed(only)) and len(listed(only)) > 1)
+    return Beside() if asked and several_cores() else nullcontext()
 
 
 def _summary(of: Made, built: Built) -> Iterator[str]:

@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-import pickle
+from collections.abc import Callable, Sequence
 
-from unitcad.children import end_with_parent, message_pipes
+from unitcad.children import answer_requests
 from unitcad.errors import UnitcadError
+from unitcad.shape.body import Body
 
 
-def main() -> None:
-    """Answer each (bodies, name) with the file, or with the sentence of an error, until there are no more requests."""
-    end_with_parent()
-    requests, answers = message_pipes()
+def begin() -> Callable[[tuple[Sequence[Body], str]], bytes | str]:
+    """Load OCCT; return what answers (bodies, name) with the file, or with the sentence of an error."""
     from unitcad.export import step
 
-    while True:
+    def answer(asked: tuple[Sequence[Body], str]) -> bytes | str:
         try:
-            bodies, name = pickle.load(requests)
-        except EOFError:
-            return
-        try:
-            answer = step.content(bodies, name)
+            return step.content(*asked)
         except UnitcadError as error:
-            answer = str(error)
-        pickle.dump(answer, answers)
-        answers.flush()
+            return str(error)
+
+    return answer
 
 
 if __name__ == "__main__":
-    main()
+    answer_requests(begin)

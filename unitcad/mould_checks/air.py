@@ -103,7 +103,8 @@ class _Boundary:
     @classmethod
     def of(cls, solid: Manifold) -> _Boundary:
         vertices, faces = arrays(solid)
-        edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges = np.stack(np.divmod(np.unique(sides[:, 0] * len(vertices) + sides[:, 1]), len(vertices)), axis=1)
         corners = vertices[faces]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

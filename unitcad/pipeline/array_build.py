@@ -18,6 +18,7 @@ from unitcad.pipeline.stages import Say, Stages, Take
 
 if TYPE_CHECKING:
     from unitcad.export.step_process import StepProcess
+    from unitcad.pipeline.beside import Beside
 
 
 def build_array(
@@ -29,6 +30,7 @@ def build_array(
     say: Say = lambda message: None,
     take: Take | None = None,
     step: StepProcess | None = None,
+    beside: Beside | None = None,
     store: Store | None = None,
 ) -> Built:
     """Build an array into `out`/<slug>-<hash12>: units, patch, tools, circuit, crosstalk and procedure.
@@ -44,7 +46,7 @@ def build_array(
         array.unit.output.formats,
         check,
         lambda formats, outputs, checked: partial(make_array, with_formats(array, formats), outputs, checked),
-        Stages(say, take, step),
+        Stages(say, take, step, beside),
         store,
     )
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -105,7 +106,7 @@ def _unit(array: Array, unit: Spec, only: Sequence[str], check: bool, store: Sto
     """Return a unit's own result; where it is cast with the sheet, without moulds and casting."""
     apart = constructions()[array.construction].own_tails
     wanted = [name for name in only if apart or name not in ("moulds", "casting")] or ["unit"]
-    of_unit = Stages(lambda stage: stages.say(f"unit: {stage}"), None, stages.step, stages.seconds)
+    of_unit = replace(stages, say=lambda stage: stages.say(f"unit: {stage}"), take=None)
     return make(unit, wanted, check, store, of_unit)
 
 

@@ -29,11 +29,12 @@ from unitcad.pipeline.bodies import (
 from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.shape.body import Body
-from unitcad.spec import to_toml
+from unitcad.spec import Spec, to_toml
 from unitcad.spec.asked import Format
 
 if TYPE_CHECKING:
     from unitcad.export.step_process import StepProcess
+    from unitcad.pipeline.beside import Beside
 
 Output = Literal["unit", "moulds", "estimate", "casting"]
 OUTPUTS: tuple[Output, ...] = ("unit", "moulds", "estimate", "casting")
@@ -41,7 +42,8 @@ FORMATS: tuple[Format, ...] = ("step", "stl", "3mf", "svg", "png", "glb")
 GEOMETRIC: tuple[Output, ...] = ("unit", "moulds", "casting")
 """The outputs that read the geometry; of the casting, the drawings of the assembled pours."""
 CASTING = ("bom.csv", "casting.json", "casting.md")
-STAGES = ("meshes", "drawing", "step pictures", "step", "pictures")
+PROCEDURE = "step pictures"
+STAGES = ("meshes", "drawing", PROCEDURE, "step", "pictures")
 """In what order shared files are made."""
 
 
@@ -61,9 +63,13 @@ class Artifact:
     bodies: tuple[str, ...] = ()
 
 
-def shared(moulds: MouldSet, only: Sequence[str], forms: Sequence[str]) -> list[Artifact]:
-    """Return the files of a blank geometry that outputs `only` and formats `forms` ask for, in the order of STAGES."""
-    table = [*_of_bodies(moulds, only), *_drawings(moulds, only), *(_pictures(moulds, only) if "png" in forms else ())]
+def shared(moulds: MouldSet, only: Sequence[str], forms: Sequence[str], beside: Beside | None = None) -> list[Artifact]:
+    """Return the files of a blank geometry that outputs `only` and formats `forms` ask for, in the order of STAGES.
+
+    `beside` is asked for the pictures of the procedure at once.
+    """
+    shaded = _pictures(moulds, only) if "png" in forms else ()
+    table = [*_of_bodies(moulds, only), *_drawings(moulds, only, beside), *shaded]
     asked = (artifact for artifact in table if artifact.form in ("", *forms))
     return sorted(asked, key=lambda artifact: STAGES.index(artifact.stage))
 
@@ -94,7 +100,7 @@ def _of_bodies(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
         yield Artifact(f"{together}.step", "step", "step", step, key, names)
 
 
-def _drawings(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
+def _drawings(moulds: MouldSet, only: Sequence[str], beside: Beside | None) -> Iterator[Artifact]:
     if "unit" in only:
         from unitcad.export import svg
 
@@ -112,10 +118,12 @@ def _drawings(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
             key = partial(geometry_key, moulds, f"section of pour {step.index}")
             drawing = partial(step_section, moulds, step)
             yield Artifact(f"step{step.index}-section.svg", "", "drawing", lambda draw=drawing: draw().encode(), key)
-        together = cache(lambda: pictures(moulds))
-        for path in map(picture_path, views(moulds)):
+        names = [*views(moulds)]
+        here = partial(pictures, moulds)
+        together = cache(beside.pictures(moulds, names, here) if beside else here)
+        for path in map(picture_path, names):
             key = partial(geometry_key, moulds, path)
-            yield Artifact(path, "", "step pictures", lambda path=path: together()[path], key)
+            yield Artifact(path, "", PROCEDURE, lambda path=path: together()[path], key)
 
 
 def _pictures(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
@@ -161,6 +169,10 @@ def own(
 
 def estimated(moulds: MouldSet, store: Store) -> dict[str, Any]:
     """Return the estimate of a variant. The layered solver's part reads no silicone: the store shares it."""
+    return moulds.once("estimate", lambda: _estimated(moulds.spec, store))
+
+
+def _estimated(spec: Spec, store: Store) -> dict[str, Any]:
     from unitcad.attenuation.curve import layered_block
     from unitcad.attenuation.edge.estimates import rounded
     from unitcad.attenuation.inputs import EstimateInput
@@ -171,7 +183,7 @@ def estimated(moulds: MouldSet, store: Store) -> dict[str, Any]:
         key = digest(repr((reads, code_version())).encode())
         return store.data(key, lambda: rounded(layered_block(asked)))
 
-    return moulds.once("estimate", lambda: estimate_spec(moulds.spec, layered=layered))
+    return estimate_spec(spec, layered=layered)
 
 
 def _casting(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> dict[str, bytes]:

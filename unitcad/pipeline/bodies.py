@@ -106,13 +106,13 @@ def step_asked(bodies: Sequence[Body], name: str, process: StepProcess | None) -
     """Ask a process for the STEP of an assembly at once; return what gives it, made here where the process is lost."""
     if process is None:
         return partial(step_content, bodies, name)
-    from unitcad.export.step_process import Lost
+    from unitcad.children import Lost
 
     asked = process.ask(bodies, name)
 
     def made() -> bytes:
         try:
-            return asked.result()
+            return asked()
         except Lost:
             return step_content(bodies, name)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +24,7 @@ from unitcad.spec.asked import Format
 
 if TYPE_CHECKING:
     from unitcad.export.step_process import StepProcess
+    from unitcad.pipeline.beside import Beside
 
 Maker = Callable[[Store, Stages], Product]
 """Makes a product whole, nothing written yet."""
@@ -53,13 +54,15 @@ def build(
     say: Say = lambda message: None,
     take: Take | None = None,
     step: StepProcess | None = None,
+    beside: Beside | None = None,
     store: Store | None = None,
 ) -> Built:
     """Build a spec's variant into `out`/<slug>-<hash12>.
 
     `only` is a choice of OUTPUTS; without `check` mould checks and mesh checks are left out. Formats and outputs that
     the folder has from before are made again beside the new ones. What others have made already comes out of `store`;
-    `take` gets what is made anew, while the rest is still being made. `step` writes STEP files beside the rest.
+    `take` gets what is made anew, while the rest is still being made. `step` writes STEP files beside the
+    rest, `beside` makes estimate and pictures of the procedure.
     Raises Refusal or UnitcadError before anything is written; a failed check is no exception, see `Built.ok`.
     """
     return build_subject(
@@ -69,7 +72,7 @@ def build(
         spec.output.formats,
         check,
         lambda formats, outputs, checked: partial(make, with_formats(spec, formats), outputs, checked),
-        Stages(say, take, step),
+        Stages(say, take, step, beside),
         store,
     )
 
@@ -125,7 +128,7 @@ def build_into(
     `wanted` shows the stages and takes the files. Raises _Changed where the folder is not `unchanged` any more.
     """
     for left in reversed(range(TRIES)):
-        stages, before = Stages(wanted.say, wanted.take, wanted.step), Counter(store.counts)
+        stages, before = replace(wanted, seconds={}), Counter(store.counts)
         try:
             product = maker(store, stages)
             timings = {

@@ -18,7 +18,7 @@ from unitcad.cache import Store, digest
 from unitcad.mould_checks.finding import FindingRecord
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import artifacts
-from unitcad.pipeline.artifacts import GEOMETRIC, Artifact, geometry_key
+from unitcad.pipeline.artifacts import GEOMETRIC, PROCEDURE, Artifact, geometry_key
 from unitcad.pipeline.bodies import body_key, groups, record
 from unitcad.pipeline.manifest_records import BodyFile, MeshFinding, MeshFindings, PartRecord, PourRecord
 from unitcad.pipeline.stages import Stages
@@ -79,7 +79,7 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, stag
     with stages("plan"):
         bodies = [body for group in groups(moulds, only) for body in group.bodies]
         label = moulds.plan.label if pours else None
-        table = artifacts.shared(moulds, only, forms)
+        table = artifacts.shared(moulds, only, forms, stages.beside)
         steps = artifacts.begun([artifact for artifact in table if artifact.form == "step"], moulds, only, stages.step)
     parts: dict[str, PartRecord] = {}
     with stages("meshes"):
@@ -97,12 +97,13 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, stag
             for name in artifact.bodies:
                 parts[name]["files"][artifact.form] = BodyFile(path=artifact.path, sha256=files[artifact.path])
 
-    put([artifact for artifact in table if artifact.form != "step"])
+    later = [artifact for artifact in table if artifact.stage == PROCEDURE]
+    put([artifact for artifact in table if artifact.form != "step" and artifact not in later])
     with stages("mould checks"):
         findings, strains = _mould_findings(moulds, only, store) if check else ([], [])
     with stages("check"):
         mesh_findings = _mesh_findings(moulds, parts, store) if check else []
-    put(steps)
+    put([*later, *steps])
     return {
         "label": label,
         "air_ring_mm": round(moulds.dimensions.air_ring, 9),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -51,13 +52,15 @@ class Product:
 def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
     """Return everything asked for of a spec, nothing written yet. Raises Refusal where the moulds can't be made."""
     moulds, possible = MouldSet(spec), possible_outputs(spec, only)
-    if "estimate" in possible and stages.step:  # while the other process loads OCCT
-        with stages("estimate"):
-            artifacts.estimated(moulds, store)
+    beside = stages.beside if "estimate" in possible else None
+    estimate = beside.estimate(spec, partial(artifacts.estimated, moulds, store)) if beside else None
     shape = geometry(moulds, possible, check, store, stages)
     drawn, no_pictures = _pictures(moulds, possible, store, stages)
     shared = {**shape["files"], **drawn}
     volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
+    if estimate:
+        with stages("estimate"):
+            moulds.once("estimate", estimate)
     own: dict[str, bytes] = {}
     for artifact in artifacts.own(moulds, possible, volumes, printed_mm3(shape["parts"]), store):
         with stages(artifact.stage):
@@ -142,7 +145,7 @@ def mould_findings(spec: Spec, shape: Geometry) -> list[FindingRecord]:
 
 
 def _estimate(moulds: MouldSet, store: Store) -> EstimateSummary:
-    from unitcad.attenuation.edge.estimates import summary
+    from unitcad.attenuation.edge.estimate_summary import summary
 
     return EstimateSummary(**summary(artifacts.estimated(moulds, store)))
 
