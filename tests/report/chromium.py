@@ -92,13 +92,16 @@ class Visit:
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     def overflowing(self) -> list[str]:
-        """What reaches past the window's right edge and is in no part that scrolls by itself."""
+        """What reaches past the right edge of the window, its section or its cell, and is in no part that scrolls."""
         return self.page.evaluate(
             """() => {
               const found = document.documentElement.scrollWidth > innerWidth ? ["the page"] : [];
               for (const node of document.body.querySelectorAll("*")) {
-                if (node.closest(".scroll, nav, .plot, script, style") || !node.checkVisibility()) continue;
-                if (node.getBoundingClientRect().right > innerWidth + 0.5) found.push(node.outerHTML.slice(0, 90));
+                const scrolls = node.closest(".scroll, nav, .plot, svg, .hidden, script, style");
+                if (scrolls || !node.checkVisibility()) continue;
+                const column = node.parentElement.closest("section, dd, .field, #page > *") || document.body;
+                const edge = Math.min(innerWidth, column.getBoundingClientRect().right || innerWidth);
+                if (node.getBoundingClientRect().right > edge + 0.5) found.push(node.outerHTML.slice(0, 90));
               }
               return found;
             }"""

@@ -136,10 +136,13 @@ def test_the_inputs_that_a_model_sees(visit: Visit, estimate: dict[str, Any]) ->
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_nothing_of_it_overflows_at_390_pixels(running: Any, solved: Path, dark: bool) -> None:
+def test_nothing_of_it_is_wider_than_its_column(running: Any, solved: Path, dark: bool) -> None:
     seen = Visit(running, solved / "report.html", width=390, height=844, dark=dark)
     seen.page.evaluate(OPEN)
-    assert seen.overflowing() == []
+    for width in (768, 1280, 1920, 390):
+        seen.page.set_viewport_size({"width": width, "height": 844})
+        seen.page.wait_for_function("() => document.documentElement.scrollWidth <= innerWidth")  # plots follow
+        assert seen.overflowing() == [], width
     text = seen.page.eval_on_selector("#estimate .ranges .value", "(node) => getComputedStyle(node).color")
     behind = seen.page.eval_on_selector("body", "(node) => getComputedStyle(node).backgroundColor")
     bright = [sum(int(part) for part in rgb.removeprefix("rgb(").rstrip(")").split(",")) for rgb in (text, behind)]

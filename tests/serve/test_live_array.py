@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import base64
+import json
 import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -58,6 +60,45 @@ def test_a_pitch_that_is_too_small_gets_the_nearest_that_its_own_limits_accept(p
     assert below[0]["field"] == "layout.pitch_mm"
 
 
+def test_every_fault_of_an_array_is_told(pockets: Server) -> None:
+    wrong = {"sheet.thickness_mm": 0.1, "sheet.margin_mm": 0.2, "moulds.plate_mm": 0.001}
+    answer = pockets.ask(TEXT, "unit", [{"path": path, "value": value} for path, value in wrong.items()])
+    faults = {fault["field"]: fault for fault in answer["faults"]}
+    assert set(faults) == set(wrong)
+    lines = answer["text"].splitlines()
+    assert all(path.split(".")[1] in lines[faults[path]["line"] - 1] for path in wrong)
+    offered = [{"path": path, "value": fault["nearest"]} for path, fault in faults.items()]
+    assert "faults" not in pockets.ask(answer["text"], "unit", offered)
+
+
+def test_a_tail_that_a_pitch_leaves_no_way_is_refused_at_the_pitch(pockets: Server) -> None:
+    """Both values offered are accepted: that of the pitch, and that of the unit, whose template stays named."""
+    narrow = [{"path": "layout.pitch_mm", "value": 17.0}]
+    message = {"text": TEXT, "edits": narrow, "since": [{"path": "layout.pitch_mm", "value": 20.0}]}
+    fault = json.loads(pockets.send("/ask", message)[1])["faults"][0]
+    assert (fault["field"], fault["at"]) == ("unit.fpcb.tail_length_mm", "layout.pitch_mm")
+    assert "faults" not in pockets.ask(TEXT, "unit", [{"path": fault["at"], "value": fault["at_nearest"]}])
+    shorter = pockets.ask(TEXT, "unit", [*narrow, {"path": fault["field"], "value": fault["nearest"]}])
+    assert "faults" not in shorter
+    asked = tomllib.loads(shorter["text"])
+    assert asked["unit"] == {"like": "encapsulating", "fpcb": {"tail_length_mm": fault["nearest"]}}
+    assert asked["layout"] == tomllib.loads(TEXT)["layout"] | {"pitch_mm": 17.0}
+    assert "# a template, a spec file, or a table" in shorter["text"]
+
+
+@pytest.mark.parametrize("text", [TEXT, TEXT.replace("pitch_mm = 20.0", "pitch_mm = [20.0, 22.0]")])
+def test_pitch_and_counts_have_their_documented_ranges(pockets: Server, text: str) -> None:
+    fields = {one["path"]: one for group in pockets.ask(text)["groups"] for one in group["fields"]}
+    pitches = [one for path, one in fields.items() if path.startswith("layout.pitch_mm")]
+    assert len(pitches) == (2 if "[20.0" in text else 1)
+    assert all((one["kind"], one["low"], one["high"]) == ("number", 1, 1000) for one in pitches)
+    assert (fields["layout.columns"]["low"], fields["layout.columns"]["high"]) == (1, 100)
+    assert any(name == "fdm-0.4" for name, _ in fields["moulds.printer"]["choices"])
+    path = pitches[-1]["path"]
+    fault = pockets.ask(text, "unit", [{"path": path, "value": 1001.0}])["faults"][0]
+    assert (fault["field"], fault["nearest"]) == (path, 1000)
+
+
 @pytest.mark.parametrize(
     "unit",
     [
@@ -102,6 +143,15 @@ def test_a_patch_is_shown_and_changed(running: Any, pockets: Server) -> None:
     live.choose('input[name="sheet.margin_mm"]', "5")
     assert "sheet along x 80 mm" in live.page.inner_text("#figures")
     assert live.page.locator("#estimate img").first.get_attribute("src") != before
+    # The pitch has a slider that is followed while it is dragged, the number of columns one of whole numbers.
+    pitch = live.page.locator('.field[data-path="layout.pitch_mm"] input[type="range"]')
+    pitch.focus()
+    live.pressed(pitch, "ArrowRight")
+    assert live.page.input_value('input[name="layout.pitch_mm"]') == "20.1"
+    columns = live.page.locator('.field[data-path="layout.columns"] input[type="range"]')
+    columns.focus()
+    live.pressed(columns, "ArrowLeft")
+    assert "units 6" in live.page.inner_text("#figures")
     live.close()
 
 

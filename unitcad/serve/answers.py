@@ -19,8 +19,6 @@ from unitcad.serve.edits import edited
 from unitcad.serve.messages import Answer, Ask, Fault, Trusted
 from unitcad.serve.remedies import remedied
 from unitcad.spec import parse_toml
-from unitcad.validation.faults import line_of
-from unitcad.validation.load import all_faults
 
 
 def respond(message: bytes, trusted: bytes) -> bytes:
@@ -45,28 +43,22 @@ def answered(ask: Ask, trusted: Trusted) -> Answer:
     answer = Answer(text=text, layers=len(data["layers"]) if isinstance(data.get("layers"), list) else 0)
     kind = array_answers if is_array(data) else unit_answers
     subject: Any = None
+    whole: dict[str, Any] | None = None
     try:
+        whole = kind.with_files(data, trusted)
         subject = kind.settled(data, trusted)
         kind.ANSWERS[ask.what](subject, answer)
     except Refusal as error:
         answer.faults = [_fault(error)]
-        if subject is None:  # else it is what the moulds or the estimate met
-            answer.faults = _of_text(error, data, text, ask, trusted)
+        if subject is None and whole is not None:  # else it is what the moulds or the estimate met
+            every = [_fault(one) for one in kind.faults_of(error, whole, text)]
+            answer.faults = remedied(every, whole, ask.since, kind.judge)
     except UnitcadError as error:
         answer.faults = [_fault(error)]
     if ask.what == "unit":
         answer.groups = kind.form(data, subject)
         answer.spec = kind.as_data(subject) if subject else None
     return answer
-
-
-def _of_text(error: Refusal, data: dict[str, Any], text: str, ask: Ask, trusted: Trusted) -> list[Fault]:
-    """Return the faults of a text's values: of a unit's spec all of them with their remedies, of an array the first."""
-    if is_array(data):
-        error.line = line_of(text, error.field)
-        return [_fault(error)]
-    every = [_fault(one) for one in all_faults(error, data, text)]
-    return remedied(every, unit_answers.with_files(data, trusted), ask.since)
 
 
 def effective(text: bytes, trusted: bytes) -> bytes:

@@ -168,7 +168,15 @@ class Live:
             if not same:
                 raise Refusal("name", save.name, "is there already; replace it, or choose another name")
         write(path, content)
-        return msgspec.json.encode({"path": str(path), "sha256": hashlib.sha256(content).hexdigest()})
+        # Work in progress is saved too, and the page says that it is refused.
+        refused = None
+        try:
+            await self._effective(save.text)
+        except (UnitcadError, WorkerLost) as error:
+            refused = str(error)
+        return msgspec.json.encode(
+            {"path": str(path), "sha256": hashlib.sha256(content).hexdigest(), "refused": refused}
+        )
 
     async def build(self, request: Request) -> Response:
         """Start the full build of the text."""

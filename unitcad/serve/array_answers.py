@@ -9,31 +9,56 @@ from typing import Any
 from msgspec.structs import replace
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import array_of, expanded, to_toml
+from unitcad.arrays.array_file import array_of, array_templates, expanded, to_toml
 from unitcad.arrays.array_tables import AskedArray, BodyTable, CircuitTable, SheetTable
 from unitcad.arrays.layouts import layouts
 from unitcad.catalogue import materials
 from unitcad.errors import Refusal
-from unitcad.serve.form import LAST_TABLES, fields, table_groups
+from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
 from unitcad.serve.messages import Answer, Field, Group, Trusted
 from unitcad.serve.unit_answers import holds_code as unit_holds_code
 from unitcad.spec.custom_code import files_named
+from unitcad.spec.toml import read_toml
 from unitcad.text import number
 from unitcad.validation import templates
 from unitcad.validation.dotted import at
+from unitcad.validation.faults import every_fault, line_of
 
 as_toml = to_toml
 
 
+judge = array_of
+
+
 def settled(data: Mapping[str, Any], trusted: Trusted) -> Array:
     """Return the array of a text's plain data. Raises Refusal, also for a file that a page's text may not name."""
+    return array_of(with_files(data, trusted))
+
+
+def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
+    """Return plain data with the whole spec of each unit in it. Raises Refusal for a file that may not be named."""
     named = array_files(data)
     values = set(named.values())
     folders = [Path(source.folder) for source in trusted.sources if values <= set(source.named.values())]
     if named and not folders:
         field, value = next(iter(named.items()))
         raise Refusal(field, value, "a page's text names only files that the server's own array names")
-    return array_of(expanded(data, folders[0] if named else Path()))
+    return expanded(data, folders[0] if named else Path())
+
+
+def faults_of(first: Refusal, whole: dict[str, Any], text: str) -> list[Refusal]:
+    """Return every fault of an array's data, the units' specs whole in it, `first` among them, each with its line."""
+    every = every_fault(first, whole, array_of, _sound(whole))
+    for one in every:
+        one.line = line_of(text, one.field)
+    return every
+
+
+def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the whole data of a shipped array: of the same construction and kind of layout, where there is one."""
+    shipped = [expanded(read_toml(path), path.parent) for path in array_templates().values()]
+    alike = [one for one in shipped if one["layout"]["kind"] == at(data, "layout.kind")] or shipped
+    return next((one for one in alike if one["array"] == data.get("array")), alike[0])
 
 
 def array_files(data: Mapping[str, Any]) -> dict[str, str]:
@@ -66,6 +91,7 @@ def form(data: Mapping[str, Any], array: Array | None) -> list[Group]:
     """Return the form of an array's plain data; `array` None where the data is refused."""
     holds = array.asked if array else {}
     choices = {
+        **choices_of(data),
         "sheet.material": [(name, "") for name in materials()],
         "layout.kind": [(name, kind.about) for name, kind in layouts().items()],
         "unit": [(name, "") for name in templates()],

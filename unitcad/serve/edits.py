@@ -7,6 +7,7 @@ from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import InlineTable
 
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.serve.messages import Edit
@@ -38,10 +39,16 @@ def _apply(document: Any, edit: Edit) -> None:
         if isinstance(node, list):
             node = node[_index(node, step, edit)]
         elif isinstance(node, dict):
+            if step == "unit" and isinstance(node.get(step), str):
+                # A unit that an array names is the `like` of the table that changes it.
+                named = tomlkit.inline_table()
+                named["like"] = str(node[step])
+                named.comment(node[step].trivia.comment)
+                node[step] = named
             if step not in node:
                 if edit.remove:
                     return
-                node[step] = tomlkit.table()
+                node[step] = tomlkit.inline_table() if isinstance(node, InlineTable) else tomlkit.table()
             node = node[step]
         else:
             raise Refusal(edit.path, edit.value, "the path runs through a value, not a table")

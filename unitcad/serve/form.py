@@ -24,7 +24,7 @@ from unitcad.spec.asked import (
     OutputTable,
     WiresTable,
 )
-from unitcad.spec.fields import alternatives, fields_of, meaning, notes
+from unitcad.spec.fields import alternatives, entry_in, fields_of, meaning, notes
 from unitcad.text import number, toml
 from unitcad.validation.dotted import ABSENT, at
 
@@ -50,7 +50,7 @@ _TEXTS_OF_FILES = ("estimate.fit_source",)
 def groups(data: Mapping[str, Any], spec: Spec | None) -> list[Group]:
     """Return the form of a spec's plain data; `spec` is the effective one, None where the data is refused."""
     holds = to_data(spec) if spec else {}
-    choices = _choices(data)
+    choices = choices_of(data)
     made = [Group("", "Unit", [*fields(AskedSpec, "", data, holds, choices, ("name", "design", "diameter_mm"))])]
     layers = data.get("layers")
     for i in range(len(layers) if isinstance(layers, list) else 0):
@@ -91,8 +91,29 @@ def fields(
         given = at(data, where)
         default = None if info.default is msgspec.NODEFAULT else info.default
         value = next((one for one in (given, at(holds, where)) if one is not ABSENT and one is not None), default)
-        made = _field(where, name, info.type, value, given is not ABSENT, choices.get(_place(where), []))
+        entries = _numbers_of(info.type, value)
+        if entries and value is not None:
+            for i, (kind, one) in enumerate(zip(entries, value, strict=True)):
+                made = _field(f"{where}.{i}", f"{_label(name)} {i + 1}", kind, one, given is not ABSENT, [])
+                yield replace(made, required=info.required, meaning=meaning(info.type))
+            continue
+        made = _field(where, _label(name), info.type, value, given is not ABSENT, choices.get(_place(where), []))
         yield replace(made, required=info.required)
+
+
+def _numbers_of(kind: Any, value: Any) -> tuple[Any, ...]:
+    """Return the kinds of a list's entries where it has a fixed number of numbers; else none."""
+    if not isinstance(value, list | tuple):
+        return ()
+    tuples = (typing.get_args(one) for one in alternatives(kind) if typing.get_origin(one) is tuple)
+    fits = (one for one in tuples if len(one) == len(value) and Ellipsis not in one)
+    entries = next(fits, ())
+    numbers = all(isinstance(one, int | float) for one in value)
+    return entries if numbers and all(float in alternatives(entry) for entry in entries) else ()
+
+
+def _label(name: str) -> str:
+    return name.removesuffix("_mm").replace("_", " ")
 
 
 def _place(path: str) -> str:
@@ -100,15 +121,19 @@ def _place(path: str) -> str:
     return ".".join(step for step in path.split(".") if not step.isdigit())
 
 
-def _field(path: str, name: str, kind: Any, value: Any, given: bool, choices: list[tuple[str, str]]) -> Field:
+def _field(path: str, label: str, kind: Any, value: Any, given: bool, choices: list[tuple[str, str]]) -> Field:
     members = [one for one in alternatives(kind) if one is not type(None)]
     words = [(word, "") for one in members if typing.get_origin(one) is Literal for word in typing.get_args(one)]
-    limits = list(notes(kind))
+    # One number for all entries of a list has their range.
+    limits = list(notes(kind)) or list(notes(entry_in(kind)))
     low = next((float(note.ge) for note in limits if note.ge is not None), None)
     high = next((float(note.le) for note in limits if note.le is not None), None)
     how: Literal["number", "integer", "word", "text", "switch", "toml"]
-    if any(typing.get_origin(one) in (tuple, list, dict) for one in members):
-        # A list is typed as TOML has it.
+    listed = any(typing.get_origin(one) in (tuple, list, dict) for one in members)
+    single = float in members and isinstance(value, int | float)
+    mixed = str in members and bool({int, float} & set(members))
+    if mixed or (listed and not single):
+        # A list is typed as TOML has it, and what may be a word or a number.
         how, value = "toml", None if value is None else toml(value)
     elif bool in members:
         how = "switch"
@@ -118,11 +143,10 @@ def _field(path: str, name: str, kind: Any, value: Any, given: bool, choices: li
         how = "integer"
     else:
         how = "word" if choices or words else "text"
-    label = name.removesuffix("_mm").replace("_", " ")
     return Field(path, label, how, value, given, low, high, choices or words, meaning(kind))
 
 
-def _choices(data: Mapping[str, Any]) -> Choices:
+def choices_of(data: Mapping[str, Any]) -> Choices:
     """Return the words of each field that the catalogue or the shipped designs give."""
     own = {
         name: data[name] for name in ("materials", "motors", "printers", "tissue") if isinstance(data.get(name), dict)

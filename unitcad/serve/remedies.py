@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeGuard
 
 import tomlkit
@@ -12,17 +12,18 @@ from tomlkit.exceptions import TOMLKitError
 
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.serve.messages import Edit, Fault
-from unitcad.spec import convert
-from unitcad.spec.asked import AskedSpec
 from unitcad.validation import put
-from unitcad.validation.defaults import effective
 from unitcad.validation.dotted import ABSENT, at, drop
 
 _HALVINGS = 24
 
 
-def remedied(faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[Edit]) -> list[Fault]:
-    """Return the faults of a spec's plain data, each with its remedies.
+Judge = Callable[[dict[str, Any]], object]
+"""Validates plain data; raises UnitcadError for a fault."""
+
+
+def remedied(faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[Edit], judge: Judge) -> list[Fault]:
+    """Return the faults of plain data, each with its remedies: what `judge` accepts.
 
     `since` takes back what was changed since the data was accepted, newest first. Where one of these changes alone is
     to blame for a fault of another field, the fault stands `at` the changed one.
@@ -30,28 +31,28 @@ def remedied(faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[E
     changed = {edit.path for edit in since}
     blamed = None
     if any(fault.field not in changed for fault in faults):
-        blamed = next((edit for edit in since if _accepted(_after(data, edit))), None)
-    return [_remedied(fault, data, None if fault.field in changed else blamed) for fault in faults]
+        blamed = next((edit for edit in since if _accepted(_after(data, edit), judge)), None)
+    return [_remedied(fault, data, None if fault.field in changed else blamed, judge) for fault in faults]
 
 
-def _remedied(fault: Fault, data: Mapping[str, Any], blamed: Edit | None) -> Fault:
+def _remedied(fault: Fault, data: Mapping[str, Any], blamed: Edit | None, judge: Judge) -> Fault:
     if blamed is not None:
-        return replace(fault, at=blamed.path, at_nearest=_nearest(data, blamed))
+        return replace(fault, at=blamed.path, at_nearest=_nearest(data, blamed, judge))
     if fault.nearest is None and at(data, fault.field) is not ABSENT:
         without = copy.deepcopy(dict(data))
-        if drop(without, fault.field) and _accepted(without):
+        if drop(without, fault.field) and _accepted(without, judge):
             return replace(fault, leave_out=True)
     return fault
 
 
-def _nearest(data: Mapping[str, Any], edit: Edit) -> float | None:
+def _nearest(data: Mapping[str, Any], edit: Edit, judge: Judge) -> float | None:
     """Return the accepted number nearest to the refused one, on the way from the one that was accepted before."""
     refused, accepted = at(data, edit.path), edit.value
     if not _is_float(refused) or not _is_float(accepted):
         return None
 
     def taken(value: float) -> bool:
-        return _accepted(_after(data, Edit(path=edit.path, value=value)))
+        return _accepted(_after(data, Edit(path=edit.path, value=value)), judge)
 
     least, most = sorted((accepted, refused))
     low, high = float(accepted), float(refused)
@@ -79,9 +80,9 @@ def _after(data: Mapping[str, Any], edit: Edit) -> dict[str, Any]:
     return changed
 
 
-def _accepted(data: dict[str, Any]) -> bool:
+def _accepted(data: dict[str, Any], judge: Judge) -> bool:
     try:
-        effective(convert(data, AskedSpec))
+        judge(data)
     except UnitcadError:
         return False
     return True

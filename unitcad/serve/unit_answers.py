@@ -10,13 +10,17 @@ from typing import Any
 from unitcad.errors import Refusal
 from unitcad.serve.form import groups
 from unitcad.serve.messages import Answer, Trusted
-from unitcad.spec import Spec, to_data, to_toml
+from unitcad.spec import Spec, convert, to_data, to_toml
+from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, with_source
 from unitcad.validation import from_data
+from unitcad.validation.defaults import effective
+from unitcad.validation.load import all_faults
 
 form = groups
 as_data = to_data
 as_toml = to_toml
+faults_of = all_faults
 
 
 def settled(data: Mapping[str, Any], trusted: Trusted) -> Spec:
@@ -28,6 +32,11 @@ def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
     """Return plain data with the texts of the files that it may name."""
     folder = folder_for(data, trusted)
     return with_source(dict(data), folder) if folder else dict(data)
+
+
+def judge(data: dict[str, Any]) -> None:
+    """Validate plain data that has its files' texts. Raises UnitcadError."""
+    effective(convert(data, AskedSpec))
 
 
 def holds_code(spec: Spec) -> bool:

@@ -44,6 +44,17 @@ def settled(refusal: Refusal, data: dict[str, Any], judge: Judge, sound: dict[st
     return Refusal(refusal.field, refusal.value, refusal.limit)
 
 
+def every_fault(first: Refusal, data: dict[str, Any], judge: Judge, sound: dict[str, Any]) -> list[Refusal]:
+    """Return the faults of plain data, `first` among them, the one that was met; arguments as of `faults`."""
+    try:
+        every = faults(data, judge, sound)
+    except RecursionError:  # nested too deeply to be looked through again
+        return [first]
+    if not any(str(one) == str(first) for one in every):
+        every = [first, *(one for one in every if one.field != first.field)]
+    return every
+
+
 def faults(data: dict[str, Any], judge: Judge, sound: dict[str, Any]) -> list[Refusal]:
     """Return the faults of a spec's plain data, in the order in which they are met; `sound` is a template's data."""
     found = []

@@ -17,7 +17,7 @@ from unitcad.spec.asked import AskedSpec
 from unitcad.spec.custom_code import with_source
 from unitcad.validation.defaults import effective
 from unitcad.validation.dotted import ABSENT, at, put
-from unitcad.validation.faults import faults, line_of, settled
+from unitcad.validation.faults import every_fault, line_of, settled
 from unitcad.validation.shipped_files import is_path, named_file, shipped_files
 from unitcad.validation.tables import Changes, Source, asked_of, changes_of, plain
 
@@ -145,7 +145,8 @@ def _sound(data: Mapping[str, Any]) -> dict[str, Any]:
 
 def _explained(first: Refusal, data: dict[str, Any], source: Source) -> Refusal:
     """Return the refusal with the spec's other faults, each with its file and line where it stands in one."""
-    every = _all_faults(first, with_source(dict(data), Path()))
+    whole = with_source(dict(data), Path())
+    every = every_fault(first, whole, _judge, _sound(whole))
     path = _file(source)
     if path is not None:
         text = read_text(path)
@@ -168,19 +169,9 @@ def _same(written: object, asked: object) -> bool:
 
 def all_faults(first: Refusal, data: Mapping[str, Any], text: str) -> list[Refusal]:
     """Return every fault of a text's plain data, `first` among them, each with its line; no file is read for it."""
-    every = _all_faults(first, data)
+    every = every_fault(first, dict(data), _judge, _sound(data))
     for one in every:
         one.line = line_of(text, one.field)
-    return every
-
-
-def _all_faults(first: Refusal, data: Mapping[str, Any]) -> list[Refusal]:
-    try:
-        every = faults(dict(data), _judge, _sound(data))
-    except RecursionError:  # nested too deeply to be looked through again
-        return [first]
-    if not any(str(one) == str(first) for one in every):
-        every = [first, *(one for one in every if one.field != first.field)]
     return every
 
 

@@ -49,7 +49,7 @@
     else content.push(absent("The mould checks were not run. Ask for them with", "unitcad build SPEC --only unit,moulds"));
     content.push(findings.length
       ? table(["File", "Rule", "Severity", "Message"], findings.map((f) => ({ className: f.severity === "error" ? "bad" : undefined, cells: [f.path, f.code, f.severity, f.message] })), { caption: "Findings in files" })
-      : el("p", {}, all.length ? "The rules for files found no fault." : ""));
+      : manifest.check && el("p", {}, all.length ? "The rules for files found no fault." : ""));
     const lines = (title, list) => list.length > 0 && [el("h3", {}, title), el("ul", {}, list.map((text) => el("li", {}, text)))];
     content.push(lines("Warnings", manifest.warnings || []));
     content.push(lines("Left out", (manifest.left_out || []).map((entry) => `${entry.what}: ${entry.why}`)));

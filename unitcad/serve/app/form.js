@@ -6,12 +6,15 @@
   const OPEN = ["Unit", "Motor", "Circuit", "Array", "Layout", "Sheet"];
   let serial = 0;
 
-  const unitOf = (path) => UNITS[path.split(".").pop().split("_").pop()] || "";
+  // The key of a list's entry is the list's.
+  const keyOf = (path) => path.replace(/\.\d+$/, "");
+  const unitOf = (path) => UNITS[keyOf(path).split(".").pop().split("_").pop()] || "";
   const STEPS = 200;
 
   // A slider's track over a documented range of decades: fine about `middle`, the value that was there first, and coarse
-  // towards the ends. `at` gives the value at a place from 0 to 1, `place` the place of a value.
-  function track(low, high, middle) {
+  // towards the ends. `at` gives the value at a place from 0 to 1, `place` the place of a value. Whole numbers are evenly spaced.
+  function track(low, high, middle, whole) {
+    if (whole) return { at: (place) => Math.round(low + place * (high - low)), place: (value) => (value - low) / (high - low) };
     const ratio = low > 0;
     const onto = (value) => (ratio ? Math.log(value) : value);
     const [from, centre, to] = [low, Math.min(high, Math.max(low, middle)), high].map(onto);
@@ -49,12 +52,13 @@
     function numeric(field, id) {
       let way = null;
       const input = el("input", { type: "number", id, step: field.kind === "integer" ? "1" : "any", inputmode: "decimal" });
-      const slider = field.kind === "number" && typeof field.value === "number" && field.high > field.low
-        ? el("input", { type: "range", min: 0, max: STEPS, step: 1, tabindex: "0", "aria-label": `${field.label}, slider` }) : null;
+      const steps = field.kind === "integer" ? field.high - field.low : STEPS;
+      const slider = typeof field.value === "number" && field.high > field.low
+        ? el("input", { type: "range", min: 0, max: steps, step: 1, tabindex: "0", "aria-label": `${field.label}, slider` }) : null;
       const place = (now) => {
         if (!slider || typeof now !== "number") return;
-        way = way || track(field.low, field.high, now);
-        slider.value = String(Math.round(STEPS * way.place(now)));
+        way = way || track(field.low, field.high, now, field.kind === "integer");
+        slider.value = String(Math.round(steps * way.place(now)));
         slider.setAttribute("aria-valuetext", `${number(now)} ${unitOf(field.path)}`);
       };
       input.addEventListener("input", () => {
@@ -67,7 +71,7 @@
         options.change(field.path, input.valueAsNumber, { coalesce: true });
       });
       if (slider) slider.addEventListener("input", () => {
-        const now = way.at(Number(slider.value) / STEPS);
+        const now = way.at(Number(slider.value) / steps);
         input.value = String(now);
         slider.setAttribute("aria-valuetext", `${number(now)} ${unitOf(field.path)}`);
         options.change(field.path, now, { coalesce: true });
@@ -126,14 +130,13 @@
       const make = { number: numeric, integer: numeric, word, switch: toggle }[field.kind] || typed;
       const made = make(field, id);
       const range = typeof field.low === "number" ? `${number(field.low)} to ${number(field.high)} ${unitOf(field.path)}`.trim() : "";
-      const help = [field.meaning, range].filter(Boolean).join("; ");
       const fault = el("p", { className: "refusal", id: `${id}-fault`, role: "status" });
-      const reset = el("button", { type: "button", className: "quiet reset", "aria-label": `${field.label}: back to the default`, title: "Back to the default", onclick: () => options.remove(field.path) }, "default");
-      made.main.setAttribute("aria-describedby", `${id}-fault`);
+      const reset = el("button", { type: "button", className: "quiet reset", "aria-label": `${field.label}: back to the default`, title: "Back to the default", onclick: () => options.remove(keyOf(field.path)) }, "default");
+      made.main.setAttribute("aria-describedby", `${id}-range ${id}-meaning ${id}-fault`);
       made.main.name = field.path;
       const row = el("div", { className: `field of-${field.kind}`, "data-path": field.path },
-        el("label", { for: id, title: help || undefined }, field.label, unitOf(field.path) && el("span", { className: "unit" }, ` ${unitOf(field.path)}`)),
-        made.main, made.others, reset, help && el("p", { className: "help" }, help), fault);
+        el("label", { for: id }, field.label, unitOf(field.path) && el("span", { className: "unit" }, ` ${unitOf(field.path)}`)),
+        made.main, reset, el("span", { className: "range", id: `${id}-range` }, range), made.others, el("span", { className: "meaning", id: `${id}-meaning` }, field.meaning), fault);
       return {
         row,
         set(next) {

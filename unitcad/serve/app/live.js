@@ -46,12 +46,13 @@
     const chip = el("span", { className: "chip", role: "status", id: "state" }, "starting");
     const host = el("div", { className: "stage-host" });
     const figures = el("div", { className: "chips", id: "figures" });
+    const glance = el("p", { id: "glance" });
     const others = el("div", { id: "faults", role: "status" });
     const drawn = el("div", { id: "drawn" });
     const judged = el("div", { id: "judged" });
     const estimated = el("div", { id: "estimated" });
     const batch = data.batch && createBatch(data.batch);
-    const view = section("view", "3D", figures, others, host);
+    const view = section("view", "3D", figures, glance, others, host);
     const pinned = U.createPinned({ current, restore: replaceText });
     const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers });
     const tabs = el("details", { className: "as-text" }, el("summary", {}, "As TOML text"), el("label", { for: "text", className: "hidden" }, "The spec as TOML"), text, textFault);
@@ -81,7 +82,7 @@
       const answer = estimate.estimate && estimate.estimate.answer ? estimate.estimate.answer.lines[0] : (estimate.lines || [])[0];
       const failed = (moulds.checks || []).filter((check) => !check.ok).length;
       const more = moulds.checks ? [["mould checks failed", failed, `of ${moulds.checks.length}`]] : [];
-      return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...(unit.figures || []), ...more], answer, text: unit.text || state.text };
+      return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...(unit.figures || []), ...more], answer, text: unit.text || state.text, refused: page.dataset.stale === "true" };
     }
 
     function remember(path, coalesce) {
@@ -111,6 +112,12 @@
         const field = state.accepted.get(path);
         return field.given ? { path, value: field.value, ...(field.kind === "toml" ? { toml: true } : {}) } : { path, remove: true };
       });
+    }
+
+    // A default that follows from other values is not known while one of them is refused: the last one stays in its field.
+    function held(field) {
+      const before = state.accepted.get(field.path);
+      return (field.value === undefined || field.value === null) && before ? { ...field, value: before.value } : field;
     }
 
     function startFrom(text) {
@@ -162,20 +169,21 @@
       const faults = answer.faults || [];
       state.layers = answer.layers || 0;
       if (answer.groups) {
-        state.groups = answer.groups;
-        form.show(answer.groups);
+        state.groups = faults.length ? answer.groups.map((group) => ({ ...group, fields: (group.fields || []).map(held) })) : answer.groups;
+        form.show(state.groups);
       }
       if (document.activeElement !== text) text.value = answer.text;
       if (!faults.length) {
         state.accepted = new Map(answer.groups.flatMap((group) => group.fields || []).map((field) => [field.path, field]));
         state.changed = [];
       }
-      // What is wrong with the text itself stands under it alone; a value's fault at its field, and here by its line.
+      // What is wrong with the text itself stands under it alone, a value's fault at its field; who types the text has all there.
       const unread = faults.filter((one) => !one.field);
       const homeless = form.refuse(faults.filter((one) => one.field));
-      textFault.textContent = faults.map((one) => (one.field && one.line ? `line ${one.line}: ${one.message}` : one.message)).join("\n");
+      const typing = document.activeElement === text;
+      textFault.textContent = !typing && !unread.length ? "" : faults.map((one) => (one.field && one.line ? `line ${one.line}: ${one.message}` : one.message)).join("\n");
       if (unread.length) tabs.open = true;
-      clear(others, homeless.map((one) => el("p", { className: "refusal" }, one.message)), faults.length > 0 && el("p", { className: "note" }, state.unit.section ? "What is shown is the last unit that could be made." : "Nothing could be made yet."));
+      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, one.message)), faults.length > 0 && el("p", { className: "note" }, state.unit.section ? "What is shown is the last unit that could be made." : "Nothing could be made yet."));
       page.dataset.stale = String(faults.length > 0);
       buttons();
       if (!faults.length) await shown(answer);
@@ -203,6 +211,18 @@
       if (stage) await stage.update(state.model).catch(() => {});
       else if (!host.firstChild) await firstModel(state.model);
       page.dataset.moulds = "old";
+      glance.dataset.old = "true";
+    }
+
+    // The estimate and the casting in a line above the view: they stand whole further down.
+    function showGlance() {
+      const { estimate, moulds } = state;
+      const percent = (level) => number(100 * level, 2);
+      const answer = estimate.of === state.unit.text && estimate.estimate && estimate.estimate.answer;
+      const level = answer && [`Edge level ${percent(answer.level)} % of the motor's amplitude`, answer.p10 !== undefined && answer.p10 !== null ? `, 80 % range ${percent(answer.p10)} to ${percent(answer.p90)} %` : "", ". "].join("");
+      const lines = moulds.of === state.unit.text && moulds.model ? moulds.lines || [] : [];
+      clear(glance, level, lines.slice(0, 1).map((line) => `${line[0].toUpperCase()}${line.slice(1)}.`));
+      glance.dataset.old = "false";
     }
 
     async function rest(mine, begun) {
@@ -223,6 +243,7 @@
         }),
       ]);
       if (mine !== state.asked) return;
+      showGlance();
       pinned.show();
       page.setAttribute("aria-busy", "false");
     }

@@ -3,12 +3,14 @@
   "use strict";
   const { el, clear, section, drawing, number, sideBySide, differences, flat } = window.unitcad;
 
-  // options: current() gives {name, spec, section, figures, lines, answer, text}; restore(text) goes back to a variant.
+  // options: current() gives {name, spec, section, figures, answer, text, refused}; restore(text) goes back to a variant.
   function createPinned({ current, restore }) {
     let pinned = null;
     const host = el("div", {});
     const pin = el("button", { type: "button", onclick: () => { pinned = { ...current() }; show(); } }, "Pin this variant");
-    const node = section("pinned", "Side by side", el("div", { className: "buttons" }, pin), host);
+    const back = el("button", { type: "button", hidden: true, onclick: () => restore(pinned.text) }, "Go back to it");
+    const unpin = el("button", { type: "button", hidden: true, onclick: () => { pinned = null; show(); pin.focus(); } }, "Unpin");
+    const node = section("pinned", "Side by side", el("div", { className: "buttons" }, pin, back, unpin), host);
 
     function column(one) {
       return {
@@ -21,24 +23,21 @@
 
     function show() {
       pin.textContent = pinned ? "Pin this one instead" : "Pin this variant";
+      back.hidden = unpin.hidden = !pinned;
       if (!pinned) {
         clear(host, el("p", { className: "absent" }, "Pin this variant, then change it: both stand here side by side."));
         return;
       }
       const now = current();
       const columns = [pinned, now].map(column);
-      const heads = [
-        [`Pinned: ${pinned.name} `, el("button", { type: "button", className: "quiet", onclick: () => restore(pinned.text) }, "Go back to it"),
-          el("button", { type: "button", className: "quiet", onclick: () => { pinned = null; show(); pin.focus(); } }, "Unpin")],
-        `Now: ${now.name}`,
-      ];
+      const heads = [`Pinned: ${pinned.name}`, `Now: ${now.name}`];
       const names = [...new Set(columns.flatMap((one) => [...one.figures.keys()]))];
       const unlike = differences(columns.map((one) => one.spec));
       clear(host, sideBySide(heads, [
         ["Section and estimate", [["Section", columns.map((one) => one.section)], ["Estimate", columns.map((one) => one.answer)]]],
         ["Figures", names.map((name) => [name, columns.map((one) => one.figures.get(name) || "–")])],
         ["What differs in the specs", unlike],
-      ]), !unlike.length && el("p", { className: "note" }, "The specs are the same."));
+      ]), now.refused ? el("p", { className: "note" }, "The changed spec is refused: Now is the last one that could be made.") : !unlike.length && el("p", { className: "note" }, "The specs are the same."));
     }
 
     show();
