@@ -17,14 +17,14 @@ from running import Server, serving
 from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
 from unitcad.arrays.crosstalk_matrix import crosstalk
-from unitcad.arrays.patch import patch_bodies
+from unitcad.arrays.patch import patch_parts
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.errors import Refusal
 from unitcad.lab.campaign import read_campaign
 from unitcad.lab.measured_charts import charts_of
 from unitcad.lab.measuring import measure
 from unitcad.mould_checks import check_moulds
-from unitcad.pipeline.bodies import glb_content
+from unitcad.pipeline.bodies import patch_glb
 from unitcad.serve.server import serve
 from unitcad.validation import templates
 
@@ -43,7 +43,7 @@ def test_answers_are_those_of_the_commands(pockets: Server) -> None:
     array = load_array("forearm-pockets", ["layout.pitch_mm=22.0"])
     edit = [{"path": "layout.pitch_mm", "value": 22.0}]
     patch = pockets.ask(TEXT, "unit", edit)
-    assert base64.b64decode(patch["model"]["unit"]) == glb_content(patch_moulds(array).blank, patch_bodies(array))
+    assert base64.b64decode(patch["model"]["unit"]) == patch_glb(patch_moulds(array).blank, patch_parts(array))
     drawn = dict(pockets.ask(TEXT, "estimate", edit)["drawings"])
     data = crosstalk(array)
     assert list(drawn.values()) == [patch_map_svg(array, data), heat_map_svg(data)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 from unitcad.arrays.array import Array, Placed
 from unitcad.arrays.circuit.circuit_files import has_circuit
@@ -15,8 +16,16 @@ from unitcad.shape.body import Body
 SHEET = "sheet"
 
 
-def patch_bodies(array: Array) -> tuple[Body, ...]:
-    """Return the bodies of the whole patch: the silicone that the units share, then each unit's own as "A1-layer1".
+class PatchPart(NamedTuple):
+    """A body in its own frame, its name among the parts, the places that it stands at; without any it is in place."""
+
+    name: str
+    body: Body
+    places: tuple[Placed, ...] = ()
+
+
+def patch_parts(array: Array) -> tuple[PatchPart, ...]:
+    """Return the distinct bodies of the whole patch: the silicone that the units share, then each distinct unit's own.
 
     Units that are cast in one pour with the sheet are there with what is bought for them, but for a circuit of their
     own: the array's takes its place.
@@ -25,14 +34,28 @@ def patch_bodies(array: Array) -> tuple[Body, ...]:
     shared = way.bodies(array)
     if way.own_tails:
         shared = tuple(replace(body, name=SHEET, shape=moved(body.shape, z=array.sheet.low)) for body in shared)
-    drawn = [unit_bodies(unit) for unit in array.units]
-    own = [
-        replace(body, name=f"{place.name}-{body.name}", shape=at_place(body.shape, place))
-        for place in array.places
-        for body in drawn[array.units.index(place.unit)]
-        if way.own_tails or body.kind == "motor"
-    ]
-    return (*shared, *own, *([circuit_body(array)] if has_circuit(array) else ()))
+    own = []
+    for i, unit in enumerate(array.units):
+        places = tuple(place for place in array.places if array.units.index(place.unit) == i)
+        of = f"unit{i + 1}-" if len(array.units) > 1 else ""
+        own += [
+            PatchPart(f"{of}{body.name}", body, places)
+            for body in unit_bodies(unit)
+            if way.own_tails or body.kind == "motor"
+        ]
+    circuit = [circuit_body(array)] if has_circuit(array) else []
+    return (*(PatchPart(body.name, body) for body in shared), *own, *(PatchPart(each.name, each) for each in circuit))
+
+
+def patch_bodies(array: Array) -> tuple[Body, ...]:
+    """Return all bodies of the whole patch at their places, a unit's own as "A1-layer1", in the order of the parts."""
+    return tuple(
+        replace(part.body, name=f"{place.name}-{part.body.name}", shape=at_place(part.body.shape, place))
+        if place
+        else part.body
+        for part in patch_parts(array)
+        for place in part.places or (None,)
+    )
 
 
 def at_place(shape: Shape, place: Placed) -> Shape:

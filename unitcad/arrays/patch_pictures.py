@@ -68,7 +68,15 @@ def _worn(moulds: PatchMoulds) -> Iterator[_Solid]:
 
 
 def _apart(moulds: PatchMoulds) -> Iterator[_Solid]:
-    """Yield tools and cast layers, one over the other in the order of the pours, and the pieces of a tool apart."""
+    for body, (aside, _, up) in taken_apart(moulds):
+        yield _solid(moulds, body, up, aside)
+
+
+def taken_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:
+    """Yield tools and cast layers and how far each is moved (mm) to be shown apart.
+
+    One over the other in the order of the pours; the pieces of a tool beside each other.
+    """
     plan, top = moulds.plan, -np.inf
     order: list[Body] = [tool for tool in plan.tools if tool.step is None and tool.kind != "blade"]
     base = len(order)
@@ -82,7 +90,7 @@ def _apart(moulds: PatchMoulds) -> Iterator[_Solid]:
         top = max(top, high + up)
         pieces = plan.pieces_of(body.name) if body.role == "tool" else (body,)
         for k, piece in enumerate(pieces):
-            yield _solid(moulds, piece, up, (k - (len(pieces) - 1) / 2) * GAP)
+            yield piece, ((k - (len(pieces) - 1) / 2) * GAP, 0.0, float(up))
 
 
 def _cut_open(moulds: PatchMoulds, index: int) -> Iterator[_Solid]:

@@ -23,10 +23,21 @@ _HALF = math.sqrt(0.5)
 
 
 @dataclass(frozen=True)
+class Standing:
+    """A place of a mesh that stands in several: a name, the turn about z (degrees), then the move (mm)."""
+
+    name: str
+    x: float
+    y: float
+    angle_deg: float = 0.0
+
+
+@dataclass(frozen=True)
 class GlbPart:
     """A named closed mesh: colour as three sRGB numbers 0 to 1, vertices (n, 3) in mm, faces (m, 3).
 
-    `extras`: plain values that programs may read.
+    `extras`: plain values that programs may read. `places`: where it stands; none for as it is, under its own name. Its
+    mesh is in the file once, however often it stands there.
     """
 
     name: str
@@ -34,6 +45,7 @@ class GlbPart:
     vertices: np.ndarray
     faces: np.ndarray
     extras: Mapping[str, Any] = field(default_factory=dict)
+    places: Sequence[Standing] = ()
 
 
 def content(parts: Sequence[GlbPart]) -> bytes:
@@ -68,7 +80,8 @@ def content(parts: Sequence[GlbPart]) -> bytes:
         }
         meshes.append({"name": part.name, "primitives": [primitive]})
         materials.append(_material(part))
-        nodes.append({"name": part.name, "mesh": len(meshes) - 1, "extras": dict(sorted(part.extras.items()))})
+        node = {"name": part.name, "mesh": len(meshes) - 1, "extras": dict(sorted(part.extras.items()))}
+        nodes += [{**node, "name": place.name, **_moved(place)} for place in part.places] or [node]
     root = {
         "name": "assembly",
         "children": list(range(1, len(nodes) + 1)),
@@ -126,6 +139,13 @@ def _pairs_round(vertex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _unit(vectors: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(length > 0, length, 1.0)
+
+
+def _moved(place: Standing) -> dict[str, Any]:
+    """Return a node's translation (mm) and rotation (a quaternion, the real part last)."""
+    half = math.radians(place.angle_deg) / 2
+    turn = {"rotation": [0.0, 0.0, math.sin(half), math.cos(half)]} if place.angle_deg else {}
+    return {**turn, "translation": [place.x, place.y, 0.0]}
 
 
 def _material(part: GlbPart) -> dict[str, Any]:

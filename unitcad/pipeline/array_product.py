@@ -22,7 +22,7 @@ from unitcad.arrays.array_extras import extras
 from unitcad.arrays.array_file import array_hash, to_toml
 from unitcad.arrays.bending import bending_record
 from unitcad.arrays.construction import constructions
-from unitcad.arrays.patch import patch_bodies
+from unitcad.arrays.patch import patch_bodies, patch_parts
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
 from unitcad.arrays.patch_pictures import picture_names, pictures
 from unitcad.cache import Store, digest
@@ -34,7 +34,7 @@ from unitcad.mould_checks.finding import FindingRecord
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import OUTPUTS, geometry_key
-from unitcad.pipeline.bodies import body_key, file_stem, glb_content, joint_key, record, step_asked, stl_content
+from unitcad.pipeline.bodies import body_key, file_stem, joint_key, patch_glb, record, step_asked, stl_content
 from unitcad.pipeline.geometry import Geometry, geometry, mesh_findings
 from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import ArrayManifest, BodyFile, FileRecord, LeftOut, MeshFinding, PartRecord
@@ -125,7 +125,7 @@ def _patch(moulds: PatchMoulds, store: Store, process: StepProcess | None) -> tu
         parts.append(part)
     bodies = patch_bodies(moulds.arranged)
     together: dict[str, Callable[[], bytes]] = {
-        "glb": lambda: glb_content(blank, bodies),
+        "glb": lambda: patch_glb(blank, patch_parts(moulds.arranged)),
         "step": lambda: step_asked(bodies, "patch", process)(),
     }
     for form, content in together.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +24,8 @@ from unitcad.shape.body import Body
 if TYPE_CHECKING:
     import numpy as np
 
+    from unitcad.arrays.patch import PatchPart
+    from unitcad.export.glb import GlbPart
     from unitcad.export.step_process import StepProcess
 
 
@@ -82,12 +84,30 @@ def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
     """Return the GLB of several bodies as assembled; what is cut or bought is in it too."""
     from unitcad.export import glb
 
+    return glb.content([_glb_part(moulds, body) for body in bodies])
+
+
+def patch_glb(moulds: MouldSet, parts: Sequence[PatchPart]) -> bytes:
+    """Return the GLB of an array's whole patch: the mesh of each distinct body once, a node at each of its places."""
+    from unitcad.export import glb
+
     return glb.content(
         [
-            glb.GlbPart(b.name, b.colour, *arrays(moulds.mesh(b)), {"role": b.role, "made": b.made, "step": b.step})
-            for b in bodies
+            replace(
+                _glb_part(moulds, part.body),
+                name=part.name,
+                places=[glb.Standing(f"{p.name}-{part.body.name}", p.x, p.y, p.angle_deg) for p in part.places],
+            )
+            for part in parts
         ]
     )
+
+
+def _glb_part(moulds: MouldSet, body: Body) -> GlbPart:
+    from unitcad.export import glb
+
+    extras = {"role": body.role, "made": body.made, "step": body.step}
+    return glb.GlbPart(body.name, body.colour, *arrays(moulds.mesh(body)), extras)
 
 
 def step_content(bodies: Sequence[Body], name: str) -> bytes:

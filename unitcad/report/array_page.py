@@ -1,4 +1,4 @@
-"""The page of an array: patch, crosstalk, tools, circuit, places, casting and units; no script, no connection."""
+"""The page of an array: 3D view, patch, crosstalk, tools, circuit, places, casting and units; no connection."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from unitcad import files
+from unitcad.arrays.array_file import array_of
 from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.casting.time_line import duration
 from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
 from unitcad.pipeline.folder import ARRAY, BENCH, PAGE
 from unitcad.pipeline.manifest_records import ArrayManifest
-from unitcad.report.plain_page import drawing, picture, plain_page
+from unitcad.report.array_view import array_model
+from unitcad.report.plain_page import VIEW, drawing, picture, plain_page
 from unitcad.report.records import expect
+from unitcad.spec import read_toml
 from unitcad.text import number
 
 CROSSTALK, CIRCUIT = ("crosstalk-patch.svg", "crosstalk.svg", "crosstalk-edge.svg"), "circuit.svg"
@@ -51,13 +54,14 @@ def write_array_page(folder: Path, warn: Callable[[str], None]) -> Path:
 
 def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) -> str:
     shown = _Shown(folder, warn)
-    array = manifest["array"]
+    array, model = manifest["array"], _model(folder, warn)
     parts = [
         '<div class="top"><div>',
         f"<h1>{escape(manifest['name'])}</h1>",
         f'<p class="line">{escape(_line(array))}</p>',
         _chips(manifest),
         "</div></div>",
+        *_section("3D", [VIEW if model else ""]),
         *_section("Patch", [*(shown.of(f"pictures/patch-{side}.png") for side in SIDES), _worn(array)]),
         *_section("Crosstalk", [_answer(shown.json("crosstalk.json")), *(shown.of(name) for name in CROSSTALK)]),
         *_section("Tools", [shown.of(f"pictures/{name}") for name in ("tools.png", *_pours(manifest))]),
@@ -68,7 +72,16 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
         *_section("Checks", [_checks(manifest)]),
         *_section("Files", [_files(manifest)]),
     ]
-    return plain_page(manifest["name"], "\n".join(parts))
+    return plain_page(manifest["name"], "\n".join(parts), model)
+
+
+def _model(folder: Path, warn: Callable[[str], None]) -> dict[str, Any] | None:
+    """Return what the 3D view shows; None, and a warning, where it can't be made, as of a unit that runs code."""
+    try:
+        return array_model(array_of(read_toml(folder / ARRAY, links=False)))
+    except UnitcadError as error:
+        warn(f"warning: no 3D view: {error}")
+        return None
 
 
 class _Shown:

@@ -31,15 +31,19 @@ def html_page(
     """Return the HTML of a page with `data`: `programs` of app/ run after the `vendored` ones, under `styles`."""
     scripts = [*(asset(f"vendor/{name}") for name in vendored), *(asset(f"app/{name}") for name in programs)]
     sheets = [asset(name) for name in styles]
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
-    packed = base64.b64encode(gzip.compress(text.encode("utf-8", "replace"), 9, mtime=0)).decode()
     body = [
         '<main id="page"><p>Reading ...</p></main>',
         f"<noscript><p>A script draws this page. {html.escape(without_script)}</p></noscript>",
-        f'<script type="text/plain" id="data">{packed}</script>',
+        f'<script type="text/plain" id="data">{packed(data)}</script>',
         f'<script type="text/plain" id="licences">{html.escape(licences, quote=False)}</script>',
     ]
     return document(title, sheets, body, scripts)
+
+
+def packed(data: dict[str, Any]) -> str:
+    """Return data as JSON, compressed and in base 64."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    return base64.b64encode(gzip.compress(text.encode("utf-8", "replace"), 9, mtime=0)).decode()
 
 
 def document(

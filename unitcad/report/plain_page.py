@@ -1,18 +1,35 @@
-"""A page without programs: its own markup in the styles of every page, under a policy that forbids all else."""
+"""A page of its own markup in the styles of every page, under a policy that forbids all else; it may hold a 3D view."""
 
 from __future__ import annotations
 
 import base64
 import html
+from typing import Any
 
-from unitcad.report.html_page import asset, document
+from unitcad.report.html_page import asset, document, packed
 
 _STYLES = ("app/page.css", "app/print.css")
 
 
-def plain_page(title: str, body: str) -> str:
-    """Return the HTML of a page that contacts nothing; `body` is markup, whose texts are escaped already."""
-    return document(title, [asset(name) for name in _STYLES], [f'<main id="page">{body}</main>'])
+_PROGRAMS = ("vendor/three.min.js", *(f"app/{name}.js" for name in ("dom", "glb", "viewer", "controls", "array")))
+VIEW = '<div class="stage-host"><p class="absent">A script draws the 3D view.</p></div>'
+"""Where in a page's markup the 3D view goes."""
+
+
+def plain_page(title: str, body: str, model: dict[str, Any] | None = None) -> str:
+    """Return the HTML of a page that contacts nothing; `body` is markup, whose texts are escaped already.
+
+    With a `model` the programs of the 3D view are in it, and draw it where the markup holds VIEW.
+    """
+    sheets, markup = [asset(name) for name in _STYLES], [f'<main id="page">{body}</main>']
+    if model is None:
+        return document(title, sheets, markup)
+    licence = html.escape(asset("vendor/three.LICENSE.txt"), quote=False)
+    markup += [
+        f'<script type="text/plain" id="data">{packed(model)}</script>',
+        f'<script type="text/plain" id="licences">{licence}</script>',
+    ]
+    return document(title, sheets, markup, [asset(name) for name in _PROGRAMS])
 
 
 def drawing(svg: str, alt: str, narrow: str = "") -> str:

@@ -34,8 +34,8 @@ def model(spec: Spec) -> dict[str, Any]:
     moulds = MouldSet(spec)
     plan = moulds.plan
     return {
-        "unit": _packed(glb_content(moulds, moulds.unit)),
-        "moulds": _packed(glb_content(moulds, plan.tools)),
+        "unit": compressed(glb_content(moulds, moulds.unit)),
+        "moulds": compressed(glb_content(moulds, plan.tools)),
         "cells": cells(moulds),
         "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(moulds)],
         "unit_apart": {name: list(offset) for name, offset in unit_apart(moulds).items()},
@@ -49,5 +49,6 @@ def cells(moulds: MouldSet) -> list[list[float]]:
     return [[cell.x, cell.y, 2 if one_sided and cell.sides == (-1,) else 0] for cell in moulds.plan.layout.cells]
 
 
-def _packed(content: bytes) -> str:
+def compressed(content: bytes) -> str:
+    """Return a file's content compressed, in base 64."""
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()

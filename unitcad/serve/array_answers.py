@@ -121,13 +121,13 @@ def _with_kinds(rows: Iterator[Field], choices: Mapping[str, list[tuple[str, str
 
 
 def _patch(array: Array, answer: Answer) -> None:
-    from unitcad.arrays.patch import patch_bodies
+    from unitcad.arrays.patch import patch_parts
     from unitcad.arrays.patch_moulds import patch_moulds
-    from unitcad.pipeline.bodies import glb_content
+    from unitcad.pipeline.bodies import patch_glb
 
-    bodies = patch_bodies(array)
-    content = glb_content(patch_moulds(array).blank, bodies)
-    answer.model = {"unit": content, "unit_apart": {body.name: [0, 0, 0] for body in bodies}, "moulds": None}
+    parts = patch_parts(array)
+    content = patch_glb(patch_moulds(array).blank, parts)
+    answer.model = {"unit": content, "unit_apart": {part.name: [0, 0, 0] for part in parts}, "moulds": None}
     x0, y0, x1, y1 = array.sheet.outline
     answer.figures = [("units", float(len(array.places)), ""), ("sheet along x", x1 - x0, "mm")]
     answer.figures += [("along y", y1 - y0, "mm"), ("thick", array.sheet.thickness_mm, "mm")]

@@ -18,13 +18,13 @@
   // The scenes of a model: the unit, the whole set of moulds with the layers, and each moment of casting. A model
   // whose moulds are not there yet has the unit alone.
   function scenes(model, unit, tools) {
-    const alone = unit.map((mesh) => ({ name: mesh.name, mesh, offset: model.unit_apart[mesh.name] }));
+    const alone = unit.flatMap((mesh) => mesh.places.map((place) => ({ name: mesh.name, mesh, place, offset: model.unit_apart[mesh.name] })));
     const names = (parts) => [...new Set(parts.map((part) => part.name))];
-    const ofUnit = [{ title: "The unit", parts: alone, names: names(alone) }];
+    const ofUnit = [{ title: `The ${model.makes || "unit"}`, parts: alone, names: names(alone) }];
     if (!tools) return { unit: ofUnit, moulds: [] };
     const layers = unit.filter((mesh) => mesh.extras.made === "cast");
     const inMoulds = [
-      ...tools.map((mesh) => ({ name: mesh.name, mesh, offset: model.moulds_apart[mesh.name] })),
+      ...tools.map((mesh) => ({ name: mesh.name, mesh, place: mesh.places[0], offset: model.moulds_apart[mesh.name] })),
       ...layers.flatMap((mesh) => model.cells.map((place) => ({ name: mesh.name, mesh, place, offset: model.moulds_apart[mesh.name] }))),
     ];
     const moments = model.moments.map((moment) => {
@@ -62,7 +62,7 @@
 
     const list = el("ul", { className: "parts" });
     const kindName = `kind-${(serial += 1)}`;
-    const radios = [["unit", "Unit"], ["moulds", "Moulds"]].map(([kind, label]) =>
+    const radios = [["unit", model.makes === "patch" ? "Patch" : "Unit"], ["moulds", "Moulds"]].map(([kind, label]) =>
       el("label", {}, el("input", { type: "radio", name: kindName, value: kind, checked: kind === state.kind, onchange: () => choose(kind) }), label));
 
     const step = range("Casting step", { min: 0, max: 0, step: 1, value: 0, name: "step" }, (value) => { state.step = value; update(true); });
@@ -78,7 +78,7 @@
     const at = range("Cut at", { min: 0, max: 1, step: 0.05, value: 0, name: "cut-at" }, () => { state.moved = true; cut(); });
     const cutOn = el("input", { type: "checkbox", name: "cut", checked: true, onchange: cut });
     const axis = el("select", { name: "axis", "aria-label": "Direction of the cut", onchange: () => { state.moved = false; limits(); cut(); } },
-      Object.entries(AXES).map(([value, label]) => el("option", { value }, label)));
+      Object.entries(model.axes || AXES).map(([value, label]) => el("option", { value }, label)));
     const buttons = el("div", { className: "buttons" }, views.map((name) =>
       el("button", { type: "button", onclick: () => { state.view = name; viewer.look(name); } }, spoken(name))));
 
@@ -101,8 +101,8 @@
       const stop = (value, round) => (round(value * 20) / 20).toFixed(2);
       at.input.min = stop(low, Math.floor);
       at.input.max = stop(high, Math.ceil);
-      // Through the unit's axis; in a set of several, through the nearest row of cells.
-      const row = kinds.moulds.length && state.parts === kinds.moulds[0].parts ? Math.min(...model.cells.map((cell) => cell[1])) : 0;
+      // Through the unit's axis; in a set of several, through the nearest row of cells; through an array's middle row.
+      const row = model.row !== undefined ? model.row : kinds.moulds.length && state.parts === kinds.moulds[0].parts ? Math.min(...model.cells.map((cell) => cell[1])) : 0;
       const middle = { x: 0, y: row, z: (low + high) / 2 }[axis.value];
       if (!state.moved) at.input.value = stop(middle, Math.round);
     }

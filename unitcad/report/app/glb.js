@@ -9,7 +9,14 @@
     return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   }
 
-  // [{name, colour: [r, g, b] linear, extras, position, normal, index}]
+  // A node's place: x and y (mm), quarter turns about z.
+  function placed(node) {
+    const [x, y] = node.translation || [0, 0];
+    const [, , sine, cosine] = node.rotation || [0, 0, 0, 1];
+    return [x, y, (4 / Math.PI) * Math.atan2(sine, cosine)];
+  }
+
+  // [{name, colour: [r, g, b] linear, extras, position, normal, index, places: one for each node of the mesh}]
   function parsed(buffer) {
     const view = new DataView(buffer);
     const length = view.getUint32(12, true);
@@ -20,11 +27,13 @@
       const offset = start + document.bufferViews[accessor.bufferView].byteOffset;
       return new ARRAYS[accessor.componentType](buffer.slice(offset), 0, accessor.count * WIDTH[accessor.type]);
     };
-    return document.nodes.filter((node) => node.mesh !== undefined).map((node) => {
-      const primitive = document.meshes[node.mesh].primitives[0];
+    return document.meshes.map((mesh, number) => {
+      const nodes = document.nodes.filter((node) => node.mesh === number);
+      const primitive = mesh.primitives[0];
       return {
-        name: node.name,
-        extras: node.extras || {},
+        name: mesh.name,
+        places: nodes.map(placed),
+        extras: nodes[0].extras || {},
         colour: document.materials[primitive.material].pbrMetallicRoughness.baseColorFactor.slice(0, 3),
         position: array(primitive.attributes.POSITION),
         normal: array(primitive.attributes.NORMAL),

@@ -1,0 +1,15 @@
+// The page of an array: its markup is there; this draws the 3D view into it.
+(() => {
+  "use strict";
+  const U = window.unitcad;
+  const host = document.querySelector(".stage-host");
+
+  async function start() {
+    const model = JSON.parse(new TextDecoder().decode(await U.unpacked(document.getElementById("data").textContent)));
+    await U.createStage(host, model);
+  }
+
+  start()
+    .catch((error) => U.clear(host, U.el("p", { className: "absent" }, `This browser draws no 3D (${error.message}); the pictures below stand in.`)))
+    .finally(() => { document.documentElement.dataset.ready = "yes"; });
+})();

@@ -1,0 +1,47 @@
+"""What the viewer shows of an array: the patch, each distinct body once with its places, and the tools by pours."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from unitcad.arrays.array import Array
+from unitcad.arrays.patch import patch_parts
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.patch_pictures import taken_apart
+from unitcad.pipeline.bodies import glb_content, patch_glb
+from unitcad.report.viewer_models import compressed
+
+BELOW = 14.0
+"""How far what is put into a sheet is drawn out of it towards the skin, mm."""
+
+
+def array_model(array: Array) -> dict[str, Any]:
+    """Return an array for the page in the form of `viewer_models.model`: the patch; tools with what is cast in them.
+
+    A body that stands at several places is there once. Raises UnitcadError where the tools can't be made any more.
+    """
+    moulds = patch_moulds(array).blank
+    plan, parts, apart = moulds.plan, patch_parts(array), dict(taken_apart(moulds))
+    shared = {part.name for part in parts if not part.places and part.body.kind != "circuit"}
+    pieces = {name: [piece.name for piece in plan.pieces_of(name)] for step in plan.steps for name in step.tools}
+    bodies = {body.step: body.name for body in moulds.unit}
+    return {
+        "makes": "patch",
+        "unit": compressed(patch_glb(moulds, parts)),
+        "unit_apart": {part.name: [0.0, 0.0, 0.0 if part.name in shared else -BELOW] for part in parts},
+        "row": min((place.y for place in array.places), key=abs),
+        "axes": {"y": "along x", "x": "along y", "z": "level"},
+        "moulds": compressed(glb_content(moulds, list(apart))),
+        "moulds_apart": {body.name: list(offset) for body, offset in apart.items()},
+        "cells": [],
+        "moments": [
+            {
+                "title": f"Pour {step.index}, struck off",
+                "parts": [
+                    *(piece for name in step.tools for piece in pieces[name]),
+                    *(bodies[i] for i in range(1, step.index + 1)),
+                ],
+            }
+            for step in plan.steps
+        ],
+    }
