@@ -196,7 +196,7 @@ def test_nothing_is_sliced_unasked_and_the_old_option_says_that_it_is_not_needed
     assert "leave out --no-slice" in done.stderr
     folder = tmp_path / done.stdout.strip()
     assert not (folder / "slicer.json").exists()
-    assert "build spec.toml --slice -o .." in (folder / "casting.md").read_text()
+    assert "build spec.toml --slice -o sliced" in (folder / "casting.md").read_text()
     assert "no-slice" not in _run("build", "--help").stdout
 
 

@@ -88,5 +88,5 @@ def listed(words: Iterable[str]) -> str:
 
 
 def spaced(name: str) -> str:
-    """Return a body's name as it is read: "cup1" as "cup 1"."""
-    return re.sub(r"(?<=\D)(?=\d+$)", " ", name)
+    """Return a body's name as it is read: "cup1" as "cup 1", which stays."""
+    return re.sub(r"(?<=[^\d\s])(?=\d+$)", " ", name)

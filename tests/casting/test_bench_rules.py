@@ -7,7 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from unitcad.casting.instructions import LEVEL_AGAIN, TACK
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.casting.instructions import GREASE, LEVEL_AGAIN, TACK
 from unitcad.casting.procedure import Pour, Procedure, procedure
 from unitcad.casting.rules import broken_rules
 from unitcad.moulds.mould_set import MouldSet
@@ -17,14 +20,21 @@ STRAPS = ("templates/custom/strap-lugs.toml",)
 LIDS = ("encapsulating", "moulds.pour=injected", "moulds.cavities=[2,2]")
 FILM = ("templates/custom/film-closed.toml",)
 RESIN = ("three-layer", "moulds.printer=sla")
+PATCH, BAND = ("forearm-patch",), ("wrist-band",)
+ARRAYS = (PATCH, BAND)
 
 
 def casting(*source: str) -> Procedure:
+    if source in ARRAYS:
+        array = patch_moulds(load_array(source[0], list(source[1:])))
+        return back_sheet_procedure(array, [100.0] * len(array.plan.steps), 1000.0)
     moulds = MouldSet(load(source[0], list(source[1:])))
     return procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
 
-@pytest.mark.parametrize("source", [*((name,) for name in templates()), LIDS, RESIN, FILM, STRAPS], ids=" ".join)
+@pytest.mark.parametrize(
+    "source", [*((name,) for name in templates()), LIDS, RESIN, FILM, STRAPS, *ARRAYS], ids=" ".join
+)
 def test_every_set_keeps_every_rule(source: tuple[str, ...]) -> None:
     assert broken_rules(casting(*source)) == []
 
@@ -129,7 +139,33 @@ def coated_before_mixed(made: Procedure) -> Procedure:
     return replace(made, pours=tuple(map(change, made.pours)))
 
 
+def greased_too_late(made: Procedure) -> Procedure:
+    """The order that a cup already on its base makes impossible."""
+
+    def change(pour: Pour) -> Pour:
+        grease = [step for step in pour.steps if step.title == GREASE]
+        rest = [step for step in pour.steps if step.title != GREASE]
+        on = next(i for i, step in enumerate(rest) if step.title == f"Cup {pour.index} on")
+        return replace(pour, steps=(*rest[: on + 1], *grease, *rest[on + 1 :]))
+
+    return replace(made, pours=tuple(map(change, made.pours)))
+
+
+def greased_with_nothing_named(made: Procedure) -> Procedure:
+    return reworded(made, "petroleum jelly", "something")
+
+
+def pulled_on_the_bench(made: Procedure) -> Procedure:
+    out = "Lift the mould off the bench first: "
+    return replace(made, release=tuple(replace(s, text=s.text.replace(out, "")) for s in made.release))
+
+
 PLANTED = {
+    "grease under a cup": (PATCH, greased_too_late, "greases what the cup already hides"),
+    "grease without a name": (PATCH, greased_with_nothing_named, "does not say what to grease with"),
+    "filament under the mould": (PATCH, pulled_on_the_bench, "while the mould lies on them"),
+    "filament under a unit's mould": (("encapsulating",), pulled_on_the_bench, "while the mould lies on them"),
+    "no picture of the grease": (PATCH, without_pictures, "Grease the flanks: has no picture"),
     "tape under the plate": (("encapsulating",), tilted_by_tape, "look at the level again"),
     "lids' bands": (LIDS, tilted_by_tape, "look at the level again"),
     "a coat before the mix": (FILM, coated_before_mixed, "uses the mix before"),

@@ -206,8 +206,8 @@ def test_bill_counts_pieces() -> None:
     casting = procedure("encapsulating", "moulds.cavities=[2,2]")
     lines = {item.item: item for item in casting.bill}
     assert lines["tongue"].quantity == lines["filament stub"].quantity == lines["LCM0720A3463F"].quantity == 4
-    assert lines["cup1"].quantity == 1
-    assert "upside down" in lines["cup1"].made
+    assert lines["cup 1"].quantity == 1
+    assert "upside down" in lines["cup 1"].made
     csv = written.files(casting)["bom.csv"].splitlines()
     assert len(csv) == len(casting.bill) + 1
 
@@ -441,7 +441,7 @@ def test_walls_vary_by_what_the_ribs_leave() -> None:
 def test_a_lid_set_speaks_of_lids_alone() -> None:
     text = words("encapsulating", "moulds.pour=injected", "moulds.cavities=[2,2]")
     assert "cups and lids upside down" in text
-    assert "Base, cups and lids are engraved" in text
+    assert "in two corners of cups and lids" in text
     assert "Touch the bead on a vent" in text
     for other in ("overflow", "blade", "truck off", "Hold cup"):
         assert other not in text

@@ -27,6 +27,7 @@ from unitcad.moulds.plan import Plan
 from unitcad.shape import Extrude, Shape, cut, cylinder, moved, union
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
+from unitcad.text import number
 
 
 def apart(unit: Spec) -> tuple[float, str]:
@@ -92,6 +93,20 @@ def plan(array: Array) -> Plan:
     return tools_plan(array, layers(array))
 
 
+def greased(array: Array, pour: int) -> str:
+    """Say where the slits beside the fins are sealed before the cup of a pour (from 1) is put on."""
+    ridges = fins(array, wiring(array))
+    if not ridges:
+        return ""
+    length = max(fin.reach for fin in ridges) - dimensions(array.unit).radii[pour - 1]
+    layer = "" if pour == 1 else f", none on Layer {pour - 1}"
+    return (
+        "every fin, the ridge that runs out from a core: both upright sides, the top and the end face, on its "
+        f"outermost {number(length, 3)} mm alone. None nearer the core, where silicone is cast against the fin"
+        f"{layer}"
+    )
+
+
 def assembly(array: Array) -> tuple[str, ...]:
     """Write how the circuit is laid in, with all motors on it."""
     return (
@@ -115,4 +130,5 @@ CONSTRUCTION = Construction(
     bodies=bodies,
     plan=plan,
     assembly=assembly,
+    greased=greased,
 )

@@ -1,17 +1,14 @@
-"""The casting of a back sheet: the procedure of its mould set, with the array's own pictures."""
+"""The casting of a back sheet: the procedure of its mould set, its assembly under titles of its own."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from unitcad.arrays.patch_moulds import PatchMoulds
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bench_views import picture_path
 from unitcad.casting.procedure import Procedure, procedure
-
-TOOLS, SKIN_SIDE = "pictures/tools.png", "pictures/patch-skin-side.png"
 
 
 def back_sheet_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
@@ -22,31 +19,17 @@ def back_sheet_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float]
     made = procedure(moulds, layer_volumes_mm3, printed_mm3)
     return replace(
         made,
-        preparation=_shown(made.preparation),
-        pours=tuple(replace(pour, steps=_shown(pour.steps)) for pour in made.pours),
-        release=_shown(made.release),
-        assembly=_motors_in(made.assembly),
+        assembly=_titled(made.assembly),
         time_line=(*made.time_line[:-1], replace(made.time_line[-1], name="motors and circuit in")),
         last="Motors and circuit in",
     )
 
 
-def _motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
-    """Return the steps of the assembly, each with its own title; the picture stands by the circuit that goes in."""
+def _titled(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
+    """Return the steps of the assembly, each with its own title: soldering shows no state of the mould."""
     solder, lay_in, cure = steps
     return (
         replace(solder, title="Solder the motors", picture=""),
-        replace(lay_in, title="Lay the circuit in", picture=SKIN_SIDE),
-        replace(cure, picture=""),
+        replace(lay_in, title="Lay the circuit in", picture=picture_path("motor-in")),
+        cure,
     )
-
-
-def _shown(steps: Iterable[BenchStep]) -> tuple[BenchStep, ...]:
-    """Return steps with the array's pictures in the place of those that are drawn of one unit's moulds."""
-    return tuple(replace(step, picture=_picture(step.picture)) for step in steps)
-
-
-def _picture(path: str) -> str:
-    if pour := re.fullmatch(re.escape(picture_path("pour")).replace("pour", r"pour(\d+)-strike"), path):
-        return f"pictures/pour{pour[1]}.png"
-    return {picture_path("pieces"): TOOLS}.get(path, "")

@@ -35,6 +35,7 @@ class Construction:
     bodies        the silicone that an array has besides its units, as cast
     plan          tools and pours of those bodies; raises Refusal where they can't be made
     assembly      how motors and circuit go into what was cast, a sentence each; () where they are in the units
+    greased       what gets petroleum jelly before the cup of a pour (from 1) is put on; "" where nothing does
     """
 
     name: str
@@ -47,6 +48,7 @@ class Construction:
     bodies: Callable[[Array], tuple[Body, ...]]
     plan: Callable[[Array], Plan]
     assembly: Callable[[Array], tuple[str, ...]] = lambda _: ()
+    greased: Callable[[Array, int], str] = lambda _, __: ""
 
 
 @cache

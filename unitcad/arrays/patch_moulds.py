@@ -15,7 +15,7 @@ from unitcad.arrays.circuit.outline import circuit_body
 from unitcad.arrays.construction import Construction, constructions
 from unitcad.designs import Dimensions, unit_bodies
 from unitcad.moulds.mould_set import MouldSet, geometric
-from unitcad.moulds.plan import Plan
+from unitcad.moulds.plan import Plan, Step
 from unitcad.shape import moved
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, to_json, with_formats
@@ -97,6 +97,16 @@ class PatchMoulds(MouldSet):
         """The least distance between two units' middles, mm; 0 of a single one."""
         places = self.arranged.places
         return min((math.dist((p.x, p.y), (q.x, q.y)) for p, q in combinations(places, 2)), default=0.0)
+
+    @property
+    def poured_across(self) -> tuple[str, float]:
+        """The widest surface that lies open in a pour: the sheet's longer side, mm."""
+        x0, y0, x1, y1 = self.arranged.sheet.outline
+        return "sheet", max(x1 - x0, y1 - y0)
+
+    def greased(self, step: Step) -> str:
+        """Return what gets petroleum jelly before a cup is put on, in the construction's words."""
+        return self.construction.greased(self.arranged, step.index)
 
     @property
     def source(self) -> str:

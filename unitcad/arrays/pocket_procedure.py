@@ -20,11 +20,11 @@ from unitcad.casting.finishing import shown
 from unitcad.casting.instructions import TACK, mixed
 from unitcad.casting.joining import joining
 from unitcad.casting.needs import needs
-from unitcad.casting.preparation import MORE_PLATES, cleaning, in_resin
+from unitcad.casting.preparation import MORE_PLATES, cleaning, fall, in_resin
 from unitcad.casting.procedure import Pour, Procedure, bubbles, pour_figures
 from unitcad.casting.time_line import duration, phases
 from unitcad.catalogue import Material
-from unitcad.moulds.dents import DENT
+from unitcad.shape.lettering import seen
 from unitcad.text import listed, number
 
 PUSH_MIN = 1.0
@@ -49,7 +49,7 @@ def pocket_procedure(
         BenchStep("Sort the pieces", _sort(moulds), TOOLS, minutes=fig.SORT_MIN),
         *cleaning(moulds, [silicone]),
         *joining(moulds, {"base": "tray"}, TOOLS),
-        BenchStep("Level the bench", _level(array), minutes=fig.LEVEL_MIN),
+        BenchStep("Level the bench", _level(moulds), minutes=fig.LEVEL_MIN),
     )
     poured = tuple(_pour(moulds, silicone, mix, verdict))
     out = tuple(_out(moulds))
@@ -141,7 +141,7 @@ def _sort(moulds: PatchMoulds) -> str:
     tray = listed(f"moulds/{piece.name}.stl" for piece in moulds.plan.pieces_of("base"))
     return (
         f"Print tray ({tray}) and blade as they lie in moulds/moulds.3mf, without supports. The tray is engraved "
-        f"B{moulds.plan.label}."
+        f"{seen(f'B{moulds.plan.label}')}."
     )
 
 
@@ -155,16 +155,12 @@ def _printing(moulds: PatchMoulds, solid_mm3: float, units: Iterable[str]) -> It
     yield f"The units' moulds: {listed(f'{folder}/moulds/moulds.3mf' for folder in units)}, as their casting.md says."
 
 
-def _level(array: Array) -> str:
+def _level(moulds: PatchMoulds) -> str:
     """Say how level the tray must lie: the sheet must not get thinner at one end by more than a dent."""
-    box = array.sheet.outline
-    length = max(box[2] - box[0], box[3] - box[1])
-    tilt = math.degrees(math.atan(DENT / length))
     return (
-        f"Silicone stays level while it cures: at {number(tilt, 2)} degrees {number(DENT, 2)} mm more stand on the low "
-        f"side of a sheet {number(length, 3)} mm long (computed); the blade takes most of it off. Lay a phone with its "
-        "level, or a small spirit level, on the tray's wall, along it and across, and put paper under a corner until "
-        "it shows less. The tray stays there: it is poured and cured on this spot."
+        f"{fall(moulds)}. Put the tray where it will stay. Lay a phone with its level, or a small spirit level, on the "
+        "tray's wall, along it and across, and put paper under a corner until it shows less. The tray stays there: it "
+        "is poured and cured on this spot."
     )
 
 
@@ -260,10 +256,8 @@ def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
     lengths = moulds.spec.moulds
     note = f"{lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
     for tool in moulds.plan.pieces:
-        name, attitude = (
-            (tool.name.replace("base", "tray") if tool.kind == "base" else tool.name),
-            "upside down" if tool.upside_down else "as drawn",
-        )
+        name = moulds.plan.called(tool.name).replace("base", "tray")
+        attitude = "upside down" if tool.upside_down else "as drawn"
         yield Item(name, 1, "piece", f"printed {attitude}", note)
 
 

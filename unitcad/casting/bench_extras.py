@@ -55,8 +55,8 @@ def sideways(side: int, x: float, y: float, z: float, length: float) -> Extra:
 
 def tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
     """Draw the strips of tape on the two sides without a pry slot: cup's wall, plate, plate's edge, underside."""
-    spec, lay = moulds.spec, moulds.plan.layout
-    top, bottom, thick = plate_top(spec), plate_bottom(spec), TAPE_THICKNESS
+    lay = moulds.plan.layout
+    (bottom, top), thick = moulds.plate, TAPE_THICKNESS
     left = CORNER_RADIUS - lay.cup[0]  # beside the filaments, which leave in the middle
     strips: list[Extra] = []
     for side in (1, -1):
@@ -76,8 +76,8 @@ def tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
 
 def bands(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
     """Draw two rubber bands round lid and base, beyond the outermost cells."""
-    spec, lay = moulds.spec, moulds.plan.layout
-    low, high, y = plate_bottom(spec), step.top, lay.plate[1]
+    lay = moulds.plan.layout
+    low, high, y = moulds.plate[0], step.top, lay.plate[1]
     bands = []
     for side in (1, -1):
         x0, x1 = sorted((side * (lay.cup[0] - 1.0), side * (lay.cup[0] - 3.0)))
@@ -182,7 +182,8 @@ def paper_in_slit(moulds: MouldSet) -> tuple[Extra, ...]:
 def screwdrivers(moulds: MouldSet) -> tuple[Extra, ...]:
     """Draw a screwdriver in every pry slot, its tip under the cup's skirt, an arrow down on each handle."""
     spec, lay = moulds.spec, moulds.plan.layout
-    low, half = pry_floor(spec), 3.0
+    (bottom, top), half = moulds.plate, 3.0
+    low = pry_floor(spec) - plate_bottom(spec) + bottom
     tip, edge = lay.cup[0] - 1.0, lay.plate[0]
     blade = box(tip, edge + 4, -half, half, low, low + 0.9)
     handle = moved(turned(Revolve(polygon((0, 0), (2.2, 0), (2.2, 9), (0, 9))), "y", 1), edge + 4, 0, low + 0.45)
@@ -192,14 +193,14 @@ def screwdrivers(moulds: MouldSet) -> tuple[Extra, ...]:
         found += [
             Extra(both, TOOL),
             downward(side * (edge + 9), 0.0, low + 9, 9.0),
-            upward(side * (lay.cup[0] + 3), -5.0, plate_top(spec) + 6, 9.0),
+            upward(side * (lay.cup[0] + 3), -5.0, top + 6, 9.0),
         ]
     return tuple(found)
 
 
 def spirit_level(moulds: MouldSet, z: float) -> tuple[Extra, ...]:
     """Draw a spirit level that lies along x on a rim at `z`, and paper under a corner of the plate."""
-    lay, bottom = moulds.plan.layout, plate_bottom(moulds.spec)
+    lay, bottom = moulds.plan.layout, moulds.plate[0]
     long = min(1.5 * lay.cup[0], 30.0)
     glass = box(-4.0, 4.0, -2.0, 2.0, z + 4.0, z + 5.0)
     x, y = lay.plate

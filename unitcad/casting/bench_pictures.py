@@ -15,7 +15,6 @@ from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, moved, polygon
 from unitcad.shape.tree import Revolve
-from unitcad.text import spaced
 
 SIZE = (540, 360)
 """Of a picture, px."""
@@ -45,14 +44,15 @@ def pictures(moulds: MouldSet, names: Collection[str] | None = None) -> dict[str
 def _drawn(
     moulds: MouldSet, shown: dict[str, View], solids: dict[object, list[_Solid]], names: Collection[str]
 ) -> Iterable[tuple[str, bytes]]:
-    for group in dict.fromkeys((shown[name].group, shown[name].eye) for name in shown if name in names):
-        own = {name: view for name, view in shown.items() if (view.group, view.eye) == group}
+    kinds = {name: (view.group, view.eye, view.turned) for name, view in shown.items()}
+    for group in dict.fromkeys(kinds[name] for name in shown if name in names):
+        own = {name: view for name, view in shown.items() if kinds[name] == group}
         keys = {name: list(_keys(view)) for name, view in own.items()}
         placed = {key: solids[key] for each in keys.values() for key in each}
         if group[0] == "pieces":
             placed = _laid_out(placed)
         points = np.concatenate([vertices for each in placed.values() for vertices, _, _ in each])
-        camera = composite.view(group[1], points, SIZE)
+        camera = composite.view(group[1], points, SIZE, turned=group[2])
         wanted = {name: each for name, each in keys.items() if name in names}
         bodies = {
             key: [composite.drawn(*solid, camera) for solid in placed[key]]
@@ -68,8 +68,9 @@ def _piece_names(moulds: MouldSet, placed: dict[object, list[_Solid]]) -> list[N
     runs: dict[str, list[np.ndarray]] = {}
     for key, solids in placed.items():
         if isinstance(key, tuple) and isinstance(key[1], Placed):
-            tool = moulds.plan.tool(key[1].name)
-            name = {"tongue": "tongue", "stub": "filament"}.get(tool.kind, spaced(tool.name))
+            (tool,) = (piece for piece in moulds.plan.pieces if piece.name == key[1].name)
+            own = moulds.plan.called(tool.name).replace(",", "")
+            name = {"tongue": "tongue", "stub": "filament"}.get(tool.kind, own)
             runs.setdefault(name, []).append(np.concatenate([vertices for vertices, _, _ in solids]))
     names = []
     for name, points in runs.items():
@@ -104,7 +105,8 @@ def _shapes(moulds: MouldSet, name: str, unit: bool) -> Iterable[tuple[Shape, tu
         for step in moulds.plan.steps:
             if step.name == name:
                 return [(shape, layer_colour(step.index - 1)) for shape in step.layer]
-    bodies = moulds.unit if unit else (*moulds.plan.tools, *moulds.plan.steps[-1].inserts)
+    tools = dict.fromkeys((*moulds.plan.tools, *moulds.plan.pieces))
+    bodies = (*moulds.unit, *moulds.laid_later) if unit else (*tools, *moulds.plan.steps[-1].inserts)
     return [(body.shape, body.colour) for body in bodies if body.name == name]
 
 

@@ -29,7 +29,7 @@ class View:
     """One picture. Views of one `eye` and `group` share their scale.
 
     `syringe_on`: channels that one stands on. `names` stand beside the points that they name; pieces laid out side by
-    side are named by their own names.
+    side are named by their own names. `turned`: the picture upside down, as what lies on its back is seen.
     """
 
     parts: tuple[Placed, ...]
@@ -38,3 +38,4 @@ class View:
     group: Literal["moulds", "under", "pieces", "unit", "cut"] = "moulds"
     syringe_on: Shape | None = None
     names: tuple[Name, ...] = ()
+    turned: bool = False

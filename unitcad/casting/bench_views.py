@@ -12,15 +12,15 @@ import numpy as np
 
 from unitcad.casting import bench_extras as draw
 from unitcad.casting.bench_extras import CARD, CLEAR, Extra
-from unitcad.casting.bench_view import ABOVE, LOW, OVER, UNDER, Offset, Placed, View
+from unitcad.casting.bench_view import ABOVE, OVER, UNDER, Offset, Placed, View
 from unitcad.casting.figures import window_length
-from unitcad.casting.piece_views import fed_through, resin_views
+from unitcad.casting.piece_views import resin_views
 from unitcad.casting.tongue_prop import tongue_prop
+from unitcad.casting.way_out import motor_views, way_out
 from unitcad.designs import layer_colour
 from unitcad.designs.tooling import Cell
 from unitcad.export.picture_letters import Name
 from unitcad.kernels.mesh import arrays, realise
-from unitcad.moulds.base import plate_bottom, plate_top
 from unitcad.moulds.layout import MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -33,8 +33,8 @@ FOLDER = "steps"
 
 
 def views(moulds: MouldSet) -> dict[str, View]:
-    """Return every view of a procedure by its name, in the order of the steps."""
-    return dict(_views(moulds))
+    """Return every view of a procedure by its name, in the order of the steps; {} for a set without cups."""
+    return dict(_views(moulds)) if moulds.plan.of_kind("cup") else {}
 
 
 def picture_path(name: str) -> str:
@@ -43,63 +43,43 @@ def picture_path(name: str) -> str:
 
 
 def _views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
-    plan, spec = moulds.plan, moulds.spec
+    plan = moulds.plan
     standing = tuple(Placed(tool.name) for kind in ("base", "stub") for tool in plan.of_kind(kind))
     base = tuple(Placed(tool.name) for tool in plan.of_kind("base"))
-    yield "pieces", View(tuple(Placed(tool.name) for tool in plan.tools), eye=OVER, group="pieces")
+    yield "pieces", View(tuple(Placed(piece.name) for piece in plan.pieces), eye=OVER, group="pieces")
     first, (cup_x, cup_y) = plan.steps[0], plan.layout.cup
     yield from resin_views(moulds)
-    paper, low = draw.paper_in_slit(moulds), plate_top(spec)
+    paper = () if plan.pins else draw.paper_in_slit(moulds)
     pressed = tuple(
         draw.downward(x * 0.8 * cup_x, y * 0.8 * cup_y, first.rim + 5, 8.0) for x in (1, -1) for y in (1, -1)
     )
-    slit = Name("paper", (cup_x + 6.0, 5.0 - cup_y, low))
-    yield "dry-fit", View((*base, Placed(first.cup)), (*paper, *pressed), names=(slit, _corner(moulds, first.rim)))
+    slit = (Name("paper", (cup_x + 6.0, 5.0 - cup_y, moulds.plate[1])),) if paper else ()
+    yield "dry-fit", View((*base, Placed(first.cup)), (*paper, *pressed), names=(*slit, _corner(moulds, first.rim)))
     if plan.of_kind("stub"):
-        down = 1.2 * (moulds.dimensions.core_height - plate_bottom(spec))
+        down = 1.2 * (moulds.dimensions.core_height - moulds.plate[0])
         stubs = tuple(Placed(tool.name, (0.0, 0.0, -down)) for tool in plan.of_kind("stub"))
         arrows = tuple(
-            draw.upward(cell.x + 4.0, cell.y - 4.0, plate_bottom(spec) - down / 2, 7.0) for cell in plan.layout.cells
+            draw.upward(cell.x + 4.0, cell.y - 4.0, moulds.plate[0] - down / 2, 7.0) for cell in plan.layout.cells
         )
         cell = plan.layout.cells[0]
-        bent = cell.x, -plan.layout.plate[1] * 0.8, plate_bottom(spec) - down
-        names = Name("filament", bent), Name("groove", (cell.x, -plan.layout.plate[1] * 0.7, plate_bottom(spec)))
+        bent = cell.x, -plan.layout.plate[1] * 0.8, moulds.plate[0] - down
+        names = Name("filament", bent), Name("groove", (cell.x, -plan.layout.plate[1] * 0.7, moulds.plate[0]))
         yield "filament", View((*base, *stubs), arrows, UNDER, "under", names=names)
     on = level_on(moulds)
     names = (
         Name("level", (0.0, -4.0, on.rim + 2)),
-        Name("paper", (-plan.layout.plate[0] - 4, -plan.layout.plate[1], plate_bottom(spec))),
+        Name("paper", (-plan.layout.plate[0] - 4, -plan.layout.plate[1], moulds.plate[0])),
     )
     yield "level", View((*standing, Placed(on.cup)), draw.spirit_level(moulds, on.rim), names=names)
     for step in plan.steps:
         for name, view in _pour(moulds, step, standing):
             yield f"pour{step.index}-{name}", view
-    if plan.of_kind("stub"):
-        arrows = tuple(
-            draw.downward(cell.x + 4.0, cell.y - 4.0, plate_bottom(spec) - 2.0, 7.0) for cell in plan.layout.cells
-        )
-        cured = tuple(Placed(step.name) for step in plan.steps)
-        yield "filament-out", View((*base, *stubs, *cured), arrows, UNDER, "under")
-    up = plan.steps[-1].rim + CLEAR
-    unit = tuple(Placed(step.name, (0.0, 0.0, up)) for step in plan.steps)
-    unit += tuple(Placed(body.name, (0.0, 0.0, up)) for body in plan.steps[-1].inserts)
-    yield "peel", View((*(base if plan.of_kind("stub") else standing), *unit), (_raised(moulds, up),))
-    inside = [body for body in moulds.unit if body.made != "cast"]
-    if inside and not moulds.design.laid_in:
-        below = moulds.design.opens == "below"
-        away = (-1.0 if below else 1.0) * (moulds.dimensions.heights[-1] + CLEAR)
-        cast = tuple(Placed(body.name, half=True) for body in moulds.unit if body.made == "cast")
-        laid = tuple(Placed(body.name, (0.0, 0.0, away)) for body in inside)
-        at = moulds.dimensions.outer_radius * 0.8
-        arrow = (draw.upward if below else draw.downward)(-at, -2.0, away / 2 + moulds.dimensions.heights[-1] / 2, 5.0)
-        eye = UNDER if below else LOW
-        fed = fed_through(moulds)
-        yield "motor-in", fed or View((*cast, *laid), (arrow,), eye, "unit")
-        yield "motor-home", View((*cast, *(Placed(body.name) for body in inside)), eye=eye, group="unit")
+    yield from way_out(moulds)
+    yield from motor_views(moulds)
 
 
 def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterator[tuple[str, View]]:
-    plan, spec, lay = moulds.plan, moulds.spec, moulds.plan.layout
+    plan, lay = moulds.plan, moulds.plan.layout
     before = plan.steps[: step.index - 1]
     inserts = tuple(Placed(body.name) for body in step.inserts)
     cured = (*standing, *(Placed(each.name) for each in before))
@@ -113,10 +93,13 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
         raised = tuple(Placed(body.name, (0.0, 0.0, 2 * CLEAR)) for body in step.inserts)
         yield "laid-in", View((*cured, *raised), (draw.downward(-lay.cup[0], -lay.cup[1], step.rim + CLEAR, 6.0),))
     cured = (*cured, *inserts)
-    up = spec.moulds.plinth_height_mm + max(step.rim, moulds.dimensions.core_height) + CLEAR
-    beside = 0.0, -lay.cup[1] - 4.0, plate_top(spec) + up / 2
+    up = max(step.rim, moulds.dimensions.core_height) - moulds.plate[1] + CLEAR
+    beside = 0.0, -lay.cup[1] - 4.0, moulds.plate[1] + up / 2
     raised = Placed(step.cup, (0.0, 0.0, up))
     key = _corner(moulds, step.rim + up)
+    if moulds.greased(step):
+        film = Extra(union(step.seals), draw.GREASE)
+        yield "grease", View(cured, (film,), names=_greased(moulds, step))
     yield "cup-on", View((*cured, raised), (draw.downward(*beside, up * 0.6),), names=(key,))
     cup, tongues = Placed(step.cup), plan.standing(step, "tongue")
     home = tuple(Placed(tool.name) for tool in tongues)
@@ -173,7 +156,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
         held = (*pads, *draw.tape(moulds, step))
         yield (
             "hold",
-            View(closed, (*held, *tabs), names=(Name("tape", (6.0 - lay.cup[0], -lay.plate[1], plate_top(spec))),)),
+            View(closed, (*held, *tabs), names=(Name("tape", (6.0 - lay.cup[0], -lay.plate[1], moulds.plate[1])),)),
         )
         thread = cylinder(0.6, step.rim - 1.0, step.rim + 14.0)
         cell = min(lay.cells, key=lambda each: (each.y, each.x))
@@ -230,7 +213,9 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
         off = Placed(step.lid, (0.0, 0.0, lift))
         pushed = tuple(draw.upward(side * (lay.cup[0] + 3.0), 0.0, step.rim + lift / 2, lift) for side in (1, -1))
         yield "lid-off", View((*cured, cup, poured, off), pushed)
-    lever = Name("screwdriver", (lay.plate[0] + 8.0, 0.0, plate_top(spec)))
+    if all(removal.piece != step.cup for removal in step.removals):
+        return
+    lever = Name("screwdriver", (lay.plate[0] + 8.0, 0.0, moulds.plate[1]))
     yield "cup-off", View((*cured, poured, raised), draw.screwdrivers(moulds), names=(lever,))
 
 
@@ -258,7 +243,7 @@ def _on_pad(moulds: MouldSet, side: int) -> Offset:
     if prop is None:
         return 0.0, 0.0, 0.0
     near = min(cell.y for cell in lay.cells if side in cell.sides) - GRIP_WIDTH / 2 - 1
-    return side * (lay.cup[0] + prop.width_mm / 2), near, plate_top(moulds.spec) + prop.thickness_mm / 3
+    return side * (lay.cup[0] + prop.width_mm / 2), near, moulds.plate[1] + prop.thickness_mm / 3
 
 
 def _sprue_and_vent(moulds: MouldSet, step: Step) -> tuple[Offset, Offset]:
@@ -297,6 +282,11 @@ def _strikers(moulds: MouldSet, step: Step) -> tuple[tuple[Placed, ...], tuple[E
     return tuple(Placed(tool.name, (back, 0.0, lift)) for tool in plan.of_kind("blade")), ()
 
 
-def _raised(moulds: MouldSet, up: float) -> Extra:
-    lay = moulds.plan.layout
-    return draw.upward(0.0, -lay.cup[1], up / 2, up * 0.8)
+def _greased(moulds: MouldSet, step: Step) -> tuple[Name, ...]:
+    """Name the grease where a seal lies nearest the eye."""
+    meshes = moulds.meshes(step.seals[:1])
+    if not meshes or meshes[0].is_empty():
+        return ()
+    points = np.asarray(arrays(meshes[0])[0], float)
+    x, y, z = points[np.argmax(points @ np.array(ABOVE))].tolist()
+    return (Name("grease", (x, y, z)),)

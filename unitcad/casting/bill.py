@@ -54,7 +54,7 @@ def _pieces(moulds: MouldSet) -> Iterator[Item]:
     for name, (tool, *more) in kinds.items():
         count = 1 + len(more)
         if tool.kind == "stub":
-            height = dims.core_height + spec.moulds.plinth_height_mm + spec.moulds.plate_mm
+            height = dims.core_height - moulds.plate[0]
             length = f"{height + plan.layout.plate[1] + 10:.0f} mm each, the end bent by a right angle"
             note = f"{number(spec.moulds.filament_mm, 3)} mm printer filament, {length}"
             yield Item("filament stub", count, "piece", "cut", note)
@@ -64,7 +64,7 @@ def _pieces(moulds: MouldSet) -> Iterator[Item]:
         else:
             attitude = "printed upside down" if tool.upside_down else "printed as drawn"
             note = f"{spec.moulds.printer}, layers of {number(spec.moulds.layer_mm, 3)} mm"
-            yield Item(name, count, "piece", attitude, note)
+            yield Item(plan.called(name), count, "piece", attitude, note)
 
 
 def _silicone(mixes: list[tuple[Material, Mix]]) -> Iterator[Item]:

@@ -24,8 +24,9 @@ def release(moulds: MouldSet, inner: Material) -> Iterator[BenchStep]:
         each = "the" if len(moulds.plan.layout.cells) == 1 else "each"
         yield BenchStep(
             "Filament out",
-            f"Pull {each} filament out downwards, by its bent end: it lets air in under the unit. Never push it "
-            f"through: {number(tear, 2)} N on its end tear {inner.name} (computed: tensile strength, "
+            f"Lift the mould off the bench first: {each} bent end lies under its plate. Pull {each} filament out "
+            "downwards, by its bent end: it lets air in under the unit. Never push it through: "
+            f"{number(tear, 2)} N on its end tear {inner.name} (computed: tensile strength, "
             f"{inner.tensile_mpa.status}, x its area).",
             picture_path("filament-out"),
             minutes=fig.PULL_MIN * len(moulds.plan.layout.cells),
@@ -37,10 +38,10 @@ def release(moulds: MouldSet, inner: Material) -> Iterator[BenchStep]:
         yield BenchStep(
             "Base off, downwards",
             f"Take off what held the cup down. Leave {cup} on: it can't be lifted past the silicone that lies over it. "
-            f"Lift the mould off the bench by {cup}, a screwdriver in each of the two pry slots, and lever the base "
-            "off downwards, on both sides at once and a little at a time, until it comes free of the silicone. It must "
-            f"come straight. The {moulds.makes} stays in {cup}.",
-            picture_path("peel"),
+            f"Hold the mould off the bench by {cup}, put a screwdriver in each of the two pry slots, and lever the "
+            "base off downwards, on both sides at once and a little at a time, until it comes free of the silicone. It "
+            f"must come straight. The {moulds.makes} stays in {cup}.",
+            picture_path("base-off"),
             minutes=fig.LIFT_MIN * 2,
         )
     film = ", and the film that the blade left along the edge," if moulds.spec.moulds.pour == "open" else ""
@@ -50,7 +51,7 @@ def release(moulds: MouldSet, inner: Material) -> Iterator[BenchStep]:
             f"Loosen the edge of the {moulds.makes} all round with a blunt spatula. Push it up out of "
             f"{spaced(moulds.plan.steps[-1].cup)} from below with the thumbs, first at the edge, then unit by unit. "
             f"Trim the flash{film} with small scissors.",
-            picture_path("peel"),
+            picture_path("push-out"),
             minutes=fig.PEEL_MIN * len(moulds.plan.layout.cells),
         )
         return

@@ -17,6 +17,8 @@ from unitcad.moulds.plan import Step
 from unitcad.moulds.ribs import ribs
 from unitcad.text import number, spaced
 
+GREASE = "Grease the flanks"
+"""The step that seals slits beside the cavity before the cup hides them."""
 HOLD = "Hold"
 """How the step begins that keeps an open cup on its base under the blade."""
 LEVEL_AGAIN = (
@@ -67,18 +69,20 @@ def pour_steps(
             "the cavity only: it keeps silicone from weeping out.",
             minutes=fig.GREASE_MIN * cells,
         )
+    if flanks := moulds.greased(step):
+        yield BenchStep(
+            GREASE,
+            f"Before cup {step.index} goes on, smear petroleum jelly thinly on {flanks}. A film that shines, no beads: "
+            "it keeps silicone out of the slits beside the cup's slots. Wipe off what lies elsewhere.",
+            picture("grease"),
+            minutes=fig.GREASE_MIN * cells,
+        )
     yield BenchStep(
         f"Cup {step.index} on",
         f"{_release_agent(moulds, step)} {_put_on(moulds, step)}",
         picture("cup-on"),
         minutes=fig.CUP_ON_MIN,
     )
-    if step.seals and not plan.concentric:
-        yield BenchStep(
-            "Grease the flanks",
-            "Grease the flanks of what stands on the base beside the cavity thinly, and wipe off the rest.",
-            minutes=fig.GREASE_MIN * cells,
-        )
     if tongues:
         slot = "" if first else " and the slot that it left in the layer before"
         seat = number(window_length(moulds, step), 2)
@@ -326,7 +330,11 @@ def _put_on(moulds: MouldSet, step: Step) -> str:
             f"Put cup {step.index} on and press it down evenly until it sits. Its ribs centre it: push it to no side."
         )
     if moulds.plan.pins:
-        return f"Put cup {step.index} on over the pins, cut corner over cut corner, and push it towards that corner."
+        play = number(moulds.plan.pins.clearance, 2)
+        return (
+            f"Put cup {step.index} on over the pins, cut corner over cut corner, and press it down flat. The pins let "
+            f"it move by {play} mm each way: push it to and fro, along the base and across, and leave it in the middle."
+        )
     pushed = ", so that the play lies on one side." if step.index == 1 else ", as the cup before."
     if step.index > 1 and moulds.plan.concentric:
         pushed = f", as the cup before: Layer {step.index} lies between two cup positions."

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 from unitcad.designs.limits import filament_groove
-from unitcad.moulds.base import plate_bottom, plate_top, pry_floor
+from unitcad.moulds.base import plate_bottom, pry_floor
 from unitcad.moulds.cup import groove_depth_of, window_section
 from unitcad.moulds.lid import skirt_end
 from unitcad.moulds.mould_set import MouldSet
@@ -57,7 +57,7 @@ def off_grid(moulds: MouldSet) -> list[OffGrid]:
 def unit_heights(moulds: MouldSet) -> list[UnitHeight]:
     """Return the cavity's depth and every layer's height over what it is cast on, where layers make another of them."""
     spec, dims = moulds.spec, moulds.plan.dimensions
-    layer, seat = spec.moulds.layer_mm, -plate_bottom(spec)
+    layer, seat = spec.moulds.layer_mm, -moulds.plate[0]
     core = dims.core_height, _whole(seat + dims.core_height, layer) - _whole(seat, layer)
     rims = [(rim, _whole(rim, layer)) for rim in dims.heights]
     heights = [UnitHeight("cavity", *core)] if moulds.plan.concentric and rims[0][0] > core[0] else []
@@ -80,11 +80,11 @@ def _whole(height: float, layer: float) -> float:
 def _edges(moulds: MouldSet) -> list[tuple[str, str, float]]:
     """Return piece, edge and height above the bed, mm. Cups lie upside down: theirs count from the rim."""
     spec, dims = moulds.spec, moulds.plan.dimensions
-    bottom = plate_bottom(spec)
+    bottom, top = moulds.plate
     edges = [
-        ("base", "plate", plate_top(spec) - bottom),
+        ("base", "plate", top - bottom),
         ("base", "seat", -bottom),
-        ("base", "pry slots' floor", pry_floor(spec) - bottom),
+        ("base", "pry slots' floor", pry_floor(spec) - plate_bottom(spec)),
     ]
     if moulds.plan.of_kind("stub"):
         edges.append(("base", "filament groove's roof", filament_groove(spec)))

@@ -82,7 +82,7 @@ def fed_through(moulds: MouldSet) -> View | None:
     side = max(dims.sides)
     pulled = draw.sideways(side, side * (end + 4.0), -half - 1.0, middle + 1.5, 6.0)
     names = (Name("slot", (side * dims.outer_radius, -half, middle)),)
-    return View((*cast, *motor), (Extra(union(strips), led[0].colour), pulled), UNDER, "unit", names=names)
+    return View((*cast, *motor), (Extra(union(strips), led[0].colour), pulled), UNDER, "unit", names=names, turned=True)
 
 
 def _bent(start: tuple[float, float], mouth: tuple[float, float], end: float, thick: float, half: float) -> Shape:

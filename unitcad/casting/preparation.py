@@ -13,7 +13,6 @@ from unitcad.casting.joining import joining
 from unitcad.casting.time_line import duration
 from unitcad.catalogue import Material
 from unitcad.designs.rib_leaves import leaf_mm
-from unitcad.moulds.base import plate_bottom
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.dents import DENT, TILT_DEG
 from unitcad.moulds.layout import BLADE_HEIGHT
@@ -28,6 +27,8 @@ PERIMETERS = 3
 SPARE = 2.0
 """What a piece of filament is longer than its way through base and core, mm."""
 FOOT_MM = 0.2
+PHONE_DEG = 0.1
+"""What a phone's level shows (assumed)."""
 MORE_PLATES = (
     "Together the pieces are larger than the bed; each one fits it. Let the slicer arrange them on as many plates as "
     "they need, none of them tilted."
@@ -53,7 +54,7 @@ def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
     ]
     if plan.splits:
         lines.append(MORE_PLATES)
-    standing = spec.moulds.plinth_height_mm + spec.moulds.plate_mm + plan.dimensions.core_height
+    standing = plan.dimensions.core_height - moulds.plate[0]
     time = fig.print_min(spec, solid_mm3, max(standing, BLADE_HEIGHT if plan.of_kind("blade") else 0.0))
     takes = f"Takes about {duration(5 * max(round(time / 5), 1))}"
     if in_resin(moulds):
@@ -72,13 +73,18 @@ def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
         )
         lines.append(
             f"{takes} (by volume and layer height, within a third of PrusaSlicer's times for other sets). Time and "
-            f"filament, piece by piece: run unitcad build {moulds.source} --slice -o .. in this folder, on a machine "
-            "with PrusaSlicer; it writes slicer.json."
+            f"filament, piece by piece: run unitcad build {moulds.source} --slice -o sliced in this folder, on a "
+            "machine with PrusaSlicer. The path that it prints last is the folder that has slicer.json."
         )
+    there = [
+        "pins (its plinth has the same play)" if plan.pins else "plinth",
+        *(["tongue"] if plan.of_kind("tongue") else []),
+        *(["filament"] if plan.of_kind("stub") else []),
+    ]
     lines.append(
         f"First time on this printer: print the fit coupon (unitcad coupon {spec.moulds.printer}): a print of "
-        "its own, whose time the slicer says. It shows whether plinth, tongue and filament fit, and gives the line for "
-        "the spec where they do not."
+        f"its own, whose time the slicer says. It shows whether {listed(there)} fit, and gives the line for the spec "
+        "where they do not."
     )
     return tuple(lines)
 
@@ -87,14 +93,14 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
     """Describe the way from the printer to an empty mould; `silicones` are those that a resin may keep from curing."""
     plan, lengths = moulds.plan, moulds.spec.moulds
     cups, cells, label = len(plan.steps), len(plan.layout.cells), seen(plan.label)
-    marked = listed(["base", "cups", *(["lids"] if plan.of_kind("lid") else [])])
-    own = [f"C{step.index:X} is {spaced(step.cup)}" for step in plan.steps]
-    own += [f"L{step.index:X} is {spaced(step.lid)}" for step in plan.steps if step.lid]
+    own = [f"C{step.index:X} on {spaced(step.cup)}" for step in plan.steps]
+    own += [f"L{step.index:X} on {spaced(step.lid)}" for step in plan.steps if step.lid]
+    pieces = " Beside it each piece of a tool that is printed in several has its number." if plan.splits else ""
     yield BenchStep(
         "Sort the pieces",
-        f"Print the pieces as they lie in their files, without supports. {marked.capitalize()} are engraved "
-        f"{label}: the base with a b before it, the others with {label[:2]} and {label[2:]} in two "
-        f"corners and their own number in the third: {listed(own)}.",
+        f"Print the pieces as they lie in their files, without supports. Engraved are {seen('B')}{label} on the base, "
+        f"{label[:2]} and {label[2:]} in two corners of {'cups and lids' if plan.of_kind('lid') else 'the cups'}, and "
+        f"in a third corner {listed(own)}.{pieces}",
         picture_path("pieces"),
         minutes=fig.SORT_MIN,
     )
@@ -149,7 +155,7 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
 
 def _bend(moulds: MouldSet) -> str:
     """Say how a piece of filament gets its bent end."""
-    leg = moulds.plan.dimensions.core_height - plate_bottom(moulds.spec) + SPARE
+    leg = moulds.plan.dimensions.core_height - moulds.plate[0] + SPARE
     between = " Of a groove that ends under the plate, cut the bent end to its length."
     inner = between if len({cell.y for cell in moulds.plan.layout.cells}) > 1 else ""
     bent = f"bend it by a right angle, so that one leg has {number(leg, 2)} mm"
@@ -202,16 +208,10 @@ def cleaning(moulds: MouldSet, silicones: Sequence[Material]) -> Iterator[BenchS
 
 def level_text(moulds: MouldSet) -> str:
     """Say how level the mould must lie, and how to see it."""
-    tilt = number(fall_deg(moulds), 2)
     if moulds.spec.moulds.pour == "injected":
         how = f"Lids clear their air up to a tilt of {number(TILT_DEG, 2)} degrees"
     else:
-        across = number(2 * moulds.dimensions.outer_radius, 3)
-        how = (
-            f"Silicone stays level while it cures: at {tilt} degrees {number(DENT, 3)} mm more stand on the low side "
-            "of a "
-            f"cavity {across} mm wide (computed)"
-        )
+        how = fall(moulds)
     cup = spaced(level_on(moulds).cup)
     return (
         f"{how}. Put the base where it will stay and {cup} on it, dry. Lay a phone with its level, or a small spirit "
@@ -220,9 +220,18 @@ def level_text(moulds: MouldSet) -> str:
     )
 
 
-def fall_deg(moulds: MouldSet) -> float:
-    """Return the tilt at which an open cavity's silicone stands DENT higher on one side than on the other, degrees."""
-    return math.degrees(math.atan(DENT / (2 * moulds.dimensions.outer_radius)))
+def fall(moulds: MouldSet) -> str:
+    """Say at which tilt an open pour stands DENT higher on one side than on the other, and what a phone shows of it."""
+    what, wide = moulds.poured_across
+    tilt = math.degrees(math.atan(DENT / wide))
+    finer = (
+        f". A phone shows {number(PHONE_DEG, 1)} degrees at best (assumed): take a long spirit level, turn it end for "
+        "end, and count half the difference of what it shows; the second strike takes off most of what is left"
+    )
+    return (
+        f"Silicone stays level while it cures: at {number(tilt, 2)} degrees {number(DENT, 3)} mm more stand on the low "
+        f"side of a {what} {number(wide, 3)} mm wide (computed){finer if tilt < PHONE_DEG else ''}"
+    )
 
 
 def in_resin(moulds: MouldSet) -> bool:

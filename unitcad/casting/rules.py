@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.finishing import layers_named
-from unitcad.casting.instructions import HOLD, LEVEL_AGAIN, TACK
+from unitcad.casting.instructions import GREASE, HOLD, LEVEL_AGAIN, TACK
 from unitcad.casting.needs import needs
 from unitcad.casting.procedure import Procedure
 from unitcad.text import spaced
@@ -58,6 +58,26 @@ def _held(procedure: Procedure) -> Iterator[str]:
             yield f"pour {pour.index}: the cup is lifted over a tongue"
 
 
+def _greased(procedure: Procedure) -> Iterator[str]:
+    """Grease what seals a cup's slots before the cup hides it, with petroleum jelly, and say on which faces."""
+    for pour in procedure.pours:
+        titles = [step.title for step in pour.steps]
+        on = f"Cup {pour.index} on"
+        if GREASE in titles:
+            text = pour.steps[titles.index(GREASE)].text
+            if titles.index(GREASE) > titles.index(on):
+                yield f"pour {pour.index}: greases what the cup already hides"
+            if "petroleum jelly" not in text or "face" not in text:
+                yield f"pour {pour.index}: does not say what to grease with, or which faces"
+
+
+def _lifted(procedure: Procedure) -> Iterator[str]:
+    """Lift the mould off the bench before a filament is pulled from under it."""
+    for step in procedure.release:
+        if step.title == "Filament out" and not step.text.startswith("Lift the mould off the bench"):
+            yield "the filaments are pulled out while the mould lies on them"
+
+
 def _cleared(procedure: Procedure) -> Iterator[str]:
     """Clear every window that resin may close, before the post-cure."""
     clear, cure = _first(procedure.preparation, "Clear the windows"), _first(procedure.preparation, "post-cure, bake")
@@ -68,7 +88,9 @@ def _cleared(procedure: Procedure) -> Iterator[str]:
 
 def _shown(procedure: Procedure) -> Iterator[str]:
     """Show every step in which a piece of the mould is put on, moved or taken off."""
-    moving = re.compile(r"^(Cup \d+ (on|off)|Lid|Tongue|Filament|Hold|Pour$|Strike off|Inject|Peel)")
+    moving = re.compile(
+        r"^(Cup \d+ (on|off)|Lid|Tongue|Filament|Grease the fl|Hold|Pour$|Strike|Inject|Peel|Base|Push|Level|Try)"
+    )
     for step in _all(procedure):
         if moving.match(step.title) and not step.picture:
             yield f"{step.title}: has no picture"
@@ -171,6 +193,8 @@ RULES = (
     _agent,
     _degassing,
     _held,
+    _greased,
+    _lifted,
     _cleared,
     _shown,
     _levelled,

@@ -89,7 +89,7 @@ def _times(procedure: Procedure) -> Iterator[str]:
 def _needed(procedure: Procedure) -> list[str]:
     rows = [
         (
-            markdown(spaced(i.item) if i.made.startswith("printed") else i.item),
+            markdown(i.item),
             f"{number(i.quantity, 3)} {i.unit}",
             i.made,
             markdown(i.note),

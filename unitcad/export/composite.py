@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,10 +47,16 @@ class DrawnBody:
     patch: np.ndarray
 
 
-def view(towards_eye: tuple[float, float, float], points: np.ndarray, size: tuple[int, int]) -> Camera:
-    """Return a view that holds all `points` (n, 3) mm, for pictures of `size` (width, height) pixels."""
+def view(
+    towards_eye: tuple[float, float, float], points: np.ndarray, size: tuple[int, int], turned: bool = False
+) -> Camera:
+    """Return a view that holds all `points` (n, 3) mm, for pictures of `size` (width, height) pixels.
+
+    `turned`: upside down, as things look that lie on their back.
+    """
     low, high = points.min(axis=0), points.max(axis=0)
-    return raster.camera(towards_eye, (low + high) / 2, points, (SHARPER * size[0], SHARPER * size[1]))
+    camera = raster.camera(towards_eye, (low + high) / 2, points, (SHARPER * size[0], SHARPER * size[1]))
+    return replace(camera, right=-camera.right, up=-camera.up) if turned else camera
 
 
 def drawn(vertices: np.ndarray, faces: np.ndarray, colour: tuple[float, float, float], of: Camera) -> DrawnBody:

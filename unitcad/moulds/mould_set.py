@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from msgspec import structs
 
 from unitcad.designs import Design, Dimensions, design_of, unit_bodies
-from unitcad.moulds.plan import Plan, plan
+from unitcad.moulds.base import plate_top
+from unitcad.moulds.plan import Plan, Step, plan
 from unitcad.moulds.ribs import rib_spaces
 from unitcad.shape import Shape
 from unitcad.shape.body import Body
@@ -146,6 +147,29 @@ class MouldSet:
     def assembly(self) -> tuple[str, ...]:
         """How motor and circuit go into the body, or into the mould, in the design's words; () where it has none."""
         return tuple(self.design.assembly(self.spec, self.plan.dimensions))
+
+    @property
+    def plate(self) -> tuple[float, float]:
+        """z of the lower and the upper face of the base's plate, mm: cups on pins stand on it, others on a plinth."""
+        top = 0.0 if self.plan.pins else plate_top(self.spec)
+        return top - self.spec.moulds.plate_mm, top
+
+    @property
+    def poured_across(self) -> tuple[str, float]:
+        """The widest surface that lies open in a pour: what it is, and how wide, mm."""
+        return "cavity", 2 * self.dimensions.outer_radius
+
+    def greased(self, step: Step) -> str:
+        """Return what gets petroleum jelly before the cup of a pour is put on; "" where nothing does.
+
+        A seal beside what a tongue passes through is greased with the tongue.
+        """
+        if self.plan.concentric or not step.seals:
+            return ""
+        return (
+            f"the upright faces of what stands on the base, only there where cup {step.index} has a slot for it, "
+            "outside the cavity"
+        )
 
     def pieces(self, name: str) -> int:
         """Return the number of solids that a body of that name is drawn of."""

@@ -18,6 +18,7 @@ from unitcad.moulds.removal import Removal, customary
 from unitcad.shape import Shape, Union, content_hash, moved, turned, union
 from unitcad.shape.body import Body, Kind
 from unitcad.spec import Spec
+from unitcad.text import spaced
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,11 @@ class Plan:
     def pieces_of(self, name: str) -> tuple[Body, ...]:
         """Return the pieces of a tool by its name: itself where it is not split. Raises KeyError."""
         return next((split.pieces for split in self.splits if split.tool == name), None) or (self.tool(name),)
+
+    def called(self, name: str) -> str:
+        """Return a tool's or a piece's name as it is read: "cup 1", "cup 1, piece 2"."""
+        numbered = ((split.tool, i, piece.name) for split in self.splits for i, piece in enumerate(split.pieces, 1))
+        return next((f"{spaced(tool)}, piece {i}" for tool, i, piece in numbered if piece == name), spaced(name))
 
     def walled(self, step: Step) -> str:
         """Return the name of the piece that has a pour's wall and rim: its cup, else the piece that stays."""

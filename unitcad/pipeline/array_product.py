@@ -5,6 +5,7 @@ patch/      the patch as it is worn: STL of the sheet, STEP and GLB of all
 moulds/     the tools of the sheet
 units/NAME/ a unit's own result, as `unitcad build` makes it: with moulds where units are cast apart
 pictures/   patch, tools, pours
+steps/      the state of the moulds at each step of the procedure
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from unitcad.arrays.patch import patch_bodies, patch_parts
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
 from unitcad.arrays.patch_pictures import picture_names, pictures
 from unitcad.cache import Store, digest
+from unitcad.casting.bench_pictures import pictures as bench_pictures
+from unitcad.casting.bench_views import picture_path, views
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.procedure import procedure as unit_procedure
 from unitcad.casting.written import files as written
@@ -81,6 +84,7 @@ def make_array(array: Array, only: Sequence[str], check: bool, store: Store, sta
                 draw = partial(step_section, moulds, step)
                 key = geometry_key(moulds, f"section of pour {step.index}")
                 shared[f"step{step.index}-section.svg"] = store.file(key, lambda draw=draw: draw().encode())
+            shared |= _step_pictures(moulds, store)
             own |= _casting(moulds, shape, units)
     with stages("circuit and crosstalk"):
         beside, lacking = extras(array, only)
@@ -143,6 +147,15 @@ def _pictures(moulds: PatchMoulds, store: Store) -> dict[str, str]:
     together = cache(lambda: pictures(blank))
     return {
         path: store.file(geometry_key(blank, path), lambda path=path: together()[path]) for path in picture_names(blank)
+    }
+
+
+def _step_pictures(moulds: PatchMoulds, store: Store) -> dict[str, str]:
+    """Return the pictures of the procedure's steps: all drawn when the first is not kept yet."""
+    together = cache(lambda: bench_pictures(moulds))
+    return {
+        path: store.file(geometry_key(moulds.blank, path), lambda path=path: together()[path])
+        for path in map(picture_path, views(moulds))
     }
 
 
