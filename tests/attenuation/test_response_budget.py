@@ -59,10 +59,7 @@ def test_a_tighter_rtol_never_loosens_the_bound(load, modulus):
         assert np.all(np.abs(one.u_r - found[-1].u_r) <= one.error_r + found[-1].error_r)
 
 
-@pytest.mark.parametrize(
-    ("kind", "seed"),
-    [("wide contrast", 482719030044), ("nearly fluid film", 482719030001), ("extreme contrast", 731905)],
-)
+@pytest.mark.parametrize(("kind", "seed"), [("wide contrast", 482719030044), ("extreme contrast", 731905)])
 def test_a_tighter_rtol_keeps_what_a_looser_one_reached(kind, seed):
     """It was up to 16 million times worse: halved poles that rounding hid, panels kept from the tail."""
     one = trial(kind, seed)
@@ -70,6 +67,14 @@ def test_a_tighter_rtol_keeps_what_a_looser_one_reached(kind, seed):
     found = [one.medium.response(one.load, one.omega, one.r, z=one.z, rtol=rtol) for rtol in tolerances]
     errors = [response.error for response in found]
     assert all(tight <= 1.02 * loose for loose, tight in pairwise(errors))
+
+
+def test_no_panels_are_halved_for_less_than_what_the_tail_leaves_anyway():
+    """621,264 wavenumbers at rtol 1e-9 for the 6.9e-5 that 1e-5 has: |u| was guessed before anything was integrated."""
+    one = trial("nearly fluid film", 482719030001)
+    loose, tight = (one.medium.response(one.load, one.omega, one.r, z=one.z, rtol=rtol) for rtol in (1e-5, 1e-9))
+    assert tight.error <= 1.02 * loose.error
+    assert tight.wavenumbers < 1.1 * loose.wavenumbers
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("nearly fluid film", 864190230005), ("extreme contrast", 552121)])

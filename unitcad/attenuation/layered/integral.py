@@ -106,13 +106,16 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     far = PHASE / span * MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
     tail = measure_tail(bare.kernel, materials, load, r, z, end, far, rtol, largest)
     least = float(tail.bounds[-1].max())
-    rtol = max(rtol, 0.3 * least / (tail.scale or 1.0))  # what the tail leaves anyway is worth no halving
+
+    def tolerance(size: float) -> float:
+        return max(rtol * min(size, largest), 0.3 * least)  # what the tail leaves anyway is worth no halving
+
     problem = replace(bare, reference=tail.reference)
     known, rounded = problem.static_part()
     total, quadrature, size = np.zeros_like(known), np.zeros(known.shape), np.zeros(known.shape)
     skipped = np.zeros(known.shape)  # by the detours
     count, done, exhausted, gained = 0, 0, False, 0.0
-    stop = tail.start(tail.scale, rtol)
+    stop = tail.start(tolerance(tail.scale))
     pending = from_origin(end, stop, span, materials)
     put_off = _PutOff.none(len(pending), known.shape)
     for _ in range(_MAX_ROUNDS):
@@ -121,11 +124,11 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             raise overflow(bare.omega)
         count += pending.shape[0] * _NODES.size
         whole, off = np.abs(known + total + found.parts.sum(0)), quadrature + found.errors.sum(0)
-        scale = min(float(np.max(whole)) or 1.0, largest)
+        wanted = tolerance(float(np.max(whole)) or 1.0)
         done += pending.shape[0]
-        limit = _PANELS_SHARE * rtol * scale / max(done, 1)
+        limit = _PANELS_SHARE * wanted / max(done, 1)
         bad = found.gains > limit
-        if np.max(off) <= _PANELS_SHARE * rtol * scale:
+        if np.max(off) <= _PANELS_SHARE * wanted:
             bad[:] = False
         due = put_off.due(found, bad)
         dropped = np.isin(put_off.of, due)
@@ -139,8 +142,8 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         gained += float(found.gains[good].sum())
         size += found.sizes[good].sum(0)
         if not np.all(good):
-            sure = min(float(np.max(whole - off - skipped)), scale)  # beside a pole |u| is at first far too large
-            left = _DETOURS_SHARE * rtol * sure - float(skipped.max())
+            sure = tolerance(float(np.max(whole - off - skipped)))  # beside a pole |u| is at first far too large
+            left = _DETOURS_SHARE * sure - float(skipped.max())
             now, later, pieces = _detours(problem, pending, found, bad, limit, left, span)
             skipped += found.hidden[now].sum(0)
             quadrature += put_off.hidden[due].sum(0)
@@ -150,15 +153,15 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             pending = np.concatenate([halved(pending[halves]), turned])
             put_off = _PutOff(np.append(of, np.full(len(turned), -1)), pieces[later], found.hidden[later])
             continue
-        wanted = tail.start(min(float(np.max(np.abs(known + total))), largest), rtol)
+        further = tail.start(tolerance(float(np.max(np.abs(known + total)))))
         # Panels that do not suffice for halving may still do for a tail that leaves more.
         spent = done > MAX_PANELS or (exhausted and tail.bound(stop).max() <= (quadrature + skipped).max())
-        exhausted |= wanted > stop and spent
-        if wanted <= stop or spent:
+        exhausted |= further > stop and spent
+        if further <= stop or spent:
             break
-        pending = onwards(stop, wanted, span)
+        pending = onwards(stop, further, span)
         put_off = _PutOff.none(len(pending), known.shape)
-        stop = wanted
+        stop = further
     else:
         found = _evaluate(problem, pending)
         gained += float(found.gains.sum())

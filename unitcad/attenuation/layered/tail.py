@@ -28,9 +28,9 @@ class Tail:
     reference: w.Material | None
     scale: float  # a first guess of the largest displacement
 
-    def start(self, scale: float, rtol: float) -> float:
-        """Return the least wavenumber (1/m) beyond which less than 0.4 rtol scale is missing, or the last one."""
-        good = np.nonzero(self.bounds.max(axis=(1, 2)) <= 0.4 * rtol * scale)[0]
+    def start(self, tolerance: float) -> float:
+        """Return the least wavenumber (1/m) beyond which less than 0.4 of the tolerance is missing, or the last one."""
+        good = np.nonzero(self.bounds.max(axis=(1, 2)) <= 0.4 * tolerance)[0]
         return float(self.k[good[0]] if good.size else self.k[-1])
 
     def bound(self, stop: float) -> np.ndarray:
@@ -83,7 +83,7 @@ def measure_tail(
 
         Among equals the one that leaves the least: the scale may have been guessed too large.
         """
-        stop = tail.start(scale, rtol)
+        stop = tail.start(rtol * scale)
         rest = float(tail.bound(stop).max())
         return max(rest, 0.4 * rtol * scale), stop, rest
 
