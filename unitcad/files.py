@@ -14,7 +14,6 @@ import json
 import math
 import os
 import re
-import secrets
 import shutil
 import stat
 from collections.abc import Callable, Iterator, Mapping
@@ -209,6 +208,8 @@ def scratch(parent: Path, name: str = "") -> Iterator[Path]:
 
     `name` is what in `parent` the work is for; `leftovers` yields it with the folder of a killed process.
     """
+    import secrets
+
     from filelock import FileLock
 
     token = secrets.token_hex(8)

@@ -8,82 +8,36 @@ from __future__ import annotations
 
 import os
 import sys
-from importlib import import_module
-from typing import Annotated, Any, cast
+from typing import Any
 
-import typer
-
-from unitcad import __version__
-from unitcad.cli.output import say_error, speak_anywhere
+from unitcad.cli.output import say_error, speak_anywhere, warn
 from unitcad.errors import UnitcadError
 
-COMMANDS = {
-    "build": "build",
-    "batch": "batch",
-    "check": "check",
-    "design": "design",
-    "estimate": "estimate",
-    "experiments": "experiments",
-    "accuracy": "accuracy",
-    "coupon": "coupon",
-    "fit": "fit",
-    "init": "init",
-    "list": "list_",
-    "material": "material",
-    "measure": "measure",
-    "phantom": "phantom",
-    "report": "report",
-    "schema": "schema",
-    "serve": "serve",
-    "cache": "cache",
-}
-"""The commands in the order of --help, and what each is called in its module."""
 INTERRUPTED = 130
-WrongArguments = cast(type[typer.BadParameter], typer.BadParameter.__mro__[2])
-"""Typer's error of the command line itself, such as an unknown option: ClickException, its own or click's."""
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"unitcad {__version__}")
-        raise typer.Exit()
-
-
-def application(*commands: str) -> typer.Typer:
-    """Return the command line with these commands alone: reading the arguments of one does not load the others."""
-    app = typer.Typer(
-        name="unitcad",
-        help="Haptic units, their casting moulds and an attenuation estimate, from a short TOML spec.",
-        no_args_is_help=True,
-        add_completion=False,
-        pretty_exceptions_enable=False,
-        rich_markup_mode=None,  # boxes cut long option names, and markup swallows square brackets
-        context_settings={"help_option_names": ["-h", "--help"]},
-    )
-    for name in commands:
-        command = getattr(import_module(f"unitcad.cli.{name}_command"), COMMANDS[name])
-        if isinstance(command, typer.Typer):
-            app.add_typer(command, name=name)
-        else:
-            app.command(name)(command)
-    app.callback()(_root)
-    return app
-
-
-def __getattr__(name: str) -> typer.Typer:
+def __getattr__(name: str) -> Any:
     """Return `app`, the whole command line. Raises AttributeError for any other name."""
     if name != "app":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from unitcad.cli.command_line import COMMANDS, application
+
     globals()[name] = application(*COMMANDS)
     return globals()[name]
 
 
-def _root(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
-    ] = False,
-) -> None:
-    pass
+def _run(words: list[str]) -> int:
+    """Run the command of the program's arguments; return its exit code."""
+    names = words[1:] if words[:1] == ["check"] else []
+    plain = sys.platform != "win32"  # there the parser expands wildcards
+    if plain and names and not any(name.startswith("-") for name in names):
+        # Names of files alone need no parser, which takes longer to load than a small mesh takes to check.
+        from unitcad.cli.check_run import Asked, run
+
+        return run(Asked(files=names))
+    from unitcad.cli import command_line
+
+    return command_line.run(words)
 
 
 def main() -> None:
@@ -91,19 +45,15 @@ def main() -> None:
     as_json = "--json" in sys.argv
     speak_anywhere()
     try:
-        named = [word for word in sys.argv[1:2] if word in COMMANDS]
-        code = application(*(named or COMMANDS))(standalone_mode=False)
+        code = _run(sys.argv[1:])
         if code == INTERRUPTED:
-            typer.echo("interrupted", err=True)
-        sys.exit(code or 0)
-    except WrongArguments as error:
-        _refuse(error, as_json)
-        sys.exit(error.exit_code)
+            warn("interrupted")
+        sys.exit(code)
     except UnitcadError as error:
         say_error(error, as_json)
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
-        typer.echo("interrupted", err=True)
+        warn("interrupted")
         sys.exit(INTERRUPTED)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -120,14 +70,3 @@ def main() -> None:
             as_json,
         )
         sys.exit(1)
-
-
-def _refuse(error: Any, as_json: bool) -> None:
-    """Print an error of Typer's as one line, with the command whose help says more."""
-    context = getattr(error, "ctx", None)
-    message = error.format_message()
-    if context and message == context.get_help() and not as_json:  # a command alone that needs another one after it
-        error.show()
-        return
-    line = " ".join(message.partition("\n")[0].split()).rstrip(".")
-    say_error(UnitcadError(f"{line}; see {context.command_path if context else 'unitcad'} --help"), as_json)

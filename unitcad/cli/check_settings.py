@@ -5,7 +5,6 @@ The nearest file with such a table, from the working directory upwards, is used;
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -105,6 +104,8 @@ def _table(path: Path, data: Mapping[str, Any]) -> str:
 
 def _read(path: Path) -> Configuration | None:
     """Read the settings of a file; None without such a table. A unit's spec named unitcad.toml has none."""
+    import tomllib  # most runs have no settings
+
     shown = seen_from(path.absolute())
     try:
         data = tomllib.loads(files.read_text(path))
