@@ -57,7 +57,7 @@ def _body(label: TDF_Label, colours: XCAFDoc_ColorTool) -> StepBody:
     found = {_colour(solid, colours) for solid in (occt.solids_in(whole) or [whole])}
     colour = found.pop() if len(found) == 1 else None
     name = TDataStd_Name()
-    text = name.Get().ToExtString() if part.FindAttribute(TDataStd_Name.GetID_s(), name) else ""
+    text = name.Get().ToExtString() if label.FindAttribute(TDataStd_Name.GetID_s(), name) else ""
     return StepBody(text, colour, occt.measure(XCAFDoc_ShapeTool.GetShape_s(label)))
 
 

@@ -1,6 +1,7 @@
 import hashlib
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from sample_bodies import all_bodies, cup, tongue, tube
 
 from unitcad.errors import UnitcadError
+from unitcad.kernels.mesh import realise
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import Cut, Revolve, Union, cylinder, moved, polygon, turned
 from unitcad.shape.body import Body
@@ -123,6 +125,26 @@ def test_bodies_of_one_shape_keep_their_own_names_colours_and_places(tmp_path):
     bodies_read = step_reader.read(tmp_path / "pair.step")
     assert [(body.name, body.colour) for body in bodies_read] == [(body.name, body.colour) for body in pair]
     assert bodies_read[1].measures.box[2] - bodies_read[0].measures.box[2] == pytest.approx(5, abs=1e-9)
+
+
+def test_copies_of_a_body_are_in_the_file_once(tmp_path):
+    shape = tongue().shape
+    places = [(0, 0, 0), (30, 0, 0), (0, 40.5, 2), (-30, 1.25, 0)]
+    copies = [
+        Body(f"stub{i + 1}", "tool", "stub", moved(turned(shape, "z", i), *at), (0.5, 0.5, 0.5))
+        for i, at in enumerate(places)
+    ]
+    others = [tube(), Body("stub", "tool", "stub", moved(shape, 0, 0, 50), (1, 0, 0))]
+    step.write(tmp_path / "a.step", [*copies, *others], "a")
+    text = (tmp_path / "a.step").read_text()
+    assert re.findall(r" = PRODUCT\('([^']*)'", text) == ["a", "stub-1", others[0].name, "stub"]
+    assert len(re.findall("MANIFOLD_SOLID_BREP", text)) == 3
+    back = step_reader.read(tmp_path / "a.step")
+    assert [(body.name, body.colour) for body in back] == [(body.name, body.colour) for body in (*copies, *others)]
+    for read, body in zip(back, (*copies, *others), strict=True):
+        box = realise(body.shape, 96).bounding_box()
+        assert read.measures.box == pytest.approx(box, abs=2e-3)  # of facets
+        assert read.measures.volume == pytest.approx(occt.measure(occt.solids([body.shape])[0]).volume, rel=1e-9)
 
 
 def test_a_body_of_several_solids_keeps_them_all(tmp_path):

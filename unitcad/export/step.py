@@ -62,9 +62,10 @@ def content(bodies: Sequence[Body], name: str) -> bytes:
     Raises UnitcadError where OCCT fails, or makes a body that differs from its mesh.
     """
     solids = occt.solids(body.shape for body in bodies)
-    for body, solid in zip(bodies, solids, strict=True):
-        occt.confirm(body.shape, solid)
-    document = _document(bodies, solids, name)
+    parts = _parts(bodies, solids)
+    for part in parts:
+        occt.confirm(bodies[part[0]].shape, solids[part[0]])
+    document = _document(bodies, solids, parts, name)
     STEPCAFControl_Controller.Init_s()
     stream = io.BytesIO()
     with _quiet(), _settings(_SETTINGS):
@@ -75,26 +76,58 @@ def content(bodies: Sequence[Body], name: str) -> bytes:
         if not done or writer.WriteStream(stream) != IFSelect_ReturnStatus.IFSelect_RetDone:
             raise UnitcadError(f"OCCT could not write {name} as STEP")
     text = _settled(_with_header(stream.getvalue().decode("ascii"), name))
-    counts = [len(occt.solids_in(solid)) for solid in solids]
-    return _with_styles(text, [body.colour for body in bodies], counts).encode("ascii")
+    counts = [len(occt.solids_in(solids[part[0]])) for part in parts]
+    return _with_styles(text, [bodies[part[0]].colour for part in parts], counts).encode("ascii")
 
 
-def _document(bodies: Sequence[Body], solids: Sequence[TopoDS_Shape], name: str) -> TDocStd_Document:
+def _parts(bodies: Sequence[Body], solids: Sequence[TopoDS_Shape]) -> list[list[int]]:
+    """Return the places in the list of the bodies that are copies of one part: one solid, of one kind and colour."""
+    parts: list[list[int]] = []
+    for i, (body, solid) in enumerate(zip(bodies, solids, strict=True)):
+        like = (body.kind, body.step, body.colour)
+        for part in parts:
+            first = bodies[part[0]]
+            if (first.kind, first.step, first.colour) == like and solid.IsPartner(solids[part[0]]):
+                part.append(i)
+                break
+        else:
+            parts.append([i])
+    return parts
+
+
+def _part_names(bodies: Sequence[Body], parts: Sequence[Sequence[int]]) -> list[str]:
+    """Return a name for each part: its body's, or for several copies that of their kind, which no body has."""
+    taken, names = {body.name for body in bodies}, []
+    for part in parts:
+        first = bodies[part[0]]
+        kind = f"{first.kind}{first.step or ''}"
+        several = (f"{kind}-{i}" if i else kind for i in itertools.count())
+        names.append(first.name if len(part) == 1 else next(name for name in several if name not in taken))
+        taken.add(names[-1])
+    return names
+
+
+def _document(
+    bodies: Sequence[Body], solids: Sequence[TopoDS_Shape], parts: Sequence[Sequence[int]], name: str
+) -> TDocStd_Document:
     document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     shapes.SetAutoNaming_s(False)
     assembly = shapes.NewShape()
     _name(assembly, name)
     earlier: list[TopoDS_Shape] = []
-    for body, solid in zip(bodies, solids, strict=True):
-        place, solid = solid.Location(), solid.Located(TopLoc_Location())
+    labels: dict[int, TDF_Label] = {}
+    for part, of_part in zip(parts, _part_names(bodies, parts), strict=True):
+        solid = solids[part[0]].Located(TopLoc_Location())
         if any(solid.IsPartner(other) for other in earlier):
-            # Two bodies of one shape would share a label, so also a name.
+            # Two parts of one shape, in two colours, would share a label, so also a name.
             solid = BRepBuilderAPI_Copy(solid).Shape()
         earlier.append(solid)
-        part = shapes.AddShape(solid, False)
-        _name(part, body.name)
-        _name(shapes.AddComponent(assembly, part, place), body.name)
+        label = shapes.AddShape(solid, False)
+        _name(label, of_part)
+        labels.update(dict.fromkeys(part, label))
+    for i, (body, solid) in enumerate(zip(bodies, solids, strict=True)):
+        _name(shapes.AddComponent(assembly, labels[i], solid.Location()), body.name)
     shapes.UpdateAssemblies()
     return document
 

@@ -15,7 +15,7 @@ from unitcad.errors import UnitcadError
 from unitcad.kernels import brep, mesh
 from unitcad.kernels.bounds import volume_bound
 from unitcad.kernels.ocp import loading
-from unitcad.shape import Shape
+from unitcad.shape import Place, Shape
 from unitcad.shape.tree import Turn
 
 with loading("OCP"):
@@ -62,8 +62,27 @@ class Measures:
 
 
 def solids(shapes: Iterable[Shape]) -> list[TopoDS_Shape]:
-    """Return the bodies of `shapes`, faces that continue each other merged."""
-    return [_unified(solid) for solid in brep.realise(shapes, sys.modules[__name__])]  # type: ignore[arg-type]
+    """Return the bodies of `shapes`, faces that continue each other merged; those of one shape are partners."""
+    chains = [_unplaced(shape) for shape in shapes]
+    distinct = list(dict.fromkeys(inner for inner, _ in chains))
+    made = brep.realise(distinct, sys.modules[__name__])  # type: ignore[arg-type]
+    merged = dict(zip(distinct, map(_unified, made), strict=True))
+    placed = []
+    for inner, places in chains:
+        solid = merged[inner]
+        for each in reversed(places):
+            solid = place(solid, each.turn, each.move)
+        placed.append(solid)
+    return placed
+
+
+def _unplaced(shape: Shape) -> tuple[Shape, list[Place]]:
+    """Return what a shape is a placed copy of, and its places, the outermost first."""
+    places = []
+    while isinstance(shape, Place):
+        places.append(shape)
+        shape = shape.shape
+    return shape, places
 
 
 def confirm(shape: Shape, solid: TopoDS_Shape, segments: int = 96) -> None:
