@@ -15,7 +15,9 @@ from unitcad.arrays.patch import patch_bodies
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.arrays.pocket_procedure import pocket_procedure
 from unitcad.cache import MemoryStore
+from unitcad.casting.bench_views import picture_path, views
 from unitcad.casting.procedure import procedure
+from unitcad.casting.rules import broken_rules
 from unitcad.casting.time_line import duration
 from unitcad.check import Options, check_bytes
 from unitcad.cli.array_summary import array_summary
@@ -24,6 +26,7 @@ from unitcad.kernels.mesh import realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.array_build import build_array
 from unitcad.pipeline.build import Built
+from unitcad.shape.lettering import seen
 from unitcad.spec import printer_of
 
 SMALL = [
@@ -77,6 +80,27 @@ def test_the_summary_has_the_silicone_of_units_and_sheet(folder: Path) -> None:
         bought = [row for row in csv.DictReader(file) if row["unit"] == "g"]
     assert set(mixed) == {layer.material for layer in array.unit.layers} | {array.sheet.material}
     assert sum(mixed.values()) == pytest.approx(sum(float(row["quantity"]) for row in bought), rel=0.01)
+
+
+def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
+    """Nine units in two cavities: five castings of two pours each, then the sheet's pour, eleven in all."""
+    array = load_array("forearm-pockets", ["moulds.cavities=[2, 1]"])
+    moulds, spec = patch_moulds(array), MouldSet(array.unit)
+    unit = procedure(spec, [100.0] * len(spec.plan.steps), 1000.0)
+    made = pocket_procedure(moulds, 6000.0, 1000.0, {"units/encapsulating": unit})
+    used = {item.item: item.quantity for item in made.bill}
+    assert used["gloves"] == used["mixing cups and sticks"] == 5 * 2 + 1
+    strips = next(item.quantity for item in unit.bill if item.item == "adhesive tape")
+    assert used["adhesive tape"] == 5 * strips
+    sizes = [float(re.findall(r"at least ([0-9.]+) ml", i.note)[0]) for i in made.bill if "degassing" in i.item]
+    asked = [float(re.findall(r"at least ([0-9.]+) ml", s.text)[0]) for s in made.pours[0].steps if s.title == "Degas"]
+    assert max(sizes) >= asked[0]
+    assert broken_rules(made) == []
+    steps = [*made.preparation, *made.pours[0].steps, *made.release]
+    drawn = {step.picture for step in steps} - {""}
+    assert drawn == {picture_path(name) for name in views(moulds)}
+    assert "tray" in {item.item for item in made.bill}
+    assert f"engraved b{seen(made.label)}" in " ".join(step.text for step in steps)
 
 
 @pytest.mark.parametrize(("count", "words"), [(1, "one casting in"), (2, "2 castings, one after the other, in")])

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 import re
+from itertools import pairwise
 
 import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.casting.bench_extras import TAPE_WIDTH, tape_places
 from unitcad.casting.instructions import GREASE
 from unitcad.casting.procedure import Procedure
+from unitcad.casting.written import to_markdown
 from unitcad.shape.lettering import seen
 
 
@@ -98,3 +101,23 @@ def test_pieces_of_split_tools_have_readable_names() -> None:
     printed = [item.item for item in made.bill if item.made.startswith("printed")]
     assert printed[:4] == ["base, piece 1", "base, piece 2", "cup 1, piece 1", "cup 1, piece 2"]
     assert f"at {math.degrees(math.atan(0.1 / 271.82)):.2g} degrees" in " ".join(s.text for s in made.preparation)
+
+
+def test_each_piece_of_a_long_tool_is_held_down() -> None:
+    """A strip of tape on either end, and one between any two seams of base and cups, clear of the filaments."""
+    moulds = patch_moulds(load_array("wrist-band"))
+    places, half = tape_places(moulds), moulds.plan.layout.cup[0]
+    seams = sorted({seam.x for split in moulds.plan.splits for seam in split.seams})
+    for low, high in pairwise((-half, *seams, half)):
+        assert any(low <= at and at + TAPE_WIDTH <= high for at in places)
+    for cell in moulds.plan.layout.cells:
+        assert all(not at < cell.x < at + TAPE_WIDTH for at in places)
+    made = back_sheet_procedure(moulds, [100.0] * 2, 1000.0)
+    hold = next(step.text for step in made.pours[0].steps if step.title == "Hold cup 1 down")
+    assert f"{len(places)} strips of tape, one at either end, so that each piece" in hold
+    (tape,) = [item for item in made.bill if item.item == "adhesive tape"]
+    assert tape.quantity == 2 * 2 * len(places)
+
+
+def test_the_smear_says_its_hours(made: Procedure) -> None:
+    assert "of which 4 h a smear's cure" in to_markdown(made)

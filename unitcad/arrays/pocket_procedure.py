@@ -14,12 +14,13 @@ from unitcad.arrays.patch_moulds import PatchMoulds
 from unitcad.arrays.tray import hold_strain
 from unitcad.casting import figures as fig
 from unitcad.casting.bench_step import BenchStep
-from unitcad.casting.bill import Item
+from unitcad.casting.bench_views import picture_path
+from unitcad.casting.bill import Item, consumed
 from unitcad.casting.figures import STRIKE_AGAIN_MIN, at_room
 from unitcad.casting.finishing import shown
 from unitcad.casting.instructions import TACK, mixed
 from unitcad.casting.joining import joining
-from unitcad.casting.needs import needs
+from unitcad.casting.needs import CALIPER, NEEDS, needs
 from unitcad.casting.preparation import MORE_PLATES, cleaning, fall, in_resin
 from unitcad.casting.procedure import Pour, Procedure, bubbles, pour_figures
 from unitcad.casting.time_line import duration, phases
@@ -29,7 +30,9 @@ from unitcad.text import listed, number
 
 PUSH_MIN = 1.0
 """To push one unit into its pocket and turn it (assumed)."""
-TOOLS, SKIN_SIDE = "pictures/tools.png", "pictures/patch-skin-side.png"
+ONCE = frozenset(need.item for need in (*NEEDS, CALIPER))
+"""What one piece, dab or roll of is enough for every casting."""
+BACK = "pictures/patch-back.png"
 
 
 def pocket_procedure(
@@ -46,10 +49,10 @@ def pocket_procedure(
     verdict = bubbles(spec, step, silicone, mix, 1)
     cast = tuple(_units(array, units))
     prepared = (
-        BenchStep("Sort the pieces", _sort(moulds), TOOLS, minutes=fig.SORT_MIN),
+        BenchStep("Sort the pieces", _sort(moulds), picture_path("pieces"), minutes=fig.SORT_MIN),
         *cleaning(moulds, [silicone]),
-        *joining(moulds, {"base": "tray"}, TOOLS),
-        BenchStep("Level the bench", _level(moulds), minutes=fig.LEVEL_MIN),
+        *joining(moulds, {"base": "tray"}, picture_path("pieces")),
+        BenchStep("Level the bench", _level(moulds), picture_path("level"), minutes=fig.LEVEL_MIN),
     )
     poured = tuple(_pour(moulds, silicone, mix, verdict))
     out = tuple(_out(moulds))
@@ -78,7 +81,7 @@ def pocket_procedure(
         *_pieces(moulds),
         Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", f"sheet, {number(mix.net_g, 3)} g net"),
         Item(f"{silicone.name} part B", mix.part_b_g, "g", "bought", f"sheet, {number(mix.net_g, 3)} g net"),
-        *(Item(need.item, need.quantity, need.unit, need.made, need.note) for need in named),
+        *consumed(moulds, [mix], named),
     ]
     return Procedure(
         name=array.name,
@@ -159,8 +162,8 @@ def _level(moulds: PatchMoulds) -> str:
     """Say how level the tray must lie: the sheet must not get thinner at one end by more than a dent."""
     return (
         f"{fall(moulds)}. Put the tray where it will stay. Lay a phone with its level, or a small spirit level, on the "
-        "tray's wall, along it and across, and put paper under a corner until it shows less. The tray stays there: it "
-        "is poured and cured on this spot."
+        "cores, which are as high as the wall, along the tray and across, and put paper under a corner until it shows "
+        "less. The tray stays there: it is poured and cured on this spot."
     )
 
 
@@ -174,6 +177,7 @@ def _pour(moulds: PatchMoulds, silicone: Material, mix: fig.Mix, verdict: str) -
         "Pour",
         "Pour in a thin thread, first along the wall and round every core, until the tray stands over its rim and the "
         "cores are covered. Prick the bubbles that you see with a pin.",
+        picture_path("pour"),
         kind="pour",
         minutes=fig.pouring_min(len(moulds.arranged.places)) - fig.STRIKE_MIN,
     )
@@ -183,13 +187,14 @@ def _pour(moulds: PatchMoulds, silicone: Material, mix: fig.Mix, verdict: str) -
         "Strike off",
         "Strike off along the rim with the blade upright, its narrow edge down, in one slow stroke from end to end: "
         "it runs on rim and cores. What it takes goes into the groove.",
-        "pictures/pour1.png",
+        picture_path("strike"),
         minutes=fig.STRIKE_MIN,
     )
     yield BenchStep(
         "Wait, strike again",
         f"Wipe it. Top up and strike again after {number(STRIKE_AGAIN_MIN, 3)} min (assumed). The film that it leaves "
         "on the cores cures too and is trimmed at the end.",
+        picture_path("strike"),
         kind="rest",
         minutes=fig.STRIKE_MIN,
         wait_min=STRIKE_AGAIN_MIN - fig.STRIKE_MIN,
@@ -199,6 +204,7 @@ def _pour(moulds: PatchMoulds, silicone: Material, mix: fig.Mix, verdict: str) -
         "Cure",
         f"Let it cure, level, for {number(hours, 2)} h. Touch the silicone in the groove, not the sheet, to see "
         f"whether it is done: {TACK}.",
+        picture_path("filled"),
         kind="cure",
         wait_min=60 * hours,
     )
@@ -211,7 +217,7 @@ def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
         "Cut the sheet free from the groove's silicone along the land. Loosen a corner with a blunt spatula and peel "
         f"the sheet off slowly, up over the cores: it is {thick} mm thick and tears at a notch. Trim the flash round "
         "the pockets and strap slots with small scissors.",
-        TOOLS,
+        picture_path("peel"),
         minutes=fig.PEEL_MIN * 2,
     )
 
@@ -238,7 +244,7 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
         f"below, back first, until the pocket's lower edge stands {over} mm over the unit's skin side all round: the "
         f"pocket stretches by {number(100 * strain, 2)} % round {number(2 * widest, 3)} mm and holds it. Water with "
         f"a drop of soap helps; it dries.{turned} Rows are lettered from the top, columns numbered from the left.",
-        SKIN_SIDE,
+        BACK,
         minutes=PUSH_MIN * len(array.places),
     )
 
@@ -256,7 +262,7 @@ def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
     lengths = moulds.spec.moulds
     note = f"{lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
     for tool in moulds.plan.pieces:
-        name = moulds.plan.called(tool.name).replace("base", "tray")
+        name = moulds.plan.called(tool.name)
         attitude = "upside down" if tool.upside_down else "as drawn"
         yield Item(name, 1, "piece", f"printed {attitude}", note)
 
@@ -273,21 +279,28 @@ def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
                 yield replace(item, quantity=times * item.quantity, note=f"{times} x, {item.note}")
             elif item.item in inside:
                 yield replace(item, quantity=count * item.quantity / unit.cells)
+            elif item.made == "bought" and item.item not in ONCE:
+                yield replace(item, quantity=times * item.quantity)
             else:
                 yield item
 
 
 def _added(items: Iterable[Item]) -> list[Item]:
-    """Return a bill in which each thing stands once: grams added, of tools and consumables the most."""
+    """Return a bill in which each thing stands once: what is used up is added, of tools the most.
+
+    A thing in two sizes has a line for each.
+    """
     found: dict[tuple[str, str, str], Item] = {}
     for item in items:
-        key = item.item, item.unit, "" if item.unit == "g" or item.made in ("tool", "bought") else item.note
+        key = item.item, item.unit, "" if item.unit == "g" or item.item in ONCE or item.made == "tool" else item.note
         there = found.get(key)
         if there is None:
             found[key] = item
         elif item.unit == "g":
             quantity, note = there.quantity + item.quantity, f"{there.note}; {item.note}"
             found[key] = replace(there, quantity=quantity, note=note)
+        elif item.made == "bought" and item.item not in ONCE:
+            found[key] = replace(there, quantity=there.quantity + item.quantity)
         else:
             found[key] = replace(there, quantity=max(there.quantity, item.quantity))
     return list(found.values())

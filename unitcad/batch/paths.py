@@ -11,6 +11,7 @@ from unitcad.arrays.array_tables import AskedArray
 from unitcad.errors import Refusal
 from unitcad.spec.asked import AskedSpec
 from unitcad.spec.fields import alternatives, entry_in, fields_of, index_in, table_in
+from unitcad.text import listed
 
 
 def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
@@ -31,14 +32,20 @@ def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
         elif entry is not None:
             there = node if isinstance(node, list) else []
             if index_in(step, len(there)) is None:
-                known = ", ".join(str(n) for n in range(len(there))) or "none"
-                raise Refusal(path, step, f"there is no such entry in the base's {'.'.join(steps[:i])} (has {known})")
+                raise Refusal(path, step, f"the base's {'.'.join(steps[:i])} has no such entry: {_entries(len(there))}")
             kind = entry
         elif any(typing.get_origin(k) is dict or k is Any for k in alternatives(kind)):
             return
         else:
             raise _unknown(path, base, where)
         node = node[int(step)] if isinstance(node, list) else node.get(step) if isinstance(node, dict) else None
+
+
+def _entries(count: int) -> str:
+    """Say how the entries of a list are numbered."""
+    if count < 2:
+        return "its only one is 0" if count else "it is empty"
+    return f"they are {listed(map(str, range(count)))}"
 
 
 def known_paths(base: dict[str, Any]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from unitcad.moulds.base import outline, plate_bottom, plate_top, pry_floor
 from unitcad.moulds.cup import skirt_end
@@ -17,6 +18,10 @@ CARD, PAPER, GREASE, INK = (0.45, 0.72, 0.38), (0.96, 0.93, 0.62), (0.98, 0.72, 
 TAB = (0.93, 0.90, 0.78)
 CLEAR = 5.0
 """Between a piece that is lifted off and what it was on, mm."""
+BESIDE = 3.0
+"""From a filament's middle to tape, mm."""
+LONG = 60.0
+"""Length of a cup from which one strip of tape a side does not hold both its ends, mm (assumed)."""
 TAPE_WIDTH, TAPE_THICKNESS, BELOW_RIM = 8.0, 0.4, 0.8
 _FILM, _MARK = 0.15, 0.6
 """Grease on a tongue, and the width of a pen's mark on it, mm."""
@@ -53,11 +58,28 @@ def sideways(side: int, x: float, y: float, z: float, length: float) -> Extra:
     return Extra(moved(turned(_arrow(length), "y", 1 if side > 0 else 3), x, y, z), ARROW)
 
 
+def tape_places(moulds: MouldSet) -> tuple[float, ...]:
+    """Return where the strips of tape that hold a cup down begin along x, mm.
+
+    One beside the filaments, which leave in the middle; at either end of a long cup; on each piece of split tools.
+    """
+    plan, half = moulds.plan, moulds.plan.layout.cup[0]
+    if 2 * half <= LONG:
+        return (CORNER_RADIUS - half,)
+    places = [CORNER_RADIUS - half, half - MARK - TAPE_WIDTH]
+    free = [at for cell in plan.layout.cells for at in (cell.x + BESIDE, cell.x - BESIDE - TAPE_WIDTH)]
+    seams = sorted({seam.x for split in plan.splits for seam in split.seams})
+    for low, high in pairwise((-half, *seams, half)):
+        inside = [[at for at in many if low <= at <= high - TAPE_WIDTH] for many in (places, free)]
+        if not inside[0] and inside[1]:
+            places.append(min(inside[1], key=lambda at: abs(2 * at - low - high)))
+    return tuple(sorted(places))
+
+
 def tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
     """Draw the strips of tape on the two sides without a pry slot: cup's wall, plate, plate's edge, underside."""
     lay = moulds.plan.layout
     (bottom, top), thick = moulds.plate, TAPE_THICKNESS
-    left = CORNER_RADIUS - lay.cup[0]  # beside the filaments, which leave in the middle
     strips: list[Extra] = []
     for side in (1, -1):
         runs = [
@@ -68,6 +90,7 @@ def tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
         ]
         boxes = [
             box(left, left + TAPE_WIDTH, min(side * a, side * b), max(side * a, side * b), low, high)
+            for left in tape_places(moulds)
             for a, b, low, high in runs
         ]
         strips.append(Extra(union(boxes), TAPE))

@@ -16,6 +16,7 @@ from unitcad.casting.bench_view import ABOVE, OVER, UNDER, Offset, Placed, View
 from unitcad.casting.figures import window_length
 from unitcad.casting.piece_views import resin_views
 from unitcad.casting.tongue_prop import tongue_prop
+from unitcad.casting.tray_views import tray_views
 from unitcad.casting.way_out import motor_views, way_out
 from unitcad.designs import layer_colour
 from unitcad.designs.tooling import Cell
@@ -33,8 +34,8 @@ FOLDER = "steps"
 
 
 def views(moulds: MouldSet) -> dict[str, View]:
-    """Return every view of a procedure by its name, in the order of the steps; {} for a set without cups."""
-    return dict(_views(moulds)) if moulds.plan.of_kind("cup") else {}
+    """Return every view of a procedure by its name, in the order of the steps."""
+    return dict(_views(moulds) if moulds.plan.of_kind("cup") else tray_views(moulds))
 
 
 def picture_path(name: str) -> str:
@@ -156,7 +157,11 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
         held = (*pads, *draw.tape(moulds, step))
         yield (
             "hold",
-            View(closed, (*held, *tabs), names=(Name("tape", (6.0 - lay.cup[0], -lay.plate[1], moulds.plate[1])),)),
+            View(
+                closed,
+                (*held, *tabs),
+                names=(Name("tape", (draw.tape_places(moulds)[0] + 4.0, -lay.plate[1], moulds.plate[1])),),
+            ),
         )
         thread = cylinder(0.6, step.rim - 1.0, step.rim + 14.0)
         cell = min(lay.cells, key=lambda each: (each.y, each.x))

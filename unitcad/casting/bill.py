@@ -7,6 +7,7 @@ import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from unitcad.casting.bench_extras import tape_places
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Mix
 from unitcad.casting.needs import Need
 from unitcad.casting.tongue_prop import grip_of, tongue_prop
@@ -31,7 +32,7 @@ class Item:
 
 def bill(moulds: MouldSet, mixes: list[tuple[Material, Mix]], named: Sequence[Need]) -> tuple[Item, ...]:
     """List pieces, silicone (every pour's mix), motor, circuit or wires, tools and consumables (`named`: by steps)."""
-    consumables = _consumables(moulds, [mix for _, mix in mixes], named)
+    consumables = consumed(moulds, [mix for _, mix in mixes], named)
     return (*_pieces(moulds), *_silicone(mixes), *_inside(moulds), *consumables)
 
 
@@ -105,16 +106,16 @@ def _ratings(spec: Spec) -> Iterator[str]:
             yield f"mass {number(motor.mass_g, 3)} g"
 
 
-def _consumables(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> Iterator[Item]:
+def consumed(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> Iterator[Item]:
     """List what the steps name, then what only its numbers make an item of this set's."""
     pours, lengths = len(moulds.plan.steps), moulds.spec.moulds
     yield Item("mixing cups and sticks", pours, "set", "bought", "no latex, no sulphur clay: they inhibit")
     yield Item("gloves", pours, "pair", "bought", "nitrile or vinyl; latex inhibits")
     resolution = number(moulds.spec.casting.scale_resolution_g, 3)
     yield Item("scale", 1, "piece", "tool", f"shows {resolution} g")
-    yield Item(
-        "flat screwdrivers", 2, "piece", "tool", f"up to {number(2 * PRY_HALF_WIDTH, 3)} mm wide, for the pry slots"
-    )
+    if cups := moulds.plan.of_kind("cup"):
+        wide = number(2 * PRY_HALF_WIDTH, 3)
+        yield Item("flat screwdrivers", 2, "piece", "tool", f"up to {wide} mm wide, for the pry slots")
     yield from (Item(need.item, need.quantity, need.unit, need.made, need.note) for need in named)
     if prop := tongue_prop(moulds):
         size = f"{number(prop.width_mm, 2)} x {number(prop.length_mm, 2)} mm, {number(prop.thickness_mm, 3)} mm thick"
@@ -136,5 +137,6 @@ def _consumables(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> I
         )
         yield Item("syringe", pours, "piece", "bought", size)
         yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
-    else:
-        yield Item("adhesive tape", 2 * pours, "strip", "bought", "holds each cup down; 8 mm wide, 30 mm long")
+    elif cups:
+        strips = 2 * len(tape_places(moulds)) * pours
+        yield Item("adhesive tape", strips, "strip", "bought", "holds each cup down; 8 mm wide, 30 mm long")

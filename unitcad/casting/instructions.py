@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from unitcad.casting import figures as fig
+from unitcad.casting.bench_extras import tape_places
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bench_views import View, picture_path
 from unitcad.casting.figures import MOST_ERROR_PCT, STRIKE_AGAIN_MIN, Mix, at_room, window_length
@@ -114,10 +115,10 @@ def pour_steps(
     else:
         yield BenchStep(
             f"Hold cup {step.index} down",
-            f"{HOLD} cup {step.index} down while it is struck off: on each of the two sides without a pry slot run a "
-            "strip of tape from the cup's wall, below the rim, round the plate's edge to its underside, beside the "
-            "filament where there is one. Clamps or weights do as well where they leave the rim free for the blade. "
-            f"{LEVEL_AGAIN}",
+            f"{HOLD} cup {step.index} down while it is struck off: on each of the two sides without a pry slot run "
+            f"{_strips(moulds)} from the cup's wall, below the rim, round the plate's edge to its underside, beside "
+            "the filament where there is one. Clamps or weights do as well where they leave the rim free for the "
+            f"blade. {LEVEL_AGAIN}",
             picture("hold"),
             minutes=fig.HOLD_MIN,
         )
@@ -167,6 +168,15 @@ def pour_steps(
             wait_min=STRIKE_AGAIN_MIN - fig.STRIKE_MIN,
         )
     yield from _cure_and_open(moulds, step, silicone, picture)
+
+
+def _strips(moulds: MouldSet) -> str:
+    """Say how many strips of tape hold a cup on each of two sides, and where."""
+    count = len(tape_places(moulds))
+    if count == 1:
+        return "a strip of tape"
+    pieces = ", so that each piece of cup and base is held," if count > 2 else ""
+    return f"{count} strips of tape, one at either end{pieces}"
 
 
 def _groove(step: Step) -> str:

@@ -51,7 +51,8 @@ def _held(procedure: Procedure) -> Iterator[str]:
     """Hold an open cup down before it is struck off, and pull the tongue before a cup is lifted."""
     for pour in procedure.pours:
         strike, hold = _first(pour.steps, "Strike off"), _first(pour.steps, f"{HOLD} cup {pour.index} down")
-        if strike is not None and (hold is None or hold > strike):
+        cups = any(step.title == f"Cup {pour.index} on" for step in pour.steps)
+        if cups and strike is not None and (hold is None or hold > strike):
             yield f"pour {pour.index}: nothing holds the cup down while it is struck off"
         inserted, pull, lift = (_first(pour.steps, words) for words in ("on the ledge", "tongue out", "Lift cup"))
         if inserted is not None and (pull is None or lift is None or pull > lift):
@@ -166,7 +167,8 @@ def _timed(procedure: Procedure) -> Iterator[str]:
 def _level_again(procedure: Procedure) -> Iterator[str]:
     """Look at the level again once tape or bands run under the plate."""
     for pour in procedure.pours:
-        if not any(LEVEL_AGAIN in step.text for step in pour.steps):
+        cups = any(step.title == f"Cup {pour.index} on" for step in pour.steps)
+        if cups and not any(LEVEL_AGAIN in step.text for step in pour.steps):
             yield f"pour {pour.index}: nothing says to look at the level again"
 
 

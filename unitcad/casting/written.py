@@ -74,7 +74,8 @@ def _times(procedure: Procedure) -> Iterator[str]:
     yield f"**{total}** from the printed pieces to the {out}, of which {bench} at the bench."
     if procedure.assembly:
         more = procedure.time_line[-1].end_min - procedure.earliest_finish_min
-        smear = ", nearly all of it a smear's cure" if any(step.wait_min for step in procedure.assembly) else ""
+        waits = sum(step.wait_min for step in procedure.assembly)
+        smear = f", of which {duration(waits)} a smear's cure" if waits else ""
         yield f"{procedure.last}: {duration(more)} more at most{smear}. Printing comes before."
     yield ""
     rows = [

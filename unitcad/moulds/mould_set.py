@@ -150,8 +150,9 @@ class MouldSet:
 
     @property
     def plate(self) -> tuple[float, float]:
-        """z of the lower and the upper face of the base's plate, mm: cups on pins stand on it, others on a plinth."""
-        top = 0.0 if self.plan.pins else plate_top(self.spec)
+        """z of the lower and the upper face of the base's plate, mm: a tray, and cups on pins, need no plinth."""
+        plinth = self.plan.of_kind("cup") and not self.plan.pins
+        top = plate_top(self.spec) if plinth else 0.0
         return top - self.spec.moulds.plate_mm, top
 
     @property

@@ -105,9 +105,12 @@ class Plan:
         return next((split.pieces for split in self.splits if split.tool == name), None) or (self.tool(name),)
 
     def called(self, name: str) -> str:
-        """Return a tool's or a piece's name as it is read: "cup 1", "cup 1, piece 2"."""
+        """Return a tool's or a piece's name as it is read: "cup 1", "cup 1, piece 2"; a base without cups is a tray."""
+        if name == "base" and not self.of_kind("cup"):
+            return "tray"
         numbered = ((split.tool, i, piece.name) for split in self.splits for i, piece in enumerate(split.pieces, 1))
-        return next((f"{spaced(tool)}, piece {i}" for tool, i, piece in numbered if piece == name), spaced(name))
+        tool, number = next(((tool, f", piece {i}") for tool, i, piece in numbered if piece == name), ("", ""))
+        return f"{self.called(tool)}{number}" if tool else spaced(name)
 
     def walled(self, step: Step) -> str:
         """Return the name of the piece that has a pour's wall and rim: its cup, else the piece that stays."""

@@ -1,0 +1,36 @@
+"""Views of a tray: a mould without cups, poured, struck off and peeled off as it stands on the bench."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from unitcad.casting import bench_extras as draw
+from unitcad.casting.bench_extras import CLEAR, Extra
+from unitcad.casting.bench_view import OVER, Placed, View
+from unitcad.designs import layer_colour
+from unitcad.export.picture_letters import Name
+from unitcad.kernels.mesh import bounds
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.shape import cylinder, moved
+
+
+def tray_views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
+    """Yield the views of a tray's one pour, in the order of its steps."""
+    plan, (x, y) = moulds.plan, moulds.plan.layout.plate
+    (step,) = plan.steps
+    tray = tuple(Placed(tool.name) for tool in plan.of_kind("base"))
+    filled = (*tray, Placed(step.name))
+    yield "pieces", View(tuple(Placed(piece.name) for piece in plan.pieces), eye=OVER, group="pieces")
+    names = Name("level", (0.0, -4.0, step.rim + 2)), Name("paper", (-x - 4, -y, moulds.plate[0]))
+    yield "level", View(tray, draw.spirit_level(moulds, step.rim), names=names)
+    x0, y0, _, _, y1, _ = bounds(moulds.meshes(step.layer)[0])
+    thread = moved(cylinder(0.6, step.rim - 1.0, step.rim + 14.0), x0 + 3.0, (y0 + y1) / 2)
+    yield "pour", View(filled, (Extra(thread, layer_colour(0)),))
+    back = -0.55 * x
+    blades = tuple(Placed(tool.name, (back, 0.0, 0.0)) for tool in plan.of_kind("blade"))
+    yield "strike", View((*filled, *blades), (draw.sideways(1, -0.2 * x, 0.0, step.rim + 9.0, x),))
+    out = moulds.spec.moulds.land_mm + moulds.spec.moulds.groove_width_mm / 2
+    touched = Name("touch here", ((x0 + 2 * x) / 3, y0 - out, step.rim - moulds.spec.moulds.groove_depth_mm))
+    yield "filled", View(filled, names=(touched,))
+    up = step.rim + 2 * CLEAR
+    yield "peel", View((*tray, Placed(step.name, (0.0, 0.0, up))), (draw.upward(0.0, -y, up / 2, up * 0.8),))
