@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
 from running import Server, serving
 
+from unitcad.arrays.array_file import array_templates
 from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.serve.server import serve
 from unitcad.validation import custom_templates
@@ -74,3 +77,16 @@ def test_without_the_extra_it_says_how_to_get_it() -> None:
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True)
     assert done.returncode == 2
     assert "pip install '.[serve]'" in done.stderr
+
+
+def test_a_question_under_way_does_not_hold_up_the_end(tmp_path: Path) -> None:
+    """Ctrl-C ends the server quietly: the question, some seconds of work, is answered that the server is ending."""
+    text = array_templates()["wrist-band"].read_text("utf-8")
+    answers: list[int] = []
+    with serving(tmp_path) as own:
+        own.ask(text)
+        asking = threading.Thread(target=lambda: answers.append(own.send("/ask", {"text": text, "what": "moulds"})[0]))
+        asking.start()
+        time.sleep(1.0)
+    asking.join(20)
+    assert answers == [500]

@@ -68,9 +68,9 @@ class Superseded(Exception):
     """A newer question of the same page about the same thing."""
 
 
-def application(setting: Setting, limits: Limits = Limits()) -> Gate:  # noqa: B008  # frozen
+def application(live: Live, limits: Limits = Limits()) -> Gate:  # noqa: B008  # frozen
     """Return the ASGI application of a live page."""
-    live = Live(setting)
+    setting = live.setting
     routes = [
         Route("/", live.page),
         Route("/files/{path:path}", live.file),
@@ -105,8 +105,12 @@ class Live:
         try:
             yield
         finally:
-            await asyncio.gather(self.jobs.close(), *(worker.close() for worker in self.workers.values()))
+            await self.close()
             await asyncio.gather(*warming)
+
+    async def close(self) -> None:
+        """End jobs and workers; a question under way is answered that the server is ending."""
+        await asyncio.gather(self.jobs.close(), *(worker.close() for worker in self.workers.values()))
 
     async def page(self, request: Request) -> Response:
         """Answer with the page, and let the browser keep the token for files."""

@@ -7,7 +7,7 @@ import contextlib
 import ipaddress
 import secrets
 import socket
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +47,7 @@ def serve(
     spec whose design is code unless `code`, and UnitcadError for a port that is taken.
     """
     uvicorn = _uvicorn()
-    from unitcad.serve.application import Setting, application
+    from unitcad.serve.application import Live, Setting, application
 
     _check_address(host, token)
     token = token or secrets.token_urlsafe(24)
@@ -77,24 +77,30 @@ def serve(
             Trusted([source for source in trusted if source.named]), starts, token, hosts, bound, batch, campaign,
         )  # fmt: skip
         shown = f"[{host}]" if ":" in host else host
+        live = Live(setting)
         config = uvicorn.Config(
-            application(setting), log_level="error", access_log=False, server_header=False, date_header=False,
+            application(live), log_level="error", access_log=False, server_header=False, date_header=False,
             timeout_keep_alive=5, timeout_graceful_shutdown=2, limit_concurrency=200,
             h11_max_incomplete_event_size=16384, ws="none", lifespan="on",
         )  # fmt: skip
         server = uvicorn.Server(config)
         # Ctrl-C is how a server is ended.
         with contextlib.suppress(KeyboardInterrupt):
-            asyncio.run(_told(server, listening, lambda: ready(f"http://{shown}:{bound}/?token={token}")))
+            asyncio.run(_told(server, listening, lambda: ready(f"http://{shown}:{bound}/?token={token}"), live.close))
 
 
-async def _told(server, listening: socket.socket, ready: Callable[[], None]) -> None:
-    """Run a server, and say when it answers and a signal ends it."""
+async def _told(
+    server, listening: socket.socket, ready: Callable[[], None], close: Callable[[], Awaitable[None]]
+) -> None:
+    """Run a server, and say when it answers and a signal ends it; `close` then ends what it waits for."""
     running = asyncio.create_task(server.serve(sockets=[listening]))
     while not (server.started or running.done()):
         await asyncio.sleep(0.01)
     if server.started:
         ready()
+    while not (server.should_exit or running.done()):
+        await asyncio.sleep(0.05)
+    await close()
     await running
 
 
