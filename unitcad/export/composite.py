@@ -25,6 +25,8 @@ _INKED = (np.arange(256) * 0.28).astype(np.uint8)
 """What a line leaves of each of the 256 brightnesses under it."""
 _WHITE = 0xFFFFFFFF
 _TIE_MM = 1e-4
+_FARTHEST = -1e30
+"""The depth of no body, mm: nearer than a body's minus infinity where it is not."""
 MARGIN_PX = 6
 """White above and below what a picture shows, pixels."""
 LETTER_PX = 2.7
@@ -36,12 +38,14 @@ _EFFORT = 6
 
 @dataclass(frozen=True)
 class DrawnBody:
-    """A body in a view: the pixels (n,) that it covers, their depths in mm, colours and smooth patches (n,).
+    """A body in a view: the rectangle of pixels that it reaches, from its `top` row and `left` column.
 
+    Of each pixel (height, width) there: depth in mm (minus infinity where the body is not), colour and smooth patch.
     A colour is four bytes, red, green, blue and 255, in one number.
     """
 
-    pixel: np.ndarray
+    top: int
+    left: int
     depth: np.ndarray
     colour: np.ndarray
     patch: np.ndarray
@@ -72,7 +76,20 @@ def drawn(vertices: np.ndarray, faces: np.ndarray, colour: tuple[float, float, f
     tints = np.full((len(faces), 4), 255, np.uint8)
     tints[:, :3] = np.clip(np.round(bright[:, None] * np.array(colour) * 255), 0, 255)
     tint = tints.view(np.uint32).reshape(-1)[face]
-    return DrawnBody(pixel, depth.astype(np.float32), tint, _patches(faces, normal)[face])
+    if not len(pixel):
+        return DrawnBody(0, 0, *(np.empty((0, 0), kind) for kind in (np.float32, np.uint32, np.int32)))
+    row, column = np.divmod(pixel, of.size[0])
+    top, left = int(row[0]), int(column.min())
+    size = int(row[-1]) - top + 1, int(column.max()) - left + 1
+    at = (row - top) * size[1] + column - left
+
+    def spread(values: np.ndarray, empty: float, kind: type) -> np.ndarray:
+        field = np.full(size, empty, kind)
+        field.reshape(-1)[at] = values
+        return field
+
+    patch = spread(_patches(faces, normal)[face], 0, np.int32)
+    return DrawnBody(top, left, spread(depth, -np.inf, np.float32), spread(tint, _WHITE, np.uint32), patch)
 
 
 def _patches(faces: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -94,30 +111,50 @@ def together(bodies: Sequence[DrawnBody], of: Camera, names: Sequence[Name] = ()
     Names stand clear of the bodies and of each other where there is room, each with a line to what it names.
     """
     width, height = of.size
-    depth = np.full(width * height, -np.inf, np.float32)
-    colour = np.full(width * height, _WHITE, np.uint32)
-    patch = np.zeros(width * height, np.int32)
-    before = 0
-    for body in bodies:
-        nearer = body.depth >= depth[body.pixel] - _TIE_MM
-        at = body.pixel[nearer]
-        depth[at], colour[at], patch[at] = body.depth[nearer], body.colour[nearer], body.patch[nearer] + before
-        before += int(body.patch.max(initial=0))
-    field = patch.reshape(height, width)
-    line = np.zeros((height, width), bool)
-    for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
-        differs = field[one] != field[other]
-        line[one] |= differs
-        line[other] |= differs
-    channels = colour.view(np.uint8).reshape(-1, 4)
-    inked = np.flatnonzero(line)
-    channels[inked, :3] = _INKED[channels[inked, :3]]
-    pixels = channels.reshape(height, width, 4)
-    _write(pixels, field > 0, names, of)
-    rows = np.flatnonzero((colour != _WHITE).reshape(height, width).any(axis=1))
+    colour = np.full((height, width), _WHITE, np.uint32)
+    pixels = colour.view(np.uint8).reshape(height, width, 4)
+    drawn = np.zeros((height, width), bool)
+    if seen := [body for body in bodies if body.depth.size]:
+        # A pixel more on each side, for the lines at a body's rim.
+        top, left = max(min(b.top for b in seen) - 1, 0), max(min(b.left for b in seen) - 1, 0)
+        bottom = min(max(b.top + b.depth.shape[0] for b in seen) + 1, height)
+        right = min(max(b.left + b.depth.shape[1] for b in seen) + 1, width)
+        inside = np.s_[top:bottom, left:right]
+        patch = _stacked(seen, (top, left), colour[inside])
+        drawn[inside] = patch > 0
+        line = np.zeros(patch.shape, bool)
+        for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+            differs = patch[one] != patch[other]
+            line[one] |= differs
+            line[other] |= differs
+        row, column = np.nonzero(line)
+        field = pixels[inside]
+        field[row, column, :3] = _INKED[field[row, column, :3]]
+    _write(pixels, drawn, names, of)
+    rows = np.flatnonzero((colour != _WHITE).any(axis=1))
     top, bottom = (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (0, height)
     top, bottom = max(top // SHARPER - MARGIN_PX, 0), min(-(-bottom // SHARPER) + MARGIN_PX, height // SHARPER)
     return raster.png(_shrunk(pixels[SHARPER * top : SHARPER * bottom]), _EFFORT)
+
+
+def _stacked(bodies: Sequence[DrawnBody], corner: tuple[int, int], colour: np.ndarray) -> np.ndarray:
+    """Draw bodies into the `colour` of a rectangle that has its upper left at `corner`; return its smooth patches.
+
+    Patches are numbered through all bodies, from 1; 0 where there is none.
+    """
+    depth = np.full(colour.shape, _FARTHEST, np.float32)
+    patch = np.zeros(colour.shape, np.int32)
+    before = 0
+    for body in bodies:
+        rows, columns = body.depth.shape
+        top, left = body.top - corner[0], body.left - corner[1]
+        at = np.s_[top : top + rows, left : left + columns]
+        nearer = body.depth >= depth[at] - _TIE_MM
+        np.copyto(depth[at], body.depth, where=nearer)
+        np.copyto(colour[at], body.colour, where=nearer)
+        np.add(body.patch, before, out=patch[at], where=nearer)
+        before += int(body.patch.max())
+    return patch
 
 
 def _write(pixels: np.ndarray, drawn: np.ndarray, names: Sequence[Name], of: Camera) -> None:

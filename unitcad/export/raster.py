@@ -97,29 +97,37 @@ def nearest(
     points = view.project(vertices)
     if not len(faces):
         return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
-    rows = points[:, 1]  # only the rows that the mesh reaches are kept
-    top, bottom = np.clip([np.floor(rows.min()), np.ceil(rows.max()) + 1], 0, height).astype(int)
-    before = top * width
-    least = np.full((bottom - top) * width, -np.inf)
-    shown = np.full((bottom - top) * width, -1, np.int64)
-    for face, pixel, depth in _fragments(points, faces, width, height):
-        pixel = pixel - before
-        kept = depth <= cut
-        if first is not None:
-            depth = depth + first[face] * (0.25 / view.scale)
-        kept &= depth > least[pixel]
-        face, pixel, depth = face[kept], pixel[kept], depth[kept]
+    # Only the rectangle that the mesh reaches is kept.
+    low, high = np.floor(points[:, :2].min(axis=0)), np.ceil(points[:, :2].max(axis=0)) + 1
+    (left, top), (right, bottom) = (np.clip(ends, 0, view.size).astype(int) for ends in (low, high))
+    wide, number = right - left, (right - left) * (bottom - top)
+    least = np.full(number, -np.inf)
+    shown = np.full(number, -1, np.int64)
+    plain, begun = first is None and cut == np.inf, False
+    for face, pixel, depth in _fragments(points, faces, width, height, wide):
+        pixel -= top * wide + left
+        if begun or not plain:  # else all are the first in their pixels
+            kept = depth <= cut
+            if first is not None:
+                depth = depth + first[face] * (0.25 / view.scale)
+            kept &= depth > least[pixel]
+            face, pixel, depth = face[kept], pixel[kept], depth[kept]
+        begun = True
         np.maximum.at(least, pixel, depth)
         seen = depth == least[pixel]
         shown[pixel[seen]] = face[seen]
     pixel = np.flatnonzero(shown >= 0)
-    return pixel + before, shown[pixel], least[pixel]
+    row, column = np.divmod(pixel, max(wide, 1))
+    return (row + top) * width + column + left, shown[pixel], least[pixel]
 
 
 def _fragments(
-    points: np.ndarray, faces: np.ndarray, width: int, height: int
+    points: np.ndarray, faces: np.ndarray, width: int, height: int, stride: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield face, pixel and depth of every pixel's middle that lies in a face, in blocks: row by row of each face."""
+    """Yield face, pixel and depth of every pixel's middle that lies in a face, in blocks: row by row of each face.
+
+    A pixel's number is its row times `stride` plus its column.
+    """
     for begin in range(0, len(faces), _FACES):
         corners = points[faces[begin : begin + _FACES]]
         one, two, three = (corners[:, k] for k in range(3))
@@ -137,11 +145,18 @@ def _fragments(
             left = np.clip(np.ceil(left - 0.5), 0, width).astype(int)
             right = np.clip(np.floor(right - 0.5), -1, width - 1).astype(int)
             number = np.maximum(right - left + 1, 0)
+            level, lean, start = one[face, 2], across[face], one[face, 0]
+            sunk, line = down[face] * (row + 0.5 - one[face, 1]), row * stride
             for block in _blocks(number):
-                own = np.repeat(face[block], number[block])
-                x, y = _counted(left[block], number[block]), np.repeat(row[block], number[block])
-                depth = one[own, 2] + across[own] * (x + 0.5 - one[own, 0]) + down[own] * (y + 0.5 - one[own, 1])
-                yield own + begin, y * width + x, depth
+                times = number[block]
+                x = _counted(left[block], times)
+                depth = x + 0.5
+                depth -= np.repeat(start[block], times)
+                depth *= np.repeat(lean[block], times)
+                depth += np.repeat(level[block], times)
+                depth += np.repeat(sunk[block], times)
+                x += np.repeat(line[block], times)
+                yield np.repeat(face[block] + begin, times), x, depth
 
 
 def _blocks(count: np.ndarray) -> list[np.ndarray]:
