@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -58,8 +59,8 @@ def _gang(
 ) -> list[Cavity]:
     """Return the cavities of a pour's cells, worked out once for all cells in like surroundings.
 
-    A cell is looked at in a column that is a little larger than what is cast in it. Silicone that leaves the column has
-    leaked: beyond its wall all is open, as it is beyond the tools of the whole.
+    A cell is looked at in a column that is a little larger than what is cast in it; where silicone leaves it, on
+    the whole plate.
     """
     tools = [plan.tool(name).shape for name in step.tools]
     there, others = Standing([*tools, *_not_tools(step)]), _not_tools(step)
@@ -76,11 +77,20 @@ def _gang(
         filled = [solid for whole in filled if not (solid := cropped(whole, column)).is_empty()]
         return _one(layers[i], channels(i), filled, _block_round(filled, step.top))
 
+    @cache
+    def of_plate() -> list[Manifold]:
+        whole = [*(solids[name] for name in step.tools), *(realise(shape, segments) for shape in others)]
+        return Manifold.batch_boolean([_block_round(whole, step.top), *whole], OpType.Subtract).decompose()
+
     # Of an array's tools the layout's cells need not be those of every pour.
     numbers = cells if len(cells) == len(layers) else range(len(layers))
     found: list[Cavity] = []
     for i, (k, (drawn, reached)) in enumerate(once_each(numbers, cavity)):
-        if k != i:
+        if _leaks(drawn, reached):
+            # How far silicone gets that leaves the column, the whole plate tells: cells may differ in that.
+            drawn = united([layers[i], *channels(i)])
+            reached, k = _holding(layers[i], drawn, of_plate()), i
+        elif k != i:
             by = np.subtract(layers[i].bounding_box()[:3], layers[k].bounding_box()[:3])
             drawn, reached = drawn.translate(tuple(by)), reached.translate(tuple(by))
         found.append(Cavity(step, f"pour {step.index} cell {i + 1}", drawn, reached, first + k))
@@ -120,13 +130,17 @@ def _one(
     """Return what is drawn to be cast in a cell, and the part of a block less what is `filled` that holds the layer."""
     drawn = united([layer, *channels])
     reached = _holding(layer, drawn, Manifold.batch_boolean([block, *filled], OpType.Subtract).decompose())
-    if abs(reached.volume() - drawn.volume()) > BALANCE * drawn.volume():
+    if _leaks(drawn, reached):
         # Among very fine facets the union of all that touches can lose a wedge: a second opinion, piece by piece.
         for piece in filled:
             block = block - piece
             block.num_tri()  # evaluated here, or all of it is joined into one operation again
         reached = _holding(layer, drawn, block.decompose())
     return drawn, reached
+
+
+def _leaks(drawn: Manifold, reached: Manifold) -> bool:
+    return abs(reached.volume() - drawn.volume()) > BALANCE * drawn.volume()
 
 
 def _holding(layer: Manifold, drawn: Manifold, components: Iterable[Manifold]) -> Manifold:
