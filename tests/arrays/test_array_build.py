@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import csv
+import gzip
 import json
 import re
 import tomllib
@@ -26,6 +28,7 @@ from unitcad.kernels.mesh import realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.array_build import build_array
 from unitcad.pipeline.build import Built
+from unitcad.report.bench_page import write_bench
 from unitcad.shape.lettering import seen
 from unitcad.spec import printer_of
 
@@ -101,6 +104,18 @@ def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
     assert drawn == {picture_path(name) for name in views(moulds)}
     assert "tray" in {item.item for item in made.bill}
     assert f"engraved b{seen(made.label)}" in " ".join(step.text for step in steps)
+
+
+def test_the_bench_page_speaks_of_the_sheet(folder: Path) -> None:
+    written = write_bench(folder)
+    assert written is not None
+    packed = re.search(r'id="data">([A-Za-z0-9+/=]*)</script>', written.read_text("utf-8"))
+    written.unlink()
+    assert packed is not None
+    content = json.loads(gzip.decompress(base64.b64decode(packed[1])))
+    assert (content["casting"]["makes"], content["casting"]["last"]) == ("sheet", "Units in")
+    wanted = {f"steps/{name}.png" for name in ("pieces", "level", "pour", "strike", "filled", "peel")}
+    assert wanted <= set(content["pictures"])
 
 
 @pytest.mark.parametrize(("count", "words"), [(1, "one casting in"), (2, "2 castings, one after the other, in")])

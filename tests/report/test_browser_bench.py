@@ -58,6 +58,7 @@ def test_it_contacts_nothing_and_fits_its_window(width: int, dark: bool, running
     assert (visit.errors, visit.console) == ([], [])
     assert {url.partition(":")[0] for url in visit.requests} <= {"file", "data"}
     assert visit.page.evaluate("document.documentElement.scrollWidth") <= width
+    assert visit.page.locator("#assembly h2").inner_text() == "Motor in"
     casting = json.loads((page_of_one.parent / "casting.json").read_text("utf-8"))
     assert visit.page.locator("li.bench-step img").count() == sum(
         bool(step["picture"])

@@ -91,6 +91,8 @@ class CastingFile(msgspec.Struct):
     assembly: list[ListedStep]
     measure: list[str]
     bill: list[ListedItem]
+    makes: str = "unit"
+    last: str = "Motor in"
 
 
 def write_bench(folder: Path) -> Path | None:

@@ -178,9 +178,9 @@
     for (const input of [ready, motor]) input.addEventListener("change", () => { state.ready = ready.value; state.motor = motor.checked; keep(); draw(); });
     draw();
     return section("plan", "Time",
-      el("p", {}, el("strong", {}, duration(casting.earliest_finish_min)), ` from the printed pieces to the unit out of the mould, of which ${duration(casting.bench_min)} at the bench.`),
+      el("p", {}, el("strong", {}, duration(casting.earliest_finish_min)), ` from the printed pieces to the ${casting.makes} out of the mould, of which ${duration(casting.bench_min)} at the bench.`),
       el("div", { className: "fields screen" }, el("label", { className: "field" }, el("span", {}, "Must be ready"), ready),
-        casting.assembly.length > 0 && el("label", { className: "field" }, motor, el("span", {}, "with the motor in"))), out);
+        casting.assembly.length > 0 && el("label", { className: "field" }, motor, el("span", {}, casting.makes === "unit" ? "with the motor in" : `with ${casting.time_line.at(-1).name}`))), out);
   }
 
   function printing() {
@@ -193,7 +193,7 @@
   const plain = (item) => item.made.startsWith("printed") || / part [AB]$/.test(item.item);
 
   function needed() {
-    const rows = data.casting.bill.map((item) => ({ className: plain(item) ? "plain" : undefined, cells: [item.item.replace(/^([a-z]+)(\d+)$/, "$1 $2"), `${number(item.quantity, 3)} ${item.unit}`, item.note] }));
+    const rows = data.casting.bill.map((item) => ({ className: plain(item) ? "plain" : undefined, cells: [item.item, `${number(item.quantity, 3)} ${item.unit}`, item.note] }));
     return section("needed", "Needed", table(["Item", "How much", "Note"], rows, { label: "What is needed" }));
   }
 
@@ -295,7 +295,8 @@
     timers.length = 0;
     let at = 0;
     const list = (id, title, steps, pour, ...more) => steps.length > 0 && section(id, title, el("ol", {}, steps.map((step) => card(step, at++, pour))), more);
-    const cells = `${casting.cells} ${casting.cells === 1 ? "cavity" : "cavities"}`;
+    const cavities = `${casting.cells} ${casting.cells === 1 ? "cavity" : "cavities"}`;
+    const cells = casting.makes === "patch" ? `${casting.cells} units in one patch` : cavities;
     clear(page,
       el("header", { className: "top" }, el("div", {}, el("h1", {}, casting.name), el("p", { className: "line" }, `Mould set ${casting.label}, ${cells} · ${data.hash}`)), el("div", { className: "chips" }, theme.button())),
       plan(), needed(), printing(),

@@ -38,7 +38,7 @@
   function times(data) {
     if (!data.time_line) return null;
     const rows = data.time_line.map((phase) => [phase.name, duration(phase.start_min), duration(phase.bench_min), duration(phase.wait_min)]);
-    return [el("p", {}, el("strong", {}, duration(data.earliest_finish_min)), ` from the printed pieces to the unit out of the mould, of which ${duration(data.bench_min)} at the bench.`),
+    return [el("p", {}, el("strong", {}, duration(data.earliest_finish_min)), ` from the printed pieces to the ${data.makes || "unit"} out of the mould, of which ${duration(data.bench_min)} at the bench.`),
       table(["What", "Begins after", "At the bench", "Then wait"], rows, { label: "Time line" })];
   }
 
