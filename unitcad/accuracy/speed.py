@@ -69,6 +69,8 @@ def run(quick: bool, say: Say) -> Result:
         cold_stl, cold_step, warm_stl, warm_step = cold("stl"), cold("both"), warmed("stl"), warmed("both")
         say("the default command")
         whole = whole_command(folder, lengths, out, rounds)
+        say("small commands")
+        whole.append(small_commands(out / OURS / "base.stl", rounds))
     warm_title = "The same, {}, warm: the library is loaded, geometry made anew"
     tables += [
         _time_table(f"The {default_template()} set, parameters to STL, cold processes", cold_stl, CADQUERY),
@@ -142,6 +144,28 @@ def whole_command(folder: Path, lengths: Path, out: Path, rounds: int) -> list[T
     return [Table(f"The whole default command, cold: {what}", head, tuple(rows))]
 
 
+def small_commands(stl: Path, rounds: int) -> Table:
+    """Time commands without geometry, cold, beside the imports that they can't do without; return the aims' table."""
+    check, scipy = "import numpy", "import numpy, scipy.special"
+    asked = (
+        (("--help",), scipy, 1.5),
+        (("list",), scipy, 1.5),
+        (("estimate", default_template()), scipy, 2.5),
+        (("check", str(stl)), check, 1.5),
+    )
+    calls = {peer: partial(_python, "-c", peer) for peer in (check, scipy)}
+    times = interleaved(calls | {words[0]: partial(_python, "-m", "unitcad", *words) for words, _, _ in asked}, rounds)
+    rows = []
+    for words, peer, aim in asked:
+        ratio = times[words[0]].median / times[peer].median
+        shown_words = " ".join(("unitcad", words[0], *(["a small STL"] if words[0] == "check" else words[1:])))
+        rows.append(
+            (shown_words, str(times[words[0]]), peer, str(times[peer]), ratio, aim, "yes" if ratio <= aim else "no")
+        )
+    head = ("command", "time", "beside", "time", "ratio of medians", "aim, at most", "met")
+    return Table("Small commands, cold", head, tuple(rows))
+
+
 def summary(stl: dict[str, Timing], step: dict[str, Timing], worst: float) -> Summary:
     """Return what the set costs in cold processes, as STL and with STEP."""
     picks = [
@@ -167,8 +191,11 @@ def _call(script: Path, *arguments: object) -> str:
 
 
 def _build(out: Path, formats: str) -> None:
-    words = ["build", default_template(), "--formats", formats, "-o", str(out)]
-    subprocess.run([sys.executable, "-m", "unitcad", *words], capture_output=True, check=True, env=_installed())
+    _python("-m", "unitcad", "build", default_template(), "--formats", formats, "-o", str(out))
+
+
+def _python(*words: str) -> None:
+    subprocess.run([sys.executable, *words], capture_output=True, check=True, env=_installed())
 
 
 def _installed() -> dict[str, str]:
