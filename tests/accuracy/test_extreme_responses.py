@@ -8,7 +8,7 @@ import pytest
 
 from unitcad.accuracy import extreme_responses
 from unitcad.accuracy.ball_reference import TooHard
-from unitcad.accuracy.extreme_responses import TOLERANCES, Row, cases, promises, rows, summary, survey
+from unitcad.accuracy.extreme_responses import TOLERANCES, Row, cases, plot, promises, rows, summary, survey
 from unitcad.accuracy.hankel import DISC, RADII
 from unitcad.accuracy.random_media import CLASSES, Trial, trial
 from unitcad.attenuation import HalfSpace, Layer, LayeredMedium
@@ -106,6 +106,14 @@ def test_what_is_promised_can_be_broken():
     stalled = [Row("a", "x", 1e-3, 0.0, 1e-3, 1e-13, 0.0, 100, seconds=61.0)]
     for at, bad in enumerate((over, undecided, stalled, worse)):
         assert [promise.ok for promise in promises(bad, bad)] == [i != at for i in range(4)]
+
+
+def test_a_point_above_the_line_is_a_broken_bound():
+    """An undamped medium was drawn 100 times above it: the reference's own error."""
+    good = Row("a", CLASSES[0], 1e-9, 1e-10, 1e-9, 1e-12, 0.1, 100)
+    undecided = replace(good, error=2.1e-8, doubt=5.5e-8, over_bound=0.0)
+    broken = replace(good, error=1e-7, doubt=5e-9, over_bound=95.0)
+    assert plot([good, undecided, broken]).series[CLASSES[0]] == ((1e-9, 1e-10), (1e-9, 1e-7))
 
 
 def test_the_front_page_has_the_response_that_is_closest_to_its_bound():
