@@ -81,11 +81,14 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
 
 
 class Peel(NamedTuple):
-    """What is pulled off along +z, the base that stays, and the outline within which the base is in its way."""
+    """What is pulled off along +z, the base that stays, and the outline within which the base is in its way.
+
+    None is the outline of the body itself.
+    """
 
     body: Manifold
     base: Manifold
-    outline: CrossSection
+    outline: CrossSection | None = None
 
 
 def peel(moulds: MouldSet, step: Step) -> list[Peel]:
@@ -100,7 +103,7 @@ def peel(moulds: MouldSet, step: Step) -> list[Peel]:
     ways = [(within, way) for within, way in parts if within]
     if len(step.layer) == cells and not ways:
         bodies = [united(moulds.meshes(shapes[i::cells])) for i in range(cells)]
-        return [Peel(body, base, body.project().hull()) for body in bodies]
+        return [Peel(body, base) for body in bodies]
     whole = united(moulds.meshes(shapes))
     if ways:
         return [_turned(whole ^ moulds.mesh_of(within), base, way) for within, way in ways[:cells]]
@@ -108,7 +111,7 @@ def peel(moulds: MouldSet, step: Step) -> list[Peel]:
     _, _, low, _, _, high = whole.bounding_box()
     column = Manifold.cube((2 * half, 2 * half, high - low)).translate((-half, -half, low))
     bodies = [whole ^ column.translate((c.x, c.y, 0)) for c in lay.cells]
-    return [Peel(body, base, body.project().hull()) for body in bodies]
+    return [Peel(body, base) for body in bodies]
 
 
 def _turned(part: Manifold, base: Manifold, direction: Way) -> Peel:
@@ -126,11 +129,12 @@ def _advice(strain: Strain, limit: float) -> str:
     return f"make what the core carries above z = {strain.z:.3g} mm no more than {largest:.3g} mm round (convex hull)"
 
 
-def peel_strain(body: Manifold, base: Manifold, outline: CrossSection) -> tuple[float, float, float]:
+def peel_strain(body: Manifold, base: Manifold, outline: CrossSection | None = None) -> tuple[float, float, float]:
     """Return (largest hoop strain of `body` pulled up off `base`, height there in mm, perimeter of its hole there, mm).
 
     At each height the hole in the body must pass whatever the base carries above it, within the outline.
     """
+    outline = body.project().hull() if outline is None else outline
     x0, y0, low, x1, y1, high = body.bounding_box()
     base = base ^ Manifold.cube((x1 - x0, y1 - y0, high - low)).translate((x0, y0, low))
     heights = sorted({float(z) for solid in (body, base) for z in arrays(solid)[0][:, 2]})
