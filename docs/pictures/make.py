@@ -80,7 +80,7 @@ def arrays() -> dict[str, bytes]:
         kind: patch_pictures(patch_moulds(load_array(name)))
         for kind, name in (("pockets", array), ("patch", "forearm-patch"))
     }
-    band = patch_pictures(patch_moulds(load_array("wrist-band")))
+    band, sleeve = (patch_pictures(patch_moulds(load_array(name))) for name in ("wrist-band", "sleeve-curved"))
     maps = crosstalk_files(array)
     return {
         **{
@@ -90,6 +90,8 @@ def arrays() -> dict[str, bytes]:
         },
         "array-band-worn.png": band["pictures/patch-worn.png"],
         "array-band-tools.png": band["pictures/tools.png"],
+        "array-curved-tools.png": sleeve["pictures/tools.png"],
+        "array-curved-pour2.png": sleeve["pictures/pour2.png"],
         "array-crosstalk.svg": maps["crosstalk.svg"],
         "array-crosstalk-patch.svg": maps["crosstalk-patch.svg"],
     }

@@ -17,7 +17,7 @@ from typing import Any
 
 from unitcad.arrays.array import Array, Placed, Sheet
 from unitcad.arrays.array_tables import AskedArray, PlaceTable
-from unitcad.arrays.construction import Construction, constructions
+from unitcad.arrays.construction import Construction, construction_of
 from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
 from unitcad.arrays.layouts.ring import RingTable
 from unitcad.arrays.sheet_outline import middle_radius, sheet_of
@@ -152,15 +152,15 @@ def _merged(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
 
 def array_of(data: Mapping[str, Any]) -> Array:
     """Return the array of plain data whose units are whole specs. Raises Refusal for the first unfit value."""
-    if at(data, "body.cast") == "curved":
-        raise Refusal("body.cast", "curved", "curved moulds are not made yet: cast flat and bend", "flat")
     try:
         asked = convert(data, AskedArray)
         table, kind = _layout(asked)
     except UnknownKey as key:
         limit = key.limit.replace("`unitcad schema`", "`unitcad schema array`")
         raise UnknownKey(key.field, key.value, limit, key.nearest) from None
-    way = constructions()[asked.array]
+    way = construction_of(asked.array, asked.body.cast)
+    if way.cast == "curved" and asked.body.radius_mm is None:
+        raise Refusal("body.radius_mm", None, "a curved mould needs the radius of the limb that it goes round", 40.0)
     if asked.circuit is not None and way.own_tails:
         limit = "its units are held with their own circuits; [circuit] is one for all, laid into notches"
         raise Refusal("array", asked.array, limit, "back-sheet")

@@ -14,7 +14,7 @@ from unitcad.catalogue import entries as kinds
 from unitcad.spec.asked import CastingTable, EstimateTable, Length, MouldsTable, OutputTable, Table
 
 Construction = Literal["pockets", "back-sheet"]
-Cast = Literal["flat"]
+Cast = Literal["flat", "curved"]
 Name = Annotated[str, Meta(min_length=1, max_length=200)]
 _UNIT = "a template, a spec file, or a table: the keys of a spec, with like = a template or file for the others"
 
@@ -31,7 +31,7 @@ class PlaceTable(Table, frozen=True, kw_only=True):
 
 
 class BodyTable(Table, frozen=True, kw_only=True):
-    """What the array is worn on: flat where no radius is given, else a cylinder; cast flat and bent."""
+    """What the array is worn on: flat where no radius is given, else a cylinder; cast flat and bent, or cast curved."""
 
     radius_mm: Annotated[Annotated[float, Meta(ge=10, le=1000)] | None, Meta(description="left out: flat")] = None
     cast: Cast = "flat"

@@ -39,7 +39,7 @@ def apart(unit: Spec) -> tuple[float, str]:
     return gap, f"between two units the fins of the circuit's notches and a wall of the cups take {gap:.4g} mm"
 
 
-def level(units: tuple[Spec, ...], thickness: float) -> Level:
+def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Level:
     """Return where the sheet lies: flush with the units' backs, over the notches of the circuit.
 
     Raises Refusal for units that have no cap, or no flexible circuit.

@@ -19,13 +19,13 @@ def back_sheet_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float]
     made = procedure(moulds, layer_volumes_mm3, printed_mm3)
     return replace(
         made,
-        assembly=_titled(made.assembly),
+        assembly=motors_in(made.assembly),
         time_line=(*made.time_line[:-1], replace(made.time_line[-1], name="motors and circuit in")),
         last="Motors and circuit in",
     )
 
 
-def _titled(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
+def motors_in(steps: Sequence[BenchStep]) -> tuple[BenchStep, ...]:
     """Return the steps of the assembly, each with its own title: soldering shows no state of the mould."""
     solder, lay_in, cure = steps
     return (

@@ -80,24 +80,38 @@ def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
 
     Tools larger than the bed are cut. Raises Refusal where they can't be, and for lids.
     """
-    drawing = _drawing(array)
-    spec, dims, lay = drawing.spec, drawing.dims, drawing.lay
-    if spec.moulds.pour == "injected":
+    if array.unit.moulds.pour == "injected":
         raise Refusal("moulds.pour", "injected", "a back sheet is struck off, its cups have no lids", "open")
+    return replace(_flat_plan(_drawing(array), cast, last=True), stretches=bent_stretches(array))
+
+
+def inner_tools(array: Array, cast: Sequence[tuple[Shape, ...]], label: str) -> Plan:
+    """Return flat tools and pours of the inner layers alone, drawn as `cast`: they are taken out and laid in elsewhere.
+
+    `label` is that of the whole set. Raises Refusal as `tools_plan`.
+    """
+    return _flat_plan(_drawing(array), cast, last=False, label=label)
+
+
+def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: bool, label: str = "") -> Plan:
+    """Return tools and pours of layers drawn as `cast`; `last`: the last of them is the sheet's."""
+    spec, dims, lay = drawing.spec, drawing.dims, drawing.lay
     pours = range(1, len(cast) + 1)
-    blanks = [_base(drawing), *(_cup(drawing, pour - 1, last=pour == len(cast)) for pour in pours)]
-    label = content_hash(Union((*blanks, *(shape for shapes in cast for shape in shapes))))[:4].upper()
-    base = replace(base_piece(engraved(blanks[0], _base_letters(drawing, f"B{label}"))), removal=DOWN)
+    sheets = [last and pour == len(cast) for pour in pours]
+    blanks = [_base(drawing), *(_cup(drawing, pour - 1, last=sheets[pour - 1]) for pour in pours)]
+    label = label or content_hash(Union((*blanks, *(shape for shapes in cast for shape in shapes))))[:4].upper()
+    base = base_piece(engraved(blanks[0], _base_letters(drawing, f"B{label}")))
+    base = replace(base, removal=DOWN) if last else base
     cups = []
     for pour, blank in zip(pours, blanks[1:], strict=True):
         cup = cup_piece(pour, engraved(blank, _cup_letters(drawing, pour, label)))
         # The last cup is a tray for the sheet: printed as it stands, and the patch leaves it, not it the patch.
-        cups.append(replace(cup, upside_down=False, removal=None) if pour == len(cast) else cup)
+        cups.append(replace(cup, upside_down=False, removal=None) if sheets[pour - 1] else cup)
     stubs = stub_pieces([filament.stub(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
-    steps = tuple(_step(drawing, cast, pour, base, cups[pour - 1], stubs) for pour in pours)
+    steps = tuple(_step(drawing, cast, pour, base, cups[pour - 1], stubs, sheet=sheets[pour - 1]) for pour in pours)
     holes = [("base", len(stubs)), *((cup.name, len(lay.cells)) for cup in cups)]
     return Plan(
-        (base, *cups, *stubs, blade_piece(blade(lay, dims.heights[-1]))),
+        (base, *cups, *stubs, blade_piece(blade(lay, dims.heights[len(cast) - 1]))),
         steps,
         lay,
         label,
@@ -105,7 +119,6 @@ def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
         concentric=False,
         pins=drawing.pins,
         genus=tuple(holes),
-        stretches=bent_stretches(array),
         splits=tuple(_splits(drawing, base, cups)),
     )
 
@@ -146,21 +159,32 @@ def _engraving(spec: Spec, top: float) -> tuple[float, float]:
 
 
 def _step(
-    drawing: Drawing, cast: Sequence[tuple[Shape, ...]], pour: int, base: Body, cup: Body, stubs: Sequence[Body]
+    drawing: Drawing,
+    cast: Sequence[tuple[Shape, ...]],
+    pour: int,
+    base: Body,
+    cup: Body,
+    stubs: Sequence[Body],
+    *,
+    sheet: bool,
 ) -> Step:
+    """Return a pour; the last of them casts the sheet, or its layers are taken out to be laid in elsewhere."""
     last, rim = pour == len(cast), drawing.dims.heights[pour - 1]
-    order = [Removal(stub.name, DOWN) for stub in stubs] + [Removal(base.name, DOWN), Removal(CAST, UP)]
+    pulled = [Removal(stub.name, DOWN) for stub in stubs] if last else []
+    # The last cup can't be lifted past the sheet.
+    first = Removal(base.name, DOWN) if sheet else Removal(cup.name, UP)
+    order = [*pulled, first, *([Removal(CAST, UP)] if last else [])]
     return Step(
         index=pour,
         name=f"layer{pour}",
-        material=drawing.array.sheet.material if last else drawing.spec.layers[pour - 1].material,
+        material=drawing.array.sheet.material if sheet else drawing.spec.layers[pour - 1].material,
         tools=(base.name, cup.name, *(stub.name for stub in stubs)),
         layer=cast[pour - 1],
         earlier=tuple(shape for shapes in cast[: pour - 1] for shape in shapes),
-        seals=tuple(_seals(drawing, pour - 1, last=last)),
+        seals=tuple(_seals(drawing, pour - 1, last=sheet)),
         rim=rim,
         top=rim,
-        removals=tuple(order) if last else (Removal(cup.name, UP),),
+        removals=tuple(order),
     )
 
 

@@ -57,9 +57,12 @@ def bending(array: Array) -> Bending | None:
 
 
 def bent_stretches(array: Array) -> tuple[tuple[str, float], ...]:
-    """Return where a plan's silicone stretches as the array is bent, and by how many percent."""
+    """Return where a plan's silicone stretches as the array is bent, or laid flat, and by how many percent."""
     bent = bending(array)
-    return ((f"sheet bent round {bent.radius:g} mm", 100 * bent.most),) if bent else ()
+    if not bent:
+        return ()
+    where = f"sheet bent round {bent.radius:g} mm" if array.cast == "flat" else "sheet laid flat for its circuit"
+    return ((where, 100 * bent.most),)
 
 
 def bending_record(array: Array) -> dict[str, float | None] | None:

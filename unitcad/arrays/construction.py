@@ -10,6 +10,9 @@ from importlib import import_module
 from typing import NamedTuple
 
 from unitcad.arrays.array import Array
+from unitcad.arrays.array_tables import Cast
+from unitcad.arrays.array_tables import Construction as Name
+from unitcad.errors import Refusal
 from unitcad.moulds.plan import Plan
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
@@ -31,7 +34,7 @@ class Construction:
     own_tails     whether units are cast whole by their own moulds, each with the tail of its own circuit
     thickness_mm  of the sheet where the file gives none
     apart         least distance between the edges of two units, mm, and why
-    level         from the distinct units and a thickness to where the sheet lies
+    level         from the distinct units, a thickness and the limb's radius (None: flat) to where the sheet lies
     bodies        the silicone that an array has besides its units, as cast
     plan          tools and pours of those bodies; raises Refusal where they can't be made
     assembly      how motors and circuit go into what was cast, a sentence each; () where they are in the units
@@ -44,17 +47,30 @@ class Construction:
     own_tails: bool
     thickness_mm: float
     apart: Callable[[Spec], tuple[float, str]]
-    level: Callable[[tuple[Spec, ...], float], Level]
+    level: Callable[[tuple[Spec, ...], float, float | None], Level]
     bodies: Callable[[Array], tuple[Body, ...]]
     plan: Callable[[Array], Plan]
     assembly: Callable[[Array], tuple[str, ...]] = lambda _: ()
     greased: Callable[[Array, int], str] = lambda _, __: ""
+    cast: Cast = "flat"
+
+
+def constructions() -> dict[str, Construction]:
+    """Return the constructions by the name that a file's `array` gives, each cast flat."""
+    return {name: way for (name, cast), way in _found().items() if cast == "flat"}
+
+
+def construction_of(name: Name, cast: Cast) -> Construction:
+    """Return a construction cast flat, or curved. Raises Refusal for one that is cast flat only."""
+    if (name, cast) not in _found():
+        raise Refusal("body.cast", cast, f"{name} are cast flat and bent; a back sheet can be cast curved", "flat")
+    return _found()[name, cast]
 
 
 @cache
-def constructions() -> dict[str, Construction]:
-    """Return the constructions by name: every file of this room that defines CONSTRUCTION is one."""
+def _found() -> dict[tuple[str, str], Construction]:
+    """Return every CONSTRUCTION that a file of this room defines, by its name and cast."""
     room = import_module(__package__ or "")
     modules = (import_module(f"{room.__name__}.{file.name}") for file in pkgutil.iter_modules(room.__path__))
     found = (module.CONSTRUCTION for module in modules if hasattr(module, "CONSTRUCTION"))
-    return {construction.name: construction for construction in found}
+    return {(construction.name, construction.cast): construction for construction in found}

@@ -37,11 +37,18 @@ class Fin(NamedTuple):
 
     def drawn(self, array: Array, reach: float, wider: float, low: float, high: float) -> Shape:
         """Draw a box along the way, from the unit's centre to `reach`, `wider` to either side, from z to z."""
-        at = array.places[self.place]
-        half, (dx, dy) = self.half + wider, self.direction
-        x0, x1 = (min(0, dx * reach), max(0, dx * reach)) if dx else (-half, half)
-        y0, y1 = (min(0, dy * reach), max(0, dy * reach)) if dy else (-half, half)
+        at, (x0, x1, y0, y1) = array.places[self.place], self._sides(reach, wider)
         return box(at.x + x0, at.x + x1, at.y + y0, at.y + y1, low, high)
+
+    def about_the_axis(self, reach: float, wider: float, low: float, high: float) -> Shape:
+        """Draw the same with the unit's axis at x = y = 0."""
+        return box(*self._sides(reach, wider), low, high)
+
+    def _sides(self, reach: float, wider: float) -> tuple[float, float, float, float]:
+        half, (dx, dy) = self.half + wider, self.direction
+        x0, x1 = (min(0.0, dx * reach), max(0.0, dx * reach)) if dx else (-half, half)
+        y0, y1 = (min(0.0, dy * reach), max(0.0, dy * reach)) if dy else (-half, half)
+        return x0, x1, y0, y1
 
 
 def fins(array: Array, circuit: Wiring) -> tuple[Fin, ...]:

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 from unitcad.arrays.array import Array, Placed
 from unitcad.arrays.circuit.circuit_files import has_circuit
-from unitcad.arrays.circuit.outline import circuit_body
-from unitcad.arrays.construction import constructions
+from unitcad.arrays.circuit.laid import laid_circuit
+from unitcad.arrays.construction import construction_of
+from unitcad.arrays.limb_frame import at_place
 from unitcad.designs import unit_bodies
-from unitcad.shape import Shape, moved, rotated
+from unitcad.shape import moved, rotated
 from unitcad.shape.body import Body
 
 SHEET = "sheet"
@@ -30,7 +31,7 @@ def patch_parts(array: Array) -> tuple[PatchPart, ...]:
     Units that are cast in one pour with the sheet are there with what is bought for them, but for a circuit of their
     own: the array's takes its place.
     """
-    way = constructions()[array.construction]
+    way = construction_of(array.construction, array.cast)
     shared = way.bodies(array)
     if way.own_tails:
         shared = tuple(replace(body, name=SHEET, shape=moved(body.shape, z=array.sheet.low)) for body in shared)
@@ -43,21 +44,27 @@ def patch_parts(array: Array) -> tuple[PatchPart, ...]:
             for body in unit_bodies(unit)
             if way.own_tails or body.kind == "motor"
         ]
-    circuit = [circuit_body(array)] if has_circuit(array) else []
+    if array.cast == "curved":
+        # Turned about the limb, each is a solid of its own.
+        own = [PatchPart(body.name, body) for part in own for body in _at_places(array, part)]
+    circuit = laid_circuit(array) if has_circuit(array) else ()
     return (*(PatchPart(body.name, body) for body in shared), *own, *(PatchPart(each.name, each) for each in circuit))
 
 
 def patch_bodies(array: Array) -> tuple[Body, ...]:
     """Return all bodies of the whole patch at their places, a unit's own as "A1-layer1", in the order of the parts."""
     return tuple(
-        replace(part.body, name=f"{place.name}-{part.body.name}", shape=at_place(part.body.shape, place))
-        if place
-        else part.body
-        for part in patch_parts(array)
-        for place in part.places or (None,)
+        body for part in patch_parts(array) for body in (_at_places(array, part) if part.places else (part.body,))
     )
 
 
-def at_place(shape: Shape, place: Placed) -> Shape:
-    """Return a unit's solid turned and moved to its place."""
-    return moved(rotated(shape, "z", place.angle_deg), place.x, place.y)
+def _at_places(array: Array, part: PatchPart) -> tuple[Body, ...]:
+    """Return a part's bodies, turned about their axes, at its places."""
+    return tuple(
+        replace(
+            part.body,
+            name=f"{place.name}-{part.body.name}",
+            shape=at_place(array, rotated(part.body.shape, "z", place.angle_deg), place),
+        )
+        for place in part.places
+    )

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 from msgspec import structs
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.circuit.outline import circuit_body
-from unitcad.arrays.construction import Construction, constructions
+from unitcad.arrays.circuit.laid import laid_circuit
+from unitcad.arrays.construction import Construction, construction_of
+from unitcad.arrays.limb_frame import at_place
 from unitcad.designs import Dimensions, unit_bodies
 from unitcad.moulds.mould_set import MouldSet, geometric
 from unitcad.moulds.plan import Plan, Step
-from unitcad.shape import moved
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, to_json, with_formats
 from unitcad.spec.effective import CastLayer
@@ -44,7 +44,7 @@ class PatchMoulds(MouldSet):
     @cached_property
     def construction(self) -> Construction:
         """The way that the array is made."""
-        return constructions()[self.arranged.construction]
+        return construction_of(self.arranged.construction, self.arranged.cast)
 
     @cached_property
     def blank(self) -> PatchMoulds:
@@ -74,11 +74,11 @@ class PatchMoulds(MouldSet):
             return ()
         array, motors = self.arranged, [body for body in unit_bodies(self.arranged.unit) if body.kind == "motor"]
         placed = [
-            replace(body, name=f"{p.name}-{body.name}", shape=moved(body.shape, p.x, p.y))
+            replace(body, name=f"{p.name}-{body.name}", shape=at_place(array, body.shape, p))
             for p in array.places
             for body in motors
         ]
-        return (*placed, circuit_body(array))
+        return (*placed, *laid_circuit(array))
 
     @property
     def makes(self) -> str:
@@ -89,6 +89,9 @@ class PatchMoulds(MouldSet):
     def across(self) -> str:
         """What to measure across."""
         x0, y0, x1, y1 = self.arranged.sheet.outline
+        if self.arranged.cast == "curved":
+            along, radius = y1 - y0, self.arranged.radius_mm or 0.0
+            return f"The sheet: {along:.2f} mm along the limb. Every unit lies on a tube of radius {radius:.2f} mm."
         middles = f" Between the middles of neighbouring units: {pitch:.2f} mm." if (pitch := self._pitch) else ""
         return f"The sheet: {x1 - x0:.2f} x {y1 - y0:.2f} mm, before it is bent.{middles}"
 
@@ -139,6 +142,8 @@ class PatchMoulds(MouldSet):
 
         array = self.arranged
         radius = max(array.sheet.corner_mm, *(unit.diameter_mm / 2 for unit in array.units))
+        if array.cast == "curved":
+            radius = max(radius, (array.radius_mm or 0.0) + array.sheet.high)
         return segment_count(radius + math.sqrt(radius), self.spec.output.tolerance_mm)
 
     @cached_property
@@ -156,7 +161,7 @@ def patch_moulds(array: Array, altered: Plan | None = None) -> PatchMoulds:
 
 def patch_spec(array: Array) -> Spec:
     """Return the spec that stands for the sheet: the unit's lengths, silicones and lab, and the sheet as its layers."""
-    unit, way = array.unit, constructions()[array.construction]
+    unit, way = array.unit, construction_of(array.construction, array.cast)
     layers = (CastLayer(material=array.sheet.material, wall_mm=array.sheet.margin_mm, cap_mm=array.sheet.thickness_mm),)
     if not way.own_tails:
         layers = (*unit.layers[:-1], structs.replace(unit.layers[-1], material=array.sheet.material))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from unitcad.arrays.patch_moulds import PatchMoulds
 from unitcad.arrays.worn import limb, worn
 from unitcad.export import composite
 from unitcad.kernels.mesh import arrays, bounds
+from unitcad.moulds.plan import Plan, Step
+from unitcad.shape import union
 from unitcad.shape.body import Body
 
 SIZE = (960, 640)
@@ -78,19 +81,39 @@ def taken_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float,
     One over the other in the order of the pours; the pieces of a tool beside each other.
     """
     plan, top = moulds.plan, -np.inf
-    order: list[Body] = [tool for tool in plan.tools if tool.step is None and tool.kind != "blade"]
-    base = len(order)
-    for step in plan.steps:
-        order += plan.standing(step, "cup") + plan.standing(step, "lid")
-        order += [body for body in moulds.unit if body.step == step.index]
-    order += plan.of_kind("blade")
-    for i, body in enumerate(order):
-        _, _, low, _, _, high = bounds(moulds.mesh(body))
-        up = 0.0 if i < base else max(0.0, top + GAP - low)
-        top = max(top, high + up)
-        pieces = plan.pieces_of(body.name) if body.role == "tool" else (body,)
-        for k, piece in enumerate(pieces):
-            yield piece, ((k - (len(pieces) - 1) / 2) * GAP, 0.0, float(up))
+    first = [tool for tool in plan.tools if tool.step is None and tool.kind != "blade"]
+    later = [row for step in plan.steps for row in _of_pour(moulds, step)]
+    rows = [(first, 0.0), *((row, GAP) for row in later), (plan.of_kind("blade"), GAP)]
+    for bodies, gap in rows:
+        low = min((bounds(moulds.mesh(body))[2] for body in bodies), default=np.inf)
+        up = max(0.0, top + gap - low) if gap and bodies else 0.0
+        for body in bodies:
+            top = max(top, bounds(moulds.mesh(body))[5] + up)
+            pieces = plan.pieces_of(body.name) if body.role == "tool" else (body,)
+            for k, piece in enumerate(pieces):
+                yield piece, ((k - (len(pieces) - 1) / 2) * GAP, 0.0, float(up))
+
+
+def laid_elsewhere(plan: Plan, step: Step) -> bool:
+    """Tell whether what a pour casts is taken out and laid into the last pour in another place."""
+    last = plan.steps[-1]
+    return step.index < last.index and not set(step.layer) <= set(last.earlier)
+
+
+def _of_pour(moulds: PatchMoulds, step: Step) -> Iterator[tuple[Body, ...]]:
+    """Yield what stands in one pour alone, from below: base and filaments, what is laid in, cup, what is cast, lid."""
+    plan, colours = moulds.plan, {body.step: body for body in moulds.unit}
+    own = (*plan.standing(step, "base"), *plan.standing(step, "stub"))
+    yield tuple(tool for tool in own if tool.step == step.index)
+    before = plan.steps[step.index - 2] if step.index > 1 else None
+    if before and laid_elsewhere(plan, before):
+        yield tuple(colours[index] for index in range(1, step.index))
+    yield from ((cup,) for cup in plan.standing(step, "cup"))
+    cast = colours[step.index]
+    if laid_elsewhere(plan, step):
+        cast = replace(cast, name=f"{cast.name}-flat", shape=union(step.layer))
+    yield (cast,)
+    yield from ((lid,) for lid in plan.standing(step, "lid"))
 
 
 def _cut_open(moulds: PatchMoulds, index: int) -> Iterator[_Solid]:

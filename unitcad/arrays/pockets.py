@@ -37,7 +37,7 @@ def apart(unit: Spec) -> tuple[float, str]:
     return LEAST_WEB, f"the sheet keeps a web of {LEAST_WEB:g} mm between its pockets"
 
 
-def level(units: tuple[Spec, ...], thickness: float) -> Level:
+def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Level:
     """Return where the sheet lies: over the tails, as near to the lowest unit's back as it can; else under them."""
     lengths = [dimensions(unit) for unit in units]
     back = min(dims.heights[-1] for dims in lengths)

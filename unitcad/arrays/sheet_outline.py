@@ -28,7 +28,7 @@ def middle_radius(asked: AskedArray, way: Construction, units: list[Spec]) -> fl
     """Return the radius of the sheet's middle round the limb, mm; None where the array is worn flat."""
     if asked.body.radius_mm is None:
         return None
-    level = way.level(_distinct(units), _thickness(asked, way))
+    level = way.level(_distinct(units), _thickness(asked, way), asked.body.radius_mm)
     return asked.body.radius_mm + (mm(level.low) + mm(level.high)) / 2
 
 
@@ -47,7 +47,7 @@ def sheet_of(asked: AskedArray, way: Construction, points: list[Point], units: l
     material = table.material or distinct[0].layers[-1].material
     catalogue.choose("sheet.material", material, known)
     hold = HOLD_MM if table.hold_mm is None else table.hold_mm
-    level = way.level(distinct, thickness)
+    level = way.level(distinct, thickness, asked.body.radius_mm)
     if thickness > level.most + 1e-9:
         limit = f"beside the units' tails and backs there is room for a sheet of {level.most:.4g} mm"
         raise Refusal("sheet.thickness_mm", thickness, limit, down(level.most) if level.most >= 0.5 else None)

@@ -1,4 +1,4 @@
-"""The patch as it is worn: its flat meshes mapped onto the limb, each at its own height over the skin."""
+"""The patch as it is worn: what was cast flat is mapped onto the limb, each point at its own height over the skin."""
 
 from __future__ import annotations
 
@@ -13,14 +13,18 @@ FINEST = 2.0
 
 
 def worn(array: Array, solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mesh of a flat solid as it lies round the limb: vertices (n, 3) in mm and faces (m, 3).
+    """Return the mesh of a cast solid as it lies round the limb: vertices (n, 3) in mm and faces (m, 3).
 
     x becomes the angle x over the middle's radius, z the distance from the limb's axis, which is y: the sheet's middle
-    keeps its length. The middle of the array is on top. Raises ValueError for an array that is worn flat.
+    keeps its length. The middle of the array is on top. What was cast curved lies so already. Raises ValueError for an
+    array that is worn flat.
     """
     radius, middle = array.radius_mm, array.middle_radius_mm
     if radius is None or middle is None:
         raise ValueError("the array is worn flat")
+    if array.cast == "curved":
+        vertices, faces = arrays(solid)
+        return np.asarray(vertices, float) + np.array([0.0, 0.0, radius]), np.asarray(faces, np.int64)
     vertices, faces = arrays(solid.refine_to_length(FINEST))
     return wrapped(np.asarray(vertices, float), radius, middle), np.asarray(faces, np.int64)
 

@@ -34,8 +34,11 @@ FOLDER = "steps"
 
 
 def views(moulds: MouldSet) -> dict[str, View]:
-    """Return every view of a procedure by its name, in the order of the steps."""
-    return dict(_views(moulds) if moulds.plan.of_kind("cup") else tray_views(moulds))
+    """Return every view of a procedure by its name, in the order of the steps; {} where a lid stands on no cup."""
+    plan = moulds.plan
+    if any(step.lid and not plan.standing(step, "cup") for step in plan.steps):
+        return {}
+    return dict(_views(moulds) if plan.of_kind("cup") else tray_views(moulds))
 
 
 def picture_path(name: str) -> str:

@@ -81,11 +81,8 @@ def _inside(moulds: MouldSet) -> Iterator[Item]:
     cells, spec = len(moulds.plan.layout.cells), moulds.spec
     size = f"{number(spec.motor.diameter_mm, 3)} x {number(spec.motor.thickness_mm, 3)} mm"
     yield Item(spec.motor.part or "motor", cells, "piece", "bought", ", ".join([size, *_ratings(spec)]))
-    for body in moulds.laid_later:
-        if body.kind == "circuit":
-            yield Item(
-                "flexible circuit", 1, "piece", "bought", "for all motors, as circuit.dxf and circuit-pads.csv say"
-            )
+    if any(body.kind == "circuit" for body in moulds.laid_later):
+        yield Item("flexible circuit", 1, "piece", "bought", "for all motors, as circuit.dxf and circuit-pads.csv say")
     if fpcb := spec.fpcb:
         sides = {"one": "one side", "both": "both sides"}.get(fpcb.tail, fpcb.tail)
         tail = f"tail {number(fpcb.tail_width_mm, 3)} wide to {sides}, {number(fpcb.thickness_mm, 3)} thick"

@@ -8,6 +8,7 @@ from unitcad.catalogue import Material, Value
 from unitcad.moulds.cup import window_section
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
+from unitcad.shape import exact_volume
 from unitcad.spec import Spec, printer_of
 
 GRAVITY = 9.80665
@@ -91,6 +92,11 @@ def mix(spec: Spec, material: Material, volume_mm3: float) -> Mix:
         return 100 * casting.scale_resolution_g / 2 / (grams * smaller)
 
     return Mix(net, total, total * share, total * (1 - share), error(net), error(total), total / density, syringe)
+
+
+def channels_mm3(step: Step) -> float:
+    """Return the volume of a pour's sprues and vents, mm3."""
+    return sum(map(exact_volume, step.channels))
 
 
 def bubble_rise_s(depth_mm: float, material: Material, bubble_mm: float = BUBBLE_MM) -> float:

@@ -126,10 +126,10 @@ def pour_steps(
         yield from mixed(moulds, step, silicone, mix, verdict)
     rests = BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=fig.rest_min(moulds.spec, step.rim, silicone))
     if step.lid:
-        yield _draw_up(mix)
+        yield draw_up(mix)
         if not moulds.spec.casting.vacuum:
             yield rests
-        yield _inject(moulds, picture("inject"))
+        yield inject(moulds, picture("inject"))
     else:
         if not moulds.spec.casting.vacuum and not rests.wait_min:
             yield BenchStep("Brush a first coat", verdict, minutes=fig.BRUSH_MIN * cells)
@@ -260,7 +260,8 @@ def _tongue_home(moulds: MouldSet, step: Step, picture: str) -> BenchStep:
     )
 
 
-def _draw_up(mix: Mix) -> BenchStep:
+def draw_up(mix: Mix) -> BenchStep:
+    """Say how the mix gets into the syringe."""
     return BenchStep(
         "Draw up",
         f"Draw at least {number(mix.syringe_ml, 2)} ml into a syringe: tip and plunger hold back some "
@@ -270,7 +271,8 @@ def _draw_up(mix: Mix) -> BenchStep:
     )
 
 
-def _inject(moulds: MouldSet, picture: str) -> BenchStep:
+def inject(moulds: MouldSet, picture: str) -> BenchStep:
+    """Say how a cavity under a lid is filled."""
     return BenchStep(
         "Inject",
         f"Press the tip into the sprue ({number(moulds.spec.moulds.sprue_mm, 3)} mm) and inject slowly until every "
@@ -285,22 +287,7 @@ def _cure_and_open(
     moulds: MouldSet, step: Step, silicone: Material, picture: Callable[[str], str]
 ) -> Iterator[BenchStep]:
     tongues = moulds.plan.standing(step, "tongue")
-    cure = at_room(float(silicone.cure_h), moulds.spec.casting.room_c)
-    touched = (
-        "the bead on a vent"
-        if step.lid
-        else f"the silicone in {_groove(step)}"
-        if step.groove
-        else "what was struck off"
-    )
-    yield BenchStep(
-        "Cure",
-        f"Let it cure, level, for {number(cure, 2)} h. Touch {touched}, not the layer, to see whether it is done: "
-        f"{TACK}.",
-        picture("filled"),
-        kind="cure",
-        wait_min=60 * cure,
-    )
+    yield cure(moulds, step, silicone, picture("filled"))
     if tongues:
         yield BenchStep(
             "Tongue out FIRST",
@@ -330,6 +317,26 @@ def _cure_and_open(
         f"Layer {step.index} stays on the {holds(moulds)}.",
         picture("cup-off"),
         minutes=fig.LIFT_MIN,
+    )
+
+
+def cure(moulds: MouldSet, step: Step, silicone: Material, picture: str) -> BenchStep:
+    """Say how long a pour cures, and how to tell that it is done."""
+    hours = at_room(float(silicone.cure_h), moulds.spec.casting.room_c)
+    touched = (
+        "the bead on a vent"
+        if step.lid
+        else f"the silicone in {_groove(step)}"
+        if step.groove
+        else "what was struck off"
+    )
+    return BenchStep(
+        "Cure",
+        f"Let it cure, level, for {number(hours, 2)} h. Touch {touched}, not the layer, to see whether it is done: "
+        f"{TACK}.",
+        picture,
+        kind="cure",
+        wait_min=60 * hours,
     )
 
 

@@ -24,7 +24,6 @@ from unitcad.catalogue import Material
 from unitcad.designs.rib_leaves import leaf_mm
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
-from unitcad.shape import exact_volume
 from unitcad.spec import Spec, printer_of
 from unitcad.text import number
 
@@ -105,7 +104,7 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
     for step, volume in zip(plan.steps, layer_volumes_mm3, strict=True):
         silicone = known[step.material]
         poured = volume * len(step.layer) / moulds.pieces(step.name)
-        mix = fig.mix(spec, silicone, poured + _channels_mm3(step))
+        mix = fig.mix(spec, silicone, poured + fig.channels_mm3(step))
         verdict = bubbles(spec, step, silicone, mix, len(plan.layout.cells))
         pours.append(
             Pour(
@@ -173,7 +172,7 @@ def pour_figures(moulds: MouldSet, step: Step, silicone: Material, mix: Mix, vol
     taken = f"({times}{channels})" if channels or not whole else times
     figures = [
         Figure(what, volume, "mm3", "computed: the drawn layer's mesh"),
-        *([Figure("sprue and vents", _channels_mm3(step), "mm3", "computed: as drawn")] if channels else []),
+        *([Figure("sprue and vents", fig.channels_mm3(step), "mm3", "computed: as drawn")] if channels else []),
         Figure("density", float(silicone.density_g_cm3), "g/cm3", sourced(silicone.density_g_cm3)),
         Figure("in the cavities, net", mix.net_g, "g", f"computed: {taken} x density"),
         Figure(
@@ -233,10 +232,6 @@ def _vacuum(mix: Mix) -> tuple[Figure, ...]:
         ),
         Figure("vacuum", fig.VACUUM_INHG, "inHg", pressure),
     )
-
-
-def _channels_mm3(step: Step) -> float:
-    return sum(map(exact_volume, step.channels))
 
 
 def bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix, cells: int) -> str:

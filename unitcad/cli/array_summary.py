@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_extras import CROSSTALK
-from unitcad.arrays.construction import constructions
+from unitcad.arrays.construction import construction_of
 from unitcad.arrays.crosstalk_words import crosstalk_lines
 from unitcad.casting.in_short import in_short
 from unitcad.check.findings import counted
@@ -40,6 +40,6 @@ def array_summary(array: Array, built: Built) -> Iterator[str]:
 def _more_cavities(array: Array) -> Iterator[str]:
     """Say that units which are cast one by one may be cast together."""
     held = Counter(array.units.index(place.unit) for place in array.places)
-    for i, count in held.items() if constructions()[array.construction].own_tails else ():
+    for i, count in held.items() if construction_of(array.construction, array.cast).own_tails else ():
         if array.units[i].moulds.cavities == (1, 1) and count > 1:
             yield f"{count} units one after the other in one cavity: [moulds] cavities = [2, 2] casts four at once"

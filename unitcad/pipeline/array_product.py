@@ -22,7 +22,7 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.array_extras import extras
 from unitcad.arrays.array_file import array_hash, to_toml
 from unitcad.arrays.bending import bending_record
-from unitcad.arrays.construction import constructions
+from unitcad.arrays.construction import construction_of
 from unitcad.arrays.patch import patch_bodies, patch_parts
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
 from unitcad.arrays.patch_pictures import picture_names, pictures
@@ -108,7 +108,7 @@ def unit_folders(array: Array) -> dict[str, Spec]:
 
 def _unit(array: Array, unit: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
     """Return a unit's own result; where it is cast with the sheet, without moulds and casting."""
-    apart = constructions()[array.construction].own_tails
+    apart = construction_of(array.construction, array.cast).own_tails
     wanted = [name for name in only if apart or name not in ("moulds", "casting")] or ["unit"]
     of_unit = replace(stages, say=lambda stage: stages.say(f"unit: {stage}"), take=None)
     return make(unit, wanted, check, store, of_unit)
@@ -167,6 +167,10 @@ def _casting(moulds: PatchMoulds, shape: Geometry, units: dict[str, Product]) ->
 
         of_units = {folder: _of_unit(unit, units[folder]) for folder, unit in unit_folders(moulds.arranged).items()}
         made = pocket_procedure(moulds, volumes[0], printed_mm3(shape["parts"]), of_units)
+    elif way.cast == "curved":
+        from unitcad.arrays.curved_procedure import curved_procedure
+
+        made = curved_procedure(moulds, volumes, printed_mm3(shape["parts"]))
     else:
         from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 

@@ -134,6 +134,12 @@ def _worn(array: Mapping[str, Any]) -> str:
         return ""
     flat = bent["strain_units_flat"]
     between = f", {number(100 * flat, 2)} % between units that stay flat" if flat else ""
+    if array["cast"] == "curved":
+        return (
+            f"<p>Cast round the limb, where it lies unstretched. Laid flat for its circuit, the sheet's faces are "
+            f"stretched by {number(100 * bent['strain'], 2)} %{between}. At its edge a unit stands "
+            f"{number(bent['sagitta_mm'], 2)} mm off the skin (computed).</p>"
+        )
     return (
         f"<p>Cast flat and bent: the sheet's middle, at a radius of {number(bent['middle_radius_mm'], 4)} mm, keeps "
         f"its length. A whole turn is {number(bent['closed_length_mm'], 4)} mm, which leaves "

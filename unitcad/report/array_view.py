@@ -7,7 +7,8 @@ from typing import Any
 from unitcad.arrays.array import Array
 from unitcad.arrays.patch import patch_parts
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.arrays.patch_pictures import taken_apart
+from unitcad.arrays.patch_pictures import laid_elsewhere, taken_apart
+from unitcad.moulds.plan import Step
 from unitcad.pipeline.bodies import glb_content, patch_glb
 from unitcad.report.viewer_models import compressed
 
@@ -25,6 +26,10 @@ def array_model(array: Array) -> dict[str, Any]:
     shared = {part.name for part in parts if not part.places and part.body.kind != "circuit"}
     pieces = {name: [piece.name for piece in plan.pieces_of(name)] for step in plan.steps for name in step.tools}
     bodies = {body.step: body.name for body in moulds.unit}
+
+    def flat(step: Step) -> str:
+        return "-flat" if laid_elsewhere(plan, step) else ""
+
     return {
         "makes": "patch",
         "unit": compressed(patch_glb(moulds, parts)),
@@ -39,7 +44,7 @@ def array_model(array: Array) -> dict[str, Any]:
                 "title": f"Pour {step.index}, struck off",
                 "parts": [
                     *(piece for name in step.tools for piece in pieces[name]),
-                    *(bodies[i] for i in range(1, step.index + 1)),
+                    *(bodies[i] + flat(step) for i in range(1, step.index + 1)),
                 ],
             }
             for step in plan.steps

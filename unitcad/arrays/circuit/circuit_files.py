@@ -9,7 +9,7 @@ from unitcad.arrays.circuit.kicad_board import kicad_board
 from unitcad.arrays.circuit.outline import outline
 from unitcad.arrays.circuit.pad_table import pad_table
 from unitcad.arrays.circuit.wiring import wiring
-from unitcad.arrays.construction import constructions
+from unitcad.arrays.construction import construction_of
 from unitcad.errors import Missing
 
 DXF = "circuit.dxf"
@@ -17,7 +17,7 @@ DXF = "circuit.dxf"
 
 def has_circuit(array: Array) -> bool:
     """Tell whether one circuit joins all motors: where the units have no tails of their own."""
-    return not constructions()[array.construction].own_tails
+    return not construction_of(array.construction, array.cast).own_tails
 
 
 def circuit_files(array: Array) -> tuple[dict[str, bytes], dict[str, str]]:

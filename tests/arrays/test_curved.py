@@ -1,0 +1,265 @@
+"""Back sheets cast round the limb: every mould check holds on their tools, and a fault drawn into one is caught."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.curved_procedure import curved_procedure
+from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.casting.procedure import Procedure
+from unitcad.check import Options, check_bytes
+from unitcad.errors import Refusal
+from unitcad.export import stl
+from unitcad.export.printing import print_ready
+from unitcad.kernels.mesh import arrays
+from unitcad.mould_checks import check_moulds, mould_checks
+from unitcad.moulds.removal import CAST, Removal
+from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union
+from unitcad.spec import printer_of
+
+Change = Callable[[Shape], Shape]
+R = 40.0
+
+
+@cache
+def sleeve(*overrides: str) -> PatchMoulds:
+    return patch_moulds(load_array("sleeve-curved", overrides))
+
+
+def pair() -> PatchMoulds:
+    """Two units side by side: what is quick to judge."""
+    return sleeve("layout.columns=2", "layout.rows=1")
+
+
+def test_every_mould_check_holds() -> None:
+    found = check_moulds(sleeve())
+    assert [f for f in found if not f.ok] == []
+    assert {f.code for f in found} == set(mould_checks())
+    assert max(f.value for f in found if f.code == "C100") < 1e-6
+
+
+HEX = {
+    "name": "hex",
+    "array": "back-sheet",
+    "unit": "encapsulating",
+    "layout": {"kind": "hex", "rings": 1, "pitch_mm": 20},
+    "circuit": {"row_width_mm": 2},
+    "body": {"radius_mm": 45, "cast": "curved"},
+}
+SLOTS = {
+    "name": "slots",
+    "array": "back-sheet",
+    "unit": {"like": "three-layer"},
+    "layout": {"kind": "list", "points_mm": [[-12, -3], [13, 4]]},
+    "sheet": {"strap_slot_mm": [3, 8]},
+    "body": {"radius_mm": 61.7, "cast": "curved"},
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("data", [HEX, SLOTS], ids=["hex", "strap slots"])
+def test_every_mould_check_holds_on_other_layouts(data: dict[str, object]) -> None:
+    findings = check_moulds(patch_moulds(load_array(data)))
+    assert [f for f in findings if not f.ok] == []
+
+
+def test_every_tool_prints_without_support() -> None:
+    moulds = sleeve()
+    for body in (*moulds.unit, *moulds.plan.tools):
+        content = stl.content(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
+        printer = printer_of(moulds.spec) if body.made == "printed" else None
+        assert check_bytes(content, f"{body.name}.stl", Options(printer=printer)).findings == ()
+
+
+def test_the_silicone_has_the_volume_of_its_lengths() -> None:
+    """A barrel 1.25 thick and 60 long with corners of 10; what each unit adds under it, summed over its foot."""
+    moulds = sleeve()
+    layer1, layer2 = (moulds.mesh(body).volume() for body in moulds.unit)
+    sheet = moulds.arranged.sheet
+    low, back = R + sheet.low, R + sheet.high
+    assert back == pytest.approx(math.hypot(R + 4.61, 5.75), abs=1 / 1024)
+    turn = 60 / (R + (sheet.low + sheet.high) / 2)
+
+    def area(radius: float) -> float:
+        """Of a cylinder's part of the sheet: each corner keeps a quarter disc, seen square to the sheet's end."""
+        n, lost = 2000, 0.0
+        for i in range(n):
+            x = 10 * (i + 0.5) / n  # from the end's plane inwards
+            lost += (10 - math.sqrt(100 - (10 - x) ** 2)) * (10 / n) / math.sqrt(1 - (x / radius) ** 2)
+        return radius * turn * 60 - 4 * lost
+
+    barrel = sum(area(low + 1.25 * (i + 0.5) / 50) for i in range(50)) * 1.25 / 50
+
+    def under(inner: float, outer: float, top: float) -> float:
+        """Between a unit's foot and the sheet: from `top` up, or from the skin where that is 0."""
+        n, total = 400, 0.0
+        for i in range(n):
+            for k in range(n):
+                x, y = (outer * (2 * (j + 0.5) / n - 1) for j in (i, k))
+                if inner <= math.hypot(x, y) < outer:
+                    total += math.sqrt(low**2 - x**2) - R - top
+        return total * (2 * outer / n) ** 2
+
+    def notch(inner: float, outer: float, half: float = 1.7) -> float:
+        def inside(r: float) -> float:
+            return half * math.sqrt(r**2 - half**2) + r**2 * math.asin(half / r)
+
+        return inside(outer) - inside(inner)
+
+    rings = 9 * (under(5.75, 7, 0) + under(0, 5.75, 3.36)) - 12 * notch(5.75, 7) * 2.11
+    assert layer2 == pytest.approx(barrel + rings, rel=2e-3)
+    assert layer1 == pytest.approx(
+        sum(moulds.mesh_of(shape).volume() for shape in moulds.plan.steps[0].layer), rel=1e-9
+    )
+
+
+def test_each_unit_stands_where_its_arc_is() -> None:
+    """The middle of its foot touches the limb, at the angle that its place has on the sheet's middle."""
+    moulds = sleeve()
+    middle = R + (moulds.arranged.sheet.low + moulds.arranged.sheet.high) / 2
+    motors = {body.name: moulds.mesh(body) for body in moulds.laid_later if body.kind == "motor"}
+    for place in moulds.arranged.places:
+        x0, y0, z0, x1, y1, z1 = motors[f"{place.name}-motor"].bounding_box()
+        x, y, z = (x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2 + R
+        assert math.atan2(x, z) == pytest.approx(place.x / middle, abs=1e-9)
+        assert (math.hypot(x, z), y) == (pytest.approx(R + 1.0, abs=2e-3), pytest.approx(place.y, abs=1e-9))
+
+
+def with_tool(name: str, change: Change) -> PatchMoulds:
+    plan = pair().plan
+    tools = tuple(replace(tool, shape=change(tool.shape)) if tool.name == name else tool for tool in plan.tools)
+    return patch_moulds(pair().arranged, replace(plan, tools=tools))
+
+
+def less(*tools: Shape) -> Change:
+    return lambda shape: cut(shape, tools)
+
+
+def more(*parts: Shape) -> Change:
+    return lambda shape: union((shape, *parts))
+
+
+def at(shape: Shape, degrees: float) -> Shape:
+    """What is drawn about the z axis, the skin at z = 0, turned about the limb's axis."""
+    return moved(rotated(moved(shape, z=R), "y", degrees), z=-R)
+
+
+SLANT = math.degrees(10 / (R + 4.3545))
+PINS = pair().plan.steps[-1].pins
+assert PINS is not None
+PIN, SEAT = PINS.places[0], PINS.seat
+FAULTS: list[tuple[str, str, str, Change]] = [
+    ("C100", "lid2", "a seam across the land", less(box(-0.2, 0.2, 5, 40, 4.5, 5.5))),
+    ("C100", "base2", "a moat 0.1 too deep", less(at(cylinder(7, -0.1, 1), SLANT))),
+    ("C200", "base2", "a core 0.05 too high", more(at(cylinder(4, 0, 2.16), SLANT))),
+    ("C210", "base2", "a pin 0.1 too thick", more(moved(cylinder(2.1, SEAT, SEAT + 2), *PIN))),
+    ("C220", "lid2", "holes for the pins too wide", less(box(-99, 99, -99, 99, SEAT - 1, SEAT + 3))),
+    ("C300", "base2", "a knob on a slanted core", more(at(cylinder(4.7, 1.0, 1.4), SLANT))),
+    ("C400", "lid2", "the vents of an end that are shut", more(box(-4, 4, 8, 11, 5.1, 8))),
+    ("C410", "lid2", "a sprue that is nearly shut", more(cut(box(-2, 2, -2, 2, 6, 7.98), [box(0, 0.3, 0, 0.3, 5, 9)]))),
+]
+
+
+@pytest.mark.parametrize(("code", "tool", "what", "change"), FAULTS, ids=[f"{f[0]}-{f[1]}-{f[2]}" for f in FAULTS])
+def test_a_planted_fault_is_caught(code: str, tool: str, what: str, change: Change) -> None:
+    faulty = mould_checks()[code].findings(with_tool(tool, change))
+    assert not all(f.ok for f in faulty), what
+
+
+def test_a_wrong_axis_or_an_impossible_order_is_caught() -> None:
+    """Units pulled straight up, or along a neighbour's axis; the cast before the lid; Layer 1 never taken out."""
+    plan = pair().plan
+    first, last = plan.steps
+    parts = [removal for removal in last.removals if removal.piece == CAST]
+    others = last.removals[: -len(parts)]
+    upright = (*others, *(replace(part, direction=(0, 0, 1)) for part in parts))
+    neighbours = (*others, replace(parts[0], direction=parts[1].direction), *parts[1:])
+    for index, removals, caught in (
+        (1, upright, "pour 2: cast at A1 out against base2"),
+        (1, neighbours, "pour 2: cast at A1 out against base2"),
+        (1, (*parts, *others), "pour 2: cast at A1 out against lid2"),
+        (1, (*others, *parts[1:-1]), "mm3 of the silicone stay"),
+        (1, (*others, Removal(CAST, (0, 0, 1))), "pour 2: cast out against base2"),
+        (0, first.removals[:-1], "pour 1: cast stays"),
+    ):
+        steps = [first, last]
+        steps[index] = replace(steps[index], removals=removals)
+        findings = mould_checks()["C300"].findings(patch_moulds(pair().arranged, replace(plan, steps=tuple(steps))))
+        assert any(caught in f.where for f in findings if not f.ok), caught
+
+
+def test_a_unit_laid_in_at_its_neighbours_slant_is_an_overlap() -> None:
+    plan = pair().plan
+    first, last = plan.steps
+    swapped = replace(last, earlier=(rotated(last.earlier[0], "y", 0.5), *last.earlier[1:]))
+    moulds = patch_moulds(pair().arranged, replace(plan, steps=(first, swapped)))
+    assert any("layer1 laid in" in f.where for f in mould_checks()["C200"].findings(moulds) if not f.ok)
+
+
+@pytest.mark.parametrize(
+    ("override", "field"),
+    [
+        ("body.radius_mm=20", "body.radius_mm"),
+        ("body.radius_mm=27", "body.radius_mm"),
+        ("unit=single-encapsulating", "body.cast"),
+        ("unit=embedded", "unit.design"),
+        ("sheet.thickness_mm=4", "sheet.thickness_mm"),
+        ("moulds.bed_z_mm=20", "moulds.bed_z_mm"),
+    ],
+)
+def test_what_can_not_be_cast_is_refused_with_what_would(override: str, field: str) -> None:
+    with pytest.raises(Refusal) as refused:
+        patch_moulds(load_array("sleeve-curved", [override])).plan  # noqa: B018
+    assert refused.value.field == field
+    assert refused.value.nearest is not None or field == "unit.design"
+    if field != "unit.design":
+        kept = f"{field}={refused.value.nearest}"
+        assert patch_moulds(load_array("sleeve-curved", [override, kept])).plan
+
+
+@pytest.fixture(scope="module")
+def made() -> Procedure:
+    moulds = sleeve()
+    return curved_procedure(moulds, [moulds.mesh(body).volume() for body in moulds.unit], 1000.0)
+
+
+def test_layer_1_is_taken_out_and_laid_in_before_the_rest_is_injected(made: Procedure) -> None:
+    first, last = ([step.title for step in pour.steps] for pour in made.pours)
+    assert first[-1] == "Cup 1 off"
+    order = ["Layer 1 out", "Filament into base 2", "Wipe Layer 1", "Lay Layer 1 in", "Lid 2 on", "Inject", "Cure"]
+    assert [title for title in last if title in order] == order
+    assert last[-1] == "Lid 2 off"
+    assert [step.title for step in made.release] == ["Filament out", "Peel off"]
+    assert made.time_line[-1].name == "motors and circuit in"
+    # What is cast flat bonds later.
+    assert all(pour.agent == () for pour in made.pours)
+    assert "No release agent on any piece" in next(
+        step.text for step in made.pours[0].steps if step.title == "Cup 1 on"
+    )
+
+
+def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> None:
+    volumes = [sleeve().mesh(body).volume() for body in sleeve().unit]
+    # A sprue of 3 mm and four vents of 1 mm through the lid's 3 mm, and 0.25 mm into the sheet.
+    volumes[1] += math.pi * (1.5**2 + 4 * 0.5**2) * 3.25
+    for pour, volume in zip(made.pours, volumes, strict=True):
+        net, density = (
+            next(f.value for f in pour.figures if f.name == name) for name in ("in the cavities, net", "density")
+        )
+        assert net == pytest.approx(volume * density / 1000, rel=1e-6)
+    items = {item.item: item.quantity for item in made.bill}
+    assert items["filament stub"] == items["filament stub, straight"] == 9
+    assert (items["syringe"], items["flexible circuit"], items["lid 2"]) == (1, 1, 1)
+
+
+def test_pockets_are_cast_flat() -> None:
+    asked = load_array("forearm-pockets").asked
+    with pytest.raises(Refusal) as refused:
+        load_array({**asked, "body": {"radius_mm": 40.0, "cast": "curved"}})
+    assert (refused.value.field, refused.value.nearest) == ("body.cast", "flat")

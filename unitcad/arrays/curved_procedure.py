@@ -1,0 +1,325 @@
+"""The casting of a curved mould: the inner layers in their flat tools, then laid in round the limb and injected."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from msgspec import structs
+
+from unitcad import catalogue
+from unitcad.arrays.array import Array
+from unitcad.arrays.back_sheet_procedure import motors_in
+from unitcad.arrays.patch_moulds import PatchMoulds
+from unitcad.casting import figures as fig
+from unitcad.casting.bench_step import BenchStep
+from unitcad.casting.bench_views import picture_path, views
+from unitcad.casting.bill import Item, bill
+from unitcad.casting.figures import at_room
+from unitcad.casting.finishing import motor_in
+from unitcad.casting.finishing import release as flat_release
+from unitcad.casting.finishing import shown as grams_shown
+from unitcad.casting.instructions import HOLD, LEVEL_AGAIN, cure, draw_up, inject, mixed, pour_steps
+from unitcad.casting.needs import needs
+from unitcad.casting.preparation import printing
+from unitcad.casting.procedure import Pour, Procedure, bubbles, pour_figures, procedure
+from unitcad.casting.release_agent import BondFace, Face
+from unitcad.casting.time_line import phases
+from unitcad.catalogue import Material
+from unitcad.moulds.plan import Step
+from unitcad.shape.lettering import seen
+from unitcad.spec import Spec
+from unitcad.text import listed, number, spaced
+
+TOOLS, SKIN_SIDE = "pictures/tools.png", "pictures/patch-skin-side.png"
+
+
+def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
+    """Return the procedure of an array that is cast round the limb: nothing is meshed or drawn.
+
+    `layer_volumes_mm3`: of each pour, of all units together. `printed_mm3`: of all printed pieces.
+    """
+    flat = _flat_set(moulds)
+    made = procedure(flat, layer_volumes_mm3[:-1], printed_mm3)
+    spec, step, volume = _injected(moulds.spec), moulds.plan.steps[-1], layer_volumes_mm3[-1]
+    under_lid = PatchMoulds(spec, moulds.plan, array=moulds.array)
+    known = catalogue.materials(spec.materials)
+    silicones = [known[each.material] for each in moulds.plan.steps]
+    last = silicones[-1]
+    mix = fig.mix(spec, last, volume + fig.channels_mm3(step))
+    verdict = bubbles(spec, step, last, mix, 1)
+    prepared = (_sort(moulds), *_shown(made.preparation[1:]))
+    mixes = [
+        (silicone, fig.mix(flat.spec, silicone, v))
+        for silicone, v in zip(silicones, layer_volumes_mm3[:-1], strict=False)
+    ]
+    # In the words of the whole set: what is cast flat bonds later, so its cup gets no release agent.
+    flat_pours = tuple(
+        replace(each, agent=(), steps=_shown(pour_steps(moulds, flat_step, *mixed_of, each.verdict, views(flat))))
+        for each, flat_step, mixed_of in zip(made.pours, flat.plan.steps, mixes, strict=True)
+    )
+    picture = f"pictures/pour{step.index}.png"
+    steps = (
+        *_laid_in(moulds, flat, silicones[0]),
+        *_lid_on(moulds, step, picture),
+        *mixed(under_lid, step, last, mix, verdict),
+        draw_up(mix),
+        *_rest(spec, step, last, verdict),
+        inject(under_lid, picture),
+        cure(under_lid, step, last, picture),
+        _lid_off(moulds, step),
+    )
+    room = spec.casting.room_c
+    pour = Pour(
+        index=step.index,
+        layer=step.name,
+        material=last.name,
+        figures=pour_figures(under_lid, step, last, mix, volume),
+        verdict=verdict,
+        agent=(),
+        degassing_min=fig.DEGASSING_MIN if spec.casting.vacuum else 0.0,
+        part_a_g=mix.part_a_g,
+        part_b_g=mix.part_b_g,
+        pot_life_min=at_room(float(last.pot_life_min), room),
+        cure_h=at_room(float(last.cure_h), room),
+        steps=steps,
+        drawing=f"step{step.index}-section.svg",
+    )
+    pours, out = (*flat_pours, pour), tuple(_out(moulds, silicones[0]))
+    together = _shown(motors_in(tuple(motor_in(moulds, silicones))))
+    stages = [("preparation", prepared), *((f"pour {each.index}", each.steps) for each in pours)]
+    stages.append(("out of the mould", out))
+    until, line = phases(stages), phases([*stages, ("motors and circuit in", together)])
+    mixes = [
+        (silicone, fig.mix(flat.spec, silicone, v))
+        for silicone, v in zip(silicones[:-1], layer_volumes_mm3[:-1], strict=True)
+    ]
+    every = [*prepared, *(each for one in pours for each in one.steps), *out, *together]
+    grams = [v * float(s.density_g_cm3) / 1000 for v, s in zip(layer_volumes_mm3, silicones, strict=True)]
+    return replace(
+        made,
+        name=spec.name,
+        label=moulds.plan.label,
+        earliest_finish_min=until[-1].end_min,
+        bench_min=sum(phase.bench_min for phase in until),
+        time_line=line,
+        printing=printing(moulds, printed_mm3),
+        preparation=prepared,
+        pours=pours,
+        bonds=tuple(_bonds(moulds)),
+        release=out,
+        assembly=together,
+        measure=tuple(_measure(moulds, grams)),
+        bill=(*_bill(moulds, [*mixes, (last, mix)], every), *_beside(moulds, mix)),
+        last="Motors and circuit in",
+    )
+
+
+def _shown(steps: Iterable[BenchStep]) -> tuple[BenchStep, ...]:
+    """Return steps with the array's pictures in the place of those that are drawn of one set of cups."""
+    return tuple(replace(step, picture=_picture(step.picture)) for step in steps)
+
+
+def _picture(path: str) -> str:
+    if pour := re.fullmatch(re.escape(picture_path("pour")).replace("pour", r"pour(\d+)-strike"), path):
+        return f"pictures/pour{pour[1]}.png"
+    return {picture_path("pieces"): TOOLS, picture_path("motor-in"): SKIN_SIDE}.get(path, "")
+
+
+def _flat_set(moulds: PatchMoulds) -> PatchMoulds:
+    """Return the set of the inner layers alone: their flat tools and pours."""
+    plan, spec = moulds.plan, moulds.spec
+    steps, dims = plan.steps[:-1], plan.dimensions
+    standing = {name for step in steps for name in step.tools}
+    tools = tuple(tool for tool in plan.tools if tool.name in standing or tool.kind == "blade")
+    inner = replace(dims, radii=dims.radii[: len(steps)], heights=dims.heights[: len(steps)])
+    layers = spec.layers[: len(steps)]
+    return PatchMoulds(
+        structs.replace(spec, layers=layers),
+        replace(plan, tools=tools, steps=steps, dimensions=inner),
+        array=moulds.array,
+    )
+
+
+def _injected(spec: Spec) -> Spec:
+    return structs.replace(spec, moulds=structs.replace(spec.moulds, pour="injected"))
+
+
+def _base(moulds: PatchMoulds) -> str:
+    """Return what the base of the last pour is called."""
+    return spaced(moulds.plan.base_of(moulds.plan.steps[-1]))
+
+
+def _sort(moulds: PatchMoulds) -> BenchStep:
+    plan, label = moulds.plan, seen(moulds.plan.label)
+    last = plan.steps[-1]
+    cups = listed(f"C{step.index:X} is {spaced(step.cup)}" for step in plan.steps[:-1])
+    return BenchStep(
+        "Sort the pieces",
+        f"Print the pieces as they lie in their files, without supports. All are engraved {label}. The flat ones are "
+        f"for Layer 1: the base has a b before it, and of the cups {cups}. The curved ones are for the last pour: "
+        f"{_base(moulds)} has B{last.index:X} before it, {spaced(last.lid or '')} L{last.index:X}.",
+        TOOLS,
+        minutes=fig.SORT_MIN,
+    )
+
+
+def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
+    """Say how the inner layers leave their flat base and come to lie on the curved one."""
+    units, base, step = len(moulds.arranged.places), _base(moulds), moulds.plan.steps[-1]
+    cast = "Layer 1" if step.index == 2 else f"Layers 1 to {step.index - 1}"
+    pulled = next(iter(flat_release(flat, inner)))
+    yield replace(pulled, title="Filament out of the flat base", picture="")
+    yield BenchStep(
+        f"{cast} out",
+        f"Peel {cast} of each unit straight up off the flat base, its edge loosened with a blunt spatula. They differ "
+        "in the notches of the circuit: lay each down on paper at its own place, the same way round as in the mould. "
+        "Trim the flash with small scissors.",
+        minutes=fig.PEEL_MIN * units,
+    )
+    yield BenchStep(
+        f"Filament into {base}",
+        f"Cut {units} straight pieces of filament, {_lengths(moulds)} mm long. Stand {base} on a board and push one up "
+        "through each core from below, until its lower end is flush with the underside: it stands on the bench and "
+        "can't sink. Trim the upper end flush with the core's top with a knife.",
+        picture=f"pictures/pour{step.index}.png",
+        minutes=fig.FILAMENT_MIN * units,
+    )
+    yield BenchStep(
+        f"Level {base}",
+        f"Put {base} where it will stay. Lay a phone with its level, or a small spirit level, on its seats beside the "
+        "pins, along it and across, and put paper under a corner until it shows less than 5 degrees: so much the vents "
+        "clear (C400).",
+        minutes=fig.LEVEL_MIN,
+    )
+    yield BenchStep(
+        f"Wipe {cast}",
+        f"Wipe {cast} with isopropanol and let it dry. Its outside is the bond face: no release agent on it, ever, no "
+        "grease, no fingers.",
+        minutes=fig.WIPE_MIN * units,
+    )
+    yield BenchStep(
+        f"Lay {cast} in",
+        f"Lay each one over its core of {base}, at the place where it was cast: A1 on A1, its notches over the fins. "
+        "Press its edge down all round until it lies on the floor of its moat and its top flat on the core: what "
+        "creeps under it fills the cavity's mouth. No release agent and no grease on core or moat.",
+        TOOLS,
+        minutes=fig.LAY_IN_MIN * units / 2,
+    )
+
+
+def _lengths(moulds: PatchMoulds) -> str:
+    """Return the lengths of the straight filaments, mm: along the unit's axis, from the core's top to the bench."""
+    array = moulds.arranged
+    radius, middle = array.radius_mm or 0.0, array.middle_radius_mm or 1.0
+    bottom = moulds.plan.tool(moulds.plan.base_of(moulds.plan.steps[-1])).shape
+    low = moulds.mesh_of(bottom).bounding_box()[2]
+    found: dict[str, int] = {}
+    for place in array.places:
+        length = radius + moulds.plan.dimensions.core_height - (radius + low) / math.cos(place.x / middle)
+        found[number(math.ceil(length) + 1, 3)] = found.get(number(math.ceil(length) + 1, 3), 0) + 1
+    return listed(f"{count} of {length}" for length, count in found.items())
+
+
+def _lid_on(moulds: PatchMoulds, step: Step, picture: str) -> Iterator[BenchStep]:
+    lid, base = spaced(step.lid or ""), _base(moulds)
+    slit = number(moulds.spec.moulds.seat_relief_mm, 3)
+    yield BenchStep(
+        f"Lid {step.index} on",
+        f"Draw a thin line of petroleum jelly on the curved land of {base} round the sheet's bed, near its outer edge. "
+        f"Put {lid} on over the pins: one of them stands off the rectangle of the others, so it goes on one way only. "
+        f"Press it down until it bears on the land all round; at both ends, beside the pins, a slit of {slit} mm stays "
+        "open.",
+        TOOLS,
+        minutes=fig.LIFT_MIN,
+    )
+    yield BenchStep(
+        f"{HOLD} lid {step.index} down",
+        f"{HOLD} it down with rubber bands round lid and base, or with a clamp, clear of sprue and vents. "
+        f"{LEVEL_AGAIN}",
+        picture,
+        minutes=fig.HOLD_MIN,
+    )
+
+
+def _rest(spec: Spec, step: Step, silicone: Material, verdict: str) -> Iterator[BenchStep]:
+    if not spec.casting.vacuum:
+        wait = fig.rest_min(spec, step.rim, silicone)
+        yield BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=wait)
+
+
+def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
+    return BenchStep(
+        f"Lid {step.index} off",
+        "Take off what held the lid down. Lay a screwdriver into the slit at either end, beside the pins, and turn "
+        f"both a little at a time, until {spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents "
+        "tear off at the sheet. Trim them flush with a knife.",
+        TOOLS,
+        minutes=fig.LIFT_MIN,
+    )
+
+
+def _out(moulds: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
+    """Describe the way from the cured sheet to a sleeve in the hand."""
+    units, base = len(moulds.arranged.places), _base(moulds)
+    tear = float(inner.tensile_mpa) * math.pi * (moulds.spec.moulds.filament_mm / 2) ** 2
+    yield BenchStep(
+        "Filament out",
+        f"Lay {base} on its side. Take each filament with pliers in its pocket and pull it out along itself: it lets "
+        f"air in under the unit. Never push it through: {number(tear, 2)} N on its end tear {inner.name} (computed: "
+        f"tensile strength, {inner.tensile_mpa.status}, x its area).",
+        f"pictures/pour{moulds.plan.steps[-1].index}.png",
+        minutes=fig.PULL_MIN * units,
+    )
+    yield BenchStep(
+        "Peel off",
+        "Loosen the sheet's edge all round with a blunt spatula. Begin at one end: lift it, and draw each unit off its "
+        "core square to the base at its place, row after row. Straight up only the middle ones come. Trim the flash "
+        "with small scissors.",
+        SKIN_SIDE,
+        minutes=fig.PEEL_MIN * units,
+    )
+
+
+def _bonds(moulds: PatchMoulds) -> Iterator[BondFace]:
+    """Yield every face of the tools that forms what bonds later."""
+    *inner, last = moulds.plan.steps
+    for step in inner:
+        yield BondFace(Face(step.cup, "bore"), f"layer {step.index + 1}")
+    yield BondFace(Face(moulds.plan.base_of(inner[0]), "core"), "motor")
+    yield BondFace(Face(moulds.plan.base_of(inner[0]), "seat"), "the next layer")
+    yield BondFace(Face(moulds.plan.base_of(last), "core and moat"), f"layer {last.index - 1}")
+
+
+def _measure(moulds: PatchMoulds, grams: Sequence[float]) -> Iterator[str]:
+    array: Array = moulds.arranged
+    yield moulds.across
+    yield (
+        f"The sheet between the units: {grams_shown(array.sheet.thickness_mm, 2)} mm thick, at its four edges and in "
+        "its middle. A lid that did not sit down shows here."
+    )
+    weights = " + ".join(grams_shown(each) for each in grams) + f" = {grams_shown(sum(grams))}"
+    yield f"Weigh one {moulds.makes}, trimmed, without motors and circuit: {weights} g. Less means air."
+
+
+def _bill(moulds: PatchMoulds, mixes: list[tuple[Material, fig.Mix]], steps: Sequence[BenchStep]) -> Iterator[Item]:
+    """Yield the bill of the whole set, its filaments told apart: bent ones, and straight ones."""
+    places = len(moulds.arranged.places)
+    for item in bill(moulds, mixes, needs(steps)):
+        if item.item == "filament stub":
+            size = f"{number(moulds.spec.moulds.filament_mm, 3)} mm printer filament"
+            yield replace(item, quantity=item.quantity - places)
+            yield Item("filament stub, straight", places, "piece", "cut", f"{size}: {_lengths(moulds)} mm long")
+        elif item.item == "adhesive tape":
+            yield replace(item, quantity=2 * (len(moulds.plan.steps) - 1))
+        else:
+            yield item
+
+
+def _beside(moulds: PatchMoulds, mix: fig.Mix) -> Iterator[Item]:
+    """Yield what the injected pour takes."""
+    tip = number(moulds.spec.moulds.sprue_mm, 3)
+    yield Item("syringe", 1, "piece", "bought", f"{number(mix.syringe_ml, 2)} ml or more, tip up to {tip} mm")
+    yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")

@@ -1,0 +1,330 @@
+"""The tools of a back sheet cast round the limb: a base with a moat a unit, and a lid; the inner layers' flat tools.
+
+    section across the limb             lid, flat on top, printed upside down
+            .--vent--sprue--vent--.
+      .-----'   .-------------.   '-----.
+      |pin   .-'  sheet        '-.   pin|   the lid bears on the base beside the sheet: both are bored and turned to the
+      |__|.-'.-|core|.  moat .---'-.|___|   radius of the sheet's back
+      |  '   |_|    ||_______|      '   |
+      '------------- base2 -------------'
+
+Base and lid part upwards, the filaments are pulled along their cores, and the silicone is peeled off unit by unit,
+each along its own axis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from unitcad.arrays.array import Array
+from unitcad.arrays.back_sheet_tools import OFF_SQUARE, UP, core_top, inner_tools
+from unitcad.arrays.bending import bent_stretches
+from unitcad.arrays.circuit.wiring import wiring
+from unitcad.arrays.curved_release import parts_out
+from unitcad.arrays.fins import fins
+from unitcad.arrays.limb_frame import angle_deg, axis, barrel, bent, inside_of_end, slice_of, strap_slot
+from unitcad.designs import Dimensions, dimensions
+from unitcad.designs.parts import BEYOND
+from unitcad.errors import Refusal
+from unitcad.moulds.base import core
+from unitcad.moulds.dents import MESH_ROOM, TILT_DEG, deepest
+from unitcad.moulds.labels import engraved
+from unitcad.moulds.lid import THICKNESS, VENT
+from unitcad.moulds.pieces import base_piece, lid_piece, stub_pieces
+from unitcad.moulds.pins import PIN_RADIUS, Pins, pin_holes, standing_pins
+from unitcad.moulds.plan import Plan, Step
+from unitcad.moulds.removal import Removal
+from unitcad.shape import (
+    Common,
+    Revolve,
+    Shape,
+    Union,
+    box,
+    content_hash,
+    cut,
+    cylinder,
+    mm,
+    moved,
+    polygon,
+    turned,
+    union,
+)
+from unitcad.shape.lettering import HEIGHT, engraving, text_width
+from unitcad.spec import Spec
+
+LAND = 4.0
+"""Where base and lid bear on each other beside the sheet, mm."""
+PIN_HEIGHT = 3.0
+VENT_OFF_END = 1 / 8
+"""From a vent to the sheet's end along the limb, mm."""
+INTO = 0.25
+"""How far sprue and vents are drawn into the sheet, mm."""
+GRIP_RADIUS = 4.0
+"""Of the pocket under a filament, in which pliers take it, mm."""
+JOINT = 1 / 8
+"""How far a seal reaches into the base, and stays off the cavity, mm."""
+
+
+@dataclass(frozen=True)
+class Former:
+    """What base and lid are drawn to, mm: half sizes, the seat beside the barrel, the base's lower face, pins on it."""
+
+    array: Array
+    spec: Spec
+    dims: Dimensions
+    half: tuple[float, float]
+    seat: float
+    bottom: float
+    pins: Pins
+
+    @property
+    def back(self) -> float:
+        """Radius of the sheet's back."""
+        return (self.array.radius_mm or 0.0) + self.array.sheet.high
+
+    @property
+    def front(self) -> float:
+        """Radius of the sheet's side towards the skin."""
+        return (self.array.radius_mm or 0.0) + self.array.sheet.low
+
+    @property
+    def top(self) -> float:
+        """Z of the lid's upper face."""
+        return self.array.sheet.high + THICKNESS
+
+
+def curved_plan(
+    array: Array, flat: Sequence[tuple[Shape, ...]], laid: Sequence[tuple[Shape, ...]], poured: Shape
+) -> Plan:
+    """Return tools and pours of an array whose inner layers are cast as `flat` and laid in as `laid`, then `poured`.
+
+    Raises Refusal for tools beyond the bed.
+    """
+    former = _former(array)
+    pour = len(flat) + 1
+    base, lid = _base(former), _lid(former)
+    label = content_hash(Union((base, lid, poured, *(shape for shapes in flat for shape in shapes))))[:4].upper()
+    base = base_piece(engraved(base, _base_letters(former, f"B{pour:X}{label}")))
+    lid = lid_piece(pour, engraved(lid, _lid_letters(former, f"L{pour:X}{label}")))
+    ways = [_down(axis(array, place.x)) for place in array.places]
+    stubs = [replace(stub, removal=way) for stub, way in zip(stub_pieces(_stubs(former)), ways, strict=True)]
+    # The flat tools have the plain names.
+    base = replace(base, name=f"base{pour}", step=pour)
+    stubs = [replace(stub, name=f"{stub.name}-{pour}", step=pour) for stub in stubs]
+    channels = tuple(_channels(former, array.sheet.high - INTO, former.top))
+    step = Step(
+        index=pour,
+        name=f"layer{pour}",
+        material=array.sheet.material,
+        tools=(base.name, lid.name, *(stub.name for stub in stubs)),
+        layer=(poured,),
+        earlier=tuple(shape for shapes in laid for shape in shapes),
+        seals=tuple(_seals(former)),
+        rim=array.sheet.high,
+        top=former.top,
+        channels=channels,
+        groove=False,
+        pins=former.pins,
+        removals=(
+            Removal(lid.name, UP),
+            *(Removal(stub.name, way) for stub, way in zip(stubs, ways, strict=True)),
+            *parts_out(array),
+        ),
+    )
+    holes = ((base.name, len(stubs)), (lid.name, len(channels)))
+    inner = inner_tools(array, flat, label)
+    return replace(
+        inner,
+        tools=(*(tool for tool in inner.tools if tool.kind != "blade"), base, lid, *stubs, *inner.of_kind("blade")),
+        steps=(*inner.steps, step),
+        genus=(*inner.genus, *holes),
+        stretches=bent_stretches(array),
+    )
+
+
+def _down(way: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = way
+    return -x, -y, -z
+
+
+def _former(array: Array) -> Former:
+    """Return what base and lid are drawn to. Raises Refusal for plates beyond the bed."""
+    spec, moulds, sheet = array.unit, array.unit.moulds, array.sheet
+    dims, radius = replace(dimensions(spec), exit=None, sides=()), array.radius_mm or 0.0
+    back = radius + sheet.high
+    x0, y0, x1, y1 = sheet.outline
+    end = math.radians(angle_deg(array, max(-x0, x1))) + LAND / back
+    seat = mm(math.floor((back * math.cos(end) - radius) / moulds.layer_mm) * moulds.layer_mm)
+    hole = PIN_RADIUS + moulds.plinth_clearance_mm
+    beside = 2 * hole + 2 * moulds.least_wall_mm
+    edge = math.sqrt(back**2 - (radius + seat) ** 2)
+    # Between the pins at one end stands the label.
+    label = text_width("B2F055", moulds.engraving_stroke_mm) / 2 + 1.0 + beside
+    half = mm(edge + beside), mm(max(max(-y0, y1) + LAND, label))
+    lowest = min([seat - moulds.plate_mm, *(_lowest(array, place.x, dims.outer_radius) for place in array.places)])
+    under = max(moulds.plate_mm, GRIP_RADIUS + moulds.least_wall_mm)
+    bottom = mm(seat - math.ceil((seat - lowest + under) / moulds.layer_mm) * moulds.layer_mm)
+    x, y = edge + beside / 2, half[1] - hole - 2 * moulds.least_wall_mm
+    places = (-x, -y), (x, -y), (-x, y), (x, y - OFF_SQUARE)
+    size, height = f"the base of {2 * half[0]:.4g} x {2 * half[1]:.4g} mm", mm(sheet.high + THICKNESS - bottom)
+    for field, needed, what in (
+        ("bed_x_mm", 2 * half[0], size),
+        ("bed_y_mm", 2 * half[1], size),
+        ("bed_z_mm", height, f"the mould, {height:.4g} mm high,"),
+    ):
+        if needed > getattr(moulds, field) + 1e-9:
+            limit = f"{what} exceeds the bed; curved tools are not cut"
+            raise Refusal(f"moulds.{field}", getattr(moulds, field), limit, math.ceil(needed * 10 - 1e-6) / 10)
+    return Former(array, spec, dims, half, seat, bottom, Pins(places, PIN_HEIGHT, moulds.plinth_clearance_mm, seat))
+
+
+def _lowest(array: Array, x: float, outer: float) -> float:
+    """Return z of the lowest point of a unit's moat."""
+    radius, turn = array.radius_mm or 0.0, math.radians(angle_deg(array, x))
+    return radius * math.cos(turn) - outer * math.sin(abs(turn)) - radius
+
+
+def _block(former: Former) -> Shape:
+    """Draw the base's outside: a block up to the seat, and the barrel over it."""
+    (x, y), seat, bottom = former.half, former.seat, former.bottom
+    over = Common((barrel(former.array, former.back), box(-x, x, -y, y, bottom + BEYOND, former.top)))
+    return union((box(-x, x, -y, y, bottom, seat), over, *standing_pins(former.pins)))
+
+
+def _base(former: Former) -> Shape:
+    """Draw the base: the sheet's bed with posts for strap slots, a moat a unit with core and fins, filaments' ways."""
+    return cut(_block(former), [_bed(former), *_moats(former), *_filament_ways(former)])
+
+
+def _bed(former: Former) -> Shape:
+    """Draw what the sheet takes from the base."""
+    array = former.array
+    sheet = array.sheet
+    posts = [strap_slot(array, slot, 2 * BEYOND) for slot in sheet.strap_slots]
+    room = Common((inside_of_end(array, left=True), inside_of_end(array, left=False)))
+    return cut(room, [barrel(array, former.front), *posts])
+
+
+def _moats(former: Former) -> list[Shape]:
+    """Draw what the units take from the base: open upwards, round core and fins."""
+    array, dims, top = former.array, former.dims, core_top(former.spec)
+    ways = fins(array, wiring(array))
+    drawn = []
+    for i, place in enumerate(array.places):
+        ridges = [
+            way.about_the_axis(dims.outer_radius + 2 * BEYOND, 0.0, -2 * BEYOND, top) for way in ways if way.place == i
+        ]
+        moat = cut(cylinder(dims.outer_radius, 0.0, array.sheet.high + 2 * BEYOND), [core(dims), *ridges])
+        drawn.append(bent(array, moat, place.x, place.y))
+    return drawn
+
+
+def _filament_ways(former: Former) -> list[Shape]:
+    """Draw a hole through each core along its axis, and the pocket under the base in which its filament is taken."""
+    array, radius, bottom = former.array, former.spec.moulds.filament_hole_mm / 2, former.bottom
+    drawn: list[Shape] = []
+    cone = Revolve(polygon((0, -BEYOND), (GRIP_RADIUS + BEYOND, -BEYOND), (0, GRIP_RADIUS)))
+    for place in array.places:
+        drawn.append(bent(array, cylinder(radius, -_far(former), former.dims.core_height + BEYOND), place.x, place.y))
+        turn = math.radians(angle_deg(array, place.x))
+        across = ((array.radius_mm or 0.0) + bottom) * math.tan(turn)
+        drawn.append(moved(cone, across, place.y, bottom))
+    return drawn
+
+
+def _stubs(former: Former) -> list[Shape]:
+    """Draw the filaments: flush with the core's top, their lower ends on the bench."""
+    array, radius = former.array, former.spec.moulds.filament_mm / 2
+    (x, y), bottom = former.half, former.bottom
+    room = box(-2 * x, 2 * x, -2 * y, 2 * y, bottom, former.top)
+    return [
+        Common((bent(array, cylinder(radius, -_far(former), former.dims.core_height), place.x, place.y), room))
+        for place in array.places
+    ]
+
+
+def _far(former: Former) -> float:
+    """Return how far under the skin a line along any unit's axis has left the base, mm."""
+    return 2 * (former.array.sheet.high - former.bottom)
+
+
+def _channels(former: Former, low: float, top: float) -> list[Shape]:
+    """Draw the sprue on top, and two vents at either end of the sheet along the limb."""
+    vent, places = VENT / 2, _vents(former)
+    sheet = former.array.sheet
+    middle = (sheet.outline[1] + sheet.outline[3]) / 2
+    sprue = moved(cylinder(former.spec.moulds.sprue_mm / 2, low, top), 0.0, middle)
+    drawn = [sprue]
+    for x in places:
+        along = (sheet.outline[3] - sheet.outline[1]) / 2 - _off_end(former, abs(x) + vent) - VENT_OFF_END - vent
+        drawn += [moved(cylinder(vent, low, top), x, middle + side * along) for side in (-1, 1)]
+    return drawn
+
+
+def _off_end(former: Former, x: float) -> float:
+    """Return how far the round corners make the sheet shorter along the limb at a place across its top, mm."""
+    sheet, back = former.array.sheet, former.back
+    r, end = sheet.corner_mm, math.radians(angle_deg(former.array, min(-sheet.outline[0], sheet.outline[2])))
+    beside = r - back * math.sin(end - math.asin(x / back))
+    return r - math.sqrt(r**2 - beside**2) if beside > 0 else 0.0
+
+
+def _vents(former: Former) -> list[float]:
+    """Return where across the top vents stand, mm: wherever a tilt brings the highest line, one is near to it.
+
+    Halfway between two vents that are 2 d apart in angle the air is deep by the back's radius times 1 - cos d.
+    """
+    count = 2
+    limit = MESH_ROOM * deepest(former.spec, len(former.spec.layers) - 1)
+    while former.back * (1 - math.cos(math.radians(TILT_DEG / count))) > limit:
+        count += 1
+    step = 2 * TILT_DEG / count
+    return [former.back * math.sin(math.radians(step * (k + 0.5) - TILT_DEG)) for k in range(count)]
+
+
+def _lid(former: Former) -> Shape:
+    """Draw the lid: a block bored to the sheet's back, a relief over the seat, holes for the pins."""
+    (x, y), array = former.half, former.array
+    under = former.seat + former.spec.moulds.seat_relief_mm
+    holes = pin_holes(former.pins)
+    ways = _channels(former, array.sheet.high - 2 * BEYOND, former.top + BEYOND)
+    return cut(box(-x, x, -y, y, under, former.top), [barrel(array, former.back), *holes, *ways])
+
+
+def _seals(former: Former) -> list[Shape]:
+    """Draw where silicone is kept from joints that meet but for a rounding: under and in what is laid in."""
+    array, dims = former.array, former.dims
+    inner, height = (
+        (dims.radii[-2], dims.heights[-2]) if len(dims.radii) > 1 else (dims.cavity_radius, dims.core_height)
+    )
+    drawn = cylinder(inner - JOINT, -JOINT, height - JOINT)
+    return [*(bent(array, drawn, place.x, place.y) for place in array.places), *_land_seals(former)]
+
+
+def _land_seals(former: Former) -> list[Shape]:
+    """Draw what the pressed joint of lid and base takes beside the sheet, round the limb and along it."""
+    array, (x, y) = former.array, former.half
+    x0, y0, x1, y1 = array.sheet.outline
+    joint = cut(barrel(array, former.back + JOINT), [barrel(array, former.back - JOINT)])
+    land = Common((joint, box(-x, x, -y, y, former.seat, former.top)))
+    beside = [box(-x, x, low, high, former.seat, former.top) for low, high in ((-y, y0 - JOINT), (y1 + JOINT, y))]
+    return [Common((land, union(beside))), cut(land, [slice_of(array, x0 - JOINT, x1 + JOINT)])]
+
+
+def _base_letters(former: Former, label: str) -> list[Shape]:
+    """Draw the base's label on its seat, along the limb."""
+    return [_along(former, label, former.seat, -former.half[0])]
+
+
+def _lid_letters(former: Former, label: str) -> list[Shape]:
+    """Draw the lid's label on its upper face, along the limb."""
+    return [_along(former, label, former.top, -former.half[0])]
+
+
+def _along(former: Former, label: str, top: float, edge: float) -> Shape:
+    """Draw a label that reads along +y on a face, its foot towards +x."""
+    stroke, depth = former.spec.moulds.engraving_stroke_mm, former.spec.moulds.engraving_depth_mm
+    drawn = turned(engraving(label, stroke, top - depth, top + BEYOND), "z", 1)
+    return moved(drawn, edge + 1.0 + HEIGHT * stroke, -text_width(label, stroke) / 2)

@@ -1,0 +1,56 @@
+"""How small a limb a curved mould can be made for: what prints without support, and what stands between the units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import combinations
+
+from unitcad.arrays.array import Array
+from unitcad.errors import Refusal
+from unitcad.spec import printer_of
+
+MOST_DEG = 75.0
+"""Of the sheet's ends from the top, at most (assumed): beyond it lid and base slide on each other as they close."""
+LARGEST = 1000.0
+"""Radius of a limb, at most, mm."""
+_STEP = 0.1
+
+
+def check_limb(array: Array, apart: float, middle: Callable[[float], float]) -> None:
+    """Raise Refusal for a limb too small, with the least radius that fits.
+
+    `apart`: between two units' feet, mm. `middle`: from the limb's radius to that of the sheet's middle, mm.
+    """
+    radius = array.radius_mm or 0.0
+    if not (why := _too_small(array, radius, apart, middle(radius))):
+        return
+    radii = (tenth * _STEP for tenth in range(math.ceil(radius / _STEP + 1e-9), round(LARGEST / _STEP) + 1))
+    fits = next((each for each in radii if not _too_small(array, each, apart, middle(each))), None)
+    if fits is None or array.layout["kind"] == "ring":
+        raise Refusal("body.cast", "curved", f"{why}; cast it flat and bend it", "flat")
+    raise Refusal("body.radius_mm", radius, why, round(fits, 1))
+
+
+def _too_small(array: Array, radius: float, apart: float, middle: float) -> str:
+    """Return what speaks against a limb of a radius, where the sheet's middle has the radius `middle` (mm), or ""."""
+    sheet = array.sheet
+    steepest = float(printer_of(array.unit).overhang_deg)
+    places = [place.x for place in array.places] + [(slot[0] + slot[2]) / 2 for slot in sheet.strap_slots]
+    tilt = math.degrees(max(map(abs, places)) / middle)
+    if tilt > steepest + 1e-9:
+        return f"the outermost unit or slot is tilted by {tilt:.3g} degrees; from {steepest:g} on it needs support"
+    end = math.degrees(max(-sheet.outline[0], sheet.outline[2]) / middle)
+    if end > MOST_DEG + 1e-9:
+        return f"the sheet reaches {end:.3g} degrees from the top; lid and base close up to {MOST_DEG:g}"
+    for one, other in combinations(array.places, 2):
+        outer, turn = one.radius + other.radius, abs(other.x - one.x) / middle / 2
+        if turn >= math.pi / 2 or abs(other.y - one.y) > outer + apart:
+            continue
+        across, along = 2 * radius * math.sin(turn), other.y - one.y
+        distance = math.hypot(across, along)
+        # Seen along the axis between the two, each unit's foot is an ellipse.
+        gap = distance - outer * math.hypot(math.cos(turn) * across, along) / distance
+        if gap < apart - 2 / 1024:
+            return f"at the skin {one.name} and {other.name} stand {gap:.3g} mm apart and need {apart:.4g} mm"
+    return ""
