@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -77,7 +80,10 @@ def test_build_writes_an_array_and_its_page(tmp_path: Path) -> None:
     page = (folder / "report.html").read_text()
     assert "1 units" not in page
     assert "The patch from the skin&#x27;s side" in page
-    assert "<script" not in page
+    named = set(re.findall(r"sha256-([A-Za-z0-9+/=]+)", page.split("<title>")[0]))
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    assert {base64.b64encode(hashlib.sha256(each.encode()).digest()).decode() for each in scripts} < named
+    assert 'class="stage-host"' in page
     assert (folder / "bench.html").is_file()
     assert (folder / "units/encapsulating/report.html").is_file()
     assert "1 unit on a sheet" in done.stderr
