@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import shutil
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -155,6 +156,22 @@ def test_a_patch_is_shown_and_changed(running: Any, pockets: Server) -> None:
     live.close()
 
 
+def test_a_campaign_is_measured_again_after_a_save(running: Any, tmp_path: Path) -> None:
+    shutil.copytree(CAMPAIGN.parent, tmp_path / "lab")
+    file = tmp_path / "lab" / CAMPAIGN.name
+    with serving(tmp_path, str(file)) as own:
+        context = running.new_context()
+        page = context.new_page()
+        page.set_default_timeout(120_000)  # a first measurement brings in the libraries of signals
+        page.goto(own.url)
+        assert page.url == f"{own.base}/"  # the token is in no address that is copied or kept
+        assert page.locator("table").first.locator("tr").count() == 7
+        file.write_text(file.read_text("utf-8").replace('use = ["line", "paper"]', 'use = ["line"]'), "utf-8")
+        page.click("text=measure again")
+        page.wait_for_function("() => document.querySelector('table').rows.length === 4")
+        context.close()
+
+
 def test_a_campaign_opens_its_decay(tmp_path: Path) -> None:
     with serving(tmp_path, str(CAMPAIGN)) as own:
         status, content, headers = own.send("/")
@@ -163,4 +180,5 @@ def test_a_campaign_opens_its_decay(tmp_path: Path) -> None:
     decay = next(svg for name, svg in charts.items() if name.startswith("decay"))
     assert decay[decay.index("<svg") :].strip() in content.decode()
     assert "frame-ancestors 'none'" in headers["content-security-policy"]
+    assert f"Measured from {CAMPAIGN.resolve()}" in content.decode()
     assert list(tmp_path.iterdir()) == []

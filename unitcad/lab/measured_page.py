@@ -20,8 +20,8 @@ h1{font-size:1.4rem}table{font-size:13px}td,th{padding:.15rem .3rem}td:first-chi
 figure{overflow-x:auto}svg{max-width:none;width:31rem}}"""
 
 
-def page(result: Measured, charts: dict[str, str]) -> str:
-    """Return the page as HTML; `charts` are SVG documents by file name."""
+def page(result: Measured, charts: dict[str, str], lead: str = "") -> str:
+    """Return the page as HTML; `charts` are SVG documents by file name, `lead` is HTML that stands first."""
     found = "".join(
         f'<li class="{one.severity}"><b>{one.code}</b> {escape(one.where)}: {escape(one.message)}. '
         f"{escape(one.as_dict()['fix'])}</li>"
@@ -39,7 +39,7 @@ def page(result: Measured, charts: dict[str, str]) -> str:
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">"
-        f"<title>{name}</title><style>{_STYLE}</style></head><body><h1>{name}</h1>"
+        f"<title>{name}</title><style>{_STYLE}</style></head><body><h1>{name}</h1>{lead}"
         f"<p>{escape(result.campaign.note)}</p><h2>Levels</h2>{_levels(result)}{assumed}{decay}"
         f"<h2>Findings</h2>{f'<ul>{found}</ul>' if found else '<p>None.</p>'}"
         f"<h2>Records</h2><p>2 u is of the amplitude in the long run, as far as one record tells; a level's interval "

@@ -7,6 +7,7 @@ and code is run, only where the spec that the server was started with names the 
 from __future__ import annotations
 
 import time
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -103,4 +104,8 @@ def campaign_page(path: bytes) -> bytes:
         result = measure(read_campaign(file), file.parent)
     except UnitcadError as error:
         return msgspec.json.encode({"refused": str(error)})
-    return msgspec.json.encode({"page": page(result, charts_of(result))})
+    lead = (
+        f"<p>Measured from {escape(str(file))} as it is saved. Its recordings are files that it names by "
+        'patterns, so it has no form here: change the file in an editor, then <a href="/">measure again</a>.</p>'
+    )
+    return msgspec.json.encode({"page": page(result, charts_of(result), lead)})

@@ -15,7 +15,7 @@ from typing import TypeVar
 import msgspec
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
 from unitcad.errors import Refusal, UnitcadError
@@ -115,6 +115,9 @@ class Live:
     async def page(self, request: Request) -> Response:
         """Answer with the page, and let the browser keep the token for files."""
         setting = self.setting
+        if setting.campaign and "token" in request.query_params:
+            # Its page has no script that takes the token out of the address.
+            return self._keeping(RedirectResponse("/", 303))
         if setting.campaign:
             return await self._campaign(setting.campaign)
         batch = page_data(setting.batch, with_models=False)[0] if setting.batch else None
@@ -123,7 +126,10 @@ class Live:
 
     def _html(self, html: str, status: int = 200) -> Response:
         headers = {"content-security-policy": HEADER_POLICY}
-        response = Response(html, status, media_type="text/html; charset=utf-8", headers=headers)
+        return self._keeping(Response(html, status, media_type="text/html; charset=utf-8", headers=headers))
+
+    def _keeping(self, response: Response) -> Response:
+        """Return a response with which the browser keeps the token."""
         response.set_cookie(self.cookie, self.setting.token, httponly=True, samesite="strict")
         return response
 
