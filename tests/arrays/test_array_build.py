@@ -99,7 +99,7 @@ def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
     asked = [float(re.findall(r"at least ([0-9.]+) ml", s.text)[0]) for s in made.pours[0].steps if s.title == "Degas"]
     assert max(sizes) >= asked[0]
     assert broken_rules(made) == []
-    steps = [*made.preparation, *made.pours[0].steps, *made.release]
+    steps = [*made.preparation, *made.pours[0].steps, *made.release, *made.assembly]
     drawn = {step.picture for step in steps} - {""}
     assert drawn == {picture_path(name) for name in views(moulds)}
     assert "tray" in {item.item for item in made.bill}
@@ -114,7 +114,7 @@ def test_the_bench_page_speaks_of_the_sheet(folder: Path) -> None:
     assert packed is not None
     content = json.loads(gzip.decompress(base64.b64decode(packed[1])))
     assert (content["casting"]["makes"], content["casting"]["last"]) == ("sheet", "Units in")
-    wanted = {f"steps/{name}.png" for name in ("pieces", "level", "pour", "strike", "filled", "peel")}
+    wanted = {f"steps/{name}.png" for name in ("pieces", "level", "pour", "strike", "filled", "peel", "units-in")}
     assert wanted <= set(content["pictures"])
 
 

@@ -14,9 +14,11 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.circuit.laid import laid_circuit
 from unitcad.arrays.construction import Construction, construction_of
 from unitcad.arrays.limb_frame import at_place
+from unitcad.arrays.patch import patch_bodies
 from unitcad.designs import Dimensions, unit_bodies
 from unitcad.moulds.mould_set import MouldSet, geometric
 from unitcad.moulds.plan import Plan, Step
+from unitcad.shape import moved
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, to_json, with_formats
 from unitcad.spec.effective import CastLayer
@@ -79,6 +81,14 @@ class PatchMoulds(MouldSet):
             for body in motors
         ]
         return (*placed, *laid_circuit(array))
+
+    @cached_property
+    def pushed_in(self) -> tuple[Body, ...]:
+        """The units that pockets hold, at their places over the sheet as it is cast."""
+        if not self.construction.own_tails:
+            return ()
+        low = self.arranged.sheet.low
+        return tuple(replace(body, shape=moved(body.shape, z=-low)) for body in patch_bodies(self.arranged)[1:])
 
     @property
     def makes(self) -> str:

@@ -32,7 +32,6 @@ PUSH_MIN = 1.0
 """To push one unit into its pocket and turn it (assumed)."""
 ONCE = frozenset(need.item for need in (*NEEDS, CALIPER))
 """What one piece, dab or roll of is enough for every casting."""
-BACK = "pictures/patch-back.png"
 
 
 def pocket_procedure(
@@ -244,7 +243,7 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
         f"below, back first, until the pocket's lower edge stands {over} mm over the unit's skin side all round: the "
         f"pocket stretches by {number(100 * strain, 2)} % round {number(2 * widest, 3)} mm and holds it. Water with "
         f"a drop of soap helps; it dries.{turned} Rows are lettered from the top, columns numbered from the left.",
-        BACK,
+        picture_path("units-in"),
         minutes=PUSH_MIN * len(array.places),
     )
 

@@ -106,7 +106,7 @@ def _shapes(moulds: MouldSet, name: str, unit: bool) -> Iterable[tuple[Shape, tu
             if step.name == name:
                 return [(shape, layer_colour(step.index - 1)) for shape in step.layer]
     tools = dict.fromkeys((*moulds.plan.tools, *moulds.plan.pieces))
-    bodies = (*moulds.unit, *moulds.laid_later) if unit else (*tools, *moulds.plan.steps[-1].inserts)
+    bodies = (*moulds.unit, *moulds.laid_later, *moulds.pushed_in) if unit else (*tools, *moulds.plan.steps[-1].inserts)
     return [(body.shape, body.colour) for body in bodies if body.name == name]
 
 

@@ -34,3 +34,18 @@ def tray_views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
     yield "filled", View(filled, names=(touched,))
     up = step.rim + 2 * CLEAR
     yield "peel", View((*tray, Placed(step.name, (0.0, 0.0, up))), (draw.upward(0.0, -y, up / 2, up * 0.8),))
+    if moulds.pushed_in:
+        yield "units-in", _units_in(moulds)
+
+
+def _units_in(moulds: MouldSet) -> View:
+    """Return the sheet, its back up, and the units under their pockets, each named by its place."""
+    high = {body.name.partition("-")[0]: bounds(moulds.mesh(body)) for body in moulds.pushed_in if body.made == "cast"}
+    down = max(top for *_, top in high.values()) + CLEAR
+    units = tuple(Placed(body.name, (0.0, 0.0, -down)) for body in moulds.pushed_in)
+    rim = moulds.plan.steps[-1].rim
+    names = [Name(name.lower(), ((x0 + x1) / 2, (y0 + y1) / 2, rim)) for name, (x0, y0, _, x1, y1, _) in high.items()]
+    arrows = [
+        draw.upward((x0 + x1) / 2, y0 - 2.0, -down / 2, 0.6 * down) for x0, y0, _, x1, _, _ in list(high.values())[-1:]
+    ]
+    return View((*(Placed(body.name) for body in moulds.unit), *units), tuple(arrows), OVER, "unit", names=tuple(names))

@@ -101,6 +101,11 @@ class MouldSet:
         return ()
 
     @cached_property
+    def pushed_in(self) -> tuple[Body, ...]:
+        """What is pushed into the cast sheet from its side towards the skin, each body's name after its place's."""
+        return ()
+
+    @cached_property
     def plan(self) -> Plan:
         """Tools and pours. Raises Refusal where the moulds can't be made."""
         if self.altered:

@@ -54,6 +54,7 @@ class ListedPour(msgspec.Struct):
     pot_life_min: float
     cure_h: float
     steps: list[ListedStep]
+    layer: str = ""
 
 
 class ListedPhase(msgspec.Struct):

@@ -301,7 +301,7 @@
       el("header", { className: "top" }, el("div", {}, el("h1", {}, casting.name), el("p", { className: "line" }, `Mould set ${casting.label}, ${cells} · ${data.hash}`)), el("div", { className: "chips" }, theme.button())),
       plan(), needed(), printing(),
       list("preparation", "Before the first pour", casting.preparation, null),
-      casting.pours.map((pour) => list(`pour${pour.index}`, `Pour ${pour.index}: layer ${pour.index}, ${pour.material}`, pour.steps, pour,
+      casting.pours.map((pour) => list(`pour${pour.index}`, `Pour ${pour.index}: ${(pour.layer || `layer${pour.index}`).replace(/(\d+)$/, " $1")}, ${pour.material}`, pour.steps, pour,
         el("div", { className: "screen" }, el("label", { className: "field" }, el("span", {}, "Lot on the bottles"), lot(pour)), words(`p${pour.index}.notes`, "Notes on this pour")))),
       list("release", "Out of the mould", casting.release, null),
       list("assembly", casting.last, casting.assembly, null),
