@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -72,12 +73,12 @@ def interruptible() -> None:
 
 
 @contextlib.contextmanager
-def serving(folder: Path, *arguments: str) -> Iterator[Server]:
-    """Run `unitcad serve` in a folder."""
-    command = [sys.executable, "-P", "-m", "unitcad", "serve", *arguments, "--no-browser"]
-    pipe = subprocess.PIPE
+def serving(folder: Path, *arguments: str, environment: dict[str, str] | None = None) -> Iterator[Server]:
+    """Run `unitcad serve` in a folder, without a browser unless asked for, with variables added to the environment."""
+    command = [sys.executable, "-P", "-m", "unitcad", "serve", "--no-browser", *arguments]
+    pipe, given = subprocess.PIPE, {**os.environ, **(environment or {})}
     with subprocess.Popen(
-        command, cwd=folder, stdout=pipe, stderr=pipe, text=True, preexec_fn=interruptible
+        command, cwd=folder, stdout=pipe, stderr=pipe, text=True, preexec_fn=interruptible, env=given
     ) as process:
         try:
             assert process.stdout

@@ -90,3 +90,20 @@ def test_a_question_under_way_does_not_hold_up_the_end(tmp_path: Path) -> None:
         time.sleep(1.0)
     asking.join(20)
     assert answers == [500]
+
+
+def test_a_browser_in_the_foreground_is_answered(tmp_path: Path) -> None:
+    """A browser that $BROWSER names ends, as one in a terminal does, after the page was read."""
+    browser = tmp_path / "browser.py"
+    browser.write_text(
+        f"#!{sys.executable}\nimport pathlib, sys, urllib.request\n"
+        "status = urllib.request.urlopen(sys.argv[1], timeout=60).status\n"
+        f"pathlib.Path({str(tmp_path / 'seen')!r}).write_text(str(status))\n"
+    )
+    browser.chmod(0o755)
+    with serving(tmp_path, "--browser", environment={"BROWSER": str(browser)}):
+        end = time.monotonic() + 60
+        while not (tmp_path / "seen").exists():
+            assert time.monotonic() < end
+            time.sleep(0.05)
+    assert (tmp_path / "seen").read_text() == "200"

@@ -33,8 +33,10 @@ def serve(
     def ready(address: str) -> None:
         typer.echo(address)
         if browser:
+            import threading
             import webbrowser
 
-            webbrowser.open(address)
+            # open() waits for the end of a browser in the terminal, or of one that $BROWSER names.
+            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
     run(source, host=host, port=port, token=token, out=out, code=code, ready=ready)
