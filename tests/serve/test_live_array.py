@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import io
 import json
 import re
 import shutil
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import trimesh
 from live import Live
 from running import Server, serving
 
@@ -48,8 +50,11 @@ def test_answers_are_those_of_the_commands(pockets: Server) -> None:
     drawn = dict(pockets.ask(TEXT, "estimate", edit)["drawings"])
     data = crosstalk(array)
     assert list(drawn.values()) == [patch_map_svg(array, data), heat_map_svg(data)]
-    checks = [check["code"] for check in pockets.ask(TEXT, "moulds", edit)["checks"]]
-    assert checks == [finding.code for finding in check_moulds(patch_moulds(array))]
+    tools = pockets.ask(TEXT, "moulds", edit)
+    moulds = patch_moulds(array)
+    assert [check["code"] for check in tools["checks"]] == [finding.code for finding in check_moulds(moulds)]
+    meshes = trimesh.load_scene(io.BytesIO(base64.b64decode(tools["model"]["moulds"])), file_type="glb").geometry
+    assert set(meshes) == set(tools["model"]["moulds_apart"]) > {tool.name for tool in moulds.plan.tools}
 
 
 def test_a_pitch_that_is_too_small_gets_the_nearest_that_its_own_limits_accept(pockets: Server) -> None:
@@ -140,6 +145,17 @@ def test_a_patch_is_shown_and_changed(running: Any, pockets: Server) -> None:
     assert live.page.inner_text("h1") == "forearm-pockets"
     assert "sheet" in (live.page.get_attribute(".stage-host", "data-shown") or "")
     assert live.page.locator("#estimate img").count() == 2
+    # The line above the view has the crosstalk and the pours; the view has the tools too.
+    glance = live.page.inner_text("#glance")
+    assert glance.startswith(live.page.locator("#estimate p.lead").inner_text())
+    assert glance.endswith("cm3 to pour.")
+    radios = live.page.locator(".stage .choice label")
+    assert radios.all_inner_texts() == ["Patch", "Moulds"]
+    assert "along x" in live.page.inner_text('.stage select[name="axis"]')
+    live.page.check('.stage input[value="moulds"]')
+    shown = (live.page.get_attribute(".stage-host", "data-shown") or "").split()
+    assert {tool.name for tool in patch_moulds(load_array("forearm-pockets")).plan.tools} < set(shown)
+    live.page.check('.stage input[value="unit"]')
     before = live.page.locator("#estimate img").first.get_attribute("src")
     live.choose('input[name="sheet.margin_mm"]', "5")
     assert "sheet along x 80 mm" in live.page.inner_text("#figures")
@@ -153,6 +169,10 @@ def test_a_patch_is_shown_and_changed(running: Any, pockets: Server) -> None:
     columns.focus()
     live.pressed(columns, "ArrowLeft")
     assert "units 6" in live.page.inner_text("#figures")
+    # A unit in the patch's place is called one.
+    live.start_from("encapsulating")
+    assert radios.all_inner_texts() == ["Unit", "Moulds"]
+    assert "along the tail" in live.page.inner_text('.stage select[name="axis"]')
     live.close()
 
 

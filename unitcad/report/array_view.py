@@ -19,11 +19,35 @@ BELOW = 14.0
 def array_model(array: Array) -> dict[str, Any]:
     """Return an array for the page in the form of `viewer_models.model`: the patch; tools with what is cast in them.
 
-    A body that stands at several places is there once. Raises UnitcadError where the tools can't be made any more.
+    Raises UnitcadError where the tools can't be made any more.
+    """
+    model = {**patch_model(array), **tools_model(array)}
+    return model | {key: compressed(model[key]) for key in ("unit", "moulds")}
+
+
+def patch_model(array: Array) -> dict[str, Any]:
+    """Return the patch for the viewer, its GLB file as bytes; a body that stands at several places is there once.
+
+    Lengths in mm.
+    """
+    parts = patch_parts(array)
+    shared = {part.name for part in parts if not part.places and part.body.kind != "circuit"}
+    return {
+        "makes": "patch",
+        "unit": patch_glb(patch_moulds(array).blank, parts),
+        "unit_apart": {part.name: [0.0, 0.0, 0.0 if part.name in shared else -BELOW] for part in parts},
+        "row": min((place.y for place in array.places), key=abs),
+        "axes": {"y": "along x", "x": "along y", "z": "level"},
+    }
+
+
+def tools_model(array: Array) -> dict[str, Any]:
+    """Return the tools of an array's sheet for the viewer, and what is cast in them: a GLB file as bytes, each pour.
+
+    Lengths in mm. Raises UnitcadError where the tools can't be made.
     """
     moulds = patch_moulds(array).blank
-    plan, parts, apart = moulds.plan, patch_parts(array), dict(taken_apart(moulds))
-    shared = {part.name for part in parts if not part.places and part.body.kind != "circuit"}
+    plan, apart = moulds.plan, dict(taken_apart(moulds))
     pieces = {name: [piece.name for piece in plan.pieces_of(name)] for step in plan.steps for name in step.tools}
     bodies = {body.step: body.name for body in moulds.unit}
 
@@ -31,12 +55,7 @@ def array_model(array: Array) -> dict[str, Any]:
         return "-flat" if laid_elsewhere(plan, step) else ""
 
     return {
-        "makes": "patch",
-        "unit": compressed(patch_glb(moulds, parts)),
-        "unit_apart": {part.name: [0.0, 0.0, 0.0 if part.name in shared else -BELOW] for part in parts},
-        "row": min((place.y for place in array.places), key=abs),
-        "axes": {"y": "along x", "x": "along y", "z": "level"},
-        "moulds": compressed(glb_content(moulds, list(apart))),
+        "moulds": glb_content(moulds, list(apart)),
         "moulds_apart": {body.name: list(offset) for body, offset in apart.items()},
         "cells": [],
         "moments": [

@@ -121,13 +121,9 @@ def _with_kinds(rows: Iterator[Field], choices: Mapping[str, list[tuple[str, str
 
 
 def _patch(array: Array, answer: Answer) -> None:
-    from unitcad.arrays.patch import patch_parts
-    from unitcad.arrays.patch_moulds import patch_moulds
-    from unitcad.pipeline.bodies import patch_glb
+    from unitcad.report.array_view import patch_model
 
-    parts = patch_parts(array)
-    content = patch_glb(patch_moulds(array).blank, parts)
-    answer.model = {"unit": content, "unit_apart": {part.name: [0, 0, 0] for part in parts}, "moulds": None}
+    answer.model = patch_model(array)
     x0, y0, x1, y1 = array.sheet.outline
     answer.figures = [("units", float(len(array.places)), ""), ("sheet along x", x1 - x0, "mm")]
     answer.figures += [("along y", y1 - y0, "mm"), ("thick", array.sheet.thickness_mm, "mm")]
@@ -136,12 +132,16 @@ def _patch(array: Array, answer: Answer) -> None:
 def _tools(array: Array, answer: Answer) -> None:
     from unitcad.arrays.patch_moulds import patch_moulds
     from unitcad.mould_checks import check_moulds
+    from unitcad.report.array_view import tools_model
 
     moulds = patch_moulds(array)
+    answer.model = tools_model(array)
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
     poured = sum(solid.volume() for step in moulds.plan.steps for solid in moulds.meshes(step.layer)) / 1000
     names = ", ".join(tool.name for tool in moulds.plan.tools)
-    answer.lines = [f"Tools of the sheet: {names}", f"To pour: {number(poured, 3)} cm3"]
+    pours = len(moulds.plan.steps)
+    answer.lines = [f"{pours} pour{'s' if pours > 1 else ''}, {number(poured, 3)} cm3 to pour"]
+    answer.lines += [f"Tools of the sheet: {names}"]
 
 
 def _crosstalk(array: Array, answer: Answer) -> None:

@@ -62,7 +62,8 @@
 
     const list = el("ul", { className: "parts" });
     const kindName = `kind-${(serial += 1)}`;
-    const radios = [["unit", model.makes === "patch" ? "Patch" : "Unit"], ["moulds", "Moulds"]].map(([kind, label]) =>
+    const made = el("span", {});
+    const radios = [["unit", made], ["moulds", "Moulds"]].map(([kind, label]) =>
       el("label", {}, el("input", { type: "radio", name: kindName, value: kind, checked: kind === state.kind, onchange: () => choose(kind) }), label));
 
     const step = range("Casting step", { min: 0, max: 0, step: 1, value: 0, name: "step" }, (value) => { state.step = value; update(true); });
@@ -78,7 +79,7 @@
     const at = range("Cut at", { min: 0, max: 1, step: 0.05, value: 0, name: "cut-at" }, () => { state.moved = true; cut(); });
     const cutOn = el("input", { type: "checkbox", name: "cut", checked: true, onchange: cut });
     const axis = el("select", { name: "axis", "aria-label": "Direction of the cut", onchange: () => { state.moved = false; limits(); cut(); } },
-      Object.entries(model.axes || AXES).map(([value, label]) => el("option", { value }, label)));
+      Object.keys(AXES).map((value) => el("option", { value })));
     const buttons = el("div", { className: "buttons" }, views.map((name) =>
       el("button", { type: "button", onclick: () => { state.view = name; viewer.look(name); } }, spoken(name))));
 
@@ -158,9 +159,11 @@
     offer();
     update(true);
 
-    // What there is to show can be chosen.
+    // What there is to show can be chosen, under the words of a unit or a patch.
     function offer() {
-      for (const label of radios) label.firstChild.disabled = !kinds[label.firstChild.value].length;
+      for (const label of radios) label.querySelector("input").disabled = !kinds[label.querySelector("input").value].length;
+      made.textContent = model.makes === "patch" ? "Patch" : "Unit";
+      for (const option of axis.options) option.textContent = (model.axes || AXES)[option.value];
     }
 
     async function replace(next) {
@@ -170,7 +173,7 @@
       model = next;
       kinds = fresh;
       if (!kinds[state.kind].length) state.kind = "unit";
-      for (const label of radios) label.firstChild.checked = label.firstChild.value === state.kind;
+      for (const label of radios) label.querySelector("input").checked = label.querySelector("input").value === state.kind;
       offer();
       state.step = Math.min(state.step, Math.max(0, kinds.moulds.length - 1));
       step.input.value = state.step;

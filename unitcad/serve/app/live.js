@@ -207,19 +207,22 @@
       clear(figures, (answer.figures || []).map(([name, value, unit]) => el("span", { className: "chip" }, `${name} ${number(value, 3)} ${unit}`.trim())));
       clear(drawn, answer.section ? U.framed(answer.section, "The unit cut along its tail, with its main dimensions", "Section drawing") : el("p", { className: "absent" }, "The patch's plan stands with its crosstalk, below."));
       jobs.keys();
-      state.model = { ...(state.model || {}), ...answer.model };
+      // The moulds of before stay in view until the new ones are there, but not a unit's beside a patch.
+      const before = state.model || {};
+      state.model = { ...(before.makes === answer.model.makes ? before : {}), ...answer.model };
       if (stage) await stage.update(state.model).catch(() => {});
       else if (!host.firstChild) await firstModel(state.model);
       page.dataset.moulds = "old";
       glance.dataset.old = "true";
     }
 
-    // The estimate and the casting in a line above the view: they stand whole further down.
+    // The estimate, or a patch's crosstalk, and the casting in a line above the view: they stand whole further down.
     function showGlance() {
       const { estimate, moulds } = state;
       const percent = (level) => number(100 * level, 2);
       const answer = estimate.of === state.unit.text && estimate.estimate && estimate.estimate.answer;
-      const level = answer && [`Edge level ${percent(answer.level)} % of the motor's amplitude`, answer.p10 !== undefined && answer.p10 !== null ? `, 80 % range ${percent(answer.p10)} to ${percent(answer.p90)} %` : "", ". "].join("");
+      const crosstalk = estimate.of === state.unit.text && estimate.drawings && `${estimate.lines[0]} `;
+      const level = crosstalk || answer && [`Edge level ${percent(answer.level)} % of the motor's amplitude`, answer.p10 !== undefined && answer.p10 !== null ? `, 80 % range ${percent(answer.p10)} to ${percent(answer.p90)} %` : "", ". "].join("");
       const lines = moulds.of === state.unit.text && moulds.model ? moulds.lines || [] : [];
       clear(glance, level, lines.slice(0, 1).map((line) => `${line[0].toUpperCase()}${line.slice(1)}.`));
       glance.dataset.old = "false";
