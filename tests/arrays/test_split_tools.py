@@ -169,5 +169,12 @@ def test_the_procedure_joins_and_seals_before_the_first_pour() -> None:
     for word in ("base in 2 pieces", "cup 1 in 2 pieces", "cup 2 in 2 pieces", "tape", "petroleum jelly", "0.15 mm"):
         assert word in step.text
     items = {item.item for item in made.bill}
-    assert {"base-1", "base-2", "cup1-1", "cup2-2", "wide adhesive tape", "petroleum jelly"} <= items
-    assert not {"base", "cup1", "cup2"} & items
+    assert {
+        "base, piece 1",
+        "base, piece 2",
+        "cup 1, piece 1",
+        "cup 2, piece 2",
+        "wide adhesive tape",
+        "petroleum jelly",
+    } <= items
+    assert not {"base", "cup 1", "cup 2"} & items

@@ -103,7 +103,7 @@ def test_its_words_are_those_of_its_tools() -> None:
         assert words not in text
     assert "0.630 g. What was laid in comes on top" in casting.measure[-1]
     coat = next(i for i, words in enumerate(casting.pours[1].steps) if "Coat the tail thinly" in words.text)
-    assert "Put cup 2 on" in casting.pours[1].steps[coat + 1].text
+    assert [step.title for step in casting.pours[1].steps[coat + 1 : coat + 3]] == ["Grease the flanks", "Cup 2 on"]
     assert "petroleum jelly" in {item.item for item in casting.bill}
 
 
