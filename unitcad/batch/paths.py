@@ -32,7 +32,9 @@ def check_path(path: str, base: dict[str, Any], where: str = "sweep") -> None:
         elif entry is not None:
             there = node if isinstance(node, list) else []
             if index_in(step, len(there)) is None:
-                raise Refusal(path, step, f"the base's {'.'.join(steps[:i])} has no such entry: {_entries(len(there))}")
+                raise Refusal(
+                    path, step, f"the base has no such entry of {'.'.join(steps[:i])}: {_entries(len(there))}"
+                )
             kind = entry
         elif any(typing.get_origin(k) is dict or k is Any for k in alternatives(kind)):
             return
