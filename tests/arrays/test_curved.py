@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.casting.figures import RESIN_LAYER_S
+from unitcad.casting.instructions import GREASE
 from unitcad.casting.procedure import Procedure
 from unitcad.check import Options, check_bytes
 from unitcad.errors import Refusal
@@ -256,6 +260,36 @@ def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> No
     items = {item.item: item.quantity for item in made.bill}
     assert items["filament stub"] == items["filament stub, straight"] == 9
     assert (items["syringe"], items["flexible circuit"], items["lid 2"]) == (1, 1, 1)
+
+
+def test_fins_of_the_flat_base_are_greased_and_the_curved_base_is_levelled_under_its_lid(made: Procedure) -> None:
+    """A fin ends 1.2 mm outside its unit; from the wall of the outer layer on it lies in the slot of cup 1."""
+    grease = next(step for step in made.pours[0].steps if step.title == GREASE)
+    outer = sleeve().arranged.unit.layers[-1].wall_mm
+    (length,) = re.findall(r"outermost ([0-9.]+) mm", grease.text)
+    assert float(length) == pytest.approx(outer + 1.2)
+    (level,) = [step for step in made.pours[1].steps if step.title == "Level base 2"]
+    assert "small spirit level, on lid 2" in level.text
+    assert "less than 5 degrees" in level.text
+
+
+def test_resin_prints_as_long_as_the_tallest_piece_takes() -> None:
+    """Every layer takes the same time: those of the highest printed file, which is the curved base or its lid."""
+    moulds = sleeve("layout.columns=2", "layout.rows=1", "moulds.printer=sla")
+    heights = {}
+    for tool in moulds.plan.tools:
+        if tool.made == "printed":
+            points, _ = print_ready(*arrays(moulds.mesh(tool)), tool.upside_down)
+            heights[tool.name] = float(np.ptp(points[:, 2]))
+    assert max(heights, key=lambda name: heights[name]) in ("base2", "lid2")
+    minutes = max(heights.values()) / moulds.spec.moulds.layer_mm * RESIN_LAYER_S / 60
+    (said,) = [line for line in printing_of(moulds) if line.startswith("Takes")]
+    hours, rest = divmod(5 * round(minutes / 5), 60)
+    assert said.startswith(f"Takes about {hours} h {rest} min" if hours else f"Takes about {rest} min")
+
+
+def printing_of(moulds: PatchMoulds) -> tuple[str, ...]:
+    return curved_procedure(moulds, [100.0] * 2, 1000.0).printing
 
 
 def test_pockets_are_cast_flat() -> None:

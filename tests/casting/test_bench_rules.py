@@ -9,6 +9,7 @@ import pytest
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
+from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.casting.instructions import GREASE, LEVEL_AGAIN, TACK
 from unitcad.casting.procedure import Pour, Procedure, procedure
@@ -21,13 +22,15 @@ LIDS = ("encapsulating", "moulds.pour=injected", "moulds.cavities=[2,2]")
 FILM = ("templates/custom/film-closed.toml",)
 RESIN = ("three-layer", "moulds.printer=sla")
 PATCH, BAND = ("forearm-patch",), ("wrist-band",)
-ARRAYS = (PATCH, BAND)
+CURVED = ("sleeve-curved", "layout.columns=2", "layout.rows=1")
+ARRAYS = (PATCH, BAND, CURVED)
 
 
 def casting(*source: str) -> Procedure:
     if source in ARRAYS:
         array = patch_moulds(load_array(source[0], list(source[1:])))
-        return back_sheet_procedure(array, [100.0] * len(array.plan.steps), 1000.0)
+        made = curved_procedure if source == CURVED else back_sheet_procedure
+        return made(array, [100.0] * len(array.plan.steps), 1000.0)
     moulds = MouldSet(load(source[0], list(source[1:])))
     return procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
@@ -156,8 +159,8 @@ def greased_with_nothing_named(made: Procedure) -> Procedure:
 
 
 def pulled_on_the_bench(made: Procedure) -> Procedure:
-    out = "Lift the mould off the bench first: "
-    return replace(made, release=tuple(replace(s, text=s.text.replace(out, "")) for s in made.release))
+    out = "Lift the mould off the bench"
+    return replace(made, release=tuple(replace(s, text=s.text.removeprefix(out)) for s in made.release))
 
 
 PLANTED = {
@@ -166,6 +169,9 @@ PLANTED = {
     "filament under the mould": (PATCH, pulled_on_the_bench, "while the mould lies on them"),
     "filament under a unit's mould": (("encapsulating",), pulled_on_the_bench, "while the mould lies on them"),
     "no picture of the grease": (PATCH, without_pictures, "Grease the flanks: has no picture"),
+    "filament under a curved base": (CURVED, pulled_on_the_bench, "while the mould lies on them"),
+    "no picture of a curved set's grease": (CURVED, without_pictures, "Grease the flanks: has no picture"),
+    "bands round a curved mould": (CURVED, tilted_by_tape, "pour 1: nothing says to look at the level again"),
     "tape under the plate": (("encapsulating",), tilted_by_tape, "look at the level again"),
     "lids' bands": (LIDS, tilted_by_tape, "look at the level again"),
     "a coat before the mix": (FILM, coated_before_mixed, "uses the mix before"),

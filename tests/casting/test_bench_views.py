@@ -7,16 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from manifold3d import Manifold
 from PIL import Image
 
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
+from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.casting.bench_extras import ARROW, BAND, CARD, TAPE
+from unitcad.casting.bench_extras import ARROW, BAND, CARD, GREASE, TAPE
 from unitcad.casting.bench_pictures import SIZE, pictures
 from unitcad.casting.bench_views import View, picture_path, views
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.tongue_prop import tongue_prop
+from unitcad.designs import layer_colour
 from unitcad.export import composite
 from unitcad.export.picture_letters import Name, written
 from unitcad.kernels.mesh import arrays, realise
@@ -25,7 +28,8 @@ from unitcad.pipeline.build import build
 from unitcad.shape import box, moved
 from unitcad.validation import load, templates
 
-ARRAYS = [("forearm-patch",), ("wrist-band",)]
+CURVED = ("sleeve-curved", "layout.columns=2", "layout.rows=1")
+ARRAYS = [("forearm-patch",), ("wrist-band",), CURVED]
 SETS = [
     *((name,) for name in templates()),
     ("encapsulating", "moulds.pour=injected", "moulds.cavities=[2,2]"),
@@ -42,8 +46,9 @@ def titles(casting: Procedure) -> list[list[str]]:
 
 def planned(*source: str) -> tuple[MouldSet, Procedure]:
     if source in ARRAYS:
-        array = patch_moulds(load_array(source[0]))
-        return array, back_sheet_procedure(array, [100.0] * len(array.plan.steps), 1000.0)
+        array = patch_moulds(load_array(source[0], list(source[1:])))
+        made = curved_procedure if source == CURVED else back_sheet_procedure
+        return array, made(array, [100.0] * len(array.plan.steps), 1000.0)
     moulds = MouldSet(load(source[0], list(source[1:])))
     return moulds, procedure(moulds, [100.0] * len(moulds.plan.steps), 1000.0)
 
@@ -117,6 +122,43 @@ def test_pictures_show_what_their_views_hold_and_repeat_to_the_byte() -> None:
     tongue = next(tool.colour for tool in moulds.plan.tools if tool.kind == "tongue")
     there = {name for name in shown if hues(drawn[picture_path(name)], tongue) > 100}
     assert there == {name for name, view in shown.items() if any(part.name == "tongue" for part in view.parts)}
+
+
+def test_pictures_of_a_curved_set_show_what_is_there() -> None:
+    moulds, _ = planned(*CURVED)
+    shown = views(moulds)
+    names = [name for name, view in shown.items() if view.group == "curved"]
+    drawn = pictures(moulds, names)
+    for name in names:
+        colours = {extra.colour for extra in shown[name].extras}
+        assert (hues(drawn[picture_path(name)], ARROW) > 30) == (ARROW in colours), name
+        assert (hues(drawn[picture_path(name)], GREASE) > 30) == (GREASE in colours), name
+    layer1 = {name for name in names if hues(drawn[picture_path(name)], layer_colour(0)) > 300}
+    assert layer1 == {"pour2-laid-in", "pour2-lid-on"}
+    layer2 = {name for name in names if hues(drawn[picture_path(name)], layer_colour(1)) > 300}
+    assert layer2 == {"pour2-lid-off", "peel"}
+
+
+def test_what_leaves_a_curved_base_is_all_of_the_silicone_and_clear_of_it() -> None:
+    """The parts have the volume of both pours, a unit's in its own direction; casts on their way in touch nothing."""
+    moulds, _ = planned(*CURVED)
+    shown, base = views(moulds), moulds.mesh(moulds.plan.tool("base2"))
+    for name, whole in (("peel", moulds.unit), ("pour2-laid-in", moulds.unit[:1])):
+        colours = {body.colour for body in moulds.unit}
+        moved_off = [moulds.mesh_of(extra.shape) for extra in shown[name].extras if extra.colour in colours]
+        volume = sum(moulds.mesh(body).volume() for body in whole)
+        assert sum(each.volume() for each in moved_off) == pytest.approx(volume, rel=1e-5)
+        assert all((each ^ base).volume() < 1e-9 for each in moved_off)
+        # Two units, ten degrees and more to either side.
+        left, right = ([each.bounding_box() for each in moved_off if side * box_x(each) > 0] for side in (-1, 1))
+        assert len(left) == len(right) == len(whole)
+        assert max(x1 for _, _, _, x1, _, _ in left) < min(x0 for x0, *_ in right) - 1.0
+
+
+def box_x(solid: Manifold) -> float:
+    """The middle of a solid's box along x."""
+    x0, _, _, x1, _, _ = solid.bounding_box()
+    return (x0 + x1) / 2
 
 
 def test_a_nearer_body_hides_one_behind_it_whatever_the_order() -> None:

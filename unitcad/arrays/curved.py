@@ -127,4 +127,5 @@ CONSTRUCTION = Construction(
     bodies=bodies,
     plan=plan,
     assembly=back_sheet.assembly,
+    greased=back_sheet.greased,
 )

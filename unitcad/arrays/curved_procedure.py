@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from msgspec import structs
@@ -33,16 +32,15 @@ from unitcad.shape.lettering import seen
 from unitcad.spec import Spec
 from unitcad.text import listed, number, spaced
 
-TOOLS, SKIN_SIDE = "pictures/tools.png", "pictures/patch-skin-side.png"
-
 
 def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
     """Return the procedure of an array that is cast round the limb: nothing is meshed or drawn.
 
     `layer_volumes_mm3`: of each pour, of all units together. `printed_mm3`: of all printed pieces.
     """
-    flat = _flat_set(moulds)
-    made = procedure(flat, layer_volumes_mm3[:-1], printed_mm3)
+    flat = moulds.cast_flat
+    assert flat is not None
+    made, shown = procedure(flat, layer_volumes_mm3[:-1], printed_mm3), views(flat)
     spec, step, volume = _injected(moulds.spec), moulds.plan.steps[-1], layer_volumes_mm3[-1]
     under_lid = PatchMoulds(spec, moulds.plan, array=moulds.array)
     known = catalogue.materials(spec.materials)
@@ -50,25 +48,24 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
     last = silicones[-1]
     mix = fig.mix(spec, last, volume + fig.channels_mm3(step))
     verdict = bubbles(spec, step, last, mix, 1)
-    prepared = (_sort(moulds), *_shown(made.preparation[1:]))
+    prepared = (_sort(moulds), *made.preparation[1:])
     mixes = [
         (silicone, fig.mix(flat.spec, silicone, v))
         for silicone, v in zip(silicones, layer_volumes_mm3[:-1], strict=False)
     ]
     # In the words of the whole set: what is cast flat bonds later, so its cup gets no release agent.
     flat_pours = tuple(
-        replace(each, agent=(), steps=_shown(pour_steps(moulds, flat_step, *mixed_of, each.verdict, views(flat))))
+        replace(each, agent=(), steps=tuple(pour_steps(moulds, flat_step, *mixed_of, each.verdict, shown)))
         for each, flat_step, mixed_of in zip(made.pours, flat.plan.steps, mixes, strict=True)
     )
-    picture = f"pictures/pour{step.index}.png"
     steps = (
         *_laid_in(moulds, flat, silicones[0]),
-        *_lid_on(moulds, step, picture),
+        *_lid_on(moulds, step),
         *mixed(under_lid, step, last, mix, verdict),
         draw_up(mix),
         *_rest(spec, step, last, verdict),
-        inject(under_lid, picture),
-        cure(under_lid, step, last, picture),
+        inject(under_lid, _picture(step, "inject")),
+        cure(under_lid, step, last, _picture(step, "filled")),
         _lid_off(moulds, step),
     )
     room = spec.casting.room_c
@@ -88,7 +85,7 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         drawing=f"step{step.index}-section.svg",
     )
     pours, out = (*flat_pours, pour), tuple(_out(moulds, silicones[0]))
-    together = _shown(motors_in(tuple(motor_in(moulds, silicones))))
+    together = motors_in(tuple(motor_in(moulds, silicones)))
     stages = [("preparation", prepared), *((f"pour {each.index}", each.steps) for each in pours)]
     stages.append(("out of the mould", out))
     until, line = phases(stages), phases([*stages, ("motors and circuit in", together)])
@@ -105,7 +102,7 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         earliest_finish_min=until[-1].end_min,
         bench_min=sum(phase.bench_min for phase in until),
         time_line=line,
-        printing=printing(moulds, printed_mm3),
+        printing=printing(moulds, printed_mm3, max(_heights(moulds))),
         preparation=prepared,
         pours=pours,
         bonds=tuple(_bonds(moulds)),
@@ -117,30 +114,17 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
     )
 
 
-def _shown(steps: Iterable[BenchStep]) -> tuple[BenchStep, ...]:
-    """Return steps with the array's pictures in the place of those that are drawn of one set of cups."""
-    return tuple(replace(step, picture=_picture(step.picture)) for step in steps)
+def _picture(step: Step, name: str) -> str:
+    """Return the path of a view of the last pour."""
+    return picture_path(f"pour{step.index}-{name}")
 
 
-def _picture(path: str) -> str:
-    if pour := re.fullmatch(re.escape(picture_path("pour")).replace("pour", r"pour(\d+)-strike"), path):
-        return f"pictures/pour{pour[1]}.png"
-    return {picture_path("pieces"): TOOLS, picture_path("motor-in"): SKIN_SIDE}.get(path, "")
-
-
-def _flat_set(moulds: PatchMoulds) -> PatchMoulds:
-    """Return the set of the inner layers alone: their flat tools and pours."""
-    plan, spec = moulds.plan, moulds.spec
-    steps, dims = plan.steps[:-1], plan.dimensions
-    standing = {name for step in steps for name in step.tools}
-    tools = tuple(tool for tool in plan.tools if tool.name in standing or tool.kind == "blade")
-    inner = replace(dims, radii=dims.radii[: len(steps)], heights=dims.heights[: len(steps)])
-    layers = spec.layers[: len(steps)]
-    return PatchMoulds(
-        structs.replace(spec, layers=layers),
-        replace(plan, tools=tools, steps=steps, dimensions=inner),
-        array=moulds.array,
-    )
+def _heights(moulds: PatchMoulds) -> Iterator[float]:
+    """Yield the heights of base and lid of the last pour as they are printed, mm."""
+    for tool in moulds.plan.tools:
+        if tool.step == len(moulds.plan.steps) and tool.made == "printed":
+            _, _, low, _, _, high = moulds.mesh(tool).bounding_box()
+            yield high - low
 
 
 def _injected(spec: Spec) -> Spec:
@@ -161,7 +145,7 @@ def _sort(moulds: PatchMoulds) -> BenchStep:
         f"Print the pieces as they lie in their files, without supports. All are engraved {label}. The flat ones are "
         f"for Layer 1: the base has a b before it, and of the cups {cups}. The curved ones are for the last pour: "
         f"{_base(moulds)} has B{last.index:X} before it, {spaced(last.lid or '')} L{last.index:X}.",
-        TOOLS,
+        picture_path("pieces"),
         minutes=fig.SORT_MIN,
     )
 
@@ -169,14 +153,16 @@ def _sort(moulds: PatchMoulds) -> BenchStep:
 def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
     """Say how the inner layers leave their flat base and come to lie on the curved one."""
     units, base, step = len(moulds.arranged.places), _base(moulds), moulds.plan.steps[-1]
+    lid = spaced(step.lid or "")
     cast = "Layer 1" if step.index == 2 else f"Layers 1 to {step.index - 1}"
     pulled = next(iter(flat_release(flat, inner)))
-    yield replace(pulled, title="Filament out of the flat base", picture="")
+    yield replace(pulled, title="Filament out of the flat base", picture=picture_path("flat-filament-out"))
     yield BenchStep(
         f"{cast} out",
         f"Peel {cast} of each unit straight up off the flat base, its edge loosened with a blunt spatula. They differ "
         "in the notches of the circuit: lay each down on paper at its own place, the same way round as in the mould. "
         "Trim the flash with small scissors.",
+        picture_path("flat-peel"),
         minutes=fig.PEEL_MIN * units,
     )
     yield BenchStep(
@@ -184,14 +170,16 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         f"Cut {units} straight pieces of filament, {_lengths(moulds)} mm long. Stand {base} on a board and push one up "
         "through each core from below, until its lower end is flush with the underside: it stands on the bench and "
         "can't sink. Trim the upper end flush with the core's top with a knife.",
-        picture=f"pictures/pour{step.index}.png",
+        _picture(step, "filament"),
         minutes=fig.FILAMENT_MIN * units,
     )
     yield BenchStep(
         f"Level {base}",
-        f"Put {base} where it will stay. Lay a phone with its level, or a small spirit level, on its seats beside the "
-        "pins, along it and across, and put paper under a corner until it shows less than 5 degrees: so much the vents "
-        "clear (C400).",
+        f"Put {base} where it will stay and {lid} on it, dry. Lay a phone with its level, or a small spirit level, on "
+        f"{lid}, along it and across, and put paper under a corner of {base} until it shows less than 5 degrees: so "
+        f"much the vents clear (C400). Lift {lid} off again. {base.capitalize()} stays there: it is filled and cured "
+        "on this spot.",
+        _picture(step, "level"),
         minutes=fig.LEVEL_MIN,
     )
     yield BenchStep(
@@ -205,7 +193,7 @@ def _laid_in(moulds: PatchMoulds, flat: PatchMoulds, inner: Material) -> Iterato
         f"Lay each one over its core of {base}, at the place where it was cast: A1 on A1, its notches over the fins. "
         "Press its edge down all round until it lies on the floor of its moat and its top flat on the core: what "
         "creeps under it fills the cavity's mouth. No release agent and no grease on core or moat.",
-        TOOLS,
+        _picture(step, "laid-in"),
         minutes=fig.LAY_IN_MIN * units / 2,
     )
 
@@ -223,7 +211,7 @@ def _lengths(moulds: PatchMoulds) -> str:
     return listed(f"{count} of {length}" for length, count in found.items())
 
 
-def _lid_on(moulds: PatchMoulds, step: Step, picture: str) -> Iterator[BenchStep]:
+def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
     lid, base = spaced(step.lid or ""), _base(moulds)
     slit = number(moulds.spec.moulds.seat_relief_mm, 3)
     yield BenchStep(
@@ -232,14 +220,14 @@ def _lid_on(moulds: PatchMoulds, step: Step, picture: str) -> Iterator[BenchStep
         f"Put {lid} on over the pins: one of them stands off the rectangle of the others, so it goes on one way only. "
         f"Press it down until it bears on the land all round; at both ends, beside the pins, a slit of {slit} mm stays "
         "open.",
-        TOOLS,
+        _picture(step, "lid-on"),
         minutes=fig.LIFT_MIN,
     )
     yield BenchStep(
         f"{HOLD} lid {step.index} down",
         f"{HOLD} it down with rubber bands round lid and base, or with a clamp, clear of sprue and vents. "
         f"{LEVEL_AGAIN}",
-        picture,
+        _picture(step, "lid-held"),
         minutes=fig.HOLD_MIN,
     )
 
@@ -256,7 +244,7 @@ def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
         "Take off what held the lid down. Lay a screwdriver into the slit at either end, beside the pins, and turn "
         f"both a little at a time, until {spaced(step.lid or '')} comes free. Lift it straight up: sprue and vents "
         "tear off at the sheet. Trim them flush with a knife.",
-        TOOLS,
+        _picture(step, "lid-off"),
         minutes=fig.LIFT_MIN,
     )
 
@@ -267,18 +255,18 @@ def _out(moulds: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
     tear = float(inner.tensile_mpa) * math.pi * (moulds.spec.moulds.filament_mm / 2) ** 2
     yield BenchStep(
         "Filament out",
-        f"Lay {base} on its side. Take each filament with pliers in its pocket and pull it out along itself: it lets "
-        f"air in under the unit. Never push it through: {number(tear, 2)} N on its end tear {inner.name} (computed: "
-        f"tensile strength, {inner.tensile_mpa.status}, x its area).",
-        f"pictures/pour{moulds.plan.steps[-1].index}.png",
+        f"Lift the mould off the bench and lay {base} on its side. Take each filament with pliers in its pocket and "
+        f"pull it out along itself: it lets air in under the unit. Never push it through: {number(tear, 2)} N on its "
+        f"end tear {inner.name} (computed: tensile strength, {inner.tensile_mpa.status}, x its area).",
+        picture_path("filament-out"),
         minutes=fig.PULL_MIN * units,
     )
     yield BenchStep(
         "Peel off",
         "Loosen the sheet's edge all round with a blunt spatula. Begin at one end: lift it, and draw each unit off its "
-        "core square to the base at its place, row after row. Straight up only the middle ones come. Trim the flash "
-        "with small scissors.",
-        SKIN_SIDE,
+        "core square to the base at its place, row after row. Straight up only the middle ones come. The "
+        "picture shows the way of each part; the sheet stays in one piece. Trim the flash with small scissors.",
+        picture_path("peel"),
         minutes=fig.PEEL_MIN * units,
     )
 

@@ -90,6 +90,23 @@ class PatchMoulds(MouldSet):
         low = self.arranged.sheet.low
         return tuple(replace(body, shape=moved(body.shape, z=-low)) for body in patch_bodies(self.arranged)[1:])
 
+    @cached_property
+    def cast_flat(self) -> PatchMoulds | None:
+        """The flat tools and pours of the inner layers alone, where the last pour is cast round the limb; else None."""
+        plan, spec = self.plan, self.spec
+        if plan.standing(plan.steps[-1], "cup") or not plan.of_kind("cup"):
+            return None
+        steps, dims = plan.steps[:-1], plan.dimensions
+        standing = {name for step in steps for name in step.tools}
+        tools = tuple(tool for tool in plan.tools if tool.name in standing or tool.kind == "blade")
+        inner = replace(dims, radii=dims.radii[: len(steps)], heights=dims.heights[: len(steps)])
+        layers = spec.layers[: len(steps)]
+        return PatchMoulds(
+            structs.replace(spec, layers=layers),
+            replace(plan, tools=tools, steps=steps, dimensions=inner),
+            array=self.array,
+        )
+
     @property
     def makes(self) -> str:
         """What comes out of the mould."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,7 +12,7 @@ from unitcad.moulds.layout import CORNER_RADIUS, MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
-from unitcad.shape import Extrude, Revolve, Shape, box, cut, moved, polygon, ring, turned, union
+from unitcad.shape import Extrude, Revolve, Shape, box, cut, moved, polygon, ring, rotated, turned, union
 
 ARROW, TAPE, BAND, TOOL = (0.10, 0.36, 0.86), (0.47, 0.78, 0.86), (0.35, 0.33, 0.38), (0.80, 0.86, 0.90)
 CARD, PAPER, GREASE, INK = (0.45, 0.72, 0.38), (0.96, 0.93, 0.62), (0.98, 0.72, 0.16), (0.10, 0.10, 0.12)
@@ -58,6 +59,11 @@ def sideways(side: int, x: float, y: float, z: float, length: float) -> Extra:
     return Extra(moved(turned(_arrow(length), "y", 1 if side > 0 else 3), x, y, z), ARROW)
 
 
+def along(way: tuple[float, float, float], x: float, y: float, z: float, length: float) -> Extra:
+    """Draw an arrow along a direction square to y, its middle at (x, y, z)."""
+    return Extra(moved(rotated(_arrow(length), "y", math.degrees(math.atan2(way[0], way[2]))), x, y, z), ARROW)
+
+
 def tape_places(moulds: MouldSet) -> tuple[float, ...]:
     """Return where the strips of tape that hold a cup down begin along x, mm.
 
@@ -97,13 +103,11 @@ def tape(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
     return tuple(strips)
 
 
-def bands(moulds: MouldSet, step: Step) -> tuple[Extra, ...]:
-    """Draw two rubber bands round lid and base, beyond the outermost cells."""
-    lay = moulds.plan.layout
-    low, high, y = moulds.plate[0], step.top, lay.plate[1]
+def bands(x: float, y: float, low: float, high: float) -> tuple[Extra, ...]:
+    """Draw two rubber bands round lid and base, near their ends at -x and x: from -y to y, from z to z."""
     bands = []
     for side in (1, -1):
-        x0, x1 = sorted((side * (lay.cup[0] - 1.0), side * (lay.cup[0] - 3.0)))
+        x0, x1 = sorted((side * (x - 1.0), side * (x - 3.0)))
         runs = [
             (-y - 1, y + 1, high, high + 1),
             (-y - 1, -y, low - 1, high + 1),
@@ -202,12 +206,19 @@ def paper_in_slit(moulds: MouldSet) -> tuple[Extra, ...]:
     return tuple(Extra(strip, PAPER) for strip in strips)
 
 
-def screwdrivers(moulds: MouldSet) -> tuple[Extra, ...]:
-    """Draw a screwdriver in every pry slot, its tip under the cup's skirt, an arrow down on each handle."""
-    spec, lay = moulds.spec, moulds.plan.layout
-    (bottom, top), half = moulds.plate, 3.0
-    low = pry_floor(spec) - plate_bottom(spec) + bottom
-    tip, edge = lay.cup[0] - 1.0, lay.plate[0]
+def in_pry_slots(moulds: MouldSet) -> tuple[Extra, ...]:
+    """Draw a screwdriver in every pry slot, its tip under the cup's skirt."""
+    spec, lay, (bottom, top) = moulds.spec, moulds.plan.layout, moulds.plate
+    return screwdrivers(lay.cup[0], lay.plate[0], pry_floor(spec) - plate_bottom(spec) + bottom, top)
+
+
+def screwdrivers(lifted: float, edge: float, low: float, top: float) -> tuple[Extra, ...]:
+    """Draw a screwdriver at either end along x, an arrow down on each handle.
+
+    Its tip is at `low` under what is lifted, which ends at x = `lifted`, and it leaves the base at x = `edge`, whose
+    upper face is at `top`.
+    """
+    tip, half = lifted - 1.0, 3.0
     blade = box(tip, edge + 4, -half, half, low, low + 0.9)
     handle = moved(turned(Revolve(polygon((0, 0), (2.2, 0), (2.2, 9), (0, 9))), "y", 1), edge + 4, 0, low + 0.45)
     found: list[Extra] = []
@@ -216,17 +227,25 @@ def screwdrivers(moulds: MouldSet) -> tuple[Extra, ...]:
         found += [
             Extra(both, TOOL),
             downward(side * (edge + 9), 0.0, low + 9, 9.0),
-            upward(side * (lay.cup[0] + 3), -5.0, top + 6, 9.0),
+            upward(side * (lifted + 3), -5.0, top + 6, 9.0),
         ]
     return tuple(found)
 
 
-def spirit_level(moulds: MouldSet, z: float) -> tuple[Extra, ...]:
-    """Draw a spirit level that lies along x on a rim at `z`, and paper under a corner of the plate."""
-    lay, bottom = moulds.plan.layout, moulds.plate[0]
-    long = min(1.5 * lay.cup[0], 30.0)
+def level_on_rim(moulds: MouldSet, z: float) -> tuple[Extra, ...]:
+    """Draw a spirit level on a rim at `z`, and paper under a corner of the plate."""
+    lay = moulds.plan.layout
+    return spirit_level(lay.cup[0], z, lay.plate, moulds.plate[0])
+
+
+def spirit_level(half: float, z: float, plate: tuple[float, float], bottom: float) -> tuple[Extra, ...]:
+    """Draw a spirit level that lies along x on what is `half` wide to either side and ends at `z`.
+
+    Paper lies under a corner of the base, whose half sizes are `plate` and whose underside is at `bottom`.
+    """
+    long = min(1.5 * half, 30.0)
     glass = box(-4.0, 4.0, -2.0, 2.0, z + 4.0, z + 5.0)
-    x, y = lay.plate
+    x, y = plate
     return (
         Extra(box(-long, long, -4.0, 4.0, z, z + 4.5), TOOL),
         Extra(glass, (0.75, 0.93, 0.35)),

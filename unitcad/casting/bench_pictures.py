@@ -70,7 +70,8 @@ def _piece_names(moulds: MouldSet, placed: dict[object, list[_Solid]]) -> list[N
         if isinstance(key, tuple) and isinstance(key[1], Placed):
             (tool,) = (piece for piece in moulds.plan.pieces if piece.name == key[1].name)
             own = moulds.plan.called(tool.name).replace(",", "")
-            name = {"tongue": "tongue", "stub": "filament"}.get(tool.kind, own)
+            filament = "straight filament" if tool.step else "filament"
+            name = {"tongue": "tongue", "stub": filament}.get(tool.kind, own)
             runs.setdefault(name, []).append(np.concatenate([vertices for vertices, _, _ in solids]))
     names = []
     for name, points in runs.items():

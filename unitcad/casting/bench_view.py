@@ -35,7 +35,7 @@ class View:
     parts: tuple[Placed, ...]
     extras: tuple[Extra, ...] = ()
     eye: Offset = ABOVE
-    group: Literal["moulds", "under", "pieces", "unit", "cut"] = "moulds"
+    group: Literal["moulds", "under", "pieces", "unit", "cut", "curved"] = "moulds"
     syringe_on: Shape | None = None
     names: tuple[Name, ...] = ()
     turned: bool = False

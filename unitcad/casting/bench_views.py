@@ -1,6 +1,7 @@
 """What each picture of the procedure shows: which pieces stand where, which one moves, what holds or fills them.
 
-Data: `bench_pictures` draws it, and only a lid's channels are meshed here, to find their mouths.
+Data: `bench_pictures` draws it. Meshed here is only what tells a place: a lid's channels, an array's motors, what is
+laid into a curved base.
 A view's name is the name of its file.
 """
 
@@ -14,6 +15,8 @@ from unitcad.casting import bench_extras as draw
 from unitcad.casting.bench_extras import CARD, CLEAR, Extra
 from unitcad.casting.bench_view import ABOVE, OVER, UNDER, Offset, Placed, View
 from unitcad.casting.figures import window_length
+from unitcad.casting.laid_in_views import laid_in_views
+from unitcad.casting.mouths import sprue_and_vent
 from unitcad.casting.piece_views import resin_views
 from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.casting.tray_views import tray_views
@@ -21,12 +24,12 @@ from unitcad.casting.way_out import motor_views, way_out
 from unitcad.designs import layer_colour
 from unitcad.designs.tooling import Cell
 from unitcad.export.picture_letters import Name
-from unitcad.kernels.mesh import arrays, realise
+from unitcad.kernels.mesh import arrays
 from unitcad.moulds.layout import MARK
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.tongue import GRIP_WIDTH
-from unitcad.shape import Shape, box, cylinder, moved, union
+from unitcad.shape import box, cylinder, moved, union
 from unitcad.text import number
 
 FOLDER = "steps"
@@ -34,11 +37,10 @@ FOLDER = "steps"
 
 
 def views(moulds: MouldSet) -> dict[str, View]:
-    """Return every view of a procedure by its name, in the order of the steps; {} where a lid stands on no cup."""
-    plan = moulds.plan
-    if any(step.lid and not plan.standing(step, "cup") for step in plan.steps):
-        return {}
-    return dict(_views(moulds) if plan.of_kind("cup") else tray_views(moulds))
+    """Return every view of a procedure by its name, in the order of the steps."""
+    if moulds.cast_flat:
+        return dict(laid_in_views(moulds, views(moulds.cast_flat)))
+    return dict(_views(moulds) if moulds.plan.of_kind("cup") else tray_views(moulds))
 
 
 def picture_path(name: str) -> str:
@@ -74,7 +76,7 @@ def _views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
         Name("level", (0.0, -4.0, on.rim + 2)),
         Name("paper", (-plan.layout.plate[0] - 4, -plan.layout.plate[1], moulds.plate[0])),
     )
-    yield "level", View((*standing, Placed(on.cup)), draw.spirit_level(moulds, on.rim), names=names)
+    yield "level", View((*standing, Placed(on.cup)), draw.level_on_rim(moulds, on.rim), names=names)
     for step in plan.steps:
         for name, view in _pour(moulds, step, standing):
             yield f"pour{step.index}-{name}", view
@@ -147,11 +149,12 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
                 names=(Name("grease", (0.4 * lay.cup[0], 0.8 - lay.cup[1], step.rim)),),
             ),
         )
-        closed, held = (*closed, Placed(step.lid)), (*pads, *draw.bands(moulds, step))
+        closed = (*closed, Placed(step.lid))
+        held = (*pads, *draw.bands(lay.cup[0], lay.plate[1], moulds.plate[0], step.top))
         filled = Extra(union(step.channels), colour)
         band = Name("rubber band", (lay.cup[0] - 2.0, 0.0, step.top + 1))
         yield "lid-held", View(closed, (*held, *tabs), names=(band,))
-        sprue, vent = _sprue_and_vent(moulds, step)
+        sprue, vent = sprue_and_vent(moulds, step)
         names = Name("sprue", sprue), Name("vent", vent, ring=True)
         yield "inject", View((*closed, poured), (*held, *tabs, filled), syringe_on=step.channels[0], names=names)
         yield "filled", View((*closed, poured), (*held, *tabs, filled), names=(Name("touch here", vent, ring=True),))
@@ -224,7 +227,7 @@ def _pour(moulds: MouldSet, step: Step, standing: tuple[Placed, ...]) -> Iterato
     if all(removal.piece != step.cup for removal in step.removals):
         return
     lever = Name("screwdriver", (lay.plate[0] + 8.0, 0.0, moulds.plate[1]))
-    yield "cup-off", View((*cured, poured, raised), draw.screwdrivers(moulds), names=(lever,))
+    yield "cup-off", View((*cured, poured, raised), draw.in_pry_slots(moulds), names=(lever,))
 
 
 def level_on(moulds: MouldSet) -> Step:
@@ -252,23 +255,6 @@ def _on_pad(moulds: MouldSet, side: int) -> Offset:
         return 0.0, 0.0, 0.0
     near = min(cell.y for cell in lay.cells if side in cell.sides) - GRIP_WIDTH / 2 - 1
     return side * (lay.cup[0] + prop.width_mm / 2), near, moulds.plate[1] + prop.thickness_mm / 3
-
-
-def _sprue_and_vent(moulds: MouldSet, step: Step) -> tuple[Offset, Offset]:
-    """Return the mouths of a cell's sprue and of its vent nearest the eye: of the second cell, clear of the syringe."""
-    count = len(step.channels) // len(moulds.plan.layout.cells)
-    first = count if len(step.channels) > count else 0
-    sprue, *vents = (_mouth(moulds, shape) for shape in step.channels[first : first + count])
-    return sprue, max(vents, key=lambda at: ABOVE[0] * at[0] + ABOVE[1] * at[1])
-
-
-def _mouth(moulds: MouldSet, channel: Shape) -> Offset:
-    """Return the middle of a channel's upper end."""
-    vertices = np.asarray(arrays(realise(channel, moulds.segments))[0], float)
-    top = vertices[:, 2].max()
-    upper = vertices[vertices[:, 2] > top - 1e-3]
-    x, y, _ = ((upper.min(axis=0) + upper.max(axis=0)) / 2).tolist()
-    return x, y, float(top)
 
 
 def _touched(moulds: MouldSet, step: Step) -> tuple[Name, ...]:

@@ -35,8 +35,11 @@ MORE_PLATES = (
 )
 
 
-def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
-    """Say which file to print and how, a sentence or two each. `solid_mm3`: volume of all printed pieces, solid."""
+def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> tuple[str, ...]:
+    """Say which file to print and how, a sentence or two each. `solid_mm3`: volume of all printed pieces, solid.
+
+    `tallest_mm`: height of a piece that may stand higher than core and blade.
+    """
     spec, plan = moulds.spec, moulds.plan
     printed = [tool for tool in plan.pieces if tool.made == "printed"]
     mixed = {tool.kind for tool in printed if not tool.upside_down}
@@ -55,7 +58,8 @@ def printing(moulds: MouldSet, solid_mm3: float) -> tuple[str, ...]:
     if plan.splits:
         lines.append(MORE_PLATES)
     standing = plan.dimensions.core_height - moulds.plate[0]
-    time = fig.print_min(spec, solid_mm3, max(standing, BLADE_HEIGHT if plan.of_kind("blade") else 0.0))
+    blade = BLADE_HEIGHT if plan.of_kind("blade") else 0.0
+    time = fig.print_min(spec, solid_mm3, max(standing, blade, tallest_mm))
     takes = f"Takes about {duration(5 * max(round(time / 5), 1))}"
     if in_resin(moulds):
         lines.append(f"{takes} ({number(fig.RESIN_LAYER_S, 2)} s a layer, assumed).")

@@ -22,7 +22,7 @@ def tray_views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
     filled = (*tray, Placed(step.name))
     yield "pieces", View(tuple(Placed(piece.name) for piece in plan.pieces), eye=OVER, group="pieces")
     names = Name("level", (0.0, -4.0, step.rim + 2)), Name("paper", (-x - 4, -y, moulds.plate[0]))
-    yield "level", View(tray, draw.spirit_level(moulds, step.rim), names=names)
+    yield "level", View(tray, draw.level_on_rim(moulds, step.rim), names=names)
     x0, y0, _, _, y1, _ = bounds(moulds.meshes(step.layer)[0])
     thread = moved(cylinder(0.6, step.rim - 1.0, step.rim + 14.0), x0 + 3.0, (y0 + y1) / 2)
     yield "pour", View(filled, (Extra(thread, layer_colour(0)),))

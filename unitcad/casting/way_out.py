@@ -9,6 +9,7 @@ from unitcad.casting.bench_extras import CLEAR
 from unitcad.casting.bench_view import LOW, UNDER, Placed, View
 from unitcad.casting.piece_views import fed_through
 from unitcad.export.picture_letters import Name
+from unitcad.kernels.mesh import bounds
 from unitcad.moulds.mould_set import MouldSet
 
 
@@ -50,10 +51,15 @@ def motor_views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
     away = (-1.0 if below else 1.0) * (high + CLEAR)
     cast = tuple(Placed(body.name, half=not patch) for body in moulds.unit if body.made == "cast")
     laid = tuple(Placed(body.name, (0.0, 0.0, away)) for body in inside)
-    cell = min(moulds.plan.layout.cells, key=lambda each: (each.y, each.x))
-    at = (cell.x, cell.y) if patch else (0.0, 0.0)
+    x = y = 0.0
+    z = high / 2
+    if patch:
+        # Round a limb a motor stands off the height that it has flat.
+        boxes = (bounds(moulds.mesh(body)) for body in inside if body.kind == "motor")
+        middles = [((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2) for x0, y0, z0, x1, y1, z1 in boxes]
+        x, y, z = min(middles, key=lambda at: (at[1], at[0]))
     arrow = draw.upward if below else draw.downward
-    shown = arrow(at[0] - moulds.dimensions.outer_radius * 0.8, at[1] - 2.0, away / 2 + high / 2, 5.0)
+    shown = arrow(x - moulds.dimensions.outer_radius * 0.8, y - 2.0, z + away / 2, 5.0)
     eye = UNDER if below else LOW
     fed = fed_through(moulds)
     yield "motor-in", fed or View((*cast, *laid), (shown,), eye, "unit", turned=below)

@@ -105,6 +105,11 @@ class MouldSet:
         """What is pushed into the cast sheet from its side towards the skin, each body's name after its place's."""
         return ()
 
+    @property
+    def cast_flat(self) -> MouldSet | None:
+        """The set of the inner layers alone, where these are cast flat and laid into the last pour; else None."""
+        return None
+
     @cached_property
     def plan(self) -> Plan:
         """Tools and pours. Raises Refusal where the moulds can't be made."""
