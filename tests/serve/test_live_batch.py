@@ -34,6 +34,10 @@ def test_a_row_of_a_batch_opens_live(running: Any, batch: Path) -> None:
             visit.until(lambda before=before: visit.page.input_value(WALL) != before)
             visit.settled()
             opened.append(visit.page.input_value(WALL))
+            # The spec begins below the header that stays, and is what the next Tab goes into.
+            header, spec = (visit.page.locator(one).bounding_box() for one in (".top", "#spec"))
+            assert spec["y"] >= header["y"] + header["height"]
+            assert visit.page.evaluate("() => document.activeElement.id") == "spec"
         assert sorted(opened) == ["1", "1.5"]
         visit.close()
 

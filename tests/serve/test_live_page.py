@@ -151,13 +151,18 @@ def test_changes_that_are_not_saved_outlast_a_reload(live: Live) -> None:
     live.settled()
 
 
-def test_layers_are_added_and_taken_out(live: Live) -> None:
-    live.page.click("text=Add a layer outside")
-    live.until(lambda: live.page.locator('.field[data-path^="layers.2."]').count() == 3)
-    live.settled()
-    live.page.click("text=Remove layer 3")
-    live.until(lambda: live.page.locator('.field[data-path^="layers.2."]').count() == 0)
-    live.settled()
+def test_layers_are_added_and_taken_out_and_the_focus_stays(live: Live) -> None:
+    """By keyboard, over a form that is made again."""
+    focused = "() => document.activeElement.name"
+    rows = live.page.locator('.field[data-path^="layers.2."]')
+    live.pressed(live.page.get_by_role("button", name="Add a layer outside"), "Enter")
+    assert (rows.count(), live.page.evaluate(focused)) == (3, "add")
+    live.pressed(live.page.get_by_role("button", name="Remove layer 3"), "Enter")
+    assert (rows.count(), live.page.evaluate(focused)) == (0, "add")
+    live.pressed(live.page.get_by_label("with circuit"), "Space")
+    assert live.page.evaluate(focused) == "with fpcb"
+    live.pressed(live.page.get_by_role("button", name="cap: back to the default").first, "Enter")
+    assert live.page.evaluate(focused) == "layers.0.cap_mm"
 
 
 def test_a_pinned_variant_stands_beside_the_changed_one(live: Live) -> None:
@@ -266,8 +271,11 @@ def test_save_and_build_from_the_page(running: Any, tmp_path: Path) -> None:
         visit.page.click("text=Save spec")
         visit.until(lambda: (tmp_path / "encapsulating.toml").is_file())
         visit.page.evaluate(WORDS)
-        visit.page.click("text=Build this")
+        visit.page.get_by_role("button", name="Build this").press("Enter")
+        visit.page.get_by_role("button", name="Cancel").focus()
         visit.page.wait_for_selector('.job[data-ended="true"]', timeout=120_000)
+        # The button kept the focus from stage to stage, and leaves it to the result.
+        assert visit.page.evaluate("() => document.activeElement.className") == "job"
         words = visit.page.evaluate("() => [...window.words]")
         assert words[0] == "The build is under way: starting"
         assert len(words) > 2, words

@@ -131,7 +131,7 @@
       const made = make(field, id);
       const range = typeof field.low === "number" ? `${number(field.low)} to ${number(field.high)} ${unitOf(field.path)}`.trim() : "";
       const fault = el("p", { className: "refusal", id: `${id}-fault`, role: "status" });
-      const reset = el("button", { type: "button", className: "quiet reset", "aria-label": `${field.label}: back to the default`, title: "Back to the default", onclick: () => options.remove(keyOf(field.path)) }, "default");
+      const reset = el("button", { type: "button", className: "quiet reset", "aria-label": `${field.label}: back to the default`, title: "Back to the default", onclick: () => { made.main.focus(); options.remove(keyOf(field.path)); } }, "default");
       made.main.setAttribute("aria-describedby", `${id}-range ${id}-meaning ${id}-fault`);
       made.main.name = field.path;
       const row = el("div", { className: `field of-${field.kind}`, "data-path": field.path },
@@ -160,14 +160,14 @@
       const body = el("div", { className: "fields" });
       const details = el("details", { "data-group": each.path || "unit", open: opened.get(each.path) ?? (OPEN.includes(each.title) || each.path.startsWith("layers.")) }, summary, body);
       details.addEventListener("toggle", () => opened.set(each.path, details.open));
-      if (each.optional) body.append(el("label", { className: "present" }, el("input", { type: "checkbox", checked: each.present, onchange: (event) => options.table(each, event.target.checked) }), `with ${each.title.toLowerCase()}`));
+      if (each.optional) body.append(el("label", { className: "present" }, el("input", { type: "checkbox", name: `with ${each.path}`, checked: each.present, onchange: (event) => options.table(each, event.target.checked) }), `with ${each.title.toLowerCase()}`));
       const layer = /^layers\.(\d+)$/.exec(each.path);
       for (const field of each.fields) {
         const made = control(field);
         controls.set(field.path, made);
         body.append(made.row);
       }
-      if (layer && options.layers() > 1) body.append(el("button", { type: "button", className: "quiet", onclick: () => options.remove(each.path) }, `Remove layer ${Number(layer[1]) + 1}`));
+      if (layer && options.layers() > 1) body.append(el("button", { type: "button", name: `remove ${each.path}`, className: "quiet", onclick: () => options.remove(each.path) }, `Remove layer ${Number(layer[1]) + 1}`));
       return details;
     }
 
@@ -182,9 +182,11 @@
         clear(node, full.flatMap((each) => {
           const made = group(each);
           const last = each.path === `layers.${options.layers() - 1}`;
-          return last ? [made, el("button", { type: "button", className: "add-layer", onclick: options.addLayer }, "Add a layer outside")] : [made];
+          return last ? [made, el("button", { type: "button", name: "add", className: "add-layer", onclick: options.addLayer }, "Add a layer outside")] : [made];
         }));
-        if (focused && node.elements[focused]) node.elements[focused].focus({ preventScroll: true });
+        // Of a layer that is taken away, the focus goes to where one is put in.
+        const back = focused && (node.elements[focused] || node.elements.add);
+        if (back) back.focus({ preventScroll: true });
       }
       for (const each of full) for (const field of each.fields) controls.get(field.path).set(field);
     }

@@ -6,7 +6,10 @@
 
   // options: server, text(), name, folder, numbers() gives [{path, value, low, high}] of the form's numbers.
   function createJobs({ server, text, name, folder, numbers }) {
-    const progress = el("div", { className: "job", role: "status" });
+    const progress = el("div", { className: "job", role: "status", tabindex: "-1" });
+    // Beside what is written anew, so that it keeps the focus.
+    const cancel = el("button", { type: "button", hidden: true, onclick: () => server.send("/cancel", { job: running }) }, "Cancel");
+    const log = el("div", { className: "job" });
     const file = el("input", { type: "text", id: "file-name", value: name, spellcheck: "false" });
     const said = el("p", { className: "note", role: "status" });
     let running = null;
@@ -22,23 +25,28 @@
       if (answer.path) clear(said, `Saved as ${answer.path}.`, answer.refused && el("span", { className: "refusal" }, ` It is refused as it stands, so nothing can be built from it yet: ${answer.refused}`));
       else {
         const there = answer.faults[0].field === "name" && !replace;
-        clear(said, answer.faults[0].message, " ", there && el("button", { type: "button", onclick: () => save(true) }, "Replace it"));
+        clear(said, answer.faults[0].message, " ", there && el("button", { type: "button", onclick: () => { file.focus(); save(true); } }, "Replace it"));
       }
     }
 
     async function follow(state) {
       if (!state.job) {
+        if (cancel.hidden) clear(log);
         clear(progress, el("p", { className: "fault" }, state.faults[0].message));
         return;
       }
       running = state.job;
       let now = state;
+      let written = "";
       while (running === state.job) {
-        show(now);
+        // What is read aloud is written anew only where it differs.
+        if (JSON.stringify(now) !== written) show(now);
+        written = JSON.stringify(now);
         if (now.ended) break;
         await new Promise((done) => setTimeout(done, EVERY_MS));
         const next = await server.send(`/job/${state.job}`);
         if (!next.job) {
+          stopped();
           clear(progress, el("p", { className: "fault" }, next.faults[0].message));
           break;
         }
@@ -54,9 +62,15 @@
       progress.dataset.ended = String(Boolean(state.ended));
       clear(progress, el("p", { className: "lead" }, words[0].toUpperCase() + words.slice(1)),
         !state.ended && el("progress", { "aria-label": state.title, ...(of ? { max: Number(of), value: Number(count) } : {}) }),
-        !state.ended && el("button", { type: "button", onclick: () => server.send("/cancel", { job: state.job }) }, "Cancel"),
-        done && state.folder && el("p", {}, "In ", el("code", {}, state.folder), ". ", state.page && el("a", { href: `/files/${state.page.split("/").map(encodeURIComponent).join("/")}`, target: "_blank", rel: "noopener" }, "Open its page")),
-        state.lines.length > 0 && el("pre", { className: "scroll" }, state.lines.join("\n")));
+        done && state.folder && el("p", {}, "In ", el("code", {}, state.folder), ". ", state.page && el("a", { href: `/files/${state.page.split("/").map(encodeURIComponent).join("/")}`, target: "_blank", rel: "noopener" }, "Open its page")));
+      clear(log, state.lines.length > 0 && el("pre", { className: "scroll" }, state.lines.join("\n")));
+      if (state.ended) stopped();
+      else cancel.hidden = false;
+    }
+
+    function stopped() {
+      if (document.activeElement === cancel) progress.focus({ preventScroll: true });
+      cancel.hidden = true;
     }
 
     const key = el("select", { id: "sweep-key", onchange: () => offer() });
@@ -94,7 +108,7 @@
       el("div", { className: "tools" }, el("button", { type: "button", className: "main", onclick: async () => follow(await server.send("/build", { text: text() })) }, "Build this")),
       el("details", {}, el("summary", {}, "Sweep this"), el("div", { className: "tools" }, field("Key", key), field("from", low), field("to", high), field("values", count),
         el("button", { type: "button", onclick: sweep }, "Run the sweep"))),
-      progress);
+      progress, cancel, log);
     return { node, keys };
   }
 

@@ -61,7 +61,7 @@
       kept.back && el("p", { className: "note", id: "kept" }, "Your changes from before the page was loaded again are back. ", el("button", { type: "button", onclick: () => startFrom(data.text) }, `Start from ${data.name} again`)),
       batch && batch.node,
       el("div", { className: "columns" },
-        el("section", { id: "spec", "aria-label": "Spec" }, el("div", { className: "buttons" }, template, undo, redo), form.node, tabs),
+        el("section", { id: "spec", "aria-label": "Spec", tabindex: "-1" }, el("div", { className: "buttons" }, template, undo, redo), form.node, tabs),
         el("div", { className: "shown" }, view, section("section", "Section", drawn), jobs.node, pinned.node, section("judgement", "Moulds", judged), estimated)),
       el("footer", {}, el("p", {}, `unitcad ${data.version}. This page contacts its own server alone.`)));
 
@@ -313,6 +313,7 @@
       // The same row may be opened again.
       history.replaceState(null, "", location.pathname);
       page.querySelector(".columns").scrollIntoView();
+      page.querySelector("#spec").focus({ preventScroll: true });
     }
 
     text.value = state.text;
