@@ -173,6 +173,10 @@ def test_a_patch_is_shown_and_changed(running: Any, pockets: Server) -> None:
     live.start_from("encapsulating")
     assert radios.all_inner_texts() == ["Unit", "Moulds"]
     assert "along the tail" in live.page.inner_text('.stage select[name="axis"]')
+    # It is looked at as a whole, as the button does.
+    seen = live.page.locator(".stage canvas").screenshot()
+    live.page.get_by_role("button", name="corner").click()
+    assert live.page.locator(".stage canvas").screenshot() == seen
     live.close()
 
 

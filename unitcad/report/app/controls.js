@@ -170,6 +170,7 @@
       const asked = (state.asked = (state.asked || 0) + 1);
       const fresh = await read(next);
       if (asked !== state.asked) return;
+      const before = extent();
       model = next;
       kinds = fresh;
       if (!kinds[state.kind].length) state.kind = "unit";
@@ -178,6 +179,13 @@
       state.step = Math.min(state.step, Math.max(0, kinds.moulds.length - 1));
       step.input.value = state.step;
       update(false);
+      // Another patch or unit, which the look from before would show in part or tiny.
+      if (Math.abs(Math.log(extent() / before)) > Math.log(1.5)) viewer.look(state.view || "corner");
+    }
+
+    // The length of the diagonal of all that stands there, mm.
+    function extent() {
+      return Math.hypot(...Object.values(viewer.bounds()).map(([low, high]) => high - low));
     }
 
     return { update: replace, free: () => viewer.free() };
