@@ -73,3 +73,21 @@ def test_the_command_loads_no_scipy_itself(tmp_path: Path) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "False False"
+
+
+@pytest.mark.parametrize(("cores", "formats", "count"), [(1, "stl", 0), (2, "stl", 1), (2, None, 1), (3, None, 2)])
+def test_a_build_begins_no_more_processes_than_cores(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, cores: int, formats: str | None, count: int
+) -> None:
+    """With STEP, two cores are full: the process of estimate and pictures would only slow them."""
+    begun: list[str] = []
+    monkeypatch.setattr("unitcad.children.cores", lambda: cores)
+    monkeypatch.setattr("unitcad.export.step_process.worthwhile", lambda: cores > 1)
+    monkeypatch.setattr("unitcad.children.Answering.__init__", lambda self, module: begun.append(module))
+    monkeypatch.setattr("unitcad.children.Answering.__enter__", lambda self: self)
+    monkeypatch.setattr("unitcad.children.Answering.__exit__", lambda self, *what: None)
+    from unitcad.cli.build_command import _beside, _step_process
+
+    with _step_process(None, formats) as step, _beside(None, 1 if step is None else 2):
+        pass
+    assert len(begun) == count

@@ -157,9 +157,9 @@ class Answering:
             raise Lost from error
 
 
-def several_cores() -> bool:
-    """Tell whether a second process can run beside this one."""
-    return (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1) > 1
+def cores() -> int:
+    """Return how many processes can run side by side."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def answer_requests(begin: Callable[[], Callable[[Any], object]]) -> None:

@@ -6,14 +6,14 @@ import sys
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 
-from unitcad.children import Answering, several_cores
+from unitcad.children import Answering, cores
 from unitcad.errors import UnitcadError
 from unitcad.shape.body import Body
 
 
 def worthwhile() -> bool:
     """Tell whether a process of its own saves time: OCCT is installed and not loaded here, and there are two cores."""
-    return several_cores() and "OCP" not in sys.modules and find_spec("OCP") is not None
+    return cores() > 1 and "OCP" not in sys.modules and find_spec("OCP") is not None
 
 
 class StepProcess(Answering):
