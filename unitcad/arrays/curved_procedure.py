@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -15,15 +16,14 @@ from unitcad.arrays.patch_moulds import PatchMoulds
 from unitcad.casting import figures as fig
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bench_views import picture_path, views
-from unitcad.casting.bill import Item, bill
-from unitcad.casting.figures import at_room
-from unitcad.casting.finishing import motor_in
+from unitcad.casting.bill import Item, bill, injecting
+from unitcad.casting.finishing import motor_in, never_pushed
 from unitcad.casting.finishing import release as flat_release
 from unitcad.casting.finishing import shown as grams_shown
-from unitcad.casting.instructions import HOLD, LEVEL_AGAIN, cure, draw_up, inject, mixed, pour_steps
+from unitcad.casting.instructions import cure, draw_up, inject, lid_held, mixed, pour_steps, rest
 from unitcad.casting.needs import needs
 from unitcad.casting.preparation import printing
-from unitcad.casting.procedure import Pour, Procedure, bubbles, pour_figures, procedure
+from unitcad.casting.procedure import Procedure, bubbles, pour_of, procedure
 from unitcad.casting.release_agent import BondFace, Face
 from unitcad.casting.time_line import phases
 from unitcad.catalogue import Material
@@ -51,7 +51,7 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
     prepared = (_sort(moulds), *made.preparation[1:])
     mixes = [
         (silicone, fig.mix(flat.spec, silicone, v))
-        for silicone, v in zip(silicones, layer_volumes_mm3[:-1], strict=False)
+        for silicone, v in zip(silicones[:-1], layer_volumes_mm3[:-1], strict=True)
     ]
     # In the words of the whole set: what is cast flat bonds later, so its cup gets no release agent.
     flat_pours = tuple(
@@ -63,36 +63,17 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         *_lid_on(moulds, step),
         *mixed(under_lid, step, last, mix, verdict),
         draw_up(mix),
-        *_rest(spec, step, last, verdict),
+        *(() if spec.casting.vacuum else (rest(spec, step, last, verdict),)),
         inject(under_lid, _picture(step, "inject")),
         cure(under_lid, step, last, _picture(step, "filled")),
         _lid_off(moulds, step),
     )
-    room = spec.casting.room_c
-    pour = Pour(
-        index=step.index,
-        layer=step.name,
-        material=last.name,
-        figures=pour_figures(under_lid, step, last, mix, volume),
-        verdict=verdict,
-        agent=(),
-        degassing_min=fig.DEGASSING_MIN if spec.casting.vacuum else 0.0,
-        part_a_g=mix.part_a_g,
-        part_b_g=mix.part_b_g,
-        pot_life_min=at_room(float(last.pot_life_min), room),
-        cure_h=at_room(float(last.cure_h), room),
-        steps=steps,
-        drawing=f"step{step.index}-section.svg",
-    )
+    pour = pour_of(under_lid, step, last, mix, volume, verdict, steps)
     pours, out = (*flat_pours, pour), tuple(_out(moulds, silicones[0]))
     together = motors_in(tuple(motor_in(moulds, silicones)))
     stages = [("preparation", prepared), *((f"pour {each.index}", each.steps) for each in pours)]
     stages.append(("out of the mould", out))
     until, line = phases(stages), phases([*stages, ("motors and circuit in", together)])
-    mixes = [
-        (silicone, fig.mix(flat.spec, silicone, v))
-        for silicone, v in zip(silicones[:-1], layer_volumes_mm3[:-1], strict=True)
-    ]
     every = [*prepared, *(each for one in pours for each in one.steps), *out, *together]
     grams = [v * float(s.density_g_cm3) / 1000 for v, s in zip(layer_volumes_mm3, silicones, strict=True)]
     return replace(
@@ -109,7 +90,7 @@ def curved_procedure(moulds: PatchMoulds, layer_volumes_mm3: Sequence[float], pr
         release=out,
         assembly=together,
         measure=tuple(_measure(moulds, grams)),
-        bill=(*_bill(moulds, [*mixes, (last, mix)], every), *_beside(moulds, mix)),
+        bill=(*_bill(moulds, [*mixes, (last, mix)], every), *injecting(spec, [mix])),
         last="Motors and circuit in",
     )
 
@@ -204,10 +185,10 @@ def _lengths(moulds: PatchMoulds) -> str:
     radius, middle = array.radius_mm or 0.0, array.middle_radius_mm or 1.0
     bottom = moulds.plan.tool(moulds.plan.base_of(moulds.plan.steps[-1])).shape
     low = moulds.mesh_of(bottom).bounding_box()[2]
-    found: dict[str, int] = {}
+    found: Counter[str] = Counter()
     for place in array.places:
         length = radius + moulds.plan.dimensions.core_height - (radius + low) / math.cos(place.x / middle)
-        found[number(math.ceil(length) + 1, 3)] = found.get(number(math.ceil(length) + 1, 3), 0) + 1
+        found[number(math.ceil(length) + 1, 3)] += 1
     return listed(f"{count} of {length}" for length, count in found.items())
 
 
@@ -223,19 +204,7 @@ def _lid_on(moulds: PatchMoulds, step: Step) -> Iterator[BenchStep]:
         _picture(step, "lid-on"),
         minutes=fig.LIFT_MIN,
     )
-    yield BenchStep(
-        f"{HOLD} lid {step.index} down",
-        f"{HOLD} it down with rubber bands round lid and base, or with a clamp, clear of sprue and vents. "
-        f"{LEVEL_AGAIN}",
-        _picture(step, "lid-held"),
-        minutes=fig.HOLD_MIN,
-    )
-
-
-def _rest(spec: Spec, step: Step, silicone: Material, verdict: str) -> Iterator[BenchStep]:
-    if not spec.casting.vacuum:
-        wait = fig.rest_min(spec, step.rim, silicone)
-        yield BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=wait)
+    yield lid_held(step, _picture(step, "lid-held"))
 
 
 def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
@@ -252,12 +221,10 @@ def _lid_off(moulds: PatchMoulds, step: Step) -> BenchStep:
 def _out(moulds: PatchMoulds, inner: Material) -> Iterator[BenchStep]:
     """Describe the way from the cured sheet to a sleeve in the hand."""
     units, base = len(moulds.arranged.places), _base(moulds)
-    tear = float(inner.tensile_mpa) * math.pi * (moulds.spec.moulds.filament_mm / 2) ** 2
     yield BenchStep(
         "Filament out",
         f"Lift the mould off the bench and lay {base} on its side. Take each filament with pliers in its pocket and "
-        f"pull it out along itself: it lets air in under the unit. Never push it through: {number(tear, 2)} N on its "
-        f"end tear {inner.name} (computed: tensile strength, {inner.tensile_mpa.status}, x its area).",
+        f"pull it out along itself: {never_pushed(moulds.spec, inner)}",
         picture_path("filament-out"),
         minutes=fig.PULL_MIN * units,
     )
@@ -304,10 +271,3 @@ def _bill(moulds: PatchMoulds, mixes: list[tuple[Material, fig.Mix]], steps: Seq
             yield replace(item, quantity=2 * (len(moulds.plan.steps) - 1))
         else:
             yield item
-
-
-def _beside(moulds: PatchMoulds, mix: fig.Mix) -> Iterator[Item]:
-    """Yield what the injected pour takes."""
-    tip = number(moulds.spec.moulds.sprue_mm, 3)
-    yield Item("syringe", 1, "piece", "bought", f"{number(mix.syringe_ml, 2)} ml or more, tip up to {tip} mm")
-    yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")

@@ -22,7 +22,7 @@ from unitcad.casting.instructions import TACK, mixed
 from unitcad.casting.joining import joining
 from unitcad.casting.needs import CALIPER, NEEDS, needs
 from unitcad.casting.preparation import MORE_PLATES, cleaning, fall, in_resin
-from unitcad.casting.procedure import Pour, Procedure, bubbles, pour_figures
+from unitcad.casting.procedure import Procedure, bubbles, pour_of
 from unitcad.casting.time_line import duration, phases
 from unitcad.catalogue import Material
 from unitcad.shape.lettering import seen
@@ -58,22 +58,7 @@ def pocket_procedure(
     together = tuple(_together(array, moulds))
     stages = [("units", cast), ("preparation", prepared), ("pour 1", poured), ("out of the mould", out)]
     until, line = phases(stages), phases([*stages, ("units in", together)])
-    room = spec.casting.room_c
-    pour = Pour(
-        index=1,
-        layer="sheet",
-        material=silicone.name,
-        figures=pour_figures(moulds, step, silicone, mix, sheet_mm3),
-        verdict=verdict,
-        agent=(),
-        degassing_min=fig.DEGASSING_MIN if spec.casting.vacuum else 0.0,
-        part_a_g=mix.part_a_g,
-        part_b_g=mix.part_b_g,
-        pot_life_min=at_room(float(silicone.pot_life_min), room),
-        cure_h=at_room(float(silicone.cure_h), room),
-        steps=poured,
-        drawing="step1-section.svg",
-    )
+    pour = replace(pour_of(moulds, step, silicone, mix, sheet_mm3, verdict, poured), layer="sheet")
     grams = sheet_mm3 * float(silicone.density_g_cm3) / 1000
     named = needs([*prepared, *poured, *out, *together])
     own = [

@@ -103,6 +103,13 @@ def _ratings(spec: Spec) -> Iterator[str]:
             yield f"mass {number(motor.mass_g, 3)} g"
 
 
+def injecting(spec: Spec, mixes: Sequence[Mix]) -> Iterator[Item]:
+    """List what pours under a lid take, each with its mix."""
+    most, tip = max(mix.syringe_ml for mix in mixes), number(spec.moulds.sprue_mm, 3)
+    yield Item("syringe", len(mixes), "piece", "bought", f"{number(most, 2)} ml or more, tip up to {tip} mm")
+    yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
+
+
 def consumed(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> Iterator[Item]:
     """List what the steps name, then what only its numbers make an item of this set's."""
     pours, lengths = len(moulds.plan.steps), moulds.spec.moulds
@@ -129,11 +136,7 @@ def consumed(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> Itera
             f"{size}; a chamber that reaches {number(VACUUM_INHG, 3)} inHg",
         )
     if lengths.pour == "injected":
-        size = (
-            f"{number(max(mix.syringe_ml for mix in mixes), 2)} ml or more, tip up to {number(lengths.sprue_mm, 3)} mm"
-        )
-        yield Item("syringe", pours, "piece", "bought", size)
-        yield Item("rubber bands or a clamp", 2, "piece", "tool", "round lid and base")
+        yield from injecting(moulds.spec, mixes)
     elif cups:
         strips = 2 * len(tape_places(moulds)) * pours
         yield Item("adhesive tape", strips, "strip", "bought", "holds each cup down; 8 mm wide, 30 mm long")

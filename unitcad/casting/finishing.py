@@ -14,20 +14,27 @@ from unitcad.casting.figures import at_room
 from unitcad.catalogue import Material
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.removal import CAST
+from unitcad.spec import Spec
 from unitcad.text import number, spaced
+
+
+def never_pushed(spec: Spec, inner: Material) -> str:
+    """Say what pulling a filament does, and what pushing it would: `inner` is Layer 1's silicone."""
+    tear = float(inner.tensile_mpa) * math.pi * (spec.moulds.filament_mm / 2) ** 2
+    return (
+        f"it lets air in under the unit. Never push it through: {number(tear, 2)} N on its end tear {inner.name} "
+        f"(computed: tensile strength, {inner.tensile_mpa.status}, x its area)."
+    )
 
 
 def release(moulds: MouldSet, inner: Material) -> Iterator[BenchStep]:
     """Describe the way from the last cured layer to a unit in the hand; `inner` is Layer 1's silicone."""
-    tear = float(inner.tensile_mpa) * math.pi * (moulds.spec.moulds.filament_mm / 2) ** 2
     if moulds.plan.of_kind("stub"):
         each = "the" if len(moulds.plan.layout.cells) == 1 else "each"
         yield BenchStep(
             "Filament out",
             f"Lift the mould off the bench first: {each} bent end lies under its plate. Pull {each} filament out "
-            "downwards, by its bent end: it lets air in under the unit. Never push it through: "
-            f"{number(tear, 2)} N on its end tear {inner.name} (computed: tensile strength, "
-            f"{inner.tensile_mpa.status}, x its area).",
+            f"downwards, by its bent end: {never_pushed(moulds.spec, inner)}",
             picture_path("filament-out"),
             minutes=fig.PULL_MIN * len(moulds.plan.layout.cells),
         )

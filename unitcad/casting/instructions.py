@@ -16,6 +16,7 @@ from unitcad.catalogue import Material
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.ribs import ribs
+from unitcad.spec import Spec
 from unitcad.text import number, spaced
 
 GREASE = "Grease the flanks"
@@ -105,13 +106,7 @@ def pour_steps(
             picture("lid-on"),
             minutes=fig.LIFT_MIN,
         )
-        yield BenchStep(
-            f"{HOLD} lid {step.index} down",
-            f"{HOLD} it down with rubber bands round lid and base, or with a clamp, clear of sprue and vents. "
-            f"{LEVEL_AGAIN}",
-            picture("lid-held"),
-            minutes=fig.HOLD_MIN,
-        )
+        yield lid_held(step, picture("lid-held"))
     else:
         yield BenchStep(
             f"Hold cup {step.index} down",
@@ -124,7 +119,7 @@ def pour_steps(
         )
     if not wet:
         yield from mixed(moulds, step, silicone, mix, verdict)
-    rests = BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=fig.rest_min(moulds.spec, step.rim, silicone))
+    rests = rest(moulds.spec, step, silicone, verdict)
     if step.lid:
         yield draw_up(mix)
         if not moulds.spec.casting.vacuum:
@@ -168,6 +163,22 @@ def pour_steps(
             wait_min=STRIKE_AGAIN_MIN - fig.STRIKE_MIN,
         )
     yield from _cure_and_open(moulds, step, silicone, picture)
+
+
+def lid_held(step: Step, picture: str) -> BenchStep:
+    """Say how a lid is held down while silicone is injected."""
+    return BenchStep(
+        f"{HOLD} lid {step.index} down",
+        f"{HOLD} it down with rubber bands round lid and base, or with a clamp, clear of sprue and vents. "
+        f"{LEVEL_AGAIN}",
+        picture,
+        minutes=fig.HOLD_MIN,
+    )
+
+
+def rest(spec: Spec, step: Step, silicone: Material, verdict: str) -> BenchStep:
+    """Say how bubbles rise where there is no vacuum, in the words of the verdict on them."""
+    return BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=fig.rest_min(spec, step.rim, silicone))
 
 
 def _strips(moulds: MouldSet) -> str:

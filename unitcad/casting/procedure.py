@@ -91,6 +91,35 @@ class Procedure:
     last: str = "Motor in"
 
 
+def pour_of(
+    moulds: MouldSet,
+    step: Step,
+    silicone: Material,
+    mix: fig.Mix,
+    volume: float,
+    verdict: str,
+    steps: Sequence[BenchStep],
+    agent: Sequence[Face] = (),
+) -> Pour:
+    """Return the record of a pour: `volume` of what it casts, mm3; `agent` as in `Pour`."""
+    casting = moulds.spec.casting
+    return Pour(
+        index=step.index,
+        layer=step.name,
+        material=silicone.name,
+        figures=pour_figures(moulds, step, silicone, mix, volume),
+        verdict=verdict,
+        agent=tuple(agent),
+        degassing_min=fig.DEGASSING_MIN if casting.vacuum else 0.0,
+        part_a_g=mix.part_a_g,
+        part_b_g=mix.part_b_g,
+        pot_life_min=fig.at_room(float(silicone.pot_life_min), casting.room_c),
+        cure_h=fig.at_room(float(silicone.cure_h), casting.room_c),
+        steps=tuple(steps),
+        drawing=f"step{step.index}-section.svg",
+    )
+
+
 def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3: float) -> Procedure:
     """Return the procedure of a mould set: nothing is meshed or drawn.
 
@@ -107,20 +136,15 @@ def procedure(moulds: MouldSet, layer_volumes_mm3: Sequence[float], printed_mm3:
         mix = fig.mix(spec, silicone, poured + fig.channels_mm3(step))
         verdict = bubbles(spec, step, silicone, mix, len(plan.layout.cells))
         pours.append(
-            Pour(
-                step.index,
-                step.name,
-                silicone.name,
-                pour_figures(moulds, step, silicone, mix, volume),
+            pour_of(
+                moulds,
+                step,
+                silicone,
+                mix,
+                volume,
                 verdict,
-                agent_faces(moulds, step),
-                fig.DEGASSING_MIN if spec.casting.vacuum else 0.0,
-                mix.part_a_g,
-                mix.part_b_g,
-                fig.at_room(float(silicone.pot_life_min), spec.casting.room_c),
-                fig.at_room(float(silicone.cure_h), spec.casting.room_c),
                 tuple(pour_steps(moulds, step, silicone, mix, verdict, shown)),
-                f"step{step.index}-section.svg",
+                agent_faces(moulds, step),
             )
         )
         mixes.append((silicone, mix))

@@ -6,10 +6,14 @@ from typing import Annotated
 
 import typer
 
+from unitcad.cli.check_run import Asked, run
+
 
 def check(
     files: Annotated[list[str] | None, typer.Argument(help="Files, folders or globs.", show_default=False)] = None,
-    output_format: Annotated[str, typer.Option(help="text, json, github, sarif, junit or markdown.")] = "text",
+    output_format: Annotated[
+        str, typer.Option(help="text, json, github, sarif, junit or markdown.")
+    ] = Asked.output_format,
     as_json: Annotated[bool, typer.Option("--json", help="Short for --output-format json.")] = False,
     report: Annotated[
         list[str] | None,
@@ -37,7 +41,7 @@ def check(
         ),
     ] = None,
     manifest: Annotated[str | None, typer.Option(help="manifest.json of a build, or its folder (M rules).")] = None,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes.")] = 1,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes.")] = Asked.jobs,
     max_faces: Annotated[int | None, typer.Option(min=1, help="Faces a file may have (default 10000000).")] = None,
     timeout: Annotated[float | None, typer.Option(min=0.001, help="Seconds a file may take (default 600).")] = None,
     memory: Annotated[
@@ -65,7 +69,4 @@ def check(
 
     Reads STL, 3MF, OBJ, PLY, OFF and GLB, and STEP where an extra with a B-rep kernel is installed.
     """
-    given = locals()  # the parameters alone: nothing else has a name yet
-    from unitcad.cli.check_run import Asked, run
-
-    raise typer.Exit(run(Asked(**given)))
+    raise typer.Exit(run(Asked(**locals())))

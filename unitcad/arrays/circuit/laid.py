@@ -6,11 +6,9 @@ from dataclasses import replace
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.circuit.outline import circuit_body
-from unitcad.arrays.limb_frame import at_place
+from unitcad.arrays.limb_frame import LENGTH, at_place
 from unitcad.shape import Common, cylinder, moved
 from unitcad.shape.body import Body
-
-_HIGH = 1000.0
 
 
 def laid_circuit(array: Array) -> tuple[Body, ...]:
@@ -27,7 +25,7 @@ def laid_circuit(array: Array) -> tuple[Body, ...]:
             name=f"{place.name}-circuit",
             shape=at_place(
                 array,
-                Common((moved(whole.shape, -place.x, -place.y), cylinder(place.radius, -_HIGH, _HIGH))),
+                Common((moved(whole.shape, -place.x, -place.y), cylinder(place.radius, -LENGTH, LENGTH))),
                 place,
             ),
         )
