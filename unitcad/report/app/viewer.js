@@ -6,6 +6,9 @@
   const VIEWS = { corner: [0.55, -1, 0.55], front: [0, -1, 0.001], above: [0, -0.001, 1], below: [0.45, -1, -0.7], side: [1, 0, 0.001] };
   // What a cut takes away faces the first view: the near side, the right one, the top.
   const CUTS = { y: [0, 1, 0], x: [-1, 0, 0], z: [0, 0, -1] };
+  // A cap's turns about x and y, and which lengths of the box then are its width and its height.
+  const CAPS = { y: [Math.PI / 2, 0, "x", "z"], x: [0, Math.PI / 2, "z", "y"], z: [0, 0, "x", "y"] };
+  const INVERT = 5386; // GL_INVERT, which three.js calls InvertStencilOp
 
   function createViewer(canvas) {
     const renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, stencil: true, preserveDrawingBuffer: true });
@@ -21,7 +24,8 @@
     controls.enableZoom = false;
     controls.addEventListener("change", draw);
     const plane = new THREE.Plane(new THREE.Vector3(0, 1, 0), 0);
-    const state = { parts: [], apart: 0, cut: { on: false, axis: "y", at: 0 } };
+    const sheet = new THREE.PlaneGeometry(1, 1);
+    const state = { parts: [], gone: [], apart: 0, cut: { on: false, axis: "y", at: 0 } };
     let waiting = false;
 
     function draw() {
@@ -30,6 +34,8 @@
       requestAnimationFrame(() => {
         waiting = false;
         renderer.render(scene, camera);
+        // Their materials are let go once the new ones are drawn, which so need no new shaders.
+        state.gone.splice(0).forEach(dispose);
       });
     }
 
@@ -57,42 +63,53 @@
       return mesh.geometry;
     }
 
-    function stencil(geometry, side, operation) {
-      const material = new THREE.MeshBasicMaterial({
-        side, depthWrite: false, depthTest: false, colorWrite: false, clippingPlanes: [plane],
+    // Marks the pixels behind which the cut solid is open: there an odd number of its faces is left.
+    function stencil() {
+      return new THREE.MeshBasicMaterial({
+        side: THREE.DoubleSide, depthWrite: false, depthTest: false, colorWrite: false, clippingPlanes: [plane],
         stencilWrite: true, stencilFunc: THREE.AlwaysStencilFunc,
-        stencilFail: operation, stencilZFail: operation, stencilZPass: operation,
+        stencilFail: INVERT, stencilZFail: INVERT, stencilZPass: INVERT,
       });
-      return new THREE.Mesh(geometry, material);
     }
 
-    function makePart(description, order) {
-      const { mesh, place = [0, 0, 0] } = description;
+    // All copies of a mesh, which do not overlap: one cap closes the cut through them all, and clears their marks.
+    function makePart(copies, order) {
+      const [{ name, mesh, offset = [0, 0, 0], shown }] = copies;
       const geometry = geometryOf(mesh);
       const colour = new THREE.Color(...mesh.colour);
+      const surface = new THREE.MeshLambertMaterial({ color: colour, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
+      const edges = new THREE.LineBasicMaterial();
+      const mark = stencil();
       const group = new THREE.Group();
-      const surface = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ color: colour, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }));
-      surface.renderOrder = 1000;
-      const edges = new THREE.LineSegments(mesh.edges, new THREE.LineBasicMaterial());
-      edges.renderOrder = 1001;
-      const marks = [stencil(geometry, THREE.BackSide, THREE.IncrementWrapStencilOp), stencil(geometry, THREE.FrontSide, THREE.DecrementWrapStencilOp)];
-      for (const mark of marks) mark.renderOrder = order + 1;
-      group.add(surface, edges, ...marks);
-      group.rotation.z = (place[2] * Math.PI) / 2;
-      const cap = new THREE.Mesh(new THREE.PlaneGeometry(1000, 1000), new THREE.MeshBasicMaterial({
+      for (const { place: [x, y, turns] = [0, 0, 0] } of copies) {
+        const copy = new THREE.Group();
+        copy.position.set(x, y, 0);
+        copy.rotation.z = (turns * Math.PI) / 2;
+        copy.add(new THREE.Mesh(geometry, surface), new THREE.LineSegments(mesh.edges, edges), new THREE.Mesh(geometry, mark));
+        [1000, 1001, order + 1].forEach((rank, i) => { copy.children[i].renderOrder = rank; });
+        group.add(copy);
+      }
+      const cap = new THREE.Mesh(sheet, new THREE.MeshBasicMaterial({
         color: colour, side: THREE.DoubleSide, stencilWrite: true, stencilRef: 0, stencilFunc: THREE.NotEqualStencilFunc,
         stencilFail: THREE.ReplaceStencilOp, stencilZFail: THREE.ReplaceStencilOp, stencilZPass: THREE.ReplaceStencilOp,
       }));
       cap.renderOrder = order + 1.1;
-      cap.onAfterRender = () => renderer.clearStencil();
       scene.add(group, cap);
-      return { ...description, group, surface, edges, marks, cap };
+      return { name, mesh, offset, shown, group, surface, edges, mark, cap };
     }
 
-    function free(part) {
-      scene.remove(part.group, part.cap);
-      part.cap.geometry.dispose();
-      for (const thing of [part.surface, part.edges, part.cap, ...part.marks]) thing.material.dispose();
+    function dispose({ surface, edges, mark, cap }) {
+      for (const material of [surface, edges, mark, cap.material]) material.dispose();
+    }
+
+    // The box of each copy of a part, where it stands.
+    function boxes(part) {
+      part.group.updateMatrixWorld(true);
+      return part.group.children.map((copy) => part.mesh.geometry.boundingBox.clone().applyMatrix4(copy.matrixWorld));
+    }
+
+    function around(found) {
+      return found.reduce((whole, one) => whole.union(one), new THREE.Box3());
     }
 
     function arrange() {
@@ -101,42 +118,38 @@
       plane.constant = -at * (plane.normal.x + plane.normal.y + plane.normal.z);
       const ink = theme.dark ? 0x0c0e10 : 0x23282d;
       for (const part of state.parts) {
-        const [x, y] = part.place || [0, 0];
-        const [dx, dy, dz] = part.offset || [0, 0, 0];
-        part.group.position.set(x + dx * state.apart, y + dy * state.apart, dz * state.apart);
+        const [dx, dy, dz] = part.offset;
+        part.group.position.set(dx * state.apart, dy * state.apart, dz * state.apart);
         part.group.visible = part.shown;
-        part.surface.material.clippingPlanes = on ? [plane] : [];
-        part.edges.material.clippingPlanes = on ? [plane] : [];
-        part.edges.material.color.set(ink);
-        for (const mark of part.marks) mark.visible = on;
-        part.cap.visible = on && part.shown;
-        plane.coplanarPoint(part.cap.position);
-        part.cap.lookAt(part.cap.position.clone().sub(plane.normal));
+        part.surface.clippingPlanes = part.edges.clippingPlanes = on ? [plane] : [];
+        part.edges.color.set(ink);
+        placeCap(part);
       }
       draw();
     }
 
-    function box(shownOnly) {
-      const all = new THREE.Box3();
-      for (const part of state.parts) {
-        if (shownOnly && !part.shown) continue;
-        part.group.updateMatrixWorld(true);
-        all.union(part.mesh.geometry.boundingBox.clone().applyMatrix4(part.group.matrixWorld));
-      }
-      return all;
+    // Every pixel costs time where there is no graphics card: what the cut does not meet has no marks, what it takes
+    // away is not drawn, and a cap is as large as what it closes.
+    function placeCap(part) {
+      const { on, axis, at } = state.cut;
+      const found = boxes(part);
+      const met = found.filter((box) => box.min[axis] <= at && box.max[axis] >= at);
+      part.group.children.forEach((copy, i) => {
+        copy.visible = !on || (CUTS[axis].includes(-1) ? found[i].min[axis] <= at : found[i].max[axis] >= at);
+        copy.children[2].visible = on && met.includes(found[i]);
+      });
+      part.cap.visible = on && part.shown && met.length > 0;
+      if (!part.cap.visible) return;
+      const size = around(met).getSize(new THREE.Vector3());
+      const [aboutX, aboutY, width, height] = CAPS[axis];
+      around(met).getCenter(part.cap.position)[axis] = at;
+      part.cap.rotation.set(aboutX, aboutY, 0);
+      part.cap.scale.set(1.02 * size[width] + 0.02, 1.02 * size[height] + 0.02, 1);
     }
 
-    // The corners of the boxes of what is shown.
     function corners() {
-      const found = [];
-      for (const part of state.parts.filter((each) => each.shown)) {
-        const { min, max } = part.mesh.geometry.boundingBox;
-        part.group.updateMatrixWorld(true);
-        for (const x of [min.x, max.x]) for (const y of [min.y, max.y]) for (const z of [min.z, max.z]) {
-          found.push(new THREE.Vector3(x, y, z).applyMatrix4(part.group.matrixWorld));
-        }
-      }
-      return found;
+      return state.parts.filter((part) => part.shown).flatMap(boxes).flatMap(({ min, max }) =>
+        [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new THREE.Vector3(x, y, z)))));
     }
 
     // Look from a side at all that is shown, as near as it fits.
@@ -199,8 +212,10 @@
     return {
       // parts: [{name, mesh, place: [x, y, quarter turns], offset: [x, y, z], shown}]
       show(parts) {
-        state.parts.forEach(free);
-        state.parts = parts.map(makePart);
+        state.gone.push(...state.parts);
+        for (const part of state.parts) scene.remove(part.group, part.cap);
+        const meshes = [...new Set(parts.map((part) => part.mesh))];
+        state.parts = meshes.map((mesh) => parts.filter((part) => part.mesh === mesh)).map(makePart);
         arrange();
       },
       visible(isShown) {
@@ -211,11 +226,12 @@
       apart(share) { state.apart = share; arrange(); },
       look,
       bounds() {
-        const all = box(false);
+        const all = around(state.parts.flatMap(boxes));
         return { x: [all.min.x, all.max.x], y: [all.min.y, all.max.y], z: [all.min.z, all.max.z] };
       },
       free() {
-        state.parts.forEach(free);
+        [...state.gone, ...state.parts].forEach(dispose);
+        sheet.dispose();
         controls.dispose();
         renderer.dispose();
       },
