@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -67,7 +68,9 @@ def content(parts: Sequence[GlbPart]) -> bytes:
 
     meshes, materials, nodes = [], [], []
     for part in parts:
-        vertices, normals, faces = shaded(*single_precision(part.vertices + 0.0, part.faces))
+        vertices, normals, faces = _ready(
+            part.vertices.astype(np.float64).tobytes(), part.faces.astype(np.int64).tobytes()
+        )
         wide = len(vertices) > 65535
         corners = faces.ravel().astype("<u4" if wide else "<u2")
         primitive = {
@@ -101,6 +104,13 @@ def content(parts: Sequence[GlbPart]) -> bytes:
     }
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     return _packed((b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", bytes(buffer)))
+
+
+@lru_cache(maxsize=32)
+def _ready(vertices: bytes, faces: bytes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a mesh in single precision, shaded: kept, since most bodies stay as they are while one number changes."""
+    corners = np.frombuffer(vertices).reshape(-1, 3) + 0.0
+    return shaded(*single_precision(corners, np.frombuffer(faces, np.int64).reshape(-1, 3)))
 
 
 def shaded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

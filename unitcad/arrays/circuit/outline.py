@@ -118,20 +118,20 @@ def _on_arc(points: np.ndarray) -> bool:
     if len(points) < 3:
         return True
     turn = _turn(points)
-    chord = points[-1] - points[0]
-    length = float(np.hypot(*chord))
+    x, y = float(points[-1, 0] - points[0, 0]), float(points[-1, 1] - points[0, 1])
+    length = math.hypot(x, y)
     if abs(turn) > _MOST_TURN or abs(turn) < 1e-6:
         return False
     radius = length / 2 / math.sin(abs(turn) / 2)
-    normal = np.array([-chord[1], chord[0]]) / length * math.copysign(1.0, turn)
-    centre = (points[0] + points[-1]) / 2 + normal * math.sqrt(max(radius**2 - length**2 / 4, 0.0))
-    return bool(np.max(np.abs(np.linalg.norm(points - centre, axis=1) - radius)) < _OFF)
+    away = math.copysign(math.sqrt(max(radius**2 - length**2 / 4, 0.0)), turn) / length
+    away_x = points[:, 0] - ((points[0, 0] + points[-1, 0]) / 2 - y * away)
+    away_y = points[:, 1] - ((points[0, 1] + points[-1, 1]) / 2 + x * away)
+    return bool(np.abs(np.hypot(away_x, away_y) - radius).max() < _OFF)
 
 
 def _turn(points: np.ndarray) -> float:
     """Return by how much an arc through points turns: left is positive, from the angles its chord is seen under."""
-    first, last = points[0], points[-1]
-    middle = points[len(points) // 2]
-    a, b = first - middle, last - middle
-    seen = math.atan2(a[0] * b[1] - a[1] * b[0], a @ b)
+    (x, y), (x0, y0), (x1, y1) = points[len(points) // 2].tolist(), points[0].tolist(), points[-1].tolist()
+    ax, ay, bx, by = x0 - x, y0 - y, x1 - x, y1 - y
+    seen = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
     return -math.copysign(2 * (math.pi - abs(seen)), seen)
