@@ -382,8 +382,17 @@ def test_moulds_that_are_refused_are_not_shown(live: Live) -> None:
     live.page.fill('input[name="diameter_mm"]', "300")  # the unit can be made, its moulds exceed the bed
     live.until(lambda: live.state == "no moulds")
     assert live.page.is_disabled('input[value="moulds"]')
+    assert live.page.inner_text('label:has(> input[value="moulds"])') == "Moulds (none can be made)"
     assert live.page.get_attribute("#page", "data-moulds") == "none"
     assert "has no moulds" in live.page.inner_text("#faults")
+
+
+def test_an_arrow_key_changes_a_number_by_its_second_digit(live: Live) -> None:
+    live.pressed(live.page.locator(WALL), "ArrowUp")
+    assert live.page.input_value(WALL) == "1.3"
+    live.pressed(live.page.locator('input[name="diameter_mm"]'), "ArrowUp")
+    assert live.page.input_value('input[name="diameter_mm"]') == "15"
+    assert live.page.evaluate("document.activeElement.name") == "diameter_mm"
 
 
 def test_an_emptied_number_is_no_change_and_says_so(live: Live) -> None:

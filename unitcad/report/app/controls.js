@@ -63,7 +63,8 @@
     const list = el("ul", { className: "parts" });
     const kindName = `kind-${(serial += 1)}`;
     const made = el("span", {});
-    const radios = [["unit", made], ["moulds", "Moulds"]].map(([kind, label]) =>
+    const ofMoulds = el("span", {});
+    const radios = [["unit", made], ["moulds", ofMoulds]].map(([kind, label]) =>
       el("label", {}, el("input", { type: "radio", name: kindName, value: kind, checked: kind === state.kind, onchange: () => choose(kind) }), label));
 
     const step = range("Casting step", { min: 0, max: 0, step: 1, value: 0, name: "step" }, (value) => { state.step = value; update(true); });
@@ -163,6 +164,7 @@
     function offer() {
       for (const label of radios) label.querySelector("input").disabled = !kinds[label.querySelector("input").value].length;
       made.textContent = model.makes === "patch" ? "Patch" : "Unit";
+      ofMoulds.textContent = kinds.moulds.length ? "Moulds" : model.moulds === undefined ? "Moulds (not made yet)" : "Moulds (none can be made)";
       for (const option of axis.options) option.textContent = (model.axes || AXES)[option.value];
     }
 

@@ -41,6 +41,12 @@
     return { at, place };
   }
 
+  // What an arrow key adds to a number: its second digit, or a hundredth of the range where it is 0.
+  function arrowStep(value, low, high) {
+    const size = Math.abs(value) || (high > low ? (high - low) / 10 : 1);
+    return 10 ** (Math.floor(Math.log10(size)) - 1);
+  }
+
   // options: change(path, value, {toml, coalesce}), remove(path), table(group, present), layers(), addLayer(), unread(path, why).
   function createForm(options) {
     const node = el("form", { className: "spec-form", autocomplete: "off", onsubmit: (event) => event.preventDefault() });
@@ -56,6 +62,8 @@
       const slider = typeof field.value === "number" && field.high > field.low
         ? el("input", { type: "range", min: 0, max: steps, step: 1, tabindex: "0", "aria-label": `${field.label}, slider` }) : null;
       const place = (now) => {
+        // Focus stays, and the value goes on to the next multiple.
+        if (field.kind !== "integer" && typeof now === "number") input.step = String(arrowStep(now, field.low, field.high));
         if (!slider || typeof now !== "number") return;
         way = way || track(field.low, field.high, now, field.kind === "integer");
         slider.value = String(Math.round(steps * way.place(now)));
