@@ -18,6 +18,7 @@ from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.arrays.pocket_procedure import pocket_procedure
 from unitcad.cache import MemoryStore
 from unitcad.casting.bench_views import picture_path, views
+from unitcad.casting.in_short import in_short
 from unitcad.casting.procedure import procedure
 from unitcad.casting.rules import broken_rules
 from unitcad.casting.time_line import duration
@@ -29,6 +30,8 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.array_build import build_array
 from unitcad.pipeline.build import Built
 from unitcad.report.bench_page import write_bench
+from unitcad.serve.answers import answered
+from unitcad.serve.messages import Ask, Trusted
 from unitcad.shape.lettering import seen
 from unitcad.spec import printer_of
 
@@ -56,6 +59,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory, store: MemoryStore) -> Path
 def _contents(folder: Path) -> dict[str, bytes]:
     files = (path for path in folder.rglob("*") if path.is_file() and path.name != "timings.json")
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def test_the_live_page_says_what_the_procedure_says(folder: Path) -> None:
+    told = answered(Ask(what="moulds", text=(folder / "array.toml").read_text("utf-8")), Trusted([]))
+    assert told.lines[:-1] == [*in_short(json.loads((folder / "casting.json").read_bytes()))]
 
 
 def test_the_folder_holds_units_patch_tools_and_procedure(folder: Path) -> None:

@@ -21,6 +21,7 @@ from unitcad import __version__
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_extras import extras
 from unitcad.arrays.array_file import array_hash, to_toml
+from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.bending import bending_record
 from unitcad.arrays.construction import construction_of
 from unitcad.arrays.patch import patch_bodies, patch_parts
@@ -160,21 +161,11 @@ def _step_pictures(moulds: PatchMoulds, store: Store) -> dict[str, str]:
 
 
 def _casting(moulds: PatchMoulds, shape: Geometry, units: dict[str, Product]) -> dict[str, bytes]:
-    """Return the procedure's files: the construction's own procedure, or that of any mould set."""
-    way, volumes = moulds.construction, [step["layer_volume_mm3"] for step in shape["steps"]]
-    if way.own_tails:
-        from unitcad.arrays.pocket_procedure import pocket_procedure
-
-        of_units = {folder: _of_unit(unit, units[folder]) for folder, unit in unit_folders(moulds.arranged).items()}
-        made = pocket_procedure(moulds, volumes[0], printed_mm3(shape["parts"]), of_units)
-    elif way.cast == "curved":
-        from unitcad.arrays.curved_procedure import curved_procedure
-
-        made = curved_procedure(moulds, volumes, printed_mm3(shape["parts"]))
-    else:
-        from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
-
-        made = back_sheet_procedure(moulds, volumes, printed_mm3(shape["parts"]))
+    """Return the procedure's files."""
+    volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
+    apart = unit_folders(moulds.arranged) if moulds.construction.own_tails else {}
+    of_units = {folder: _of_unit(unit, units[folder]) for folder, unit in apart.items()}
+    made = array_procedure(moulds, volumes, printed_mm3(shape["parts"]), of_units)
     return {path: text.encode() for path, text in written(made).items()}
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
 
@@ -17,12 +19,15 @@ from unitcad.errors import Refusal
 from unitcad.serve.form import LAST_TABLES, choices_of, fields, table_groups
 from unitcad.serve.messages import Answer, Field, Group, Trusted
 from unitcad.serve.unit_answers import holds_code as unit_holds_code
+from unitcad.serve.unit_answers import printed_mm3, unit_procedure
 from unitcad.spec.custom_code import files_named
-from unitcad.spec.toml import read_toml
-from unitcad.text import number
+from unitcad.spec.toml import from_json, read_toml, to_json
 from unitcad.validation import templates
 from unitcad.validation.dotted import at
 from unitcad.validation.faults import every_fault, line_of
+
+if TYPE_CHECKING:
+    from unitcad.casting.procedure import Procedure
 
 as_toml = to_toml
 
@@ -130,18 +135,30 @@ def _patch(array: Array, answer: Answer) -> None:
 
 
 def _tools(array: Array, answer: Answer) -> None:
+    from unitcad.arrays.array_procedure import array_procedure
     from unitcad.arrays.patch_moulds import patch_moulds
+    from unitcad.casting.in_short import in_short
     from unitcad.mould_checks import check_moulds
+    from unitcad.pipeline.array_product import unit_folders
     from unitcad.report.array_view import tools_model
 
     moulds = patch_moulds(array)
     answer.model = tools_model(array)
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
-    poured = sum(solid.volume() for step in moulds.plan.steps for solid in moulds.meshes(step.layer)) / 1000
-    names = ", ".join(tool.name for tool in moulds.plan.tools)
-    pours = len(moulds.plan.steps)
-    answer.lines = [f"{pours} pour{'s' if pours > 1 else ''}, {number(poured, 3)} cm3 to pour"]
-    answer.lines += [f"Tools of the sheet: {names}"]
+    apart = unit_folders(array) if moulds.construction.own_tails else {}
+    volumes = [sum(solid.volume() for solid in moulds.meshes(step.layer)) for step in moulds.plan.steps]
+    of_units = {name: _cast(to_json(unit)) for name, unit in apart.items()}
+    made = array_procedure(moulds, volumes, printed_mm3(moulds), of_units)
+    tools = ", ".join(tool.name for tool in moulds.plan.tools)
+    answer.lines = [*in_short(asdict(made)), f"Tools of the sheet: {tools}"]
+
+
+@lru_cache(maxsize=8)
+def _cast(unit: str) -> Procedure:
+    """Return the procedure of a unit, given as JSON: it stays while the sheet changes."""
+    from unitcad.moulds.mould_set import MouldSet
+
+    return unit_procedure(MouldSet(from_json(unit)))
 
 
 def _crosstalk(array: Array, answer: Answer) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from unitcad.errors import Refusal
 from unitcad.serve.form import groups
@@ -16,6 +16,10 @@ from unitcad.spec.custom_code import files_named, is_allowed, is_body_file, with
 from unitcad.validation import from_data
 from unitcad.validation.defaults import effective
 from unitcad.validation.load import all_faults
+
+if TYPE_CHECKING:
+    from unitcad.casting.procedure import Procedure
+    from unitcad.moulds.mould_set import MouldSet
 
 form = groups
 as_data = to_data
@@ -95,25 +99,35 @@ def _grams(spec: Spec, volumes: list[float]) -> list[float]:
 
 def _moulds(spec: Spec, answer: Answer) -> None:
     from unitcad.casting.in_short import in_short
-    from unitcad.casting.procedure import procedure
     from unitcad.mould_checks import check_moulds
     from unitcad.moulds.mould_set import MouldSet
-    from unitcad.pipeline.bodies import glb_content, is_printed
+    from unitcad.pipeline.bodies import glb_content
     from unitcad.pipeline.scenes import moments, taken_apart
     from unitcad.report.viewer_models import cells
 
     moulds = MouldSet(spec)
-    plan, solids = moulds.plan, moulds.solids
     answer.model = {
-        "moulds": glb_content(moulds, plan.tools),
+        "moulds": glb_content(moulds, moulds.plan.tools),
         "cells": cells(moulds),
         "moments": [{"title": moment.title, "parts": list(moment.parts)} for moment in moments(moulds)],
         "moulds_apart": {name: list(offset) for name, offset in taken_apart(moulds).items()},
     }
     answer.checks = [dict(finding.as_dict()) for finding in check_moulds(moulds)]
-    printed = sum(solids[tool.name].volume() for tool in plan.tools if is_printed(tool))
-    made = procedure(moulds, [solids[step.name].volume() for step in plan.steps], printed)
-    answer.lines = list(in_short(asdict(made)))
+    answer.lines = list(in_short(asdict(unit_procedure(moulds))))
+
+
+def unit_procedure(moulds: MouldSet) -> Procedure:
+    """Return the casting procedure of a unit from its meshes."""
+    from unitcad.casting.procedure import procedure
+
+    return procedure(moulds, [moulds.solids[step.name].volume() for step in moulds.plan.steps], printed_mm3(moulds))
+
+
+def printed_mm3(moulds: MouldSet) -> float:
+    """Return the volume of all printed tools."""
+    from unitcad.pipeline.bodies import is_printed
+
+    return sum(moulds.mesh(tool).volume() for tool in moulds.plan.tools if is_printed(tool))
 
 
 def _estimate(spec: Spec, answer: Answer) -> None:
