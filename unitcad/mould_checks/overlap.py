@@ -95,10 +95,10 @@ def common_volume(one: Manifold, other: Manifold) -> float:
     """Return the volume that two solids share, mm3.
 
     Where faces coincide the mesh kernel now and then keeps a part that is not shared, in one order of the two alone:
-    what is found is found in both orders.
+    what is found is found in both orders. `other` is cut first: a cup and then the base take half as long that way.
     """
-    volume = float((one ^ other).volume())
-    return volume if volume <= OVERLAP else min(volume, float((other ^ one).volume()))
+    volume = float((other ^ one).volume())
+    return volume if volume <= OVERLAP else min(volume, float((one ^ other).volume()))
 
 
 class _Volumes:
