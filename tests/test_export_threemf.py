@@ -8,8 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sample_bodies import all_bodies
 
+from unitcad.check import check_file
 from unitcad.export import printing, threemf
 from unitcad.kernels.mesh import arrays, realise
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.bodies import is_printed, threemf_content
+from unitcad.validation import load
 
 CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 
@@ -91,3 +95,37 @@ def test_names_are_escaped(parts):
     odd = threemf.MeshPart('a<b>"&', (0, 0.5, 1), parts[-1].vertices, parts[-1].faces)
     node = next(model(threemf.content([odd])).iter(f"{CORE}object"))
     assert node.get("name") == 'a<b>"&'
+
+
+def volume(node: ElementTree.Element) -> float:
+    """Return an object's volume by the divergence theorem, mm3."""
+    corners = np.array([[float(v.get(axis, "")) for axis in "xyz"] for v in node.iter(f"{CORE}vertex")])
+    faces = [[int(t.get(key, "")) for key in ("v1", "v2", "v3")] for t in node.iter(f"{CORE}triangle")]
+    return float(np.linalg.det(corners[faces]).sum() / 6)
+
+
+def test_copies_share_a_mesh_and_each_has_an_item(tmp_path):
+    moulds = MouldSet(load("encapsulating", ("moulds.cavities=[2,3]",)))
+    bodies = [body for body in moulds.plan.pieces if is_printed(body)]
+    path = tmp_path / "moulds.3mf"
+    path.write_bytes(threemf_content(moulds, bodies))
+    root = model(path.read_bytes())
+    tongues = [body.name for body in bodies if body.kind == "tongue"]
+    assert len(tongues) == 6
+    numbers = [name for item in root.iter(f"{CORE}item") if (name := item.get("partnumber"))]
+    assert sorted(numbers) == tongues
+    assert [o.get("name") for o in root.iter(f"{CORE}object")] == [
+        "base",
+        "cup1",
+        "cup2",
+        "tongue",
+        "tongue-1",
+        "blade",
+    ]
+    volumes = {o.get("id"): volume(o) for o in root.iter(f"{CORE}object")}
+    built = [volumes[item.get("objectid")] for item in root.iter(f"{CORE}item")]
+    assert sorted(built) == pytest.approx(sorted(moulds.mesh(body).volume() for body in bodies), rel=1e-5)
+    boxes = placed_boxes(root)
+    for i, (low, high) in enumerate(boxes):
+        assert all(np.maximum(low - b, a - high)[:2].max() >= threemf.GAP_MM - 1e-5 for a, b in boxes[:i])
+    assert not check_file(path).findings

@@ -20,7 +20,7 @@ from unitcad import files
 from unitcad.errors import UnitcadError
 from unitcad.kernels import occt
 from unitcad.kernels.ocp import loading
-from unitcad.shape.body import Body
+from unitcad.shape.body import Body, part_names
 
 with loading("OCP"):
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
@@ -95,18 +95,6 @@ def _parts(bodies: Sequence[Body], solids: Sequence[TopoDS_Shape]) -> list[list[
     return parts
 
 
-def _part_names(bodies: Sequence[Body], parts: Sequence[Sequence[int]]) -> list[str]:
-    """Return a name for each part: its body's, or for several copies that of their kind, which no body has."""
-    taken, names = {body.name for body in bodies}, []
-    for part in parts:
-        first = bodies[part[0]]
-        kind = f"{first.kind}{first.step or ''}"
-        several = (f"{kind}-{i}" if i else kind for i in itertools.count())
-        names.append(first.name if len(part) == 1 else next(name for name in several if name not in taken))
-        taken.add(names[-1])
-    return names
-
-
 def _document(
     bodies: Sequence[Body], solids: Sequence[TopoDS_Shape], parts: Sequence[Sequence[int]], name: str
 ) -> TDocStd_Document:
@@ -117,7 +105,7 @@ def _document(
     _name(assembly, name)
     earlier: list[TopoDS_Shape] = []
     labels: dict[int, TDF_Label] = {}
-    for part, of_part in zip(parts, _part_names(bodies, parts), strict=True):
+    for part, of_part in zip(parts, part_names(bodies, parts), strict=True):
         solid = solids[part[0]].Located(TopLoc_Location())
         if any(solid.IsPartner(other) for other in earlier):
             # Two parts of one shape, in two colours, would share a label, so also a name.

@@ -32,7 +32,8 @@ _RELATIONSHIPS = """<?xml version="1.0" encoding="UTF-8"?>
 class MeshPart:
     """A named mesh in print attitude: vertices (n, 3) float32 in mm, faces (m, 3), colour as three numbers 0 to 1.
 
-    Faces of several colours have a `palette`, of which `paint` (m,) is each face's index.
+    Faces of several colours have a `palette`, of which `paint` (m,) is each face's index. `copies`: the names of
+    several that are alike; the mesh is in the file once, and each has an item of the build, its name as part number.
     """
 
     name: str
@@ -41,6 +42,7 @@ class MeshPart:
     faces: np.ndarray
     palette: tuple[tuple[float, float, float], ...] = ()
     paint: np.ndarray | None = None
+    copies: tuple[str, ...] = ()
 
 
 def content(parts: Sequence[MeshPart], bed_mm: tuple[float, float] = (220.0, 220.0)) -> bytes:
@@ -89,7 +91,8 @@ def colour_hex(colour: tuple[float, float, float]) -> str:
 def _model(parts: Sequence[MeshPart], bed_mm: tuple[float, float]) -> str:
     low = [part.vertices.min(axis=0).astype(float) for part in parts]
     size = [part.vertices.max(axis=0).astype(float) - least for part, least in zip(parts, low, strict=True)]
-    places = layout([(float(width), float(depth)) for width, depth, _ in size], bed_mm)
+    built = [(index, copy) for index, part in enumerate(parts) for copy in part.copies or ("",)]
+    places = layout([(float(size[index][0]), float(size[index][1])) for index, _ in built], bed_mm)
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<model unit="millimeter" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">',
@@ -119,9 +122,10 @@ def _model(parts: Sequence[MeshPart], bed_mm: tuple[float, float]) -> str:
         ]
         base += len(part.palette) or 1
     lines += ["</resources>", "<build>"]
-    for index, (x, y) in enumerate(places):
+    for (index, copy), (x, y) in zip(built, places, strict=True):
         move = " ".join(f"{value + 0.0:.6f}" for value in (x, y, 0.0) - low[index])
-        lines.append(f'<item objectid="{index + 2}" transform="1 0 0 0 1 0 0 0 1 {move}"/>')
+        named = f" partnumber={quoteattr(copy)}" if copy else ""
+        lines.append(f'<item objectid="{index + 2}" transform="1 0 0 0 1 0 0 0 1 {move}"{named}/>')
     return "\n".join([*lines, "</build>", "</model>", ""])
 
 

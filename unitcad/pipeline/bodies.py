@@ -19,7 +19,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.manifest_records import PartRecord
 from unitcad.pipeline.versions import code_version, kernel_versions
 from unitcad.shape import Shape, content_hash
-from unitcad.shape.body import Body
+from unitcad.shape.body import Body, copies, part_names
 
 if TYPE_CHECKING:
     import numpy as np
@@ -73,11 +73,16 @@ def stl_content(moulds: MouldSet, body: Body) -> bytes:
 
 
 def threemf_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:
-    """Return the 3MF of several bodies, side by side on the spec's bed."""
+    """Return the 3MF of several bodies, side by side on the spec's bed; copies share one mesh."""
     from unitcad.export import threemf
 
     bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
-    return threemf.content([threemf.MeshPart(b.name, b.colour, *_ready(moulds, b)) for b in bodies], bed)
+    alike = copies(bodies)
+    parts = []
+    for name, places in zip(part_names(bodies, alike), alike, strict=True):
+        first, several = bodies[places[0]], tuple(bodies[i].name for i in places) if len(places) > 1 else ()
+        parts.append(threemf.MeshPart(name, first.colour, *_ready(moulds, first), copies=several))
+    return threemf.content(parts, bed)
 
 
 def glb_content(moulds: MouldSet, bodies: Sequence[Body]) -> bytes:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from unitcad.shape.tree import Shape
+from unitcad.shape.tree import UNTURNED, Place, Shape
 
 Kind = Literal[
     "layer",
@@ -49,3 +51,31 @@ class Body:
 
     def __repr__(self) -> str:
         return f"Body({self.name!r}: {self.kind}, {self.made}, {type(self.shape).__name__})"
+
+
+def copies(bodies: Sequence[Body]) -> list[list[int]]:
+    """Return the places in the list of bodies that differ by name and a move alone: as they are printed, one solid."""
+    found: dict[object, list[int]] = {}
+    for i, body in enumerate(bodies):
+        like = (_unmoved(body.shape), body.kind, body.step, body.colour, body.made, body.upside_down)
+        found.setdefault(like, []).append(i)
+    return list(found.values())
+
+
+def part_names(bodies: Sequence[Body], parts: Sequence[Sequence[int]]) -> list[str]:
+    """Return a name for each part: its body's, or for several copies that of their kind, which no body has."""
+    taken, names = {body.name for body in bodies}, []
+    for part in parts:
+        first = bodies[part[0]]
+        kind = f"{first.kind}{first.step or ''}"
+        several = (f"{kind}-{i}" if i else kind for i in itertools.count())
+        names.append(first.name if len(part) == 1 else next(name for name in several if name not in taken))
+        taken.add(names[-1])
+    return names
+
+
+def _unmoved(shape: Shape) -> Shape:
+    """Return a shape before the last moves that turned nothing."""
+    while isinstance(shape, Place) and shape.turn == UNTURNED:
+        shape = shape.shape
+    return shape
