@@ -34,6 +34,17 @@ def test_the_middle_of_the_sheet_keeps_its_length() -> None:
     assert pairs(array).centre[0, 1] == pytest.approx(2 * math.pi * 40 / 8, abs=2e-3)
 
 
+@pytest.mark.parametrize("template", ["sleeve-curved", "wrist-band"])
+def test_the_back_lies_at_its_radius(template: str) -> None:
+    """A point of the back, wrapped round the limb, is that far from the axis."""
+    array = load_array(template)
+    assert array.radius_mm is not None
+    assert array.middle_radius_mm is not None
+    back = np.array([[7.0, 1.0, array.sheet.high]])
+    x, _, z = wrapped(back, array.radius_mm, array.middle_radius_mm)[0]
+    assert array.back_radius_mm == pytest.approx(math.hypot(x, z), rel=1e-12)
+
+
 def test_strains_and_sagitta_are_those_of_the_geometry() -> None:
     """A face at the middle's radius +- t/2 has the arc's length times that ratio; a flat unit is a tangent."""
     array = load_array("wrist-band")

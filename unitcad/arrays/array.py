@@ -92,6 +92,11 @@ class Array:
         """Radius of the sheet's middle round the limb, which keeps its length as the sheet is bent; None: worn flat."""
         return None if self.radius_mm is None else self.radius_mm + (self.sheet.low + self.sheet.high) / 2
 
+    @property
+    def back_radius_mm(self) -> float:
+        """Distance of the sheet's back from the limb's axis; of a flat array from the skin."""
+        return (self.radius_mm or 0.0) + self.sheet.high
+
     @cached_property
     def pitch_mm(self) -> float:
         """The least distance between two places' centres, mm; infinite for one place."""

@@ -82,7 +82,7 @@ def poured(array: Array) -> Shape:
     inner, height, outer = dims.radii[-2], dims.heights[-2], dims.outer_radius
     holes = [strap_slot(array, slot, BEYOND) for slot in sheet.strap_slots]
     back = Common(
-        (barrel(array, radius + sheet.high), inside_of_end(array, left=True), inside_of_end(array, left=False))
+        (barrel(array, array.back_radius_mm), inside_of_end(array, left=True), inside_of_end(array, left=False))
     )
     back = cut(back, [barrel(array, radius + sheet.low), *holes])
     rounds = [bent(array, cylinder(outer, 0.0, sheet.high + BEYOND), p.x, p.y) for p in array.places]

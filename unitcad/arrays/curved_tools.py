@@ -82,7 +82,7 @@ class Former:
     @property
     def back(self) -> float:
         """Radius of the sheet's back."""
-        return (self.array.radius_mm or 0.0) + self.array.sheet.high
+        return self.array.back_radius_mm
 
     @property
     def front(self) -> float:
@@ -153,7 +153,7 @@ def _former(array: Array) -> Former:
     """Return what base and lid are drawn to. Raises Refusal for plates beyond the bed."""
     spec, moulds, sheet = array.unit, array.unit.moulds, array.sheet
     dims, radius = replace(dimensions(spec), exit=None, sides=()), array.radius_mm or 0.0
-    back = radius + sheet.high
+    back = array.back_radius_mm
     x0, y0, x1, y1 = sheet.outline
     end = math.radians(angle_deg(array, max(-x0, x1))) + LAND / back
     seat = mm(math.floor((back * math.cos(end) - radius) / moulds.layer_mm) * moulds.layer_mm)

@@ -48,7 +48,7 @@ def barrel(array: Array, radius: float) -> Shape:
 
 def slice_of(array: Array, first: float, last: float) -> Shape:
     """Draw all that lies between two places of the flat frame (mm), planes through the limb's axis."""
-    reach = 2 * ((array.radius_mm or 0.0) + array.sheet.high)
+    reach = 2 * array.back_radius_mm
     turns = (math.radians(angle_deg(array, x)) for x in (last, first))
     corners = ((reach * math.sin(turn), reach * math.cos(turn)) for turn in turns)
     drawn = Extrude(polygon((0, 0), *corners), -LENGTH, LENGTH)
@@ -59,7 +59,7 @@ def inside_of_end(array: Array, *, left: bool) -> Shape:
     """Draw all that lies on the sheet's side of its left or right end: a plane through the axis, with round corners."""
     sheet = array.sheet
     x0, y0, x1, y1 = sheet.outline
-    r, far, quarter = sheet.corner_mm, 3 * ((array.radius_mm or 0.0) + sheet.high), math.tan(math.pi / 8)
+    r, far, quarter = sheet.corner_mm, 3 * array.back_radius_mm, math.tan(math.pi / 8)
     corners = [(-far, y0, 0.0), (-r, y0, quarter), (0.0, y0 + r, 0.0), (0.0, y1 - r, quarter)]
     if mm(y0 + r) == mm(y1 - r):  # two corners that meet
         del corners[2]

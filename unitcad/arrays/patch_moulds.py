@@ -170,7 +170,7 @@ class PatchMoulds(MouldSet):
         array = self.arranged
         radius = max(array.sheet.corner_mm, *(unit.diameter_mm / 2 for unit in array.units))
         if array.cast == "curved":
-            radius = max(radius, (array.radius_mm or 0.0) + array.sheet.high)
+            radius = max(radius, array.back_radius_mm)
         return segment_count(radius + math.sqrt(radius), self.spec.output.tolerance_mm)
 
     @cached_property
