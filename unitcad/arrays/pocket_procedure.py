@@ -21,7 +21,8 @@ from unitcad.casting.finishing import shown
 from unitcad.casting.instructions import TACK, mixed
 from unitcad.casting.joining import joining
 from unitcad.casting.needs import CALIPER, NEEDS, needs
-from unitcad.casting.preparation import MORE_PLATES, cleaning, fall, in_resin
+from unitcad.casting.plates import mould_plates
+from unitcad.casting.preparation import cleaning, fall, in_resin, on_plates
 from unitcad.casting.procedure import Procedure, bubbles, pour_of
 from unitcad.casting.time_line import duration, phases
 from unitcad.catalogue import Material
@@ -125,18 +126,19 @@ def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
 
 
 def _sort(moulds: PatchMoulds) -> str:
-    tray = listed(f"moulds/{piece.name}.stl" for piece in moulds.plan.pieces_of("base"))
+    tray, files = (
+        listed(f"moulds/{piece.name}.stl" for piece in moulds.plan.pieces_of("base")),
+        listed(mould_plates(moulds)),
+    )
     return (
-        f"Print tray ({tray}) and blade as they lie in moulds/moulds.3mf, without supports. The tray is engraved "
+        f"Print tray ({tray}) and blade as they lie in {files}, without supports. The tray is engraved "
         f"{seen(f'B{moulds.plan.label}')}."
     )
 
 
 def _printing(moulds: PatchMoulds, solid_mm3: float, units: Iterable[str]) -> Iterator[str]:
     lengths, what = moulds.spec.moulds, "resin" if in_resin(moulds) else "filament"
-    yield "Plate: moulds/moulds.3mf (tray and blade, as they are printed; moulds/ has them singly as STL too)."
-    if moulds.plan.splits:
-        yield MORE_PLATES
+    yield on_plates(moulds, "tray and blade, as they are printed")
     yield f"Printer {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm, no supports."
     yield f"At most {number(solid_mm3 / 1000, 2)} cm3 of {what} (computed: the pieces, solid)."
     yield f"The units' moulds: {listed(f'{folder}/moulds/moulds.3mf' for folder in units)}, as their casting.md says."

@@ -10,6 +10,7 @@ from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bench_views import View, level_on, picture_path
 from unitcad.casting.figures import at_room, window_length
 from unitcad.casting.joining import joining
+from unitcad.casting.plates import mould_plates
 from unitcad.casting.time_line import duration
 from unitcad.catalogue import Material
 from unitcad.designs.rib_leaves import leaf_mm
@@ -29,10 +30,17 @@ SPARE = 2.0
 FOOT_MM = 0.2
 PHONE_DEG = 0.1
 """What a phone's level shows (assumed)."""
-MORE_PLATES = (
-    "Together the pieces are larger than the bed; each one fits it. Let the slicer arrange them on as many plates as "
-    "they need, none of them tilted."
-)
+
+
+def on_plates(moulds: MouldSet, count: str) -> str:
+    """Say which files to print, and what is in each where one bed does not hold all; `count`: the pieces in words."""
+    files = mould_plates(moulds)
+    singly = "moulds/ has them singly as STL too"
+    if len(files) == 1:
+        return f"Plate: {next(iter(files))} ({count}; {singly})."
+    names = {path: [moulds.plan.called(one.name).replace(",", "") for one in plate] for path, plate in files.items()}
+    each = (f"{path} with {listed(there)}" for path, there in names.items())
+    return f"{len(files)} plates, for one bed does not hold all: {'; '.join(each)} ({count}; {singly})."
 
 
 def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> tuple[str, ...]:
@@ -51,12 +59,10 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> tup
     turned = listed(dict.fromkeys(names))
     count = "one piece" if len(printed) == 1 else f"{len(printed)} pieces"
     lines = [
-        f"Plate: moulds/moulds.3mf ({count}; moulds/ has them singly as STL too). They lie in it as they are printed: "
+        f"{on_plates(moulds, count)} They lie in it as they are printed: "
         f"{turned} upside down, the rest as drawn. Turn none of them.",
         f"Printer {spec.moulds.printer}, layers of {number(spec.moulds.layer_mm, 3)} mm, no supports.",
     ]
-    if plan.splits:
-        lines.append(MORE_PLATES)
     standing = plan.dimensions.core_height - moulds.plate[0]
     blade = BLADE_HEIGHT if plan.of_kind("blade") else 0.0
     time = fig.print_min(spec, solid_mm3, max(standing, blade, tallest_mm))

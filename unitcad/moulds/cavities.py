@@ -119,7 +119,8 @@ def _block_round(solids: Sequence[Manifold], top: float) -> Manifold:
     It ends at the rim plane, where the pour is open and the blade runs, or at the lid's upper face, where sprue and
     vents open.
     """
-    x0, y0, z0, x1, y1, _ = Manifold.compose(list(solids)).bounding_box()
+    boxes = np.array([solid.bounding_box() for solid in solids])
+    (x0, y0, z0), (x1, y1) = boxes[:, :3].min(axis=0).tolist(), boxes[:, 3:5].max(axis=0).tolist()
     # On the grid, as everything drawn is: a film above the tools would close every cavity.
     return realise(box(x0 - 5, x1 + 5, y0 - 5, y1 + 5, z0 - 5, top), 4)
 

@@ -13,6 +13,7 @@ from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from unitcad.cache import Store, digest
+from unitcad.casting.plates import plates
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.bodies import (
     body_key,
@@ -92,8 +93,9 @@ def _of_bodies(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
         for body in printed:
             path, key = f"{group.name}/{file_stem(body)}.stl", partial(body_key, moulds, body, "stl")
             yield Artifact(path, "stl", "meshes", partial(stl_content, moulds, body), key, (body.name,))
-        threemf, key = partial(threemf_content, moulds, printed), partial(joint_key, moulds, every, "3mf", *bed)
-        yield Artifact(f"{together}.3mf", "3mf", "meshes", threemf, key, tuple(body.name for body in printed))
+        for path, plate in plates(moulds, printed, together).items():
+            threemf, key = partial(threemf_content, moulds, plate), partial(joint_key, moulds, plate, "3mf", *bed)
+            yield Artifact(path, "3mf", "meshes", threemf, key, tuple(body.name for body in plate))
         glb, key = partial(glb_content, moulds, every), partial(joint_key, moulds, every, "glb")
         yield Artifact(f"{together}.glb", "glb", "meshes", glb, key, names)
         step, key = partial(step_content, every, group.name), partial(_step_key, moulds, every, group.name)

@@ -172,6 +172,11 @@ def _dot(row: Sequence[float], column: Sequence[float]) -> float:
     return sum(one * other for one, other in zip(row, column, strict=True))
 
 
+def extent(shape: Shape) -> Extent:
+    """Return a box that holds a shape: (x0, y0, z0, x1, y1, z1), mm; of what is cut the body's."""
+    return _Nodes().of(shape).extent
+
+
 @lru_cache(maxsize=4096)
 def _box_of(shape: Shape) -> Extent:
     """Return a box that holds a leaf, in its own frame, mm; a circle's polygon may stand out of the circle a little."""
