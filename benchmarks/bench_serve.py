@@ -55,7 +55,7 @@ def main() -> None:
     """Measure every spec and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--changes", type=int, default=40, help="of each spec")
-    parser.add_argument("--specs", default="embedded,encapsulating,three-layer,forearm-pockets")
+    parser.add_argument("--specs", default="embedded,encapsulating,three-layer,forearm-pockets,forearm-patch")
     parser.add_argument("--json", type=Path, metavar="FILE")
     parser.add_argument("--write", action="store_true", help="the table into docs/serve.md")
     asked = parser.parse_args()

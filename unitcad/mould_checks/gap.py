@@ -75,13 +75,15 @@ def _on_pins(moulds: MouldSet, name: str, piece: Manifold, base: Manifold, pins:
 def _sideways(cup: Manifold, base: Manifold, most: float, seat: float = 0.0) -> float:
     """Return the least distance in any section above the seat, at most `most`, mm."""
     heights = sorted({seat, *(float(z) for solid in (cup, base) for z in arrays(solid)[0][:, 2] if z > seat)})
-    gaps = [most]
+    least = most
     for below, above in pairwise(heights):
         sections = [solid.slice((below + above) / 2) for solid in (cup, base)]
         if above - below > THIN and not any(section.is_empty() for section in sections):
             one, other = (Manifold.extrude(section, 1.0) for section in sections)
-            gaps.append(float(one.min_gap(other, most)))
-    return min(gaps)
+            least = min(least, float(one.min_gap(other, least)))  # looked for no farther than the least so far
+            if least == 0:
+                break
+    return least
 
 
 CHECK = MouldCheck("C210", "gap: faces that slide have the printer's clearance", findings)
