@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import hashlib
 import json
 import math
 import os
 import re
-import shutil
 import stat
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -80,6 +78,8 @@ def read_json(path: str | os.PathLike[str], *, largest: int = LARGEST, links: bo
 
 def sha256(path: str | os.PathLike[str]) -> str:
     """Return the SHA-256 of a file of any size, read in pieces. Raises UnitcadError where it can't be read."""
+    import hashlib
+
     found = hashlib.sha256()
     try:
         with open(path, "rb", opener=regular()) as file:
@@ -237,6 +237,8 @@ def _remove_scratch(folder: Path) -> None:
                 os.unlink(folder / name)
         os.rmdir(folder)
     except OSError:
+        import shutil
+
         shutil.rmtree(folder, ignore_errors=True)
 
 

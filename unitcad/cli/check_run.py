@@ -66,8 +66,7 @@ def run(asked: Asked) -> int:
         raise unknown_name("--output-format", output_format, FORMATS)
     copies = [_copy(given, FORMATS) for given in asked.report or []]
     configuration = check_settings.find(asked.config, wanted=not asked.no_config)
-    settings = configuration.settings
-    fail_on = asked.fail_on or settings.fail_on or "error"
+    fail_on = asked.fail_on or configuration.value("fail_on") or "error"
     if fail_on not in ("error", "warning"):
         raise unknown_name("--fail-on", fail_on, ("error", "warning"))
     base = Path(asked.baseline) if asked.baseline is not None else configuration.baseline
@@ -85,21 +84,23 @@ def run(asked: Asked) -> int:
         unit=unit_named(*configuration.chosen("unit", asked.unit)),
         printer=_printer(*configuration.chosen("printer", asked.printer)),
         shells=asked.shells,
-        strict_3mf=bool(settings.strict_3mf if asked.strict_3mf is None else asked.strict_3mf),
-        limits=_limits(asked.max_faces or settings.max_faces, *configuration.chosen("timeout", asked.timeout)),
+        strict_3mf=bool(configuration.value("strict_3mf") if asked.strict_3mf is None else asked.strict_3mf),
+        limits=_limits(
+            asked.max_faces or configuration.value("max_faces"), *configuration.chosen("timeout", asked.timeout)
+        ),
         locations=detail.MOST if asked.all_locations or base is not None or asked.show is not None else detail.SHOWN,
         draw=asked.show is not None,
     )
     if not asked.files and asked.manifest is None:
         raise UnitcadError("check needs files, folders or globs, or --manifest")
-    for pattern, codes in settings.per_file_ignores.items():
+    for pattern, codes in (configuration.value("per_file_ignores") or {}).items():
         check_prefixes(configuration.name(f"per-file-ignores.{pattern}"), codes)
     draw = None
     if asked.show is not None:
         from unitcad.export import finding_pictures
 
         draw = partial(finding_pictures.write, Path(asked.show))
-    memory = asked.memory or settings.memory or 8000
+    memory = asked.memory or configuration.value("memory") or 8000
     check_all = partial(many_files.check_files, jobs=asked.jobs, memory_mb=memory, then=draw)
     reports = _reports(asked.files or [], configuration, options, asked.manifest, check_all)
     shown = detail.MOST if asked.all_locations else detail.SHOWN

@@ -6,39 +6,26 @@ The nearest file with such a table, from the working directory upwards, is used;
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from msgspec import Meta, Struct, field
+from typing import TYPE_CHECKING, Any
 
 from unitcad import files
 from unitcad.errors import Refusal, UnitcadError, unknown_key
 from unitcad.files import seen_from
 
+if TYPE_CHECKING:
+    from unitcad.cli.check_table import Settings
+
 NAMES = ("unitcad.toml", "pyproject.toml")
 
 
-class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename="kebab"):
-    """Keys that a file may set, None or empty where it does not. They have the options' names."""
-
-    select: list[str] = []
-    ignore: list[str] = []
-    per_file_ignores: dict[str, list[str]] = {}
-    fail_on: Literal["error", "warning"] | None = None
-    printer: str | None = None
-    unit: str | None = None
-    strict_3mf: bool | None = field(default=None, name="3mf-strict")
-    max_faces: Annotated[int, Meta(ge=1)] | None = None
-    timeout: Annotated[float, Meta(ge=0.001)] | None = None
-    memory: Annotated[int, Meta(ge=200)] | None = None
-    baseline: str | None = None
-
-
-class Configuration(Struct, frozen=True, kw_only=True):
+@dataclass(frozen=True, kw_only=True)
+class Configuration:
     """Settings with the file they come from, None for none, and the table's name there."""
 
-    settings: Settings = Settings()
+    settings: Settings | None = None
     path: Path | None = None
     table: str = ""
 
@@ -48,7 +35,11 @@ class Configuration(Struct, frozen=True, kw_only=True):
 
     def chosen(self, key: str, given: Any) -> tuple[str, Any]:
         """Return an option's name and the value `given` to it; without one, the name and the value of its setting."""
-        return (f"--{key}", given) if given is not None else (self.name(key), getattr(self.settings, key))
+        return (f"--{key}", given) if given is not None else (self.name(key), self.value(key))
+
+    def value(self, key: str) -> Any:
+        """Return the value of a setting, None without a file."""
+        return getattr(self.settings, key, None)
 
     @property
     def shown(self) -> str | None:
@@ -58,13 +49,13 @@ class Configuration(Struct, frozen=True, kw_only=True):
     @property
     def baseline(self) -> Path | None:
         """Path of the baseline, which the file gives from its own folder."""
-        if self.path is None or self.settings.baseline is None:
+        if self.path is None or self.value("baseline") is None:
             return None
-        return Path(seen_from(self.path.parent / self.settings.baseline))
+        return Path(seen_from(self.path.parent / self.value("baseline")))
 
     def ignored(self, path: str) -> list[str]:
         """Return prefixes of codes that per-file-ignores drops for a file; patterns start at the settings' folder."""
-        if self.path is None:
+        if self.path is None or self.settings is None:
             return []
         below = seen_from(path, self.path.parent)
         return [
@@ -104,7 +95,7 @@ def _table(path: Path, data: Mapping[str, Any]) -> str:
 
 def _read(path: Path) -> Configuration | None:
     """Read the settings of a file; None without such a table. A unit's spec named unitcad.toml has none."""
-    import tomllib  # most runs have no settings
+    import tomllib
 
     shown = seen_from(path.absolute())
     try:
@@ -126,7 +117,8 @@ def _read(path: Path) -> Configuration | None:
                     raise unknown_key(".".join([*above, key]), data[key], [last])
         if last not in data:
             return None
-        from unitcad.spec.convert import convert  # most runs have no settings
+        from unitcad.cli.check_table import Settings
+        from unitcad.spec.convert import convert
 
         settings = convert(_mapping(table, data[last]), Settings, table)
     except Refusal as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -68,6 +67,8 @@ def check_listed(part: ListedFile, report: FileReport) -> Iterator[Finding]:
         yield M004.finding(f"listed for {', '.join(part.names)}")
         return
     if part.sha256 is not None:
+        import hashlib  # most files are in no manifest
+
         try:
             with path.open("rb") as file:
                 digest = hashlib.file_digest(file, "sha256").hexdigest()

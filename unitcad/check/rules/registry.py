@@ -56,10 +56,10 @@ def explain(codes: str) -> str:
     )
 
 
-def check_prefixes(option: str, prefixes: Sequence[str]) -> tuple[str, ...]:
+def check_prefixes(option: str, prefixes: Sequence[str] | None) -> tuple[str, ...]:
     """Return the prefixes in capitals. Raises `Refusal` for one that begins no code."""
     kept = []
-    for prefix in prefixes:
+    for prefix in prefixes or ():
         wanted = prefix.strip().upper()
         if not wanted or not any(code.startswith(wanted) for code in rules()):
             near = difflib.get_close_matches(wanted, rules(), n=1, cutoff=0.5)

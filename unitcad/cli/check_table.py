@@ -1,0 +1,23 @@
+"""What a settings file of `unitcad check` may hold: read only where there is one, since most runs have none."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct, field
+
+
+class Settings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, rename="kebab"):
+    """Keys that a file may set, None or empty where it does not. They have the options' names."""
+
+    select: list[str] = []
+    ignore: list[str] = []
+    per_file_ignores: dict[str, list[str]] = {}
+    fail_on: Literal["error", "warning"] | None = None
+    printer: str | None = None
+    unit: str | None = None
+    strict_3mf: bool | None = field(default=None, name="3mf-strict")
+    max_faces: Annotated[int, Meta(ge=1)] | None = None
+    timeout: Annotated[float, Meta(ge=0.001)] | None = None
+    memory: Annotated[int, Meta(ge=200)] | None = None
+    baseline: str | None = None
