@@ -229,3 +229,17 @@ def test_ctrl_c_stops_without_a_traceback(tmp_path: Path) -> None:
     assert "Traceback" not in errors
     assert len(list(tmp_path.glob("[!.]*"))) < len(NAMES)
     assert not [p for p in tmp_path.glob(".tmp-*")]
+
+
+@pytest.mark.parametrize(
+    "met",
+    [
+        "exec('raise KeyboardInterrupt')",  # as in a dataclass that is being made
+        "type('Made', (), {'kept': type('Name', (), {'__set_name__': lambda *_: exec('raise KeyboardInterrupt')})()})",
+    ],
+)
+def test_ctrl_c_while_a_module_is_loaded_leaves_with_130(met: str, tmp_path: Path) -> None:
+    (tmp_path / "command.py").write_text(f"import unitcad.cli as c; c._run = lambda _: {met}; c.main()")
+    command = [sys.executable, "-m", "command"]  # python -m alone passes on what Python noted of the interrupt
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")

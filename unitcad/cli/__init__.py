@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Any
+from typing import Any, NoReturn
 
 from unitcad.cli.output import say_error, speak_anywhere, warn
 from unitcad.errors import UnitcadError
@@ -40,6 +40,21 @@ def _run(words: list[str]) -> int:
     return command_line.run(words)
 
 
+def _interrupt_behind(error: BaseException | None) -> bool:
+    """Return whether Ctrl-C led to this error: Python 3.11 makes a RuntimeError of it while a class is made."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
+def _leave_interrupted() -> NoReturn:
+    """Say so and leave with exit code 130."""
+    warn("interrupted")
+    # Where Ctrl-C met an exec of text, as a dataclass has, Python ends itself by the signal unless another exec follows.
+    exec("")
+    sys.exit(INTERRUPTED)
+
+
 def main() -> None:
     """Entry point of `unitcad`: run a command, turn every error into one line and an exit code."""
     as_json = "--json" in sys.argv
@@ -47,14 +62,13 @@ def main() -> None:
     try:
         code = _run(sys.argv[1:])
         if code == INTERRUPTED:
-            warn("interrupted")
+            _leave_interrupted()
         sys.exit(code)
     except UnitcadError as error:
         say_error(error, as_json)
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
-        warn("interrupted")
-        sys.exit(INTERRUPTED)
+        _leave_interrupted()
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
@@ -63,6 +77,8 @@ def main() -> None:
         say_error(UnitcadError(f"{place}{error.strerror or error}"), as_json)
         sys.exit(2)
     except Exception as error:
+        if _interrupt_behind(error):
+            _leave_interrupted()
         if os.environ.get("UNITCAD_TRACEBACK"):
             raise
         say_error(
