@@ -50,7 +50,7 @@ def _interrupt_behind(error: BaseException | None) -> bool:
 def _leave_interrupted() -> NoReturn:
     """Say so and leave with exit code 130."""
     warn("interrupted")
-    # Where Ctrl-C met an exec of text, as a dataclass has, Python ends itself by the signal unless another exec follows.
+    # Where Ctrl-C met an exec of text, as in a dataclass, Python ends itself by the signal unless another exec follows.
     exec("")
     sys.exit(INTERRUPTED)
 
