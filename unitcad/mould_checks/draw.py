@@ -11,8 +11,9 @@ is sampled.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from functools import cache
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache, lru_cache
+from itertools import takewhile
 
 import numpy as np
 from manifold3d import Manifold
@@ -33,6 +34,7 @@ LEVEL = 1e-9
 """Heights nearer than this are equal, mm."""
 SLIVER = 1e-4
 """Volume of silicone that rounding leaves between two parts of it, mm3."""
+_Named = Sequence[tuple[str, Manifold]]
 _BLOCK = 100_000  # pairs of triangles clipped together
 
 
@@ -50,7 +52,8 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
         laid = [(body.name, moulds.mesh(body)) for body in step.inserts]
         silicone = [*(("layer", solid) for solid in layers), *laid]
         whole: Manifold | None = None
-        for removal in step.removals:
+        together: dict[Removal, float] = {}
+        for place, removal in enumerate(step.removals):
             where = f"pour {step.index}: {removal.piece}{removal.part and f' {removal.part}'} out"
             cast = removal.piece == CAST
             if cast and silicone:
@@ -67,7 +70,13 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
                 yield _out_of_order(where, "it is not there: it was taken away before, or does not stand in this pour")
                 continue
             areas, way, apart = [], removal.direction, []
-            for name, solid in (*there.items(), *silicone):
+            stays = [*there.items(), *silicone]
+            if not (cast or overlapping or removal in together):
+                together |= _together(step.removals[place:], piece, stays, facing)
+            if together.get(removal, math.inf) <= BLOCKED:
+                yield at_most("C300", where, together[removal], BLOCKED, "mm2")
+                continue
+            for name, solid in stays:
                 if cast and name == "layer":
                     continue
                 if overlapping and boxes_meet(piece, solid):
@@ -92,6 +101,24 @@ def _parted(moulds: MouldSet, silicone: Manifold, removal: Removal) -> tuple[Man
         return silicone, Manifold()
     part, rest = silicone.split(moulds.mesh_of(removal.within))
     return part, rest
+
+
+def _together(
+    removals: Sequence[Removal], first: Manifold, stays: _Named, facing: Callable[[Manifold, Way, bool], np.ndarray]
+) -> dict[Removal, float]:
+    """Return for the first removals, of pieces that go the same way, the area at which any of them meets anything.
+
+    `first` is the piece of the first removal. All that goes counts as staying too, so what is free here is free in any
+    order. One after the other, a hundred stubs under a plate would each be compared with the whole plate.
+    """
+    way, there = removals[0].direction, dict(stays)
+    like = takewhile(lambda each: each.direction == way and each.piece in there and each.piece != CAST, removals[1:])
+    going = [removals[0], *like]
+    if len(going) == 1:
+        return {}
+    up = np.concatenate([facing(piece, way, True) for piece in (first, *(there[each.piece] for each in going[1:]))])
+    down = np.concatenate([facing(solid, way, False) for solid in (first, *(solid for _, solid in stays))])
+    return dict.fromkeys(going, _meeting(up, down))
 
 
 def _areas(piece: np.ndarray, others: list[tuple[str, np.ndarray]]) -> list[tuple[float, str]]:
@@ -198,6 +225,7 @@ def _facing(solid: Manifold, direction: Way, upwards: bool) -> np.ndarray:
     return corners[doubled > 1e-9] if upwards else corners[doubled < -1e-9]
 
 
+@lru_cache(maxsize=256)
 def upright(direction: Way) -> np.ndarray:
     """Return a rotation that turns a direction to +z, by rows; for a signed axis it is exact."""
     up = np.asarray(direction, float) / math.hypot(*direction)
