@@ -16,7 +16,7 @@ from unitcad.kernels.mesh import shells
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
 from unitcad.mould_checks.hollows import GRID, SLIVER, hollows, least_wall
-from unitcad.moulds.congruence import Congruence, cropped, once_each
+from unitcad.moulds.congruence import Congruence, cropped, once_each, reaching
 from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -59,7 +59,7 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
             if tiles:
                 there = groove ^ _circle(tiles[i], farthest)
                 near = there ^ _circle(tiles[i], -farthest)
-                beside = Manifold.compose([cropped(piece, tiles[i]) for piece in _reaching(pieces, tiles[i])])
+                beside = Manifold.compose([cropped(piece, tiles[i]) for piece in reaching(pieces, tiles[i])])
             around = Manifold.extrude(near.offset(farthest, JoinType.Round), top - bottom + farthest)
             inside = Manifold.extrude(there.offset(GRID, JoinType.Miter), step.rim - bottom + 2 * GRID)
             others = beside ^ (around.translate((0, 0, bottom - farthest)) - inside.translate((0, 0, bottom - GRID)))
@@ -110,13 +110,6 @@ def _tiles(moulds: MouldSet, groove: CrossSection, beside: float, ends: tuple[fl
     tiles = [Column(cell.x, cell.y, reach + beside, *ends) for cell in lay.cells]
     covered = CrossSection.batch_boolean([_circle(tile, -beside) for tile in tiles], OpType.Add)
     return tiles if (groove - covered).is_empty() else []
-
-
-def _reaching(pieces: list[Manifold], column: Column) -> list[Manifold]:
-    """Return the pieces whose boxes reach into a column's."""
-    boxes = np.array([piece.bounding_box() for piece in pieces])
-    apart = np.maximum(boxes[:, :2] - (column.x, column.y), (column.x, column.y) - boxes[:, 3:5])
-    return [pieces[i] for i in np.flatnonzero((apart < column.radius + SLACK).all(axis=1))]
 
 
 def _border(section: CrossSection) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 from manifold3d import Manifold, OpType
 
 from unitcad.kernels.mesh import realise
-from unitcad.moulds.congruence import MARGIN, column_round, cropped, once_each
+from unitcad.moulds.congruence import MARGIN, column_round, cropped, once_each, reaching
 from unitcad.moulds.plan import Plan, Step
 from unitcad.shape import Shape, box
 from unitcad.shape.column import Standing
@@ -62,8 +62,8 @@ def _gang(
     A cell is looked at in a column that is a little larger than what is cast in it; where silicone leaves it, on
     the whole plate.
     """
-    tools = [plan.tool(name).shape for name in step.tools]
-    there, others = Standing([*tools, *_not_tools(step)]), _not_tools(step)
+    tools, others = [solids[name] for name in step.tools], _not_tools(step)
+    beside = Standing(others)
     layers, share = [realise(shape, segments) for shape in step.layer], len(step.channels) // len(step.layer)
 
     def channels(i: int) -> list[Manifold]:
@@ -71,15 +71,13 @@ def _gang(
 
     def cavity(i: int) -> tuple[Manifold, Manifold]:
         column = column_round([layers[i], *channels(i)], MARGIN, endless=True)
-        near = there.inside(column)
-        filled = [solids[step.tools[k]] for k in near if k < len(tools)]
-        filled += [realise(others[k - len(tools)], segments) for k in near if k >= len(tools)]
+        filled = [*reaching(tools, column), *(realise(others[k], segments) for k in beside.inside(column))]
         filled = [solid for whole in filled if not (solid := cropped(whole, column)).is_empty()]
         return _one(layers[i], channels(i), filled, _block_round(filled, step.top))
 
     @cache
     def of_plate() -> list[Manifold]:
-        whole = [*(solids[name] for name in step.tools), *(realise(shape, segments) for shape in others)]
+        whole = [*tools, *(realise(shape, segments) for shape in others)]
         return Manifold.batch_boolean([_block_round(whole, step.top), *whole], OpType.Subtract).decompose()
 
     # Of an array's tools the layout's cells need not be those of every pour.

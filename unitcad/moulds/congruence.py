@@ -23,6 +23,8 @@ SAME = 1e-6
 """Distance up to which two corners of meshes are one, mm."""
 MARGIN = 0.2
 """How much wider than what is looked at a column is, mm: less than the thinnest wall."""
+SLACK = 0.1
+"""How much wider than a column's circle its box is taken, mm: the polygon about it reaches beyond it."""
 _DIRECTIONS = np.array([[0.3217, 0.5931, 0.7381], [0.8017, -0.2713, 0.5326]])
 _SIDES = 48
 _FLAT = 1e-8
@@ -52,12 +54,19 @@ def cropped(solid: Manifold, column: Column) -> Manifold:
     return solid ^ wall.translate((column.x, column.y, low))
 
 
+def reaching(solids: Sequence[Manifold], column: Column) -> list[Manifold]:
+    """Return the solids whose boxes reach into a column's, seen from above."""
+    boxes = np.array([solid.bounding_box() for solid in solids]).reshape(-1, 6)
+    apart = np.maximum(boxes[:, :2] - (column.x, column.y), (column.x, column.y) - boxes[:, 3:5])
+    return [solids[i] for i in np.flatnonzero((apart < column.radius + SLACK).all(axis=1))]
+
+
 class Congruence:
     """Tells which columns through the same shapes and meshes are alike."""
 
     def __init__(self, shapes: Sequence[Shape], meshes: Sequence[Manifold] = ()) -> None:
         self.standing = Standing(shapes)
-        corners = np.concatenate([np.empty((0, 3)), *(_corners(*arrays(mesh)) for mesh in meshes)])
+        corners = _corners(*_together(meshes))
         self._corners = corners[np.argsort(corners[:, 0], kind="stable")]
         self._known: dict[Hashable, list[tuple[int, np.ndarray]]] = {}
         self._count = 0
@@ -80,6 +89,15 @@ class Congruence:
         inside = (near[:, 2] > column.low) & (near[:, 2] < column.high)
         near = near[inside & (np.hypot(near[:, 0], near[:, 1]) < column.radius)]
         return np.sort(near @ _DIRECTIONS.T, axis=0)
+
+
+def _together(meshes: Sequence[Manifold]) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices (n, 3) and faces (m, 3) of several meshes as of one."""
+    every = [arrays(mesh) for mesh in meshes]
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in every)])
+    faces = [faces + start for (_, faces), start in zip(every, starts, strict=False)]
+    vertices = [np.empty((0, 3)), *(vertices for vertices, _ in every)]
+    return np.concatenate(vertices), np.concatenate([np.empty((0, 3), np.int64), *faces])
 
 
 def _corners(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
