@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ from faulty_sets import set_of, with_fault
 from manifold3d import Manifold, OpType
 
 from unitcad.kernels.mesh import realise, shells
-from unitcad.mould_checks import check_moulds, groove_walls
+from unitcad.mould_checks import check_moulds, draw, groove_walls
 from unitcad.mould_checks.walls import near
 from unitcad.moulds.congruence import column_round, cropped
 from unitcad.moulds.mould_set import MouldSet
@@ -27,6 +28,10 @@ GANGS = [
     ("encapsulating", "moulds.cavities=[2,2]", "moulds.printer=sla"),
     ("custom/strap-lugs", "moulds.cavities=[2,1]"),
 ]
+
+
+BELOW = box(-1, 1, -1, 1, -30, -29)
+"""A box under the middle of a plate."""
 
 
 def each_cell_alone(moulds: MouldSet) -> MouldSet:
@@ -139,6 +144,16 @@ def test_a_fault_in_one_cell_is_found_there(code: str, tool: str, change: Callab
     assert found == alone
     cells = {where for code, where in found if code == "C100"}
     assert len(cells) <= 2  # pours of that one cell
+
+
+def test_of_stubs_that_leave_together_the_one_that_is_caught_is_named() -> None:
+    """A piece of the base below the middle stub stops it, and no other."""
+    faulty = with_fault(set_of("no-fpcb", "moulds.cavities=[3,3]"), "base", lambda base: union((base, BELOW)))
+    found = [f for f in draw.findings(faulty) if not f.ok]
+    assert [f.where for f in found] == ["pour 2: stub5 out against base"]
+    radius = faulty.spec.moulds.filament_mm / 2
+    # Over the box lie half the elbow's disc and 1 mm of the lying tail.
+    assert found[0].value == pytest.approx(math.pi / 2 * radius**2 + 2 * radius, rel=1e-3)
 
 
 def test_a_hundred_cells_have_three_surroundings() -> None:

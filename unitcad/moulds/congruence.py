@@ -58,7 +58,7 @@ def reaching(solids: Sequence[Manifold], column: Column) -> list[Manifold]:
     """Return the solids whose boxes reach into a column's, seen from above."""
     boxes = np.array([solid.bounding_box() for solid in solids]).reshape(-1, 6)
     apart = np.maximum(boxes[:, :2] - (column.x, column.y), (column.x, column.y) - boxes[:, 3:5])
-    return [solids[i] for i in np.flatnonzero((apart < column.radius + SLACK).all(axis=1))]
+    return [solids[int(i)] for i in np.flatnonzero((apart < column.radius + SLACK).all(axis=1))]
 
 
 class Congruence:
