@@ -9,8 +9,12 @@ import pytest
 from live import WALL, Live
 from running import serving
 
+from unitcad.batch import BatchOptions, run
+from unitcad.batch.executors import SerialExecutor
+from unitcad.batch.sweep import from_file
 from unitcad.cache import MemoryStore
 from unitcad.pipeline.build import build
+from unitcad.report.page import page_data
 from unitcad.validation import load
 
 
@@ -39,6 +43,22 @@ def test_a_row_of_a_batch_opens_live(running: Any, batch: Path) -> None:
             assert spec["y"] >= header["y"] + header["height"]
             assert visit.page.evaluate("() => document.activeElement.id") == "spec"
         assert sorted(opened) == ["1", "1.5"]
+        visit.close()
+
+
+def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running: Any, tmp_path: Path) -> None:
+    base = {"base": "single-embedded", "set": {"output.formats": []}}
+    sweep = from_file({**base, "sweep": {"layers.0.wall_mm": [1.0, 1.5]}}, Path(), "walls")
+    options = BatchOptions(("unit",), check=False, folders=False)
+    run(sweep, tmp_path / "walls", options, SerialExecutor(), workers=1)
+    assert not list((tmp_path / "walls").glob("single-*"))
+    with serving(tmp_path, str(tmp_path / "walls")) as own:
+        folder = next(row[0] for row in page_data(tmp_path / "walls", with_models=False)[0]["table"]["rows"])
+        for wrong in ("single-embedded-000000000000", f"other-{folder[-12:]}", folder[-12:-1], "-"):
+            assert own.send(f"/variant/{wrong}")[0] == 404
+        visit = Live(running, own)
+        visit.page.locator("#variants tbody th a").nth(1).click()
+        visit.until(lambda: visit.page.input_value(WALL) == "1.5")
         visit.close()
 
 

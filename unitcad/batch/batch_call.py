@@ -17,13 +17,13 @@ from unitcad.batch.batch_records import Summary
 from unitcad.batch.estimate_table import write_estimates
 from unitcad.batch.executors import Workers
 from unitcad.batch.parquet_table import read_parquet
-from unitcad.batch.result_folders import STORE
 from unitcad.batch.results import TABLES
 from unitcad.batch.run import Watch, run, trim
 from unitcad.batch.shards import shard_of
 from unitcad.batch.sweep import Sweep, load_sweep
 from unitcad.errors import WrongArgument, unknown_name
 from unitcad.pipeline.artifacts import OUTPUTS
+from unitcad.pipeline.folder import STORE
 from unitcad.spec.asked import Format
 from unitcad.text import toml
 from unitcad.validation import Changes

@@ -13,19 +13,15 @@ from msgspec.json import decode
 
 from unitcad import files
 from unitcad.batch.batch_options import BatchOptions
-from unitcad.batch.batch_records import JournalEntry
+from unitcad.batch.batch_records import JournalEntry, RecordPlace
 from unitcad.batch.destination import Destination, Folders, InStore, made
 from unitcad.batch.journal import JOURNAL
-from unitcad.batch.record_packs import export
+from unitcad.batch.record_packs import export, read_record
 from unitcad.batch.remote import Receiver
 from unitcad.cache import DiskStore, MissingContent, SharedStore
 from unitcad.errors import UnitcadError, WrongArgument
-from unitcad.pipeline.folder import whole
+from unitcad.pipeline.folder import ADDRESS, STORE, whole
 
-ADDRESS = "store.json"
-"""File of a batch that names its store, if that is not its own."""
-STORE = "store"
-"""Folder of a batch's own store."""
 FOLDERS_BELOW = 1000
 """Variants below which each has a folder, unless asked otherwise."""
 
@@ -80,15 +76,36 @@ def export_variant(batch: Path, wanted: str, out: Path, cache: DiskStore, addres
     The store is that of the batch, else the one at `address`. Raises WrongArgument for a hash that no variant has, or
     several; UnitcadError for a batch without a store, and for what the store has lost; OSError.
     """
+    entry, place = _stored(batch, wanted)
+    out.mkdir(parents=True, exist_ok=True)
+    export(_store_of(batch, address), place, out / entry.folder, cache)
+    return out / entry.folder
+
+
+def stored_spec(batch: Path, folder: str) -> str:
+    """Return the spec of a variant of a batch that has no folder for it, as text, from the batch's store.
+
+    Raises UnitcadError where no variant has a folder of that name, and for what the store has lost; OSError.
+    """
+    entry, place = _stored(batch, folder.rpartition("-")[2])
+    if entry.folder != folder:
+        raise WrongArgument("folder", folder, "no variant of the batch has it", entry.folder)
+    return read_record(_store_of(batch), place)[0].own["spec.toml"].decode()
+
+
+def _stored(batch: Path, wanted: str) -> tuple[JournalEntry, RecordPlace]:
+    """Return a variant's line of the journal, and where its record is in the store."""
     entry = _entry_of(batch, wanted)
     if entry.record is None:
         raise UnitcadError(f"{batch / entry.folder}: this variant is not in a store, its folder is its result")
+    return entry, entry.record
+
+
+def _store_of(batch: Path, address: str | None = None) -> SharedStore:
+    """Return the store that a batch names, else the one at `address`, else its own."""
     if address is None and (batch / ADDRESS).is_file():
         address = str(files.read_json(batch / ADDRESS)["store"])
-    store = SharedStore(absolute(address or str(batch / STORE)))
-    out.mkdir(parents=True, exist_ok=True)
-    export(store, entry.record, out / entry.folder, cache)
-    return out / entry.folder
+    return SharedStore(absolute(address or str(batch / STORE)))
 
 
 def _entry_of(batch: Path, wanted: str) -> JournalEntry:

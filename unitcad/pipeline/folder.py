@@ -26,6 +26,10 @@ PAGE = "report.html"
 """The page of a folder, made on request and kept up by every later build into it."""
 BENCH = "bench.html"
 """The bench page of a variant's procedure, made beside the page."""
+ADDRESS = "store.json"
+"""File of a batch that names its store, if that is not its own."""
+STORE = "store"
+"""Folder of a batch's own store."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from unitcad import files
 from unitcad.casting.cast_record import ENDING, read_cast_record
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.files import TEMPORARY
-from unitcad.pipeline.folder import PAGE
+from unitcad.pipeline.folder import ADDRESS, PAGE, STORE
 from unitcad.pipeline.manifest_records import Manifest
 from unitcad.report.records import BatchFile, ResultsTable, VariantRecord, expect
 from unitcad.report.step_pictures import step_pictures
@@ -149,11 +149,18 @@ def _drawing(path: Path) -> str:
     return files.read_text(path, largest=LARGEST_DRAWING, links=False)
 
 
-def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], damaged: dict[str, str]) -> ResultsTable:
+def keeps_store(folder: Path) -> bool:
+    """Tell whether a batch keeps its variants in a store, from which their folders can be made."""
+    return (folder / STORE).is_dir() or (folder / ADDRESS).is_file()
+
+
+def results_table(
+    batch: dict[str, Any] | None, variants: list[VariantRecord], damaged: dict[str, str], *, stored: bool = False
+) -> ResultsTable:
     """Return a batch's table, as `batch` (its batch.json) lists it, else from the manifests.
 
     Chosen values come first, then the levels at the edge, then the rest. `damaged` says by folder why a result
-    can't be read.
+    can't be read; `stored`: variants without a folder are in a store.
     """
     if batch:
         entries, columns = batch["variants"], [name for name in batch["columns"] if name != "folder"]
@@ -172,10 +179,12 @@ def results_table(batch: dict[str, Any] | None, variants: list[VariantRecord], d
     swept = _swept(columns)
     columns = _in_order(columns, swept)
     there = {each.folder for each in variants}
-    rows = [
-        [entry.get("folder") if entry.get("folder") in there else "", *(_cell(entry.get(c)) for c in columns)]
-        for entry in entries
-    ]
+
+    def opened(entry: dict[str, Any]) -> str:
+        folder = entry.get("folder") or ""
+        return folder if folder in there or (stored and entry.get("status") == "ok") else ""
+
+    rows = [[opened(entry), *(_cell(entry.get(c)) for c in columns)] for entry in entries]
     return ResultsTable(columns, rows, [name for name in columns if name in swept])
 
 

@@ -69,7 +69,7 @@ class VariantRecord(Struct, kw_only=True):
 
 
 class ResultsTable(Struct, frozen=True):
-    """Table of a batch on the page: each row begins with the folder of its variant, "" for one that failed.
+    """Table of a batch on the page: each row begins with the folder that its variant has, or can have, else "".
 
     `swept` are the columns that a person chose values for.
     """

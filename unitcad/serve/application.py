@@ -18,7 +18,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import Refusal, UnitcadError, WrongArgument
 from unitcad.files import read_text, write
 from unitcad.report.page import page_data
 from unitcad.serve.gate import Gate, Limits
@@ -33,6 +33,8 @@ ANSWER_S = {"unit": 20.0, "moulds": 60.0, "estimate": 30.0}
 """Seconds that a question may take, by what is asked."""
 CAMPAIGN_S = 300.0
 """Seconds that the records of a campaign may take."""
+STORE_S = 10.0
+"""Seconds that a batch's store may take to give a variant's spec."""
 FILE_TYPES = {
     ".html": "text/html; charset=utf-8", ".svg": "image/svg+xml", ".png": "image/png", ".json": "application/json",
     ".md": "text/plain; charset=utf-8", ".csv": "text/csv; charset=utf-8", ".toml": "text/plain; charset=utf-8",
@@ -236,15 +238,23 @@ class Live:
         return given["text"], ["--allow-code"] if given["code"] else []
 
     async def variant(self, request: Request) -> Response:
-        """Answer with the spec of a variant of the batch, as text."""
+        """Answer with the spec of a variant of the batch, as text: of its folder, else from the batch's store."""
+        from unitcad.batch.result_folders import JOURNAL, stored_spec
+
         root, folder = self.setting.batch, request.path_params["folder"]
         path = _within(root, f"{folder}/spec.toml") if root else None
-        if path is None:
-            return PlainTextResponse("no such variant\n", 404)
         try:
-            return _json(msgspec.json.encode({"text": read_text(path)}))
-        except UnitcadError as error:
-            return _json(msgspec.json.encode({"faults": [Fault(str(error))]}), 422)
+            if path is None and root is not None and (root / JOURNAL).is_file():
+                text = await asyncio.wait_for(asyncio.to_thread(stored_spec, root, folder), STORE_S)
+            elif path is None:
+                return PlainTextResponse("no such variant\n", 404)
+            else:
+                text = read_text(path)
+            return _json(msgspec.json.encode({"text": text}))
+        except WrongArgument as error:
+            return PlainTextResponse(f"no such variant: {error}\n", 404)
+        except (UnitcadError, OSError, TimeoutError) as error:
+            return _json(msgspec.json.encode({"faults": [Fault(str(error) or "the store does not answer")]}), 422)
 
     async def job(self, request: Request) -> Response:
         """Answer with how far a job is."""

@@ -47,7 +47,7 @@
     return svg && el("img", { className: "thumbnail", src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`, alt: "", loading: "lazy" });
   };
 
-  // {sections, chips, plot}: `plot` draws once the sections are on a page. why(folder, column) says why a level is missing,
+  // {sections, chips, plot, ask}: `plot` draws once the sections are on a page; `ask(folder)` is for a variant that is not on it. why(folder, column) says why a level is missing,
   // variant(folder) gives a record.
   function batchOf(data, why, variant) {
     const { batch } = data;
@@ -104,11 +104,18 @@
     // A batch of estimates alone has no folders.
     const failed = table.rows.filter((row) => !row[0] && !(table.columns.includes("status") && row[at("status")] === "ok")).length;
     const chips = [geometries > 0 && el("span", { className: "chip" }, `${geometries} ${geometries === 1 ? "geometry" : "geometries"}`), failed > 0 && el("span", { className: "chip bad" }, `${failed} failed`)];
-    const sections = [section("variants", "Variants", made.node), pins.node, section("plot", "Two columns against each other", controls, notRead, plotHost)];
+    const lacking = el("p", { className: "lacking", role: "status" });
+    // Says how the folder of a variant is made that the page was opened for and has none.
+    const ask = (folder) => {
+      const there = folder && table.rows.some((row) => row[0] === folder);
+      clear(lacking, there && [`${folder} has no folder here. Make it, and then this page again, with `,
+        el("code", {}, `unitcad cache export ${folder.split("-").pop()} --batch ${data.stored_in} && unitcad report ${data.stored_in}`)]);
+    };
+    const sections = [section("variants", "Variants", lacking, made.node), pins.node, section("plot", "Two columns against each other", controls, notRead, plotHost)];
     if (data.damaged.length) sections.push(section("damaged", "Damaged", U.table(["Result", "Why"], data.damaged, { label: "Damaged results" })));
     if (batch) sections.push(section("batch", "The batch", el("details", {}, el("summary", {}, "Properties of the batch"), U.facts(batch))));
     ready = true;
-    return { sections, chips, plot };
+    return { sections, chips, plot, ask };
   }
 
   Object.assign(window.unitcad, { batch: batchOf, records, variantAsked });
