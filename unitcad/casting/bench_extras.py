@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 from unitcad.moulds.base import outline, plate_bottom, plate_top, pry_floor
@@ -36,6 +37,7 @@ class Extra:
     colour: tuple[float, float, float]
 
 
+@lru_cache(maxsize=64)
 def _arrow(length: float) -> Shape:
     """Draw an arrow along +z, its middle at the origin."""
     shaft, head = 0.55, 1.5

@@ -60,10 +60,10 @@ def shift_per_depth(standing: tuple[Rib, ...], cells: list[tuple[float, float]])
     at = np.array([(rib.x, rib.y) for rib in standing])
     # What a shift (x, y) and a small turn of the cup take from each rib's depth, along its normal.
     rows = np.column_stack([outward, at[:, 0] * outward[:, 1] - at[:, 1] * outward[:, 0]])
-    worst = 0.0
-    for strengths in product((1 - UNEVEN, 1 + UNEVEN), repeat=len(standing)):
-        weighted = rows * np.array(strengths)[:, None]
-        # Each rib pushes the cup outwards by its depth; moved out by u it is crushed by that much less.
-        x, y, turn = np.linalg.solve(weighted.T @ rows, weighted.sum(axis=0))
-        worst = max(worst, *(math.hypot(x - turn * cy, y + turn * cx) for cx, cy in cells))
-    return worst
+    strengths = np.array(list(product((1 - UNEVEN, 1 + UNEVEN), repeat=len(standing))))
+    weighted = rows * strengths[:, :, None]
+    # Each rib pushes the cup outwards by its depth; moved out by u it is crushed by that much less.
+    moved = np.linalg.solve(np.swapaxes(weighted, 1, 2) @ rows, weighted.sum(axis=1)[:, :, None])
+    x, y, turn = np.moveaxis(moved, 1, 0)
+    cx, cy = np.array(cells).T
+    return float(np.hypot(x - turn * cy, y + turn * cx).max())

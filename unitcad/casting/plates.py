@@ -16,14 +16,16 @@ def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tup
     In their order, each on the first plate where it lies beside what is there.
     """
     bed = moulds.spec.moulds.bed_x_mm, moulds.spec.moulds.bed_y_mm
-    filled: list[list[Body]] = []
+    filled: list[list[tuple[Body, tuple[float, float]]]] = []
     for body in bodies:
-        plate = next((each for each in filled if _fits([*each, body], bed)), None)
+        x0, y0, _, x1, y1, _ = extent(body.shape)
+        size = x1 - x0, y1 - y0
+        plate = next((each for each in filled if _fits([*(size for _, size in each), size], bed)), None)
         if plate is None:
             filled.append(plate := [])
-        plate.append(body)
+        plate.append((body, size))
     names = [f"{stem}-{i + 1}.3mf" for i in range(len(filled))] if len(filled) > 1 else [f"{stem}.3mf"]
-    return {name: tuple(each) for name, each in zip(names, filled, strict=True)}
+    return {name: tuple(body for body, _ in each) for name, each in zip(names, filled, strict=True)}
 
 
 def mould_plates(moulds: MouldSet) -> dict[str, tuple[Body, ...]]:
@@ -31,8 +33,6 @@ def mould_plates(moulds: MouldSet) -> dict[str, tuple[Body, ...]]:
     return plates(moulds, [piece for piece in moulds.plan.pieces if piece.made == "printed"], "moulds/moulds")
 
 
-def _fits(bodies: Sequence[Body], bed: tuple[float, float]) -> bool:
-    boxes = [extent(body.shape) for body in bodies]
-    sizes = [(x1 - x0, y1 - y0) for x0, y0, _, x1, y1, _ in boxes]
+def _fits(sizes: Sequence[tuple[float, float]], bed: tuple[float, float]) -> bool:
     places = zip(layout(sizes, bed), sizes, strict=True)
     return all(x + width <= bed[0] and y + depth <= bed[1] for (x, y), (width, depth) in places)

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from itertools import count
 
+import msgspec
+
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bill import to_csv
 from unitcad.casting.figures import Figure
@@ -34,7 +36,8 @@ def files(procedure: Procedure) -> dict[str, str]:
 def to_json(procedure: Procedure) -> str:
     """Write the procedure as JSON: the same records; numbers to nine significant digits."""
     data = json.loads(json.dumps(asdict(procedure)), parse_float=lambda text: float(f"{float(text):.9g}"))
-    return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    # Indented by msgspec: json's own indenting is not compiled.
+    return msgspec.json.format(json.dumps(data, allow_nan=False, ensure_ascii=False), indent=1) + "\n"
 
 
 def to_markdown(procedure: Procedure) -> str:

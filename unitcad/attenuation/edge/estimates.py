@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
+from functools import lru_cache
 from typing import Any
 
 from unitcad.attenuation.curve import decay_at, layered_block
@@ -181,6 +182,7 @@ def variant_block(variant: EstimateInput) -> dict[str, Any]:
     }
 
 
+@lru_cache
 def table_error(moduli: Moduli = "dynamic") -> dict[str, Any]:
     """Return every model's errors against the measured table by such moduli, and the null model's.
 
