@@ -172,7 +172,7 @@ def test_a_tail_into_a_neighbour_is_an_overlap() -> None:
         ("layout.pitch_mm=15", "layout.pitch_mm"),
         ("sheet.thickness_mm=2", "sheet.thickness_mm"),
         ("moulds.pour=injected", "moulds.pour"),
-        ("moulds.bed_x_mm=90", "moulds.bed_x_mm"),
+        ("moulds.bed_x_mm=30", "moulds.bed_x_mm"),
     ],
 )
 def test_what_can_not_be_cast_is_refused_with_what_would(override: str, field: str) -> None:

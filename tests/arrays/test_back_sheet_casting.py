@@ -107,7 +107,7 @@ def test_each_piece_of_a_long_tool_is_held_down() -> None:
     """A strip of tape on either end, and one between any two seams of base and cups, clear of the filaments."""
     moulds = patch_moulds(load_array("wrist-band"))
     places, half = tape_places(moulds), moulds.plan.layout.cup[0]
-    seams = sorted({seam.x for split in moulds.plan.splits for seam in split.seams})
+    seams = sorted({seam.at for split in moulds.plan.splits for seam in split.seams})
     for low, high in pairwise((-half, *seams, half)):
         assert any(low <= at and at + TAPE_WIDTH <= high for at in places)
     for cell in moulds.plan.layout.cells:

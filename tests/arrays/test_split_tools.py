@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -19,7 +19,8 @@ from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.mould_checks import check_moulds, mould_checks
-from unitcad.moulds.dovetails import DEPTH, FLANK_DEG, NECK, ROUND, cuts, seams, split
+from unitcad.moulds.cuts import Feature, Sized, in_gaps, seams
+from unitcad.moulds.dovetails import FLANK_DEG, LARGE, ROUND, Seam, split, straight
 from unitcad.moulds.pieces import base_piece
 from unitcad.pipeline.bodies import file_stem
 from unitcad.shape import Shape, box, cut, moved, union
@@ -39,7 +40,7 @@ def test_every_mould_check_holds_on_a_band_of_eight() -> None:
     plan = band().plan
     assert {s.tool: len(s.pieces) for s in plan.splits} == {"base": 2, "cup1": 2, "cup2": 2}
     # No seam of a cup lies over the base's; every piece of either stands on two pins or more.
-    base, *cups = ([seam.x for seam in s.seams] for s in plan.splits)
+    base, *cups = ([seam.at for seam in s.seams] for s in plan.splits)
     assert not set(base) & {x for each in cups for x in each}
     assert plan.pins is not None
     for each in plan.splits:
@@ -62,12 +63,12 @@ def test_the_gap_is_the_play_times_the_line() -> None:
     """A plate with two seams: the pieces have its volume but for the line's length x play x height."""
     play, height, width = 0.15, 5.0, 40.0
     plate = base_piece(box(-150, 150, -width / 2, width / 2, 0, height))
-    made = split(plate, seams([-80, 70.5], (-19, 19), play))
+    made = split(plate, [straight(at, [(-19, 19)], play) for at in (-80, 70.5)])
     assert len(made.seams[0].teeth) == 3
-    flank, turn = DEPTH / math.cos(math.radians(FLANK_DEG)), math.radians(90 + FLANK_DEG)
-    tip = NECK + 2 * DEPTH * math.tan(math.radians(FLANK_DEG))
+    flank, turn = LARGE.depth / math.cos(math.radians(FLANK_DEG)), math.radians(90 + FLANK_DEG)
+    tip = LARGE.neck + 2 * LARGE.depth * math.tan(math.radians(FLANK_DEG))
     rounded = 4 * ROUND * (turn - 2 * math.tan(turn / 2))
-    length = width + 3 * (tip - NECK + 2 * flank + rounded)
+    length = width + 3 * (tip - LARGE.neck + 2 * flank + rounded)
     solids = [realise(piece.shape, 96) for piece in made.pieces]
     gap = 300 * width * height - sum(solid.volume() for solid in solids)
     assert gap == pytest.approx(2 * length * play * height, rel=2e-3)
@@ -107,28 +108,37 @@ def test_too_many_seams_weep_too_much() -> None:
     """Six seams in place of one: what they hold is more than a hundredth of the layer."""
     plan = band().plan
     sound = plan.splits[-1].seams[0]
-    many = split(plan.tool("cup2"), [replace(sound, x=-15.0 + 10 * i) for i in range(6)])
+    teeth = [(sound.teeth[0].middle[1] - 5, sound.teeth[0].middle[1] + 5)]
+    many = split(plan.tool("cup2"), [straight(-15.0 + 10 * i, teeth, sound.play) for i in range(6)])
     faulty = replace(plan, splits=(*plan.splits[:-1], many))
     found = [f for f in mould_checks()["C250"].findings(patch_moulds(band().arranged, faulty)) if "silicone" in f.where]
     assert [f.ok for f in found] == [True, False]
 
 
+def cut_at(bed: float, other: Sequence[Seam] = ()) -> list[float]:
+    """Cut a tool 220 mm long, a feature 12 mm wide every 20 mm."""
+    features = tuple(
+        Feature(((x - 6.0, -30), (x + 6.0, -30), (x + 6.0, 30), (x - 6.0, 30))) for x in range(-100, 101, 20)
+    )
+    sized = Sized("x", (-110, 110), bed, (-30, 30), features, (tuple(in_gaps((-110, 110), features)),))
+    return [seam.at for seam in seams([sized], "it", 0.15, other)]
+
+
 def test_cuts_are_few_and_clear_and_a_bed_too_small_names_the_least() -> None:
-    features = [(x - 6.0, x + 6.0) for x in range(-100, 101, 20)]
-    assert cuts((-110, 110), features, 250, "it") == []
+    assert cut_at(250) == []
     for bed in (230, 120, 80, 50, 35):
-        where = cuts((-110, 110), features, bed, "it")
+        where = cut_at(bed)
         assert all(abs((x - 10) % 20) < 1e-9 for x in where)
-        ends = [-110 + DEPTH / 2, *where, 110 - DEPTH / 2]
-        assert max(b - a + DEPTH for a, b in pairwise(ends)) <= bed
+        ends = [-110 + LARGE.depth / 2, *where, 110 - LARGE.depth / 2]
+        assert max(b - a + LARGE.depth for a, b in pairwise(ends)) <= bed
         assert len(where) >= math.ceil(220 / bed) - 1
-    assert cuts((-110, 110), features, 150, "it", other=[-10.0]) == [10.0]
+    assert cut_at(150, [straight(-10.0, [(-30, 30)], 0.15)]) == [10.0]
     with pytest.raises(Refusal) as refused:
-        cuts((-110, 110), features, 20, "it")
+        cut_at(20)
     assert isinstance(refused.value.nearest, float)
-    assert cuts((-110, 110), features, refused.value.nearest, "it")
+    assert cut_at(refused.value.nearest)
     with pytest.raises(Refusal):
-        cuts((-110, 110), features, refused.value.nearest - 0.2, "it")
+        cut_at(refused.value.nearest - 0.2)
 
 
 @pytest.mark.parametrize(
@@ -136,7 +146,9 @@ def test_cuts_are_few_and_clear_and_a_bed_too_small_names_the_least() -> None:
     [
         ("wrist-band", ["moulds.bed_x_mm=40"], "moulds.bed_x_mm"),
         ("wrist-band", ["moulds.bed_y_mm=40"], "moulds.bed_y_mm"),
-        ("hex-19", ["moulds.bed_x_mm=100"], "moulds.bed_x_mm"),
+        ("hex-19", ["moulds.bed_x_mm=30"], "moulds.bed_x_mm"),
+        ("hex-19", ["moulds.bed_y_mm=20"], "moulds.bed_y_mm"),
+        # A strap slot as long as two rows.
         ("forearm-pockets", ["moulds.bed_y_mm=60"], "moulds.bed_y_mm"),
     ],
 )

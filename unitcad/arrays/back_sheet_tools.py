@@ -16,53 +16,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from unitcad.arrays.array import Array
+from unitcad.arrays.back_sheet_drawing import LABEL_MARGIN, Drawing, drawing_of
 from unitcad.arrays.bending import bent_stretches
-from unitcad.arrays.circuit.wiring import wiring
-from unitcad.arrays.fins import Fin, fins
-from unitcad.arrays.larger_than_bed import across, pieces, taken
+from unitcad.arrays.larger_than_bed import longer_than_bed
 from unitcad.arrays.outlines import rounded, slot_profile
-from unitcad.designs import Dimensions, dimensions
+from unitcad.arrays.piece_labels import Strip, on_pieces
+from unitcad.designs import dimensions
 from unitcad.designs.parts import BEYOND
-from unitcad.designs.tooling import Cell, Layout
 from unitcad.errors import Refusal
+from unitcad.geometry.segments import between_convex
 from unitcad.moulds import filament
-from unitcad.moulds.base import PRY_UNDER, core, outline, plate_top, pry_slot
+from unitcad.moulds.base import core, outline, plate_top, pry_slot
 from unitcad.moulds.blade import blade
 from unitcad.moulds.cup import groove_depth_of
-from unitcad.moulds.dovetails import BESIDE, Interval, Split, cuts, seams, split
-from unitcad.moulds.labels import corner_labels, engraved, row, row_width
+from unitcad.moulds.dovetails import Split, seen, split, strips
+from unitcad.moulds.labels import corner_labels, engraved, row_width
 from unitcad.moulds.layout import MARK, TEXT_MARGIN
 from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, stub_pieces
-from unitcad.moulds.pins import CHAMFER, PIN_RADIUS, Pins, pin_holes, standing_pins
+from unitcad.moulds.pins import pin_holes, standing_pins
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal
-from unitcad.shape import Common, Extrude, Shape, Union, box, content_hash, cut, cylinder, moved, ring, union
+from unitcad.shape import (
+    Common,
+    Extrude,
+    Shape,
+    Union,
+    box,
+    content_hash,
+    cut,
+    cylinder,
+    moved,
+    polygon,
+    ring,
+    turned,
+    union,
+)
 from unitcad.shape.body import Body
-from unitcad.shape.lettering import HEIGHT
 from unitcad.spec import Spec
 
-OFF_SQUARE = 4.0
-"""How far one pin stands off the rectangle of the others, mm: a cup goes on in one attitude only."""
-LABEL_MARGIN = 0.6
-"""From a label to the edges of the strip that it stands on, mm."""
 UP, DOWN = (0, 0, 1), (0, 0, -1)
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """What all tools of an array are drawn to; where the base and the cups are cut that are larger than the bed."""
-
-    array: Array
-    spec: Spec
-    dims: Dimensions
-    fins: tuple[Fin, ...]
-    lay: Layout
-    pins: Pins
-    base_cuts: tuple[float, ...] = ()
-    cup_cuts: tuple[float, ...] = ()
 
 
 def core_top(spec: Spec) -> float:
@@ -82,7 +77,7 @@ def tools_plan(array: Array, cast: Sequence[tuple[Shape, ...]]) -> Plan:
     """
     if array.unit.moulds.pour == "injected":
         raise Refusal("moulds.pour", "injected", "a back sheet is struck off, its cups have no lids", "open")
-    return replace(_flat_plan(_drawing(array), cast, last=True), stretches=bent_stretches(array))
+    return replace(_flat_plan(drawing_of(array), cast, last=True), stretches=bent_stretches(array))
 
 
 def inner_tools(array: Array, cast: Sequence[tuple[Shape, ...]], label: str) -> Plan:
@@ -90,7 +85,7 @@ def inner_tools(array: Array, cast: Sequence[tuple[Shape, ...]], label: str) -> 
 
     `label` is that of the whole set. Raises Refusal as `tools_plan`.
     """
-    return _flat_plan(_drawing(array), cast, last=False, label=label)
+    return _flat_plan(drawing_of(array), cast, last=False, label=label)
 
 
 def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: bool, label: str = "") -> Plan:
@@ -110,8 +105,9 @@ def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: boo
     stubs = stub_pieces([filament.stub(spec, dims, lay, cell, _bottom(spec)) for cell in lay.cells])
     steps = tuple(_step(drawing, cast, pour, base, cups[pour - 1], stubs, sheet=sheets[pour - 1]) for pour in pours)
     holes = [("base", len(stubs)), *((cup.name, len(lay.cells)) for cup in cups)]
+    bar = blade(lay, dims.heights[len(cast) - 1])
     return Plan(
-        (base, *cups, *stubs, blade_piece(blade(lay, dims.heights[len(cast) - 1]))),
+        (base, *cups, *stubs, blade_piece(bar, too_long=longer_than_bed(spec, 2 * lay.plate[1]))),
         steps,
         lay,
         label,
@@ -125,33 +121,30 @@ def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: boo
 
 def _splits(drawing: Drawing, base: Body, cups: Sequence[Body]) -> Iterator[Split]:
     """Yield the tools that are larger than the bed, cut."""
-    for tool, where in ((base, drawing.base_cuts), *((cup, drawing.cup_cuts) for cup in cups)):
+    for tool, where in ((base, drawing.base_seams), *((cup, drawing.cup_seams) for cup in cups)):
         if where:
-            yield split(tool, seams(where, across(drawing.array), drawing.pins.clearance))
+            yield split(tool, where)
 
 
 def _base_letters(drawing: Drawing, label: str) -> list[Shape]:
     """Draw the base's label; on a base that is cut, on each piece with its number."""
-    spec, lay = drawing.spec, drawing.lay
-    stroke, y = spec.moulds.engraving_stroke_mm, (lay.cup[1] + lay.plate[1]) / 2 - lay.label_height / 2
-    letters: list[Shape] = []
-    for i, (low, high) in enumerate(pieces((-lay.plate[0], lay.plate[0]), drawing.base_cuts)):
-        texts = [label, str(i + 1)][: 1 + bool(drawing.base_cuts)]
-        letters += row(texts, stroke, ((low + high - row_width(texts, stroke)) / 2, y), _engraving(spec, 0.0))
-    return letters
+    spec, (x, y) = drawing.spec, drawing.lay.plate
+    strip = Strip((-x, -y, x, y), LABEL_MARGIN, spec.moulds.engraving_stroke_mm, _engraving(spec, 0.0), "top")
+    return on_pieces(strip, label, drawing.base_seams)
 
 
 def _cup_letters(drawing: Drawing, pour: int, label: str) -> list[Shape]:
     """Draw a cup's letters in its corners; the pieces of one that is cut have its name and their number at the left."""
     spec, lay, rim = drawing.spec, drawing.lay, drawing.dims.heights[pour - 1]
-    own, y = f"C{pour:X}", lay.cup[1] - TEXT_MARGIN - lay.label_height
+    own, (x, y), stroke = f"C{pour:X}", lay.cup, spec.moulds.engraving_stroke_mm
     letters = corner_labels(spec, lay, rim, (own, label[:2], label[2:]))
-    if not drawing.cup_cuts:
+    if not drawing.cup_seams:
         return letters
-    starts = [TEXT_MARGIN - lay.cup[0], *(low + BESIDE for low, _ in pieces((0, 0), drawing.cup_cuts)[1:])]
-    heights = _engraving(spec, rim)
-    rows = [row([own, str(i + 1)], spec.moulds.engraving_stroke_mm, (x, y), heights) for i, x in enumerate(starts)]
-    return [*letters[1:], *(shape for shapes in rows for shape in shapes)]
+    width, high, hole = row_width([label[:2]], stroke) + TEXT_MARGIN, lay.label_height + TEXT_MARGIN, drawing.hole
+    taken = [(-x, -y, width - x, high - y), (x - width, -y, x, high - y), (x - MARK, y - MARK, x, y)]
+    taken += [(at - hole, beside - hole, at + hole, beside + hole) for at, beside in drawing.pins.places]
+    strip = Strip((-x, -y, x, y), TEXT_MARGIN, stroke, _engraving(spec, rim), "top", taken)
+    return [*letters[1:], *on_pieces(strip, own, drawing.cup_seams)]
 
 
 def _engraving(spec: Spec, top: float) -> tuple[float, float]:
@@ -186,62 +179,6 @@ def _step(
         top=rim,
         removals=tuple(order),
     )
-
-
-def _drawing(array: Array) -> Drawing:
-    """Return what the tools are drawn to. Raises Refusal for plates larger than the bed that can't be cut."""
-    spec, moulds = array.unit, array.unit.moulds
-    dims = replace(dimensions(spec), exit=None, sides=())
-    height = min(dims.heights[0] - moulds.least_wall_mm - 0.4, 3.0)
-    height = math.floor(height / moulds.layer_mm + 1e-6) * moulds.layer_mm
-    label = HEIGHT * moulds.engraving_stroke_mm
-    hole = PIN_RADIUS + moulds.plinth_clearance_mm
-    wall = max(2 * hole + 2 * moulds.least_wall_mm, label + 1.0 + moulds.least_wall_mm)
-    box_, beside = array.sheet.outline, moulds.land_mm + moulds.groove_width_mm + wall
-    cup = max(abs(box_[0]), box_[2]) + beside, max(abs(box_[1]), box_[3]) + beside
-    plate = cup[0] + label + 2 * LABEL_MARGIN, cup[1] + label + 2 * LABEL_MARGIN
-    if 2 * plate[1] > moulds.bed_y_mm + 1e-9:
-        limit = f"the base of {2 * plate[0]:.4g} x {2 * plate[1]:.4g} mm exceeds the bed; tools are cut across x alone"
-        raise Refusal("moulds.bed_y_mm", moulds.bed_y_mm, limit, math.ceil(20 * plate[1] - 1e-6) / 10)
-    x, y = cup[0] / 2, cup[1] - wall / 2
-    places = (-x, -y), (x, -y), (-x, y), (x - OFF_SQUARE, y)
-    cells = tuple(Cell(place.x, place.y, (), place.name) for place in array.places)
-    pitch = min(array.pitch_mm, 2 * cup[1])
-    # No plinth, so no ribs on it.
-    lay = Layout(cells, MARK, pitch, (0.0, 0.0), cup, plate, label)
-    drawn = Drawing(
-        array, spec, dims, fins(array, wiring(array)), lay, Pins(places, height, moulds.plinth_clearance_mm)
-    )
-    return _cut(drawn) if 2 * plate[0] > moulds.bed_x_mm + 1e-9 else drawn
-
-
-def _cut(drawn: Drawing) -> Drawing:
-    """Return the drawing with its cuts, and with as many pins that each piece of base and cups stands on two."""
-    moulds, lay, array, (cup, y) = drawn.spec.moulds, drawn.lay, drawn.array, drawn.lay.cup
-    across(array)
-    bore = drawn.dims.outer_radius + moulds.land_mm + moulds.groove_width_mm
-    reach = [max([bore, *(_slot(drawn, f) for f in drawn.fins if f.place == i)]) for i in range(len(array.places))]
-    pin = drawn.pins.hole_radius + CHAMFER
-    label = row_width(["C1", "1"], moulds.engraving_stroke_mm) + TEXT_MARGIN
-    ends: list[Interval] = [(-lay.plate[0], -cup + max(PRY_UNDER, label)), (cup - max(PRY_UNDER, label), lay.plate[0])]
-    there = list(taken(array, reach, [*ends, *((x - pin, x + pin) for x, _ in drawn.pins.places)]))
-    plate = -lay.plate[0], lay.plate[0]
-    base = cuts(plate, there, moulds.bed_x_mm, f"the base of {2 * lay.plate[0]:.4g} x {2 * lay.plate[1]:.4g} mm")
-    cups = base if 2 * cup > moulds.bed_x_mm + 1e-9 else []
-    if cups:
-        cups = cuts((-cup, cup), there, moulds.bed_x_mm, f"a cup of {2 * cup:.4g} x {2 * y:.4g} mm", base)
-    places = list(drawn.pins.places)
-    for low, high in pieces((-cup, cup), sorted({*base, *cups})):
-        if sum(low < x < high for x, _ in places) < 2:
-            middle = min((place.x for place in array.places), key=lambda x: abs(x - (low + high) / 2))
-            places += [(middle, side * drawn.pins.places[-1][1]) for side in (-1, 1)]
-    return replace(drawn, pins=replace(drawn.pins, places=tuple(places)), base_cuts=tuple(base), cup_cuts=tuple(cups))
-
-
-def _slot(drawn: Drawing, fin: Fin) -> float:
-    """Return how far a fin and its slot reach along x from the unit's middle, mm."""
-    clearance = drawn.spec.moulds.plinth_clearance_mm
-    return fin.reach + clearance if fin.direction[0] else fin.half + clearance
 
 
 def _bottom(spec: Spec) -> float:
@@ -297,7 +234,7 @@ def _slots(drawing: Drawing) -> list[Shape]:
 
 
 def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
-    """Draw a groove round each bore; it stops over a slot and beside another bore where the wall would be too thin."""
+    """Draw a groove round each bore; it stops at seams, over slots and beside other bores: walls would be thin."""
     spec, dims, cells = drawing.spec, drawing.dims, drawing.lay.cells
     moulds, rim = spec.moulds, dims.heights[layer]
     inner = dims.radii[layer] + moulds.land_mm
@@ -312,6 +249,12 @@ def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
         wider = moulds.plinth_clearance_mm + moulds.least_wall_mm
         over = fin.drawn(drawing.array, outer + BEYOND, wider, low - BEYOND, high + BEYOND)
         stops[fin.place].append(over)
+    for seam in drawing.cup_seams:
+        for strip in strips(seam, moulds.least_wall_mm + seam.play / 2):
+            over = Extrude(polygon(*strip), low - BEYOND, high + BEYOND)
+            for i, cell in enumerate(cells):
+                if between_convex([seen((cell.x, cell.y), seam.across)], strip) < outer:
+                    stops[i].append(over if seam.across == "x" else turned(over, "z", 1))
     return [cut(moved(ring(inner, outer, low, high), c.x, c.y), stops[i]) for i, c in enumerate(cells)]
 
 

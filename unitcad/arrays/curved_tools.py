@@ -19,7 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.back_sheet_tools import OFF_SQUARE, UP, core_top, inner_tools
+from unitcad.arrays.back_sheet_drawing import OFF_SQUARE
+from unitcad.arrays.back_sheet_tools import UP, core_top, inner_tools
 from unitcad.arrays.bending import bent_stretches
 from unitcad.arrays.circuit.wiring import wiring
 from unitcad.arrays.curved_release import parts_out

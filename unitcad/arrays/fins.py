@@ -14,7 +14,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from unitcad.arrays.array import Array
+from unitcad.arrays.array import Array, Box
 from unitcad.arrays.circuit.wiring import Wiring
 from unitcad.shape import Shape, box
 from unitcad.spec import Spec
@@ -37,8 +37,13 @@ class Fin(NamedTuple):
 
     def drawn(self, array: Array, reach: float, wider: float, low: float, high: float) -> Shape:
         """Draw a box along the way, from the unit's centre to `reach`, `wider` to either side, from z to z."""
+        x0, y0, x1, y1 = self.taken(array, reach, wider)
+        return box(x0, x1, y0, y1, low, high)
+
+    def taken(self, array: Array, reach: float, wider: float) -> Box:
+        """Return what that box takes in the plane, mm."""
         at, (x0, x1, y0, y1) = array.places[self.place], self._sides(reach, wider)
-        return box(at.x + x0, at.x + x1, at.y + y0, at.y + y1, low, high)
+        return at.x + x0, at.y + y0, at.x + x1, at.y + y1
 
     def about_the_axis(self, reach: float, wider: float, low: float, high: float) -> Shape:
         """Draw the same with the unit's axis at x = y = 0."""

@@ -56,9 +56,9 @@ def pictures(moulds: PatchMoulds) -> dict[str, bytes]:
     return drawn | {f"{FOLDER}/pour{i + 1}.png": picture for i, picture in enumerate(cuts)}
 
 
-def _solid(moulds: PatchMoulds, body: Body, up: float = 0.0, aside: float = 0.0) -> _Solid:
+def _solid(moulds: PatchMoulds, body: Body, by: _Eye = (0.0, 0.0, 0.0)) -> _Solid:
     vertices, faces = arrays(moulds.mesh(body))
-    return np.asarray(vertices, float) + np.array([aside, 0.0, up]), np.asarray(faces, np.int64), body.colour
+    return np.asarray(vertices, float) + np.array(by), np.asarray(faces, np.int64), body.colour
 
 
 def _worn(moulds: PatchMoulds) -> Iterator[_Solid]:
@@ -71,8 +71,8 @@ def _worn(moulds: PatchMoulds) -> Iterator[_Solid]:
 
 
 def _apart(moulds: PatchMoulds) -> Iterator[_Solid]:
-    for body, (aside, _, up) in taken_apart(moulds):
-        yield _solid(moulds, body, up, aside)
+    for body, by in taken_apart(moulds):
+        yield _solid(moulds, body, by)
 
 
 def taken_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float, float]]]:
@@ -90,8 +90,11 @@ def taken_apart(moulds: PatchMoulds) -> Iterator[tuple[Body, tuple[float, float,
         for body in bodies:
             top = max(top, bounds(moulds.mesh(body))[5] + up)
             pieces = plan.pieces_of(body.name) if body.role == "tool" else (body,)
+            columns = next((split.columns for split in plan.splits if split.tool == body.name), 1)
             for k, piece in enumerate(pieces):
-                yield piece, ((k - (len(pieces) - 1) / 2) * GAP, 0.0, float(up))
+                row, column = divmod(k, columns)
+                aside = column - (columns - 1) / 2, (len(pieces) / columns - 1) / 2 - row
+                yield piece, (aside[0] * GAP, aside[1] * GAP, float(up))
 
 
 def laid_elsewhere(plan: Plan, step: Step) -> bool:

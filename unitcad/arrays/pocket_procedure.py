@@ -131,14 +131,19 @@ def _sort(moulds: PatchMoulds) -> str:
         listed(mould_plates(moulds)),
     )
     return (
-        f"Print tray ({tray}) and blade as they lie in {files}, without supports. The tray is engraved "
+        f"Print tray ({tray}){_and_blade(moulds)} as they lie in {files}, without supports. The tray is engraved "
         f"{seen(f'B{moulds.plan.label}')}."
     )
 
 
+def _and_blade(moulds: PatchMoulds) -> str:
+    """Name the blade where it is printed too."""
+    return " and blade" * all(blade.made == "printed" for blade in moulds.plan.of_kind("blade"))
+
+
 def _printing(moulds: PatchMoulds, solid_mm3: float, units: Iterable[str]) -> Iterator[str]:
     lengths, what = moulds.spec.moulds, "resin" if in_resin(moulds) else "filament"
-    yield on_plates(moulds, "tray and blade, as they are printed")
+    yield on_plates(moulds, f"tray{_and_blade(moulds)}, as they are printed")
     yield f"Printer {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm, no supports."
     yield f"At most {number(solid_mm3 / 1000, 2)} cm3 of {what} (computed: the pieces, solid)."
     yield f"The units' moulds: {listed(f'{folder}/moulds/moulds.3mf' for folder in units)}, as their casting.md says."

@@ -9,15 +9,16 @@ import math
 
 from unitcad.arrays.array import Array, Box
 from unitcad.arrays.bending import bent_stretches
-from unitcad.arrays.larger_than_bed import across, pieces, taken
+from unitcad.arrays.larger_than_bed import longer_than_bed, of_sheet, round_units, sized
 from unitcad.arrays.outlines import rounded, slot_profile
+from unitcad.arrays.piece_labels import Strip, on_pieces
 from unitcad.designs import Dimensions
 from unitcad.designs.tooling import Cell, Layout
-from unitcad.errors import Refusal
 from unitcad.moulds.blade import bar
 from unitcad.moulds.cup import groove_depth_of
-from unitcad.moulds.dovetails import cuts, seams, split
-from unitcad.moulds.labels import engraved, row, row_width
+from unitcad.moulds.cuts import seams
+from unitcad.moulds.dovetails import Seam, split
+from unitcad.moulds.labels import engraved
 from unitcad.moulds.pieces import base_piece, blade_piece
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal
@@ -38,20 +39,18 @@ def tray_plan(array: Array, cast: Shape) -> Plan:
     """
     sheet, spec = array.sheet, array.unit
     outer = _outer(array)
-    cut_at = _cuts(array, outer)
+    cut_at = _seams(array, outer)
     drawn = tray(array)
     label = content_hash(Union((drawn, cast)))[:4].upper()
     # Under a low rim no deeper than the groove.
     stroke = spec.moulds.engraving_stroke_mm
     depth = min(spec.moulds.engraving_depth_mm, groove_depth_of(spec, sheet.thickness_mm))
     wall = (outer[3] - sheet.outline[3] - spec.moulds.land_mm - spec.moulds.groove_width_mm - HEIGHT * stroke) / 2
-    heights, y = (sheet.thickness_mm - depth, sheet.thickness_mm + BEYOND), outer[1] + wall
-    letters: list[Shape] = []
-    for i, (low, high) in enumerate(pieces((outer[0], outer[2]), cut_at)):
-        texts = [f"B{label}", str(i + 1)][: 1 + bool(cut_at)]
-        letters += row(texts, stroke, ((low + high - row_width(texts, stroke)) / 2, y), heights)
+    heights = sheet.thickness_mm - depth, sheet.thickness_mm + BEYOND
+    letters = on_pieces(Strip(outer, wall, stroke, heights, "bottom"), f"B{label}", cut_at)
     half = (outer[2] - outer[0]) / 2, (outer[3] - outer[1]) / 2
-    tools = (base_piece(engraved(drawn, letters)), blade_piece(bar(half[1], sheet.thickness_mm)))
+    strike = blade_piece(bar(half[1], sheet.thickness_mm), too_long=longer_than_bed(spec, 2 * half[1]))
+    tools = base_piece(engraved(drawn, letters)), strike
     layout = Layout((Cell(0.0, 0.0, ()),), 0.0, 0.0, half, half, half, HEIGHT * stroke)
     step = Step(
         index=1,
@@ -80,8 +79,7 @@ def tray_plan(array: Array, cast: Shape) -> Plan:
     held = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, sheet.hold_mm) for unit in array.units}
     stretches = tuple((f"pocket round a unit of {number(size, 3)} mm", 100 * strain) for size, strain in held.items())
     stretches += bent_stretches(array)
-    joined = seams(cut_at, across(array), spec.moulds.plinth_clearance_mm) if cut_at else ()
-    splits = (split(tools[0], joined),) if joined else ()
+    splits = (split(tools[0], cut_at),) if cut_at else ()
     return Plan(tools, (step,), layout, label, dims, stretches=stretches, splits=splits)
 
 
@@ -118,16 +116,8 @@ def _outer(array: Array) -> Box:
     return box[0] - by, box[1] - by, box[2] + by, box[3] + by
 
 
-def _cuts(array: Array, outer: Box) -> list[float]:
+def _seams(array: Array, outer: Box) -> tuple[Seam, ...]:
     """Return where the tray is cut. Raises Refusal for one that stays larger than the bed."""
-    moulds, sheet = array.unit.moulds, array.sheet
-    length, depth = outer[2] - outer[0], outer[3] - outer[1]
-    what = f"the tray of {length:.4g} x {depth:.4g} mm"
-    if depth > moulds.bed_y_mm + 1e-9:
-        limit = f"{what} exceeds the bed; tools are cut across x alone"
-        raise Refusal("moulds.bed_y_mm", moulds.bed_y_mm, limit, math.ceil(depth * 10 - 1e-6) / 10)
-    if length <= moulds.bed_x_mm + 1e-9:
-        return []
-    across(array)
-    there = taken(array, (place.radius - sheet.hold_mm for place in array.places))
-    return cuts((outer[0], outer[2]), there, moulds.bed_x_mm, what)
+    kept = [*round_units(array, (place.radius - array.sheet.hold_mm for place in array.places)), *of_sheet(array)]
+    what = f"the tray of {outer[2] - outer[0]:.4g} x {outer[3] - outer[1]:.4g} mm"
+    return seams(sized(array, outer, kept, kept), what, array.unit.moulds.plinth_clearance_mm)

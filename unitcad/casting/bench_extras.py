@@ -76,7 +76,7 @@ def tape_places(moulds: MouldSet) -> tuple[float, ...]:
         return (CORNER_RADIUS - half,)
     places = [CORNER_RADIUS - half, half - MARK - TAPE_WIDTH]
     free = [at for cell in plan.layout.cells for at in (cell.x + BESIDE, cell.x - BESIDE - TAPE_WIDTH)]
-    seams = sorted({seam.x for split in plan.splits for seam in split.seams})
+    seams = sorted({seam.at for split in plan.splits for seam in split.seams if seam.across == "x"})
     for low, high in pairwise((-half, *seams, half)):
         inside = [[at for at in many if low <= at <= high - TAPE_WIDTH] for many in (places, free)]
         if not inside[0] and inside[1]:

@@ -59,6 +59,9 @@ def _pieces(moulds: MouldSet) -> Iterator[Item]:
             length = f"{height + plan.layout.plate[1] + 10:.0f} mm each, the end bent by a right angle"
             note = f"{number(spec.moulds.filament_mm, 3)} mm printer filament, {length}"
             yield Item("filament stub", count, "piece", "cut", note)
+        elif tool.kind == "blade" and tool.made == "cut":
+            note = f"a straight bar of metal, {plan.layout.plate[1] * 2:.0f} mm long or longer: the bed takes no blade"
+            yield Item("blade", 1, "piece", "tool", note)
         elif tool.made == "cut":
             height = dims.exit.height if dims.exit else 0.0
             yield Item(name, count, "piece", "cut", f"from film or steel strip of {number(height, 3)} mm")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from unitcad.casting.bench_step import BenchStep
+from unitcad.moulds.dovetails import Split
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.text import listed, number, spaced
 
@@ -22,12 +23,18 @@ def joining(moulds: MouldSet, names: dict[str, str] | None = None, picture: str 
     below = called[plan.splits[0].tool]
     upper = [name for tool, name in called.items() if plan.tool(tool).kind == "cup"]
     play = number(plan.splits[0].seams[0].play, 2)
+    grid = any(seam.across == "y" for split in plan.splits for seam in split.seams)
+    numbered = "each engraved with its number from the left" + ", row by row from the back" * grid
+    if any(_inner(split) for split in plan.splits):
+        numbered += "; a piece without an outer edge has none"
+    rows = ", one row after the other" * grid
     text = (
-        f"Printed in pieces, since they are larger than the bed: {parts}, each engraved with its number from the left. "
+        f"Printed in pieces, since they are larger than the bed: {parts}, {numbered}. "
         "Cut off the bulge of the first layer along their dovetails. Lay a piece flat on the bench, hold the next one "
-        "over it and push it straight down, dovetail into dovetail, until a fingernail feels no step between their "
-        f"faces. They have {play} mm of play all round; scrape dovetails that jam. Then seal each seam from outside, "
-        f"never on a face that silicone touches: tape over the underside of the {below} and over the ends of the seam"
+        f"over it and push it straight down, dovetail into dovetail{rows}, until a fingernail feels no step between "
+        f"their faces. They have {play} mm of play all round; scrape dovetails that jam. Then seal each seam from "
+        f"outside, never on a face that silicone touches: tape over the underside of the {below} and over the ends "
+        "of the seam"
     )
     if upper:
         text += (
@@ -35,4 +42,9 @@ def joining(moulds: MouldSet, names: dict[str, str] | None = None, picture: str 
             "keep a cup off its seat. The pins hold the pieces of each cup in line"
         )
     text += f". Silicone that gets into a seam cures to a fin {play} mm thick: pull it off with the flash."
-    yield BenchStep("Join the pieces", text, picture, minutes=JOIN_MIN * sum(len(s.seams) for s in plan.splits))
+    yield BenchStep("Join the pieces", text, picture, minutes=JOIN_MIN * sum(len(s.pieces) - 1 for s in plan.splits))
+
+
+def _inner(split: Split) -> bool:
+    """Tell whether a piece lies between others on all sides."""
+    return min(split.columns, len(split.pieces) // split.columns) > 2

@@ -1,8 +1,9 @@
-"""Distances of points and straight segments in the plane."""
+"""Distances of points, straight segments and convex polygons in the plane."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 Point = tuple[float, float]
 
@@ -34,3 +35,22 @@ def to_box(start: Point, end: Point, box: tuple[float, float, float, float]) -> 
         return 0.0
     corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
     return min(between_segments(start, end, *side) for side in zip(corners, [*corners[1:], corners[0]], strict=True))
+
+
+def between_convex(one: Sequence[Point], other: Sequence[Point]) -> float:
+    """Return the distance of two convex polygons, which may be points or segments; 0 where they meet."""
+    if _inside(one[0], other) or _inside(other[0], one):
+        return 0.0
+    return min(between_segments(*edge, *beside) for edge in _edges(one) for beside in _edges(other))
+
+
+def _edges(corners: Sequence[Point]) -> list[tuple[Point, Point]]:
+    if len(corners) < 3:
+        return [(corners[0], corners[-1])]
+    return list(zip(corners, [*corners[1:], corners[0]], strict=True))
+
+
+def _inside(at: Point, corners: Sequence[Point]) -> bool:
+    """Tell whether a point lies in a convex polygon of three corners or more."""
+    sides = [(q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0]) for p, q in _edges(corners)]
+    return len(corners) > 2 and (min(sides) >= 0 or max(sides) <= 0)

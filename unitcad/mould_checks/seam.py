@@ -2,13 +2,14 @@
 
 Measured on the meshes. What a tool has and its pieces lack is the gap: it is as wide as the play, no wider and no
 narrower, the pieces share no volume and slide together along z. What of the gap a pour's silicone can reach, with tape
-under the tool, is what weeps into it.
+or petroleum jelly under each tool, is what weeps into it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
+import math
+from collections.abc import Iterator, Sequence
+from itertools import chain, pairwise
 
 import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold
@@ -30,6 +31,7 @@ GRID = 3 / GRID_PER_MM
 """What snapping two borders to the grid may take from their gap, or add to it, mm."""
 SLIVER = 1e-6
 """Volume of a piece of a gap that is what rounding leaves, mm3."""
+_Named = tuple[str, Manifold]
 THIN = 1e-3
 """A slice between two heights nearer than this is left out, and what is nearer is touched, mm."""
 
@@ -76,16 +78,30 @@ def _of_split(moulds: MouldSet, split: Split, gap: Manifold) -> Iterator[MouldFi
     play = moulds.spec.moulds.plinth_clearance_mm
     beyond = sum(float((piece - whole).volume()) for _, piece in pieces)
     yield at_most("C250", f"{split.tool}: pieces beyond it", beyond, OVERLAP, "mm3")
-    for (name, piece), (after, other) in pairwise(pieces):
+    for (name, piece), (after, other) in _neighbours(pieces, split.columns):
         where = f"{name} and {after}"
         yield at_most("C250", f"{where}: overlap", float((piece ^ other).volume()), OVERLAP, "mm3")
         narrowest = float(piece.min_gap(other, play + 1))
         yield at_least("C250", f"{where}: narrowest gap", narrowest, play - GRID, "mm", "the printer's play is missing")
         facing = min(blocked(other, piece, (0, 0, way)) for way in (1, -1))
         yield at_most("C250", f"{where}: slide together", facing, BLOCKED, "mm2", "one piece is caught in the other")
-    yield at_most(
-        "C250", f"{split.tool}: widest gap", _widest(gap), play + GRID, "mm", "something of the tool is missing"
-    )
+    missing = "something of the tool is missing"
+    _, _, low, _, _, high = whole.bounding_box()
+    spot = Manifold.cylinder(high - low + 2, 2 * play + GRID).translate((0, 0, low - 1))
+    spots = united(spot.translate((x, y, 0)) for x, y in split.crossings)
+    yield at_most("C250", f"{split.tool}: widest gap", _widest(gap - spots), play + GRID, "mm", missing)
+    if split.crossings:
+        # The four corners of a crossing stand on a square, whose diagonal is free.
+        most = math.sqrt(2) * play + GRID
+        yield at_most("C250", f"{split.tool}: widest gap where seams cross", _widest(gap ^ spots), most, "mm", missing)
+
+
+def _neighbours(pieces: Sequence[_Named], columns: int) -> Iterator[tuple[_Named, _Named]]:
+    """Yield each two of the pieces, given row by row, that have a seam or a corner of one between them."""
+    for i, piece in enumerate(pieces):
+        right, left = (i + 1) % columns > 0, i % columns > 0
+        beside = [i + 1] * right + [i + columns - 1] * left + [i + columns] + [i + columns + 1] * right
+        yield from ((piece, pieces[k]) for k in beside if k < len(pieces))
 
 
 def _widest(gap: Manifold) -> float:
@@ -106,11 +122,13 @@ def _inscribed(section: CrossSection) -> float:
 
 
 def _weep(moulds: MouldSet, step: Step, gaps: list[Manifold]) -> MouldFinding:
-    """Compare the volume of the gaps that touch the layer, under the rim, with the layer's."""
+    """Compare the volume of the gaps that touch the layer, under the rim, with the layer's.
+
+    Each tool's seams are sealed from below: nothing gets from a cup's into the base's where the two cross.
+    """
     layers = moulds.meshes(step.layer)
-    under = united(gap.trim_by_plane((0, 0, -1), -step.rim) for gap in gaps)
     reached = 0.0
-    for part in under.decompose():
+    for part in chain.from_iterable(gap.trim_by_plane((0, 0, -1), -step.rim).decompose() for gap in gaps):
         if part.volume() > SLIVER and any(part.min_gap(layer, 2 * THIN) < THIN for layer in layers):
             reached += float(part.volume())
     limit = WEEP * sum(float(layer.volume()) for layer in layers)

@@ -1,4 +1,4 @@
-r"""Tools larger than the printer's bed: cut across x at dovetails, whose pieces slide together along z.
+r"""Tools larger than the printer's bed: cut at dovetails, whose pieces slide together along z.
 
        piece 1        piece 2
     ------------.  .-------------      the line of a seam, seen from above: round corners, teeth of piece 1 in piece 2
@@ -10,63 +10,105 @@ r"""Tools larger than the printer's bed: cut across x at dovetails, whose pieces
     ------------'  '-------------
 
 Either side of the line is moved square to itself by half the play, so that the gap is the play everywhere, along the
-flanks too. A cut lies in the middle of a gap between features, so that it meets none of them.
+flanks too. A seam goes from edge to edge. Where seams across x and across y cross, both run straight: the corners of
+the four pieces are whole, and no tooth is cut.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, pairwise
+from itertools import pairwise
+from typing import Literal
 
-from unitcad.errors import Refusal
-from unitcad.shape import Common, Extrude, Profile
+from unitcad.geometry.segments import Point, to_segment
+from unitcad.shape import Common, Extrude, Profile, Shape, turned
 from unitcad.shape.body import Body
 
-DEPTH = 3.5
-"""Of a tooth, mm."""
-NECK = 5.0
-"""Width of a tooth at its foot, mm."""
 FLANK_DEG = 30.0
 """Of a flank against the way that pulls the pieces apart: they part by play / sin(30) = 2 plays before it bears."""
 ROUND = 0.8
 """Radius of the line's corners, mm: a nozzle follows it, and the gap stays the play round them."""
 TOOTH_PITCH = 14.0
-BESIDE = 1.2
-"""From a tooth to a feature of the tool, at least, mm."""
-FREE = DEPTH + 2 * BESIDE
-"""Width of a gap between features that takes a seam, mm."""
-TIP = NECK + 2 * DEPTH * math.tan(math.radians(FLANK_DEG))
-"""Width of a tooth at its tip, mm."""
-_FAR = 1000.0
-_Point = tuple[float, float]
+FAR = 1000.0
+"""Where lines begin and end, beyond every tool, mm."""
 Interval = tuple[float, float]
+Axis = Literal["x", "y"]
+
+
+@dataclass(frozen=True)
+class Dovetail:
+    """A tooth's depth and its width at the foot, mm."""
+
+    depth: float
+    neck: float
+
+    @property
+    def tip(self) -> float:
+        """Its width at the tip, mm."""
+        return self.neck + 2 * self.depth * math.tan(math.radians(FLANK_DEG))
+
+
+LARGE, SMALL = Dovetail(3.5, 5.0), Dovetail(2.5, 4.0)
+"""SMALL is for what units that stand close leave between them."""
+
+
+@dataclass(frozen=True)
+class Tooth:
+    """A tooth on a seam's line: the middle of its foot, the line's way there, on its right (1) or left (-1)."""
+
+    middle: Point
+    way: Point
+    side: int
+    size: Dovetail = LARGE
+
+    @property
+    def corners(self) -> tuple[Point, ...]:
+        """Its corners along the line's way: foot, tip, tip, foot."""
+        (ux, uy), size = self.way, self.size
+        deep = self.side * uy * size.depth, -self.side * ux * size.depth
+        half = -size.neck / 2, -size.tip / 2, size.tip / 2, size.neck / 2
+        return tuple(
+            (self.middle[0] + ux * by + out * deep[0], self.middle[1] + uy * by + out * deep[1])
+            for by, out in zip(half, (0, 1, 1, 0), strict=True)
+        )
 
 
 @dataclass(frozen=True)
 class Seam:
-    """A cut across x: the middle of its teeth in x, their middles in y, and the gap between the pieces (mm)."""
+    """A cut across x or y: `at` there, and the gap between the pieces (mm).
 
-    x: float
-    teeth: tuple[float, ...]
+    `line` goes from far below to far above, `teeth` stand on it, in the frame of the tools; across y in that frame
+    turned by a quarter, (y, -x): there too the seam goes from below to above.
+    """
+
+    at: float
+    line: tuple[Point, ...]
+    teeth: tuple[Tooth, ...]
     play: float
+    across: Axis = "x"
 
     @property
-    def corners(self) -> tuple[_Point, ...]:
-        """The line's corners from -y to +y."""
-        low, high = self.x - DEPTH / 2, self.x + DEPTH / 2
-        return tuple(
-            point
-            for y in self.teeth
-            for point in ((low, y - NECK / 2), (high, y - TIP / 2), (high, y + TIP / 2), (low, y + NECK / 2))
-        )
+    def corners(self) -> tuple[Point, ...]:
+        """The line's corners with those of its teeth, without its ends."""
+        found: list[Point] = []
+        for start, end in pairwise(self.line):
+            there = [tooth for tooth in self.teeth if to_segment(tooth.middle, start, end) < 1e-6]
+            found += [c for tooth in sorted(there, key=lambda t: math.dist(start, t.middle)) for c in tooth.corners]
+            found.append(end)
+        return tuple(found[:-1])
+
+    @property
+    def extent(self) -> Interval:
+        """From where to where it reaches along the axis that it is across, mm."""
+        reached = [x for x, _ in (*self.line, *self.corners)]
+        return min(reached), max(reached)
 
     def side(self, of: int) -> tuple[tuple[float, float, float], ...]:
-        """Return the border of the piece on the left (-1) or right (1) of the line, from -y to +y, with bulges."""
+        """Return the border of the piece on the left (-1) or right (1) of the line, from below, with bulges."""
         shift = -of * self.play / 2  # to the left of the way along the line
-        ends = (self.x - DEPTH / 2, -_FAR), (self.x - DEPTH / 2, _FAR)
-        line = (ends[0], *self.corners, ends[1])
+        line = (self.line[0], *self.corners, self.line[-1])
         ways = [_unit(a, b) for a, b in pairwise(line)]
         border = [(*_beside(line[0], ways[0], shift), 0.0)]
         for corner, before, after in zip(line[1:-1], ways[:-1], ways[1:], strict=True):
@@ -79,111 +121,99 @@ class Seam:
 
 @dataclass(frozen=True)
 class Split:
-    """A tool by its name, and the pieces that it is printed in, from -x to +x; `seams` lie between them."""
+    """A tool by its name, and the pieces that it is printed in: row by row from the top, each row from -x to +x."""
 
     tool: str
     pieces: tuple[Body, ...]
     seams: tuple[Seam, ...]
 
+    @property
+    def columns(self) -> int:
+        """The number of pieces in a row."""
+        return 1 + sum(seam.across == "x" for seam in self.seams)
+
+    @property
+    def crossings(self) -> tuple[Point, ...]:
+        """Where four pieces meet."""
+        over = [seam.line[0][0] for seam in self.seams if seam.across == "y"]
+        return tuple((at(seam.line, y), y) for seam in self.seams if seam.across == "x" for y in over)
+
 
 def split(tool: Body, seams: Sequence[Seam]) -> Split:
-    """Cut a tool at its seams. The pieces are named by the tool and a number from -x on: base-1, base-2 ..."""
-    pieces = []
-    for i, (left, right) in enumerate(pairwise((None, *seams, None))):
-        within = Extrude(_between(left, right), -_FAR, _FAR)
-        pieces.append(replace(tool, name=f"{tool.name}-{i + 1}", shape=Common((tool.shape, within))))
-    return Split(tool.name, tuple(pieces), tuple(seams))
+    """Cut a tool at its seams. The pieces are named by the tool and a number: base-1, base-2 ..."""
+    across, along = (sorted((s for s in seams if s.across == axis), key=lambda s: s.at) for axis in ("x", "y"))
+    columns: list[list[Shape]] = [[_between(*ends)] if across else [] for ends in pairwise((None, *across, None))]
+    rows: list[list[Shape]] = [
+        [turned(_between(*ends), "z", 1)] if along else [] for ends in pairwise((None, *along, None))
+    ]
+    within = [(*column, *row) for row in reversed(rows) for column in columns]
+    pieces = tuple(
+        replace(tool, name=f"{tool.name}-{i}", shape=Common((tool.shape, *shapes)))
+        for i, shapes in enumerate(within, 1)
+    )
+    return Split(tool.name, pieces, (*across, *along))
 
 
-def seams(cuts: Iterable[float], across: Interval, play: float) -> tuple[Seam, ...]:
-    """Return a seam at each cut, its teeth within `across` (y, mm), as many as stand there at their pitch."""
-    middle, width = sum(across) / 2, across[1] - across[0]
-    count = max(1, math.floor((width - TIP) / TOOTH_PITCH) + 1)
-    teeth = tuple(middle + (i - (count - 1) / 2) * TOOTH_PITCH for i in range(count))
-    return tuple(Seam(x, teeth, play) for x in cuts)
+def straight(
+    where: float, stretches: Sequence[Interval], play: float, across: Axis = "x", size: Dovetail = LARGE
+) -> Seam:
+    """Return a straight seam whose teeth, all to one side, have their middle at `where` and stand in `stretches`."""
+    x = where - size.depth / 2
+    teeth = tuple(Tooth((x, y), (0.0, 1.0), 1, size) for ends in stretches for y in evenly(ends, size))
+    return Seam(where, ((x, -FAR), (x, FAR)), teeth, play, across)
 
 
-def cuts(ends: Interval, taken: Iterable[Interval], bed: float, what: str, other: Sequence[float] = ()) -> list[float]:
-    """Return where a tool between `ends` is cut so that every piece fits the bed along x: as few cuts as can be.
-
-    Among these the longest piece is as short as it can be. `taken`: what features take along x; a cut lies in the
-    middle of a gap between them. Where it can, it lies at none of the cuts of the tool under it (`other`): each then
-    holds the other's pieces together, and no seam lies over a seam. Raises Refusal for a bed that no cut makes large
-    enough, with the least that is.
-    """
-    places = _places(ends, taken)
-    staggered = _fewest(ends, [place for place in places if place not in other], bed)
-    found = _fewest(ends, places, bed)
-    if found is None:
-        needed = min(length for length in (max(_lengths(ends, places)), ends[1] - ends[0]))
-        limit = f"{what} exceeds the bed, and the cuts between its features leave longer pieces"
-        raise Refusal("moulds.bed_x_mm", bed, limit, math.ceil(needed * 10 - 1e-6) / 10)
-    return staggered if staggered is not None and len(staggered) == len(found) else found
+def evenly(within: Interval, size: Dovetail) -> list[float]:
+    """Return the middles of as many teeth as stand within an interval at their pitch; none where there is no room."""
+    middle, width = sum(within) / 2, within[1] - within[0]
+    if width < size.tip - 1e-9:
+        return []
+    count = max(1, math.floor((width - size.tip) / TOOTH_PITCH) + 1)
+    return [middle + (i - (count - 1) / 2) * TOOTH_PITCH for i in range(count)]
 
 
-def _places(ends: Interval, taken: Iterable[Interval]) -> list[float]:
-    """Return the middles of the gaps that take a seam."""
-    reached, found = ends[0], []
-    for low, high in (*sorted(taken), (ends[1], ends[1])):
-        if low - reached >= FREE:
-            found.append((low + reached) / 2)
-        reached = max(reached, high)
-    return found
+def at(line: Sequence[Point], y: float) -> float:
+    """Return x of a line that goes upwards at a height y that it passes."""
+    for (x0, y0), (x1, y1) in pairwise(line):
+        if y0 <= y <= y1:
+            return x0 + (x1 - x0) * (y - y0) / (y1 - y0)
+    raise ValueError(f"the line does not pass y = {y:g}")
 
 
-def _fewest(ends: Interval, places: Sequence[float], bed: float) -> list[float] | None:
-    """Return the fewest cuts with which no piece is longer than the bed, the longest as short as can be; or None."""
-    found = _reaching(ends, places, bed)
-    if found is None:
-        return None
-    marks = _marks(ends, places)
-    for most in sorted({b - a + DEPTH for a, b in combinations(marks, 2)}):
-        better = _reaching(ends, places, min(most, bed))
-        if better is not None and len(better) == len(found):
-            return better
-    return found
+def seen(point: Point, across: Axis) -> Point:
+    """Return a point in the frame of the seams across an axis."""
+    return point if across == "x" else (point[1], -point[0])
 
 
-def _reaching(ends: Interval, places: Sequence[float], most: float) -> list[float] | None:
-    """Return cuts from the left on, each as far as a piece of length `most` reaches; None where one would be longer."""
-    chosen: list[float] = []
-    while _lengths(ends, chosen)[-1] > most + 1e-9:
-        further = [x for x in places if x > (chosen[-1] if chosen else ends[0])]
-        near = [x for x in further if _lengths(ends, [*chosen, x])[-2] <= most + 1e-9]
-        if not near:
-            return None
-        chosen.append(near[-1])
-    return chosen
+def strips(seam: Seam, by: float) -> Iterator[tuple[Point, ...]]:
+    """Yield rectangles that cover all that is nearer to a seam's line than `by`, and its teeth, in the seam's frame."""
+    for start, end in pairwise((seam.line[0], *seam.corners, seam.line[-1])):
+        way = _unit(start, end)
+        ends = _along(start, way, -by), _along(end, way, by)
+        yield tuple(_beside(ends[i], way, side * by) for i, side in ((0, -1), (1, -1), (1, 1), (0, 1)))
+    for tooth in seam.teeth:
+        yield tooth.corners[:: tooth.side]
 
 
-def _lengths(ends: Interval, cuts: Sequence[float]) -> list[float]:
-    """Return the pieces' lengths along x: from the outermost of one seam's teeth to that of the next one's."""
-    return [b - a + DEPTH for a, b in pairwise(_marks(ends, cuts))]
-
-
-def _marks(ends: Interval, cuts: Sequence[float]) -> list[float]:
-    return [ends[0] + DEPTH / 2, *cuts, ends[1] - DEPTH / 2]
-
-
-def _between(left: Seam | None, right: Seam | None) -> Profile:
-    """Return the region between two seams; without one it reaches far out."""
-    up = right.side(-1) if right else ((_FAR, -_FAR, 0.0), (_FAR, _FAR, 0.0))
-    down = left.side(1) if left else ((-_FAR, -_FAR, 0.0), (-_FAR, _FAR, 0.0))
+def _between(left: Seam | None, right: Seam | None) -> Shape:
+    """Draw the region between two seams; without one it reaches far out."""
+    up = right.side(-1) if right else ((FAR, -FAR, 0.0), (FAR, FAR, 0.0))
+    down = left.side(1) if left else ((-FAR, -FAR, 0.0), (-FAR, FAR, 0.0))
     # Walked the other way, an arc's bulge stands at its other end and turns to the other side.
     bulges = [-bulge for _, _, bulge in down[:-1]]
     back = [(x, y, bulge) for (x, y, _), bulge in zip(reversed(down), [*reversed(bulges), 0.0], strict=True)]
-    return Profile((*up, *back))
+    return Extrude(Profile((*up, *back)), -FAR, FAR)
 
 
-def _unit(a: _Point, b: _Point) -> _Point:
+def _unit(a: Point, b: Point) -> Point:
     length = math.dist(a, b)
     return (b[0] - a[0]) / length, (b[1] - a[1]) / length
 
 
-def _along(point: _Point, way: _Point, by: float) -> _Point:
+def _along(point: Point, way: Point, by: float) -> Point:
     return point[0] + way[0] * by, point[1] + way[1] * by
 
 
-def _beside(point: _Point, way: _Point, by: float) -> _Point:
+def _beside(point: Point, way: Point, by: float) -> Point:
     """Return the point moved to the left of a way by `by`."""
     return point[0] - way[1] * by, point[1] + way[0] * by

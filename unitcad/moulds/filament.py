@@ -43,6 +43,12 @@ def way(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) ->
     return moved(union((hole, channel)), cell.x, cell.y)
 
 
+def groove(spec: Spec, lay: Layout, cell: Cell) -> tuple[float, float, float, float]:
+    """Return what the groove takes of the plate's lower face: x0, y0, x1, y1 (mm)."""
+    half, up = filament_groove(spec) / 2, spec.moulds.filament_hole_mm / 2 + FLARE
+    return cell.x - half, cell.y - _length(spec, lay, cell), cell.x + half, cell.y + up
+
+
 def stub(spec: Spec, dims: Dimensions, lay: Layout, cell: Cell, bottom: float) -> Shape:
     """Draw the stub itself: flush with the core's top, its bent end on the bench."""
     radius = spec.moulds.filament_mm / 2

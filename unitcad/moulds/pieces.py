@@ -48,9 +48,9 @@ def stub_pieces(stubs: Sequence[Shape]) -> list[Body]:
     ]
 
 
-def blade_piece(shape: Shape) -> Body:
-    """Return the blade, printed upside down; it stands in no pour."""
-    return Body("blade", "tool", "blade", shape, _BLADE, upside_down=True)
+def blade_piece(shape: Shape, *, too_long: bool = False) -> Body:
+    """Return the blade, printed upside down; it stands in no pour. One that no bed takes is cut: it has no joint."""
+    return Body("blade", "tool", "blade", shape, _BLADE, made="cut" if too_long else "printed", upside_down=True)
 
 
 def _numbered(name: str, index: int, among: Sequence[object]) -> str:

@@ -1,0 +1,166 @@
+"""Tools larger than the bed along y, along both axes, and of hexagons: a grid of pieces whose seams cross."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from itertools import combinations, pairwise
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
+from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.arrays.patch_pictures import taken_apart
+from unitcad.check import Options, check_bytes
+from unitcad.errors import Refusal
+from unitcad.export import stl
+from unitcad.export.printing import print_ready
+from unitcad.geometry.segments import between_convex, to_segment
+from unitcad.kernels.mesh import arrays, bounds, realise
+from unitcad.mould_checks import check_moulds, mould_checks
+from unitcad.moulds.cuts import BESIDE
+from unitcad.moulds.dovetails import Split, split, straight
+from unitcad.moulds.pieces import base_piece
+from unitcad.shape import Shape, box, cut, moved
+from unitcad.spec import printer_of
+
+TWO = ["layout.rows=2", "layout.columns=2"]
+BED = {"x": "moulds.bed_x_mm", "y": "moulds.bed_y_mm"}
+ARRAYS = {
+    "patch, y": ("forearm-patch", ["layout.rows=6", "layout.columns=1", f"{BED['y']}=110"]),
+    "patch, x and y": ("forearm-patch", ["layout.pitch_mm=110", *TWO, f"{BED['x']}=140", f"{BED['y']}=140"]),
+    "hexagon, y": ("hex-19", [f"{BED['y']}=80"]),
+    "hexagon, x and y": ("hex-19", ["layout.rings=3", f"{BED['x']}=110", f"{BED['y']}=100"]),
+}
+PIECES = {"patch, y": 2, "patch, x and y": 4, "hexagon, y": 2, "hexagon, x and y": 4}
+
+
+@cache
+def made(name: str) -> PatchMoulds:
+    template, overrides = ARRAYS[name]
+    return patch_moulds(load_array(template, overrides))
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_every_mould_check_holds(name: str) -> None:
+    assert [f for f in check_moulds(made(name)) if not f.ok] == []
+    assert {len(each.pieces) for each in made(name).plan.splits} == {PIECES[name]}
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_every_piece_prints_without_support_and_has_its_number(name: str) -> None:
+    moulds = made(name)
+    for body in moulds.plan.pieces:
+        if body.made == "printed":
+            content = stl.content(*print_ready(*arrays(moulds.mesh(body)), body.upside_down), body.name)
+            assert check_bytes(content, f"{body.name}.stl", Options(printer=printer_of(moulds.spec))).findings == ()
+    for each in moulds.plan.splits:
+        assert [piece.name for piece in each.pieces] == [f"{each.tool}-{i + 1}" for i in range(len(each.pieces))]
+        middles = [bounds(moulds.mesh(piece)) for piece in each.pieces]
+        # From the left, row by row from the top.
+        assert sorted(middles, key=lambda b: (-round((b[1] + b[4]) / 20), b[0])) == middles
+
+
+@pytest.mark.parametrize("name", ["patch, y", "patch, x and y"])
+def test_each_piece_stands_on_two_pins(name: str) -> None:
+    plan = made(name).plan
+    assert plan.pins is not None
+    for each in plan.splits:
+        for piece in each.pieces:
+            x0, y0, _, x1, y1, _ = bounds(made(name).mesh(piece))
+            assert sum(x0 < x < x1 and y0 < y < y1 for x, y in plan.pins.places) >= 2
+
+
+def test_no_seam_of_a_cup_lies_over_one_of_the_base() -> None:
+    base, *cups = ({(s.across, s.at) for s in each.seams} for each in made("patch, y").plan.splits)
+    assert not any(base & cup for cup in cups)
+
+
+@pytest.mark.parametrize("name", ["hexagon, y", "hexagon, x and y"])
+def test_a_hexagons_seams_keep_clear_of_its_cores(name: str) -> None:
+    """The distance of every core from line and teeth, measured on the corners."""
+    array = made(name).arranged
+    (each,) = made(name).plan.splits
+    for seam in each.seams:
+        assert seam.teeth
+        for place in array.places:
+            at = (place.x, place.y) if seam.across == "x" else (place.y, -place.x)
+            radius = place.radius - array.sheet.hold_mm
+            line = (seam.line[0], *seam.corners, seam.line[-1])
+            assert min(to_segment(at, *ends) for ends in pairwise(line)) >= radius + BESIDE - 1e-6
+            assert all(between_convex(tooth.corners, [at]) >= radius + BESIDE - 1e-6 for tooth in seam.teeth)
+
+
+def plate() -> Split:
+    drawn = base_piece(box(-60, 60, -50, 50, 0, 5))
+    seams = [straight(-10.0, [(-45, 15), (30, 45)], 0.15), straight(20.0, [(-55, 0), (20, 55)], 0.15, "y")]
+    return split(drawn, seams)
+
+
+def test_where_seams_cross_four_square_corners_meet() -> None:
+    """The pieces have the plate's volume but for gap x length x height, the crossing counted once."""
+    play, height = 0.15, 5.0
+    pieces = [realise(piece.shape, 96) for piece in plate().pieces]
+    alone = [split(base_piece(box(-60, 60, -50, 50, 0, 5)), [seam]) for seam in plate().seams]
+    gaps = [120 * 100 * height - sum(realise(p.shape, 96).volume() for p in each.pieces) for each in alone]
+    gap = 120 * 100 * height - sum(piece.volume() for piece in pieces)
+    assert gap == pytest.approx(sum(gaps) - play**2 * height, abs=0.05)
+    assert plate().crossings == (pytest.approx((-11.75, 18.25)),)
+    for one, other in combinations(range(4), 2):
+        near = math.sqrt(2) * play if one + other == 3 else play
+        assert pieces[one].min_gap(pieces[other], 1) == pytest.approx(near, abs=3 / 1024)
+
+
+Change = Callable[[Shape], Shape]
+FAULTS: list[tuple[str, str, float, Change]] = [
+    ("narrowest gap", "no play", 0.0, lambda shape: shape),
+    ("narrowest gap", "the play along y, not square to the flank", 0.0, lambda shape: moved(shape, 0, 0.15)),
+    ("overlap", "a piece 0.5 too far in", 0.15, lambda shape: moved(shape, 0, -0.5)),
+    ("where seams cross", "a corner broken off", 0.15, lambda shape: cut(shape, [box(-0.3, 0, 0, 0.3, -99, 99)])),
+]
+
+
+@pytest.mark.parametrize(("where", "what", "play", "change"), FAULTS, ids=[fault[1] for fault in FAULTS])
+def test_a_faulty_seam_across_y_is_caught(where: str, what: str, play: float, change: Change) -> None:
+    moulds = made("hexagon, x and y")
+    plan, sound = moulds.plan, moulds.plan.splits[-1]
+    drawn = split(plan.tool("base"), [replace(s, play=play if s.across == "y" else s.play) for s in sound.seams])
+    ((x, y),) = sound.crossings
+    shape = moved(change(moved(drawn.pieces[0].shape, -x, -y)), x, y)
+    faulty = replace(drawn, pieces=(replace(drawn.pieces[0], shape=shape), *drawn.pieces[1:]))
+    altered = patch_moulds(moulds.arranged, replace(plan, splits=(*plan.splits[:-1], faulty)))
+    found = [f.where for f in mould_checks()["C250"].findings(altered) if not f.ok]
+    assert any(where in each for each in found), (what, found)
+
+
+def test_pieces_of_a_grid_are_drawn_apart_both_ways() -> None:
+    moulds = made("hexagon, x and y")
+    by = {body.name: offset[:2] for body, offset in taken_apart(moulds) if body.name.startswith("base")}
+    signs = {name: (math.copysign(1, x), math.copysign(1, y)) for name, (x, y) in by.items()}
+    assert signs == {"base-1": (-1, 1), "base-2": (1, 1), "base-3": (-1, -1), "base-4": (1, -1)}
+
+
+def test_the_procedure_says_how_a_grid_is_joined_and_what_the_bed_is_too_small_for() -> None:
+    procedure = back_sheet_procedure(made("patch, x and y"), [100.0] * 2, 1000.0)
+    (step,) = [step for step in procedure.preparation if step.title == "Join the pieces"]
+    assert "row by row from the back" in step.text
+    assert "cup 2 in 4 pieces" in step.text
+    blade = next(item for item in procedure.bill if item.item == "blade")
+    assert blade.made == "tool"
+    assert "bar of metal, 157 mm long" in blade.note
+    assert not any("blade" in line for line in procedure.printing)
+
+
+def test_a_single_tooth_at_a_corner_may_be_missing_but_no_piece_is_loose() -> None:
+    """Of a grid of four by six units no tooth fits beside the outermost row: the other seam holds these pieces."""
+    overrides = ["layout.rows=4", "layout.columns=6", "moulds.bed_x_mm=110", "moulds.bed_y_mm=80"]
+    plan = patch_moulds(load_array("forearm-patch", overrides)).plan
+    for each in plan.splits:
+        assert len(each.pieces) == 4
+        assert all(seam.teeth for seam in each.seams)
+    with pytest.raises(Refusal) as refused:
+        patch_moulds(load_array("forearm-patch", [*overrides[:2], "moulds.bed_y_mm=20"])).plan  # noqa: B018
+    assert refused.value.field == "moulds.bed_y_mm"

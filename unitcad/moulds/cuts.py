@@ -1,0 +1,278 @@
+"""Where tools larger than the printer's bed are cut: between features, as few cuts as can be, with room for teeth.
+
+In a wide gap a seam is straight and its teeth reach to one side. In a narrow one its line keeps the middle, and small
+teeth stand to either side where the features leave room: between four units of a grid, or three of a hexagon.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+from typing import NamedTuple
+
+from unitcad.errors import Refusal
+from unitcad.geometry.segments import Point, between_convex
+from unitcad.moulds.dovetails import (
+    FAR,
+    LARGE,
+    SMALL,
+    TOOTH_PITCH,
+    Axis,
+    Dovetail,
+    Interval,
+    Seam,
+    Tooth,
+    at,
+    evenly,
+    seen,
+)
+
+BESIDE = 1.2
+"""From a seam to a feature of the tool, at least, mm."""
+FREE = LARGE.depth + 2 * BESIDE
+"""Width of a wide gap, mm."""
+STEP = 0.5
+"""Between two places that are tried for a tooth, mm."""
+
+
+class Feature(NamedTuple):
+    """What a cut keeps clear of: a convex polygon by its corners, and all that is nearer to it than `radius` (mm)."""
+
+    corners: tuple[Point, ...]
+    radius: float = 0.0
+
+    @property
+    def extent(self) -> Interval:
+        """What it takes along x, mm."""
+        return min(x for x, _ in self.corners) - self.radius, max(x for x, _ in self.corners) + self.radius
+
+
+class Place(NamedTuple):
+    """Where a cut may lie: the middle of a gap, and the line of its seam, in the frame of its seam."""
+
+    at: float
+    line: tuple[Point, ...]
+    wide: bool = False
+
+    @property
+    def extent(self) -> Interval:
+        """From where to where its seam may reach, teeth included, mm."""
+        if self.wide:
+            return self.at - LARGE.depth / 2, self.at + LARGE.depth / 2
+        return min(x for x, _ in self.line) - SMALL.depth, max(x for x, _ in self.line) + SMALL.depth
+
+
+@dataclass(frozen=True)
+class Sized:
+    """A tool that exceeds the bed along an axis, in the frame of the seams across that axis, mm.
+
+    `ends` of the tool, the `bed`, `teeth`: where along the seams teeth may stand; `features` that teeth keep clear of.
+    `choices` are places for cuts: the later ones are looked at where the earlier ones do not do.
+    """
+
+    across: Axis
+    ends: Interval
+    bed: float
+    teeth: Interval
+    features: tuple[Feature, ...]
+    choices: tuple[tuple[Place, ...], ...]
+
+
+def seams(tool: Iterable[Sized], what: str, play: float, other: Sequence[Seam] = ()) -> tuple[Seam, ...]:
+    """Return the seams of a tool of which every piece fits the bed, as few as can be, along the axes that it exceeds.
+
+    Among these the longest piece is as short as it can be. Where they can, they lie at none of the seams of the
+    tool under it (`other`): each then holds the other's pieces together, and no seam lies over a seam. Teeth join
+    all pieces, though not each two that share a border. Raises Refusal for a bed that no cut makes large enough,
+    with the least that is.
+    """
+    sized, useless = tuple(tool), set[tuple[Axis, Place]]()
+    while True:
+        chosen = [(each, place) for each in sized for place in _cuts(each, what, other, useless)]
+        bare = [Seam(place.at, place.line, (), play, each.across) for each, place in chosen]
+        made = [toothed(place, each, play, [s for s in bare if s.across != each.across]) for each, place in chosen]
+        found = [seam for seam in made if seam]
+        if len(found) == len(chosen) and _joined(found):
+            return tuple(found)
+        poor = [not seam or not all(_stretches(seam, found)) for seam in made]
+        useless |= {(each.across, place) for (each, place), few in zip(chosen, poor, strict=True) if few}
+
+
+def _heights(seam: Seam, others: Iterable[Seam]) -> list[float]:
+    """Return where along a seam those across the other axis cross it, from below, in its frame."""
+    crossing = [other for other in others if other.across != seam.across]
+    if seam.across == "x":
+        return sorted(other.line[0][0] for other in crossing)
+    return sorted(-at(other.line, seam.line[0][0]) for other in crossing)
+
+
+def _stretches(seam: Seam, others: Iterable[Seam]) -> list[int]:
+    """Return how many teeth a seam has on each stretch between crossings, from below, in its frame."""
+    heights = _heights(seam, others)
+    places = [bisect(heights, tooth.middle[1]) for tooth in seam.teeth]
+    return [places.count(i) for i in range(len(heights) + 1)]
+
+
+def _joined(found: Sequence[Seam]) -> bool:
+    """Tell whether teeth join all pieces, over one another."""
+    columns, rows = (sorted((s for s in found if s.across == axis), key=lambda s: s.at) for axis in ("x", "y"))
+    links = [
+        *(((i, j), (i + 1, j)) for i, s in enumerate(columns) for j, n in enumerate(_stretches(s, found)) if n),
+        # Seen along a seam across y, columns go from right to left.
+        *(((i, j), (i, j + 1)) for j, s in enumerate(rows) for i, n in enumerate(_stretches(s, found)[::-1]) if n),
+    ]
+    reached = {(0, 0)}
+    while more := {piece for link in links if reached & set(link) for piece in link} - reached:
+        reached |= more
+    return len(reached) == (len(columns) + 1) * (len(rows) + 1)
+
+
+def gaps(ends: Interval, features: Iterable[Feature], least: float) -> Iterator[Interval]:
+    """Yield the gaps along x that are as wide as `least`, between features that are taken from edge to edge."""
+    reached = ends[0]
+    for low, high in (*sorted(feature.extent for feature in features), (ends[1], ends[1])):
+        if low - reached >= least:
+            yield reached, low
+        reached = max(reached, high)
+
+
+def in_gaps(ends: Interval, features: Sequence[Feature], *, narrow: bool = False) -> Iterator[Place]:
+    """Yield a place in the middle of each wide gap, and of each `narrow` one too that leaves room for a line."""
+    for low, high in gaps(ends, features, 2 * BESIDE if narrow else FREE):
+        wide, middle = high - low >= FREE, (low + high) / 2
+        x = middle - LARGE.depth / 2 if wide else middle
+        yield Place(middle, ((x, -FAR), (x, FAR)), wide)
+
+
+def toothed(place: Place, sized: Sized, play: float, crossing: Sequence[Seam] = ()) -> Seam | None:
+    """Return the seam at a place, with teeth clear of the seams that cross it (`crossing`); None without room."""
+    heights = _heights(Seam(place.at, place.line, (), play, sized.across), crossing)
+    way = {"x": lambda p: (-p[1], p[0]), "y": lambda p: seen(p, "y")}[sized.across]
+    lines = [tuple(way(point) for point in seam.line) for seam in crossing]
+    features = (*sized.features, *(Feature(ends, LARGE.depth) for line in lines for ends in pairwise(line)))
+    teeth: list[Tooth] = []
+    for low, high in pairwise((sized.teeth[0], *heights, sized.teeth[1])):
+        keep = LARGE.depth + BESIDE
+        within = low + keep * (low in heights), high - keep * (high in heights)
+        teeth += _fitting(place, within, features)
+    return Seam(place.at, place.line, tuple(teeth), play, sized.across) if teeth else None
+
+
+def _fitting(place: Place, within: Interval, features: Sequence[Feature]) -> list[Tooth]:
+    """Return the teeth of a place's line, clear of the features, in the middle of where they fit."""
+    if place.wide:
+        at_pitch = [Tooth((place.line[0][0], y), (0.0, 1.0), 1) for y in evenly(within, LARGE)]
+        if all(_clear(tooth, features) for tooth in at_pitch):
+            return at_pitch
+    sides, size = ((1,), LARGE) if place.wide else ((1, -1), SMALL)
+    found = [
+        tooth
+        for ends in pairwise(place.line)
+        for side in sides
+        for tooth in _beside(*ends, within, side, size, features)
+    ]
+    teeth: list[Tooth] = []
+    for tooth in sorted(found, key=lambda t: t.middle[1]):
+        if not teeth or math.dist(tooth.middle, teeth[-1].middle) >= TOOTH_PITCH - STEP:
+            teeth.append(tooth)
+    return teeth
+
+
+def _beside(
+    start: Point, end: Point, within: Interval, side: int, size: Dovetail, features: Sequence[Feature]
+) -> Iterator[Tooth]:
+    """Yield the teeth that fit beside one straight stretch of a line."""
+    low, high = max(start[1], within[0]), min(end[1], within[1])
+    length = math.dist(start, end)
+    way = (end[0] - start[0]) / length, (end[1] - start[1]) / length
+    # Round corners of the line stay beside a tooth's foot.
+    room = (high - low) / way[1] - size.tip - 2 * BESIDE * (start[0] != end[0])
+    if room < 0:
+        return
+    y = (low + high) / 2
+    middle = start[0] + way[0] * (y - start[1]) / way[1], y
+    near = [f for f in features if between_convex((start, end), f.corners) < f.radius + size.depth + BESIDE]
+    count = 2 * math.floor(room / 2 / STEP)
+    runs: list[list[float]] = []
+    for by in [(i - count / 2) * STEP for i in range(count + 1)]:
+        if not _clear(_shifted(middle, way, by, side, size), near):
+            continue
+        if runs and by - runs[-1][-1] < 1.5 * STEP:
+            runs[-1].append(by)
+        else:
+            runs.append([by])
+    for run in runs:
+        for by in evenly((run[0] - size.tip / 2, run[-1] + size.tip / 2), size):
+            yield _shifted(middle, way, by, side, size)
+
+
+def _shifted(middle: Point, way: Point, by: float, side: int, size: Dovetail) -> Tooth:
+    return Tooth((middle[0] + way[0] * by, middle[1] + way[1] * by), way, side, size)
+
+
+def _clear(tooth: Tooth, features: Iterable[Feature]) -> bool:
+    """Tell whether a tooth keeps clear of features."""
+    reach, corners = tooth.size.tip + tooth.size.depth + BESIDE, tooth.corners
+    for points, radius in features:
+        # Far off along either axis: the distance need not be worked out.
+        if any(
+            min(p[i] for p in points) - radius - reach > tooth.middle[i]
+            or max(p[i] for p in points) + radius + reach < tooth.middle[i]
+            for i in (0, 1)
+        ):
+            continue
+        if between_convex(corners, points) < radius + BESIDE - 1e-9:
+            return False
+    return True
+
+
+def _cuts(sized: Sized, what: str, other: Sequence[Seam], useless: set[tuple[Axis, Place]]) -> list[Place]:
+    """Return the places of the cuts across one axis. Raises Refusal where none do."""
+    taken = {seam.at for seam in other if seam.across == sized.across}
+    places: list[Place] = []
+    for choice in sized.choices:
+        places = sorted(place for place in choice if (sized.across, place) not in useless)
+        found = _fewest(sized, places)
+        if found is not None:
+            staggered = _fewest(sized, [place for place in places if place.at not in taken])
+            return staggered if staggered is not None and len(staggered) == len(found) else found
+    usable = [place for place in places if toothed(place, sized, 0.0)]
+    length = sized.ends[1] - sized.ends[0]
+    needed = min((most for most in _all_lengths(sized, usable) if _reaching(sized, usable, most)), default=length)
+    field = f"moulds.bed_{sized.across}_mm"
+    limit = f"{what} exceeds the bed, and the cuts between its features leave longer pieces"
+    raise Refusal(field, sized.bed, limit, math.ceil(min(needed, length) * 10 - 1e-6) / 10)
+
+
+def _fewest(sized: Sized, places: Sequence[Place]) -> list[Place] | None:
+    """Return the fewest cuts with which no piece is longer than the bed, the longest as short as can be; or None."""
+    found = _reaching(sized, places, sized.bed)
+    if found is None:
+        return None
+    for most in _all_lengths(sized, places):
+        better = _reaching(sized, places, min(most, sized.bed))
+        if better is not None and len(better) == len(found):
+            return better
+    return found
+
+
+def _reaching(sized: Sized, places: Sequence[Place], most: float) -> list[Place] | None:
+    """Return cuts from below on, each as far as a piece of length `most` reaches; None where one would be longer."""
+    chosen: list[Place] = []
+    start, reached = sized.ends[0], -math.inf
+    while sized.ends[1] - start > most + 1e-9:
+        near = [p for p in places if p.extent[0] > reached + BESIDE and p.extent[1] - start <= most + 1e-9]
+        if not near:
+            return None
+        chosen.append(max(near, key=lambda place: place.at))
+        start, reached = chosen[-1].extent
+    return chosen
+
+
+def _all_lengths(sized: Sized, places: Sequence[Place]) -> list[float]:
+    """Return every length that a piece can have, the shortest first."""
+    marks = [(sized.ends[0], sized.ends[0]), *(place.extent for place in places), (sized.ends[1], sized.ends[1])]
+    return sorted({after[1] - before[0] for before, after in combinations(marks, 2)})
