@@ -82,6 +82,14 @@ def test_the_groove_of_a_low_tray_is_whole(thickness: float) -> None:
     assert [f for f in check_moulds(patch_moulds(array)) if not f.ok] == []
 
 
+def test_letters_as_deep_as_a_shallow_groove_are_no_groove() -> None:
+    """The label of a narrow tray, 0.2 mm deep as its groove is."""
+    layout = {"kind": "grid", "columns": 1, "rows": 3, "pitch_mm": 17.54}
+    data = {"name": "narrow", "array": "pockets", "unit": "encapsulating", "layout": layout}
+    moulds = patch_moulds(load_array({**data, "moulds": {"groove_depth_mm": 0.3}}))
+    assert [f for f in check_moulds(moulds) if not f.ok] == []
+
+
 def test_a_tray_whose_pieces_exceed_the_bed_is_refused_with_the_bed_that_fits() -> None:
     array = load_array("forearm-pockets", ["layout.columns=12", "moulds.bed_x_mm=30", "moulds.cavities=[1,1]"])
     with pytest.raises(Refusal) as refused:

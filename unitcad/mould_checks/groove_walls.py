@@ -45,7 +45,10 @@ def _of_cup(moulds: MouldSet, step: Step) -> MouldFinding:
     above = [piece for piece in high if piece not in joined]
     above += [part for part in shells(_above(bottom, joined)) if part.bounding_box()[5] > rim]
     sections = [part for solid in above for part in solid.slice(level).decompose()]
-    regions = _without(sections, moulds.meshes((*step.layer, *step.earlier)), level)
+    silicone = moulds.meshes((*step.layer, *step.earlier))
+    regions = _without(sections, silicone, level)
+    if level > under_letters:
+        regions = _beside(regions, silicone, level, moulds.spec.moulds.land_mm)
     limit = min(least_wall(moulds), bottom - GRID)
     thinnest = farthest = 2 * limit
     if regions:
@@ -93,6 +96,13 @@ def _without(sections: list[CrossSection], silicone: list[Manifold], level: floa
         if (section ^ there).is_empty():
             free.append(section)
     return free
+
+
+def _beside(sections: list[CrossSection], silicone: list[Manifold], level: float, land: float) -> list[CrossSection]:
+    """Return the sections that begin where the land round the silicone ends: letters as deep as a groove stand off."""
+    cast = CrossSection.batch_boolean([solid.slice(level) for solid in silicone], OpType.Add)
+    reach = cast.offset(land + 2 * GRID, JoinType.Round)
+    return [section for section in sections if not (section ^ reach).is_empty()]
 
 
 def _tiles(moulds: MouldSet, groove: CrossSection, beside: float, ends: tuple[float, float]) -> list[Column]:
