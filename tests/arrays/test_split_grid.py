@@ -11,9 +11,11 @@ from itertools import combinations, pairwise
 import pytest
 
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.back_sheet_drawing import drawing_of
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
 from unitcad.arrays.patch_pictures import taken_apart
+from unitcad.arrays.seam_weep import weep
 from unitcad.check import Options, check_bytes
 from unitcad.errors import Refusal
 from unitcad.export import stl
@@ -94,6 +96,26 @@ def test_a_hexagons_seams_keep_clear_of_its_cores(name: str) -> None:
             assert all(between_convex(tooth.corners, [at]) >= radius + BESIDE - 1e-6 for tooth in seam.teeth)
 
 
+@pytest.mark.parametrize("name", ARRAYS)
+def test_the_silicone_in_the_seams_is_what_c250_measures(name: str) -> None:
+    """What is refused by lengths and heights, and what is measured on meshes."""
+    moulds = made(name)
+    (*_, found) = (f for f in mould_checks()["C250"].findings(moulds) if "silicone" in f.where)
+    tool, sheet = moulds.plan.splits[-1], moulds.arranged.sheet
+    x0, y0, _, x1, y1, _ = bounds(moulds.solids[tool.tool])
+    plate, rim = moulds.spec.moulds.plate_mm, moulds.plan.steps[-1].rim
+    heights = (plate, plate + rim) if moulds.construction.own_tails else (sheet.low, rim)
+    assert weep(moulds.arranged, tool.seams, (x0, y0, x1, y1), heights) == pytest.approx(found.value, rel=0.03)
+
+
+def test_seams_that_would_take_too_much_silicone_are_refused_with_the_bed_that_would_do() -> None:
+    with pytest.raises(Refusal) as refused:
+        patch_moulds(load_array("hex-19", ["moulds.bed_x_mm=60"])).plan  # noqa: B018
+    assert refused.value.field == "moulds.bed_x_mm"
+    assert "silicone" in str(refused.value)
+    assert patch_moulds(load_array("hex-19", [f"moulds.bed_x_mm={refused.value.nearest}"])).plan
+
+
 def plate() -> Split:
     drawn = base_piece(box(-60, 60, -50, 50, 0, 5))
     seams = [straight(-10.0, [(-45, 15), (30, 45)], 0.15), straight(20.0, [(-55, 0), (20, 55)], 0.15, "y")]
@@ -157,10 +179,10 @@ def test_the_procedure_says_how_a_grid_is_joined_and_what_the_bed_is_too_small_f
 def test_a_single_tooth_at_a_corner_may_be_missing_but_no_piece_is_loose() -> None:
     """Of a grid of four by six units no tooth fits beside the outermost row: the other seam holds these pieces."""
     overrides = ["layout.rows=4", "layout.columns=6", "moulds.bed_x_mm=110", "moulds.bed_y_mm=80"]
-    plan = patch_moulds(load_array("forearm-patch", overrides)).plan
-    for each in plan.splits:
-        assert len(each.pieces) == 4
-        assert all(seam.teeth for seam in each.seams)
+    drawing = drawing_of(load_array("forearm-patch", [*overrides, "moulds.plinth_clearance_mm=0.05"]))
+    for found in (drawing.base_seams, drawing.cup_seams):
+        assert {seam.across for seam in found} == {"x", "y"}
+        assert all(seam.teeth for seam in found)
     with pytest.raises(Refusal) as refused:
         patch_moulds(load_array("forearm-patch", [*overrides[:2], "moulds.bed_y_mm=20"])).plan  # noqa: B018
     assert refused.value.field == "moulds.bed_y_mm"

@@ -10,8 +10,10 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.circuit.wiring import wiring
 from unitcad.arrays.fins import Fin, fins
 from unitcad.arrays.larger_than_bed import box_feature, intervals, of_sheet, round_units, sized
+from unitcad.arrays.seam_weep import sheet_mm2, too_much
 from unitcad.designs import Dimensions, dimensions
 from unitcad.designs.tooling import Cell, Layout
+from unitcad.errors import Refusal
 from unitcad.moulds import filament
 from unitcad.moulds.base import PRY_HALF_WIDTH, PRY_UNDER
 from unitcad.moulds.cuts import Feature, seams
@@ -81,9 +83,20 @@ def _cut(drawn: Drawing) -> Drawing:
     clear, close = [*grooved, *slots, *kept], [*round_units(array, [bore] * len(array.places)), *slots, *kept]
     what = f"the base of {2 * plate[0]:.4g} x {2 * plate[1]:.4g} mm"
     play = moulds.plinth_clearance_mm
+    dims, sheet = drawn.dims, array.sheet
+    inner = [dims.cavity_radius, *dims.radii][-2]
+    moats = len(array.places) * math.pi * (dims.radii[-1] ** 2 - inner**2) * sheet.low
+    layer_mm3 = sheet_mm2(array) * sheet.thickness_mm + moats
+    fault = too_much(array, (-x, -y, x, y), (sheet.low, dims.heights[-1]), layer_mm3)
     under = [box_feature(*filament.groove(drawn.spec, drawn.lay, cell)) for cell in drawn.lay.cells]
-    base = seams(sized(array, (-plate[0], -plate[1], *plate), clear, close, under), what, play)
-    cups = seams(sized(array, (-x, -y, x, y), clear, close), f"a cup of {2 * x:.4g} x {2 * y:.4g} mm", play, base)
+    bases = sized(array, (-plate[0], -plate[1], *plate), clear, close, under)
+    try:
+        base = seams(bases, what, play)
+    except Refusal:
+        # The bed that would do must do for the cups too.
+        base = seams(bases, what, play, fault=fault)
+    what = f"a cup of {2 * x:.4g} x {2 * y:.4g} mm"
+    cups = seams(sized(array, (-x, -y, x, y), clear, close), what, play, base, fault)
     cut_at = replace(drawn, base_seams=base, cup_seams=cups)
     return replace(cut_at, pins=replace(drawn.pins, places=(*drawn.pins.places, *_more_pins(cut_at))))
 

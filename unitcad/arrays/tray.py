@@ -12,6 +12,7 @@ from unitcad.arrays.bending import bent_stretches
 from unitcad.arrays.larger_than_bed import longer_than_bed, of_sheet, round_units, sized
 from unitcad.arrays.outlines import rounded, slot_profile
 from unitcad.arrays.piece_labels import Strip, on_pieces
+from unitcad.arrays.seam_weep import sheet_mm2, too_much
 from unitcad.designs import Dimensions
 from unitcad.designs.tooling import Cell, Layout
 from unitcad.moulds.blade import bar
@@ -120,4 +121,7 @@ def _seams(array: Array, outer: Box) -> tuple[Seam, ...]:
     """Return where the tray is cut. Raises Refusal for one that stays larger than the bed."""
     kept = [*round_units(array, (place.radius - array.sheet.hold_mm for place in array.places)), *of_sheet(array)]
     what = f"the tray of {outer[2] - outer[0]:.4g} x {outer[3] - outer[1]:.4g} mm"
-    return seams(sized(array, outer, kept, kept), what, array.unit.moulds.plinth_clearance_mm)
+    plate, thickness = array.unit.moulds.plate_mm, array.sheet.thickness_mm
+    area = sheet_mm2(array) - sum(math.pi * (place.radius - array.sheet.hold_mm) ** 2 for place in array.places)
+    fault = too_much(array, outer, (plate, plate + thickness), area * thickness)
+    return seams(sized(array, outer, kept, kept), what, array.unit.moulds.plinth_clearance_mm, fault=fault)

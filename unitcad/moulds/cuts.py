@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
@@ -81,17 +81,53 @@ class Sized:
     choices: tuple[tuple[Place, ...], ...]
 
 
-def seams(tool: Iterable[Sized], what: str, play: float, other: Sequence[Seam] = ()) -> tuple[Seam, ...]:
+def seams(
+    tool: Iterable[Sized],
+    what: str,
+    play: float,
+    other: Sequence[Seam] = (),
+    fault: Callable[[Sequence[Seam]], str] = lambda found: "",
+) -> tuple[Seam, ...]:
     """Return the seams of a tool of which every piece fits the bed, as few as can be, along the axes that it exceeds.
 
-    Among these the longest piece is as short as it can be. Where they can, they lie at none of the seams of the
-    tool under it (`other`): each then holds the other's pieces together, and no seam lies over a seam. Teeth join
-    all pieces, though not each two that share a border. Raises Refusal for a bed that no cut makes large enough,
-    with the least that is.
+    Among these the longest piece is as short as it can be. Where they can, they lie at none of the seams of the tool
+    under it (`other`): each then holds the other's pieces together, and no seam lies over a seam. Teeth join all
+    pieces, though not each two that share a border. `fault` says what is wrong with seams, "" where nothing is. Raises
+    Refusal for a bed that no such cut makes large enough, with the least that is.
     """
-    sized, useless = tuple(tool), set[tuple[Axis, Place]]()
+    sized = tuple(tool)
+    found = _found(sized, play, other)
+    why = fault(found) if isinstance(found, tuple) else f"{what} exceeds the bed, and the cuts leave longer pieces"
+    if isinstance(found, tuple) and not why:
+        return found
+    # The axis along which no cut was found first.
+    for each in sorted(sized, key=lambda each: each.across != found):
+        places = [place for choice in each.choices for place in choice]
+        beds = sorted({math.ceil(10 * most - 1e-6) / 10 for most in _all_lengths(each, places) if most > each.bed})
+
+        def enough(bed: float, each: Sized = each) -> bool:
+            larger = [replace(one, bed=bed) if one is each else one for one in sized]
+            tried = _found([one for one in larger if one.ends[1] - one.ends[0] > one.bed + 1e-9], play, other)
+            return isinstance(tried, tuple) and not fault(tried)
+
+        least = bisect(beds, False, key=enough)
+        if least < len(beds):
+            raise Refusal(f"moulds.bed_{each.across}_mm", each.bed, why, beds[least])
+    first = next(each for each in sized if each.across == found or isinstance(found, tuple))
+    needed = math.ceil(10 * (first.ends[1] - first.ends[0]) - 1e-6) / 10
+    raise Refusal(f"moulds.bed_{first.across}_mm", first.bed, why, needed)
+
+
+def _found(sized: Sequence[Sized], play: float, other: Sequence[Seam]) -> tuple[Seam, ...] | Axis:
+    """Return the seams of a tool, or the axis along which no cuts give pieces that fit the bed."""
+    useless = set[tuple[Axis, Place]]()
     while True:
-        chosen = [(each, place) for each in sized for place in _cuts(each, what, other, useless)]
+        chosen: list[tuple[Sized, Place]] = []
+        for each in sized:
+            places = _cuts(each, other, useless)
+            if places is None:
+                return each.across
+            chosen += [(each, place) for place in places]
         bare = [Seam(place.at, place.line, (), play, each.across) for each, place in chosen]
         made = [toothed(place, each, play, [s for s in bare if s.across != each.across]) for each, place in chosen]
         found = [seam for seam in made if seam]
@@ -229,22 +265,16 @@ def _clear(tooth: Tooth, features: Iterable[Feature]) -> bool:
     return True
 
 
-def _cuts(sized: Sized, what: str, other: Sequence[Seam], useless: set[tuple[Axis, Place]]) -> list[Place]:
-    """Return the places of the cuts across one axis. Raises Refusal where none do."""
+def _cuts(sized: Sized, other: Sequence[Seam], useless: set[tuple[Axis, Place]]) -> list[Place] | None:
+    """Return the places of the cuts across one axis; None where none give pieces that fit."""
     taken = {seam.at for seam in other if seam.across == sized.across}
-    places: list[Place] = []
     for choice in sized.choices:
         places = sorted(place for place in choice if (sized.across, place) not in useless)
         found = _fewest(sized, places)
         if found is not None:
             staggered = _fewest(sized, [place for place in places if place.at not in taken])
             return staggered if staggered is not None and len(staggered) == len(found) else found
-    usable = [place for place in places if toothed(place, sized, 0.0)]
-    length = sized.ends[1] - sized.ends[0]
-    needed = min((most for most in _all_lengths(sized, usable) if _reaching(sized, usable, most)), default=length)
-    field = f"moulds.bed_{sized.across}_mm"
-    limit = f"{what} exceeds the bed, and the cuts between its features leave longer pieces"
-    raise Refusal(field, sized.bed, limit, math.ceil(min(needed, length) * 10 - 1e-6) / 10)
+    return None
 
 
 def _fewest(sized: Sized, places: Sequence[Place]) -> list[Place] | None:

@@ -185,6 +185,15 @@ def seen(point: Point, across: Axis) -> Point:
     return point if across == "x" else (point[1], -point[0])
 
 
+def length(seam: Seam, low: float, high: float) -> float:
+    """Return how long a seam's line is between two heights, between which it turns, its corners round (mm)."""
+    ends = (at(seam.line, low), low), (at(seam.line, high), high)
+    line = (ends[0], *(corner for corner in seam.corners if low < corner[1] < high), ends[1])
+    angles = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(line)]
+    turns = [abs(math.remainder(after - before, 2 * math.pi)) for before, after in pairwise(angles)]
+    return sum(math.dist(*each) for each in pairwise(line)) - ROUND * sum(2 * math.tan(t / 2) - t for t in turns)
+
+
 def strips(seam: Seam, by: float) -> Iterator[tuple[Point, ...]]:
     """Yield rectangles that cover all that is nearer to a seam's line than `by`, and its teeth, in the seam's frame."""
     for start, end in pairwise((seam.line[0], *seam.corners, seam.line[-1])):
