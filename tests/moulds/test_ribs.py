@@ -79,7 +79,7 @@ def test_the_shift_of_unequal_ribs_is_that_of_a_simulated_press() -> None:
             x, y, turn = x + 0.05 * fx, y + 0.05 * fy, turn + 2e-4 * moment
         assert math.hypot(fx, fy) < 1e-9
         worst = max(worst, *(math.hypot(x - turn * c.y, y + turn * c.x) for c in moulds.plan.layout.cells))
-    bound = depth * shift_per_depth(standing, [(c.x, c.y) for c in moulds.plan.layout.cells])
+    bound = depth * shift_per_depth(standing, tuple((c.x, c.y) for c in moulds.plan.layout.cells))
     assert worst <= bound + 1e-9
     assert bound < 1.5 * depth * UNEVEN * math.sqrt(2)
     assert worst > 0.3 * bound

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -46,7 +47,7 @@ def eccentricity(moulds: MouldSet, *, with_ribs: bool = True) -> Eccentricity:
     standing = ribs(moulds.spec, lay) if with_ribs else ()
     if not standing:
         return Eccentricity(0, math.sqrt(2) * clearance, math.sqrt(2) * (clearance + off), off)
-    cells = [(cell.x, cell.y) for cell in lay.cells]
+    cells = tuple((cell.x, cell.y) for cell in lay.cells)
     # A gap can't be narrower than nothing; one wider than the ribs reach leaves the rest as play.
     tight = depth + min(off, clearance)
     loose = math.sqrt(2) * max(off - depth, 0.0)
@@ -54,7 +55,8 @@ def eccentricity(moulds: MouldSet, *, with_ribs: bool = True) -> Eccentricity:
     return Eccentricity(len(standing), share * depth, max(share * tight, loose), off)
 
 
-def shift_per_depth(standing: tuple[Rib, ...], cells: list[tuple[float, float]]) -> float:
+@lru_cache(maxsize=16)
+def shift_per_depth(standing: tuple[Rib, ...], cells: tuple[tuple[float, float], ...]) -> float:
     """Return the greatest shift of a cell's bore, over the depth of the ribs, for every choice of their strengths."""
     outward = -np.array([rib.inwards for rib in standing], dtype=float)
     at = np.array([(rib.x, rib.y) for rib in standing])

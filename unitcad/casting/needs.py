@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 from unitcad.casting.bench_step import BenchStep
 
@@ -53,8 +54,14 @@ NEEDS = (
 
 def needs(steps: Iterable[BenchStep]) -> list[Need]:
     """Return what the steps name, in the table's order."""
-    words = " ".join(step.text for step in steps).lower()
-    return [need for need in NEEDS if re.search(need.words, words)] + [CALIPER]
+    named = frozenset().union(*(_named(step.text) for step in steps))
+    return [need for need in NEEDS if need in named] + [CALIPER]
+
+
+@lru_cache(maxsize=512)
+def _named(text: str) -> frozenset[Need]:
+    """Return what a step's words name: in a batch most steps are said again and again."""
+    return frozenset(need for need in NEEDS if re.search(need.words, text.lower()))
 
 
 CALIPER = Need("", "caliper", 1, "piece", "tool", "for the card and the first part")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import count
 
 import msgspec
@@ -35,7 +35,7 @@ def files(procedure: Procedure) -> dict[str, str]:
 
 def to_json(procedure: Procedure) -> str:
     """Write the procedure as JSON: the same records; numbers to nine significant digits."""
-    data = json.loads(json.dumps(asdict(procedure)), parse_float=lambda text: float(f"{float(text):.9g}"))
+    data = json.loads(json.dumps(msgspec.to_builtins(procedure)), parse_float=lambda text: float(f"{float(text):.9g}"))
     # Indented by msgspec: json's own indenting is not compiled.
     return msgspec.json.format(json.dumps(data, allow_nan=False, ensure_ascii=False), indent=1) + "\n"
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -35,17 +35,23 @@ def inputs_seen(variant: EstimateInput, levels: Levels, step: float = STEP) -> d
 
     Without a finite level `by` is None and a `reason` stands beside it.
     """
-    changes = changed(variant)
-    ends = [change(variant, factor) for change in changes.values() for factor in (np.exp(-step), np.exp(step))]
     with np.errstate(all="ignore"):
-        low, high = np.log(np.asarray(levels(ends), dtype=float)).reshape(-1, 2).T
+        low, high = np.log(np.asarray(levels(ends(variant, step)), dtype=float)).reshape(-1, 2).T
     if not np.all(np.isfinite([low, high])):
         return {"by": None, "not_seen": None, "reason": "no finite level at the middle of the inputs' ranges"}
-    slopes = {name: round(float(d), _DIGITS) for name, d in zip(changes, (high - low) / (2 * step), strict=True)}
+    slopes = {
+        name: round(float(d), _DIGITS) for name, d in zip(changed(variant), (high - low) / (2 * step), strict=True)
+    }
     return {
         "by": {name: slope for name, slope in slopes.items() if slope},
         "not_seen": [name for name, slope in slopes.items() if not slope],
     }
+
+
+@lru_cache(maxsize=4)
+def ends(variant: EstimateInput, step: float) -> tuple[EstimateInput, ...]:
+    """Return the variant with each input of `changed` lower, then higher, by `step`: every model reads the same."""
+    return tuple(change(variant, factor) for change in changed(variant).values() for factor in np.exp([-step, step]))
 
 
 def changed(variant: EstimateInput) -> dict[str, Scaled]:

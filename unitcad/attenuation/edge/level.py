@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.bush import sections
 from unitcad.attenuation.edge.closed_form import Units
 from unitcad.attenuation.edge.fitted_models import edge_levels, path_of, stored
-from unitcad.attenuation.edge.inputs_seen import inputs_seen
+from unitcad.attenuation.edge.inputs_seen import STEP, ends, inputs_seen
 from unitcad.attenuation.edge.lab_fit import LabFit, predictive_block
 from unitcad.attenuation.edge.measured_levels import CONTROL, measured_table
 from unitcad.attenuation.edge.variant_units import FIELDS, nominal, stacked
@@ -62,8 +63,9 @@ ASSUMPTIONS = {
 }
 
 
+@lru_cache(maxsize=4)
 def corners(variant: EstimateInput) -> Units:
-    """Yield the variant with inputs at the ends of their ranges: all corners, or one input at a time if there are many.
+    """Return the variant with inputs at the ends of their ranges: all corners, or one at a time if there are many.
 
     Layers of one material move together.
     """
@@ -175,9 +177,15 @@ def model_block(variant: EstimateInput, model: str, fit: LabFit | None = None) -
         block |= _paper_details(variant, controls)
     if model == "consistent":
         block["wave_of_the_level"] = "s"
-    block["inputs_seen"] = inputs_seen(variant, lambda variants: edge_levels(stacked(variants), model, constants))
+    block["inputs_seen"] = inputs_seen(variant, lambda _: edge_levels(_changed(variant), model, constants))
     block["assumptions"] = ASSUMPTIONS[model]
     return block
+
+
+@lru_cache(maxsize=4)
+def _changed(variant: EstimateInput) -> Units:
+    """Return the variants that `inputs_seen` compares, which every model reads."""
+    return stacked(ends(variant, STEP))
 
 
 def _controls(variant: EstimateInput) -> list[int]:
