@@ -297,3 +297,21 @@ def test_pockets_are_cast_flat() -> None:
     with pytest.raises(Refusal) as refused:
         load_array({**asked, "body": {"radius_mm": 40.0, "cast": "curved"}})
     assert (refused.value.field, refused.value.nearest) == ("body.cast", "flat")
+
+
+@pytest.mark.parametrize(
+    ("overrides", "field"),
+    [(["layout.rows=12"], "layout.rows"), (["layout.rows=6", "moulds.bed_y_mm=100"], "moulds.bed_y_mm")],
+)
+def test_curved_tools_beyond_the_bed_are_refused_with_the_rows_or_the_bed_that_fit(
+    overrides: list[str], field: str
+) -> None:
+    """Rows where the bed is the printer's, the bed where the file asks for a smaller one; a row more does not fit."""
+    with pytest.raises(Refusal) as refused:
+        patch_moulds(load_array("sleeve-curved", overrides)).plan  # noqa: B018
+    fits = refused.value.nearest
+    assert refused.value.field == field
+    assert patch_moulds(load_array("sleeve-curved", [*overrides, f"{field}={fits}"])).plan
+    if field == "layout.rows":
+        with pytest.raises(Refusal):
+            patch_moulds(load_array("sleeve-curved", [f"layout.rows={int(str(fits)) + 1}"])).plan  # noqa: B018

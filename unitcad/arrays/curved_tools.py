@@ -26,6 +26,7 @@ from unitcad.arrays.circuit.wiring import wiring
 from unitcad.arrays.curved_release import parts_out
 from unitcad.arrays.fins import fins
 from unitcad.arrays.limb_frame import angle_deg, axis, barrel, bent, inside_of_end, slice_of, strap_slot
+from unitcad.catalogue import printers
 from unitcad.designs import Dimensions, dimensions
 from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
@@ -177,8 +178,23 @@ def _former(array: Array) -> Former:
     ):
         if needed > getattr(moulds, field) + 1e-9:
             limit = f"{what} exceeds the bed; curved tools are not cut"
+            if field == "bed_y_mm" and (fewer := _rows_that_fit(array, needed)):
+                raise Refusal("layout.rows", array.layout["rows"], limit, fewer)
             raise Refusal(f"moulds.{field}", getattr(moulds, field), limit, math.ceil(needed * 10 - 1e-6) / 10)
     return Former(array, spec, dims, half, seat, bottom, Pins(places, PIN_HEIGHT, moulds.plinth_clearance_mm, seat))
+
+
+def _rows_that_fit(array: Array, length: float) -> int:
+    """Return how many rows of a grid fit the printer's own bed along the limb, where its tools have a `length` beyond.
+
+    0 where none do, for other layouts, and where the file itself asks for a smaller bed.
+    """
+    bed = array.unit.moulds.bed_y_mm
+    own = float(printers(array.unit.printers)[array.unit.moulds.printer].bed_y_mm)
+    rows = sorted({place.y for place in array.places})
+    if array.layout["kind"] != "grid" or len(rows) < 2 or bed < own:
+        return 0
+    return max(0, len(rows) - math.ceil((length - bed) / (rows[1] - rows[0]) - 1e-6))
 
 
 def _lowest(array: Array, x: float, outer: float) -> float:
