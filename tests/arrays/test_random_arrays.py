@@ -61,7 +61,20 @@ def drawn(seed: int) -> dict[str, Any]:
 
 @pytest.mark.parametrize("seed", [*range(QUICK), *(pytest.param(i, marks=pytest.mark.long) for i in range(QUICK, ALL))])
 def test_a_random_array_is_made_with_all_checks_or_refused(seed: int) -> None:
+    judge(drawn(seed))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(ALL))
+def test_a_random_array_on_a_small_bed_is_made_in_pieces_or_refused(seed: int) -> None:
     data = drawn(seed)
+    put(data, "moulds.bed_x_mm", 110.0)
+    put(data, "moulds.bed_y_mm", 110.0)
+    judge(data)
+
+
+def judge(data: dict[str, Any]) -> None:
+    """Build the moulds of an array file with every check, or see it refused with field and limit."""
     try:
         moulds = patch_moulds(load_array(data))
         findings = check_moulds(moulds)
