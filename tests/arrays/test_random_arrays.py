@@ -56,6 +56,12 @@ def drawn(seed: int) -> dict[str, Any]:
         put(data, path, changes[path])
     if kind == "ring" and pick.random() < 0.8:
         put(data, "body.radius_mm", pick.randint(20, 60))
+    if pick.random() < 0.3:
+        put(data, "moulds.bed_x_mm", pick.randint(80, 180))
+    if pick.random() < 0.3:
+        put(data, "moulds.bed_y_mm", pick.randint(80, 180))
+    if pick.random() < 0.2:
+        put(data, "body.cast", "curved")
     return data
 
 
