@@ -38,6 +38,8 @@ VARIANTS = [
     ("layout.columns=1", "layout.pitch_mm=18"),
     ("layout.rows=1", "sheet.strap_slot_mm=[3,8]", "moulds.printer=fdm-0.25", "sheet.thickness_mm=1.5"),
     ("sheet.thickness_mm=0.6", "circuit.row_width_mm=2", "layout.pitch_mm=[18,19]", "sheet.margin_mm=7"),
+    # Grooves side by side: 0.4 mm apart, and where fins cut what two of them share.
+    ("layout.rows=2", "layout.columns=2", "layout.pitch_mm=[20.66,20.2]", "moulds.land_mm=2.88"),
 ]
 
 

@@ -22,7 +22,7 @@ from unitcad.errors import Refusal
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
-from unitcad.mould_checks import check_moulds, mould_checks
+from unitcad.mould_checks import air, check_moulds, mould_checks
 from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union
 from unitcad.spec import printer_of
@@ -71,6 +71,11 @@ SLOTS = {
 def test_every_mould_check_holds_on_other_layouts(data: dict[str, object]) -> None:
     findings = check_moulds(patch_moulds(load_array(data)))
     assert [f for f in findings if not f.ok] == []
+
+
+def test_air_leaves_a_narrow_sheet_whose_round_corners_hold_vents_off_its_ends() -> None:
+    found = list(air.findings(sleeve("layout.columns=1", "layout.rows=1", "body.radius_mm=86")))
+    assert [f for f in found if not f.ok] == []
 
 
 def test_every_tool_prints_without_support() -> None:

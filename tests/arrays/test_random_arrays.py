@@ -62,6 +62,11 @@ def drawn(seed: int) -> dict[str, Any]:
         put(data, "moulds.bed_y_mm", pick.randint(80, 180))
     if pick.random() < 0.2:
         put(data, "body.cast", "curved")
+        if pick.random() < 0.8:  # what a curved cast needs, or nearly all of them would stop at its first condition
+            data["array"], data["unit"]["like"] = "back-sheet", default_template()
+            put(data, "body.radius_mm", pick.randint(25, 90))
+            if kind == "ring":
+                data["layout"] = {"kind": "grid", **layouts["grid"]}
     return data
 
 

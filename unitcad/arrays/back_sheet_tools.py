@@ -27,7 +27,7 @@ from unitcad.arrays.piece_labels import Strip, on_pieces
 from unitcad.designs import dimensions
 from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
-from unitcad.geometry.segments import between_convex
+from unitcad.geometry.segments import Point, between_convex
 from unitcad.moulds import filament
 from unitcad.moulds.base import core, outline, plate_top, pry_slot
 from unitcad.moulds.blade import blade
@@ -42,6 +42,7 @@ from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import (
     Common,
     Extrude,
+    Profile,
     Shape,
     Union,
     box,
@@ -234,7 +235,7 @@ def _slots(drawing: Drawing) -> list[Shape]:
 
 
 def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
-    """Draw a groove round each bore; it stops at seams, over slots and beside other bores: walls would be thin."""
+    """Draw a groove round each bore; it stops at seams, over slots and beside its neighbours: walls would be thin."""
     spec, dims, cells = drawing.spec, drawing.dims, drawing.lay.cells
     moulds, rim = spec.moulds, dims.heights[layer]
     inner = dims.radii[layer] + moulds.land_mm
@@ -243,8 +244,12 @@ def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
     stops: list[list[Shape]] = [[] for _ in cells]
     for i, cell in enumerate(cells):
         for other in cells:
-            if other is not cell and math.hypot(other.x - cell.x, other.y - cell.y) < outer + inner:
+            apart = math.hypot(other.x - cell.x, other.y - cell.y)
+            if other is not cell and apart < outer + inner:
                 stops[i].append(moved(cylinder(inner, low - BEYOND, high + BEYOND), other.x, other.y))
+            if other is not cell and apart < 2 * outer + moulds.least_wall_mm:
+                between = _halfway((cell.x, cell.y), (other.x, other.y), outer, moulds.least_wall_mm)
+                stops[i].append(Extrude(between, low - BEYOND, high + BEYOND))
     for fin in drawing.fins if low - slot_roof(spec) < moulds.least_wall_mm else ():
         wider = moulds.plinth_clearance_mm + moulds.least_wall_mm
         over = fin.drawn(drawing.array, outer + BEYOND, wider, low - BEYOND, high + BEYOND)
@@ -256,6 +261,15 @@ def _grooves(drawing: Drawing, layer: int) -> list[Shape]:
                 if between_convex([seen((cell.x, cell.y), seam.across)], strip) < outer:
                     stops[i].append(over if seam.across == "x" else turned(over, "z", 1))
     return [cut(moved(ring(inner, outer, low, high), c.x, c.y), stops[i]) for i, c in enumerate(cells)]
+
+
+def _halfway(a: Point, b: Point, half: float, width: float) -> Profile:
+    """Return a strip across the middle of the way from a to b, `half` long to either side of it, mm."""
+    apart = math.dist(a, b)
+    way = (b[0] - a[0]) / apart, (b[1] - a[1]) / apart
+    at = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
+    sides = [(along * width / 2, across * half) for along, across in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return polygon(*((at[0] + u * way[0] - v * way[1], at[1] + u * way[1] + v * way[0]) for u, v in sides))
 
 
 def _seals(drawing: Drawing, layer: int, *, last: bool) -> list[Shape]:

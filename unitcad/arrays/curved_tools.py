@@ -275,9 +275,14 @@ def _channels(former: Former, low: float, top: float) -> list[Shape]:
     sprue = moved(cylinder(former.spec.moulds.sprue_mm / 2, low, top), 0.0, middle)
     drawn = [sprue]
     for x in places:
-        along = (sheet.outline[3] - sheet.outline[1]) / 2 - _off_end(former, abs(x) + vent) - VENT_OFF_END - vent
+        along = (sheet.outline[3] - sheet.outline[1]) / 2 - _vent_off_end(former, x) - vent
         drawn += [moved(cylinder(vent, low, top), x, middle + side * along) for side in (-1, 1)]
     return drawn
+
+
+def _vent_off_end(former: Former, x: float) -> float:
+    """Return how far from the sheet's end the edge of a vent stands, along the limb, at a place across its top, mm."""
+    return _off_end(former, abs(x) + VENT / 2) + VENT_OFF_END
 
 
 def _off_end(former: Former, x: float) -> float:
@@ -289,16 +294,37 @@ def _off_end(former: Former, x: float) -> float:
 
 
 def _vents(former: Former) -> list[float]:
-    """Return where across the top vents stand, mm: wherever a tilt brings the highest line, one is near to it.
-
-    Halfway between two vents that are 2 d apart in angle the air is deep by the back's radius times 1 - cos d.
-    """
-    count = 2
+    """Return where across the top vents stand, mm: wherever a tilt brings the highest line, one is near to it."""
+    count, places = 2, _spread(former, 2)
     limit = MESH_ROOM * deepest(former.spec, len(former.spec.layers) - 1)
-    while former.back * (1 - math.cos(math.radians(TILT_DEG / count))) > limit:
+    # An odd number of vents puts one in the middle, where none stands nearer to the end.
+    at_end = max(limit, _kept_at_end(former, [0.0]))
+    while _kept_between(former, count) > limit or _kept_at_end(former, places) > at_end:
         count += 1
+        places = _spread(former, count)
+    return places
+
+
+def _spread(former: Former, count: int) -> list[float]:
+    """Return places across the top at equal angles from each other, within the tilt to either side, mm."""
     step = 2 * TILT_DEG / count
     return [former.back * math.sin(math.radians(step * (k + 0.5) - TILT_DEG)) for k in range(count)]
+
+
+def _kept_between(former: Former, count: int) -> float:
+    """Return how deep the air is halfway between two of so many vents, tilted round the limb, mm."""
+    return former.back * (1 - math.cos(math.radians(TILT_DEG / count)))
+
+
+def _kept_at_end(former: Former, places: list[float]) -> float:
+    """Return how deep the air is at an end that a tilt raises, mm: round corners hold vents off it that stand aside."""
+    tilt = math.radians(TILT_DEG)
+
+    def depth(x: float) -> float:
+        below = former.back - math.sqrt(former.back**2 - x**2)
+        return below * math.cos(tilt) + _vent_off_end(former, x) * math.sin(tilt)
+
+    return min(map(depth, places))
 
 
 def _lid(former: Former) -> Shape:
