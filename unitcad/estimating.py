@@ -8,9 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from unitcad.attenuation.curve import layered_block
 from unitcad.attenuation.edge.closed_form import CONTROL_PASSES
-from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded
+from unitcad.attenuation.edge.estimates import Layered, estimate, frequency_table, rounded, rounded_layered
 from unitcad.attenuation.edge.lab_fit import LabFit
 from unitcad.attenuation.inputs import EstimateInput, Geometry, LayerShape, Pad, Quantity, SiliconeLayer, TissueLayer
 from unitcad.attenuation.layered.rheology import FractionalKelvinVoigt
@@ -30,7 +29,7 @@ def estimate_spec(
     spec: Spec,
     models: Sequence[str] | None = None,
     frequency_hz: float | None = None,
-    layered: Layered = layered_block,
+    layered: Layered = rounded_layered,
     say: Callable[[str], None] = lambda line: None,
 ) -> dict[str, Any]:
     """Return the estimate of a spec as JSON-ready data (`attenuation.edge.estimates`); same spec, same data.

@@ -38,9 +38,13 @@ FOLDER = "steps"
 
 def views(moulds: MouldSet) -> dict[str, View]:
     """Return every view of a procedure by its name, in the order of the steps."""
+    return moulds.once_a_geometry("views", lambda blank: dict(_all(blank)))
+
+
+def _all(moulds: MouldSet) -> Iterator[tuple[str, View]]:
     if moulds.cast_flat:
-        return dict(laid_in_views(moulds, views(moulds.cast_flat)))
-    return dict(_views(moulds) if moulds.plan.of_kind("cup") else tray_views(moulds))
+        return laid_in_views(moulds, views(moulds.cast_flat))
+    return _views(moulds) if moulds.plan.of_kind("cup") else tray_views(moulds)
 
 
 def picture_path(name: str) -> str:

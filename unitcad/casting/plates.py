@@ -30,6 +30,10 @@ def plates(moulds: MouldSet, bodies: Sequence[Body], stem: str) -> dict[str, tup
 
 def mould_plates(moulds: MouldSet) -> dict[str, tuple[Body, ...]]:
     """Return the printed pieces of each plate by its file in a result's folder."""
+    return moulds.once_a_geometry("plates", _mould_plates)
+
+
+def _mould_plates(moulds: MouldSet) -> dict[str, tuple[Body, ...]]:
     return plates(moulds, [piece for piece in moulds.plan.pieces if piece.made == "printed"], "moulds/moulds")
 
 

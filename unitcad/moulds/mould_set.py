@@ -49,11 +49,18 @@ def _drawn(geometry: str) -> Plan:
     return plan(from_json(geometry))
 
 
+@lru_cache(maxsize=32)
+def _kept(geometry: str) -> dict[str, Any]:
+    """Return what is kept of a geometry for the next set of it, by name."""
+    return {}
+
+
 def forget() -> None:
-    """Drop plans and meshes that are kept for the next call: what a measurement of times needs."""
+    """Drop plans, meshes and all else that is kept for the next call: what a measurement of times needs."""
     from unitcad.kernels import mesh
 
     _drawn.cache_clear()
+    _kept.cache_clear()
     mesh.forget()
 
 
@@ -260,3 +267,12 @@ class MouldSet:
         if name not in self._kept:
             self._kept[name] = make()
         return self._kept[name]
+
+    def once_a_geometry(self, name: str, make: Callable[[MouldSet], _T]) -> _T:
+        """Return what `make` gives of the blank set, worked out once under `name` for all sets of one geometry."""
+        if self.altered:
+            return self.once(name, lambda: make(self.blank))
+        kept = _kept(self.geometry)
+        if name not in kept:
+            kept[name] = make(self.blank)
+        return kept[name]

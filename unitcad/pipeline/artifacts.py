@@ -175,15 +175,14 @@ def estimated(moulds: MouldSet, store: Store) -> dict[str, Any]:
 
 
 def _estimated(spec: Spec, store: Store) -> dict[str, Any]:
-    from unitcad.attenuation.curve import layered_block
-    from unitcad.attenuation.edge.estimates import rounded
+    from unitcad.attenuation.edge.estimates import rounded_layered
     from unitcad.attenuation.inputs import EstimateInput
     from unitcad.estimating import estimate_spec
 
     def layered(asked: EstimateInput) -> dict[str, Any]:
         reads = (asked.tissue_name, asked.tissue, asked.frequency, asked.diameter, asked.motor_diameter, asked.drive)
         key = digest(repr((reads, code_version())).encode())
-        return store.data(key, lambda: rounded(layered_block(asked)))
+        return store.data(key, lambda: rounded_layered(asked))
 
     return estimate_spec(spec, layered=layered)
 

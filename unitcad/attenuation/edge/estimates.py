@@ -52,10 +52,15 @@ DECAY_AT_MM = (5.0, 10.0, 20.0, 30.0)
 Layered = Callable[[EstimateInput], dict[str, Any]]
 
 
+def rounded_layered(variant: EstimateInput) -> dict[str, Any]:
+    """Return the layered solver's block, numbers to nine digits."""
+    return rounded(layered_block(variant))
+
+
 def estimate(
     variant: EstimateInput,
     models: Sequence[str] = MODELS,
-    layered: Layered = layered_block,
+    layered: Layered = rounded_layered,
     fit: LabFit | None = None,
     stack: Sequence[str] | None = None,
 ) -> dict[str, Any]:
@@ -63,7 +68,7 @@ def estimate(
 
     With a lab's `fit` the constants are its own, each model has a predictive range, and the data have `fit` and
     `own_measured`. `stack` names the closed forms behind the answer's range, where they are not `models`.
-    `layered` gives the layered solver's block, which reads no silicone: variants on one body share it.
+    `layered` gives the layered solver's block, rounded; it reads no silicone: variants on one body share it.
     A quantity that can't be given is null beside a `reason`. Raises `Refusal` for values that no body has.
     """
     errors = table_error(variant.moduli)
@@ -100,7 +105,8 @@ def estimate(
     held = HELD.get(tuple(of_this_drive)) if variant.moduli == "dynamic" else None
     # The units of a lab's fit may have other lengths than the paper's.
     lead = answer(data, expected) if fit else answer(data, expected, unlike_measured(variant), held)
-    return rounded({"variant": data.pop("variant"), "answer": lead, **data})
+    whole = {"variant": data.pop("variant"), "answer": lead, **data}
+    return {name: block if name == "layered" else rounded(block) for name, block in whole.items()}
 
 
 def not_of_this_drive(variant: EstimateInput, models: Sequence[str]) -> list[str]:
