@@ -166,6 +166,18 @@ def test_a_tail_into_a_neighbour_is_an_overlap() -> None:
     assert found == ["unit: layer1 and circuit", "unit: layer2 and circuit"]
 
 
+def test_corners_of_the_circuit_that_reach_into_silicone_are_refused_before_they_overlap() -> None:
+    data = {"name": "hex", "array": "back-sheet", "unit": "encapsulating"}
+    data |= {"layout": {"kind": "hex", "rings": 2, "pitch_mm": 21.04}}
+    overlaps = mould_checks()["C200"].findings
+    try:
+        found = list(overlaps(patch_moulds(load_array(data))))
+    except Refusal as refused:
+        assert refused.field == "circuit.corner_mm"
+        found = list(overlaps(patch_moulds(load_array(data, [f"circuit.corner_mm={refused.nearest}"]))))
+    assert [f for f in found if not f.ok] == []
+
+
 @pytest.mark.parametrize(
     ("override", "field"),
     [

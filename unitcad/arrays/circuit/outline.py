@@ -22,8 +22,10 @@ _OFF = 2e-3
 """How far a polygon's corners may lie off the arc that takes their place, mm."""
 _LEAST_SIDES = 4
 """Sides of a polygon that are taken for an arc."""
-_LEAST_AREA = 1e-3
-"""Beside a notch, that is not a polygon's rounding, mm2."""
+_KEPT_OFF = 0.01
+"""What inner corners keep off silicone, mm: more than polygons and meshes are off."""
+_LEAST_AREA = 1e-6
+"""Of a corner that is not rounding's, mm2."""
 _MOST_TURN = math.radians(170)
 """Of one arc: a longer one is two."""
 
@@ -55,9 +57,10 @@ def _rounded(array: Array, laid: Wiring, corner: float) -> tuple[CrossSection, s
         return closed, "the circuit's inner corners would enclose a hole between its rows or pads"
     added = closed - whole
     for place in array.places:
-        clearance, inner = place.unit.moulds.slot_width_clearance_mm / 2, dimensions(place.unit).cavity_radius
+        clearance = place.unit.moulds.slot_width_clearance_mm / 2 - _KEPT_OFF
+        inner, outer = dimensions(place.unit).cavity_radius - _KEPT_OFF, place.radius + _KEPT_OFF
         notch = [_rectangle(strip, clearance) for strip in laid.strips]
-        wall = CrossSection.circle(place.radius, 128) - CrossSection.circle(inner, 128)
+        wall = CrossSection.circle(outer, 128) - CrossSection.circle(inner, 128)
         beside = (added ^ wall.translate((place.x, place.y))) - CrossSection.batch_boolean(notch, OpType.Add)
         if beside.area() > _LEAST_AREA:
             return closed, f"the circuit's inner corners would reach into the silicone of {place.name} beside its notch"
