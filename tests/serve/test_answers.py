@@ -132,7 +132,8 @@ def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path: Path, text: str) 
     (tmp_path / "out" / "sweep-1").mkdir(parents=True)
     with serving(tmp_path) as own:
         quick = text + "\n[output]\nformats = []\n"
-        message = {"text": quick, "key": "layers.0.wall_mm", "low": 1.0, "high": 1.5, "count": 2}
+        # At 1.8 the circuit's pad has to be smaller than the default for 1.25.
+        message = {"text": quick, "key": "layers.0.wall_mm", "low": 1.0, "high": 1.8, "count": 2}
         state = json.loads(own.send("/sweep", message)[1])
         state, stages = ended(own, state)
         assert state["code"] == 0, state
@@ -144,4 +145,6 @@ def test_each_sweep_is_a_batch_beside_its_sweep_file(tmp_path: Path, text: str) 
     folder = tmp_path / "out" / "sweep-2"
     assert sorted(path.name for path in folder.iterdir()) == ["results", "spec.toml", "sweep.toml"]
     swept = from_file(tomllib.loads((folder / "sweep.toml").read_text()), folder, "sweep")
-    assert [(axis.path, axis.values) for axis in swept.axes] == [("layers.0.wall_mm", [1.0, 1.5])]
+    assert [(axis.path, axis.values) for axis in swept.axes] == [("layers.0.wall_mm", [1.0, 1.8])]
+    # Defaults follow the key's values: the base is the text itself.
+    assert (folder / "spec.toml").read_text() == quick

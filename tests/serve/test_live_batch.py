@@ -32,7 +32,7 @@ def test_a_row_of_a_batch_opens_live(running: Any, batch: Path) -> None:
         names = visit.page.locator("#variants tbody th a")
         assert names.count() == 2
         opened = []
-        for index in (0, 1):
+        for index in (1, 0):
             before = visit.page.input_value(WALL)
             names.nth(index).click()
             visit.until(lambda before=before: visit.page.input_value(WALL) != before)
@@ -57,6 +57,9 @@ def test_a_row_of_a_batch_without_folders_opens_live_from_its_store(running: Any
         for wrong in ("single-embedded-000000000000", f"other-{folder[-12:]}", folder[-12:-1], "-"):
             assert own.send(f"/variant/{wrong}")[0] == 404
         visit = Live(running, own)
+        # The page begins with the batch's first variant.
+        assert visit.page.input_value('input[name="name"]') == "single-embedded"
+        assert visit.page.input_value(WALL) == "1"
         visit.page.locator("#variants tbody th a").nth(1).click()
         visit.until(lambda: visit.page.input_value(WALL) == "1.5")
         visit.close()

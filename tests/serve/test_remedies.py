@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 pytest.importorskip("tomlkit", reason="the extra serve is not installed")
+from unitcad.arrays.array_file import array_templates
 from unitcad.serve.answers import answered
 from unitcad.serve.messages import Ask, Edit, Fault, Trusted
 from unitcad.validation import templates
@@ -14,7 +15,7 @@ from unitcad.validation import templates
 
 def faults(template: str, edits: list[Edit], since: list[Edit]) -> list[Fault]:
     """The faults of a template after edits."""
-    text = templates()[template].read_text("utf-8")
+    text = (templates() | array_templates())[template].read_text("utf-8")
     return answered(Ask(text=text, edits=edits, since=since), Trusted()).faults
 
 
@@ -53,6 +54,50 @@ def test_a_key_that_has_to_go_is_offered_to_be_left_out() -> None:
     assert fault.leave_out
     assert faults("embedded", [edit, Edit(path=fault.field, remove=True)], []) == []
     assert not faults("embedded", [Edit(path="layers.0.material", value="cheese")], [])[0].leave_out
+
+
+@pytest.mark.parametrize(
+    ("template", "path", "before", "now", "gone"),
+    [
+        ("encapsulating", "design", "encapsulating", "embedded", ["layers.0.cap_mm", "layers.1.cap_mm"]),
+        ("forearm-pockets", "layout.kind", "grid", "hex", ["layout.columns", "layout.rows"]),
+    ],
+)
+def test_keys_that_have_to_go_together_are_offered_to_be_left_out_together(
+    template: str, path: str, before: str, now: str, gone: list[str]
+) -> None:
+    edit = Edit(path=path, value=now)
+    for fault in faults(template, [edit], [Edit(path=path, value=before)]):
+        assert fault.leave_out
+        assert sorted([fault.field, *fault.together]) == gone
+        # And back to the word that was there.
+        assert (fault.at, fault.at_nearest) == (path, before)
+    assert faults(template, [edit, *(Edit(path=each, remove=True) for each in gone)], []) == []
+
+
+def test_a_default_that_was_changed_has_a_nearest_value_too() -> None:
+    edit = Edit(path="motor.diameter_mm", value=30)
+    fault = faults("encapsulating", [edit], [Edit(path="motor.diameter_mm", remove=True)])[0]
+    assert (fault.field, fault.at) == ("diameter_mm", "motor.diameter_mm")
+    assert fault.at_nearest is not None
+    assert faults("encapsulating", [Edit(path=fault.at, value=fault.at_nearest)], []) == []
+
+
+def test_what_is_offered_is_accepted_where_another_field_refuses_the_nearest_value() -> None:
+    edit = Edit(path="layout.pitch_mm", value=10)
+    fault = faults("forearm-pockets", [edit], [Edit(path="layout.pitch_mm", value=20)])[0]
+    assert "nearest accepted: 16" in fault.message
+    assert fault.nearest is not None
+    assert fault.nearest > 16
+    assert faults("forearm-pockets", [Edit(path="layout.pitch_mm", value=fault.nearest)], []) == []
+
+
+def test_an_unknown_key_is_offered_its_right_name() -> None:
+    text = templates()["encapsulating"].read_text("utf-8").replace("diameter_mm = 14", "diamter_mm = 14", 1)
+    fault = answered(Ask(text=text), Trusted()).faults[0]
+    assert fault.rename == ("diameter_mm", 14)
+    edits = [Edit(path=fault.field, remove=True), Edit(path=fault.rename[0], value=fault.rename[1])]
+    assert answered(Ask(text=text, edits=edits), Trusted()).faults == []
 
 
 def test_wires_begin_with_what_they_need_in_place_of_the_circuit() -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from unitcad.arrays.array_file import is_array
-from unitcad.errors import Refusal, UnitcadError
+from unitcad.errors import Refusal, UnitcadError, UnknownKey
 from unitcad.serve import array_answers, unit_answers
 from unitcad.serve.edits import edited
 from unitcad.serve.messages import Answer, Ask, Fault, Trusted
@@ -64,23 +64,29 @@ def answered(ask: Ask, trusted: Trusted) -> Answer:
 
 
 def effective(text: bytes, trusted: bytes) -> bytes:
-    """Return {"text": the effective spec as TOML, "code": whether it holds code} of a text, or {"refused": why}.
+    """Return {"text": the effective spec as TOML, "asked", "code"} of a text, or {"refused": why}.
 
-    The spec holds the texts of the files that it may name, and no other code.
+    `asked` leaves out what the text leaves out, so that defaults follow other values; `code`: whether it holds code.
+    Both hold the texts of the files that the text may name, and no other code.
     """
     try:
         data = parse_toml(text.decode(), "the text")
         kind = array_answers if is_array(data) else unit_answers
-        subject: Any = kind.settled(data, msgspec.json.decode(trusted, type=Trusted))
-        code = kind.holds_code(subject)
+        known = msgspec.json.decode(trusted, type=Trusted)
+        subject: Any = kind.settled(data, known)
+        asked, code = kind.asked_toml(text.decode(), data, subject, known), kind.holds_code(subject)
     except UnitcadError as error:
         return msgspec.json.encode({"refused": str(error)})
-    return msgspec.json.encode({"text": kind.as_toml(subject), "code": code})
+    return msgspec.json.encode({"text": kind.as_toml(subject), "asked": asked, "code": code})
 
 
 def _fault(error: UnitcadError) -> Fault:
     if isinstance(error, Refusal):
         given = error.as_dict()
+        if isinstance(error, UnknownKey):
+            # What is nearest is a key's name; `remedied` tells whether the text is accepted with it.
+            rename = (str(error.nearest), given["value"]) if error.nearest else None
+            return Fault(str(error), error.field, line=error.line, rename=rename)
         return Fault(str(error), error.field, given["nearest"], error.line)
     return Fault(str(error))
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from html import escape
 from itertools import count
 from pathlib import Path, PurePosixPath
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 from starlette.applications import Starlette
@@ -195,9 +195,9 @@ class Live:
         return await _handled(request, Build, self._build)
 
     async def _build(self, build: Build) -> bytes:
-        text, code = await self._effective(build.text)
+        given, code = await self._effective(build.text)
         arguments = ["build", "{spec}", "-o", _plain(self.setting.out), *code]
-        state = await self.jobs.start("the build", arguments, {"spec.toml": text})
+        state = await self.jobs.start("the build", arguments, {"spec.toml": given["text"]})
         return msgspec.json.encode(state)
 
     async def sweep(self, request: Request) -> Response:
@@ -207,14 +207,15 @@ class Live:
     async def _sweep(self, sweep: Sweep) -> bytes:
         if not sweep.low < sweep.high:
             raise Refusal("high", sweep.high, f"must be above low, {sweep.low:g}")
-        text, code = await self._effective(sweep.text)
+        given, code = await self._effective(sweep.text)
         step = (sweep.high - sweep.low) / (sweep.count - 1)
         values = [round(sweep.low + i * step, 6) for i in range(sweep.count)]
         asked = f'base = "spec.toml"\n\n[sweep]\nmode = "product"\n{toml(sweep.key)} = {toml(values)}\n'
         # A folder of its own, in which the sweep file stays beside the results.
         folder = self._free_folder("sweep")
         arguments = ["batch", "{sweep}", "-o", _plain(folder / "results"), "--report", *code]
-        files, first = {"spec.toml": text, "sweep.toml": asked}, f"0 of {len(values)} variants"
+        # The base leaves out what the text leaves out: defaults follow the key's values as they do on the page.
+        files, first = {"spec.toml": given["asked"], "sweep.toml": asked}, f"0 of {len(values)} variants"
         state = await self.jobs.start("the sweep", arguments, files, folder, first)
         return msgspec.json.encode(state)
 
@@ -222,8 +223,8 @@ class Live:
         """Return the first of NAME-1, NAME-2, ... that is not there."""
         return next(path for i in count(1) if not (path := self.setting.out / f"{name}-{i}").exists())
 
-    async def _effective(self, text: str) -> tuple[str, list[str]]:
-        """Return the effective spec of a text, which names no file, and the option that its code needs.
+    async def _effective(self, text: str) -> tuple[dict[str, Any], list[str]]:
+        """Return the effective spec of a text as `text`, the text without files as `asked`, the option its code needs.
 
         Raises UnitcadError for a text that is refused.
         """
@@ -235,7 +236,7 @@ class Live:
         given = msgspec.json.decode(content)
         if "refused" in given:
             raise UnitcadError(given["refused"])
-        return given["text"], ["--allow-code"] if given["code"] else []
+        return given, ["--allow-code"] if given["code"] else []
 
     async def variant(self, request: Request) -> Response:
         """Answer with the spec of a variant of the batch, as text: of its folder, else from the batch's store."""

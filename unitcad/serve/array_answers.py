@@ -32,7 +32,14 @@ if TYPE_CHECKING:
 as_toml = to_toml
 
 
-judge = array_of
+def judge(data: dict[str, Any]) -> Mapping[str, Any]:
+    """Return an array's plain data with its units' whole specs, settled. Raises UnitcadError."""
+    return array_of(data).asked
+
+
+def asked_toml(text: str, data: Mapping[str, Any], array: Array, trusted: Trusted) -> str:
+    """Return what a text asks for as TOML that names no file: the text itself where it names none."""
+    return to_toml(array) if array_files(data) else text
 
 
 def settled(data: Mapping[str, Any], trusted: Trusted) -> Array:

@@ -44,6 +44,8 @@ _OPTIONAL = {"fpcb": "wires", "wires": "fpcb"}
 """Tables that may be left out, each with the one whose place it takes."""
 _NEEDS = {"wires": {"diameter_mm": 0.3}}
 """What a table begins with: the wire of a small motor, across its insulation."""
+_UNITS = ("mm", "hz", "um", "g", "c", "kpa")
+"""Units that a key ends in."""
 _TEXTS_OF_FILES = ("estimate.fit_source",)
 
 
@@ -113,7 +115,9 @@ def _numbers_of(kind: Any, value: Any) -> tuple[Any, ...]:
 
 
 def _label(name: str) -> str:
-    return name.removesuffix("_mm").replace("_", " ")
+    """Return a key in words, without its unit, which the page sets beside it."""
+    words, _, last = name.rpartition("_")
+    return (words if words and last in _UNITS else name).replace("_", " ")
 
 
 def _place(path: str) -> str:
@@ -123,16 +127,19 @@ def _place(path: str) -> str:
 
 def _field(path: str, label: str, kind: Any, value: Any, given: bool, choices: list[tuple[str, str]]) -> Field:
     members = [one for one in alternatives(kind) if one is not type(None)]
-    words = [(word, "") for one in members if typing.get_origin(one) is Literal for word in typing.get_args(one)]
+    words = _words(kind)
     # One number for all entries of a list has their range.
     limits = list(notes(kind)) or list(notes(entry_in(kind)))
     low = next((float(note.ge) for note in limits if note.ge is not None), None)
     high = next((float(note.le) for note in limits if note.le is not None), None)
-    how: Literal["number", "integer", "word", "text", "switch", "toml"]
+    how: Literal["number", "integer", "word", "words", "text", "switch", "toml"]
     listed = any(typing.get_origin(one) in (tuple, list, dict) for one in members)
+    several = _words(entry_in(kind)) if listed and len(members) == 1 else []
     single = float in members and isinstance(value, int | float)
     mixed = str in members and bool({int, float} & set(members))
-    if mixed or (listed and not single):
+    if several:
+        how, words = "words", several
+    elif mixed or (listed and not single):
         # A list is typed as TOML has it, and what may be a word or a number.
         how, value = "toml", None if value is None else toml(value)
     elif bool in members:
@@ -144,6 +151,13 @@ def _field(path: str, label: str, kind: Any, value: Any, given: bool, choices: l
     else:
         how = "word" if choices or words else "text"
     return Field(path, label, how, value, given, low, high, choices or words, meaning(kind))
+
+
+def _words(kind: Any) -> list[tuple[str, str]]:
+    """Return the words of which a value is one."""
+    return [
+        (word, "") for one in alternatives(kind) if typing.get_origin(one) is Literal for word in typing.get_args(one)
+    ]
 
 
 def choices_of(data: Mapping[str, Any]) -> Choices:

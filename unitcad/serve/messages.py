@@ -78,7 +78,8 @@ class Fault(Struct, frozen=True, omit_defaults=True):
     """A value that is refused: the sentence, its field, a value that would be accepted, and its line in the text.
 
     `at` is the field whose change is to blame, where that is another one, and `at_nearest` a value accepted there.
-    `leave_out`: without the key the text is accepted.
+    `leave_out`: without the key, and without those of `together`, the text is accepted. `rename`: the right name of an
+    unknown key, and its value.
     """
 
     message: str
@@ -86,20 +87,23 @@ class Fault(Struct, frozen=True, omit_defaults=True):
     nearest: Any = None
     line: int | None = None
     at: str = ""
-    at_nearest: float | None = None
+    at_nearest: float | str | None = None
     leave_out: bool = False
+    together: list[str] = []
+    rename: tuple[str, Any] | None = None
 
 
 class Field(Struct, frozen=True, omit_defaults=True):
     """A control of the form.
 
     `value` is what holds now, `given` tells whether the text says it, `required` whether it must. A number has its
-    documented range from `low` to `high`. `choices` are words, each with what it means.
+    documented range from `low` to `high`. `choices` are words, each with what it means; of kind `words` is a list of
+    some of them.
     """
 
     path: str
     label: str
-    kind: Literal["number", "integer", "word", "text", "switch", "toml"]
+    kind: Literal["number", "integer", "word", "words", "text", "switch", "toml"]
     value: Any = None
     given: bool = False
     low: float | None = None

@@ -18,8 +18,8 @@ from unitcad.validation.dotted import ABSENT, at, drop
 _HALVINGS = 24
 
 
-Judge = Callable[[dict[str, Any]], object]
-"""Validates plain data; raises UnitcadError for a fault."""
+Judge = Callable[[dict[str, Any]], Mapping[str, Any]]
+"""Validates plain data and returns it settled; raises UnitcadError for a fault."""
 
 
 def remedied(faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[Edit], judge: Judge) -> list[Fault]:
@@ -32,12 +32,24 @@ def remedied(faults: Sequence[Fault], data: Mapping[str, Any], since: Sequence[E
     blamed = None
     if any(fault.field not in changed for fault in faults):
         blamed = next((edit for edit in since if _accepted(_after(data, edit), judge)), None)
-    return [_remedied(fault, data, None if fault.field in changed else blamed, judge) for fault in faults]
+    own = {edit.path: edit for edit in since}
+    told = [_remedied(one, data, None if one.field in own else blamed, own.get(one.field), judge) for one in faults]
+    return _left_out(told, data, judge)
 
 
-def _remedied(fault: Fault, data: Mapping[str, Any], blamed: Edit | None, judge: Judge) -> Fault:
+def _remedied(fault: Fault, data: Mapping[str, Any], blamed: Edit | None, own: Edit | None, judge: Judge) -> Fault:
+    """Return a fault with its remedy; `own` takes back the change of its field, `blamed` that of another one."""
+    if fault.rename is not None:
+        if _accepted(_renamed(data, fault.field, fault.rename[0]), judge):
+            return fault
+        fault = replace(fault, rename=None)
     if blamed is not None:
-        return replace(fault, at=blamed.path, at_nearest=_nearest(data, blamed, judge))
+        back = blamed.value if isinstance(blamed.value, str) and not blamed.toml else _nearest(data, blamed, judge)
+        return replace(fault, at=blamed.path, at_nearest=back)
+    enough = fault.nearest is not None and _accepted(_after(data, Edit(path=fault.field, value=fault.nearest)), judge)
+    if own and not enough and (nearest := _nearest(data, own, judge)) is not None:
+        # Something else refuses what this field's own fault would accept.
+        return replace(fault, nearest=nearest)
     if fault.nearest is None and at(data, fault.field) is not ABSENT:
         without = copy.deepcopy(dict(data))
         if drop(without, fault.field) and _accepted(without, judge):
@@ -45,15 +57,40 @@ def _remedied(fault: Fault, data: Mapping[str, Any], blamed: Edit | None, judge:
     return fault
 
 
+def _renamed(data: Mapping[str, Any], path: str, right: str) -> dict[str, Any]:
+    """Return plain data whose key at a path has the name at another path."""
+    changed = copy.deepcopy(dict(data))
+    value = at(changed, path)
+    if at(changed, right) is ABSENT and drop(changed, path):
+        put(changed, right, value)
+    return changed
+
+
+def _left_out(faults: Sequence[Fault], data: Mapping[str, Any], judge: Judge) -> list[Fault]:
+    """Return the faults, told to leave their keys out where the text is accepted once all of them are gone."""
+    fields = [fault.field for fault in faults]
+    without = copy.deepcopy(dict(data))
+    if len(fields) < 2 or not all([drop(without, field) for field in fields]) or not _accepted(without, judge):
+        return list(faults)
+    return [replace(one, leave_out=True, together=[field for field in fields if field != one.field]) for one in faults]
+
+
 def _nearest(data: Mapping[str, Any], edit: Edit, judge: Judge) -> float | None:
     """Return the accepted number nearest to the refused one, on the way from the one that was accepted before."""
     refused, accepted = at(data, edit.path), edit.value
+    if edit.remove:
+        try:
+            accepted = at(judge(_after(data, edit)), edit.path)
+        except UnitcadError:
+            return None
     if not _is_float(refused) or not _is_float(accepted):
         return None
 
     def taken(value: float) -> bool:
         return _accepted(_after(data, Edit(path=edit.path, value=value)), judge)
 
+    if not taken(accepted):
+        return None
     least, most = sorted((accepted, refused))
     low, high = float(accepted), float(refused)
     for _ in range(_HALVINGS):

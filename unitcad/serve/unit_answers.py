@@ -38,9 +38,16 @@ def with_files(data: Mapping[str, Any], trusted: Trusted) -> dict[str, Any]:
     return with_source(dict(data), folder) if folder else dict(data)
 
 
-def judge(data: dict[str, Any]) -> None:
-    """Validate plain data that has its files' texts. Raises UnitcadError."""
-    effective(convert(data, AskedSpec))
+def judge(data: dict[str, Any]) -> Mapping[str, Any]:
+    """Return plain data that has its files' texts, settled. Raises UnitcadError."""
+    return to_data(effective(convert(data, AskedSpec)))
+
+
+def asked_toml(text: str, data: Mapping[str, Any], spec: Spec, trusted: Trusted) -> str:
+    """Return what a text asks for as TOML that names no file: the text itself where it names none."""
+    import tomlkit
+
+    return tomlkit.dumps(with_files(data, trusted)) if files_named(data) else text
 
 
 def holds_code(spec: Spec) -> bool:

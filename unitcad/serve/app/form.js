@@ -47,7 +47,7 @@
     return 10 ** (Math.floor(Math.log10(size)) - 1);
   }
 
-  // options: change(path, value, {toml, coalesce}), remove(path), table(group, present), layers(), addLayer(), unread(path, why).
+  // options: change(path, value, {toml, coalesce}), remove(...paths), rename(from, to, value), table(group, present), layers(), addLayer(), unread(path, why).
   function createForm(options) {
     const node = el("form", { className: "spec-form", autocomplete: "off", onsubmit: (event) => event.preventDefault() });
     const controls = new Map();
@@ -118,6 +118,13 @@
       } };
     }
 
+    // A list of some of the choices, in their order.
+    function several(field, id) {
+      const boxes = field.choices.map(([name, meaning]) => [name, el("input", { type: "checkbox", name: `${field.path} ${name}`, title: meaning || undefined, onchange: () => options.change(field.path, boxes.filter(([, box]) => box.checked).map(([each]) => each)) })]);
+      const main = el("span", { className: "several", id, role: "group", tabindex: "-1", "aria-label": field.label }, boxes.map(([name, box]) => el("label", {}, box, ` ${name}`)));
+      return { main, others: [], set: (next) => { for (const [name, box] of boxes) box.checked = (next.value || []).includes(name); } };
+    }
+
     function toggle(field, id) {
       const box = el("input", { type: "checkbox", id, onchange: () => options.change(field.path, box.checked) });
       return { main: box, others: [], set: (next) => { box.checked = Boolean(next.value); } };
@@ -125,17 +132,27 @@
 
     // What would make a refused text accepted, as words and what they do: a value here, one in another field, none.
     function remedies(one, path) {
+      const out = [one.field, ...(one.together || [])];
       const use = (at, value, where) => value !== undefined && value !== null && [`Use ${where}${typeof value === "number" ? number(value, 6) : value}`, () => options.change(at, value)];
       return [
         one.at && use(one.at, one.at_nearest, ""),
         use(one.field || path, one.nearest, one.at ? `${one.field} = ` : ""),
-        one.leave_out && ["Leave it out", () => options.remove(one.field)],
+        one.rename && [`Rename it ${one.rename[0]}`, () => options.rename(one.field, ...one.rename)],
+        one.leave_out && [out.length > 1 ? `Leave out ${out.join(" and ")}` : "Leave it out", () => options.remove(...out)],
       ].filter(Boolean);
+    }
+
+    // A refusal with its reason and a button for each remedy; `then` puts the focus where the button no longer is.
+    function told(one, path, then) {
+      return [one.message, remedies(one, path).map(([words, act]) => el("button", { type: "button", onclick: () => {
+        act();
+        then();
+      } }, words))];
     }
 
     function control(field) {
       const id = `field-${(serial += 1)}`;
-      const make = { number: numeric, integer: numeric, word, switch: toggle }[field.kind] || typed;
+      const make = { number: numeric, integer: numeric, word, words: several, switch: toggle }[field.kind] || typed;
       const made = make(field, id);
       const range = typeof field.low === "number" ? `${number(field.low)} to ${number(field.high)} ${unitOf(field.path)}`.trim() : "";
       const fault = el("p", { className: "refusal", id: `${id}-fault`, role: "status" });
@@ -155,10 +172,7 @@
         // A refused value stays where it was typed, with the reason and what would be accepted.
         refuse(one) {
           made.main.setAttribute("aria-invalid", String(Boolean(one)));
-          clear(fault, one && [one.message, remedies(one, field.path).map(([words, act]) => el("button", { type: "button", onclick: () => {
-            act();
-            made.main.focus();
-          } }, words))]);
+          clear(fault, one && told(one, field.path, () => made.main.focus()));
         },
       };
     }
@@ -223,7 +237,7 @@
       if (made) made.refuse({ message: `The field ${why}; the spec keeps the value before.` });
     }
 
-    return { node, show, refuse, unread };
+    return { node, show, refuse, unread, told };
   }
 
   Object.assign(window.unitcad, { createForm });

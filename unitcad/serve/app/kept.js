@@ -1,24 +1,27 @@
-// The text of a tab over a reload: what was changed and not saved comes back while the server's own text is the same.
+// What a tab holds over a reload: what was changed and not saved, what undo goes back to, and the pinned variant, while the
+// server's own text is the same.
 (() => {
   "use strict";
   const KEY = "unitcad-text";
+  const MOST_STEPS = 50;
 
-  // Returns the text to begin with, whether it is one from before, and what keeps a newer one.
+  // Returns {text, past, pinned, back, keep}: what to begin with, whether it is from before, and what keeps something newer.
   function keepText(first) {
-    const keep = (text) => {
+    const keep = ({ text, past, pinned }) => {
       try {
-        sessionStorage.setItem(KEY, JSON.stringify({ first, text }));
+        sessionStorage.setItem(KEY, JSON.stringify({ first, text, past: past.slice(-MOST_STEPS), pinned }));
       } catch {
         // Storage that is off or full: a reload then begins with the server's text.
       }
     };
+    const anew = { text: first, past: [], pinned: null, back: false, keep };
     try {
-      const kept = JSON.parse(sessionStorage.getItem(KEY) || "null");
-      if (kept && kept.first === first && typeof kept.text === "string" && kept.text !== first) return { text: kept.text, back: true, keep };
+      const { first: of, text, past, pinned } = JSON.parse(sessionStorage.getItem(KEY) || "{}");
+      if (of === first && typeof text === "string" && Array.isArray(past)) return { text, past, pinned: pinned || null, back: past.length > 0 && text !== first, keep };
     } catch {
       // As above.
     }
-    return { text: first, back: false, keep };
+    return anew;
   }
 
   Object.assign(window.unitcad, { keepText });

@@ -15,16 +15,17 @@
     history.replaceState(null, "", location.pathname + location.hash);
     const server = U.createServer(data.token);
     const kept = U.keepText(data.text);
-    const state = { text: kept.text, pending: [], past: [], future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], accepted: new Map(), changed: [], opened: "", later: 0, asked: 0 };
+    const state = { text: kept.text, pending: [], past: kept.past, future: [], last: { path: "", at: 0 }, layers: 0, model: null, unit: {}, moulds: {}, estimate: {}, groups: [], accepted: new Map(), changed: [], opened: "", later: 0, asked: 0 };
     window.unitcad.timings = [];
 
     const form = U.createForm({
       change: (path, value, how = {}) => edit({ path, value, ...(how.toml ? { toml: true } : {}) }, how.coalesce),
-      remove: (path) => edit({ path, remove: true }),
+      remove: (...paths) => edit(paths.map((path) => ({ path, remove: true }))),
+      rename: (from, to, value) => edit([{ path: from, remove: true }, { path: to, value }]),
       unread: (path, why) => form.unread(path, why),
       table: (group, present) => {
-        if (present && group.instead) edit({ path: group.instead, remove: true });
-        edit(present ? { path: group.path, value: group.needs || {} } : { path: group.path, remove: true });
+        const change = present ? { path: group.path, value: group.needs || {} } : { path: group.path, remove: true };
+        edit([present && group.instead && { path: group.instead, remove: true }, change].filter(Boolean));
       },
       layers: () => state.layers,
       addLayer: () => {
@@ -53,7 +54,7 @@
     const estimated = el("div", { id: "estimated" });
     const batch = data.batch && createBatch(data.batch);
     const view = section("view", "3D", figures, glance, others, host);
-    const pinned = U.createPinned({ current, restore: replaceText });
+    const pinned = U.createPinned({ current, restore: replaceText, before: kept.pinned, keep });
     const jobs = U.createJobs({ server, text: now, name: data.name, folder: data.folder, numbers });
     const tabs = el("details", { className: "as-text" }, el("summary", {}, "As TOML text"), el("label", { for: "text", className: "hidden" }, "The spec as TOML"), text, textFault);
     clear(page,
@@ -68,6 +69,11 @@
     let stage = null;
     const firstModel = (model) => U.createStage(host, model).then((made) => { stage = made; }, (error) => clear(host, el("p", { className: "absent" }, `This browser draws no 3D (${error.message}); the section stands below.`)));
 
+    // A text that was not changed is the server's to give.
+    function keep() {
+      if (state.past.length || pinned.held()) kept.keep({ text: state.text, past: state.past, pinned: pinned.held() });
+    }
+
     // The text as the page knows it; edits that are under way are in the next one.
     function now() { return state.text; }
 
@@ -81,8 +87,10 @@
       const { moulds, estimate } = { moulds: state.moulds.of === unit.text ? state.moulds : {}, estimate: state.estimate.of === unit.text ? state.estimate : {} };
       const answer = estimate.estimate && estimate.estimate.answer ? estimate.estimate.answer.lines[0] : (estimate.lines || [])[0];
       const failed = (moulds.checks || []).filter((check) => !check.ok).length;
+      const { model, level } = (estimate.estimate && estimate.estimate.answer) || {};
+      const levels = typeof level === "number" ? [[`edge level by ${model}`, 100 * level, "% of the motor's amplitude"]] : [];
       const more = moulds.checks ? [["mould checks failed", failed, `of ${moulds.checks.length}`]] : [];
-      return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...(unit.figures || []), ...more], answer, text: unit.text || state.text, refused: page.dataset.stale === "true" };
+      return { name: (unit.spec && unit.spec.name) || data.name, spec: unit.spec, section: unit.section, figures: [...levels, ...(unit.figures || []), ...more], answer, text: unit.text || state.text, refused: page.dataset.stale === "true" };
     }
 
     function remember(path, coalesce) {
@@ -96,13 +104,18 @@
       state.last = { path, at };
     }
 
-    function edit(change, coalesce = false) {
-      if (!state.pending.length || change.path !== state.last.path) remember(change.path, coalesce);
-      else state.last = { path: change.path, at: performance.now() };
-      // Only the newest value of a key that is being dragged is worth sending.
-      state.pending = state.pending.filter((one) => one.path !== change.path || one.remove || change.remove);
-      state.pending.push(change);
-      state.changed = [change.path, ...state.changed.filter((path) => path !== change.path)].slice(0, 5);
+    // One change, or several that are undone together.
+    function edit(changes, coalesce = false) {
+      const all = [changes].flat();
+      const path = all[all.length - 1].path;
+      if (!state.pending.length || path !== state.last.path) remember(path, coalesce);
+      else state.last = { path, at: performance.now() };
+      for (const change of all) {
+        // Only the newest value of a key that is being dragged is worth sending.
+        state.pending = state.pending.filter((one) => one.path !== change.path || one.remove || change.remove);
+        state.pending.push(change);
+        state.changed = [change.path, ...state.changed.filter((one) => one !== change.path)].slice(0, 5);
+      }
       ask();
     }
 
@@ -117,7 +130,7 @@
     // A default that follows from other values is not known while one of them is refused: the last one stays in its field.
     function held(field) {
       const before = state.accepted.get(field.path);
-      return (field.value === undefined || field.value === null) && before ? { ...field, value: before.value } : field;
+      return (field.value === undefined || field.value === null) && before && !field.required ? { ...field, value: before.value } : field;
     }
 
     function startFrom(text) {
@@ -165,7 +178,7 @@
       }
       state.text = answer.text;
       state.pending = state.pending.slice(sent);
-      kept.keep(state.text);
+      keep();
       const faults = answer.faults || [];
       state.layers = answer.layers || 0;
       if (answer.groups) {
@@ -183,7 +196,7 @@
       const typing = document.activeElement === text;
       textFault.textContent = !typing && !unread.length ? "" : faults.map((one) => (one.field && one.line ? `line ${one.line}: ${one.message}` : one.message)).join("\n");
       if (unread.length) tabs.open = true;
-      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, one.message)), faults.length > 0 && el("p", { className: "note" }, state.unit.section ? "What is shown is the last unit that could be made." : "Nothing could be made yet."));
+      clear(others, (typing ? [] : homeless).map((one) => el("p", { className: "refusal" }, form.told(one, one.field, toForm))), faults.length > 0 && el("p", { className: "note" }, state.unit.text ? "What is shown is the last unit that could be made." : "Nothing could be made yet."));
       page.dataset.stale = String(faults.length > 0);
       buttons();
       if (!faults.length) await shown(answer);
@@ -275,11 +288,13 @@
       if (faults.length) {
         said("bad", "no moulds");
         const left = form.refuse(faults);
-        clear(others, left.map((one) => el("p", { className: "refusal" }, one.message)), el("p", { className: "note" }, "This unit has no moulds; the view keeps the unit alone."));
+        clear(others, left.map((one) => el("p", { className: "refusal" }, form.told(one, one.field, toForm))), el("p", { className: "note" }, "This unit has no moulds; the view keeps the unit alone."));
         state.model = { ...state.model, moulds: null };
         if (stage) await stage.update(state.model).catch(() => {});
       } else said(failed.length ? "bad" : "good", failed.length ? `${failed.length} of ${manifest.laws.length} mould checks failed` : `${manifest.laws.length} mould checks passed`);
     }
+
+    function toForm() { page.querySelector("#spec").focus({ preventScroll: true }); }
 
     function said(kind, words) {
       chip.className = `chip ${kind}`;
@@ -313,7 +328,17 @@
       // The same row may be opened again.
       history.replaceState(null, "", location.pathname);
       page.querySelector(".columns").scrollIntoView();
-      page.querySelector("#spec").focus({ preventScroll: true });
+      toForm();
+    }
+
+    // A batch's page begins with its first variant.
+    async function openFirst() {
+      // A row begins with its folder.
+      const [[folder] = []] = (data.batch.table || { rows: [] }).rows;
+      const answer = folder ? await server.send(`/variant/${encodeURIComponent(folder)}`) : {};
+      if (answer.text !== undefined) [state.text, state.opened] = [answer.text, folder];
+      text.value = state.text;
+      ask();
     }
 
     text.value = state.text;
@@ -321,7 +346,8 @@
       batch.plot();
       window.addEventListener("hashchange", openVariant);
     }
-    ask();
+    if (batch && !kept.back) openFirst();
+    else ask();
   }
 
   function createBatch(data) {

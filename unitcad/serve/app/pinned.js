@@ -3,14 +3,21 @@
   "use strict";
   const { el, clear, section, drawing, number, sideBySide, differences, flat } = window.unitcad;
 
-  // options: current() gives {name, spec, section, figures, answer, text, refused}; restore(text) goes back to a variant.
-  function createPinned({ current, restore }) {
-    let pinned = null;
+  // options: current() gives {name, spec, section, figures, answer, text, refused}; restore(text) goes back to a variant;
+  // `before` is what was pinned before a reload, and keep() is told of each change.
+  function createPinned({ current, restore, before, keep }) {
+    let pinned = before;
     const host = el("div", {});
-    const pin = el("button", { type: "button", onclick: () => { pinned = { ...current() }; show(); } }, "Pin this variant");
+    const pin = el("button", { type: "button", onclick: () => set({ ...current() }) }, "Pin this variant");
     const back = el("button", { type: "button", hidden: true, onclick: () => restore(pinned.text) }, "Go back to it");
-    const unpin = el("button", { type: "button", hidden: true, onclick: () => { pinned = null; show(); pin.focus(); } }, "Unpin");
+    const unpin = el("button", { type: "button", hidden: true, onclick: () => { set(null); pin.focus(); } }, "Unpin");
     const node = section("pinned", "Side by side", el("div", { className: "buttons" }, pin, back, unpin), host);
+
+    function set(one) {
+      pinned = one;
+      show();
+      keep();
+    }
 
     function column(one) {
       return {
@@ -30,18 +37,19 @@
       }
       const now = current();
       const columns = [pinned, now].map(column);
-      const heads = [`Pinned: ${pinned.name}`, `Now: ${now.name}`];
+      const heads = [`Pinned: ${pinned.name}`, now.refused ? "The last one that could be made; what is asked for now is refused" : `Now: ${now.name}`];
       const names = [...new Set(columns.flatMap((one) => [...one.figures.keys()]))];
       const unlike = differences(columns.map((one) => one.spec));
+      host.dataset.refused = String(now.refused);
       clear(host, sideBySide(heads, [
         ["Section and estimate", [["Section", columns.map((one) => one.section)], ["Estimate", columns.map((one) => one.answer)]]],
         ["Figures", names.map((name) => [name, columns.map((one) => one.figures.get(name) || "–")])],
         ["What differs in the specs", unlike],
-      ]), now.refused ? el("p", { className: "note" }, "The changed spec is refused: Now is the last one that could be made.") : !unlike.length && el("p", { className: "note" }, "The specs are the same."));
+      ]), !now.refused && !unlike.length && el("p", { className: "note" }, "The specs are the same."));
     }
 
     show();
-    return { node, show };
+    return { node, show, held: () => pinned };
   }
 
   Object.assign(window.unitcad, { createPinned });
