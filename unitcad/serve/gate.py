@@ -14,6 +14,8 @@ from urllib.parse import parse_qs
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from unitcad.serve.addresses import means
+
 TOKEN_HEADER = b"x-unitcad-token"
 LARGEST_BODY = 4 << 20
 """Bytes of a request's body."""
@@ -43,9 +45,9 @@ class Limits:
 class Gate:
     """ASGI middleware in front of `app`: passes a request on, its body whole, or refuses it with one line.
 
-    `hosts` are the values of Host that mean this server. A GET carries the token in its query or in the cookie
-    `cookie`, which is sent to this server's own pages alone; anything else carries it in a header, which a page of
-    another site can't set.
+    `hosts` are the values of Host that mean this server (`addresses.hosts`). A GET carries the token in its query or in
+    the cookie `cookie`, which is sent to this server's own pages alone; anything else carries it in a header, which a
+    page of another site can't set.
     """
 
     def __init__(self, app: ASGIApp, token: str, hosts: frozenset[str], cookie: str, limits: Limits) -> None:
@@ -78,7 +80,7 @@ class Gate:
         """Return the status and the reason for which a request is refused by its head alone; None where it is not."""
         headers = [(name.lower(), value) for name, value in scope["headers"]]
         hosts = [value.decode("latin-1").lower() for name, value in headers if name == b"host"]
-        if len(hosts) != 1 or hosts[0] not in self.hosts:
+        if len(hosts) != 1 or not means(hosts[0], self.hosts):
             return 421, "this server answers to its own address alone"
         origins = [value.decode("latin-1").lower() for name, value in headers if name == b"origin"]
         if any(origin != f"http://{hosts[0]}" for origin in origins):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ipaddress
 import secrets
 import socket
 from collections.abc import Awaitable, Callable, Iterator, Mapping
@@ -18,14 +17,15 @@ from unitcad.pipeline.folder import ARRAY
 from unitcad.report.array_page import is_array_folder
 from unitcad.report.page import page_data
 from unitcad.report.read_results import is_variant
+from unitcad.serve.addresses import LOOPBACK, check_address, hosts, shown
 from unitcad.serve.array_answers import array_files
 from unitcad.serve.messages import Source, Trusted
 from unitcad.spec import parse_toml, read_toml
 from unitcad.spec.custom_code import files_named, is_body_file, is_custom
+from unitcad.text import listed
 from unitcad.validation import custom_templates, default_template, templates
 from unitcad.validation.shipped_files import is_path, named_file
 
-LOOPBACK = "127.0.0.1"
 DEFAULT_OUT = Path("out")
 
 
@@ -48,8 +48,9 @@ def serve(
     """
     uvicorn = _uvicorn()
     from unitcad.serve.application import Live, Setting, application
+    from unitcad.serve.connections import Connection
 
-    _check_address(host, token)
+    check_address(host, token)
     token = token or secrets.token_urlsafe(24)
     source, batch = _source(source)
     if batch and out == DEFAULT_OUT:
@@ -71,22 +72,22 @@ def serve(
             starts[name] = None
     with _listening(host, port) as listening:
         bound = listening.getsockname()[1]
-        hosts = frozenset(f"{name}:{bound}" for name in _names(host))
         setting = Setting(
             text, path.name if is_own(source) else f"{path.stem}.toml", folder, out,
-            Trusted([source for source in trusted if source.named]), starts, token, hosts, bound, batch, campaign,
+            Trusted([source for source in trusted if source.named]), starts, token, hosts(host, bound), bound,
+            batch, campaign,
         )  # fmt: skip
-        shown = f"[{host}]" if ":" in host else host
+        address = f"http://{shown(host)}:{bound}/?token={token}"
         live = Live(setting)
         config = uvicorn.Config(
             application(live), log_level="error", access_log=False, server_header=False, date_header=False,
-            timeout_keep_alive=5, timeout_graceful_shutdown=2, limit_concurrency=200,
-            h11_max_incomplete_event_size=16384, ws="none", lifespan="on",
+            timeout_keep_alive=5, timeout_graceful_shutdown=2, h11_max_incomplete_event_size=16384, http=Connection,
+            ws="none", lifespan="on",
         )  # fmt: skip
         server = uvicorn.Server(config)
         # Ctrl-C is how a server is ended.
         with contextlib.suppress(KeyboardInterrupt):
-            asyncio.run(_told(server, listening, lambda: ready(f"http://{shown}:{bound}/?token={token}"), live.close))
+            asyncio.run(_told(server, listening, lambda: ready(address), live.close))
 
 
 async def _told(
@@ -111,13 +112,30 @@ def _source(source: str | None) -> tuple[str | None, Path | None]:
     folder = Path(source)
     if is_variant(folder):
         return str(folder / (ARRAY if is_array_folder(folder) else "spec.toml")), None
-    page_data(folder, with_models=False)
+    try:
+        page_data(folder, with_models=False)
+    except UnitcadError as error:
+        specs = sorted(path for path in folder.glob("*.toml") if _is_spec(path))
+        if len(specs) == 1:
+            return str(specs[0]), None
+        if specs:
+            raise UnitcadError(f"{error}; it has {listed([path.name for path in specs])}: give one of them") from None
+        raise
     return None, folder
+
+
+def _is_spec(path: Path) -> bool:
+    """Tell whether a file is a spec of a unit, of an array or of a campaign: by its keys, not by its values."""
+    try:
+        data = read_toml(path)
+    except UnitcadError:
+        return False
+    return is_array(data) or {"sensor", "unit"} <= set(data) or {"name", "layers"} <= set(data)
 
 
 def is_own(source: str | None) -> bool:
     """Tell whether a source is a file of the person's own, not a template's name."""
-    return source is not None and is_path(source)
+    return source is not None and is_path(source) and source not in custom_templates()
 
 
 def _uvicorn():
@@ -128,24 +146,6 @@ def _uvicorn():
     except ImportError as error:
         raise Missing(f"the live page needs {error.name}: in a clone, pip install '.[serve]'") from None
     return uvicorn
-
-
-def _check_address(host: str, token: str | None) -> None:
-    try:
-        loopback = ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        loopback = host == "localhost"
-    if not loopback and not token:
-        limit = "is not this machine's loopback address; another one needs a token of yours too (--token)"
-        raise WrongArgument("host", host, limit, LOOPBACK)
-    if token is not None and (len(token) < 16 or not token.isascii() or not token.isprintable() or " " in token):
-        raise WrongArgument("token", "(not shown)", "needs at least 16 printable ASCII characters without spaces")
-
-
-def _names(host: str) -> set[str]:
-    """Return the names under which a browser may ask for the server at an address."""
-    own = f"[{host}]" if ":" in host else host
-    return {own, "localhost", "127.0.0.1", "[::1]"} if host in ("localhost", LOOPBACK, "::1") else {own}
 
 
 def _listening(host: str, port: int) -> socket.socket:

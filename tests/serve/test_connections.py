@@ -1,0 +1,152 @@
+"""Who is let in at which address, and connections whose headers do not come."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from running import serving
+
+pytest.importorskip("uvicorn", reason="the extra serve is not installed")
+import uvicorn
+
+from unitcad.errors import UnitcadError
+from unitcad.serve.addresses import hosts, means
+from unitcad.serve.connections import Connection
+from unitcad.serve.server import serve
+from unitcad.validation import templates
+
+HALF = b"GET / HTTP/1.1\r\n"
+LAST = b"GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+KEPT = b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"
+
+
+class Quick(Connection):
+    """A connection that waits for headers for a short time, one of few."""
+
+    headers_s = 0.3
+    most_waiting = 20
+
+
+async def _hello(scope: Any, receive: Any, send: Any) -> None:
+    await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"2")]})
+    await send({"type": "http.response.body", "body": b"hi"})
+
+
+def _run(client: Callable[[Callable[[], socket.socket]], None]) -> None:
+    """Run a client, given what connects it, of a server whose connections are `Quick`."""
+
+    async def both() -> None:
+        listening = socket.create_server(("127.0.0.1", 0), backlog=200)
+        address = listening.getsockname()
+        config = uvicorn.Config(
+            _hello, http=Quick, ws="none", lifespan="off", log_level="critical", timeout_keep_alive=1
+        )
+        server = uvicorn.Server(config)
+        running = asyncio.create_task(server.serve(sockets=[listening]))
+        while not server.started:
+            await asyncio.sleep(0.01)
+        with contextlib.ExitStack() as lines:
+            try:
+                await asyncio.to_thread(
+                    client, lambda: lines.enter_context(socket.create_connection(address, timeout=3.0))
+                )
+            finally:
+                server.should_exit = True
+                await running
+
+    asyncio.run(both())
+
+
+def _read(line: socket.socket) -> bytes:
+    """What comes back until the server closes."""
+    parts = []
+    with contextlib.suppress(ConnectionResetError):
+        while part := line.recv(4096):
+            parts.append(part)
+    return b"".join(parts)
+
+
+@pytest.mark.parametrize(("sent", "answers"), [([], 0), ([HALF], 0), ([KEPT, HALF], 1), ([KEPT + HALF], 1)])
+def test_headers_that_do_not_come_are_not_waited_for(sent: list[bytes], answers: int) -> None:
+    """Of a new connection, of a request begun, of the next one on a connection that is kept."""
+
+    def client(connect: Callable[[], socket.socket]) -> None:
+        line = connect()
+        for part in sent:
+            line.sendall(part)
+            time.sleep(0.1)
+        assert _read(line).count(b"200 OK") == answers
+
+    _run(client)
+
+
+def test_a_connection_that_is_used_is_not_cut_off() -> None:
+    def client(connect: Callable[[], socket.socket]) -> None:
+        line = connect()
+        line.sendall(KEPT)
+        time.sleep(0.5)
+        line.sendall(LAST)
+        assert _read(line).count(b"200 OK") == 2
+
+    _run(client)
+
+
+def test_connections_that_wait_keep_nobody_out() -> None:
+    def client(connect: Callable[[], socket.socket]) -> None:
+        waiting = [connect() for _ in range(100)]
+        for each in waiting:
+            with contextlib.suppress(OSError):  # the oldest ones have to go
+                each.sendall(HALF)
+        begun, line = time.monotonic(), connect()
+        line.sendall(LAST)
+        assert b"200 OK" in _read(line)
+        assert time.monotonic() - begun < 2.0
+
+    _run(client)
+
+
+@pytest.mark.parametrize("wildcard", ["0.0.0.0", "::"])
+def test_at_all_addresses_a_host_is_an_address_or_an_own_name(wildcard: str) -> None:
+    allowed = hosts(wildcard, 8000)
+    own = ["127.0.0.1:8000", "192.168.1.7:8000", "[fe80::1]:8000", "localhost:8000", f"{socket.gethostname()}:8000"]
+    for host in own:
+        assert means(host.lower(), allowed), host
+    for host in ("evil.example:8000", "192.168.1.7", "192.168.1.7:80", "fe80::1:8000", "[192.168.1.7]:8000",
+                 "192.168.1.7.evil.example:8000", "[evil]:8000", "*:80", ":8000", "0x7f.1:8000"):  # fmt: skip
+        assert not means(host, allowed), host
+    assert not means("192.168.1.7:8000", hosts("127.0.0.1", 8000))
+    assert means("192.168.1.7:8000", hosts("192.168.1.7", 8000))
+
+
+def test_a_server_at_all_addresses_answers_at_those_of_the_machine(tmp_path: Path) -> None:
+    with serving(tmp_path, "embedded", "--host", "0.0.0.0", "--token", "a-token-of-the-lab") as own:
+        assert "0.0.0.0" not in own.base
+        assert own.send("/")[0] == 200
+        for host, status in (("127.0.0.1", 200), ("evil.example", 421)):
+            assert own.send("/", headers={"Host": f"{host}:{own.port}"})[0] == status
+
+
+def test_a_shipped_custom_unit_is_saved_into_the_working_directory(tmp_path: Path) -> None:
+    with serving(tmp_path, "custom/dome", "--allow-code") as own:
+        status, content, _ = own.send("/save", {"text": "name = 1", "name": "mine.toml"})
+        assert status == 200, content
+    assert (tmp_path / "mine.toml").read_text() == "name = 1"
+
+
+def test_a_folder_of_specs_opens_its_only_one_or_names_them(tmp_path: Path) -> None:
+    text = templates()["embedded"].read_text("utf-8")
+    (tmp_path / "settings.toml").write_text("colour = 1")
+    (tmp_path / "one.toml").write_text(text)
+    with serving(tmp_path, ".") as own:
+        assert b"one.toml" in own.send("/")[1]
+        assert own.ask(text)["layers"] == 2
+    (tmp_path / "two.toml").write_text(text)
+    with pytest.raises(UnitcadError, match=r"one.toml and two.toml: give one of them"):
+        serve(str(tmp_path))
