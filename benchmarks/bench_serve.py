@@ -28,7 +28,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "report")
 import chromium
 
 SHOWN = {"unit": "unit and section", "moulds": "moulds judged", "estimate": "estimate"}
-NUMBERS = {"forearm-pockets": ("layout.pitch_mm", 20.0, 24.0), "forearm-patch": ("sheet.margin_mm", 3.0, 5.0)}
+NUMBERS = {
+    "forearm-pockets": ("layout.pitch_mm", 20.0, 24.0),
+    "forearm-patch": ("sheet.margin_mm", 3.0, 5.0),
+    "sleeve-curved": ("body.radius_mm", 40.0, 44.0),
+}
 """What is typed, and from where to where, in what is no unit's spec."""
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "serve.md"
 WARM = 5
