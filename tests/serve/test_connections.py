@@ -7,6 +7,7 @@ import contextlib
 import socket
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,9 @@ def _run(client: Callable[[Callable[[], socket.socket]], None]) -> None:
                 server.should_exit = True
                 await running
 
-    asyncio.run(both())
+    # In a thread of its own: a browser's test before this one leaves a loop in the main one.
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(asyncio.run, both()).result()
 
 
 def _read(line: socket.socket) -> bytes:
