@@ -3,6 +3,7 @@
 import contextlib
 import importlib
 import math
+from collections import Counter
 
 import pytest
 from hypothesis import HealthCheck, Phase, assume, given, settings
@@ -11,6 +12,7 @@ from sample_bodies import LAYER1, QUARTER, all_bodies
 
 from unitcad.errors import UnitcadError
 from unitcad.kernels import bounds, mesh
+from unitcad.moulds.ribs import rib_shapes, slot_shapes
 from unitcad.pipeline.variant import Variant
 from unitcad.shape import (
     Below,
@@ -237,3 +239,26 @@ def test_planted_faults_are_seen():
 def test_a_taper_has_the_same_arcs_above_and_below():
     with pytest.raises(ProfileError, match="same angle"):
         Extrude(rounded_rectangle(4, 4, 1), 0, 1, top=rounded_rectangle(3, 3, 1, key=1))
+
+
+def test_flat_sides_of_a_taper_are_planes():
+    """A boolean of splines takes twenty times as long; a side that is not flat stays what it is, to its volume."""
+    kinds = Counter(map(_kind, occt.faces_of(occt.solids([LEAVES["taper"]])[0])))
+    assert kinds["Plane"] == 7, kinds  # two ends, four sides, the cut corner
+    assert set(kinds) <= {"Plane", "Cone", "BSplineSurface"}
+    twisted = Extrude(polygon((0, 0), (4, 0), (4, 3), (0, 3)), 0, 2, top=polygon((0, 0), (4, 1), (4, 3), (0, 3)))
+    assert Counter(map(_kind, occt.faces_of(occt.solids([twisted])[0]))) == {"Plane": 5, "BSplineSurface": 1}
+
+
+@pytest.mark.parametrize("printer", ["fdm-0.4", "sla"])
+def test_ribs_and_plinth_have_flat_sides(printer):
+    variant = Variant.of("encapsulating", f"moulds.printer={printer}")
+    shapes = [*rib_shapes(variant.spec, variant.plan.layout), *slot_shapes(variant.spec, variant.plan.layout)]
+    for solid in occt.solids(shapes):
+        assert {_kind(face) for face in occt.faces_of(solid)} == {"Plane"}
+
+
+def _kind(face):
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+
+    return BRepAdaptor_Surface(face).GetType().name.removeprefix("GeomAbs_")

@@ -20,6 +20,8 @@ from unitcad.shape.tree import Turn
 
 with loading("OCP"):
     from OCP.Bnd import Bnd_Box
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
     from OCP.BRepAlgoAPI import BRepAlgoAPI_BooleanOperation, BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
     from OCP.BRepBndLib import BRepBndLib
     from OCP.BRepBuilderAPI import (
@@ -35,11 +37,13 @@ with loading("OCP"):
     from OCP.BRepLib import BRepLib
     from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol
+    from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
     from OCP.GC import GC_MakeArcOfCircle
+    from OCP.GeomAbs import GeomAbs_Plane
     from OCP.gp import gp_Ax1, gp_Ax3, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
     from OCP.GProp import GProp_GProps
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
-    from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_SHELL, TopAbs_SOLID
+    from OCP.TopAbs import TopAbs_FACE, TopAbs_IN, TopAbs_ShapeEnum, TopAbs_SHELL, TopAbs_SOLID
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS, TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Wire
@@ -47,7 +51,9 @@ with loading("OCP"):
 
 
 _SEWN = 1e-6
-"""Distance up to which edges of neighbouring triangles are one, mm."""
+"""Distance up to which edges of neighbouring faces are one, mm."""
+_FLAT = 1e-9
+"""Distance from a line or a plane up to which points lie on it, mm."""
 
 
 @dataclass(frozen=True)
@@ -153,24 +159,63 @@ def loft(below: TopoDS_Wire, above: TopoDS_Wire) -> TopoDS_Shape:
     builder = BRepOffsetAPI_ThruSections(True, True)
     builder.AddWire(below)
     builder.AddWire(above)
-    return builder.Shape()
+    return _with_planes(builder.Shape())
+
+
+def _with_planes(ruled: TopoDS_Shape) -> TopoDS_Shape:
+    """Return a ruled solid, its flat sides as planes.
+
+    OCCT rules a spline between edges of different lengths; a boolean of splines takes twenty times as long.
+    """
+    sewing = BRepBuilderAPI_Sewing(_SEWN)
+    for side in faces_of(ruled):
+        corners = [] if BRepAdaptor_Surface(side).GetType() == GeomAbs_Plane else _flat_corners(side)
+        sewing.Add(_polygon(corners) if corners else side)
+    return _sewn(sewing)
+
+
+def _flat_corners(side: TopoDS_Face) -> list[gp_Pnt]:
+    """Return the corners of a face whose edges are straight and lie in one plane; none of another face."""
+    explorer, corners = BRepTools_WireExplorer(BRepTools.OuterWire_s(side)), []
+    while explorer.More():
+        corner, curve = BRep_Tool.Pnt_s(explorer.CurrentVertex()), BRepAdaptor_Curve(explorer.Current())
+        ends = [curve.Value(at) for at in (curve.FirstParameter(), curve.LastParameter())]
+        middle = curve.Value((curve.FirstParameter() + curve.LastParameter()) / 2)
+        if gp_Vec(ends[0], middle).Crossed(gp_Vec(ends[0], ends[1])).Magnitude() > _FLAT * ends[0].Distance(ends[1]):
+            return []
+        corners.append(corner)
+        explorer.Next()
+    first, *others = corners
+    across = gp_Vec(first, others[0]).Crossed(gp_Vec(first, others[-1]))
+    flat = all(abs(gp_Vec(first, other).Dot(across)) <= _FLAT * across.Magnitude() for other in others)
+    return corners if flat else []
+
+
+def _polygon(corners: Sequence[gp_Pnt]) -> TopoDS_Face:
+    outline = BRepBuilderAPI_MakePolygon()
+    for corner in corners:
+        outline.Add(corner)
+    outline.Close()
+    return BRepBuilderAPI_MakeFace(outline.Wire(), True).Face()
 
 
 def polyhedron(corners: Sequence[brep.Point], faces: Sequence[Sequence[int]]) -> TopoDS_Shape:
     """Return the solid of triangles: their edges sewn together, faces in one plane made one."""
     sewing = BRepBuilderAPI_Sewing(_SEWN)
     for face in faces:
-        a, b, c = (gp_Pnt(*corners[i]) for i in face)
-        outline = BRepBuilderAPI_MakePolygon(a, b, c, True)
-        sewing.Add(BRepBuilderAPI_MakeFace(outline.Wire(), True).Face())
+        sewing.Add(_polygon([gp_Pnt(*corners[i]) for i in face]))
+    return _unified(_sewn(sewing))
+
+
+def _sewn(sewing: BRepBuilderAPI_Sewing) -> TopoDS_Shape:
+    """Return the solid that sewn faces bound."""
     sewing.Perform()
-    builder, explorer = BRepBuilderAPI_MakeSolid(), TopExp_Explorer(sewing.SewedShape(), TopAbs_SHELL)
-    while explorer.More():
-        builder.Add(TopoDS.Shell(explorer.Current()))
-        explorer.Next()
+    builder = BRepBuilderAPI_MakeSolid()
+    for shell in _explored(sewing.SewedShape(), TopAbs_SHELL):
+        builder.Add(TopoDS.Shell(shell))
     solid = builder.Solid()
     BRepLib.OrientClosedSolid_s(solid)
-    return _unified(solid)
+    return solid
 
 
 def fuse(parts: Sequence[TopoDS_Shape]) -> TopoDS_Shape:
@@ -195,13 +240,8 @@ def component(solid: TopoDS_Shape, at: brep.Point) -> TopoDS_Shape:
 def below(solid: TopoDS_Shape, bottom: float) -> TopoDS_Shape:
     """Return the prisms under the upward faces, fused: exact where each such face is seen whole from above."""
     x0, y0, _, x1, y1, high = _box(solid)
-    prisms = []
-    explorer = TopExp_Explorer(solid, TopAbs_FACE)
-    while explorer.More():
-        each = TopoDS.Face(explorer.Current())
-        if _faces_up(each):
-            prisms.append(BRepPrimAPI_MakePrism(each, gp_Vec(0, 0, bottom - 1 - high), True).Shape())
-        explorer.Next()
+    down = gp_Vec(0, 0, bottom - 1 - high)
+    prisms = [BRepPrimAPI_MakePrism(each, down, True).Shape() for each in faces_of(solid) if _faces_up(each)]
     under = BRepPrimAPI_MakeBox(gp_Pnt(x0 - 1, y0 - 1, bottom), gp_Pnt(x1 + 1, y1 + 1, high + 1)).Shape()
     return common(fuse([solid, *prisms]), under)
 
@@ -257,8 +297,17 @@ def _unified(solid: TopoDS_Shape) -> TopoDS_Shape:
 
 def solids_in(shape: TopoDS_Shape) -> list[TopoDS_Shape]:
     """Return the solids of a shape: itself, or those of a compound."""
-    explorer, solids = TopExp_Explorer(shape, TopAbs_SOLID), []
+    return _explored(shape, TopAbs_SOLID)
+
+
+def faces_of(shape: TopoDS_Shape) -> list[TopoDS_Face]:
+    """Return the faces of a shape."""
+    return [TopoDS.Face(face) for face in _explored(shape, TopAbs_FACE)]
+
+
+def _explored(shape: TopoDS_Shape, kind: TopAbs_ShapeEnum) -> list[TopoDS_Shape]:
+    explorer, there = TopExp_Explorer(shape, kind), []
     while explorer.More():
-        solids.append(explorer.Current())
+        there.append(explorer.Current())
         explorer.Next()
-    return solids
+    return there

@@ -34,6 +34,7 @@ from unitcad.designs.rib_leaves import CREST, LEAF_WIDTH, leaf_mm
 from unitcad.designs.tooling import Layout
 from unitcad.moulds.layout import CORNER_RADIUS, PLINTH_DRAFT_DEG
 from unitcad.shape import Extrude, Profile, Shape, box, polygon, union
+from unitcad.shape.profile import mm
 from unitcad.spec import Spec, printer_of
 
 ROOF = 1.5
@@ -104,24 +105,27 @@ def drawn(
     standing: tuple[Rib, ...], clearance: float, interference: float, crest: float, root: float = ROOT
 ) -> list[Shape]:
     """Draw ribs: a crest as wide as a printed line, flanks of 45 degrees, and a ramp at either end."""
-    tip, back = interference * SQUARE, -clearance * SQUARE - root
+    tip, back = mm(interference * SQUARE), mm(-clearance * SQUARE - root)
+    reach = mm(crest / 2) + tip
     shapes: list[Shape] = []
     for rib in standing:
         heights = (rib.foot, rib.bottom, rib.top, rib.head)
         # At foot and head the tip lies within the wall.
-        tips = (back + root / 2, tip, tip, back + root / 2)
-        sections = [
-            _section(rib, at, back, crest / 2, crest / 2 + tip - back, z) for at, z in zip(tips, heights, strict=True)
-        ]
+        tips = (back + mm(root / 2), tip, tip, back + mm(root / 2))
+        sections = [_section(rib, at, back, reach, z) for at, z in zip(tips, heights, strict=True)]
         shapes += [Extrude(sections[i], heights[i], heights[i + 1], top=sections[i + 1]) for i in range(3)]
     return shapes
 
 
-def _section(rib: Rib, tip: float, back: float, narrow: float, wide: float, z: float) -> Profile:
-    """Draw a rib's section at z: its tip and its back lie so far inwards of the plinth's face there."""
-    (nx, ny), face = rib.inwards, z * SLOPE
-    corners = ((tip, -narrow), (tip, narrow), (back, wide), (back, -wide))
-    return polygon(*((rib.x + nx * (d + face) - ny * t, rib.y + ny * (d + face) + nx * t) for d, t in corners))
+def _section(rib: Rib, tip: float, back: float, reach: float, z: float) -> Profile:
+    """Draw a rib's section at z: its tip and its back lie so far inwards of the plinth's face there.
+
+    Its flanks would meet at `reach`. All lengths are on the grid, so that flanks are planes at exactly 45 degrees.
+    """
+    (nx, ny), face = rib.inwards, mm(z * SLOPE)
+    corners = ((tip, tip - reach), (tip, reach - tip), (back, reach - back), (back, back - reach))
+    x, y = mm(rib.x), mm(rib.y)
+    return polygon(*((x + nx * (d + face) - ny * t, y + ny * (d + face) + nx * t) for d, t in corners))
 
 
 def leaf_slots(standing: tuple[Rib, ...], clearance: float, leaf: float, top: float = 0.0) -> list[Shape]:
