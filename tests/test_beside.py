@@ -1,17 +1,23 @@
-"""A second process beside a build: the same bytes with it, without it and where it is lost; nothing left behind."""
+"""Processes beside a build: the same bytes with them, without them and where they are lost; nothing left behind."""
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from unitcad.pipeline.beside import Beside
+from unitcad.errors import UnitcadError
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.beside import Beside, started
 from unitcad.pipeline.build import Built, build
+from unitcad.shape import Revolve, Union, cylinder, polygon, turned
 from unitcad.validation import load
 
 
@@ -20,17 +26,34 @@ def _files(built: Built) -> dict[str, bytes]:
     return {path: content for path, content in found.items() if path != "timings.json"}
 
 
-def test_a_build_writes_the_same_with_a_process_without_and_where_it_is_lost(tmp_path: Path) -> None:
-    spec, only = load("single-embedded", {"output.formats": ["stl"]}), ("casting", "estimate")
+def _lost() -> bytes:
+    raise LookupError("made here")
+
+
+def _killed(process: Beside) -> None:
+    for each in process._processes:
+        os.kill(each._child.pid, signal.SIGKILL)
+
+
+@pytest.mark.parametrize(("step", "rest"), [(False, True), (True, False), (True, True)])
+def test_a_build_writes_the_same_with_processes_without_and_where_they_are_lost(
+    tmp_path: Path, step: bool, rest: bool
+) -> None:
+    if step:
+        pytest.importorskip("OCP")
+    spec = load("single-embedded", {"output.formats": ["stl", "step"] if step else ["stl"]})
+    only = ("unit", "casting", "estimate")
     here = _files(build(spec, tmp_path / "here", only=only, check=False))
     assert {"estimate.json", "steps/pieces.png", "steps/peel.png"} < here.keys()
-    with Beside() as process:
-        assert _files(build(spec, tmp_path / "beside", only=only, check=False, beside=process)) == here
-        child = process._child
-    assert child.returncode is not None
-    with Beside() as process:
-        os.kill(process._child.pid, signal.SIGKILL)
-        assert _files(build(spec, tmp_path / "lost", only=only, check=False, beside=process)) == here
+    assert ("unit.step" in here) == step
+    with Beside(step, rest) as processes:
+        assert _files(build(spec, tmp_path / "beside", only=only, check=False, beside=processes)) == here
+        children = [each._child for each in processes._processes]
+    assert len(children) == step + rest
+    assert all(child.returncode is not None for child in children)
+    with Beside(step, rest) as processes:
+        _killed(processes)
+        assert _files(build(spec, tmp_path / "lost", only=only, check=False, beside=processes)) == here
 
 
 def test_what_the_process_gives_is_taken_and_what_it_has_not_begun_is_made_here() -> None:
@@ -41,7 +64,7 @@ def test_what_the_process_gives_is_taken_and_what_it_has_not_begun_is_made_here(
         made_here.append("estimate")
         return {"made": "here"}
 
-    with Beside() as process:
+    with Beside(rest=True) as process:
         first = process.estimate(spec, here)
         waiting = process.estimate(spec, here)
         assert waiting() == {"made": "here"}
@@ -56,11 +79,45 @@ def test_what_is_refused_there_is_refused_here() -> None:
     def here() -> dict[str, str]:
         raise LookupError("asked here")
 
-    with Beside() as process:
-        asked = process.answer(("estimate", "no spec"))
+    with Beside(rest=True) as process:
+        (child,) = process._processes
+        asked = child.answer(("estimate", "no spec"))
         assert asked.exception() is not None or asked.result() is None
         with pytest.raises(LookupError, match="asked here"):  # the process has ended, or said that it refuses
             process.estimate(spec, here)()
+
+
+def test_step_files_come_in_the_order_of_asking_and_with_the_same_bytes_as_here() -> None:
+    pytest.importorskip("OCP")
+    from unitcad.export import step
+
+    bodies = MouldSet(load("single-embedded")).unit
+    with Beside(step=True) as process:
+        first, second = process.step(bodies, "unit", _lost), process.step(bodies[:1], "layer", _lost)
+        assert second() == step.content(bodies[:1], "layer")
+        assert first() == step.content(bodies, "unit")
+
+
+def test_what_fails_in_occt_is_the_same_error_here_and_the_process_goes_on() -> None:
+    """OCCT loses a part of this body: a cylinder and a cone lying in it, edge on edge."""
+    pytest.importorskip("OCP")
+    from unitcad.export import step
+
+    bodies = MouldSet(load("single-embedded")).unit[:1]
+    shape = Union((cylinder(1, 0, 1), turned(Revolve(polygon((0, 0), (1, 0), (0, 1))), "y", 3)))
+    with Beside(step=True) as process:
+        wrong = process.step([replace(bodies[0], shape=shape)], "wrong", _lost)
+        sound = process.step(bodies, "layer", _lost)
+        with pytest.raises(UnitcadError, match="OCCT and manifold3d differ: 1 solids"):
+            wrong()
+        assert sound() == step.content(bodies, "layer")
+
+
+def test_who_asks_a_process_that_has_ended_makes_the_step_itself() -> None:
+    with Beside(step=True) as process:
+        _killed(process)
+        with pytest.raises(LookupError, match="made here"):
+            process.step(MouldSet(load("single-embedded")).unit, "unit", _lost)()
 
 
 def test_the_command_loads_no_scipy_itself(tmp_path: Path) -> None:
@@ -75,19 +132,51 @@ def test_the_command_loads_no_scipy_itself(tmp_path: Path) -> None:
     assert done.stdout.splitlines()[-1] == "False False"
 
 
-@pytest.mark.parametrize(("cores", "formats", "count"), [(1, "stl", 0), (2, "stl", 1), (2, None, 1), (3, None, 2)])
-def test_a_build_begins_no_more_processes_than_cores(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, cores: int, formats: str | None, count: int
-) -> None:
-    """With STEP, two cores are full: the process of estimate and pictures would only slow them."""
-    begun: list[str] = []
-    monkeypatch.setattr("unitcad.children.cores", lambda: cores)
-    monkeypatch.setattr("unitcad.export.step_process.worthwhile", lambda: cores > 1)
-    monkeypatch.setattr("unitcad.children.Answering.__init__", lambda self, module: begun.append(module))
-    monkeypatch.setattr("unitcad.children.Answering.__enter__", lambda self: self)
-    monkeypatch.setattr("unitcad.children.Answering.__exit__", lambda self, *what: None)
-    from unitcad.cli.build_command import _beside, _step_process
+def test_the_command_loads_no_occt_itself_and_leaves_no_process(tmp_path: Path) -> None:
+    psutil = pytest.importorskip("psutil")
+    pytest.importorskip("OCP")
+    code = (
+        "import sys; from unitcad.cli import app; "
+        "app(['build', 'single-embedded', '--only', 'unit', '--no-check', '-o', sys.argv[1]], standalone_mode=False); "
+        "print('OCP' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True)
+    folder, loaded = done.stdout.splitlines()
+    assert "unit.step" in json.loads((Path(folder) / "manifest.json").read_text())["files"]
+    assert loaded == ("False" if len(os.sched_getaffinity(0)) > 1 else "True")
+    command = [sys.executable, "-m", "unitcad", "build", "encapsulating", "-o", str(tmp_path / "killed")]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as parent:
+        children = _wait(lambda: psutil.Process(parent.pid).children())
+        parent.kill()
+    assert _wait(lambda: not any(child.is_running() and child.status() != "zombie" for child in children))
 
-    with _step_process(None, formats) as step, _beside(None, 1 if step is None else 2):
-        pass
-    assert len(begun) == count
+
+def _wait(what):
+    for _ in range(300):
+        if found := what():
+            return found
+        time.sleep(0.1)
+    raise AssertionError("waited for 30 s")
+
+
+@pytest.mark.parametrize(
+    ("cores", "occt", "step", "rest", "begun"),
+    [
+        (1, True, True, True, []),
+        (2, True, False, True, ["estimate"]),
+        (2, True, True, True, ["step"]),
+        (2, False, True, True, ["estimate"]),
+        (3, True, True, True, ["step", "estimate"]),
+        (3, True, True, False, ["step"]),
+    ],
+)
+def test_no_more_processes_run_than_there_are_cores(
+    monkeypatch: pytest.MonkeyPatch, cores: int, occt: bool, step: bool, rest: bool, begun: list[str]
+) -> None:
+    monkeypatch.setattr("unitcad.pipeline.beside.cores", lambda: cores)
+    monkeypatch.setattr("unitcad.pipeline.beside.find_spec", lambda name: name if occt else None)
+    monkeypatch.delitem(sys.modules, "OCP", raising=False)
+    asked: list[str] = []
+    monkeypatch.setattr("unitcad.children.Answering.__init__", lambda self, module, first: asked.append(first))
+    started(step, rest)
+    assert asked == begun

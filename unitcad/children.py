@@ -118,11 +118,11 @@ class Lost(Exception):
 class Answering:
     """A Python process that answers requests in the order of asking, and ends with the block. See `answer_requests`."""
 
-    def __init__(self, module: str) -> None:
+    def __init__(self, module: str, *arguments: str) -> None:
         from concurrent.futures import ThreadPoolExecutor
 
         self._child = subprocess.Popen(
-            [sys.executable, "-P", "-m", module],
+            [sys.executable, "-P", "-m", module, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

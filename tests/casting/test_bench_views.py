@@ -15,7 +15,7 @@ from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.casting.bench_extras import ARROW, BAND, CARD, GREASE, TAPE
-from unitcad.casting.bench_pictures import SIZE, pictures
+from unitcad.casting.bench_pictures import SIZE, BenchPictures, pictures
 from unitcad.casting.bench_views import View, picture_path, views
 from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.tongue_prop import tongue_prop
@@ -128,7 +128,8 @@ def test_pictures_of_a_curved_set_show_what_is_there() -> None:
     moulds, _ = planned(*CURVED)
     shown = views(moulds)
     names = [name for name, view in shown.items() if view.group == "curved"]
-    drawn = pictures(moulds, names)
+    bench = BenchPictures(moulds)
+    drawn = {picture_path(name): bench.picture(name) for name in names}
     for name in names:
         colours = {extra.colour for extra in shown[name].extras}
         assert (hues(drawn[picture_path(name)], ARROW) > 30) == (ARROW in colours), name

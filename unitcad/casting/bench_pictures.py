@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 
-from unitcad.casting.bench_extras import TOOL
+from unitcad.casting.bench_extras import TOOL, Extra
 from unitcad.casting.bench_views import Placed, View, picture_path, views
 from unitcad.designs import layer_colour
 from unitcad.export import composite
+from unitcad.export.composite import DrawnBody
 from unitcad.export.picture_letters import Name
+from unitcad.export.raster import Camera
 from unitcad.kernels.mesh import arrays, bounds, realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, moved, polygon
@@ -23,44 +27,90 @@ _GAP = 9.0
 _Solid = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
 
 
-def pictures(moulds: MouldSet, names: Collection[str] | None = None) -> dict[str, bytes]:
-    """Return the PNG of every view of a set's procedure, or of `names`, by its path in the result's folder."""
-    shown = views(moulds)
-    solids: dict[object, list[_Solid]] = {}
-    for view in shown.values():
-        for part in view.parts:
-            key = view.group == "unit", part
-            if key not in solids:
-                solids[key] = list(_solids(moulds, part, view.group == "unit"))
-        for extra in view.extras:
-            if extra not in solids:
-                solids[extra] = [(*_mesh(moulds, extra.shape), extra.colour)]
-        if view.syringe_on is not None and view.syringe_on not in solids:
-            solids[view.syringe_on] = [(*_mesh(moulds, _syringe(moulds, view.syringe_on)), TOOL)]
-    drawn = _drawn(moulds, shown, solids, shown.keys() if names is None else names)
-    return {picture_path(name): content for name, content in drawn}
+def pictures(moulds: MouldSet) -> dict[str, bytes]:
+    """Return the PNG of every view of a set's procedure by its path in the result's folder."""
+    bench = BenchPictures(moulds)
+    return {picture_path(name): bench.picture(name) for name in bench.names}
 
 
-def _drawn(
-    moulds: MouldSet, shown: dict[str, View], solids: dict[object, list[_Solid]], names: Collection[str]
-) -> Iterable[tuple[str, bytes]]:
-    kinds = {name: (view.group, view.eye, view.turned) for name, view in shown.items()}
-    for group in dict.fromkeys(kinds[name] for name in shown if name in names):
-        own = {name: view for name, view in shown.items() if kinds[name] == group}
-        keys = {name: list(_keys(view)) for name, view in own.items()}
-        placed = {key: solids[key] for each in keys.values() for key in each}
-        if group[0] == "pieces":
+@dataclass(frozen=True)
+class _Kind:
+    """Views of one kind: they show things that stand alike, from one side, at one scale."""
+
+    group: str
+    eye: tuple[float, float, float]
+    turned: bool
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What the views of one kind show: solids at their places by their keys, and as they are drawn by `camera`."""
+
+    kind: _Kind
+    placed: dict[object, list[_Solid]]
+    camera: Camera
+    bodies: dict[object, list[DrawnBody]] = field(default_factory=dict)
+
+    def drawn(self, key: object) -> list[DrawnBody]:
+        """Return what stands for a key, drawn once."""
+        if key not in self.bodies:
+            self.bodies[key] = [composite.drawn(*solid, self.camera) for solid in self.placed[key]]
+        return self.bodies[key]
+
+
+class BenchPictures:
+    """The pictures of a set's procedure, each drawn when it is asked for.
+
+    Of what is drawn for one kind of view all pictures of that kind are made: ask for `names` in their order, or
+    backwards.
+    """
+
+    def __init__(self, moulds: MouldSet) -> None:
+        self._moulds = moulds
+        self._views = views(moulds)
+        self._kinds = {name: _Kind(view.group, view.eye, view.turned) for name, view in self._views.items()}
+        self._solids: dict[object, list[_Solid]] = {}
+        self._scene: _Scene | None = None
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the views, kind by kind."""
+        kinds = list(dict.fromkeys(self._kinds.values()))
+        return sorted(self._kinds, key=lambda name: kinds.index(self._kinds[name]))
+
+    def picture(self, name: str) -> bytes:
+        """Return the PNG of a view."""
+        kind = self._kinds[name]
+        if self._scene is None or self._scene.kind != kind:
+            self._scene = self._scene_of(kind)
+        scene, view = self._scene, self._views[name]
+        written = _piece_names(self._moulds, scene.placed) if kind.group == "pieces" else view.names
+        return composite.together([body for key in _keys(view) for body in scene.drawn(key)], scene.camera, written)
+
+    def _scene_of(self, kind: _Kind) -> _Scene:
+        own = [view for name, view in self._views.items() if self._kinds[name] == kind]
+        placed = {key: solids for view in own for key, solids in self._of_view(view)}
+        if kind.group == "pieces":
             placed = _laid_out(placed)
         points = np.concatenate([vertices for each in placed.values() for vertices, _, _ in each])
-        camera = composite.view(group[1], points, SIZE, turned=group[2])
-        wanted = {name: each for name, each in keys.items() if name in names}
-        bodies = {
-            key: [composite.drawn(*solid, camera) for solid in placed[key]]
-            for key in dict.fromkeys(key for each in wanted.values() for key in each)
-        }
-        for name, each in wanted.items():
-            written = _piece_names(moulds, placed) if group[0] == "pieces" else own[name].names
-            yield name, composite.together([body for key in each for body in bodies[key]], camera, written)
+        return _Scene(kind, placed, composite.view(kind.eye, points, SIZE, turned=kind.turned))
+
+    def _of_view(self, view: View) -> Iterable[tuple[object, list[_Solid]]]:
+        """Yield what a view shows: a key, and the solids that stand for it, made once for all views."""
+        for key in _keys(view):
+            if key not in self._solids:
+                self._solids[key] = list(self._made(key))
+            yield key, self._solids[key]
+
+    def _made(self, key: object) -> Iterable[_Solid]:
+        moulds = self._moulds
+        match key:
+            case bool() as unit, Placed() as part:
+                return _solids(moulds, part, unit)
+            case Extra(shape=shape, colour=colour):
+                return [(*_mesh(moulds, shape), colour)]
+            case _:
+                return [(*_mesh(moulds, _syringe(moulds, cast(Shape, key))), TOOL)]
 
 
 def _piece_names(moulds: MouldSet, placed: dict[object, list[_Solid]]) -> list[Name]:

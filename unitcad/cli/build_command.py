@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +28,6 @@ from unitcad.cli.shared_options import (
 )
 
 if TYPE_CHECKING:
-    from unitcad.export.step_process import StepProcess
     from unitcad.pipeline.beside import Beside
     from unitcad.pipeline.build import Built
     from unitcad.pipeline.manifest_records import Manifest
@@ -108,7 +107,7 @@ def _built(
     from unitcad.pipeline.subjects import subject_of, unit_of
     from unitcad.validation import load
 
-    with _step_process(only, formats) as step, _beside(only, 1 if step is None else 2) as beside:
+    with _beside(only, formats) as beside:
         changes, chosen = overrides(with_fit(sets, fit), formats), outputs(only)
         allow_code(code)
         # Every spec is validated before the first one is built.
@@ -125,7 +124,7 @@ def _built(
         for i, spec in enumerate(wanted):
             run = partial(build_array, spec) if isinstance(spec, Array) else partial(build_spec, spec)
             with progress(spec.name) as say:
-                made = partial(run, out, only=chosen, check=not no_check, say=say, step=step, beside=beside)
+                made = partial(run, out, only=chosen, check=not no_check, say=say, beside=beside)
                 if slicing:
                     with begin(unit_of(spec), out / subject_of(spec).folder_name, say) as pieces:
                         results.append(made(take=take(pieces)))
@@ -150,25 +149,13 @@ def _built(
     return all(result.ok for result in results)
 
 
-def _step_process(only: str | None, formats: str | None) -> AbstractContextManager[StepProcess | None]:
-    """Return a process for STEP files, begun before anything else where STEP may be asked for; None without use."""
-    from unitcad.export.step_process import StepProcess, worthwhile
+def _beside(only: str | None, formats: str | None) -> Beside:
+    """Return the processes beside a build, begun before anything else where what they make may be asked for."""
+    from unitcad.pipeline.beside import started
 
-    drawn = only is None or {"unit", "moulds"} & set(listed(only))
-    asked = drawn and (formats is None or "step" in listed(formats))
-    return StepProcess() if asked and worthwhile() else nullcontext()
-
-
-def _beside(only: str | None, running: int) -> AbstractContextManager[Beside | None]:
-    """Return a process for estimate and pictures; None where it has nothing beside it or the `running` fill the cores.
-
-    Measured on two cores: 0.77 of the time where no STEP is written, 1.07 where the STEP process runs.
-    """
-    from unitcad.children import cores
-    from unitcad.pipeline.beside import Beside
-
-    asked = only is None or ({"estimate", "casting"} & set(listed(only)) and len(listed(only)) > 1)
-    return Beside() if asked and cores() > running else nullcontext()
+    asked = {"unit", "moulds", "estimate", "casting"} if only is None else set(listed(only))
+    step = bool(asked & {"unit", "moulds"}) and (formats is None or "step" in listed(formats))
+    return started(step, bool(asked & {"estimate", "casting"}) and len(asked) > 1)
 
 
 def _summary(of: Made, built: Built) -> Iterator[str]:

@@ -17,7 +17,6 @@ from unitcad.pipeline.product import checked_outputs
 from unitcad.pipeline.stages import Say, Stages, Take
 
 if TYPE_CHECKING:
-    from unitcad.export.step_process import StepProcess
     from unitcad.pipeline.beside import Beside
 
 
@@ -29,7 +28,6 @@ def build_array(
     check: bool = True,
     say: Say = lambda message: None,
     take: Take | None = None,
-    step: StepProcess | None = None,
     beside: Beside | None = None,
     store: Store | None = None,
 ) -> Built:
@@ -46,7 +44,7 @@ def build_array(
         array.unit.output.formats,
         check,
         lambda formats, outputs, checked: partial(make_array, with_formats(array, formats), outputs, checked),
-        Stages(say, take, step, beside),
+        Stages(say, take, beside),
         store,
     )
 

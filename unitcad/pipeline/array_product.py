@@ -48,7 +48,7 @@ from unitcad.pipeline.versions import kernel_versions
 from unitcad.spec import Spec
 
 if TYPE_CHECKING:
-    from unitcad.export.step_process import StepProcess
+    from unitcad.pipeline.beside import Beside
 
 """The file that makes a folder the result of an array."""
 
@@ -72,7 +72,7 @@ def make_array(array: Array, only: Sequence[str], check: bool, store: Store, sta
             parts += shape["parts"]
     if "unit" in only:
         with stages("patch"):
-            made, files = _patch(moulds, store, stages.step)
+            made, files = _patch(moulds, store, stages.beside)
         parts, shared = [*parts, *made], shared | files
     drawn: list[str] = []
     if {"unit", "moulds"} & set(only):
@@ -115,7 +115,7 @@ def _unit(array: Array, unit: Spec, only: Sequence[str], check: bool, store: Sto
     return make(unit, wanted, check, store, of_unit)
 
 
-def _patch(moulds: PatchMoulds, store: Store, process: StepProcess | None) -> tuple[list[PartRecord], dict[str, str]]:
+def _patch(moulds: PatchMoulds, store: Store, beside: Beside | None) -> tuple[list[PartRecord], dict[str, str]]:
     """Return records and files of the silicone that the units share, and the files of the whole patch."""
     forms = moulds.spec.output.formats
     blank = moulds.blank
@@ -131,7 +131,7 @@ def _patch(moulds: PatchMoulds, store: Store, process: StepProcess | None) -> tu
     bodies = patch_bodies(moulds.arranged)
     together: dict[str, Callable[[], bytes]] = {
         "glb": lambda: patch_glb(blank, patch_parts(moulds.arranged)),
-        "step": lambda: step_asked(bodies, "patch", process)(),
+        "step": lambda: step_asked(bodies, "patch", beside)(),
     }
     for form, content in together.items():
         if form in forms:

@@ -34,7 +34,7 @@ from unitcad.spec import Spec, to_toml
 from unitcad.spec.asked import Format
 
 if TYPE_CHECKING:
-    from unitcad.export.step_process import StepProcess
+    from unitcad.casting.bench_pictures import BenchPictures
     from unitcad.pipeline.beside import Beside
 
 Output = Literal["unit", "moulds", "estimate", "casting"]
@@ -64,24 +64,35 @@ class Artifact:
     bodies: tuple[str, ...] = ()
 
 
-def shared(moulds: MouldSet, only: Sequence[str], forms: Sequence[str], beside: Beside | None = None) -> list[Artifact]:
-    """Return the files of a blank geometry that outputs `only` and formats `forms` ask for, in the order of STAGES.
-
-    `beside` is asked for the pictures of the procedure at once.
-    """
+def shared(moulds: MouldSet, only: Sequence[str], forms: Sequence[str]) -> list[Artifact]:
+    """Return the files of a blank geometry that outputs `only` and formats `forms` ask for, in the order of STAGES."""
     shaded = _pictures(moulds, only) if "png" in forms else ()
-    table = [*_of_bodies(moulds, only), *_drawings(moulds, only, beside), *shaded]
+    table = [*_of_bodies(moulds, only), *_drawings(moulds, only), *shaded]
     asked = (artifact for artifact in table if artifact.form in ("", *forms))
     return sorted(asked, key=lambda artifact: STAGES.index(artifact.stage))
 
 
-def begun(
-    steps: Sequence[Artifact], moulds: MouldSet, only: Sequence[str], process: StepProcess | None
-) -> list[Artifact]:
-    """Return STEP files that a process is asked for at once; it makes them while other files are made here."""
-    by_path = {f"{group.together}.step": group for group in groups(moulds, only)}
-    made = {one.path: step_asked(by_path[one.path].bodies, by_path[one.path].name, process) for one in steps}
-    return [replace(one, make=made[one.path]) for one in steps]
+def begun(table: Sequence[Artifact], moulds: MouldSet, only: Sequence[str], beside: Beside) -> list[Artifact]:
+    """Return the table, its STEP files and pictures of the procedure asked for at once, STEP first."""
+    there = {one.path for one in table}
+    made = {
+        path: step_asked(group.bodies, group.name, beside)
+        for group in groups(moulds, only)
+        if (path := f"{group.together}.step") in there
+    }
+    if any(one.stage == PROCEDURE for one in table):
+        from unitcad.casting.bench_views import picture_path
+
+        bench = _bench(moulds)
+        drawn = cache(beside.pictures(moulds, bench.names, bench.picture))
+        made |= {picture_path(name): lambda name=name: drawn()[name] for name in bench.names}
+    return [replace(one, make=made.get(one.path, one.make)) for one in table]
+
+
+def _bench(moulds: MouldSet) -> BenchPictures:
+    from unitcad.casting.bench_pictures import BenchPictures
+
+    return moulds.once("bench pictures", lambda: BenchPictures(moulds))
 
 
 def _of_bodies(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
@@ -102,7 +113,7 @@ def _of_bodies(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
         yield Artifact(f"{together}.step", "step", "step", step, key, names)
 
 
-def _drawings(moulds: MouldSet, only: Sequence[str], beside: Beside | None) -> Iterator[Artifact]:
+def _drawings(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:
     if "unit" in only:
         from unitcad.export import svg
 
@@ -112,20 +123,17 @@ def _drawings(moulds: MouldSet, only: Sequence[str], beside: Beside | None) -> I
 
         yield Artifact("section.svg", "", "drawing", drawn, partial(geometry_key, moulds, "section"))
     if "casting" in only:
-        from unitcad.casting.bench_pictures import pictures
-        from unitcad.casting.bench_views import picture_path, views
+        from unitcad.casting.bench_views import picture_path
         from unitcad.casting.written import step_section
 
         for step in moulds.plan.steps:
             key = partial(geometry_key, moulds, f"section of pour {step.index}")
             drawing = partial(step_section, moulds, step)
             yield Artifact(f"step{step.index}-section.svg", "", "drawing", lambda draw=drawing: draw().encode(), key)
-        names = [*views(moulds)]
-        here = partial(pictures, moulds)
-        together = cache(beside.pictures(moulds, names, here) if beside else here)
-        for path in map(picture_path, names):
-            key = partial(geometry_key, moulds, path)
-            yield Artifact(path, "", PROCEDURE, lambda path=path: together()[path], key)
+        bench = _bench(moulds)
+        for name in bench.names:
+            path = picture_path(name)
+            yield Artifact(path, "", PROCEDURE, partial(bench.picture, name), partial(geometry_key, moulds, path))
 
 
 def _pictures(moulds: MouldSet, only: Sequence[str]) -> Iterator[Artifact]:

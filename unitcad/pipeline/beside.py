@@ -1,46 +1,110 @@
-"""A second process for a build: it makes a unit's estimate and the pictures of its procedure beside everything else."""
+"""Processes beside a build: they write its STEP, make its estimate and draw its procedure beside everything else.
+
+The first one loads OCCT from the moment it is started and writes STEP, then draws pictures. Where there is another
+core, a second one makes the estimate and the pictures from the start. What none of them has begun when it is wanted is
+made by the one who asked.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future
-from typing import Any
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any, Self
 
-from unitcad.children import Answering, Lost
+from unitcad.children import Answering, Lost, cores
+from unitcad.errors import UnitcadError
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.shape.body import Body
 from unitcad.spec import Spec, to_json
 from unitcad.spec.custom_code import is_custom
 
-_PICTURES = 7
-"""Of one request: what the process has not begun when it is wanted is made by the one who asked."""
+if TYPE_CHECKING:
+    from contextlib import ExitStack
+
+_CHILD = "unitcad.pipeline.beside_child"
 
 
-class Beside(Answering):
-    """The process, which ends with the block. What it is asked for is made in the order of asking."""
+def started(step: bool, rest: bool) -> Beside:
+    """Return the processes that pay on this machine, where STEP (`step`) and estimate and pictures (`rest`) are wanted.
 
-    def __init__(self) -> None:
-        super().__init__("unitcad.pipeline.beside_child")
+    With one core there are none; none writes STEP where OCCT is not installed, or is loaded here already.
+    """
+    step = step and cores() > 1 and "OCP" not in sys.modules and find_spec("OCP") is not None
+    return Beside(step, rest and cores() > 1 + step)
+
+
+class Beside:
+    """The processes, which end with the block; each makes what it is asked for in the order of asking."""
+
+    def __init__(self, step: bool = False, rest: bool = False) -> None:
+        self._step = Answering(_CHILD, "step") if step else None
+        self._rest = Answering(_CHILD, "estimate") if rest else None
+        self._ending: ExitStack | None = None
+
+    def __enter__(self) -> Self:
+        from contextlib import ExitStack
+
+        with ExitStack() as ending:
+            for process in self._processes:
+                ending.enter_context(process)
+            self._ending = ending.pop_all()
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        if self._ending:
+            self._ending.close()
+
+    @property
+    def _processes(self) -> list[Answering]:
+        return [process for process in (self._step, self._rest) if process]
+
+    def step(self, bodies: Sequence[Body], name: str, here: Callable[[], bytes]) -> Callable[[], bytes]:
+        """Ask for the STEP of an assembly; return what waits for it, made by `here` where the process is lost.
+
+        That raises UnitcadError where OCCT fails.
+        """
+        if self._step is None:
+            return here
+        asked = self._step.answer(("step", (tuple(bodies), name)))
+
+        def made() -> bytes:
+            try:
+                answer = asked.result()
+            except Lost:
+                return here()
+            if isinstance(answer, str):
+                raise UnitcadError(answer)
+            return answer
+
+        return made
+
+    @property
+    def estimates(self) -> bool:
+        """Whether a process makes estimates from the start."""
+        return self._rest is not None
 
     def estimate(self, spec: Spec, here: Callable[[], dict[str, Any]]) -> Callable[[], dict[str, Any]]:
         """Ask for a spec's estimate; return what gives it, by `here` where the process has not begun or is lost."""
-        if is_custom(spec.design):
+        if self._rest is None or is_custom(spec.design):
             return here
-        asked = self.answer(("estimate", to_json(spec)))
+        asked = self._rest.answer(("estimate", to_json(spec)))
         return lambda: _given(asked, here)
 
     def pictures(
-        self, moulds: MouldSet, names: Sequence[str], here: Callable[[Sequence[str]], Mapping[str, bytes]]
+        self, moulds: MouldSet, names: Sequence[str], here: Callable[[str], bytes]
     ) -> Callable[[], dict[str, bytes]]:
-        """Ask for pictures of a procedure by their names; return what gives them, by their paths, as `estimate`."""
-        if type(moulds) is not MouldSet or moulds.altered or is_custom(moulds.spec.design):
-            return lambda: dict(here(names))
-        some = [names[i : i + _PICTURES] for i in range(0, len(names), _PICTURES)]
-        asked = [(each, self.answer(("pictures", (moulds.geometry, each)))) for each in some]
+        """Ask for pictures of a procedure by the names of their views; return what gives them, as `estimate`."""
+        process = self._rest or self._step
+        if process is None or type(moulds) is not MouldSet or moulds.altered or is_custom(moulds.spec.design):
+            return lambda: {name: here(name) for name in names}
+        asked = {name: process.answer(("picture", (moulds.geometry, name))) for name in names}
 
         def made() -> dict[str, bytes]:
             # Backwards: the process makes the first ones meanwhile.
-            found = [_given(future, lambda each=each: here(each)) for each, future in reversed(asked)]
-            return {path: content for part in reversed(found) for path, content in part.items()}
+            found = {name: _given(asked[name], lambda name=name: here(name)) for name in reversed(names)}
+            return {name: found[name] for name in names}
 
         return made
 

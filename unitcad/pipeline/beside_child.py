@@ -1,36 +1,66 @@
-"""The process that makes estimates and pictures for `beside`; it loads what they need first."""
+"""A process of `beside`; its argument is what it loads first: "step" or "estimate"."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from unitcad.casting.bench_pictures import BenchPictures
 from unitcad.children import answer_requests
+from unitcad.errors import UnitcadError
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.shape.body import Body
+from unitcad.spec import from_json
 
 
 def begin() -> Callable[[tuple[str, Any]], object]:
     """Return what answers (what, of what); None for what is refused, which the caller then meets itself."""
-    from unitcad import estimating  # noqa: F401  the slowest to load
-    from unitcad.cache import MemoryStore
-    from unitcad.casting.bench_pictures import pictures
-    from unitcad.errors import UnitcadError
-    from unitcad.moulds.mould_set import MouldSet
-    from unitcad.pipeline.artifacts import estimated
-    from unitcad.spec import from_json
+    if "step" in sys.argv:
+        from unitcad.export import step  # noqa: F401
+    else:
+        from unitcad import estimating  # noqa: F401
 
-    sets: dict[str, MouldSet] = {}
+    benches: dict[str, BenchPictures] = {}
+
+    def pictures(geometry: str) -> BenchPictures:
+        if geometry not in benches:
+            benches.clear()
+            benches[geometry] = BenchPictures(MouldSet(from_json(geometry)))
+        return benches[geometry]
 
     def answer(asked: tuple[str, Any]) -> object:
         what, of = asked
         try:
-            if what == "estimate":
-                return estimated(MouldSet(from_json(of)), MemoryStore())
-            geometry, names = of
-            return pictures(sets.setdefault(geometry, MouldSet(from_json(geometry))), names)
+            match what:
+                case "step":
+                    return _step(*of)
+                case "estimate":
+                    return _estimate(of)
+                case _:
+                    geometry, name = of
+                    return pictures(geometry).picture(name)
         except UnitcadError:
             return None
 
     return answer
+
+
+def _step(bodies: Sequence[Body], name: str) -> bytes | str:
+    """Return the STEP of an assembly, or the sentence of an error."""
+    from unitcad.export import step
+
+    try:
+        return step.content(bodies, name)
+    except UnitcadError as error:
+        return str(error)
+
+
+def _estimate(spec: str) -> dict[str, Any]:
+    from unitcad.cache import MemoryStore
+    from unitcad.pipeline.artifacts import estimated
+
+    return estimated(MouldSet(from_json(spec)), MemoryStore())
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from unitcad.arrays.patch import PatchPart
     from unitcad.export.glb import GlbPart
-    from unitcad.export.step_process import StepProcess
+    from unitcad.pipeline.beside import Beside
 
 
 @dataclass(frozen=True)
@@ -127,21 +127,10 @@ def step_content(bodies: Sequence[Body], name: str) -> bytes:
         return path.read_bytes()
 
 
-def step_asked(bodies: Sequence[Body], name: str, process: StepProcess | None) -> Callable[[], bytes]:
-    """Ask a process for the STEP of an assembly at once; return what gives it, made here where the process is lost."""
-    if process is None:
-        return partial(step_content, bodies, name)
-    from unitcad.children import Lost
-
-    asked = process.ask(bodies, name)
-
-    def made() -> bytes:
-        try:
-            return asked()
-        except Lost:
-            return step_content(bodies, name)
-
-    return made
+def step_asked(bodies: Sequence[Body], name: str, beside: Beside | None) -> Callable[[], bytes]:
+    """Ask for the STEP of an assembly at once; return what gives it, made here where no process makes it."""
+    here = partial(step_content, bodies, name)
+    return beside.step(bodies, name, here) if beside else here
 
 
 def record(moulds: MouldSet, body: Body) -> PartRecord:

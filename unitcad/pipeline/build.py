@@ -23,7 +23,6 @@ from unitcad.spec import Spec, with_formats
 from unitcad.spec.asked import Format
 
 if TYPE_CHECKING:
-    from unitcad.export.step_process import StepProcess
     from unitcad.pipeline.beside import Beside
 
 Maker = Callable[[Store, Stages], Product]
@@ -53,7 +52,6 @@ def build(
     check: bool = True,
     say: Say = lambda message: None,
     take: Take | None = None,
-    step: StepProcess | None = None,
     beside: Beside | None = None,
     store: Store | None = None,
 ) -> Built:
@@ -61,8 +59,8 @@ def build(
 
     `only` is a choice of OUTPUTS; without `check` mould checks and mesh checks are left out. Formats and outputs that
     the folder has from before are made again beside the new ones. What others have made already comes out of `store`;
-    `take` gets what is made anew, while the rest is still being made. `step` writes STEP files beside the
-    rest, `beside` makes estimate and pictures of the procedure.
+    `take` gets what is made anew, while the rest is still being made. `beside` are processes that make STEP,
+    estimate and pictures of the procedure beside the rest.
     Raises Refusal or UnitcadError before anything is written; a failed check is no exception, see `Built.ok`.
     """
     return build_subject(
@@ -72,7 +70,7 @@ def build(
         spec.output.formats,
         check,
         lambda formats, outputs, checked: partial(make, with_formats(spec, formats), outputs, checked),
-        Stages(say, take, step, beside),
+        Stages(say, take, beside),
         store,
     )
 

@@ -79,8 +79,9 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, stag
     with stages("plan"):
         bodies = [body for group in groups(moulds, only) for body in group.bodies]
         label = moulds.plan.label if pours else None
-        table = artifacts.shared(moulds, only, forms, stages.beside)
-        steps = artifacts.begun([artifact for artifact in table if artifact.form == "step"], moulds, only, stages.step)
+        table = artifacts.shared(moulds, only, forms)
+        if stages.beside:
+            table = artifacts.begun(table, moulds, only, stages.beside)
     parts: dict[str, PartRecord] = {}
     with stages("meshes"):
         for body in bodies:
@@ -97,13 +98,13 @@ def _made(moulds: MouldSet, only: Sequence[str], check: bool, store: Store, stag
             for name in artifact.bodies:
                 parts[name]["files"][artifact.form] = BodyFile(path=artifact.path, sha256=files[artifact.path])
 
-    later = [artifact for artifact in table if artifact.stage == PROCEDURE]
-    put([artifact for artifact in table if artifact.form != "step" and artifact not in later])
+    later = [artifact for artifact in table if artifact.stage in (PROCEDURE, "step")]
+    put([artifact for artifact in table if artifact not in later])
     with stages("mould checks"):
         findings, strains = _mould_findings(moulds, only, store) if check else ([], [])
     with stages("check"):
         mesh_findings = _mesh_findings(moulds, parts, store) if check else []
-    put([*later, *steps])
+    put(later)
     return {
         "label": label,
         "air_ring_mm": round(moulds.dimensions.air_ring, 9),

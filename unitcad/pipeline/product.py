@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from unitcad import __version__, files
 from unitcad.cache import Store, digest
@@ -52,8 +53,7 @@ class Product:
 def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Stages) -> Product:
     """Return everything asked for of a spec, nothing written yet. Raises Refusal where the moulds can't be made."""
     moulds, possible = MouldSet(spec), possible_outputs(spec, only)
-    beside = stages.beside if "estimate" in possible else None
-    estimate = beside.estimate(spec, partial(artifacts.estimated, moulds, store)) if beside else None
+    estimate = _estimate_begun(moulds, possible, store, stages) if "estimate" in possible else None
     shape = geometry(moulds, possible, check, store, stages)
     drawn, no_pictures = _pictures(moulds, possible, store, stages)
     shared = {**shape["files"], **drawn}
@@ -94,6 +94,20 @@ def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Sta
         files=dict(sorted(listed.items())),
     )
     return Product(manifest, {**own, "manifest.json": json_bytes(manifest)}, shared)
+
+
+def _estimate_begun(
+    moulds: MouldSet, only: Sequence[str], store: Store, stages: Stages
+) -> Callable[[], dict[str, Any]] | None:
+    """Ask for the estimate; where no process makes it, make it now: STEP is under way meanwhile, and is waited for."""
+    if {"moulds", "casting"} & set(only):
+        moulds.plan  # noqa: B018  # refuses before the long work begins
+    here = partial(artifacts.estimated, moulds, store)
+    if stages.beside and stages.beside.estimates:
+        return stages.beside.estimate(moulds.spec, here)
+    with stages("estimate"):
+        here()
+    return None
 
 
 def checked_outputs(only: Sequence[str]) -> tuple[str, ...]:

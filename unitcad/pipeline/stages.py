@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from unitcad.export.step_process import StepProcess
     from unitcad.pipeline.beside import Beside
 
 Say = Callable[[str], None]
@@ -21,13 +20,11 @@ Take = Callable[[str, bytes], None]
 class Stages:
     """`with stages("meshes"): ...` calls `say`, once a stage, and adds to `seconds`; `take` gets files as they come.
 
-    step: the process that writes STEP files; beside: the one that makes the estimate and the pictures of the
-    procedure. Without them both are made in this process.
+    beside: processes that write STEP, make the estimate and draw the procedure; without them all is made in this one.
     """
 
     say: Say = lambda stage: None
     take: Take | None = None
-    step: StepProcess | None = None
     beside: Beside | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
