@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from unitcad import estimating
 from unitcad.errors import UnitcadError
-from unitcad.pipeline import Variant
+from unitcad.pipeline import Variant, artifacts
 from unitcad.pipeline.build import build
 from unitcad.pipeline.folder import folder_name, replacing
 from unitcad.validation import load, templates
@@ -243,3 +244,21 @@ def test_ctrl_c_while_a_module_is_loaded_leaves_with_130(met: str, tmp_path: Pat
     command = [sys.executable, "-m", "command"]  # python -m alone passes on what Python noted of the interrupt
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
+def test_variants_that_differ_in_casting_alone_share_one_estimate(monkeypatch, tmp_path):
+    """The file is the one that another process, which remembers nothing, makes; another silicone has its own."""
+    made = []
+    whole = estimating.estimate_spec
+    monkeypatch.setattr(estimating, "estimate_spec", lambda *asked, **more: made.append(asked) or whole(*asked, **more))
+    artifacts._ESTIMATES.clear()
+    changes = [(), ("casting.room_c=24",), ("casting.waste=0.7",), ("layers.0.material=ecoflex-00-30",)]
+    files = []
+    for i, change in enumerate(changes):
+        built = build(load("single-embedded", change), tmp_path / str(i), only=("estimate",))
+        files.append((built.folder / "estimate.json").read_bytes())
+    assert len(made) == 2
+    assert files[0] == files[1] == files[2] != files[3]
+    artifacts._ESTIMATES.clear()
+    again = build(load("single-embedded", changes[1]), tmp_path / "again", only=("estimate",))
+    assert (again.folder / "estimate.json").read_bytes() == files[1]

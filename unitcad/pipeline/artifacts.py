@@ -7,9 +7,9 @@ that variants share it. `own` are the files that read the silicones, the name or
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from unitcad.cache import Store, digest
@@ -169,7 +169,7 @@ def own(
     """
     yield Artifact("spec.toml", "", "spec", lambda: to_toml(moulds.spec).encode())
     if "estimate" in only:
-        yield Artifact("estimate.json", "", "estimate", lambda: json_bytes(estimated(moulds, store)))
+        yield Artifact("estimate.json", "", "estimate", lambda: _estimate(moulds, store).content)
     if "casting" in only:
         for path in CASTING:
             yield Artifact(
@@ -179,7 +179,43 @@ def own(
 
 def estimated(moulds: MouldSet, store: Store) -> dict[str, Any]:
     """Return the estimate of a variant. The layered solver's part reads no silicone: the store shares it."""
-    return moulds.once("estimate", lambda: _estimated(moulds.spec, store))
+    return _estimate(moulds, store).data
+
+
+def given(moulds: MouldSet, estimate: Callable[[], dict[str, Any]]) -> None:
+    """Take the estimate of a variant from `estimate`."""
+    moulds.once("estimate", lambda: MadeEstimate(estimate()))
+
+
+@dataclass(frozen=True, eq=False)
+class MadeEstimate:
+    """An estimate, and its file."""
+
+    data: dict[str, Any]
+
+    @cached_property
+    def content(self) -> bytes:
+        return json_bytes(self.data)
+
+
+_ESTIMATES: dict[Hashable, MadeEstimate] = {}
+"""Estimates that this process made last, by what they read: variants that differ in casting alone share one."""
+_KEPT = 64
+
+
+def _estimate(moulds: MouldSet, store: Store) -> MadeEstimate:
+    return moulds.once("estimate", lambda: _made_last(moulds.spec, store))
+
+
+def _made_last(spec: Spec, store: Store) -> MadeEstimate:
+    from unitcad.estimating import estimate_input
+
+    reads = estimate_input(spec), spec.estimate
+    if reads not in _ESTIMATES:
+        while len(_ESTIMATES) >= _KEPT:
+            del _ESTIMATES[next(iter(_ESTIMATES))]
+        _ESTIMATES[reads] = MadeEstimate(_estimated(spec, store))
+    return _ESTIMATES[reads]
 
 
 def _estimated(spec: Spec, store: Store) -> dict[str, Any]:

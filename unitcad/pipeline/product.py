@@ -60,7 +60,7 @@ def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Sta
     volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
     if estimate:
         with stages("estimate"):
-            moulds.once("estimate", estimate)
+            artifacts.given(moulds, estimate)
     own: dict[str, bytes] = {}
     for artifact in artifacts.own(moulds, possible, volumes, printed_mm3(shape["parts"]), store):
         with stages(artifact.stage):
