@@ -6,13 +6,16 @@ Topology rules against trimesh's is_volume on the same arrays; all rules (topolo
 pymeshlab's compute_selection_by_self_intersections_per_face, which is GPL and runs in an environment of its own
 (`--peer`); a whole file by `check_file` beside the admesh command, which knows no crossing; and the peak memory of a
 process that judges the file. With `--peer`, an environment that also has meshlib (non-commercial), the crossing test
-alone on six shapes.
+alone on six shapes, and the whole process `unitcad check FILE` beside one in which MeshLib reads the file and looks for
+holes, degenerate faces, edges of more than two faces and crossings.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
 import shutil
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -108,6 +111,45 @@ def crossing_test(shape: str, size: int, peer: str, rounds: int) -> str:
     return f"crossing test, {shape}, {len(faces)} faces: {middle['ours']:.3f} s, {ratios} (1 wanted)"
 
 
+WHOLE = """
+import sys
+from meshlib import mrmeshpy
+mesh = mrmeshpy.loadMesh(sys.argv[1])
+part = mrmeshpy.MeshPart(mesh)
+holes, bad = mesh.topology.findNumHoles(), mrmeshpy.findDegenerateFaces(part, 1e6).count()
+bad += mrmeshpy.findMultipleEdges(mesh.topology).size() + mrmeshpy.findSelfCollidingTriangles(part).size()
+print(holes, bad)
+"""
+
+
+def whole_process(shape: str, size: int, peer: str, rounds: int, folder: Path) -> str:
+    """Wall and processor seconds of the whole command on an STL file, and their ratios to MeshLib's process."""
+    import meshes
+
+    vertices, faces = getattr(meshes, shape)(size)
+    path = folder / f"{shape}-{size}.stl"
+    write_stl(path, vertices, faces)
+    commands = {
+        "ours": [sys.executable, "-m", "unitcad", "check", str(path)],
+        "meshlib": [peer, "-c", WHOLE, str(path)],
+    }
+    times: dict[str, list[tuple[float, float]]] = {name: [] for name in commands}
+    for _ in range(rounds):
+        for name, command in commands.items():
+            before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+            subprocess.run(command, capture_output=True, check=False)
+            wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+            times[name].append((wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime))
+    path.unlink()
+    (ours, worked), (other, spent) = (
+        (statistics.median(wall for wall, _ in of), statistics.median(cpu for _, cpu in of)) for of in times.values()
+    )
+    return (
+        f"whole process, {shape}, {len(faces)} faces: {ours:.3f} s, {ours / other:.2f} of meshlib (1 wanted); "
+        f"processor {worked:.3f} s, {worked / spent:.2f} of it"
+    )
+
+
 def timed(work: Callable[[], object]) -> float:
     """Seconds of wall time."""
     start = time.perf_counter()
@@ -172,6 +214,7 @@ def main() -> None:
             print("\n".join(measure(int(size), given.peer, given.rounds, Path(folder))), flush=True)
             for shape in SHAPES if given.peer else ():
                 print(crossing_test(shape, int(size), given.peer, given.rounds), flush=True)
+                print(whole_process(shape, int(size), given.peer, given.rounds, Path(folder)), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Connected components of a graph. Small graphs need no scipy, which takes longer to load than they take."""
+"""Connected components of a graph. Only large ones need scipy, which takes longer to load than others take."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from unitcad.geometry.arrays import Ints
 
-_SMALL = 60_000
+_SMALL = 1_500_000
 
 
 def scipy_pays(n: int) -> bool:
-    """Return whether scipy pays for `n` rows: to load it takes longer than a small mesh takes without it."""
-    return n > _SMALL or "scipy.sparse" in sys.modules
+    """Return whether scipy pays for `n` rows: to load it takes 0.2 s, what it saves 0.1 s a million rows."""
+    return n > _SMALL or "scipy.sparse.csgraph" in sys.modules
 
 
 def components(n: int, left: Ints, right: Ints) -> Ints:

@@ -12,11 +12,14 @@ import numpy as np
 from unitcad.check.geometry.edges import half_edges
 from unitcad.check.geometry.triangle_mesh import float32_steps, same_place
 from unitcad.geometry.arrays import Bools, Floats, Ints, extents
+from unitcad.geometry.boxes import box_pairs
 from unitcad.geometry.components import components
 
 WELD = 1e-5  # of the shell's diagonal
 NARROW = 0.1  # of the shortest edge at a vertex
-_CROWD = 30  # pairs within reach a vertex: more means points that lie everywhere, not a seam
+_CROWD = 30  # points within reach of a vertex, itself too: more means points that lie everywhere, not a seam
+_BLOCK = 1024  # pairs of boxes looked at: of so many for each of a crowd the rest is not looked at
+_BLOCKS = 64  # blocks that a few points may take
 
 
 @dataclass(frozen=True)
@@ -98,22 +101,45 @@ def _near(points: Floats, reach: Floats) -> tuple[Ints, Floats]:
 
     Points of like reach are searched together, so that a coarse shell does not make a fine one a crowd.
     """
-    from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
-
     near = [np.empty((0, 2), np.int64)]
     level = np.ceil(np.log2(np.maximum(reach, 1e-300)) / 2)
     for size in np.unique(level):
         some = np.flatnonzero(level >= size)
-        within = float(4.0**size)
-        tree = cKDTree(points[some])
-        if len(some) < 2 or tree.count_neighbors(tree, within) > _CROWD * len(some):
-            continue
-        pairs = some[tree.query_pairs(within, output_type="ndarray")]
-        near.append(pairs[level[pairs].min(axis=1, initial=np.inf) == size])
+        if len(some) > 1:
+            pairs = some[_within(points[some], float(4.0**size))]
+            near.append(pairs[level[pairs].min(axis=1, initial=np.inf) == size])
     pairs = np.concatenate(near)
     distance = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
     fits = distance <= reach[pairs].min(axis=1, initial=np.inf)
     return pairs[fits], distance[fits]
+
+
+class _Crowd(Exception):
+    """Points that lie close on the scale of all of them."""
+
+
+def _within(points: Floats, reach: float) -> Ints:
+    """Return pairs (k, 2) of points no farther from each other than `reach`; none of a crowd."""
+    n = len(points)
+    blocks = iter(range(_BLOCKS + _CROWD * n // _BLOCK))
+
+    def tick() -> None:
+        if next(blocks, None) is None:
+            raise _Crowd
+
+    try:
+        half = 0.5000001 * reach
+        pairs = box_pairs(points - half, points + half, tick)
+    except _Crowd:
+        # The boxes' steps are too coarse for them.
+        from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
+
+        tree = cKDTree(points)
+        if tree.count_neighbors(tree, reach) > _CROWD * n:
+            return np.empty((0, 2), np.int64)
+        return tree.query_pairs(reach, output_type="ndarray")
+    pairs = pairs[np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) <= reach]
+    return pairs if n + 2 * len(pairs) <= _CROWD * n else pairs[:0]
 
 
 def _joined(place: Ints, stored: Ints, points: Ints, pairs: Ints) -> Ints:
