@@ -1,4 +1,4 @@
-"""Pairs of points within reach, as every pair of points tells them: ordinary sets, crowds, and sets beside far points."""
+"""Pairs of points within reach, as all pairs of points tell them: ordinary sets, crowds, sets beside far points."""
 
 from __future__ import annotations
 
