@@ -190,11 +190,19 @@ def diagonals(low: Floats, high: Floats) -> Floats:
 
 
 def _same_vertices(faces: Ints) -> tuple[Ints, Bools]:
-    """Return an order of the faces, and where in it a face has the vertices of the one before."""
+    """Return an order of the faces that may have others' vertices, and where in it one has those of the one before."""
     ordered = np.sort(faces, axis=1)
-    order = np.lexsort(ordered.T)
-    same = (ordered[order[1:]] == ordered[order[:-1]]).all(axis=1)
-    return order, np.append(False, same)[: len(faces)]
+    low, middle, high = ordered.T.astype(np.uint64)
+    # Equal for equal faces; products that leave 64 bits make others equal now and then.
+    key = (low * np.uint64(0x9E3779B97F4A7C15) + middle) * np.uint64(0xC2B2AE3D27D4EB4F) + high
+    known = np.sort(key)
+    several = known[1:][known[1:] == known[:-1]]
+    if not len(several):
+        return np.empty(0, np.int64), np.empty(0, bool)
+    some = np.flatnonzero(several[np.searchsorted(several, key).clip(max=len(several) - 1)] == key)
+    some = some[np.lexsort(ordered[some].T)]
+    same = (ordered[some[1:]] == ordered[some[:-1]]).all(axis=1)
+    return some, np.append(False, same)[: len(some)]
 
 
 def _duplicates(faces: Ints) -> Ints:
