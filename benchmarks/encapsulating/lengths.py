@@ -100,7 +100,8 @@ def _ribs(spec: Any, lay: Any) -> list[list[list[list[float]]]]:
         (nx, ny), sections = rib.inwards, []
         for z, tip in ((rib.foot, -wall - ROOT / 2), (rib.bottom, into), (rib.top, into), (rib.head, -wall - ROOT / 2)):
             face = z * math.tan(draft)
-            corners = ((tip, -line / 2), (tip, line / 2), (-wall - ROOT, foot), (-wall - ROOT, -foot))
+            half = line / 2 + into - tip  # flanks of 45 degrees
+            corners = ((tip, -half), (tip, half), (-wall - ROOT, foot), (-wall - ROOT, -foot))
             sections.append(
                 [[rib.x + nx * (d + face) - ny * t, rib.y + ny * (d + face) + nx * t, z] for d, t in corners]
             )
