@@ -35,6 +35,7 @@ def printable(text: str) -> str:
     return _INVISIBLE.sub(lambda match: ascii(match[0])[1:-1], text)
 
 
+@lru_cache(maxsize=4096)
 def markdown(text: str) -> str:
     """Return a text in one line that Markdown shows unchanged: no markup, no HTML."""
     plain = _INVISIBLE.sub(" ", text).replace("&", "&amp;").replace("<", "&lt;")
