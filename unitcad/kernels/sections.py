@@ -1,8 +1,10 @@
-"""The width of plane sections of meshes."""
+"""Lengths of plane sections of meshes: the widest circle in one, the gap between two."""
 
 from __future__ import annotations
 
 from manifold3d import CrossSection, JoinType
+
+from unitcad.geometry.outline_gaps import between_outlines
 
 FINENESS = 1e-3
 """Accuracy of the widest circle's diameter, mm."""
@@ -27,3 +29,10 @@ def widest(section: CrossSection) -> tuple[float, tuple[float, float]]:
     # Any corner of the last offset lies that deep; the mean of its corners would not, were it a ring.
     corner = min(tuple(map(float, point)) for loop in kept.to_polygons() for point in loop)
     return 2 * low, (corner[0], corner[1])
+
+
+def gap(one: CrossSection, other: CrossSection, most: float) -> float:
+    """Return the least distance between two sections, neither empty, mm: 0 where they overlap, `most` at most."""
+    if not (one ^ other).is_empty():
+        return 0.0
+    return between_outlines(one.to_polygons(), other.to_polygons(), most)

@@ -9,12 +9,14 @@ sections: above it the cup may touch its edge.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
-from manifold3d import Manifold
+import numpy as np
+from manifold3d import CrossSection, Manifold
 
 from unitcad.kernels.mesh import arrays
+from unitcad.kernels.sections import gap as gap_between
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.finding import MouldFinding, at_least
 from unitcad.moulds.cavities import united
@@ -50,7 +52,7 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             gap = beside.trim_by_plane((0, 0, -1), skirt).min_gap(base, skirt + 1)
             yield at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm")
         if not moulds.plan.concentric:
-            gap = _sideways(beside, base, window + 1)
+            gap = _sideways((beside, base), _above_seat((beside, base)), window + 1)
             where = f"{step.cup} and what stands on the base"
             yield at_least("C210", where, gap, window * chord - GRID, "mm", KNIFE)
         for tongue in moulds.plan.standing(step, "tongue"):
@@ -63,24 +65,47 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
 
 def _on_pins(moulds: MouldSet, name: str, piece: Manifold, base: Manifold, pins: Pins) -> MouldFinding:
     """Measure the gap between pins and the holes of the piece that they centre."""
-    play = pins.clearance
-    column = cylinder(PIN_RADIUS + play, pins.seat, pins.seat + pins.height)
-    wider = cylinder(pins.hole_radius + 1, pins.seat, pins.seat + pins.height)
-    columns, rooms = (united(moulds.meshes(moved(shape, *at) for at in pins.places)) for shape in (column, wider))
-    gap = _sideways(piece ^ rooms, base ^ columns, play + 1, pins.seat)
+    play, reach, seat = pins.clearance, pins.hole_radius + 1, pins.seat
+    columns, rooms = (
+        united(moulds.meshes(moved(cylinder(radius, 0.0, 1.0), *at) for at in pins.places)).project()
+        for radius in (PIN_RADIUS + play, reach)
+    )
+    corners = np.concatenate([arrays(solid)[0] for solid in (piece, base)])
+    beside = np.min([np.hypot(corners[:, 0] - x, corners[:, 1] - y) for x, y in pins.places], axis=0) <= reach
+    top = seat + pins.height
+    heights = [seat, *corners[beside & (corners[:, 2] > seat) & (corners[:, 2] < top), 2].tolist(), top]
+    gap = _sideways((piece, base), heights, play + 1, (rooms, columns))
     limit = play * math.cos(math.pi / moulds.segments) - GRID
     return at_least("C210", f"{name} holes and pins", gap, limit, "mm")
 
 
-def _sideways(cup: Manifold, base: Manifold, most: float, seat: float = 0.0) -> float:
-    """Return the least distance in any section above the seat, at most `most`, mm."""
-    heights = sorted({seat, *(float(z) for solid in (cup, base) for z in arrays(solid)[0][:, 2] if z > seat)})
+def _above_seat(solids: Iterable[Manifold]) -> Iterator[float]:
+    """Yield the seat's height, and those of all corners above it."""
+    yield 0.0
+    for solid in solids:
+        heights = arrays(solid)[0][:, 2]
+        yield from heights[heights > 0].tolist()
+
+
+def _sideways(
+    solids: tuple[Manifold, Manifold],
+    heights: Iterable[float],
+    most: float,
+    within: tuple[CrossSection, CrossSection] | None = None,
+) -> float:
+    """Return the least distance of two solids in any section between two heights, at most `most`, mm.
+
+    `within` are regions outside which nothing of either is looked at.
+    """
     least = most
-    for below, above in pairwise(heights):
-        sections = [solid.slice((below + above) / 2) for solid in (cup, base)]
-        if above - below > THIN and not any(section.is_empty() for section in sections):
-            one, other = (Manifold.extrude(section, 1.0) for section in sections)
-            least = min(least, float(one.min_gap(other, least)))  # looked for no farther than the least so far
+    for below, above in pairwise(sorted(set(heights))):
+        if above - below <= THIN:
+            continue
+        sections = [solid.slice((below + above) / 2) for solid in solids]
+        if within:
+            sections = [section ^ region for section, region in zip(sections, within, strict=True)]
+        if not any(section.is_empty() for section in sections):
+            least = gap_between(sections[0], sections[1], least)  # looked for no farther than the least so far
             if least == 0:
                 break
     return least
