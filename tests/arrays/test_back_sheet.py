@@ -132,6 +132,7 @@ FAULTS: list[tuple[str, str, str, Change]] = [
     ("C200", "base", "a pin higher than its hole", more(moved(cylinder(1.5, 0, 2.6), 23.2, -35.45))),
     ("C300", "base", "a knob on a core", more(moved(cylinder(4.7, 1.0, 1.4), 20, 20))),
     ("C300", "cup2", "a lip in a bore", more(box(-7.2, -6.9, -1, 1, 2.5, 2.8))),
+    ("C310", "base", "a core into the cap, which has no hole for it", more(cylinder(3, 0, 2.31))),
     ("C410", "cup2", "a lid with a pinhole", more(cut(box(-38, 38, -30, 30, 4.4, 4.61), [box(0, 0.3, 0, 0.3, 4, 5)]))),
 ]
 

@@ -19,14 +19,14 @@ BED = ("moulds.bed_x_mm=400", "moulds.bed_y_mm=400")
 def whole_plate_findings(moulds: MouldSet, monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
     """Return what the checks find where no place stands for another and every cavity is that of the whole plate."""
     whole = MouldSet(moulds.spec, moulds.altered)
-    whole.__dict__["cells"] = tuple(range(len(moulds.plan.layout.cells)))
+    whole.__dict__["cells"] = (tuple(range(len(moulds.plan.layout.cells))),) * len(moulds.plan.steps)
     whole.__dict__["cavities"] = tuple(
         Cavity(cavity.step, cavity.where, cavity.drawn, reached_from(cavity, parts), i)
         for i, (cavity, parts) in enumerate(with_parts(whole))
     )
     with monkeypatch.context() as patch:
         patch.setattr(groove_walls, "_tiles", lambda *_: [])
-        patch.setattr(overlap, "_surroundings", lambda _: {})
+        patch.setattr(overlap, "_alike", lambda *_: {})
         return [shown(finding) for finding in check_moulds(whole)]
 
 

@@ -23,13 +23,13 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
 
     The cells of a layer are compared with each other, then count as one solid.
     """
-    return moulds.once("C200", lambda: [*of_unit(moulds, volumes := _Volumes({})), *_of_pours(moulds, volumes)])
+    return moulds.once("C200", lambda: [*of_unit(moulds, volumes := _Volumes()), *_of_pours(moulds, volumes)])
 
 
 def of_unit(moulds: MouldSet, volumes: _Volumes | None = None) -> list[MouldFinding]:
     """Look at the unit alone; `volumes` keeps what its pairs share."""
     there = [(body.name, [moulds.mesh(body)]) for body in (*moulds.unit, *moulds.laid_later)]
-    return _findings("unit", there, volumes or _Volumes({}))
+    return _findings("unit", there, volumes or _Volumes())
 
 
 _There = Sequence[tuple[str, Sequence[Manifold]]]
@@ -41,8 +41,9 @@ def _of_pours(moulds: MouldSet, of_unit: _Volumes) -> Iterator[MouldFinding]:
     drawn = {body.name: (body.shape,) for body in moulds.unit}
     single = {step.name for step in moulds.plan.steps if step.layer == drawn.get(step.name)}
     known = {pair: volume for pair, volume in of_unit.of_names.items() if single.issuperset(pair)}
-    volumes = _Volumes(_surroundings(moulds), known)
+    volumes = _Volumes(known)
     for step in moulds.plan.steps:
+        volumes.alike = _alike(moulds, step)
         cells = moulds.meshes(step.layer)
         alone = [(f"{step.name}.{i + 1}", [cell]) for i, cell in enumerate(cells)]
         yield from _findings(f"pour {step.index}", alone, volumes)
@@ -61,22 +62,26 @@ def _earlier(moulds: MouldSet, step: Step) -> Iterator[tuple[str, list[Manifold]
         yield before.name if there == before.layer else f"{before.name} laid in", moulds.meshes(there)
 
 
-def _surroundings(moulds: MouldSet) -> dict[int, Hashable]:
-    """Return for a gang's small solids, by identity, a value that is the same for those in like surroundings."""
-    plan = moulds.plan
-    if len(plan.layout.cells) == 1:
+def _alike(moulds: MouldSet, step: Step) -> dict[int, Hashable]:
+    """Return for the small solids of a pour, by identity, a value that is the same for those in like surroundings."""
+    around, count = moulds.surroundings[step.index - 1], len(moulds.plan.layout.cells)
+    if count == 1:
         return {}
+    pours, cast = around.steps[0].index, (*step.earlier, *step.layer)
     alike: dict[int, Hashable] = {
-        id(solid): (step.index, cell)
-        for step in plan.steps
-        if len(step.layer) == len(moulds.cells)
-        for solid, cell in zip(moulds.meshes(step.layer), moulds.cells, strict=True)
+        id(solid): (pours, start, cell)
+        for start in range(0, len(cast) - count + 1, count)
+        for solid, cell in zip(moulds.meshes(cast[start : start + count]), moulds.cells[step.index - 1], strict=True)
     }
     whole = _reach(moulds.pressed["base"])
-    for tool in plan.tools:
-        solid = moulds.pressed[tool.name]
+    for name in step.tools:
+        solid = moulds.pressed[name]
         if _reach(solid) < whole / 2:
-            alike[id(solid)] = moulds.congruence.number(column_round([solid], MARGIN))
+            number = moulds.once(
+                f"surroundings of {name} in pour {pours}",
+                lambda solid=solid: around.congruence.number(column_round([solid], MARGIN)),
+            )
+            alike[id(solid)] = pours, number
     return alike
 
 
@@ -104,12 +109,12 @@ def common_volume(one: Manifold, other: Manifold) -> float:
 class _Volumes:
     """The volumes that pairs share: a pair that stands together in several pours, or in like places, is cut once.
 
-    `alike` has, for small solids by identity, a value that is the same for those in like surroundings; `known` and
-    `of_names` hold volumes by names.
+    `alike` has, for small solids of a pour by identity, a value that is the same for those in like surroundings;
+    `known` and `of_names` hold volumes by names.
     """
 
-    def __init__(self, alike: Mapping[int, Hashable], known: Mapping[tuple[str, str], float] | None = None) -> None:
-        self._alike = alike
+    def __init__(self, known: Mapping[tuple[str, str], float] | None = None) -> None:
+        self.alike: Mapping[int, Hashable] = {}
         self.of_names = dict(known or {})
         self._of_places: dict[Hashable, float] = {}
         self._boxes: dict[int, tuple[float, ...]] = {}
@@ -127,14 +132,14 @@ class _Volumes:
         return self.of_names[a, b]
 
     def _cut(self, part: Manifold, a: str, beside: Manifold, b: str) -> float:
-        if id(part) not in self._alike:
+        if id(part) not in self.alike:
             part, a, beside, b = beside, b, part, a
-        if id(part) not in self._alike:
+        if id(part) not in self.alike:
             return common_volume(part, beside)
         # Of the large pieces there is one of each name; a small one is known by its place beside the first.
         own, box = self._box(part), self._box(beside)
-        place = tuple(round(y - x, 6) for x, y in zip(own, box, strict=True)) if id(beside) in self._alike else b
-        key = self._alike[id(part)], place
+        place = tuple(round(y - x, 6) for x, y in zip(own, box, strict=True)) if id(beside) in self.alike else b
+        key = self.alike[id(part)], place
         if key not in self._of_places:
             self._of_places[key] = common_volume(part, beside)
         return self._of_places[key]

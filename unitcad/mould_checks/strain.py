@@ -25,6 +25,7 @@ from unitcad.moulds.congruence import once_each
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.removal import CAST, Way
+from unitcad.shape import Shape
 from unitcad.spec import Spec
 
 FOOT = 1e-3
@@ -54,8 +55,9 @@ def strains(moulds: MouldSet) -> list[Strain]:
         last = step is moulds.plan.steps[-1]
         if not last and not any(removal.piece == CAST for removal in step.removals):
             continue
-        pulled = peel(moulds, step)
-        judged = once_each(moulds.cells, lambda i, pulled=pulled: peel_strain(*pulled[i]))
+        pulled, parted = peel(moulds, step), _cell_by_cell(moulds, step)
+        numbers = moulds.cells[step.index - 1] if parted else range(len(pulled))
+        judged = once_each(numbers, lambda i, pulled=pulled: peel_strain(*pulled[i]))
         for i, (_, (strain, z, room)) in enumerate(judged):
             where = "" if last else f"pour {step.index}: "
             where += "peel off the core" + (f", cell {i + 1}" if len(pulled) > 1 else "")
@@ -99,19 +101,27 @@ def peel(moulds: MouldSet, step: Step) -> list[Peel]:
     """
     lay, base = moulds.plan.layout, moulds.solids[moulds.plan.base_of(step)]
     shapes, cells = (*step.earlier, *step.layer), len(lay.cells)
-    parts = [(removal.within, removal.direction) for removal in step.removals if removal.piece == CAST]
-    ways = [(within, way) for within, way in parts if within]
-    if len(step.layer) == cells and not ways:
+    if _cell_by_cell(moulds, step):
         bodies = [united(moulds.meshes(shapes[i::cells])) for i in range(cells)]
         return [Peel(body, base) for body in bodies]
     whole = united(moulds.meshes(shapes))
-    if ways:
+    if ways := _ways(step):
         return [_turned(whole ^ moulds.mesh_of(within), base, way) for within, way in ways[:cells]]
     half = lay.pitch / 2
     _, _, low, _, _, high = whole.bounding_box()
     column = Manifold.cube((2 * half, 2 * half, high - low)).translate((-half, -half, low))
     bodies = [whole ^ column.translate((c.x, c.y, 0)) for c in lay.cells]
     return [Peel(body, base) for body in bodies]
+
+
+def _cell_by_cell(moulds: MouldSet, step: Step) -> bool:
+    """Tell whether a pour's layer has a solid in every cell, and none leaves in a way of its own."""
+    return len(step.layer) == len(moulds.plan.layout.cells) and not _ways(step)
+
+
+def _ways(step: Step) -> list[tuple[Shape, Way]]:
+    """Return the parts of the silicone that leave in ways of their own: the space of each, and its way."""
+    return [(each.within, each.direction) for each in step.removals if each.piece == CAST and each.within]
 
 
 def _turned(part: Manifold, base: Manifold, direction: Way) -> Peel:
@@ -158,10 +168,7 @@ def peel_strain(body: Manifold, base: Manifold, outline: CrossSection | None = N
 
 
 def _perimeter(section: CrossSection) -> float:
-    total = 0.0
-    for loop in section.to_polygons():
-        total += float(sum(((loop - loop[[*range(1, len(loop)), 0]]) ** 2).sum(axis=1) ** 0.5))
-    return total
+    return sum(float(np.hypot(*(np.roll(loop, -1, axis=0) - loop).T).sum()) for loop in section.to_polygons())
 
 
 CHECK = MouldCheck(

@@ -34,14 +34,16 @@ class Cavity(NamedTuple):
     first: int
 
 
-def cavities(plan: Plan, solids: Mapping[str, Manifold], segments: int, cells: Sequence[int]) -> tuple[Cavity, ...]:
-    """Return the cavities of all pours in their order, one a cell; `cells` are equal in like surroundings."""
+def cavities(
+    plan: Plan, solids: Mapping[str, Manifold], segments: int, cells: Sequence[Sequence[int]]
+) -> tuple[Cavity, ...]:
+    """Return the cavities of all pours in their order, one a cell; a pour's `cells` are equal in like surroundings."""
     filled: list[Cavity] = []
-    for step in plan.steps:
+    for step, numbers in zip(plan.steps, cells, strict=True):
         if len(step.layer) == 1:
             filled.append(_alone(step, solids, segments, len(filled)))
         else:
-            filled += _gang(plan, step, solids, segments, cells, len(filled))
+            filled += _gang(step, solids, segments, numbers, len(filled))
     return tuple(filled)
 
 
@@ -54,9 +56,7 @@ def _alone(step: Step, solids: Mapping[str, Manifold], segments: int, first: int
     return Cavity(step, f"pour {step.index}", *cavity, first)
 
 
-def _gang(
-    plan: Plan, step: Step, solids: Mapping[str, Manifold], segments: int, cells: Sequence[int], first: int
-) -> list[Cavity]:
+def _gang(step: Step, solids: Mapping[str, Manifold], segments: int, cells: Sequence[int], first: int) -> list[Cavity]:
     """Return the cavities of a pour's cells, worked out once for all cells in like surroundings.
 
     A cell is looked at in a column that is a little larger than what is cast in it; where silicone leaves it, on
@@ -70,7 +70,7 @@ def _gang(
         return [realise(shape, segments) for shape in step.channels[i * share : (i + 1) * share]]
 
     def cavity(i: int) -> tuple[Manifold, Manifold]:
-        column = column_round([layers[i], *channels(i)], MARGIN, endless=True)
+        column = column_round([layers[i], *channels(i)], MARGIN)
         filled = [*reaching(tools, column), *(realise(others[k], segments) for k in beside.inside(column))]
         filled = [solid for whole in filled if not (solid := cropped(whole, column)).is_empty()]
         return _one(layers[i], channels(i), filled, _block_round(filled, step.top))

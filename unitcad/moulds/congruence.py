@@ -31,15 +31,13 @@ _FLAT = 1e-8
 """Least eigenvalue of the sum of n n' over the normals n of a vertex up to which they lie in one plane."""
 
 
-def column_round(solids: Sequence[Manifold], margin: float, *, endless: bool = False) -> Column:
-    """Return the column round solids, `margin` (mm) larger than they are about their box's middle, or `endless`."""
+def column_round(solids: Sequence[Manifold], margin: float) -> Column:
+    """Return the column round solids, `margin` (mm) larger than they are about their box's middle."""
     boxes = np.array([solid.bounding_box() for solid in solids])
     low, high = boxes[:, :2].min(axis=0), boxes[:, 3:5].max(axis=0)
     x, y = (low + high) / 2
     column = Column(float(x), float(y), 0.0)
     corners = np.concatenate([arrays(solid)[0][:, :2] for solid in solids]) - (column.x, column.y)
-    if endless:
-        return Column(column.x, column.y, float(np.hypot(*corners.T).max()) + margin)
     ends = float(boxes[:, 2].min()) - margin, float(boxes[:, 5].max()) + margin
     return Column(column.x, column.y, float(np.hypot(*corners.T).max()) + margin, *ends)
 

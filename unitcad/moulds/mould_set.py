@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
     from unitcad.moulds.cavities import Cavity
-    from unitcad.moulds.congruence import Congruence
+    from unitcad.moulds.surroundings import Surroundings
 
 _T = TypeVar("_T")
 
@@ -203,37 +203,16 @@ class MouldSet:
         return {body.name: self.mesh(body) for body in (*self.unit, *self.plan.tools)}
 
     @cached_property
-    def congruence(self) -> Congruence:
-        """All tools that stand in a pour, what is cast or laid in there, and seals: which places of it are alike."""
-        from unitcad.moulds.congruence import Congruence
+    def surroundings(self) -> tuple[Surroundings, ...]:
+        """What stands round each place, by the pours in their order; the same of pours that leave all where it is."""
+        from unitcad.moulds.surroundings import surroundings
 
-        plan = self.plan
-        last = plan.steps[-1]
-        tools = [tool for tool in plan.tools if any(tool.name in step.tools for step in plan.steps)]
-        shapes = [tool.shape for tool in tools] + [*last.earlier, *last.layer]
-        for step in plan.steps:
-            shapes += [*step.seals, *step.channels, *(body.shape for body in step.inserts)]
-        shapes += rib_spaces(self.spec, plan.layout)
-        return Congruence(shapes, [self.solids[tool.name] for tool in tools])
+        return surroundings(self.plan, self.solids, rib_spaces(self.spec, self.plan.layout), self.segments)
 
     @cached_property
-    def cells(self) -> tuple[int, ...]:
-        """For every cell a number that is the same for cells in like surroundings."""
-        from unitcad.moulds.congruence import MARGIN, column_round
-
-        last, count = self.plan.steps[-1], len(self.plan.layout.cells)
-        if len(last.layer) != count or count == 1:
-            # One layer joins all cells: none is like another.
-            return tuple(range(count))
-        above = [step.channels for step in self.plan.steps]
-        columns = []
-        for i in range(count):
-            shapes = [*(*last.earlier, *last.layer)[i::count]]
-            for channels in above:
-                share = len(channels) // count
-                shapes += channels[i * share : (i + 1) * share]
-            columns.append(column_round(self.meshes(shapes), MARGIN, endless=True))
-        return tuple(self.congruence.number(column) for column in columns)
+    def cells(self) -> tuple[tuple[int, ...], ...]:
+        """For every cell of each pour a number that is the same for cells in like surroundings."""
+        return tuple(each.cells for each in self.surroundings)
 
     @cached_property
     def rib_spaces(self) -> Manifold:
