@@ -133,22 +133,38 @@ def _pockets(surface: _Boundary, opening: np.ndarray, up: np.ndarray) -> list[tu
     opens = np.bincount(plateau, weights=opening, minlength=count) > 0
     peaks = np.nonzero(~rises & ~opens & (facing > 0))[0]
     vertices = [int(np.nonzero(plateau == peak)[0][0]) for peak in peaks]
-    return [(_depth(surface.edges, height, opening, vertex), surface.vertices[vertex]) for vertex in vertices]
+    if not vertices:
+        return []
+    # A pocket without a way out empties nowhere.
+    low = np.maximum(_ways_out(surface.edges, height, opening), height.min())
+    return [(float(height[vertex] - low[vertex]), surface.vertices[vertex]) for vertex in vertices]
 
 
-def _depth(edges: np.ndarray, height: np.ndarray, opening: np.ndarray, vertex: int) -> float:
-    """Return how far below a vertex the highest way to the opening leads, by bisection over the vertices' heights."""
-    levels = np.unique(height[height <= height[vertex]])
-    lowest = np.minimum(height[edges[:, 0]], height[edges[:, 1]])
-    low, high = 0, len(levels) - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        part = components(len(height), *edges[lowest >= levels[middle]].T)
-        if np.any(part[opening & (height >= levels[middle])] == part[vertex]):
-            low = middle
-        else:
-            high = middle - 1
-    return float(height[vertex] - levels[low])
+def _ways_out(edges: np.ndarray, height: np.ndarray, opening: np.ndarray) -> np.ndarray:
+    """Return for every vertex the height of the lowest point of its highest way to the opening; -inf without one.
+
+    From a vertex, going up to its steepest neighbour loses no height and ends on a top; so ways lead from top to top.
+    """
+    order = np.argsort(height, kind="stable")
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    first, second = edges.T
+    highest = rank.copy()
+    np.maximum.at(highest, first, rank[second])
+    np.maximum.at(highest, second, rank[first])
+    top = order[highest]
+    while not np.array_equal(above := top[top], top):
+        top = above
+    saddle, apart = np.minimum(height[first], height[second]), top[first] != top[second]
+    one, other, saddle = top[first[apart]], top[second[apart]], saddle[apart]
+    out = np.full(len(order), -np.inf)
+    np.maximum.at(out, top[opening], height[opening])
+    while True:
+        before = out.copy()
+        np.maximum.at(out, one, np.minimum(out[other], saddle))
+        np.maximum.at(out, other, np.minimum(out[one], saddle))
+        if np.array_equal(out, before):
+            return np.minimum(out[top], height)
 
 
 CHECK = MouldCheck("C400", "air: every high region of a cavity meets the rim or a vent, level and tilted", findings)
