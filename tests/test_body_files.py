@@ -15,6 +15,7 @@ import pytest
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.estimating import estimate_spec
 from unitcad.export import stl
+from unitcad.geometry.arrays import unique_rows
 from unitcad.kernels import mesh
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.mould_checks import check_moulds
@@ -246,3 +247,13 @@ def test_a_shipped_design_loads_no_mesh_rules() -> None:
     code = "import sys\nfrom unitcad.validation import load\nload('embedded')\n"
     code += "print('unitcad.check.one_file' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
+
+
+def test_distinct_rows_are_those_of_numpy() -> None:
+    pick = np.random.default_rng(1)
+    for kind in (np.float32, np.float64):
+        rows = pick.integers(-2, 3, (500, 3)).astype(kind)
+        distinct, place = unique_rows(rows)
+        known, index = np.unique(rows, axis=0, return_inverse=True)
+        assert np.array_equal(distinct, known)
+        assert np.array_equal(place, index.reshape(-1))

@@ -1,12 +1,14 @@
 """The common circuit's rows, spine and tail: where they lie, what they may not run into, what is offered instead."""
 
 import math
+import random
 
 import numpy as np
 import pytest
 
 from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.circuit.outline import _arc_sides
 from unitcad.arrays.circuit.wiring import LEAST_BEND, wiring
 from unitcad.errors import Refusal
 
@@ -128,3 +130,35 @@ def test_every_way_that_is_found_is_clear_by_points() -> None:
                 single = len({place.x for place in array.places}) == 1 or len({p.y for p in array.places}) == 1
                 assert single or not own
     assert found > 20
+
+
+def sides_one_by_one(points: np.ndarray) -> int:
+    """The sides that go on an arc, one more at a time, each time on the circle through first, middle and last point."""
+    for count in range(3, len(points) + 1):
+        some = points[:count]
+        three = some[[0, count // 2, -1]]
+        try:
+            middle = np.linalg.solve(2 * (three[1:] - three[0]), (three[1:] ** 2).sum(axis=1) - (three[0] ** 2).sum())
+        except np.linalg.LinAlgError:
+            return count - 2
+        away = np.hypot(*(some - middle).T)
+        a, b = three[0] - three[1], three[2] - three[1]
+        turn = 360 - 2 * math.degrees(math.acos(float(a @ b) / float(np.hypot(*a) * np.hypot(*b))))
+        if turn > 170 or np.abs(away - away[0]).max() >= 2e-3:
+            return count - 2
+    return len(points) - 1
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_arcs_end_where_their_points_leave_one_circle(seed: int) -> None:
+    """An arc runs on as a line, as the same arc the other way round, or farther than half a turn."""
+    pick = random.Random(seed)
+    radius, step, sides = pick.uniform(0.5, 8), math.radians(pick.uniform(1, 4)), pick.randint(4, 40)
+    angles = step * np.arange(sides + 1)
+    arc = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    along = np.array([-math.sin(angles[-1]), math.cos(angles[-1])]) * 2 * radius * step
+    for after in (arc[-1] + np.arange(1, 60)[:, None] * along, arc[-2::-1] + np.array((3 * radius, 0)), arc[:0]):
+        points = np.concatenate([arc, after])
+        assert sides - 1 <= _arc_sides(points) == sides_one_by_one(points)
+    whole = np.linspace(0, 2 * math.pi, 180)
+    assert _arc_sides(np.stack([np.cos(whole), np.sin(whole)], axis=1)) == int(170 // (360 / 179))

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from unitcad.export.printing import single_precision
+from unitcad.geometry.arrays import unique_rows
 
 CREASE_DEG = 20.0
 """Faces that meet at more than this angle are not shaded as one surface."""
@@ -127,11 +128,10 @@ def shaded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
     first, second = _pairs_round(vertex)
     near = np.einsum("ik,ik->i", normal[face[first]], normal[face[second]]) > math.cos(math.radians(CREASE_DEG))
     first, second = first[near], second[near]
-    sums = np.zeros((len(vertex), 3))
-    np.add.at(sums, first, normal[face[second]] * angle[second, None])
+    weighted = normal[face[second]] * angle[second, None]
+    sums = np.stack([np.bincount(first, column, len(vertex)) for column in weighted.T], axis=1)
     smooth = _unit(sums).round(5) + 0.0
-    keys = np.column_stack([vertex, smooth])
-    unique, index = np.unique(keys, axis=0, return_inverse=True)
+    unique, index = unique_rows(np.column_stack([vertex, smooth]))
     return vertices[unique[:, 0].astype(int)], _unit(unique[:, 1:]), index.reshape(-1, 3)
 
 

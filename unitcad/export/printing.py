@@ -6,6 +6,7 @@ import manifold3d
 import numpy as np
 
 from unitcad.errors import UnitcadError
+from unitcad.geometry.arrays import unique_rows
 
 ROUNDS = 6
 
@@ -55,8 +56,8 @@ def single_precision(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarra
 def _rounded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the mesh in float32: equal vertices merged, collapsed faces left out, in canonical order."""
     # Adding zero turns -0.0 into 0.0, which would otherwise be another vertex in the bytes.
-    merged, index = np.unique(vertices.astype(np.float32) + np.float32(0), axis=0, return_inverse=True)
-    faces = index.reshape(-1)[faces]
+    merged, index = unique_rows(vertices.astype(np.float32) + np.float32(0))
+    faces = index[faces]
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
     least = faces.argmin(axis=1)

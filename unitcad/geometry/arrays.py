@@ -61,3 +61,17 @@ def cross(a: Floats, b: Floats) -> Floats:
         i, j = (axis + 1) % 3, (axis + 2) % 3
         np.subtract(a[:, i] * b[:, j], a[:, j] * b[:, i], out=product[:, axis])
     return product
+
+
+def unique_rows(rows: Floats) -> tuple[Floats, Ints]:
+    """Return the distinct rows of (n, m) numbers in their order, and the place among them of each row, (n,).
+
+    As numpy.unique along an axis, which compares rows as bytes and takes several times as long.
+    """
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    first = np.ones(len(rows), bool)
+    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    place = np.empty(len(rows), np.int64)
+    place[order] = np.cumsum(first) - 1
+    return ordered[first], place

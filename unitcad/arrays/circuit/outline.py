@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from manifold3d import CrossSection, JoinType, OpType
@@ -24,6 +27,8 @@ _LEAST_SIDES = 4
 """Sides of a polygon that are taken for an arc."""
 _KEPT_OFF = 0.01
 """What inner corners keep off silicone, mm: more than polygons and meshes are off."""
+_TOGETHER = 32
+"""Runs of sides that are compared with arcs at once."""
 _LEAST_AREA = 1e-6
 """Of a corner that is not rounding's, mm2."""
 _MOST_TURN = math.radians(170)
@@ -36,16 +41,42 @@ def outline(array: Array, laid: Wiring | None = None) -> Profile:
     `laid` is the array's wiring, where it is known. Raises Refusal as `wiring`, and for corners that would enclose a
     hole or reach into a unit's silicone beside its notch.
     """
-    laid, table = laid or wiring(array), array.circuit or CircuitTable()
-    closed, blocked = _rounded(array, laid, table.corner_mm)
+    table = array.circuit or CircuitTable()
+    walls = tuple(
+        _Wall(
+            place.name,
+            (place.x, place.y),
+            dimensions(place.unit).cavity_radius - _KEPT_OFF,
+            place.radius + _KEPT_OFF,
+            place.unit.moulds.slot_width_clearance_mm / 2 - _KEPT_OFF,
+        )
+        for place in array.places
+    )
+    return _outline(laid or wiring(array), walls, table.corner_mm)
+
+
+class _Wall(NamedTuple):
+    """The silicone of a unit that corners keep off: its name and middle, two radii, a notch's play at a side, mm."""
+
+    name: str
+    at: tuple[float, float]
+    inner: float
+    outer: float
+    clearance: float
+
+
+@lru_cache(maxsize=8)
+def _outline(laid: Wiring, walls: tuple[_Wall, ...], corner: float) -> Profile:
+    """Return the outline, kept: most changes of a sheet leave the circuit as it is. Raises Refusal."""
+    closed, blocked = _rounded(laid, walls, corner)
     if blocked:
-        tenths = range(math.ceil(10 * table.corner_mm) - 1, 1, -1)
-        fits = next((tenth / 10 for tenth in tenths if not _rounded(array, laid, tenth / 10)[1]), None)
-        raise Refusal("circuit.corner_mm", table.corner_mm, blocked, fits)
+        tenths = range(math.ceil(10 * corner) - 1, 1, -1)
+        fits = next((tenth / 10 for tenth in tenths if not _rounded(laid, walls, tenth / 10)[1]), None)
+        raise Refusal("circuit.corner_mm", corner, blocked, fits)
     return Profile(tuple(_with_arcs(_distinct(np.asarray(closed.to_polygons()[0], float)))))
 
 
-def _rounded(array: Array, laid: Wiring, corner: float) -> tuple[CrossSection, str]:
+def _rounded(laid: Wiring, walls: Sequence[_Wall], corner: float) -> tuple[CrossSection, str]:
     """Return the circuit as a polygon with inner corners of a radius, and what speaks against it, or ""."""
     discs = [CrossSection.circle(pad.radius, _segments(pad.radius)).translate((pad.x, pad.y)) for pad in laid.pads]
     joints = [CrossSection.circle(one.half, _segments(one.half)).translate(one.end) for one in laid.spine[:-1]]
@@ -56,14 +87,12 @@ def _rounded(array: Array, laid: Wiring, corner: float) -> tuple[CrossSection, s
     if closed.num_contour() != 1:
         return closed, "the circuit's inner corners would enclose a hole between its rows or pads"
     added = closed - whole
-    for place in array.places:
-        clearance = place.unit.moulds.slot_width_clearance_mm / 2 - _KEPT_OFF
-        inner, outer = dimensions(place.unit).cavity_radius - _KEPT_OFF, place.radius + _KEPT_OFF
-        notch = [_rectangle(strip, clearance) for strip in laid.strips]
-        wall = CrossSection.circle(outer, 128) - CrossSection.circle(inner, 128)
-        beside = (added ^ wall.translate((place.x, place.y))) - CrossSection.batch_boolean(notch, OpType.Add)
+    for wall in walls:
+        notch = [_rectangle(strip, wall.clearance) for strip in laid.strips]
+        silicone = CrossSection.circle(wall.outer, 128) - CrossSection.circle(wall.inner, 128)
+        beside = (added ^ silicone.translate(wall.at)) - CrossSection.batch_boolean(notch, OpType.Add)
         if beside.area() > _LEAST_AREA:
-            return closed, f"the circuit's inner corners would reach into the silicone of {place.name} beside its notch"
+            return closed, f"the circuit's inner corners would reach into the silicone of {wall.name} beside its notch"
     return closed, ""
 
 
@@ -76,7 +105,7 @@ def circuit_body(array: Array) -> Body:
 
 def _segments(radius: float) -> int:
     """Return the sides of a circle while it is a polygon: a multiple of four."""
-    return 4 * max(8, min(90, math.ceil(2 * math.pi * radius / _CHORD / 4)))
+    return 4 * math.ceil(max(8, min(90, 2 * math.pi * radius / _CHORD / 4)))
 
 
 def _rectangle(strip: Strip, wider: float = 0.0) -> CrossSection:
@@ -101,12 +130,13 @@ def _with_arcs(corners: np.ndarray) -> list[Vertex]:
     n = len(corners)
     ring = np.concatenate([corners, corners[:1]])
     sides = np.linalg.norm(np.diff(ring, axis=0), axis=1)
+    # Up to where a side is too long for an arc's; none has as many sides as half the finest circle.
+    long = np.append(np.flatnonzero(sides >= 2.5 * _CHORD), n)
     found: list[Vertex] = []
     at = 0
     while at < n:
-        end = at
-        while end < n and sides[end] < 2.5 * _CHORD and _on_arc(ring[at : end + 2]):
-            end += 1
+        end = min(int(long[np.searchsorted(long, at)]), at + _segments(math.inf) // 2)
+        end = at + _arc_sides(ring[at : end + 1])
         if end - at >= _LEAST_SIDES:
             found.append((float(ring[at, 0]), float(ring[at, 1]), math.tan(_turn(ring[at : end + 1]) / 4)))
             at = end
@@ -116,20 +146,32 @@ def _with_arcs(corners: np.ndarray) -> list[Vertex]:
     return found
 
 
-def _on_arc(points: np.ndarray) -> bool:
-    """Return whether points lie on one arc of at most `_MOST_TURN`; three points or fewer always do."""
-    if len(points) < 3:
-        return True
-    turn = _turn(points)
-    x, y = float(points[-1, 0] - points[0, 0]), float(points[-1, 1] - points[0, 1])
-    length = math.hypot(x, y)
-    if abs(turn) > _MOST_TURN or abs(turn) < 1e-6:
-        return False
-    radius = length / 2 / math.sin(abs(turn) / 2)
-    away = math.copysign(math.sqrt(max(radius**2 - length**2 / 4, 0.0)), turn) / length
-    away_x = points[:, 0] - ((points[0, 0] + points[-1, 0]) / 2 - y * away)
-    away_y = points[:, 1] - ((points[0, 1] + points[-1, 1]) / 2 + x * away)
-    return bool(np.abs(np.hypot(away_x, away_y) - radius).max() < _OFF)
+def _arc_sides(points: np.ndarray) -> int:
+    """Return how many sides from the first point on lie on one arc of at most `_MOST_TURN`, together with all before.
+
+    A single side, between two points, always does.
+    """
+    for first in range(3, len(points) + 1, _TOGETHER):
+        counts = np.arange(first, min(first + _TOGETHER, len(points) + 1))
+        wrong = _off_arcs(points[: counts[-1]], counts)
+        if wrong.any():
+            return first + int(np.argmax(wrong)) - 2
+    return len(points) - 1
+
+
+def _off_arcs(points: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Tell for each of some counts whether the first so many points, three or more, do not lie on one arc."""
+    start, ends, middles = points[0], points[counts - 1], points[counts // 2]
+    (ax, ay), (bx, by), (x, y) = (start - middles).T, (ends - middles).T, (ends - start).T
+    seen, length = np.arctan2(ax * by - ay * bx, ax * bx + ay * by), np.hypot(x, y)
+    turn = -np.copysign(2 * (math.pi - np.abs(seen)), seen)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radius = length / 2 / np.sin(np.abs(turn) / 2)
+        away = np.copysign(np.sqrt(np.maximum(radius**2 - length**2 / 4, 0.0)), turn) / length
+        middle_x, middle_y = (start[0] + ends[:, 0]) / 2 - y * away, (start[1] + ends[:, 1]) / 2 + x * away
+        off = np.hypot(points[:, 0] - middle_x[:, None], points[:, 1] - middle_y[:, None]) - radius[:, None]
+        near = (np.abs(off) < _OFF) | (np.arange(len(points)) >= counts[:, None])
+    return ~near.all(axis=1) | (np.abs(turn) > _MOST_TURN) | (np.abs(turn) < 1e-6)
 
 
 def _turn(points: np.ndarray) -> float:
