@@ -13,6 +13,7 @@ from unitcad.mould_checks.finding import MouldFinding, at_most
 from unitcad.moulds.congruence import MARGIN, column_round
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
+from unitcad.shape import Shape, union
 
 OVERLAP = 1e-6
 """Largest volume two pieces may share, mm3: what rounding leaves where faces touch."""
@@ -23,7 +24,22 @@ def findings(moulds: MouldSet) -> list[MouldFinding]:
 
     The cells of a layer are compared with each other, then count as one solid.
     """
-    return moulds.once("C200", lambda: [*of_unit(moulds, volumes := _Volumes()), *_of_pours(moulds, volumes)])
+    return moulds.once("C200", lambda: _of_all(moulds))
+
+
+def _of_all(moulds: MouldSet) -> list[MouldFinding]:
+    volumes = _Volumes()
+    pours = [*_of_pours(moulds, volumes)]
+    return [*of_unit(moulds, _Volumes(_of_layers(moulds, volumes))), *pours]
+
+
+def _of_layers(moulds: MouldSet, volumes: _Volumes) -> dict[tuple[str, str], float]:
+    """Return what layers of the unit share by their names, as known from the last pour, where they lie in it so."""
+    last = moulds.plan.steps[-1]
+    cast = [*_earlier(moulds, last), (last.name, last.layer)]
+    bodies = {name: body.name for name, shapes in cast for body in moulds.unit if body.shape == union(shapes)}
+    known = volumes.of_names.items()
+    return {(bodies[a], bodies[b]): volume for (a, b), volume in known if a in bodies and b in bodies}
 
 
 def of_unit(moulds: MouldSet, volumes: _Volumes | None = None) -> list[MouldFinding]:
@@ -36,30 +52,25 @@ _There = Sequence[tuple[str, Sequence[Manifold]]]
 """What stands in a pour by name: a layer has a part in every cell."""
 
 
-def _of_pours(moulds: MouldSet, of_unit: _Volumes) -> Iterator[MouldFinding]:
-    # A layer that is cast singly is the unit's own body: what it shares with another such layer is known.
-    drawn = {body.name: (body.shape,) for body in moulds.unit}
-    single = {step.name for step in moulds.plan.steps if step.layer == drawn.get(step.name)}
-    known = {pair: volume for pair, volume in of_unit.of_names.items() if single.issuperset(pair)}
-    volumes = _Volumes(known)
+def _of_pours(moulds: MouldSet, volumes: _Volumes) -> Iterator[MouldFinding]:
     for step in moulds.plan.steps:
         volumes.alike = _alike(moulds, step)
         cells = moulds.meshes(step.layer)
         alone = [(f"{step.name}.{i + 1}", [cell]) for i, cell in enumerate(cells)]
         yield from _findings(f"pour {step.index}", alone, volumes)
-        cast = [*_earlier(moulds, step), (step.name, cells)]
+        cast = [*((name, moulds.meshes(shapes)) for name, shapes in _earlier(moulds, step)), (step.name, cells)]
         laid = [(body.name, [moulds.mesh(body)]) for body in step.inserts]
         tools = [(name, [moulds.pressed[name]]) for name in step.tools]
         yield from _findings(f"pour {step.index}", [*tools, *cast, *laid], volumes)
 
 
-def _earlier(moulds: MouldSet, step: Step) -> Iterator[tuple[str, list[Manifold]]]:
+def _earlier(moulds: MouldSet, step: Step) -> Iterator[tuple[str, tuple[Shape, ...]]]:
     """Yield the cured layers of a pour by name, where they lie in it: a layer that was laid in is another solid."""
     start = 0
     for before in moulds.plan.steps[: step.index - 1]:
         there = step.earlier[start : start + len(before.layer)]
         start += len(before.layer)
-        yield before.name if there == before.layer else f"{before.name} laid in", moulds.meshes(there)
+        yield before.name if there == before.layer else f"{before.name} laid in", there
 
 
 def _alike(moulds: MouldSet, step: Step) -> dict[int, Hashable]:

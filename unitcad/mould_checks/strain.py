@@ -149,14 +149,17 @@ def peel_strain(body: Manifold, base: Manifold, outline: CrossSection | None = N
     base = base ^ Manifold.cube((x1 - x0, y1 - y0, high - low)).translate((x0, y0, low))
     heights = sorted({float(z) for solid in (body, base) for z in arrays(solid)[0][:, 2]})
     levels = [z for z in heights if low <= z <= high]
-    worst = (0.0, 0.0, 0.0)
+    worst, passing, top = (0.0, 0.0, 0.0), outline, base.bounding_box()[5]
     for below, above in pairwise(levels):
-        if above - below < 1e-6:
-            continue
         z = (below + above) / 2
+        if above - below < 1e-6 or z >= top:
+            continue
         silicone = body.slice(z)
-        passing = base.trim_by_plane((0, 0, 1), z).project() ^ outline
+        # Above a higher level the base carries no more: where nothing was in the way of this section, nothing is.
         if silicone.is_empty() or (passing ^ silicone).area() <= TOUCHING:
+            continue
+        passing = base.trim_by_plane((0, 0, 1), z).project() ^ outline
+        if (passing ^ silicone).area() <= TOUCHING:
             continue
         holes = [part for part in (silicone.hull() - silicone).decompose() if part.area() > SLIVER]
         hole = CrossSection.compose(holes) if holes else CrossSection()
