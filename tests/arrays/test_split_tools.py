@@ -23,7 +23,7 @@ from unitcad.moulds.cuts import Feature, Sized, in_gaps, seams
 from unitcad.moulds.dovetails import FLANK_DEG, LARGE, ROUND, Seam, split, straight
 from unitcad.moulds.pieces import base_piece
 from unitcad.pipeline.bodies import file_stem
-from unitcad.shape import Shape, box, cut, moved, union
+from unitcad.shape import Common, Shape, box, cut, moved, union
 from unitcad.spec import printer_of
 
 
@@ -102,6 +102,22 @@ def test_a_faulty_seam_is_caught(where: str, what: str, play: float, change: Cha
     faulty = replace(plan, splits=(*plan.splits[:-1], replace(drawn, pieces=pieces)))
     found = [f.where for f in mould_checks()["C250"].findings(patch_moulds(band().arranged, faulty)) if not f.ok]
     assert any(where in each for each in found), (what, found)
+
+
+def test_what_pieces_have_beyond_their_tool_is_a_burr_and_no_overlap_of_theirs() -> None:
+    """A burr of 2 mm3; a piece that lies 1 mm into its neighbour has the same volume too much, and none beyond."""
+    plan = band().plan
+    sound = plan.splits[-1]
+    cup, (first, second, *rest) = plan.tool("cup2"), sound.pieces
+    for change, beyond in (
+        (lambda shape: union((shape, box(60, 62, 18, 19, 20, 21))), 2.0),
+        (lambda shape: union((shape, Common((moved(shape, -1), cup.shape)))), 0.0),
+        (lambda shape: shape, 0.0),
+    ):
+        pieces = first, replace(second, shape=change(second.shape)), *rest
+        faulty = patch_moulds(band().arranged, replace(plan, splits=(replace(sound, pieces=pieces),)))
+        found = [f.value for f in mould_checks()["C250"].findings(faulty) if "beyond it" in f.where]
+        assert found == [pytest.approx(beyond, abs=1e-6)]
 
 
 def test_too_many_seams_weep_too_much() -> None:

@@ -76,7 +76,10 @@ def _of_split(moulds: MouldSet, split: Split, gap: Manifold) -> Iterator[MouldFi
     """Look at overlap, gap and way in of neighbouring pieces, at the widest gap, and for what the tool has not."""
     whole, pieces = moulds.solids[split.tool], [(piece.name, moulds.mesh(piece)) for piece in split.pieces]
     play = moulds.spec.moulds.plinth_clearance_mm
-    beyond = sum(float((piece - whole).volume()) for _, piece in pieces)
+    # With the gap the pieces have the tool's volume, and what they have beyond it, or two of them have in common.
+    beyond = max(sum(float(piece.volume()) for _, piece in pieces) + float(gap.volume() - whole.volume()), 0.0)
+    if beyond > OVERLAP / 2:
+        beyond = sum(float((piece - whole).volume()) for _, piece in pieces)
     yield at_most("C250", f"{split.tool}: pieces beyond it", beyond, OVERLAP, "mm3")
     for (name, piece), (after, other) in _neighbours(pieces, split.columns):
         where = f"{name} and {after}"
