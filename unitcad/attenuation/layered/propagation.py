@@ -1,7 +1,7 @@
 """Propagation of a stack's state through one layer, upwards, at many wavenumbers.
 
-A plane is a pair of (2, 2, n) blocks (U, T): all states u = U c, t = T c that the stack below can carry. In its chart U
-or T is the identity, so the plane's own equation is T u = U t.
+A plane is a pair of (2, 2, n) blocks (U, T): all states u = U c, t = T c that the stack below can carry. By reciprocity
+any two of them have u . t' = t . u', so the plane's own equation is T^T u = U^T t.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from unitcad.attenuation.layered import waves as w
+from unitcad.attenuation.layered.series import THIN, gain
 
 
 class Plane(NamedTuple):
@@ -25,8 +26,8 @@ def underside(material: w.Material, k: w.Array) -> Plane:
     """Return the plane at the top of a half-space (or of nothing, if its modulus is 0)."""
     if material.shear == 0:
         return Plane(_identity(k.size), np.zeros((2, 2, k.size), dtype=np.complex128))
-    waves = w.waves(material, k)
-    return charted(Plane(waves.displacement, waves.traction))
+    waves = w.waves(material, k, *w.rates(material, k))
+    return Plane(waves.displacement, waves.traction)
 
 
 def raised(material: w.Material, h: float, k: w.Array, below: Plane, with_bottom: bool = False) -> Plane:
@@ -34,64 +35,57 @@ def raised(material: w.Material, h: float, k: w.Array, below: Plane, with_bottom
     below = Plane(below.u, below.t, (below.u, below.t) if with_bottom else None)
     if h == 0.0:
         return below
-    method = route(material, h, k)
-    methods = np.unique(method)
-    if methods.size == 1:
-        return _METHODS[int(methods[0])](material, h, k, below)
+    rates = w.rates(material, k)
+    by_series = merging(material, h, k, rates)
+    parts = [(_thick, np.flatnonzero(~by_series)), (_series, np.flatnonzero(by_series))]
+    for method, part in parts:
+        if part.size == k.size:
+            return method(material, h, k, rates, below)
     out = Plane(
         np.empty_like(below.u),
         np.empty_like(below.t),
         (np.empty_like(below.u), np.empty_like(below.t)) if with_bottom else None,
     )
-    for one in methods:
-        part = method == one
+    for method, part in parts:
         bottom = (below.u[..., part], below.t[..., part])
-        top = _METHODS[int(one)](material, h, k[part], Plane(*bottom, bottom if with_bottom else None))
+        plane = Plane(*bottom, bottom if with_bottom else None)
+        top = method(material, h, k[part], (rates[0][part], rates[1][part]), plane)
         out.u[..., part], out.t[..., part] = top.u, top.t
         if out.bottom and top.bottom:
             out.bottom[0][..., part], out.bottom[1][..., part] = top.bottom
     return out
 
 
-def route(material: w.Material, h: float, k: w.Array) -> np.ndarray:
-    """Choose a layer's method for each wavenumber: 0 thin (series), 1 grazing (squared series), 2 thick (reflection).
+def merging(material: w.Material, h: float, k: w.Array, rates: tuple[w.Array, w.Array]) -> np.ndarray:
+    """Return at which wavenumbers the waves down and up are alike, so that reflection would lose digits.
 
-    Grazing: one of the two waves hardly changes over the layer (next to its branch point, or k h small where k_s h is
-    not), so that the waves down and up are alike and reflection would lose digits.
+    The layer is thin for both waves, or one of them hardly changes over it: next to its branch point, or k h small
+    where k_s h is not.
     """
-    thin = np.maximum(np.abs(k), abs(material.ks2) ** 0.5) * h < w.THIN
-    gp, gs = w.rates(material, k)
-    grazing = np.minimum(np.abs(gp), np.abs(gs)) * h < w.THIN
-    return np.where(thin, 0, np.where(grazing, 1, 2))
+    thin = np.maximum(np.abs(k), abs(material.ks2) ** 0.5) * h < THIN
+    return thin | (np.minimum(np.abs(rates[0]), np.abs(rates[1])) * h < THIN)
 
 
-def _thin(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
-    du, dt = w.thin_step(material, k, h, below.u, below.t)
-    return charted(Plane(below.u + du, below.t + dt, below.bottom))
-
-
-def _grazing(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
-    """Propagate by squaring the series, in pieces across which nothing grows by more than e."""
-    growth = max(float(np.max(rate.real)) for rate in w.rates(material, k)) * h
-    pieces = max(1, int(np.ceil(growth)))
-    gained = w.squared_step(material, k, h / pieces)
+def _series(material: w.Material, h: float, k: w.Array, rates: tuple[w.Array, w.Array], below: Plane) -> Plane:
+    """Propagate by the series, in pieces across which nothing grows by more than e."""
+    pieces = max(1, int(np.ceil(max(float(np.max(rate.real)) for rate in rates) * h)))
+    gained = gain(material, k, h / pieces)
     for _ in range(pieces):
-        both = np.concatenate([below.u, below.t])
-        both = both + np.einsum("ijn,jkn->ikn", gained, both)
-        below = charted(Plane(both[:2], both[2:], below.bottom))
+        below = charted(Plane(*gained.added(below.u, below.t), below.bottom))
     return below
 
 
-def _thick(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
+def _thick(material: w.Material, h: float, k: w.Array, rates: tuple[w.Array, w.Array], below: Plane) -> Plane:
     """Propagate by reflection.
 
-    The amplitudes are a down at the top and R E a up at the bottom, with R from the plane's equation T u = U t.
+    The amplitudes are a down at the top and R E a up at the bottom, with R from the plane's own equation.
     """
-    waves = w.waves(material, k)
+    waves = w.waves(material, k, *rates)
     d, tr = waves.displacement, waves.traction
     jd, jt = w.mirrored(d), -w.mirrored(tr)
-    system = w.product(below.t, jd) - w.product(below.u, jt)
-    given = w.product(below.u, tr) - w.product(below.t, d)
+    of_u, of_t = below.t.swapaxes(0, 1), below.u.swapaxes(0, 1)
+    system = w.product(of_u, jd) - w.product(of_t, jt)
+    given = w.product(of_t, tr) - w.product(of_u, d)
     e = w.decay(material, waves, h)
     reflected = w.product(w.adjugate(system), w.product(given, e)) / w.determinant(system)
     back = w.product(e, reflected)
@@ -101,10 +95,7 @@ def _thick(material: w.Material, h: float, k: w.Array, below: Plane) -> Plane:
             w.product(d, e) + w.product(jd, reflected),
             w.product(tr, e) + w.product(jt, reflected),
         )
-    return charted(Plane(d + w.product(jd, back), tr + w.product(jt, back), bottom))
-
-
-_METHODS = (_thin, _grazing, _thick)
+    return Plane(d + w.product(jd, back), tr + w.product(jt, back), bottom)
 
 
 def charted(raw: Plane) -> Plane:

@@ -17,8 +17,6 @@ from typing import Any
 import numpy as np
 
 Array = Any  # a complex numpy array
-THIN = 0.4  # below this max(|k|, |k_s|) h a layer is propagated by series: its stiffness blocks, like 1/h, lose digits
-_TERM = 1e-18
 
 
 @dataclass(frozen=True)
@@ -40,6 +38,10 @@ class Waves:
     traction: Array
 
 
+_ADJUGATE = np.array([[[1.0], [-1.0]], [[-1.0], [1.0]]])
+_MIRROR = np.array([[[1.0]], [[-1.0]]])
+
+
 def product(a: Array, b: Array) -> Array:
     """Return the matrix product of two (2, 2, n) blocks (or of a block and an (2, m, n) one)."""
     return a[:, 0, None] * b[None, 0] + a[:, 1, None] * b[None, 1]
@@ -52,12 +54,12 @@ def determinant(a: Array) -> Array:
 
 def adjugate(a: Array) -> Array:
     """Return the adjugate of a (2, 2, n) block: its inverse times its determinant."""
-    return np.array([[a[1, 1], -a[0, 1]], [-a[1, 0], a[0, 0]]])
+    return np.swapaxes(a[::-1, ::-1], 0, 1) * _ADJUGATE
 
 
 def mirrored(a: Array) -> Array:
     """Return J a with J = diag(1, -1): the block of the waves that go up."""
-    return np.array([a[0], -a[1]])
+    return a * _MIRROR
 
 
 def decaying_root(squared: Array) -> Array:
@@ -65,8 +67,9 @@ def decaying_root(squared: Array) -> Array:
 
     Below that axis it goes on from there, so that a wavenumber may leave the real axis either way.
     """
-    root = np.sqrt(squared.real + 1j * (squared.imag + 0.0))
-    return np.where((squared.real < 0) & (squared.imag < 0), -root, root)
+    left = squared.real < 0
+    root = np.sqrt(np.where(left, -squared, squared))
+    return np.where(left, 1j * root, root)
 
 
 def rates(material: Material, k: Array) -> tuple[Array, Array]:
@@ -76,10 +79,9 @@ def rates(material: Material, k: Array) -> tuple[Array, Array]:
     return decaying_root((k - kp) * (k + kp)), decaying_root((k - ks) * (k + ks))
 
 
-def waves(material: Material, k: Array) -> Waves:
-    """Return the waves P and Q of `material` at complex wavenumbers k, shape (n,), in 1/m."""
+def waves(material: Material, k: Array, gp: Array, gs: Array) -> Waves:
+    """Return the waves P and Q of `material` at complex wavenumbers k, shape (n,), in 1/m, with their `rates`."""
     eps, ks2, mu = material.eps, material.ks2, material.shear
-    gp, gs = rates(material, k)
     below_p, below_s = 1.0 / (gp + k), 1.0 / (gs + k)
     displacement = np.array([[k, -below_s], [gp, eps * below_p]])
     traction = mu * np.array(
@@ -103,40 +105,3 @@ def _expm1_over(x: Array) -> Array:
     """Return (e^x - 1) / x, 1 at x = 0."""
     safe = np.where(x == 0, 1.0, x)
     return np.where(x == 0, 1.0, np.expm1(safe) / safe)
-
-
-def thin_step(material: Material, k: Array, h: float, u: Array, t: Array, up: bool = True) -> tuple[Array, Array]:
-    """Return what (u, t), shape (2, m, n), gain over a thin layer of thickness h: the series of exp(-+A h) - 1.
-
-    `up`: from the layer's bottom to its top, else from top to bottom. Equation y' = A y of elastodynamics in (u, t).
-    """
-    mu, eps, ks2 = material.shear, material.eps, material.ks2
-    step = -h if up else h
-    size = 2.0 * h * max(float(np.max(np.abs(k))), abs(ks2) ** 0.5)
-    stiff = (4.0 * (1.0 - eps) * k * k - ks2) * mu
-    mass = ks2 * mu
-    k_lame = (1.0 - 2.0 * eps) * k
-    gained_u, gained_t = np.zeros_like(u), np.zeros_like(t)
-    bound, term = 1.0, 0
-    while bound > _TERM:
-        term += 1
-        bound *= size / term
-        u, t = (
-            np.array([k * u[1] - t[0] / mu, -k_lame * u[0] - eps / mu * t[1]]) * (step / term),
-            np.array([k_lame * t[1] - stiff * u[0], mass * u[1] - k * t[0]]) * (step / term),
-        )
-        gained_u += u
-        gained_t += t
-    return gained_u, gained_t
-
-
-def squared_step(material: Material, k: Array, h: float) -> Array:
-    """Return exp(-A h) - 1 as (4, 4, n) in (u_r, u_z, t_r, t_z): a thin layer's, doubled until it is h thick."""
-    size = max(float(np.max(np.abs(k))), abs(material.ks2) ** 0.5) * h
-    doublings = max(0, int(np.ceil(np.log2(size / THIN))))
-    one: Array = np.zeros((4, 4, k.size), dtype=np.complex128)
-    one[range(4), range(4)] = 1.0
-    gained = np.concatenate(thin_step(material, k, h / 2**doublings, one[:2], one[2:]))
-    for _ in range(doublings):
-        gained = 2.0 * gained + np.einsum("ijn,jkn->ikn", gained, gained)
-    return gained
