@@ -38,14 +38,15 @@ def bessels(orders: tuple[int, ...], x: Any) -> Any:
     return np.stack([values[order] for order in orders])
 
 
-_ABOVE_ASYMPTOTE = (1.0, 1.035, 1.089)
+_ABOVE_ASYMPTOTE = np.array([1.0, 1.035, 1.089])
 """The most that |J_n| sqrt(pi x / 2) is, for n = 0, 1, 2: at infinity, x = 2.17 and x = 3.31."""
 
 
-def bessel_bound(order: int, x: Any) -> Any:
-    """Return a bound of |J| of order 0, 1 or 2 for real x >= 0, shape of x."""
+def bessel_bounds(orders: tuple[int, ...], x: Any) -> Any:
+    """Return a bound of |J| of each of the orders 0, 1 or 2 for real x >= 0, shape (orders,) + x.shape."""
     with np.errstate(divide="ignore"):
-        return np.minimum(1.0, _ABOVE_ASYMPTOTE[order] * np.sqrt(2.0 / (np.pi * x)))
+        root = np.sqrt(2.0 / (np.pi * np.asarray(x)))
+    return np.minimum(1.0, np.multiply.outer(_ABOVE_ASYMPTOTE[list(orders)], root))
 
 
 def moment(x: Any) -> Any:

@@ -18,7 +18,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from unitcad.attenuation.layered.bessel import bessel, bessel_bound, moment
+from unitcad.attenuation.layered.bessel import bessel, bessel_bounds, moment
 from unitcad.attenuation.layered.rheology import MOST, finite
 from unitcad.attenuation.layered.statics import Direction, disc_integrals, static_rounding
 from unitcad.errors import Refusal, unknown_name
@@ -133,7 +133,7 @@ class UniformDisc:
         x = np.asarray(k) * self.radius
         if self.direction == "radial":
             return self.radius**2 * np.minimum(0.3, (1.0 + np.sqrt(2.0 * x / np.pi)) * 1.1 / x**2)
-        return self.radius**2 * np.minimum(0.5, bessel_bound(1, x) / x)
+        return self.radius**2 * np.minimum(0.5, bessel_bounds((1,), x)[0] / x)
 
     def static(self, r: Any) -> Any:
         """Return the integrals of q(k) J_n(kr) dk in m, a row an order, r in m."""

@@ -13,52 +13,53 @@ from unitcad.attenuation.layered import waves as w
 PHASE = 8.0 * np.pi
 """Of the fastest Bessel product over one panel."""
 MAX_PANELS = 40_000
-_LEAST_PANELS = 6  # up to the last pole
+MOST_PIECES = 16
+"""Of a panel beyond all poles, each with waves of that phase."""
 _MAX_HALVINGS = 40
 
 
 def wavenumbers(panels: w.Array, s: w.Array) -> tuple[w.Array, w.Array]:
     """Return the wavenumbers (1/m) at s, a row a panel, and their slopes over s."""
     base, turn = panels[:, 2, None], panels[:, 3, None]
+    if not np.any(turn):
+        return s, np.ones_like(s)
     return np.where(turn == 0, s, base + turn * s * s), np.where(turn == 0, 1.0, 2.0 * turn * s)
 
 
-def from_origin(end: float, stop: float, span: float, materials: tuple[w.Material, ...]) -> w.Array:
-    """Return the panels from 0 to `stop`, of one length up to `end`; span: phase per unit wavenumber (m).
+def from_origin(
+    end: float, stop: float, span: float, materials: tuple[w.Material, ...], least: int = 6, sparse: bool = False
+) -> w.Array:
+    """Return the panels from 0 to `stop`, which is beyond `end`; span: phase per unit wavenumber (m).
 
-    The one at k = 0 is halved towards 0 until it is shorter than the least wavenumber of a material: a stiff
-    half-space's branch points and pole lie there, too small a feature for a long panel's last coefficients.
+    They are of one length up to `end`, at `least` so many. The one at k = 0 is halved towards 0 until it is shorter
+    than the least wavenumber of a material: a stiff half-space's branch points and pole lie there, too small a feature
+    for a long panel's last coefficients. `sparse`: two of three of these corners are left out, but not the last.
     """
-    longest = PHASE / span if span > 0 else np.inf
-    if end > 0:
-        line = np.linspace(0.0, end, max(_LEAST_PANELS, int(np.ceil(end / longest))) + 1)
-    else:
-        line = np.array([0.0, min(stop, longest) / 8.0])
-    line = _continued(line, end, stop, longest)
-    least = min(abs(m.ks2) ** 0.5 * (m.eps**0.5 or 1.0) for m in materials if m.shear != 0)
-    if 0.0 < least < line[1]:
-        halvings = min(int(np.ceil(np.log2(line[1] / least))) + 1, _MAX_HALVINGS)
-        line = np.concatenate([[0.0], line[1] * 2.0 ** -np.arange(halvings, -1, -1), line[2:]])
-    return _turned(line, _branch_points(materials[-1]), 1.0 / span if span > 0 else np.inf)
+    longest = PHASE / span
+    line = np.linspace(0.0, end, max(least, int(np.ceil(end / longest))) + 1)
+    line = _continued(line if end > 0 else np.array([0.0, min(stop, longest) / 8.0]), stop, longest)
+    shortest = min(abs(m.ks2) ** 0.5 * (m.eps**0.5 or 1.0) for m in materials if m.shear != 0)
+    if 0.0 < shortest < line[1]:
+        halvings = 3 * int(np.ceil((min(np.log2(line[1] / shortest), _MAX_HALVINGS) + 1.0) / 3.0))
+        powers = np.arange(halvings + 1)
+        kept = powers[(powers % 3 == 0) | (powers == 1)] if sparse else powers
+        line = np.concatenate([[0.0], line[1] * 2.0 ** -kept[::-1], line[2:]])
+    return _turned(line, _branch_points(materials[-1]), 1.0 / span)
 
 
 def onwards(start: float, stop: float, span: float) -> w.Array:
     """Return the panels beyond all poles, from `start` to `stop`."""
-    return _plain(_continued(np.array([start]), 0.0, stop, PHASE / span if span > 0 else np.inf))
+    return _plain(_continued(np.array([start]), stop, PHASE / span))
 
 
-def _continued(line: np.ndarray, end: float, stop: float, longest: float) -> np.ndarray:
-    """Continue the corners to `stop`, at first each panel as long as its distance from 0."""
+def _continued(line: np.ndarray, stop: float, longest: float) -> np.ndarray:
+    """Continue the corners to `stop`, each panel as long as its distance from 0, if that is no more than it may be.
+
+    There the kernel varies as slowly as that: what swings faster are the waves alone.
+    """
     corners = list(line)
     while corners[-1] < stop and len(corners) < MAX_PANELS:
-        growth = corners[-1]
-        if growth > longest:
-            count = int(min(np.ceil((stop - corners[-1]) / longest), MAX_PANELS))
-            corners += list(corners[-1] + longest * np.arange(1, count + 1))
-        else:
-            corners.append(corners[-1] + growth)
-    if len(corners) > 1 and corners[-1] > max(stop, end):
-        corners[-1] = max(stop, end)  # the tail's bound counts from there, and so do panels added later
+        corners.append(min(stop, corners[-1] + min(corners[-1], MOST_PIECES * longest)))
     return np.array(corners)
 
 
@@ -71,13 +72,16 @@ def _branch_points(half_space: w.Material) -> list[float]:
 
 
 def _plain(line: np.ndarray) -> w.Array:
-    nothing = np.zeros(len(line) - 1)
-    return np.stack([line[:-1], line[1:], nothing, nothing], axis=1).astype(np.complex128)
+    panels = np.zeros((len(line) - 1, 4), dtype=np.complex128)
+    panels[:, 0], panels[:, 1] = line[:-1], line[1:]
+    return panels
 
 
 def _turned(line: np.ndarray, branch_points: list[float], longest: float) -> w.Array:
     """Return the panels between the corners, those on both sides of each branch point in the square root there."""
     inside = [k for k in branch_points if k < line[-1]]
+    if not inside:
+        return _plain(line)
     others = [k for k in line if all(abs(k - one) > 1e-6 * one for one in inside)]
     line = np.unique([*others, *inside])
     panels = []
@@ -92,9 +96,23 @@ def _turned(line: np.ndarray, branch_points: list[float], longest: float) -> w.A
     return np.concatenate([plain[~at], np.array(panels, dtype=np.complex128).reshape(-1, 4)])
 
 
-def halved(panels: w.Array) -> w.Array:
-    """Cut each panel in two equal ones."""
-    return pieced(panels, np.stack([panels[:, 0], panels[:, :2].mean(axis=1), panels[:, 1]], axis=1))
+def halved_towards(panels: w.Array, at: w.Array, times: np.ndarray) -> tuple[w.Array, np.ndarray]:
+    """Cut each panel in two equal ones, and of these the one next to `at` again, so many times in all.
+
+    at: in the panel's t, from -1 to 1, or beyond. Return the pieces, and which panel each is from.
+    """
+    of = np.arange(len(panels))
+    pieces, origin = [panels[:0]], [of[:0]]
+    while len(panels):
+        right = (at.real > 0).astype(int)
+        both = pieced(panels, np.stack([panels[:, 0], panels[:, :2].mean(axis=1), panels[:, 1]], axis=1))
+        near, other = (both[2 * np.arange(len(panels)) + side] for side in (right, 1 - right))
+        again = times > 1
+        pieces += [other, near[~again]]
+        origin += [of, of[~again]]
+        panels, of, times = near[again], of[again], times[again] - 1
+        at = 2.0 * at[again] - np.where(right[again], 1.0, -1.0)
+    return np.concatenate(pieces), np.concatenate(origin)
 
 
 def pieced(panels: w.Array, corners: w.Array) -> w.Array:

@@ -89,6 +89,7 @@ class Stack:
         self.layers: tuple[Layer, ...] = tuple(entries)
         self.half_space = half_space
         self.least_loss = least_loss
+        self._last: tuple[float, tuple[w.Material, ...]] | None = None
 
     def __repr__(self) -> str:
         count, thickness = len(self.layers), sum(layer.thickness for layer in self.layers)
@@ -126,7 +127,10 @@ class Stack:
         omega = finite("omega", omega)
         if self.half_space.youngs_modulus == 0.0 and omega == 0.0:
             raise Refusal("omega", omega, "nothing holds this body: static loads would carry it away")
-        return tuple(_material(body, omega, self.least_loss) for body in (*self.layers, self.half_space))
+        if self._last is None or self._last[0] != omega:
+            bodies = (*self.layers, self.half_space)
+            self._last = omega, tuple(_material(body, omega, self.least_loss) for body in bodies)
+        return self._last[1]
 
     def planes(self, k: w.Array, omega: float, depth: float = 0.0) -> list[Plane]:
         """Return the stack's planes, top first, down to the cut at `depth` (m), for k of shape (n,).

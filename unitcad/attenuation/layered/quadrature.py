@@ -1,0 +1,212 @@
+"""Gauss and Legendre over the panels of a Hankel integral, with a bound of the error of each.
+
+A panel's kernel is known at 16 nodes. Where the Bessel functions swing faster than they can be seen there, the panel is
+cut into pieces, and the kernel's Legendre series is read off at the nodes of each: the kernel, which costs most, is
+sampled as it varies, not as the waves do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from scipy.special import factorial2
+
+from unitcad.attenuation.layered import waves as w
+from unitcad.attenuation.layered.bessel import bessel_bounds, bessels
+from unitcad.attenuation.layered.detours import HIDDEN, LOST, Poles, poles
+from unitcad.attenuation.layered.loads import Load
+from unitcad.attenuation.layered.path import pieced, wavenumbers
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_COUNT = _NODES.size
+_TO_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_NODES, _COUNT - 1))
+_DEGREES = np.arange(2 * _COUNT, _COUNT, -1)
+_ODD_FACTORIALS = np.array([float(factorial2(2 * m - 1)) for m in _DEGREES])
+ROUNDING = 1e-15
+"""Of a wavenumber, as the kernel feels it next to a pole."""
+_CANCELLED = 4e-15
+"""Of what was taken out of the kernel: what rounding leaves of the last coefficients of the difference."""
+_SINGLE = 1e-7
+"""Uncertainty of a pole below which a panel has no other, or one that is next to nothing beside it."""
+_CHUNK = 200_000  # integrand values held at once
+
+
+class Seen(Protocol):
+    """A load seen at radii r (m), shape (n,)."""
+
+    @property
+    def load(self) -> Load: ...
+
+    @property
+    def r(self) -> np.ndarray: ...
+
+    @property
+    def taken_out(self) -> np.ndarray:
+        """Return the size of what each row of the kernel is less by, shape (rows,)."""
+        ...
+
+
+class Evaluated(NamedTuple):
+    """Of each panel, row and radius: the integral, a bound of its error, its absolute size.
+
+    gains: of each panel, by how much halving it lessens the largest part of its error; poles: the one of each panel;
+    hidden (panels, rows, radii): what a detour around it may leave out; blurred: where that may be rounding's alone.
+    """
+
+    parts: np.ndarray
+    errors: np.ndarray
+    sizes: np.ndarray
+    gains: np.ndarray
+    poles: Poles
+    hidden: np.ndarray
+    blurred: np.ndarray
+
+
+def nodes(panels: w.Array) -> tuple[w.Array, w.Array]:
+    """Return the wavenumbers (1/m) at which a panel's kernel is sampled and their slopes, shape (panels, nodes)."""
+    half = (panels[:, 1] - panels[:, 0]) / 2.0
+    return wavenumbers(panels, panels[:, :2].mean(1)[:, None] + half[:, None] * _NODES)
+
+
+def panel_poles(panels: w.Array, kernel: w.Array) -> Poles:
+    """Return the pole that each panel's kernel (with dk/ds), shape (rows, panels, nodes), would have."""
+    return poles(kernel, _NODES, _TO_LEGENDRE, _closeness(wavenumbers(panels, panels[:, :2])[0]))
+
+
+def _closeness(ends: w.Array) -> np.ndarray:
+    """Return the wavenumber over half of what a panel covers of it."""
+    return np.abs(ends).max(axis=1) / (np.abs(ends[:, 1] - ends[:, 0]) / 2.0)
+
+
+def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Evaluated:
+    """Integrate over each panel, on the axis or off it, its kernel (with dk/ds) of shape (rows, panels, nodes).
+
+    phase: the most that the fastest Bessel product may turn over a piece of a panel.
+
+    The kernel is its Legendre series to degree n - 1 and a rest. The rest is at most twice the last two coefficients
+    that were seen, as soon as they halve within n degrees or so (to count on the rate at which they seem to fall was
+    too bold: a pole of small residue next to the panel shows in the last ones only); it enters the integral and the
+    rule. Next to a pole the wavenumber's own rounding, times the kernel's slope of at most itself over the panel, is
+    all that is left of the last coefficients: halving doubles it. Where the kernel is little beside what it is less by,
+    their difference's rounding is left, and stays.
+    """
+    rest = 2.0 * np.abs(kernel @ _TO_LEGENDRE[-2:].T).sum(axis=-1).T
+    ends, slope = wavenumbers(panels, panels[:, :2])
+    closeness = _closeness(ends)
+    rounding = (ROUNDING * closeness * np.abs(kernel).max(axis=-1)).T
+    found = poles(kernel, _NODES, _TO_LEGENDRE, closeness)
+    turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(seen)
+    pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
+    on_axis = (panels[:, :2].imag == 0).all(axis=1)
+    shape = (len(panels), len(seen.load.orders), seen.r.size)
+    parts, (sizes, covered, swing) = np.empty(shape, dtype=np.complex128), np.empty((3, *shape))
+    for which in (np.flatnonzero(on_axis), np.flatnonzero(~on_axis)):
+        if which.size:
+            summed = _summed(seen, panels[which], kernel[:, which], pieces[which])
+            parts[which], sizes[which], covered[which], swing[which] = summed
+    errors = 2.0 * np.maximum(rest, rounding)[..., None] * covered + swing
+    halved = 2.0 * (2.0 * rounding + _CANCELLED * seen.taken_out)[..., None] * covered
+    return Evaluated(
+        parts,
+        errors,
+        sizes,
+        np.maximum(errors.max(axis=(1, 2)) - halved.max(axis=(1, 2)), 0.0),
+        found,
+        HIDDEN * found.rest.T[..., None] * covered,
+        found.uncertainty <= np.maximum(_SINGLE, 10.0 * LOST * closeness),
+    )
+
+
+def _span(seen: Seen) -> float:
+    return float(seen.r.max()) + seen.load.reach
+
+
+def _summed(seen: Seen, panels: w.Array, kernel: w.Array, pieces: np.ndarray) -> Iterator[w.Array]:
+    """Yield the four sums of `_integrated` for each panel, all on the axis or all off it, cut into so many `pieces`."""
+    kinds = [(int(count), np.flatnonzero(pieces == count)) for count in np.unique(pieces)]
+    order = np.concatenate([which for _, which in kinds])
+    cut = np.concatenate([panels[which] if n == 1 else _pieces(panels[which], n) for n, which in kinds])
+    values = np.concatenate([_on_pieces(kernel[:, which], n) for n, which in kinds], axis=1)
+    step = max(1, _CHUNK // (_COUNT * seen.r.size * len(kernel)))
+    chunks = [slice(first, first + step) for first in range(0, len(cut), step)]
+    found = [_integrated(seen, cut[chunk], values[:, chunk]) for chunk in chunks]
+    firsts = np.concatenate([[0], np.cumsum(pieces[order])[:-1]])
+    for quantity in range(4):
+        parts = [one[quantity] for one in found]
+        whole = np.concatenate(parts) if len(parts) > 1 else parts[0]
+        yield (np.add.reduceat(whole, firsts, axis=0) if len(whole) > len(panels) else whole)[np.argsort(order)]
+
+
+def _pieces(panels: w.Array, count: int) -> w.Array:
+    share = np.linspace(0.0, 1.0, count + 1)
+    return pieced(panels, panels[:, :1] * (1.0 - share) + panels[:, 1:2] * share)
+
+
+def _on_pieces(kernel: w.Array, count: int) -> w.Array:
+    """Return a kernel known at its panels' nodes at those of their equal pieces, shape (rows, pieces, nodes)."""
+    if count == 1:
+        return kernel
+    re, im = np.moveaxis(_pair(kernel) @ _spread(count), 2, 0)
+    return (re + 1j * im).reshape(len(kernel), -1, _COUNT)
+
+
+@lru_cache(maxsize=64)
+def _spread(count: int) -> np.ndarray:
+    """Return the matrix from values at a panel's nodes to those at the nodes of its equal pieces."""
+    middles = (2.0 * np.arange(count) + 1.0) / count - 1.0
+    at = (middles[:, None] + _NODES / count).ravel()
+    return (np.polynomial.legendre.legvander(at, _COUNT - 1) @ _TO_LEGENDRE).T
+
+
+def _integrated(seen: Seen, panels: w.Array, kernel: w.Array) -> tuple[w.Array, np.ndarray, np.ndarray, np.ndarray]:
+    """Return of each panel, row and radius the integral, its absolute size, that of the waves alone, the rule's error.
+
+    The waves are a mean of e^{ikx}, |x| up to `span`, of total weight `weight`: their coefficient of degree m is
+    at most weight phi^m / (2m - 1)!!, phi = span |half a panel|, and that of the kernel of degree j
+    meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
+    six halves: there their envelope takes the place of the weight. Off the axis both grow by e^{|Im k| span}.
+    """
+    load, r, span = seen.load, seen.r, _span(seen)
+    half = (panels[:, 1] - panels[:, 0]) / 2.0
+    k = nodes(panels)[0].ravel()
+    if not np.any(panels[:, :2].imag):
+        k, half = k.real, half.real  # Bessel functions of real numbers are cheaper
+    waves = bessels(load.orders, k[:, None] * r) * load.transform(k)[:, None]
+    waves = waves.reshape(len(load.orders), half.size, _COUNT, -1) * half[:, None, None]
+    parts = products(kernel * _WEIGHTS, waves)
+    size = np.abs(kernel) * _WEIGHTS
+    both = np.stack([size, np.broadcast_to(_WEIGHTS, size.shape)], axis=2) @ np.abs(waves)
+    sizes, covered = np.moveaxis(both, (2, 0), (0, 2))
+    ends, slope = wavenumbers(panels, panels[:, :2])
+    half = np.abs(half)
+    phi = half * np.abs(slope).max(axis=1) * span
+    powers = phi[:, None] ** _DEGREES / _ODD_FACTORIALS
+    swing = np.einsum("rpj,pj->pr", np.abs(kernel @ _TO_LEGENDRE.T), powers)
+    swing *= (3.0 * half * np.exp(np.abs(ends.imag).max(axis=1) * span))[:, None]
+    least, covers = ends.real.min(axis=1), np.abs(ends[:, 1] - ends[:, 0]) / 2.0
+    at = np.maximum(least, covers) / 2.0
+    envelope = np.where(least > 6.0 * covers, 2.0 * load.envelope(at), np.inf)[:, None, None]
+    weight = np.minimum(envelope * bessel_bounds(load.orders, at[:, None] * r).swapaxes(0, 1), load.weight)
+    return parts, sizes, covered, swing[..., None] * weight
+
+
+def products(kernel: w.Array, waves: w.Array) -> w.Array:
+    """Sum kernel (rows, panels, nodes) times waves (rows, panels, nodes, radii) over the nodes; (panels, rows, radii).
+
+    By products of real matrices with two rows. A complex row by a matrix is a matrix by a vector to BLAS, which starts
+    its threads for each of them from 256 radii on.
+    """
+    if np.iscomplexobj(waves):
+        (re, im), (re_of_i, im_of_i) = (np.moveaxis(_pair(kernel) @ part, 2, 0) for part in (waves.real, waves.imag))
+        re, im = re - im_of_i, im + re_of_i
+    else:
+        re, im = np.moveaxis(_pair(kernel) @ waves, 2, 0)
+    return (re + 1j * im).swapaxes(0, 1)
+
+
+def _pair(values: w.Array) -> np.ndarray:
+    """Return the real and the imaginary part, one more axis before the last."""
+    return np.stack([values.real, values.imag], axis=2)
