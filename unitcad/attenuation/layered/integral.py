@@ -35,7 +35,7 @@ _FIRST_PIECES = 32
 _DEGREES_SEEN = 14
 _CLEAR = 0.3
 """Of a pole's distance from its panel: how uncertain it may be where it says how far to halve."""
-_MOST_TIMES = 8
+_MOST_TIMES = 9
 _PANELS_SHARE = 0.3
 """Of the tolerance: what the panels may be off by together. The tail may leave 0.4."""
 _DETOURS_SHARE = 0.25
@@ -213,13 +213,15 @@ def _times(found: Evaluated, enough: float) -> np.ndarray:
     """Return how often each panel is to be halved towards its pole until it gains no more than `enough`, shape (n,).
 
     A pole at sinh(x) over a panel's half leaves e^(-x) of a Legendre coefficient in the next one. Once where no single
-    pole is seen.
+    pole is seen, or where so many times would not suffice: a detour may serve, and panels too short for it keep more of
+    its rounding.
     """
     at = found.poles.at
     away = np.maximum(np.abs(at - np.clip(at.real, -1.0, 1.0)), 1e-9)
     needed = np.arcsinh(away) + np.log(np.maximum(found.gains / enough, 1.0)) / _DEGREES_SEEN
     times = np.ceil(np.log2(np.sinh(needed) / away))
-    return np.where(found.poles.uncertainty < _CLEAR * away, np.clip(times, 1, _MOST_TIMES), 1).astype(int)
+    within = (found.poles.uncertainty < _CLEAR * away) & (times > 1) & (times <= _MOST_TIMES)
+    return np.where(within, times, 1).astype(int)
 
 
 def _worst(errors: np.ndarray, bad: np.ndarray, room: int) -> np.ndarray:
