@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import special
 
-from unitcad.attenuation.layered.integral import Problem
+from unitcad.attenuation.layered.integral import Body, Problem
 from unitcad.attenuation.layered.loads import Load, Point, UniformDisc
 from unitcad.attenuation.layered.medium import HalfSpace, Layer, LayeredMedium
 from unitcad.attenuation.layered.path import halved_towards
@@ -20,6 +20,7 @@ class Seen(NamedTuple):
     load: Load
     r: np.ndarray
     taken_out: np.ndarray = np.zeros(2)
+    orders: tuple[int, ...] = (1, 0)
 
 
 def _kernel(k):
@@ -59,7 +60,7 @@ def test_a_tight_tolerance_far_out_takes_few_wavenumbers():
 @pytest.mark.parametrize("chunk", [1, 7])
 def test_the_kernel_is_the_same_in_chunks(monkeypatch, chunk):
     medium = LayeredMedium([Layer(1.5e-3, 1100, 130e3, 0.49)], HalfSpace(1050, 12e3, 0.495))
-    problem = Problem(medium, UniformDisc(3.5e-3), 785.0, np.array([7e-3]), 0.0)
+    problem = Problem((Body(medium, 785.0),), (UniformDisc(3.5e-3),), np.array([7e-3]), 0.0)
     k = np.geomspace(1.0, 1e5, 20).astype(complex)
     whole = problem.kernel(k)
     monkeypatch.setattr("unitcad.attenuation.layered.integral._MOST_SAMPLES", chunk)

@@ -102,7 +102,7 @@ def test_a_product_of_real_matrices_is_the_complex_one(turn):
     rng = np.random.default_rng(0)
     kernel = rng.normal(size=(2, 3, 16)) + 1j * rng.normal(size=(2, 3, 16))
     waves = rng.normal(size=(2, 3, 16, 5)) * turn
-    assert np.allclose(products(kernel, waves), np.einsum("rpn,rpnx->prx", kernel, waves), rtol=1e-14, atol=1e-14)
+    assert np.allclose(products(kernel, waves), np.einsum("rpn,rpnx->rpx", kernel, waves), rtol=1e-14, atol=1e-14)
 
 
 def test_what_was_accepted_beside_a_too_large_scale_is_done_again():

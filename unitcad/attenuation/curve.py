@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from unitcad.attenuation.edge import closed_form as cf
 from unitcad.attenuation.edge.inputs_seen import inputs_seen
 from unitcad.attenuation.inputs import Drive, EstimateInput, Quantity, body
 from unitcad.attenuation.layered.loads import UniformDisc
-from unitcad.attenuation.layered.response import Response
+from unitcad.attenuation.layered.response import Response, responses
 from unitcad.attenuation.layered.statics import Direction
 
 EDGE_TO_MM = 30
@@ -38,7 +39,7 @@ ASSUMPTIONS = [
 ]
 _DIRECTIONS: dict[Drive, Direction] = {"flat": "tangential", "axial": "normal"}
 _COMPONENTS = {"flat": ("u_r", "u_theta", "u_z"), "axial": ("u_r", "u_z")}
-_SPREAD_RTOL = 1e-3
+_DECAY_RTOL = 1e-3
 _SLOPE_RTOL, _SLOPE_STEP = 1e-6, 0.01
 """They leave the slopes off by less than 1e-3."""
 _NO_UNIT = "a laterally uniform body under the motor's disc: walls, caps, silicones, circuit and mass are not in it"
@@ -57,9 +58,9 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
     radius = variant.diameter / 2.0
     r = radius + r_mm * 1e-3
     order: tuple[Drive, ...] = ("flat", "axial") if variant.drive == "flat" else ("axial", "flat")
-    cases = [({}, rtol)] + [(end, _SPREAD_RTOL) for end in _ends(variant)]
-    found = {drive: [_response(variant, drive, r, end, to) for end, to in cases] for drive in order}
-    below = {drive: [_response(variant, drive, r[::5], {}, rtol, z * 1e-3) for z in DEPTHS_MM] for drive in order}
+    found = _responses(variant, order, r, [{}, *_ends(variant)], rtol)
+    depths = [_responses(variant, order, r[::5], [{}], rtol, z * 1e-3) for z in DEPTHS_MM]
+    below = {drive: [one[drive][0] for one in depths] for drive in order}
     axial = found["axial"][0]
     edge = abs(axial.u_z[0])
     old = [np.abs([one.u_z, one.u_r]) / abs(one.u_z[0]) for one in found["axial"]]
@@ -93,21 +94,8 @@ def layered_block(variant: EstimateInput, rtol: float = 1e-4) -> dict[str, Any]:
 
 
 def _inputs_seen(variant: EstimateInput) -> dict[str, Any]:
-    """Return d ln (|u| at `EDGE_TO_MM` over |u| at the edge) / d ln input under the motor's drive.
-
-    Variants of one body, diameter, disc and frequency are solved once.
-    """
-    known: dict[str, float] = {}
-
-    def decay(one: EstimateInput) -> float:
-        reads = repr((one.tissue, one.frequency, one.diameter, one.motor_diameter))
-        if reads not in known:
-            r = one.diameter / 2.0 + 1e-3 * np.array([0.0, EDGE_TO_MM])
-            edge, far = _size(_response(one, one.drive, r, {}, _SLOPE_RTOL))
-            known[reads] = float(far / edge)
-        return known[reads]
-
-    seen = inputs_seen(variant, lambda variants: [decay(one) for one in variants], _SLOPE_STEP)
+    """Return d ln (|u| at `EDGE_TO_MM` over |u| at the edge) / d ln input under the motor's drive."""
+    seen = inputs_seen(variant, _decays, _SLOPE_STEP)
     return {
         "of": f"|u| of the skin {EDGE_TO_MM} mm from the unit's edge over |u| at the edge",
         "drive": variant.drive,
@@ -116,26 +104,64 @@ def _inputs_seen(variant: EstimateInput) -> dict[str, Any]:
     }
 
 
+def _decays(variants: Sequence[EstimateInput]) -> list[float]:
+    """Return |u| at `EDGE_TO_MM` over |u| at the edge of each variant under its motor's drive.
+
+    Those of one disc are solved on one path, those of one body and frequency once.
+    """
+    by_disc: dict[tuple[float, Drive], list[EstimateInput]] = {}
+    for one in variants:
+        by_disc.setdefault((one.motor_diameter, one.drive), []).append(one)
+    decays: dict[str, float] = {}
+    for (disc, drive), some in by_disc.items():
+        bodies = {_reads(one): (body(one.tissue), 2.0 * np.pi * one.frequency.middle) for one in some}
+        edges = [*dict.fromkeys(one.diameter / 2.0 for one in some)]
+        load = UniformDisc(disc / 2.0, _DIRECTIONS[drive])
+        found = responses([*bodies.values()], [load], np.add.outer(edges, [0.0, 1e-3 * EDGE_TO_MM]), rtol=_SLOPE_RTOL)
+        sizes = {key: _size(response) for key, (response,) in zip(bodies, found, strict=True)}
+        for one in some:
+            edge, far = sizes[_reads(one)][edges.index(one.diameter / 2.0)]
+            decays[repr(one)] = float(far / edge)
+    return [decays[repr(one)] for one in variants]
+
+
+def _reads(variant: EstimateInput) -> str:
+    """Return what of a variant a body and its frequency are made of."""
+    return repr((variant.tissue, variant.frequency))
+
+
 def decay_at(variant: EstimateInput, frequency: float, distances_mm: tuple[float, ...]) -> dict[str, list[float]]:
     """Return |u| under a `flat` and an `axial` drive and, `u`, the motor's; `u_z`: |u_z| under an axial one.
 
     Each over its value at the edge, at distances (mm) from the edge and one frequency (Hz), nominal body.
     """
     r = variant.diameter / 2.0 + 1e-3 * np.array([0.0, *distances_mm])
-    at = replace(variant, frequency=Quantity(frequency))
-    axial = _response(at, "axial", r, {}, _SPREAD_RTOL)
-    sizes = {"flat": _size(_response(at, "flat", r, {}, _SPREAD_RTOL)), "axial": _size(axial)}
-    parts = {"u": sizes[variant.drive], **sizes, "u_z": np.abs(axial.u_z)}
+    found = _responses(replace(variant, frequency=Quantity(frequency)), ("flat", "axial"), r, [{}], _DECAY_RTOL)
+    sizes = {drive: _size(one) for drive, (one,) in found.items()}
+    parts = {"u": sizes[variant.drive], **sizes, "u_z": np.abs(found["axial"][0].u_z)}
     return {name: [float(v) for v in part[1:] / part[0]] for name, part in parts.items()}
 
 
-def _response(
-    variant: EstimateInput, drive: Drive, r: np.ndarray, end: dict[str, int], rtol: float, z: float = 0.0
-) -> Response:
-    """Return the skin's displacement under one pascal of a drive on the motor's disc; `end` as `inputs.body` has it."""
-    hertz = variant.frequency.ends[end["frequency"]] if "frequency" in end else variant.frequency.middle
-    load = UniformDisc(variant.motor_diameter / 2.0, _DIRECTIONS[drive])
-    return body(variant.tissue, end).response(load, 2.0 * np.pi * hertz, r, z=z, rtol=rtol)
+def _responses(
+    variant: EstimateInput,
+    drives: Sequence[Drive],
+    r: np.ndarray,
+    ends: Sequence[dict[str, int]],
+    rtol: float,
+    z: float = 0.0,
+) -> dict[Drive, list[Response]]:
+    """Return the skin's displacement under one pascal of each drive on the motor's disc, for `ends` of `body`."""
+    hertz = variant.frequency
+    bodies = [
+        (
+            body(variant.tissue, end),
+            2.0 * np.pi * (hertz.ends[end["frequency"]] if "frequency" in end else hertz.middle),
+        )
+        for end in ends
+    ]
+    loads = [UniformDisc(variant.motor_diameter / 2.0, _DIRECTIONS[drive]) for drive in drives]
+    found = responses(bodies, loads, r, z=z, rtol=rtol)
+    return {drive: [one[i] for one in found] for i, drive in enumerate(drives)}
 
 
 def _size(one: Response) -> np.ndarray:

@@ -9,6 +9,7 @@ the first panels are sampled in one call: most of what a call takes does not han
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -19,8 +20,8 @@ from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.path import MAX_PANELS, PHASE, from_origin, halved_towards, onwards, pieced
 from unitcad.attenuation.layered.quadrature import Evaluated, evaluate, nodes, panel_poles
 from unitcad.attenuation.layered.stack import Stack
-from unitcad.attenuation.layered.statics import static_kernel
-from unitcad.attenuation.layered.tail import grid, measure_tail
+from unitcad.attenuation.layered.statics import Direction, static_kernel, static_kernels
+from unitcad.attenuation.layered.tail import grid, joined, measure_tail
 from unitcad.errors import UnitcadError
 
 _MAX_ROUNDS = 40
@@ -29,8 +30,8 @@ _FEW, _LOOSE, _LESS_LOOSE = 6, 1e-3, 1e-5
 """Panels up to the last pole for a loose rtol, twice as many for others; and from where what lies next to k = 0 may be
 cut sparsely. To cut a panel later takes longer than to begin with two, where both are mostly needed.
 """
-_PHASE_RTOL = 1e-6
-"""From which on the rule is off by no more than a hundredth of rtol where the waves turn by `PHASE`."""
+_PHASE_RTOL = 1e-8
+"""From which on pieces are of `PHASE`: there the rule is off by some 1e-9 of the waves over a piece."""
 _FIRST_PIECES = 32
 _DEGREES_SEEN = 14
 _CLEAR = 0.3
@@ -49,50 +50,81 @@ _WORTH = 0.2
 
 
 @dataclass(frozen=True)
-class Problem:
-    """A medium under a load at omega (rad/s), seen at radii r (m), shape (n,), and depth z (m)."""
+class Body:
+    """A medium at omega (rad/s), and the static half-space that was taken out, None below the surface."""
 
     medium: Stack
-    load: Load
     omega: float
+    reference: w.Material | None = None
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Bodies under loads that differ in their directions only, seen at radii r (m), shape (n,), and depth z (m).
+
+    One path for all: bodies are alike, and poles on the axis are one body's. Rows: of each body those of each load.
+    """
+
+    bodies: tuple[Body, ...]
+    loads: tuple[Load, ...]
     r: np.ndarray
     z: float
-    reference: w.Material | None = None  # of the static half-space that was taken out; None below the surface
+
+    @property
+    def load(self) -> Load:
+        return self.loads[0]
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        return tuple(order for load in self.loads for order in load.orders)
 
     def kernel(self, k: w.Array) -> w.Array:
-        """Return k C(k), less the static one, a row an order of the load; the load's transform is not in it."""
+        """Return k C(k), less the static one, a row an order of each load; the loads' transform is not in it."""
         chunks = [k[first : first + _MOST_SAMPLES] for first in range(0, k.size, _MOST_SAMPLES)]
-        out = k * np.concatenate([self._compliance(chunk) for chunk in chunks], axis=1)
-        return self.less_static(out)
+        rows = [np.concatenate([self._compliance(body, chunk) for chunk in chunks], axis=1) for body in self.bodies]
+        return self.less_static(k * np.concatenate(rows))
 
     def less_static(self, kernel: w.Array) -> w.Array:
         """Return a kernel of which nothing was taken out, shape (rows, n), less the static one."""
-        if self.reference is None:
-            return kernel
-        return kernel - static_kernel(self.reference, self.load.direction)[:, None]
+        return kernel - self.taken_out[:, None]
 
-    def _compliance(self, k: w.Array) -> w.Array:
-        traction = np.zeros((2, k.size), dtype=np.complex128)
-        traction[1 if self.load.direction == "normal" else 0] = 1.0
-        u_r, u_z = self.medium.transfer(traction, k, self.omega, self.z)
-        if self.load.direction != "tangential":
-            return np.array([u_r, u_z])
-        u_theta = self.medium.shear_transfer(k, self.omega, self.z)
-        return np.array([(u_r + u_theta) / 2.0, (u_r - u_theta) / 2.0, u_z])
+    def _compliance(self, body: Body, k: w.Array) -> w.Array:
+        ways = [1 if load.direction == "normal" else 0 for load in self.loads]
+        columns = sorted(set(ways))
+        traction = np.zeros((2, len(columns), k.size), dtype=np.complex128)
+        traction[columns, range(len(columns))] = 1.0
+        u = body.medium.transfer(traction, k, body.omega, self.z)
+        rows = []
+        for load, way in zip(self.loads, ways, strict=True):
+            u_r, u_z = u[:, columns.index(way)]
+            if load.direction == "tangential":
+                u_theta = body.medium.shear_transfer(k, body.omega, self.z)
+                rows += [(u_r + u_theta) / 2.0, (u_r - u_theta) / 2.0, u_z]
+            else:
+                rows += [u_r, u_z]
+        return np.array(rows)
 
-    @property
-    def taken_out(self) -> np.ndarray:
-        """The size of the static kernel that was taken out, shape (rows,)."""
-        if self.reference is None:
-            return np.zeros(len(self.load.orders))
-        return np.abs(static_kernel(self.reference, self.load.direction))
+    @cached_property
+    def taken_out(self) -> w.Array:
+        """The static kernel that was taken out, shape (rows,)."""
+        directions: list[Direction] = [load.direction for load in self.loads]
+        none = np.zeros(len(self.orders))
+        kernels = [static_kernels(body.reference, directions) if body.reference else none for body in self.bodies]
+        return np.concatenate(kernels)
 
     def static_part(self) -> tuple[np.ndarray, np.ndarray]:
         """Return what was taken out, shape (rows, n), and a bound of its rounding."""
-        if self.reference is None:
-            shape = (len(self.load.orders), self.r.size)
-            return np.zeros(shape, dtype=np.complex128), np.zeros(shape)
-        return self.load.static_part(static_kernel(self.reference, self.load.direction), self.r)
+        parts = [
+            load.static_part(static_kernel(body.reference, load.direction), self.r)
+            for body in self.bodies
+            if body.reference
+            for load in self.loads
+        ]
+        if not parts:
+            none = np.zeros((len(self.bodies) * len(self.orders), self.r.size))
+            return none.astype(np.complex128), none
+        known, rounded = (np.concatenate(part) for part in zip(*parts, strict=True))
+        return known, rounded
 
 
 @dataclass(frozen=True)
@@ -120,7 +152,8 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     |u|: of a row.
     """
     load, r, z = bare.load, bare.r, bare.z
-    materials = bare.medium.materials(bare.omega)
+    each = [body.medium.materials(body.omega) for body in bare.bodies]
+    materials = tuple(material for some in each for material in some)
     span = float(r.max()) + load.reach + 2.0 * z
     far = PHASE / span * MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
     beyond = grid(load, r, z, end)
@@ -128,13 +161,20 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     pending = from_origin(end, stop, span, materials, _FEW if rtol >= _LOOSE else 2 * _FEW, rtol >= _LESS_LOOSE)
     k, slope = nodes(pending)
     raw = bare.kernel(np.concatenate([beyond, k.ravel()]))
-    tail = measure_tail(beyond, raw[:, : beyond.size], materials, load, r, z, far, rtol, largest)
+    by_body = np.split(raw[:, : beyond.size], len(each))
+    tail = joined(
+        [
+            measure_tail(beyond, rows, some, bare.loads, r, z, far, rtol, largest)
+            for rows, some in zip(by_body, each, strict=True)
+        ]
+    )
     least = float(tail.bounds[-1].max())
 
     def tolerance(size: float) -> float:
         return max(rtol * min(size, largest), 0.3 * least)  # what the tail leaves anyway is worth no halving
 
-    problem = replace(bare, reference=tail.reference)
+    bodies = (replace(body, reference=one) for body, one in zip(bare.bodies, tail.references, strict=True))
+    problem = replace(bare, bodies=tuple(bodies))
     kernel = problem.less_static(raw[:, beyond.size :]).reshape(-1, *k.shape) * slope
     phase = PHASE * min(1.0, (rtol / _PHASE_RTOL) ** (1 / 32))
     known, rounded = problem.static_part()
@@ -145,7 +185,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     for left in range(_MAX_ROUNDS, -1, -1):
         found = evaluate(problem, pending, kernel, phase)
         if not np.all(np.isfinite(found.parts)):
-            raise overflow(bare.omega)
+            raise overflow(bare.bodies[0].omega)
         count += k.size
         whole, off = np.abs(known + total + found.parts.sum(0)), quadrature + found.errors.sum(0)
         wanted = tolerance(float(np.max(whole)) or 1.0)
@@ -273,7 +313,8 @@ def _detours(
     clear = bad & ((hidden <= max(enough, left)) | found.blurred) & (panels[:, :2].imag == 0).all(axis=1)
 
     def lossier(panel: w.Array, loss: float) -> Poles:
-        lossy = replace(problem, medium=problem.medium.with_loss(loss))
+        bodies = (replace(body, medium=body.medium.with_loss(loss)) for body in problem.bodies)
+        lossy = replace(problem, bodies=tuple(bodies))
         return panel_poles(panel[None], _sampled(lossy, panel[None]))
 
     at = np.flatnonzero(clear)

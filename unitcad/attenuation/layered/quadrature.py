@@ -35,17 +35,24 @@ _CHUNK = 200_000  # integrand values held at once
 
 
 class Seen(Protocol):
-    """A load seen at radii r (m), shape (n,)."""
+    """Loads that have one transform, on bodies that are alike, seen at radii r (m), shape (n,)."""
 
     @property
-    def load(self) -> Load: ...
+    def load(self) -> Load:
+        """Return one of the loads: all have its transform."""
+        ...
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Return the orders of the Bessel functions that the rows of each body's kernel meet."""
+        ...
 
     @property
     def r(self) -> np.ndarray: ...
 
     @property
-    def taken_out(self) -> np.ndarray:
-        """Return the size of what each row of the kernel is less by, shape (rows,)."""
+    def taken_out(self) -> w.Array:
+        """Return what each row of the kernel is less by, shape (rows,)."""
         ...
 
 
@@ -84,6 +91,8 @@ def _closeness(ends: w.Array) -> np.ndarray:
 def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Evaluated:
     """Integrate over each panel, on the axis or off it, its kernel (with dk/ds) of shape (rows, panels, nodes).
 
+    The rows are those of the first body, of the second one, and so on.
+
     phase: the most that the fastest Bessel product may turn over a piece of a panel.
 
     The kernel is its Legendre series to degree n - 1 and a rest. The rest is at most twice the last two coefficients
@@ -101,14 +110,15 @@ def evaluate(seen: Seen, panels: w.Array, kernel: w.Array, phase: float) -> Eval
     turn = np.abs(panels[:, 1] - panels[:, 0]) * np.abs(slope).max(axis=1) * _span(seen)
     pieces = np.maximum(np.ceil(turn / phase), 1.0).astype(int)
     on_axis = (panels[:, :2].imag == 0).all(axis=1)
-    shape = (len(panels), len(seen.load.orders), seen.r.size)
-    parts, (sizes, covered, swing) = np.empty(shape, dtype=np.complex128), np.empty((3, *shape))
+    shape = (len(panels), len(kernel), seen.r.size)
+    sums = np.empty(shape, dtype=np.complex128), *np.empty((3, *shape))
     for which in (np.flatnonzero(on_axis), np.flatnonzero(~on_axis)):
-        if which.size:
-            summed = _summed(seen, panels[which], kernel[:, which], pieces[which])
-            parts[which], sizes[which], covered[which], swing[which] = summed
+        for some, summed in _summed(seen, panels[which], kernel[:, which], pieces[which]):
+            for whole, part in zip(sums, summed, strict=True):
+                whole[which[some]] = part
+    parts, sizes, covered, swing = sums
     errors = 2.0 * np.maximum(rest, rounding)[..., None] * covered + swing
-    halved = 2.0 * (2.0 * rounding + _CANCELLED * seen.taken_out)[..., None] * covered
+    halved = 2.0 * (2.0 * rounding + _CANCELLED * np.abs(seen.taken_out))[..., None] * covered
     return Evaluated(
         parts,
         errors,
@@ -124,20 +134,27 @@ def _span(seen: Seen) -> float:
     return float(seen.r.max()) + seen.load.reach
 
 
-def _summed(seen: Seen, panels: w.Array, kernel: w.Array, pieces: np.ndarray) -> Iterator[w.Array]:
-    """Yield the four sums of `_integrated` for each panel, all on the axis or all off it, cut into so many `pieces`."""
+def _summed(
+    seen: Seen, panels: w.Array, kernel: w.Array, pieces: np.ndarray
+) -> Iterator[tuple[np.ndarray, tuple[w.Array, ...]]]:
+    """Yield, for some panels after others, which they are and their sums of what `_integrated` returns.
+
+    All are on the axis or all off it, each cut into so many `pieces`.
+    """
+    if not len(panels):
+        return
     kinds = [(int(count), np.flatnonzero(pieces == count)) for count in np.unique(pieces)]
     order = np.concatenate([which for _, which in kinds])
     cut = np.concatenate([panels[which] if n == 1 else _pieces(panels[which], n) for n, which in kinds])
     values = np.concatenate([_on_pieces(kernel[:, which], n) for n, which in kinds], axis=1)
+    firsts = np.concatenate([[0], np.cumsum(pieces[order])])
     step = max(1, _CHUNK // (_COUNT * seen.r.size * len(kernel)))
-    chunks = [slice(first, first + step) for first in range(0, len(cut), step)]
-    found = [_integrated(seen, cut[chunk], values[:, chunk]) for chunk in chunks]
-    firsts = np.concatenate([[0], np.cumsum(pieces[order])[:-1]])
-    for quantity in range(4):
-        parts = [one[quantity] for one in found]
-        whole = np.concatenate(parts) if len(parts) > 1 else parts[0]
-        yield (np.add.reduceat(whole, firsts, axis=0) if len(whole) > len(panels) else whole)[np.argsort(order)]
+    for some in np.split(np.arange(len(order)), np.flatnonzero(np.diff(firsts[:-1] // step)) + 1):
+        low, high = firsts[some[0]], firsts[some[-1] + 1]
+        found = _integrated(seen, cut[low:high], values[:, low:high])
+        if high - low > some.size:
+            found = tuple(np.add.reduceat(one, firsts[some] - low, axis=0) for one in found)
+        yield order[some], found
 
 
 def _pieces(panels: w.Array, count: int) -> w.Array:
@@ -149,7 +166,7 @@ def _on_pieces(kernel: w.Array, count: int) -> w.Array:
     """Return a kernel known at its panels' nodes at those of their equal pieces, shape (rows, pieces, nodes)."""
     if count == 1:
         return kernel
-    re, im = np.moveaxis(_pair(kernel) @ _spread(count), 2, 0)
+    re, im = np.moveaxis(_pair(kernel) @ _spread(count), -2, 0)
     return (re + 1j * im).reshape(len(kernel), -1, _COUNT)
 
 
@@ -169,44 +186,45 @@ def _integrated(seen: Seen, panels: w.Array, kernel: w.Array) -> tuple[w.Array, 
     meets an error of the rule from m = 2n - j on. Far from k = 0 they are e^{+-ikx} times what hardly changes within
     six halves: there their envelope takes the place of the weight. Off the axis both grow by e^{|Im k| span}.
     """
-    load, r, span = seen.load, seen.r, _span(seen)
+    load, r, span, rows = seen.load, seen.r, _span(seen), len(kernel)
     half = (panels[:, 1] - panels[:, 0]) / 2.0
     k = nodes(panels)[0].ravel()
     if not np.any(panels[:, :2].imag):
         k, half = k.real, half.real  # Bessel functions of real numbers are cheaper
-    waves = bessels(load.orders, k[:, None] * r) * load.transform(k)[:, None]
-    waves = waves.reshape(len(load.orders), half.size, _COUNT, -1) * half[:, None, None]
-    parts = products(kernel * _WEIGHTS, waves)
-    size = np.abs(kernel) * _WEIGHTS
-    both = np.stack([size, np.broadcast_to(_WEIGHTS, size.shape)], axis=2) @ np.abs(waves)
-    sizes, covered = np.moveaxis(both, (2, 0), (0, 2))
+    waves = bessels(seen.orders, k[:, None] * r) * load.transform(k)[:, None]
+    waves = waves.reshape(len(seen.orders), half.size, _COUNT, -1) * half[:, None, None]
+    by_body = kernel.reshape(-1, len(seen.orders), half.size, _COUNT)
+    size = np.abs(by_body) * _WEIGHTS
+    both = np.stack([size, np.broadcast_to(_WEIGHTS, size.shape)], axis=-2) @ np.abs(waves)
     ends, slope = wavenumbers(panels, panels[:, :2])
     half = np.abs(half)
     phi = half * np.abs(slope).max(axis=1) * span
     powers = phi[:, None] ** _DEGREES / _ODD_FACTORIALS
-    swing = np.einsum("rpj,pj->pr", np.abs(kernel @ _TO_LEGENDRE.T), powers)
-    swing *= (3.0 * half * np.exp(np.abs(ends.imag).max(axis=1) * span))[:, None]
+    swing = np.einsum("brpj,pj->brp", np.abs(by_body @ _TO_LEGENDRE.T), powers)
+    swing *= 3.0 * half * np.exp(np.abs(ends.imag).max(axis=1) * span)
     least, covers = ends.real.min(axis=1), np.abs(ends[:, 1] - ends[:, 0]) / 2.0
     at = np.maximum(least, covers) / 2.0
-    envelope = np.where(least > 6.0 * covers, 2.0 * load.envelope(at), np.inf)[:, None, None]
-    weight = np.minimum(envelope * bessel_bounds(load.orders, at[:, None] * r).swapaxes(0, 1), load.weight)
-    return parts, sizes, covered, swing[..., None] * weight
+    envelope = np.where(least > 6.0 * covers, 2.0 * load.envelope(at), np.inf)[:, None]
+    weight = np.minimum(envelope * bessel_bounds(seen.orders, at[:, None] * r), load.weight)
+    quantities = products(by_body * _WEIGHTS, waves), both[..., 0, :], both[..., 1, :], swing[..., None] * weight
+    parts, sizes, covered, oscillation = (one.reshape(rows, half.size, -1).swapaxes(0, 1) for one in quantities)
+    return parts, sizes, covered, oscillation
 
 
 def products(kernel: w.Array, waves: w.Array) -> w.Array:
-    """Sum kernel (rows, panels, nodes) times waves (rows, panels, nodes, radii) over the nodes; (panels, rows, radii).
+    """Sum kernel (.., rows, panels, nodes) times waves (rows, panels, nodes, radii); (.., rows, panels, radii).
 
     By products of real matrices with two rows. A complex row by a matrix is a matrix by a vector to BLAS, which starts
     its threads for each of them from 256 radii on.
     """
     if np.iscomplexobj(waves):
-        (re, im), (re_of_i, im_of_i) = (np.moveaxis(_pair(kernel) @ part, 2, 0) for part in (waves.real, waves.imag))
+        (re, im), (re_of_i, im_of_i) = (np.moveaxis(_pair(kernel) @ part, -2, 0) for part in (waves.real, waves.imag))
         re, im = re - im_of_i, im + re_of_i
     else:
-        re, im = np.moveaxis(_pair(kernel) @ waves, 2, 0)
-    return (re + 1j * im).swapaxes(0, 1)
+        re, im = np.moveaxis(_pair(kernel) @ waves, -2, 0)
+    return re + 1j * im
 
 
 def _pair(values: w.Array) -> np.ndarray:
     """Return the real and the imaginary part, one more axis before the last."""
-    return np.stack([values.real, values.imag], axis=2)
+    return np.stack([values.real, values.imag], axis=-2)

@@ -17,13 +17,14 @@ cheaper than the layer.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from unitcad.attenuation.layered import waves as w
-from unitcad.attenuation.layered.integral import Integrals, Problem, integrate, overflow
+from unitcad.attenuation.layered.integral import Body, Integrals, Problem, integrate, overflow
 from unitcad.attenuation.layered.loads import Load
 from unitcad.attenuation.layered.path import PHASE
 from unitcad.attenuation.layered.rheology import LEAST, MOST, finite, out_of_range
@@ -32,6 +33,7 @@ from unitcad.errors import Refusal
 
 _MOST_PANELS = 2_500  # up to the last pole: a few seconds
 _MOST_ATTEMPTS = 3
+_CLOSER = 4.0  # the rtol of several responses: the largest |u| of one may be less than that of all
 _MOST_WAVENUMBERS = 8_000_000
 """Of one response: nothing is tried again that would take more of them, a quarter of a minute or so."""
 
@@ -60,6 +62,11 @@ class Response:
         """The largest of all bounds: what rtol times the largest |u| is compared with."""
         return float(max(np.max(self.error_r), np.max(self.error_theta), np.max(self.error_z)))
 
+    @property
+    def largest(self) -> float:
+        """The largest |u| of a component."""
+        return float(max(np.max(np.abs(u)) for u in (self.u_r, self.u_theta, self.u_z)))
+
 
 def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rtol: float = 1e-6) -> Response:
     """Return the displacement of `medium` under `load` at radii r (m, any shape), a depth z (m) and omega (rad/s).
@@ -68,34 +75,80 @@ def respond(medium: Stack, load: Load, omega: float, r: Any, z: float = 0.0, rto
     for r = 0 under a surface point load, `UnitcadError` where no finite answer was found. If rtol can't be reached
     the errors say so.
     """
-    if not isinstance(load, Load):
-        raise Refusal("load", str(load), "must be a Point or a UniformDisc")
+    return responses([(medium, omega)], [load], r, z, rtol)[0][0]
+
+
+def responses(
+    bodies: Sequence[tuple[Stack, float]], loads: Sequence[Load], r: Any, z: float = 0.0, rtol: float = 1e-6
+) -> list[list[Response]]:
+    """Return the displacements of each body (a medium and its omega) under each of the loads, as `respond` does.
+
+    The loads differ in their directions only, and none is radial if one is not. They share one kernel, and bodies that
+    are alike one path: each that does not reach rtol on it, beside its own largest |u|, is solved by itself. Raises as
+    `respond`.
+    """
+    for load in loads:
+        if not isinstance(load, Load):
+            raise Refusal("load", str(load), "must be a Point or a UniformDisc")
+    if len({(load.reach, load.direction == "radial") for load in loads}) > 1:
+        raise Refusal("loads", str(loads), "must differ in their directions only, all radial or none")
     radii = _radii(r)
     z, rtol = finite("z", z), finite("rtol", rtol, above=True)
     if not 1e-12 <= rtol <= 0.1:
         raise Refusal("rtol", rtol, "must be from 1e-12 to 0.1", min(max(rtol, 1e-12), 0.1))
-    if load.reach == 0.0 and z == 0.0 and np.any(radii == 0.0):
+    if loads[0].reach == 0.0 and z == 0.0 and np.any(radii == 0.0):
         raise Refusal("r", 0.0, "under a point load the surface goes to infinity: give r > 0, z > 0 or a disc")
     # A layer of no thickness changes nothing, so its waves must not set the path.
-    medium = medium.without_empty_layers()
-    materials = medium.materials(omega)
+    solved = [Body(medium.without_empty_layers(), omega) for medium, omega in bodies]
+    if len(solved) * len(loads) == 1:
+        return _on_one_path(solved, loads, radii, z, rtol)
+    shared = _on_one_path(solved, loads, radii, z, max(rtol / _CLOSER, 1e-12)) if all(map(_damped, solved)) else None
+    return [
+        [
+            shared[i][j]
+            if shared and shared[i][j].error <= rtol * shared[i][j].largest
+            else _on_one_path([body], [load], radii, z, rtol)[0][0]
+            for j, load in enumerate(loads)
+        ]
+        for i, body in enumerate(solved)
+    ]
+
+
+def _damped(body: Body) -> bool:
+    """Return whether no pole of a body lies on the path."""
+    return all(material.shear.imag > 0 or material.shear == 0 for material in body.medium.materials(body.omega))
+
+
+def _on_one_path(
+    bodies: Sequence[Body], loads: Sequence[Load], radii: w.Array, z: float, rtol: float
+) -> list[list[Response]]:
+    """Return the displacement of each body under each load, rtol being over the largest of all."""
     flat = radii.ravel()
-    end = _last_pole(medium, materials, omega)
-    _check_size(end, float(flat.max()) + load.reach + 2.0 * z, omega)
-    sideways = load.direction == "tangential"
+    end = max(_last_pole(body.medium, body.medium.materials(body.omega), body.omega) for body in bodies)
+    _check_size(end, float(flat.max()) + loads[0].reach + 2.0 * z, max(body.omega for body in bodies))
+    sideways = any(load.direction == "tangential" for load in loads)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # what is no number is refused below
         # Each component is made of at most two rows, and one of them is at least as large as each row.
-        integrals = _solve(Problem(medium, load, omega, flat, z), end, rtol / 2.0 if sideways else rtol)
-    rows, errors = (part.reshape(-1, *radii.shape) for part in (integrals.total, integrals.error))
-    if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(errors))):
-        raise overflow(omega)
-    if sideways:
+        problem = Problem(tuple(bodies), tuple(loads), flat, z)
+        integrals = _solve(problem, end, rtol / 2.0 if sideways else rtol)
+    if not (np.all(np.isfinite(integrals.total)) and np.all(np.isfinite(integrals.error))):
+        raise overflow(bodies[0].omega)
+    every = [*loads] * len(bodies)
+    ends = np.cumsum([len(load.orders) for load in every])[:-1]
+    rows, errors = (np.split(part.reshape(-1, *radii.shape), ends) for part in (integrals.total, integrals.error))
+    found = [_of_rows(*one, integrals.wavenumbers) for one in zip(every, rows, errors, strict=True)]
+    return [found[first : first + len(loads)] for first in range(0, len(found), len(loads))]
+
+
+def _of_rows(load: Load, rows: w.Array, errors: np.ndarray, wavenumbers: int) -> Response:
+    """Return the response of which these are the integrals, shape (rows, ...)."""
+    if load.direction == "tangential":
         (a, b, c), (of_a, of_b, of_c) = rows, errors
         u, error = (a - b, -(a + b), -c), (of_a + of_b, of_a + of_b, of_c)
     else:
-        zero = np.zeros(radii.shape)
+        zero = np.zeros(rows.shape[1:])
         u, error = (rows[0], zero + 0j, rows[1]), (errors[0], zero, errors[1])
-    return Response(*(part[()] for part in u), *(part[()] for part in error), wavenumbers=integrals.wavenumbers)
+    return Response(*(part[()] for part in u), *(part[()] for part in error), wavenumbers=wavenumbers)
 
 
 def _radii(r: Any) -> w.Array:

@@ -144,11 +144,10 @@ class Stack:
         return planes[::-1]
 
     def transfer(self, traction: w.Array, k: w.Array, omega: float, depth: float) -> w.Array:
-        """Return (u_r, u_z) at `depth`, shape (2, n), for surface tractions of shape (2, n) at wavenumbers k (n,)."""
+        """Return (u_r, u_z) at `depth` for m surface tractions (t_r, t_z), both (2, m, n), at wavenumbers k (n,)."""
         planes = self.planes(k, omega, depth)
-        state = traction[:, None]
         top = planes[0]
-        c = w.product(w.adjugate(top.t), state) / w.determinant(top.t)
+        c = w.product(w.adjugate(top.t), traction) / w.determinant(top.t)
         u = w.product(top.u, c)
         materials = self.materials(omega)
         pieces = _cut([layer.thickness for layer in self.layers], depth)
@@ -159,7 +158,7 @@ class Stack:
             material = materials[kind]
             stiffness = abs(material.shear) * np.maximum(np.abs(k), abs(material.ks2) ** 0.5)
             c = parameter(below, u, t, stiffness)
-        return u[:, 0]
+        return u
 
     def shear_transfer(self, k: w.Array, omega: float, depth: float) -> w.Array:
         """Return u_theta at `depth` per surface traction of horizontally polarised shear (m/Pa), shape (n,)."""

@@ -8,6 +8,7 @@ Rows are those of a load's kernel, with its `orders`: (u_r, u_z) under an axisym
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, Literal
 
@@ -31,6 +32,11 @@ def static_kernel(material: w.Material, direction: Direction) -> w.Array:
     if direction == "tangential":
         return np.array([(1.5 - eps) / twice, -(0.5 - eps) / twice, across])
     return np.array([across, along] if direction == "normal" else [along, across])
+
+
+def static_kernels(material: w.Material, directions: Sequence[Direction]) -> w.Array:
+    """Return the rows of `static_kernel` of each direction, one after the other."""
+    return np.concatenate([static_kernel(material, direction) for direction in directions])
 
 
 def disc_integrals(s: Any, direction: Direction) -> Any:

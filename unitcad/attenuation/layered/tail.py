@@ -2,34 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from unitcad.attenuation.layered import waves as w
 from unitcad.attenuation.layered.bessel import bessel_bounds
 from unitcad.attenuation.layered.loads import Load
-from unitcad.attenuation.layered.statics import static_kernel
+from unitcad.attenuation.layered.statics import Direction, static_kernels
 
 _PER_DECADE = 16
 _MARGIN = 1.5
+_SOON = 10.0
+"""Over the first wavenumber: where a tail may stop by the top layer's half-space, no other one is tried."""
 
 
 @dataclass(frozen=True)
 class Tail:
     """bounds[i]: the integrals of the kernel's rows from k[i] to infinity are at most that (m per pascal or newton).
 
-    Shape (wavenumbers, rows, radii).
+    Shape (wavenumbers, rows, radii). references: the static half-space to be taken out of each body's rows.
     """
 
     k: np.ndarray
     bounds: np.ndarray
-    reference: w.Material | None
+    references: tuple[w.Material | None, ...]
     scale: float  # a first guess of the largest displacement
+
+    @cached_property
+    def _most(self) -> np.ndarray:
+        return self.bounds.max(axis=(1, 2))
 
     def start(self, tolerance: float) -> float:
         """Return the least wavenumber (1/m) beyond which less than 0.4 of the tolerance is missing, or the last one."""
-        good = np.nonzero(self.bounds.max(axis=(1, 2)) <= 0.4 * tolerance)[0]
+        good = np.nonzero(self._most <= 0.4 * tolerance)[0]
         return float(self.k[good[0]] if good.size else self.k[-1])
 
     def bound(self, stop: float) -> np.ndarray:
@@ -46,18 +54,25 @@ def grid(load: Load, r: np.ndarray, z: float, end: float) -> np.ndarray:
     return first * 10.0 ** np.linspace(0.0, decades, int(_PER_DECADE * decades) + 2)
 
 
+def joined(tails: Sequence[Tail]) -> Tail:
+    """Return the tail of several bodies, measured on one grid."""
+    bounds = np.concatenate([tail.bounds for tail in tails], axis=1)
+    references = tuple(reference for tail in tails for reference in tail.references)
+    return Tail(tails[0].k, bounds, references, max(tail.scale for tail in tails))
+
+
 def measure_tail(
     k: np.ndarray,
     raw: w.Array,
     materials: tuple[w.Material, ...],
-    load: Load,
+    loads: Sequence[Load],
     r: np.ndarray,
     z: float,
     far: float,
     rtol: float,
     largest: float = np.inf,
 ) -> Tail:
-    """Bound the tail by the kernel on its `grid` k; choose the static half-space that leaves the least.
+    """Bound a body's tail by the kernel on its `grid` k; choose the static half-space that leaves the least.
 
     raw (rows, wavenumbers): the kernel, nothing taken out; far: the last wavenumber (1/m) that can be afforded;
     largest: displacement, if known. Two bounds, the lower one counts: the envelope of the Bessel functions, and, where
@@ -65,19 +80,28 @@ def measure_tail(
     """
     within = max(1, int(np.searchsorted(k, far)))
     if z > 0:
-        bounds = _bounds(k, raw[None], load, r)[0, :within]
-        return Tail(k[:within], bounds, None, min(float(bounds[0].max()), largest))
+        bounds = _bounds(k, raw[None], loads, r)[0, :within]
+        return Tail(k[:within], bounds, (None,), min(float(bounds[0].max()), largest))
     # As on a half-space of the compliance at the wavenumber of the load's size: a film is not what the disc rests on.
-    at = min(int(np.searchsorted(k, 1.0 / max(load.reach, float(r.min())))), k.size - 1)
-    scale = min(float(np.max(np.abs(load.static(r)).T * np.abs(raw[:, at]))), largest)
+    at = min(int(np.searchsorted(k, 1.0 / max(loads[0].reach, float(r.min())))), k.size - 1)
+    static = np.concatenate([load.static(r) for load in loads])
+    scale = min(float(np.max(np.abs(static).T * np.abs(raw[:, at]))), largest)
+    directions: list[Direction] = [load.direction for load in loads]
+
+    def less(material: w.Material) -> w.Array:
+        return raw - static_kernels(material, directions)[:, None]
+
+    def tail(material: w.Material) -> Tail:
+        return Tail(k[:within], _bounds(k, less(material)[None], loads, r)[0, :within], (material,), scale)
+
     choice = [material for material in dict.fromkeys(reversed(materials)) if material.shear != 0]
-    kernels = [raw - static_kernel(material, load.direction)[:, None] for material in choice]
-    if len(choice) > 1:
-        few = np.array([r.min(), r[np.argmin(np.abs(r - load.reach))], r.max()])
-        tails = [Tail(k[:within], bounds[:within], None, scale) for bounds in _bounds(k, np.array(kernels), load, few)]
-        best = min(range(len(choice)), key=lambda i: _left(tails[i], rtol))
-        choice, kernels = choice[best : best + 1], kernels[best : best + 1]
-    return Tail(k[:within], _bounds(k, np.array(kernels), load, r)[0, :within], choice[0], scale)
+    top = tail(materials[0])
+    if len(choice) == 1 or top.start(rtol * scale) <= _SOON * k[0]:
+        return top
+    few = np.array([r.min(), r[np.argmin(np.abs(r - loads[0].reach))], r.max()])
+    bounds = _bounds(k, np.array([less(material) for material in choice]), loads, few)
+    left = [_left(Tail(k[:within], bound[:within], (), scale), rtol) for bound in bounds]
+    return tail(choice[left.index(min(left))])
 
 
 def _left(tail: Tail, rtol: float) -> tuple[float, float, float]:
@@ -90,12 +114,13 @@ def _left(tail: Tail, rtol: float) -> tuple[float, float, float]:
     return max(rest, 0.4 * rtol * tail.scale), stop, rest
 
 
-def _bounds(k: np.ndarray, kernels: w.Array, load: Load, r: np.ndarray) -> np.ndarray:
+def _bounds(k: np.ndarray, kernels: w.Array, loads: Sequence[Load], r: np.ndarray) -> np.ndarray:
     """Return the bounds from each wavenumber on, shape (kernels, wavenumbers, rows, radii); kernels (.., rows, k)."""
-    kernels = np.swapaxes(kernels, 1, 2)
+    kernels, load = np.swapaxes(kernels, 1, 2), loads[0]
+    orders = tuple(order for one in loads for order in one.orders)
     size = np.abs(kernels)[..., None]
     phase = k[:, None] * r
-    waves = load.envelope(k)[:, None, None] * bessel_bounds(load.orders, phase).swapaxes(0, 1)
+    waves = load.envelope(k)[:, None, None] * bessel_bounds(orders, phase).swapaxes(0, 1)
     by_envelope = _from_right(k, size * waves)
     variation = size.copy()
     variation[:, :-1] += np.cumsum(np.abs(np.diff(kernels, axis=1))[:, ::-1], axis=1)[:, ::-1, :, None]
