@@ -26,14 +26,11 @@ from unitcad.errors import UnitcadError
 
 _MAX_ROUNDS = 40
 _MOST_SAMPLES = 8_192  # kernel values worked out at once
-_FEW, _LOOSE, _LESS_LOOSE = 6, 1e-3, 1e-5
-"""Panels up to the last pole for a loose rtol, twice as many for others; and from where what lies next to k = 0 may be
-cut sparsely. To cut a panel later takes longer than to begin with two, where both are mostly needed.
-"""
 _PHASE_RTOL = 1e-8
 """From which on pieces are of `PHASE`: there the rule is off by some 1e-9 of the waves over a piece."""
 _FIRST_PIECES = 32
-_DEGREES_SEEN = 14
+_FAR = 2.0
+"""Of a panel's half: the distance of a pole that leaves few of the last coefficients."""
 _CLEAR = 0.3
 """Of a pole's distance from its panel: how uncertain it may be where it says how far to halve."""
 _MOST_TIMES = 9
@@ -158,7 +155,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
     far = PHASE / span * MAX_PANELS * 5 / 6  # the others are there to be halved: a tail cut short says so
     beyond = grid(load, r, z, end)
     stop = _first_stop(beyond, end, rtol, PHASE / span)
-    pending = from_origin(end, stop, span, materials, _FEW if rtol >= _LOOSE else 2 * _FEW, rtol >= _LESS_LOOSE)
+    pending = from_origin(end, stop, span, materials)
     k, slope = nodes(pending)
     raw = bare.kernel(np.concatenate([beyond, k.ravel()]))
     by_body = np.split(raw[:, : beyond.size], len(each))
@@ -215,7 +212,7 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
             quadrature += put_off.hidden[due].sum(0)
             turned = np.concatenate([pieces[now], put_off.pieces[due]]).reshape(-1, 4)
             halves = bad & ~now
-            times = np.where(later, 1, _times(found, limit))[halves]
+            times = np.where(later, 1, _times(found))[halves]
             cut, origin = halved_towards(pending[halves], found.poles.at[halves], times)
             of = np.where(later, np.cumsum(later) - 1, -1)[halves][origin]
             pending = np.concatenate([cut, turned])
@@ -249,17 +246,16 @@ def _first_stop(beyond: np.ndarray, end: float, rtol: float, longest: float) -> 
     return float(max(aim, beyond[0]))
 
 
-def _times(found: Evaluated, enough: float) -> np.ndarray:
-    """Return how often each panel is to be halved towards its pole until it gains no more than `enough`, shape (n,).
+def _times(found: Evaluated) -> np.ndarray:
+    """Return how often each panel is to be halved towards its pole until that is not much nearer than `_FAR`, (n,).
 
-    A pole at sinh(x) over a panel's half leaves e^(-x) of a Legendre coefficient in the next one. Once where no single
-    pole is seen, or where so many times would not suffice: a detour may serve, and panels too short for it keep more of
-    its rounding.
+    Once where no single pole is seen, or where so many times would not suffice: a detour may serve, and panels too
+    short for it keep more of its rounding. No tolerance is in it: those of a tighter
+    rtol stay pieces of a looser one's.
     """
     at = found.poles.at
     away = np.maximum(np.abs(at - np.clip(at.real, -1.0, 1.0)), 1e-9)
-    needed = np.arcsinh(away) + np.log(np.maximum(found.gains / enough, 1.0)) / _DEGREES_SEEN
-    times = np.ceil(np.log2(np.sinh(needed) / away))
+    times = np.floor(np.log2(_FAR / away))
     within = (found.poles.uncertainty < _CLEAR * away) & (times > 1) & (times <= _MOST_TIMES)
     return np.where(within, times, 1).astype(int)
 

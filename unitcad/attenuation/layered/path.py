@@ -15,6 +15,7 @@ PHASE = 8.0 * np.pi
 MAX_PANELS = 40_000
 MOST_PIECES = 16
 """Of a panel beyond all poles, each with waves of that phase."""
+_LEAST_PANELS = 12  # up to the last pole: with fewer, most are cut later, which takes longer
 _MAX_HALVINGS = 40
 
 
@@ -26,24 +27,20 @@ def wavenumbers(panels: w.Array, s: w.Array) -> tuple[w.Array, w.Array]:
     return np.where(turn == 0, s, base + turn * s * s), np.where(turn == 0, 1.0, 2.0 * turn * s)
 
 
-def from_origin(
-    end: float, stop: float, span: float, materials: tuple[w.Material, ...], least: int = 6, sparse: bool = False
-) -> w.Array:
-    """Return the panels from 0 to `stop`, which is beyond `end`; span: phase per unit wavenumber (m).
+def from_origin(end: float, stop: float, span: float, materials: tuple[w.Material, ...]) -> w.Array:
+    """Return the panels from 0 to `stop`, beyond `end` and the first panel; span: phase per unit wavenumber (m).
 
-    They are of one length up to `end`, at `least` so many. The one at k = 0 is halved towards 0 until it is shorter
-    than the least wavenumber of a material: a stiff half-space's branch points and pole lie there, too small a feature
-    for a long panel's last coefficients. `sparse`: two of three of these corners are left out, but not the last.
+    They are of one length up to `end`. The one at k = 0 is halved towards 0 until it is shorter than the least
+    wavenumber of a material: a stiff half-space's branch points and pole lie there, too small a feature for a long
+    panel's last coefficients. No tolerance is in it: panels of a tighter one are to be pieces of those of a looser one.
     """
     longest = PHASE / span
-    line = np.linspace(0.0, end, max(least, int(np.ceil(end / longest))) + 1)
-    line = _continued(line if end > 0 else np.array([0.0, min(stop, longest) / 8.0]), stop, longest)
+    line = np.linspace(0.0, end, max(_LEAST_PANELS, int(np.ceil(end / longest))) + 1)
+    line = _continued(line if end > 0 else np.array([0.0, longest / 8.0]), stop, longest)
     shortest = min(abs(m.ks2) ** 0.5 * (m.eps**0.5 or 1.0) for m in materials if m.shear != 0)
     if 0.0 < shortest < line[1]:
-        halvings = 3 * int(np.ceil((min(np.log2(line[1] / shortest), _MAX_HALVINGS) + 1.0) / 3.0))
-        powers = np.arange(halvings + 1)
-        kept = powers[(powers % 3 == 0) | (powers == 1)] if sparse else powers
-        line = np.concatenate([[0.0], line[1] * 2.0 ** -kept[::-1], line[2:]])
+        halvings = min(int(np.ceil(np.log2(line[1] / shortest))) + 1, _MAX_HALVINGS)
+        line = np.concatenate([[0.0], line[1] * 2.0 ** -np.arange(halvings, -1.0, -1.0), line[2:]])
     return _turned(line, _branch_points(materials[-1]), 1.0 / span)
 
 
