@@ -128,8 +128,8 @@ class Problem:
 class Integrals:
     """A row an order of the load at each radius, shape (rows, n), and a bound of its error.
 
-    cut_short: most of it is the tail's beyond what can be afforded, or all but little is that or rounding's;
-    exhausted: there were panels left to be halved.
+    cut_short: all but little of it is rounding's, or the tail's beyond what can be afforded; exhausted: there were
+    panels left to be halved.
     """
 
     total: np.ndarray
@@ -231,9 +231,8 @@ def integrate(bare: Problem, end: float, rtol: float, largest: float) -> Integra
         kernel = problem.kernel(k.ravel()).reshape(-1, *k.shape) * slope
     rest = tail.bound(stop)
     error = quadrature + skipped + rest + 4e-15 * size + rounded
-    whole_error = float(np.max(error))
     to_gain = gained + float(skipped.max() + rest.max()) - least
-    cut_short = least > 0.5 * whole_error or to_gain < _WORTH * whole_error
+    cut_short = to_gain < _WORTH * float(np.max(error))
     return Integrals(known + total, error, count, cut_short, exhausted)
 
 
