@@ -18,6 +18,9 @@ from typing import Any
 
 from unitcad import __version__
 
+EFFORT = 6
+"""Of the compression: half the time of the greatest, pages a hundredth larger."""
+
 
 def html_page(
     data: dict[str, Any],
@@ -43,7 +46,7 @@ def html_page(
 def packed(data: dict[str, Any]) -> str:
     """Return data as JSON, compressed and in base 64."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
-    return base64.b64encode(gzip.compress(text.encode("utf-8", "replace"), 9, mtime=0)).decode()
+    return base64.b64encode(gzip.compress(text.encode("utf-8", "replace"), EFFORT, mtime=0)).decode()
 
 
 def document(

@@ -12,6 +12,7 @@ from unitcad.pipeline.artifacts import GEOMETRIC
 from unitcad.pipeline.bodies import glb_content
 from unitcad.pipeline.geometry import build_key
 from unitcad.pipeline.scenes import moments, taken_apart, unit_apart
+from unitcad.report.html_page import EFFORT
 from unitcad.spec import Spec, read_toml, with_formats
 from unitcad.validation import from_data
 
@@ -51,4 +52,4 @@ def cells(moulds: MouldSet) -> list[list[float]]:
 
 def compressed(content: bytes) -> str:
     """Return a file's content compressed, in base 64."""
-    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+    return base64.b64encode(gzip.compress(content, EFFORT, mtime=0)).decode()
