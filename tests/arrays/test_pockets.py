@@ -15,11 +15,12 @@ from unitcad.errors import Refusal
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
-from unitcad.mould_checks import check_moulds
+from unitcad.mould_checks import check_moulds, overlap
 from unitcad.moulds.cavities import BALANCE
 from unitcad.shape import Shape, box, cut, cylinder, moved, polygon, union
 from unitcad.shape.tree import Revolve
 from unitcad.spec import printer_of
+from unitcad.validation import load
 
 POCKETS = ["forearm-pockets", "hex-19"]
 
@@ -55,6 +56,52 @@ def test_a_pocket_is_smaller_than_its_unit_by_the_hold() -> None:
         x, y = place.x, place.y
         assert (solid ^ moulds.meshes([moved(free, x, y)])[0]).volume() == 0
         assert (solid ^ moulds.meshes([moved(cylinder(6.7, -1, 9), x, y)])[0]).volume() > 1
+
+
+LAYOUT = {"kind": "grid", "columns": 2, "rows": 2, "pitch_mm": 24}
+
+
+def _of(unit: str, **more: Any) -> dict[str, Any]:
+    return {"name": "own", "array": "pockets", "unit": unit, "layout": LAYOUT, **more}
+
+
+@pytest.mark.parametrize(
+    ("unit", "why"), [("custom/strap-lugs", r"reaches 12\.5 mm"), ("custom/dome", "where the sheet lies")]
+)
+def test_a_unit_that_is_no_disc_is_refused_with_one_that_is_held(unit: str, why: str) -> None:
+    name = unit.rpartition("/")[2]
+    placed = _of("encapsulating", place=[{"at": "B2", "unit": unit}], sheet={"thickness_mm": 1.5})
+    for field, data in (("unit", _of(unit)), ("place.0.unit", placed)):
+        with pytest.raises(Refusal, match=why) as refused:
+            load_array(data)
+        assert (refused.value.field, refused.value.value) == (field, name)
+        assert load_array(data, {field: refused.value.nearest})
+
+
+def test_a_tail_that_leaves_at_the_sheet_is_refused() -> None:
+    with pytest.raises(Refusal, match="leave where the sheet lies") as refused:
+        load_array(_of("custom/film-closed", sheet={"thickness_mm": 3.3}))
+    assert refused.value.field == "unit"
+    assert [f for f in check_moulds(patch_moulds(load_array(_of("custom/film-closed")))) if not f.ok] == []
+
+
+@pytest.mark.parametrize("name", POCKETS)
+def test_finished_units_share_space_with_nothing_but_the_hold(name: str) -> None:
+    found = [f for f in check_moulds(patch_moulds(load_array(name))) if f.code == "C200" and "sheet" in f.where]
+    assert found
+    assert all(f.ok for f in found)
+
+
+def test_units_that_meet_each_other_or_the_sheet_are_caught() -> None:
+    """A tail turned into a neighbour, and lugs that no refusal kept out: 12 by 4 by 1.5 mm through the sheet."""
+    array = load_array("forearm-pockets")
+    turned = replace(array, places=(replace(array.placed("A1"), angle_deg=0.0), *array.places[1:]))
+    assert {f.where for f in overlap.findings(patch_moulds(turned)) if not f.ok} == {"unit: A1 and A2"}
+    array = load_array(_of("encapsulating"))
+    lugs = replace(array, places=tuple(replace(place, unit=load("custom/strap-lugs")) for place in array.places))
+    caught = {f.where: f.value for f in overlap.findings(patch_moulds(lugs)) if not f.ok}
+    assert caught["unit: sheet and A1"] > 10
+    assert caught["unit: A2 and B2"] > 1
 
 
 _FAULTS = [

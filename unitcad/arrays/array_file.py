@@ -16,20 +16,21 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.arrays.array import Array, Placed, Sheet
-from unitcad.arrays.array_tables import AskedArray, PlaceTable
+from unitcad.arrays.array_tables import AskedArray
+from unitcad.arrays.asked_places import layout_of, places_of
 from unitcad.arrays.construction import Construction, construction_of
-from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point, layouts
+from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point
 from unitcad.arrays.layouts.ring import RingTable
 from unitcad.arrays.sheet_outline import middle_radius, sheet_of
 from unitcad.arrays.tail_ways import Blocked, angles
 from unitcad.designs.limits import up
-from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument, unknown_name
+from unitcad.errors import Refusal, UnitcadError, UnknownKey, WrongArgument
 from unitcad.files import read_text
 from unitcad.shape import mm
 from unitcad.spec import Spec, convert, read_toml, to_data
 from unitcad.spec.custom_code import with_source
 from unitcad.spec.toml import text_of
-from unitcad.validation import custom_templates, from_data, templates
+from unitcad.validation import custom_templates, default_template, from_data, templates
 from unitcad.validation.dotted import ABSENT, at
 from unitcad.validation.faults import line_of
 from unitcad.validation.load import changed, override
@@ -154,7 +155,7 @@ def array_of(data: Mapping[str, Any]) -> Array:
     """Return the array of plain data whose units are whole specs. Raises Refusal for the first unfit value."""
     try:
         asked = convert(data, AskedArray)
-        table, kind = _layout(asked)
+        table, kind = layout_of(asked)
     except UnknownKey as key:
         limit = key.limit.replace("`unitcad schema`", "`unitcad schema array`")
         raise UnknownKey(key.field, key.value, limit, key.nearest) from None
@@ -167,7 +168,7 @@ def array_of(data: Mapping[str, Any]) -> Array:
     points = _points(kind, table, asked.body.radius_mm)
     if len(points) > MOST_PLACES:
         raise Refusal("layout", len(points), f"an array has at most {MOST_PLACES} units")
-    places = _places(asked, points)
+    places = places_of(asked, points)
     unit = _unit(asked.unit, "unit", data)
     units = [unit] * len(points)
     for index, i in places.items():
@@ -181,6 +182,7 @@ def array_of(data: Mapping[str, Any]) -> Array:
     if middle is not None:
         points = _points(kind, table, middle)
     sheet = sheet_of(asked, way, points, units)
+    _check_held(way, data, sheet, units, asked, places)
     if middle is not None:
         apart = max(unit.diameter_mm + way.apart(unit)[0] for unit in units)
         _check_closes(asked, table, sheet, middle, apart)
@@ -255,47 +257,6 @@ def _unit_tables(settled: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [settled["unit"], *(place["unit"] for place in settled.get("place", ()) if "unit" in place)]
 
 
-def _layout(asked: AskedArray) -> tuple[Any, LayoutKind]:
-    """Return the layout's table and kind."""
-    name = asked.layout.get("kind")
-    if name is None:
-        raise Refusal("layout.kind", None, f"is required: one of {', '.join(layouts())}")
-    if not isinstance(name, str) or name not in layouts():
-        raise unknown_name("layout.kind", str(name), layouts())
-    kind = layouts()[name]
-    return convert(asked.layout, kind.table, "layout"), kind
-
-
-def _places(asked: AskedArray, points: list[Point]) -> dict[int, int]:
-    """Return the number of each point that a [[place]] speaks of, with that table's number."""
-    found: dict[int, int] = {}
-    for i, place in enumerate(asked.place):
-        index = _number(place, i, points)
-        if index in found:
-            raise Refusal(f"place.{i}.at", _shown(place), f"place.{found[index]} speaks of it too")
-        found[index] = i
-    return found
-
-
-def _number(place: PlaceTable, i: int, points: list[Point]) -> int:
-    """Return the number of the point that a place speaks of."""
-    if isinstance(place.at, str):
-        names = [p.name for p in points]
-        if place.at not in names:
-            raise unknown_name(f"place.{i}.at", place.at, names)
-        return names.index(place.at)
-    column, row = place.at
-    there = {(p.column + 1, p.row + 1): n for n, p in enumerate(points)}
-    if (column, row) not in there:
-        nearest = min(there, key=lambda at: (abs(at[0] - column) + abs(at[1] - row), at))
-        raise Refusal(f"place.{i}.at", [column, row], "there is no such column and row", list(nearest))
-    return there[column, row]
-
-
-def _shown(place: PlaceTable) -> object:
-    return place.at if isinstance(place.at, str) else list(place.at)
-
-
 def _unit(given: str | dict[str, Any], field: str, data: Mapping[str, Any]) -> Spec:
     """Return a unit's spec, with the array's tables over its own; refusals name the field in the array's file."""
     if isinstance(given, str):  # not expanded: plain data that names a template
@@ -312,6 +273,31 @@ def _unit(given: str | dict[str, Any], field: str, data: Mapping[str, Any]) -> S
         place = refusal.field if own else f"{field}.{refusal.field}"
         kind = UnknownKey if isinstance(refusal, UnknownKey) else Refusal
         raise kind(place, refusal.value, refusal.limit, refusal.nearest) from None
+
+
+def _check_held(
+    way: Construction,
+    data: Mapping[str, Any],
+    sheet: Sheet,
+    units: list[Spec],
+    asked: AskedArray,
+    places: dict[int, int],
+) -> None:
+    """Raise Refusal for a unit that the sheet can't hold, with a template's name that is accepted there."""
+    fields = {n: f"place.{i}.unit" for n, i in places.items() if asked.place[i].unit is not None}
+    for field, unit in {fields.get(n, "unit"): unit for n, unit in enumerate(units)}.items():
+        if why := way.unfit(unit, sheet):
+            known = sorted(templates(), key=lambda name: name != default_template())
+            raise Refusal(field, unit.name, why, next((name for name in known if _accepted(data, field, name)), None))
+
+
+def _accepted(data: Mapping[str, Any], field: str, value: object) -> bool:
+    """Tell whether plain data is accepted with another value in a field."""
+    try:
+        array_of(changed(data, [(field, value)]))
+    except UnitcadError:
+        return False
+    return True
 
 
 def _check_apart(

@@ -9,7 +9,7 @@ from functools import cache
 from importlib import import_module
 from typing import NamedTuple
 
-from unitcad.arrays.array import Array
+from unitcad.arrays.array import Array, Sheet
 from unitcad.arrays.array_tables import Cast
 from unitcad.arrays.array_tables import Construction as Name
 from unitcad.errors import Refusal
@@ -35,6 +35,7 @@ class Construction:
     thickness_mm  of the sheet where the file gives none
     apart         least distance between the edges of two units, mm, and why
     level         from the distinct units, a thickness and the limb's radius (None: flat) to where the sheet lies
+    unfit         from a unit and the sheet to why the sheet can't hold it; "" where it can
     bodies        the silicone that an array has besides its units, as cast
     plan          tools and pours of those bodies; raises Refusal where they can't be made
     assembly      how motors and circuit go into what was cast, a sentence each; () where they are in the units
@@ -50,6 +51,7 @@ class Construction:
     level: Callable[[tuple[Spec, ...], float, float | None], Level]
     bodies: Callable[[Array], tuple[Body, ...]]
     plan: Callable[[Array], Plan]
+    unfit: Callable[[Spec, Sheet], str] = lambda _, __: ""
     assembly: Callable[[Array], tuple[str, ...]] = lambda _: ()
     greased: Callable[[Array, int], str] = lambda _, __: ""
     cast: Cast = "flat"

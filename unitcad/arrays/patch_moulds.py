@@ -14,11 +14,11 @@ from unitcad.arrays.array import Array
 from unitcad.arrays.circuit.laid import laid_circuit
 from unitcad.arrays.construction import Construction, construction_of
 from unitcad.arrays.limb_frame import at_place
-from unitcad.arrays.patch import patch_bodies
+from unitcad.arrays.patch import SHEET, patch_bodies
 from unitcad.designs import Dimensions, unit_bodies
 from unitcad.moulds.mould_set import MouldSet, geometric
 from unitcad.moulds.plan import Plan, Step
-from unitcad.shape import moved
+from unitcad.shape import Shape, cut, cylinder, moved
 from unitcad.shape.body import Body
 from unitcad.spec import Spec, to_json, with_formats
 from unitcad.spec.effective import CastLayer
@@ -89,6 +89,26 @@ class PatchMoulds(MouldSet):
             return ()
         low = self.arranged.sheet.low
         return tuple(replace(body, shape=moved(body.shape, z=-low)) for body in patch_bodies(self.arranged)[1:])
+
+    @cached_property
+    def together(self) -> tuple[tuple[str, tuple[Shape, ...]], ...]:
+        """What shares the space of the patch, by name: of pockets the units, and the sheet as it lies round them.
+
+        A pocket is stretched to its unit's radius: what the hold takes of the sheet is none of the overlap. A turned
+        unit's polygon lies within the circle round the pocket's.
+        """
+        if not self.construction.own_tails:
+            return super().together
+        array, round_polygon = self.arranged, 1 / math.cos(math.pi / self.segments)
+        (sheet,) = self.unit
+        high = array.sheet.thickness_mm
+        open_to = [
+            moved(cylinder(place.radius * round_polygon, -high, 2 * high), place.x, place.y) for place in array.places
+        ]
+        units: dict[str, list[Shape]] = {place.name: [] for place in array.places}
+        for body in self.pushed_in:
+            units[body.name.partition("-")[0]].append(body.shape)
+        return (SHEET, (cut(sheet.shape, open_to),)), *((name, tuple(shapes)) for name, shapes in units.items())
 
     @cached_property
     def cast_flat(self) -> PatchMoulds | None:

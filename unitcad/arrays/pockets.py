@@ -16,13 +16,14 @@ The tray is drawn from lengths, not by subtracting the sheet: C100 compares the 
 
 from __future__ import annotations
 
-from unitcad.arrays.array import Array
+from unitcad.arrays.array import Array, Sheet
 from unitcad.arrays.construction import Construction, Level
 from unitcad.arrays.outlines import rounded, slot_profile
 from unitcad.arrays.tray import tray_plan
-from unitcad.designs import dimensions, layer_colour
+from unitcad.designs import design_of, dimensions, layer_colour, unit_bodies
+from unitcad.errors import UnitcadError
 from unitcad.moulds.plan import Plan
-from unitcad.shape import Extrude, Shape, cut, cylinder, moved
+from unitcad.shape import Extrude, Shape, cut, cylinder, moved, ring
 from unitcad.shape.body import Body
 from unitcad.spec import Spec
 
@@ -30,6 +31,10 @@ LEAST_WEB = 2.0
 """Silicone between two pockets, at least, mm (assumed): a narrower strip tears as a unit is pushed in."""
 BEYOND = 1.0
 """How far a cutting tool reaches past what it cuts, mm."""
+OFF_ROUND = 0.05
+"""How far a unit's outline may lie off its disc, mm (assumed): a quarter of the usual hold."""
+SLIVER = 1e-6
+"""Volume that is rounding's, mm3."""
 
 
 def apart(unit: Spec) -> tuple[float, str]:
@@ -46,6 +51,40 @@ def level(units: tuple[Spec, ...], thickness: float, radius: float | None) -> Le
     most = max(back - over, min(under, back))
     top = back if back - over >= thickness - 1e-9 else min(under, back)
     return Level(top - thickness, top, most)
+
+
+def unfit(unit: Spec, sheet: Sheet) -> str:
+    """Return why a sheet's pocket can't hold a unit, "" where it can: the unit is a disc of its diameter there.
+
+    Nothing but tails reaches beyond that disc, they do so under or over the sheet, and at the sheet the silicone
+    fills the disc's edge. Where a design can't be drawn, that is said when it is drawn.
+    """
+    if design_of(unit).tooling == "concentric":
+        return ""  # rings of these radii: their tails leave where `level` looks
+    from unitcad.kernels.mesh import realise, segment_count
+    from unitcad.moulds.cavities import united
+
+    try:
+        bodies = unit_bodies(unit)
+    except UnitcadError:
+        return ""
+    radius, segments = unit.diameter_mm / 2, segment_count(unit.diameter_mm, unit.output.tolerance_mm)
+    made = united(realise(body.shape, segments) for body in bodies if body.made != "bought")
+    whole = united(realise(body.shape, segments) for body in bodies)
+    disc = f"a pocket holds a disc of diameter_mm = {unit.diameter_mm:g}"
+    low, high = made.bounding_box()[2::3]
+    beyond = made - realise(cylinder(radius + OFF_ROUND, low - BEYOND, high + BEYOND), segments)
+    if beyond.volume() > SLIVER:
+        x0, y0, _, x1, y1, _ = beyond.bounding_box()
+        return f"{disc}, and this unit reaches {max(-x0, -y0, x1, y1):.3g} mm from its axis"
+    at_sheet = realise(cylinder(radius + OFF_ROUND, sheet.low, sheet.high), segments)
+    across = whole.trim_by_plane((0, 0, 1), sheet.low).trim_by_plane((0, 0, -1), -sheet.high) - at_sheet
+    if across.volume() > SLIVER:
+        return f"its circuit or wires leave where the sheet lies, {sheet.low:.3g} to {sheet.high:.3g} mm over the skin"
+    edge = ring(radius - OFF_ROUND - sheet.hold_mm, radius - OFF_ROUND, sheet.low, sheet.high)
+    if (realise(edge, segments) - made).volume() > SLIVER:
+        return f"{disc}; where the sheet lies, {sheet.low:.3g} to {sheet.high:.3g} mm over the skin, this unit is none"
+    return ""
 
 
 def sheet(array: Array) -> Shape:
@@ -80,4 +119,5 @@ CONSTRUCTION = Construction(
     level=level,
     bodies=bodies,
     plan=plan,
+    unfit=unfit,
 )

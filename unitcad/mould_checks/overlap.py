@@ -1,4 +1,7 @@
-"""C200: no two solids of the unit, or of an assembled pour, share volume. Ribs count as crushed: C220 looks at them."""
+"""C200: no two solids of the unit, of a patch, or of an assembled pour, share volume.
+
+Ribs count as crushed: C220 looks at them. A pocket counts as stretched round its unit: C310 looks at its strain.
+"""
 
 from __future__ import annotations
 
@@ -43,8 +46,8 @@ def _of_layers(moulds: MouldSet, volumes: _Volumes) -> dict[tuple[str, str], flo
 
 
 def of_unit(moulds: MouldSet, volumes: _Volumes | None = None) -> list[MouldFinding]:
-    """Look at the unit alone; `volumes` keeps what its pairs share."""
-    there = [(body.name, [moulds.mesh(body)]) for body in (*moulds.unit, *moulds.laid_later)]
+    """Look at the unit, or the patch, alone; `volumes` keeps what its pairs share."""
+    there = [(name, moulds.meshes(shapes)) for name, shapes in moulds.together]
     return _findings("unit", there, volumes or _Volumes())
 
 

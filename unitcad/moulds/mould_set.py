@@ -112,6 +112,11 @@ class MouldSet:
         """What is pushed into the cast sheet from its side towards the skin, each body's name after its place's."""
         return ()
 
+    @cached_property
+    def together(self) -> tuple[tuple[str, tuple[Shape, ...]], ...]:
+        """What shares the space of the finished unit, by name: its bodies, and what goes in after casting."""
+        return tuple((body.name, (body.shape,)) for body in (*self.unit, *self.laid_later))
+
     @property
     def cast_flat(self) -> MouldSet | None:
         """The set of the inner layers alone, where these are cast flat and laid into the last pour; else None."""
