@@ -1,5 +1,7 @@
 """C210: faces that must slide have the printer's clearance: skirt and plinth, or pins, tongue and window, lid and cup.
 
+Pins and the slits beside a base's fins have the clearance asked for, and no less than the printer's own play.
+
 The skirt is measured below the seat, where cup and plinth touch on purpose, and beside its ribs, which reach into the
 plinth; the lid's below the rim. Round corners are polygons of as many sides a turn on both pieces: midway along a facet
 their gap is the clearance's cosine of pi / n. In moulds by complement the gap to what stands on the base is that of
@@ -24,6 +26,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.pins import PIN_RADIUS, Pins
 from unitcad.shape import cylinder, moved
 from unitcad.shape.profile import GRID_PER_MM
+from unitcad.spec.effective import Moulds
 
 KNIFE = "the base carries an edge thinner than that clearance: give the silicone over it a corner less sharp"
 THIN = 1e-3
@@ -38,6 +41,8 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
     lengths, solids = moulds.spec.moulds, moulds.solids
     skirt, window = min(lengths.plinth_clearance_mm, lengths.seat_relief_mm), lengths.window_clearance_mm
     play = lengths.plinth_clearance_mm
+    pins = moulds.plan.pins
+    beside_base, advice = (least_play(lengths), too_tight(lengths)) if pins else (window, KNIFE)
     for step in moulds.plan.steps:
         base = solids[moulds.plan.base_of(step)]
         if step.cup not in solids:
@@ -46,15 +51,15 @@ def findings(moulds: MouldSet) -> Iterator[MouldFinding]:
             continue  # what stands alone slides on nothing
         cup = solids[step.cup]
         beside = cup - moulds.rib_spaces
-        if pins := moulds.plan.pins:
+        if pins:
             yield _on_pins(moulds, step.cup, beside, base, pins)
         else:
             gap = beside.trim_by_plane((0, 0, -1), skirt).min_gap(base, skirt + 1)
             yield at_least("C210", f"{step.cup} skirt and plinth", gap, skirt * chord - GRID, "mm")
         if not moulds.plan.concentric:
-            gap = _sideways((beside, base), _above_seat((beside, base)), window + 1)
+            gap = _sideways((beside, base), _above_seat((beside, base)), beside_base + 1)
             where = f"{step.cup} and what stands on the base"
-            yield at_least("C210", where, gap, window * chord - GRID, "mm", KNIFE)
+            yield at_least("C210", where, gap, beside_base * chord - GRID, "mm", advice)
         for tongue in moulds.plan.standing(step, "tongue"):
             gap = cup.min_gap(solids[tongue.name], window + 1)
             yield at_least("C210", f"{step.cup} window and {tongue.name}", gap, window - GRID, "mm")
@@ -75,8 +80,25 @@ def _on_pins(moulds: MouldSet, name: str, piece: Manifold, base: Manifold, pins:
     top = seat + pins.height
     heights = [seat, *corners[beside & (corners[:, 2] > seat) & (corners[:, 2] < top), 2].tolist(), top]
     gap = _sideways((piece, base), heights, play + 1, (rooms, columns))
-    limit = play * math.cos(math.pi / moulds.segments) - GRID
-    return at_least("C210", f"{name} holes and pins", gap, limit, "mm")
+    lengths = moulds.spec.moulds
+    limit = max(play, least_play(lengths)) * math.cos(math.pi / moulds.segments) - GRID
+    return at_least("C210", f"{name} holes and pins", gap, limit, "mm", too_tight(lengths))
+
+
+def least_play(lengths: Moulds) -> float:
+    """Return what pieces without ribs keep between them: the clearance asked for, or the printer's own play, mm."""
+    return max(lengths.plinth_clearance_mm, lengths.xy_play_mm)
+
+
+def too_tight(lengths: Moulds) -> str:
+    """Write what to change where pieces have less than `least_play` between them."""
+    asked, play = lengths.plinth_clearance_mm, lengths.xy_play_mm
+    if asked >= play:
+        return "the clearance (moulds.plinth_clearance_mm) is missing"
+    return (
+        f"moulds.plinth_clearance_mm = {asked:g} is less than the printer's own play, moulds.xy_play_mm = {play:g}: "
+        f"give it {play:g} or more"
+    )
 
 
 def _above_seat(solids: Iterable[Manifold]) -> Iterator[float]:

@@ -1,8 +1,8 @@
 """C250: every printed piece fits the bed, and the pieces of a split tool fit together.
 
-Measured on the meshes. What a tool has and its pieces lack is the gap: it is as wide as the play, no wider and no
-narrower, the pieces share no volume and slide together along z. What of the gap a pour's silicone can reach, with tape
-or petroleum jelly under each tool, is what weeps into it.
+Measured on the meshes. What a tool has and its pieces lack is the gap: it is as wide as the play asked for, no wider
+and no narrower, and no narrower than the printer's own play. The pieces share no volume and slide together along z.
+What of the gap a pour's silicone can reach, with tape or petroleum jelly under each tool, is what weeps into it.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from unitcad.kernels.mesh import arrays
 from unitcad.mould_checks.check import MouldCheck
 from unitcad.mould_checks.draw import BLOCKED, blocked
 from unitcad.mould_checks.finding import MouldFinding, at_least, at_most
+from unitcad.mould_checks.gap import least_play, too_tight
 from unitcad.mould_checks.overlap import OVERLAP
 from unitcad.moulds.cavities import united
 from unitcad.moulds.dovetails import Split
@@ -75,7 +76,8 @@ def _gap(moulds: MouldSet, split: Split) -> Manifold:
 def _of_split(moulds: MouldSet, split: Split, gap: Manifold) -> Iterator[MouldFinding]:
     """Look at overlap, gap and way in of neighbouring pieces, at the widest gap, and for what the tool has not."""
     whole, pieces = moulds.solids[split.tool], [(piece.name, moulds.mesh(piece)) for piece in split.pieces]
-    play = moulds.spec.moulds.plinth_clearance_mm
+    lengths = moulds.spec.moulds
+    play, least = lengths.plinth_clearance_mm, least_play(lengths)
     # With the gap the pieces have the tool's volume, and what they have beyond it, or two of them have in common.
     beyond = max(sum(float(piece.volume()) for _, piece in pieces) + float(gap.volume() - whole.volume()), 0.0)
     if beyond > OVERLAP / 2:
@@ -84,8 +86,8 @@ def _of_split(moulds: MouldSet, split: Split, gap: Manifold) -> Iterator[MouldFi
     for (name, piece), (after, other) in _neighbours(pieces, split.columns):
         where = f"{name} and {after}"
         yield at_most("C250", f"{where}: overlap", float((piece ^ other).volume()), OVERLAP, "mm3")
-        narrowest = float(piece.min_gap(other, play + 1))
-        yield at_least("C250", f"{where}: narrowest gap", narrowest, play - GRID, "mm", "the printer's play is missing")
+        narrowest = float(piece.min_gap(other, least + 1))
+        yield at_least("C250", f"{where}: narrowest gap", narrowest, least - GRID, "mm", too_tight(lengths))
         facing = min(blocked(other, piece, (0, 0, way)) for way in (1, -1))
         yield at_most("C250", f"{where}: slide together", facing, BLOCKED, "mm2", "one piece is caught in the other")
     missing = "something of the tool is missing"
