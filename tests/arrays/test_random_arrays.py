@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from typing import Any
 
 import pytest
@@ -85,13 +86,19 @@ def test_a_random_array_on_a_small_bed_is_made_in_pieces_or_refused(seed: int) -
 
 
 def judge(data: dict[str, Any]) -> None:
-    """Build the moulds of an array file with every check, or see it refused with field and limit."""
+    """Build the moulds of an array file with every check, or see it refused with field, limit and what is accepted."""
     try:
         moulds = patch_moulds(load_array(data))
         findings = check_moulds(moulds)
     except Refusal as refusal:
         assert refusal.field
         assert refusal.limit
+        if (
+            type(refusal) is Refusal
+            and refusal.nearest is not None
+            and not re.search("also needs|; then", refusal.limit)
+        ):
+            assert patch_moulds(load_array(data, {refusal.field: refusal.nearest})).plan
         return
     broken = [f"{f.code} {f.where}: {f.value:.3g}, limit {f.limit:.3g} {f.unit}" for f in findings if not f.ok]
     assert broken == []

@@ -21,6 +21,8 @@ from unitcad.arrays.asked_places import layout_of, places_of
 from unitcad.arrays.construction import Construction, construction_of
 from unitcad.arrays.layouts import MOST_PLACES, LayoutKind, Point
 from unitcad.arrays.layouts.ring import RingTable
+from unitcad.arrays.made_plan import made_plan
+from unitcad.arrays.offers import offered
 from unitcad.arrays.sheet_outline import middle_radius, sheet_of
 from unitcad.arrays.tail_ways import Blocked, angles
 from unitcad.designs.limits import up
@@ -90,10 +92,16 @@ def load_array(source: ArraySource, set: Changes = ()) -> Array:
     whole = changed(override(written, ()), changes_of(set))
     try:
         return array_of(whole)
-    except Refusal as refusal:
+    except Refusal as first:
+        refusal = offered(first, whole, confirm_makeable)
         if path is not None:
             _locate(refusal, path, data, written, whole)
-        raise
+        raise refusal from None
+
+
+def confirm_makeable(data: Mapping[str, Any]) -> None:
+    """Raise Refusal for plain data of which no array, or no tools or circuit of it, can be made."""
+    made_plan(array_of(data))
 
 
 def _locate(
@@ -174,10 +182,11 @@ def array_of(data: Mapping[str, Any]) -> Array:
     for index, i in places.items():
         given = asked.place[i].unit
         if given is not None:
+            other = _unit(given, f"place.{i}.unit", data)
             if not way.mixed:
-                limit = f"{asked.array} casts all units in one pour, so they are of one kind; pockets hold others"
-                raise Refusal(f"place.{i}.unit", "...", limit)
-            units[index] = _unit(given, f"place.{i}.unit", data)
+                limit = f"a {asked.array} casts all units in one pour, so they are of one kind: leave it out, or take"
+                raise Refusal(f"place.{i}.unit", other.name, f"{limit} array = 'pockets'")
+            units[index] = other
     middle = middle_radius(asked, way, units)
     if middle is not None:
         points = _points(kind, table, middle)

@@ -11,11 +11,15 @@ from typing import TYPE_CHECKING
 from msgspec import structs
 
 from unitcad.arrays.array import Array
+from unitcad.arrays.array_file import confirm_makeable
 from unitcad.arrays.circuit.laid import laid_circuit
 from unitcad.arrays.construction import Construction, construction_of
 from unitcad.arrays.limb_frame import at_place
+from unitcad.arrays.made_plan import made_plan
+from unitcad.arrays.offers import offered, with_other_ways
 from unitcad.arrays.patch import SHEET, patch_bodies
 from unitcad.designs import Dimensions, unit_bodies
+from unitcad.errors import Refusal
 from unitcad.moulds.mould_set import MouldSet, geometric
 from unitcad.moulds.plan import Plan, Step
 from unitcad.shape import Shape, cut, cylinder, moved
@@ -175,7 +179,14 @@ class PatchMoulds(MouldSet):
     @cached_property
     def plan(self) -> Plan:
         """Tools and pours. Raises Refusal where the moulds can't be made."""
-        return self.altered or self.construction.plan(self.arranged)
+        if self.altered:
+            return self.altered
+        try:
+            return made_plan(self.arranged)
+        except Refusal as refusal:
+            asked, places = self.arranged.asked, len(self.arranged.places)
+            better = offered(refusal, asked, confirm_makeable)
+            raise with_other_ways(better, asked, places, confirm_makeable) from None
 
     @cached_property
     def dimensions(self) -> Dimensions:

@@ -148,6 +148,9 @@ def _too_large(spec: Spec, dims: Dimensions, lay: Layout, columns: int, rows: in
     )
     size = f"the plate of {2 * lay.plate[0]:.1f} x {2 * lay.plate[1]:.1f} mm exceeds the bed"
     by = f"by {max(over):.1f} mm"
+    moulds, (x, y) = spec.moulds, lay.plate
+    if 2 * x <= moulds.bed_y_mm and 2 * y <= moulds.bed_x_mm:
+        by += f"; turned by a quarter it fits: moulds.bed_x_mm = {moulds.bed_y_mm:g}, bed_y_mm = {moulds.bed_x_mm:g}"
     if still <= 1e-9:
         return Refusal("moulds.cavities", [columns, rows], f"{size} {by}", fits)
     nearest = math.floor((spec.diameter_mm - still - 1) * 100) / 100

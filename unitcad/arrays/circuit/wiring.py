@@ -109,10 +109,7 @@ def wiring(array: Array) -> Wiring:
         raise Refusal("circuit.rows", table.rows, limit, other)
     tenths = range(math.ceil(10 * table.row_width_mm) - 1, 9, -1)
     narrower = next((w / 10 for w in tenths if free(replace(table, row_width_mm=w / 10))[0]), None)
-    needed = up(2 * max(place.radius for place in array.places) + table.row_width_mm + 2 * CLEAR)
-    limit = (
-        f"no way for the spine is free, it runs into {blocked}; between two columns it needs a pitch of {needed:g} mm"
-    )
+    limit = f"no way for the spine is free, it runs into {blocked}"
     raise Refusal("circuit.row_width_mm", table.row_width_mm, limit, narrower)
 
 

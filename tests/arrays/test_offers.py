@@ -1,0 +1,89 @@
+"""What a refusal of an array offers is put in, and accepted; where more has to change, its sentence says what."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.errors import Refusal
+from unitcad.moulds.mould_set import MouldSet
+
+_SHEET = {"array": "back-sheet", "unit": "encapsulating"}
+_HEX = {**_SHEET, "layout": {"kind": "hex", "rings": 1, "pitch_mm": 20}}
+_SMALL_BED = {
+    **_SHEET,
+    "layout": {"kind": "grid", "columns": 5, "rows": 4, "pitch_mm": 19},
+    "moulds": {"bed_x_mm": 90, "bed_y_mm": 90},
+}
+_POINTS = {**_SHEET, "unit": "embedded", "layout": {"kind": "list", "points_mm": [[0, 0], [20, 0], [10, 40]]}}
+_RESIN = {"moulds.printer": "sla"}
+
+
+def refusal_of(source: Any, changes: dict[str, Any]) -> Refusal:
+    with pytest.raises(Refusal) as refused:
+        patch_moulds(load_array(source, changes)).plan  # noqa: B018
+    return refused.value
+
+
+def named(limit: str, before: str, after: str) -> dict[str, Any]:
+    """Return what a sentence names between two words, by paths."""
+    (part,) = re.findall(f"{before} (.*?)(?: {after}|;|$)", limit)
+    pairs = re.findall(r"([a-z_.0-9]+) = ('?)([^' ]+)", part)
+    return {path: text if quote else float(text) if "." in path and "mm" in path else int(text)
+            for path, quote, text in pairs}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("data", "changes", "field", "also"),
+    [
+        (_HEX, {}, "circuit.row_width_mm", {"circuit.corner_mm"}),
+        (_POINTS, {}, "unit.design", {"unit.layers.0.cap_mm", "unit.layers.1.cap_mm", "circuit.rows"}),
+        (_SMALL_BED, {}, "moulds.bed_x_mm", set()),
+    ],
+)
+def test_the_value_offered_is_accepted_with_what_it_also_needs(
+    data: dict[str, Any], changes: dict[str, Any], field: str, also: set[str]
+) -> None:
+    source = {"name": "offered", **data}
+    refused = refusal_of(source, changes)
+    assert refused.field == field
+    more = named(refused.limit, "also needs", "then") if also else {}
+    assert set(more) == also
+    assert patch_moulds(load_array(source, {**changes, field: refused.nearest, **more})).plan
+
+
+@pytest.mark.parametrize(
+    ("source", "changes", "words"),
+    [
+        ({"name": "hex", **_HEX}, {}, {"layout.pitch_mm": 22.0}),
+        ({"name": "small", **_SMALL_BED}, {}, {"layout.columns": 3}),
+        ("forearm-patch", _RESIN, {"layout.pitch_mm": 18.0, "sheet.strap_slot_mm.1": 21.0}),
+        ("sleeve-curved", {"moulds.bed_x_mm": 60}, {"layout.columns": 2}),
+    ],
+)
+def test_a_bed_or_circuit_too_small_names_the_layout_that_fits(
+    source: Any, changes: dict[str, Any], words: dict[str, Any]
+) -> None:
+    refused = refusal_of(source, changes)
+    found = named(refused.limit, "(?:on this bed|with this circuit)", "would do")
+    assert found == words
+    for path, value in found.items():
+        assert patch_moulds(load_array(source, {**changes, path: value})).plan
+
+
+def test_a_plate_that_fits_turned_by_a_quarter_says_so() -> None:
+    array = load_array("hex-19", _RESIN)
+    with pytest.raises(Refusal, match=r"turned by a quarter it fits: moulds\.bed_x_mm = 80, bed_y_mm = 130") as refused:
+        MouldSet(array.unit).plan  # noqa: B018
+    assert MouldSet(load_array(array, {"moulds.cavities": refused.value.nearest}).unit).plan
+    assert MouldSet(load_array(array, {"moulds.bed_x_mm": 80, "moulds.bed_y_mm": 130}).unit).plan
+
+
+def test_another_unit_in_a_back_sheet_is_named() -> None:
+    refused = refusal_of("forearm-patch", {"place": [{"at": "B2", "unit": "motor-10mm"}]})
+    assert (refused.field, refused.value, refused.nearest) == ("place.0.unit", "motor-10mm", None)
+    assert "leave it out" in refused.limit

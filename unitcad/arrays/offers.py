@@ -1,0 +1,147 @@
+"""What a refused array offers in place of the refused value: changes that are tried out, and accepted."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from unitcad.errors import Refusal, UnitcadError
+from unitcad.text import number
+from unitcad.validation.dotted import at, drop, put
+
+Judge = Callable[[dict[str, Any]], object]
+"""Makes an array of plain data; raises Refusal for what can't be made."""
+_MOST = 8
+"""Changes that are tried together."""
+_PITCHES = 3
+"""Pitches to either side of the present one that are tried."""
+_MANY = 64
+"""Of an array with more places no other pitch or slot is tried: a try takes seconds."""
+_OF_BED, _OF_CIRCUIT = "moulds.bed_", "circuit."
+_COUNTS: dict[str, dict[str, str]] = {
+    "grid": {"moulds.bed_x_mm": "columns", "moulds.bed_y_mm": "rows"},
+    "hex": {"moulds.bed_x_mm": "rings", "moulds.bed_y_mm": "rings"},
+    "ring": {"moulds.bed_x_mm": "count", "moulds.bed_y_mm": "bands"},
+}
+"""What makes an array of a kind of layout shorter along each side of the bed."""
+
+
+def offered(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> Refusal:
+    """Return the refusal of plain data, its nearest value one that is accepted, or with what has to change as well."""
+    if type(refusal) is not Refusal or refusal.nearest is None:
+        return refusal
+    changes: dict[str, object] = {refusal.field: refusal.nearest}
+    met = _met(data, changes, judge)
+    for _ in range(_MOST):
+        if met is None or met.nearest is None or changes.get(met.field) == met.nearest:
+            break
+        changes[met.field] = met.nearest
+        met = _met(data, changes, judge)
+    nearest = changes.pop(refusal.field)
+    if met is not None and met.field == refusal.field:
+        return Refusal(refusal.field, refusal.value, refusal.limit)
+    limit = refusal.limit
+    if changes:
+        limit += f"; the value offered here also needs {_listed(changes, 'and')}"
+    if met is not None:
+        limit += f"; then {met.field} is refused: {met.limit}"
+    return Refusal(refusal.field, refusal.value, limit, nearest)
+
+
+def with_other_ways(refusal: Refusal, data: Mapping[str, Any], places: int, judge: Judge) -> Refusal:
+    """Return the refusal of a bed or a circuit, its limit naming pitch, strap slot or fewer units that fit.
+
+    `places`: the array's number of them.
+    """
+    bed = refusal.field.startswith(_OF_BED)
+    found: dict[str, object] = {}
+    if places <= _MANY and (bed or refusal.field.startswith(_OF_CIRCUIT)):
+        found = next((each for each in _pitches(refusal, data) if _met(data, each, judge) is None), {})
+    if places <= _MANY and bed:
+        found |= _shorter_slot(data, judge)
+    word = "or"
+    if bed and not found:
+        found, word = _fewer(refusal, data, judge), "and"
+    if not found:
+        return refusal
+    limit = f"{refusal.limit}; {'on this bed' if bed else 'with this circuit'} {_listed(found, word)} would do"
+    return Refusal(refusal.field, refusal.value, limit, refusal.nearest)
+
+
+def _met(data: Mapping[str, Any], changes: Mapping[str, object], judge: Judge) -> Refusal | None:
+    """Return what data with changes is refused for; None where it is accepted."""
+    tried = copy.deepcopy(dict(data))
+    try:
+        for path, value in changes.items():
+            if value is None:
+                drop(tried, path)
+            else:
+                put(tried, path, value)
+        judge(tried)
+    except Refusal as refusal:
+        return refusal
+    except UnitcadError as error:
+        return Refusal("array", None, str(error))
+    return None
+
+
+def _pitches(refusal: Refusal, data: Mapping[str, Any]) -> Iterator[dict[str, object]]:
+    """Yield other pitches in whole mm, the nearest first: of a grid's two, the one along the bed that is too short."""
+    path = "layout.pitch_mm"
+    pitch = at(data, path)
+    if isinstance(pitch, list | tuple):
+        axis = int(refusal.field == "moulds.bed_y_mm")
+        path, pitch = f"{path}.{axis}", pitch[axis]
+    if isinstance(pitch, int | float):
+        for by in range(1, _PITCHES + 1):
+            yield {path: float(round(pitch) - by)}
+            yield {path: float(round(pitch) + by)}
+
+
+def _shorter_slot(data: Mapping[str, Any], judge: Judge) -> dict[str, object]:
+    """Return the longest strap slot, in whole mm, that leaves room for cuts; {} where slots are not the cause."""
+    path = "sheet.strap_slot_mm"
+    slot = at(data, path)
+    if not isinstance(slot, list | tuple) or _met(data, {path: None}, judge) is not None:
+        return {}
+    length = _largest(int(slot[1]), lambda mm: _met(data, {f"{path}.1": float(mm)}, judge) is None)
+    return {f"{path}.1": float(length)} if length else {path: None}
+
+
+def _fewer(refusal: Refusal, data: Mapping[str, Any], judge: Judge) -> dict[str, object]:
+    """Return fewer columns, rows, rings or units of a band that fit the bed, first along the refused axis; {}: none."""
+    keys = _COUNTS.get(str(at(data, "layout.kind")), {})
+    changes: dict[str, object] = {}
+    for bed in sorted(keys, key=lambda bed: bed != refusal.field):
+        path = f"layout.{keys[bed]}"
+        count = at(data, path)
+        if isinstance(count, int) and _refused_for(bed, data, changes, judge):
+            fewer = _largest(
+                count, lambda n, bed=bed, more=changes, path=path: not _refused_for(bed, data, {**more, path: n}, judge)
+            )
+            changes = {**changes, path: fewer}
+    return changes if changes and all(changes.values()) and _met(data, changes, judge) is None else {}
+
+
+def _refused_for(bed: str, data: Mapping[str, Any], changes: Mapping[str, object], judge: Judge) -> bool:
+    met = _met(data, changes, judge)
+    return met is not None and met.field == bed
+
+
+def _largest(most: int, fits: Callable[[int], bool]) -> int:
+    """Return the largest whole number below `most` that fits, where all below one that fits do; 0 for none."""
+    low, high = 0, most
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return low
+
+
+def _listed(changes: Mapping[str, object], word: str) -> str:
+    """Write changes as a person types them."""
+    texts = [
+        f"no {path}" if value is None else f"{path} = {number(value, 6) if isinstance(value, float) else repr(value)}"
+        for path, value in changes.items()
+    ]
+    return f" {word} ".join(texts)
