@@ -33,7 +33,7 @@ from unitcad.moulds.base import core, outline, plate_top, pry_slot
 from unitcad.moulds.blade import blade
 from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.dovetails import Split, seen, split, strips
-from unitcad.moulds.labels import corner_labels, engraved, row_width
+from unitcad.moulds.labels import corner_labels, engraved, set_label
 from unitcad.moulds.layout import MARK, TEXT_MARGIN
 from unitcad.moulds.pieces import base_piece, blade_piece, cup_piece, stub_pieces
 from unitcad.moulds.pins import pin_holes, standing_pins
@@ -44,9 +44,7 @@ from unitcad.shape import (
     Extrude,
     Profile,
     Shape,
-    Union,
     box,
-    content_hash,
     cut,
     cylinder,
     moved,
@@ -95,7 +93,7 @@ def _flat_plan(drawing: Drawing, cast: Sequence[tuple[Shape, ...]], *, last: boo
     pours = range(1, len(cast) + 1)
     sheets = [last and pour == len(cast) for pour in pours]
     blanks = [_base(drawing), *(_cup(drawing, pour - 1, last=sheets[pour - 1]) for pour in pours)]
-    label = label or content_hash(Union((*blanks, *(shape for shapes in cast for shape in shapes))))[:4].upper()
+    label = label or set_label((*blanks, *(shape for shapes in cast for shape in shapes)))
     base = base_piece(engraved(blanks[0], _base_letters(drawing, f"B{label}")))
     base = replace(base, removal=DOWN) if last else base
     cups = []
@@ -131,21 +129,20 @@ def _base_letters(drawing: Drawing, label: str) -> list[Shape]:
     """Draw the base's label; on a base that is cut, on each piece with its number."""
     spec, (x, y) = drawing.spec, drawing.lay.plate
     strip = Strip((-x, -y, x, y), LABEL_MARGIN, spec.moulds.engraving_stroke_mm, _engraving(spec, 0.0), "top")
-    return on_pieces(strip, label, drawing.base_seams)
+    return on_pieces(strip, [(label,)], drawing.base_seams)
 
 
 def _cup_letters(drawing: Drawing, pour: int, label: str) -> list[Shape]:
-    """Draw a cup's letters in its corners; the pieces of one that is cut have its name and their number at the left."""
+    """Draw a cup's letters in its corners; the pieces of one that is cut have its name, the label and their number."""
     spec, lay, rim = drawing.spec, drawing.lay, drawing.dims.heights[pour - 1]
     own, (x, y), stroke = f"C{pour:X}", lay.cup, spec.moulds.engraving_stroke_mm
-    letters = corner_labels(spec, lay, rim, (own, label[:2], label[2:]))
     if not drawing.cup_seams:
-        return letters
-    width, high, hole = row_width([label[:2]], stroke) + TEXT_MARGIN, lay.label_height + TEXT_MARGIN, drawing.hole
-    taken = [(-x, -y, width - x, high - y), (x - width, -y, x, high - y), (x - MARK, y - MARK, x, y)]
+        return corner_labels(spec, lay, rim, (own, label[:2], label[2:]))
+    hole = drawing.hole
+    taken = [(x - MARK, y - MARK, x, y)]
     taken += [(at - hole, beside - hole, at + hole, beside + hole) for at, beside in drawing.pins.places]
     strip = Strip((-x, -y, x, y), TEXT_MARGIN, stroke, _engraving(spec, rim), "top", taken)
-    return [*letters[1:], *on_pieces(strip, own, drawing.cup_seams)]
+    return on_pieces(strip, [(own, label), (own,)], drawing.cup_seams)
 
 
 def _engraving(spec: Spec, top: float) -> tuple[float, float]:

@@ -32,7 +32,7 @@ from unitcad.designs.parts import BEYOND
 from unitcad.errors import Refusal
 from unitcad.moulds.base import core
 from unitcad.moulds.dents import MESH_ROOM, TILT_DEG, deepest
-from unitcad.moulds.labels import engraved
+from unitcad.moulds.labels import engraved, set_label
 from unitcad.moulds.lid import THICKNESS, VENT
 from unitcad.moulds.pieces import base_piece, lid_piece, stub_pieces
 from unitcad.moulds.pins import PIN_RADIUS, Pins, pin_holes, standing_pins
@@ -42,9 +42,7 @@ from unitcad.shape import (
     Common,
     Revolve,
     Shape,
-    Union,
     box,
-    content_hash,
     cut,
     cylinder,
     mm,
@@ -107,7 +105,7 @@ def curved_plan(
     former = _former(array)
     pour = len(flat) + 1
     base, lid = _base(former), _lid(former)
-    label = content_hash(Union((base, lid, poured, *(shape for shapes in flat for shape in shapes))))[:4].upper()
+    label = set_label((base, lid, poured, *(shape for shapes in flat for shape in shapes)))
     base = base_piece(engraved(base, _base_letters(former, f"B{pour:X}{label}")))
     lid = lid_piece(pour, engraved(lid, _lid_letters(former, f"L{pour:X}{label}")))
     ways = [_down(axis(array, place.x)) for place in array.places]

@@ -19,11 +19,11 @@ from unitcad.moulds.blade import bar
 from unitcad.moulds.cup import groove_depth_of
 from unitcad.moulds.cuts import seams
 from unitcad.moulds.dovetails import Seam, split
-from unitcad.moulds.labels import engraved
+from unitcad.moulds.labels import engraved, set_label
 from unitcad.moulds.pieces import base_piece, blade_piece
 from unitcad.moulds.plan import Plan, Step
 from unitcad.moulds.removal import CAST, Removal
-from unitcad.shape import Extrude, Shape, Union, content_hash, cut, cylinder, moved, union
+from unitcad.shape import Extrude, Shape, cut, cylinder, moved, union
 from unitcad.shape.lettering import HEIGHT
 from unitcad.text import number
 
@@ -42,13 +42,13 @@ def tray_plan(array: Array, cast: Shape) -> Plan:
     outer = _outer(array)
     cut_at = _seams(array, outer)
     drawn = tray(array)
-    label = content_hash(Union((drawn, cast)))[:4].upper()
+    label = set_label((drawn, cast))
     # Under a low rim no deeper than the groove.
     stroke = spec.moulds.engraving_stroke_mm
     depth = min(spec.moulds.engraving_depth_mm, groove_depth_of(spec, sheet.thickness_mm))
     wall = (outer[3] - sheet.outline[3] - spec.moulds.land_mm - spec.moulds.groove_width_mm - HEIGHT * stroke) / 2
     heights = sheet.thickness_mm - depth, sheet.thickness_mm + BEYOND
-    letters = on_pieces(Strip(outer, wall, stroke, heights, "bottom"), f"B{label}", cut_at)
+    letters = on_pieces(Strip(outer, wall, stroke, heights, "bottom"), [(f"B{label}",)], cut_at)
     half = (outer[2] - outer[0]) / 2, (outer[3] - outer[1]) / 2
     strike = blade_piece(bar(half[1], sheet.thickness_mm), too_long=longer_than_bed(spec, 2 * half[1]))
     tools = base_piece(engraved(drawn, letters)), strike

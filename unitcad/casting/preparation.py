@@ -106,11 +106,16 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
     own = [f"C{step.index:X} on {spaced(step.cup)}" for step in plan.steps]
     own += [f"L{step.index:X} on {spaced(step.lid)}" for step in plan.steps if step.lid]
     pieces = " Beside it each piece of a tool that is printed in several has its number." if plan.splits else ""
+    marks = (
+        f"{label[:2]} and {label[2:]} in two corners of {'cups and lids' if plan.of_kind('lid') else 'the cups'}, and "
+        f"in a third corner {listed(own)}"
+    )
+    if any(len(plan.pieces_of(cup.name)) > 1 for cup in plan.of_kind("cup")):
+        marks = f"{listed(own)}, and after it {label} where the piece has room"
     yield BenchStep(
         "Sort the pieces",
         f"Print the pieces as they lie in their files, without supports. Engraved are {seen('B')}{label} on the base, "
-        f"{label[:2]} and {label[2:]} in two corners of {'cups and lids' if plan.of_kind('lid') else 'the cups'}, and "
-        f"in a third corner {listed(own)}.{pieces}",
+        f"{marks}.{pieces}",
         picture_path("pieces"),
         minutes=fig.SORT_MIN,
     )

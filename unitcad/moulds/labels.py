@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from unitcad.designs.parts import BEYOND
 from unitcad.designs.tooling import Layout
 from unitcad.moulds.layout import TEXT_MARGIN
-from unitcad.shape import Cut, Shape, cut, moved
+from unitcad.shape import Cut, Shape, Union, content_hash, cut, moved
 from unitcad.shape.lettering import HEIGHT, PITCH, engraving, text_width
 from unitcad.spec import Spec
+
+
+def set_label(shapes: Iterable[Shape]) -> str:
+    """Return four characters that tell a set, from the hash of its shapes as they are before a label is on them.
+
+    Without B and C, which stand for base and cup: "C1" is a cup's mark on every piece. Without D, whose bars are those
+    of a small letter: a text shows the label as it is engraved.
+    """
+    return "".join(one for one in content_hash(Union(tuple(shapes))).upper() if one not in "BCD")[:4]
 
 
 def engraved(blank: Shape, letters: list[Shape]) -> Shape:

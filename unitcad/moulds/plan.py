@@ -12,10 +12,10 @@ from unitcad.moulds import lid
 from unitcad.moulds.base import plate_top
 from unitcad.moulds.concentric import concentric
 from unitcad.moulds.dovetails import Split
-from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved
+from unitcad.moulds.labels import base_label, cell_numbers, corner_labels, engraved, set_label
 from unitcad.moulds.pins import Pins
 from unitcad.moulds.removal import Removal, customary
-from unitcad.shape import Shape, Union, content_hash, moved, turned, union
+from unitcad.shape import Shape, moved, turned, union
 from unitcad.shape.body import Body, Kind
 from unitcad.spec import Spec
 from unitcad.text import spaced
@@ -138,9 +138,8 @@ def plan(spec: Spec) -> Plan:
     layers = cast_layers(spec)
     made = _tooling(spec, layers)
     dims, lay = made.dimensions, made.layout
-    # Material variants share pieces: the label is of geometry alone, drawn before there is a label on it.
-    # No C in it: "C9" in a corner would read as the ninth cup's.
-    label = content_hash(Union((*(tool.shape for tool in made.tools), *layers))).replace("c", "")[:4].upper()
+    # Material variants share pieces: the label is of geometry alone.
+    label = set_label((*(tool.shape for tool in made.tools), *layers))
     tools = tuple(_engraved(tool, spec, dims, lay, label) for tool in made.tools)
     cast = [tuple(placed(layer, dims, cell) for cell in lay.cells) for layer in layers]
     laid_in, laid = design_of(spec).laid_in, inserts(spec)

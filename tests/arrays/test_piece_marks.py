@@ -1,0 +1,58 @@
+"""Marks are unmistakable: no set's label reads as a base's or a cup's, and pieces of a split tool carry it whole."""
+
+from __future__ import annotations
+
+import pytest
+
+from unitcad.arrays.array_file import array_templates, load_array
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.piece_labels import Strip, on_pieces
+from unitcad.kernels.mesh import realise
+from unitcad.moulds.dovetails import straight
+from unitcad.moulds.labels import set_label
+from unitcad.shape import box, union
+from unitcad.shape.lettering import engraving, seen
+
+
+@pytest.mark.parametrize("name", array_templates())
+def test_no_label_of_an_array_holds_a_mark(name: str) -> None:
+    label = patch_moulds(load_array(name)).plan.label
+    assert len(label) == 4
+    assert not set(label) & set("BCDL")
+
+
+def test_a_label_has_no_letter_of_a_mark_and_is_shown_as_it_is_engraved() -> None:
+    labels = {set_label([box(0, i + 1, 0, 1, 0, 1)]) for i in range(300)}
+    assert len(labels) > 290
+    assert set().union(*labels) == set("0123456789AEF")
+    assert all(seen(label) == label for label in labels)
+
+
+def test_every_piece_of_a_split_tool_carries_mark_label_and_number() -> None:
+    """The strokes that are cut away at each piece's rim are those of its own row of texts."""
+    moulds = patch_moulds(load_array("wrist-band"))
+    plan, lengths = moulds.plan, moulds.spec.moulds
+    for split in plan.splits:
+        top = plan.steps[split.pieces[0].step - 1].rim if split.pieces[0].step else 0.0
+        for number, piece in enumerate(split.pieces, 1):
+            mark = [f"C{piece.step}", plan.label] if piece.step else [f"B{plan.label}"]
+            letters = sum(_area(text, lengths.engraving_stroke_mm) for text in (*mark, str(number)))
+            solid, depth = moulds.mesh(piece), lengths.engraving_depth_mm
+            lost = solid.slice(top - 1.5 * depth).area() - solid.slice(top - 0.5 * depth).area()
+            assert lost == pytest.approx(letters, abs=0.05), piece.name
+
+
+def _area(text: str, stroke: float) -> float:
+    return realise(engraving(text, stroke, 0.0, 1.0), 24).volume()
+
+
+def test_a_row_of_texts_stands_whole_where_it_has_room() -> None:
+    """A bar cut in pieces of 45, 25 and 30 mm: the row of 28 mm has room on the first alone, beside what is taken."""
+    stroke = 0.8
+    strip = Strip((0.0, 0.0, 100.0, 20.0), 1.0, stroke, (0.0, 1.0), "top", taken=[(0.0, 15.0, 4.0, 20.0)])
+    cuts = [straight(45.0, [(5, 15)], 0.15), straight(70.0, [(5, 15)], 0.15)]
+    drawn = realise(union(on_pieces(strip, [("C1", "79A5"), ("C1",)], cuts)), 24)
+    rows = [("C1", "79A5", "1"), ("C1", "2"), ("C1", "3")]
+    assert drawn.volume() == pytest.approx(sum(_area(text, stroke) for row in rows for text in row))
+    x0 = drawn.bounding_box()[0]
+    assert x0 >= 4.0 + 0.6
