@@ -50,7 +50,7 @@ def on_pieces(strip: Strip, rows: Sequence[Sequence[str]], seams: Sequence[Seam]
                 ("left", i == 0),
                 ("right", i == len(columns) - 1),
             )
-            free = [side for side, there in ends if there]
+            free: list[Side] = [side for side, there in ends if there]
             within: dict[Side, Interval] = {side: across if side in ("top", "bottom") else along for side in free}
             number = [str(j * len(columns) + i + 1)] if seams else []
             letters += _on_piece(strip, [[*each, *number] for each in rows], within)

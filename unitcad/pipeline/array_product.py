@@ -23,6 +23,8 @@ from unitcad.arrays.array_extras import extras
 from unitcad.arrays.array_file import array_hash, to_toml
 from unitcad.arrays.array_procedure import array_procedure
 from unitcad.arrays.bending import bending_record
+from unitcad.arrays.circuit.circuit_files import has_circuit
+from unitcad.arrays.circuit.tracks import crowded_tracks
 from unitcad.arrays.construction import construction_of
 from unitcad.arrays.patch import patch_bodies, patch_parts
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
@@ -35,6 +37,7 @@ from unitcad.casting.procedure import procedure as unit_procedure
 from unitcad.casting.written import files as written
 from unitcad.casting.written import step_section
 from unitcad.mould_checks.finding import FindingRecord
+from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import OUTPUTS, geometry_key
@@ -202,6 +205,7 @@ def _manifest(
             MeshFinding(**{**each, "path": f"{folder}/{each['path']}"}) for each in manifest["check"]["findings"]
         ]
         every += [_under(folder, part) for part in manifest["parts"]]
+    own_warnings = [*(crowded_tracks(array) if has_circuit(array) else []), *shallow_grooves(moulds)]
     unit_warnings = [f"{folder}: {line}" for folder, product in units.items() for line in product.manifest["warnings"]]
     return ArrayManifest(
         name=array.name,
@@ -210,7 +214,7 @@ def _manifest(
         hash=array_hash(array)[:12],
         outputs=list(only),
         label=moulds.plan.label if shape else None,
-        warnings=unit_warnings,
+        warnings=[*own_warnings, *unit_warnings],
         air_ring_mm=first["air_ring_mm"],
         mesh={**first["mesh"], "segments": moulds.segments},
         parts=every,

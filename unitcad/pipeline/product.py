@@ -16,6 +16,7 @@ from unitcad.designs import design_of, no_estimate
 from unitcad.designs.design import Reason
 from unitcad.errors import WrongArgument, unknown_name
 from unitcad.mould_checks.finding import FindingRecord
+from unitcad.moulds.groove_depths import shallow_grooves
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline import artifacts
 from unitcad.pipeline import folder as folders
@@ -74,7 +75,7 @@ def make(spec: Spec, only: Sequence[str], check: bool, store: Store, stages: Sta
         hash=spec_hash(spec)[:12],
         outputs=list(possible),
         label=shape["label"],
-        warnings=warnings(spec),
+        warnings=[*warnings(spec), *(shallow_grooves(moulds) if "moulds" in possible else [])],
         air_ring_mm=shape["air_ring_mm"],
         mesh={
             "kernel": "manifold3d",

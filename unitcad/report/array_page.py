@@ -62,6 +62,7 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
         _chips(manifest),
         "</div></div>",
         *_section("3D", [VIEW if model else ""]),
+        *_section("Warnings", [f"<p>{escape(line)}</p>" for line in manifest["warnings"]]),
         *_section("Patch", [*(shown.of(f"pictures/patch-{side}.png") for side in SIDES), _worn(array)]),
         *_section("Crosstalk", [_answer(shown.json("crosstalk.json")), *(shown.of(name) for name in CROSSTALK)]),
         *_section("Tools", [shown.of(f"pictures/{name}") for name in ("tools.png", *_pours(manifest))]),

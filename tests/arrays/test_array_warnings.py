@@ -1,0 +1,60 @@
+"""What an array warns of: too many motors for its circuit's width, a groove drawn less deep than asked for."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from pathlib import Path
+
+import pytest
+
+from unitcad.arrays.array_file import array_templates, load_array
+from unitcad.arrays.circuit.circuit_files import has_circuit
+from unitcad.arrays.circuit.tracks import GAP_MM, TRACK_MM, crowded_tracks, width_needed
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.moulds.cup import groove_depth_of
+from unitcad.moulds.groove_depths import shallow_grooves
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.array_build import build_array
+from unitcad.report.array_page import write_array_page
+from unitcad.validation import load
+
+
+def test_144_motors_need_a_tail_of_29_mm() -> None:
+    """145 tracks of 0.1 mm with 146 gaps; 3 mm hold 14, for 13 motors and their return."""
+    (said,) = crowded_tracks(load_array("forearm-patch", {"layout.rows": 12, "layout.columns": 12}))
+    assert "144 tracks" in said
+    assert f"need {145 * TRACK_MM + 146 * GAP_MM:.1f} mm" in said
+    assert "enough for 13 motors" in said
+    assert width_needed(13) <= 3.0 < width_needed(14)
+
+
+@pytest.mark.parametrize("name", array_templates())
+def test_no_template_warns(name: str) -> None:
+    array = load_array(name)
+    assert not (has_circuit(array) and crowded_tracks(array))
+    assert shallow_grooves(patch_moulds(array)) == []
+
+
+@pytest.mark.parametrize("only", ["unit", "moulds"])
+def test_manifest_and_page_say_it(tmp_path: Path, only: str) -> None:
+    changes = {"moulds.groove_depth_mm": 3.3, "circuit.row_width_mm": 1.5, "layout.columns": 2,
+               "layout.rows": 4, "output.formats": ["stl"]}  # fmt: skip
+    array = load_array("forearm-patch", changes)
+    built = build_array(array, tmp_path, only=(only,), check=False)
+    circuit, groove = json.loads((built.folder / "manifest.json").read_bytes())["warnings"][:2]
+    assert "1.5 mm wide (circuit.row_width_mm), enough for 6 motors" in circuit
+    depths = [groove_depth_of(array.unit, step.rim) for step in patch_moulds(array).plan.steps]
+    assert depths == pytest.approx([1.6, 2.2])
+    assert groove.endswith("the groove is drawn 1.6 mm on cup 1 and 2.2 mm on cup 2")
+    page = write_array_page(built.folder, print).read_text("utf-8")
+    assert escape(circuit) in page
+    assert escape(groove) in page
+
+
+def test_a_single_units_set_says_it_too() -> None:
+    moulds = MouldSet(load("encapsulating", {"moulds.groove_depth_mm": 3.3}))
+    (said,) = shallow_grooves(moulds)
+    assert "moulds.groove_depth_mm = 3.3 mm" in said
+    assert "on cup 1 and" in said
+    assert shallow_grooves(MouldSet(load("encapsulating", {"moulds.groove_depth_mm": 0.6}))) == []
