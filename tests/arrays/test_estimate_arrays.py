@@ -78,6 +78,15 @@ def test_what_an_array_has_not_is_refused(words: tuple[str, ...], said: str) -> 
     assert said in str(found.exception)
 
 
+def test_an_estimate_reads_no_tail() -> None:
+    """At 16 mm a tail of 10 mm finds no way between nine units: a build is refused, the crosstalk is not."""
+    close = ("--set", "layout.pitch_mm=16", "--set", "sheet.strap_slot_mm=[3,8]")
+    with pytest.raises(Refusal, match="finds no straight way"):
+        load_array(NINE, ["layout.pitch_mm=16", "sheet.strap_slot_mm=[3,8]"])
+    _, text, _ = run(NINE, *close, "--json")
+    assert json.loads(text)["nearest"]["distance_mm"] == 16
+
+
 def test_a_wider_pitch_is_less_in_every_sentence() -> None:
     _, near, _ = run(NINE, "--json")
     _, far, _ = run(NINE, WIDE, "--json")

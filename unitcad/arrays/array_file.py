@@ -12,6 +12,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -73,10 +74,11 @@ def confirm_known(name: str, field: str = "spec", kind: type[Refusal] = WrongArg
     named_file(name, templates() | custom_templates() | array_templates(), field, kind)
 
 
-def load_array(source: ArraySource, set: Changes = ()) -> Array:
+def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True) -> Array:
     """Return the array of a template's name, a file, plain data, or another array.
 
     `set` changes values as for `unitcad.load`: texts "path=value", or a dict by dotted path such as "layout.pitch_mm".
+    Without `lay_tails` no way is looked for between the units, as for an estimate, which reads none.
 
     Raises Refusal or UnitcadError, naming the field, for the first value that is not valid.
     """
@@ -91,9 +93,9 @@ def load_array(source: ArraySource, set: Changes = ()) -> Array:
     written = expanded(data, folder)
     whole = changed(override(written, ()), changes_of(set))
     try:
-        return array_of(whole)
+        return array_of(whole, lay_tails=lay_tails)
     except Refusal as first:
-        refusal = offered(first, whole, confirm_makeable)
+        refusal = offered(first, whole, confirm_makeable if lay_tails else partial(array_of, lay_tails=False))
         if path is not None:
             _locate(refusal, path, data, written, whole)
         raise refusal from None
@@ -159,8 +161,11 @@ def _merged(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     return merged
 
 
-def array_of(data: Mapping[str, Any]) -> Array:
-    """Return the array of plain data whose units are whole specs. Raises Refusal for the first unfit value."""
+def array_of(data: Mapping[str, Any], *, lay_tails: bool = True) -> Array:
+    """Return the array of plain data whose units are whole specs. Raises Refusal for the first unfit value.
+
+    Without `lay_tails` units keep the angle that they are given, or 0, whatever their tails run into.
+    """
     try:
         asked = convert(data, AskedArray)
         table, kind = layout_of(asked)
@@ -205,7 +210,7 @@ def array_of(data: Mapping[str, Any]) -> Array:
         places=tuple(
             Placed(name=p.name, x=p.x, y=p.y, angle_deg=angle, unit=each)
             for p, each, angle in zip(
-                points, units, _angles(asked, way, points, units, places, sheet.strap_slots), strict=True
+                points, units, _angles(asked, way, points, units, places, sheet.strap_slots, lay_tails), strict=True
             )
         ),
         sheet=sheet,
@@ -335,12 +340,18 @@ def _check_apart(
 
 
 def _angles(
-    asked: AskedArray, way: Construction, points: list[Point], units: list[Spec], places: dict[int, int], slots: Any
+    asked: AskedArray,
+    way: Construction,
+    points: list[Point],
+    units: list[Spec],
+    places: dict[int, int],
+    slots: Any,
+    lay_tails: bool,
 ) -> list[float]:
     """Return the units' angles, degrees. Raises Refusal for a tail that finds no way."""
     given = {n: asked.place[i].angle_deg for n, i in places.items() if asked.place[i].angle_deg is not None}
     wanted = {n: float(angle or 0.0) for n, angle in given.items()}
-    if not way.own_tails:
+    if not (way.own_tails and lay_tails):
         return [wanted.get(n, 0.0) for n in range(len(points))]
     try:
         return angles(points, units, wanted, slots)

@@ -31,7 +31,7 @@ def estimate_arrays(
         if not is_array(name):
             raise Refusal("SPEC", name, "is a unit, and the others are arrays: estimate them apart")
     own = [f"estimate.frequency_hz={hertz[0]!r}"] if len(hertz) == 1 else []
-    arrays = [load_array(name, [*sets, *own]) for name in names]
+    arrays = [load_array(name, [*sets, *own], lay_tails=False) for name in names]
     band = hertz if len(hertz) > 1 else () if hertz else BAND_HZ
     with progress("crosstalk") as stage:
         every = [crosstalk(array, band, masses, say=stage) for array in arrays]
