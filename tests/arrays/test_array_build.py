@@ -19,6 +19,7 @@ from unitcad.arrays.pocket_procedure import pocket_procedure
 from unitcad.cache import MemoryStore
 from unitcad.casting.bench_views import picture_path, views
 from unitcad.casting.in_short import in_short
+from unitcad.casting.plates import mould_plates
 from unitcad.casting.procedure import procedure
 from unitcad.casting.rules import broken_rules
 from unitcad.casting.time_line import duration
@@ -124,6 +125,17 @@ def test_the_bench_page_speaks_of_the_sheet(folder: Path) -> None:
     assert (content["casting"]["makes"], content["casting"]["last"]) == ("sheet", "Units in")
     wanted = {f"steps/{name}.png" for name in ("pieces", "level", "pour", "strike", "filled", "peel", "units-in")}
     assert wanted <= set(content["pictures"])
+
+
+@pytest.mark.parametrize("cavities", [[1, 1], [2, 5]])
+def test_the_procedure_of_pockets_names_the_units_plates_that_there_are(cavities: list[int]) -> None:
+    """One bed holds the moulds of one unit; those of ten take two."""
+    array = load_array("forearm-pockets", [f"moulds.cavities={cavities}"])
+    spec = MouldSet(array.unit)
+    unit = procedure(spec, [100.0] * len(spec.plan.steps), 1000.0)
+    made = pocket_procedure(patch_moulds(array), 6000.0, 1000.0, {"units/encapsulating": unit})
+    (line,) = [line for line in made.printing if line.startswith("The units' moulds")]
+    assert re.findall(r"units/\S+3mf", line) == [f"units/encapsulating/{file}" for file in mould_plates(spec)]
 
 
 @pytest.mark.parametrize(("count", "words"), [(1, "one casting in"), (2, "2 castings, one after the other, in")])

@@ -26,6 +26,7 @@ from unitcad.casting.preparation import cleaning, fall, in_resin, on_plates
 from unitcad.casting.procedure import Procedure, bubbles, pour_of
 from unitcad.casting.time_line import duration, phases
 from unitcad.catalogue import Material
+from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.lettering import seen
 from unitcad.text import listed, number
 
@@ -77,7 +78,7 @@ def pocket_procedure(
         earliest_finish_min=until[-1].end_min,
         bench_min=sum(phase.bench_min for phase in until),
         time_line=line,
-        printing=tuple(_printing(moulds, printed_mm3, units)),
+        printing=tuple(_printing(moulds, printed_mm3, array, units)),
         preparation=(*cast, *prepared),
         off_grid=(),
         unit_heights=(),
@@ -141,12 +142,14 @@ def _and_blade(moulds: PatchMoulds) -> str:
     return " and blade" * all(blade.made == "printed" for blade in moulds.plan.of_kind("blade"))
 
 
-def _printing(moulds: PatchMoulds, solid_mm3: float, units: Iterable[str]) -> Iterator[str]:
+def _printing(moulds: PatchMoulds, solid_mm3: float, array: Array, folders: Iterable[str]) -> Iterator[str]:
     lengths, what = moulds.spec.moulds, "resin" if in_resin(moulds) else "filament"
     yield on_plates(moulds, f"tray{_and_blade(moulds)}, as they are printed")
     yield f"Printer {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm, no supports."
     yield f"At most {number(solid_mm3 / 1000, 2)} cm3 of {what} (computed: the pieces, solid)."
-    yield f"The units' moulds: {listed(f'{folder}/moulds/moulds.3mf' for folder in units)}, as their casting.md says."
+    of_units = zip(folders, array.units, strict=True)
+    files = (f"{folder}/{file}" for folder, unit in of_units for file in mould_plates(MouldSet(unit)))
+    yield f"The units' moulds: {listed(files)}, as their casting.md says."
 
 
 def _level(moulds: PatchMoulds) -> str:
