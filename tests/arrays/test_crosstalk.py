@@ -202,13 +202,31 @@ def test_the_heat_map_shows_every_pair_and_the_map_every_unit() -> None:
     svg = heat_map_svg(DATA)
     texts = [text.text for text in ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")]
     assert texts.count("35") == 24
-    assert {"drives", "moved", "A1", "C3"} <= set(texts)
+    assert {"unit that vibrates", "unit that is reached", "A1", "C3"} <= set(texts)
     assert heat_map_svg(crosstalk(load_array(NINE.asked))) == svg
     patch = patch_map_svg(NINE, DATA, outline(NINE))
     drawn = ElementTree.fromstring(patch)
     assert len(list(drawn.iter("{http://www.w3.org/2000/svg}circle"))) == 9
     assert "<title>circuit</title>" in patch
     assert "A1" in patch_map_svg(NINE)
+
+
+def test_a_patch_map_gives_equal_values_one_colour_on_a_scale_from_0() -> None:
+    """Eight alike, round a limb, but for rounding; then two values, one half of the other."""
+    svg = "{http://www.w3.org/2000/svg}"
+
+    def fills(values: list[float]) -> list[str | None]:
+        data = {**DATA, "sums": {"own_drive": {"root_sum_of_squares": values}}}
+        drawn = ElementTree.fromstring(patch_map_svg(NINE, data))
+        scale = [text.text for text in drawn.iter(f"{svg}text") if (text.text or "").endswith(" %")]
+        assert scale[0] == "0 %"
+        return [circle.get("fill") for circle in drawn.iter(f"{svg}circle")]
+
+    assert len(set(fills([0.224502, 0.224496, *[0.2245] * 7]))) == 1
+    most, half, *_, nothing = fills([0.8, 0.4, *[0.8] * 6, 0.0])
+    light, dark = (247, 251, 255), (8, 64, 129)
+    assert (most, nothing) == ("#084081", "#f7fbff")
+    assert half == "#" + "".join(f"{round((a + b) / 2):02x}" for a, b in zip(light, dark, strict=True))
 
 
 def test_a_heat_map_of_many_units_draws_each_cell_once() -> None:

@@ -1,8 +1,12 @@
-"""Pictures of an array's crosstalk as SVG: a heat map of who moves whom, and the patch coloured by what adds up."""
+"""Pictures of an array's crosstalk as SVG: a heat map of all pairs, the patch coloured by what adds up at each unit.
+
+Colours go from 0 to the largest value; values that are written alike have one colour.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from html import escape
 from itertools import groupby
 from typing import Any
@@ -12,9 +16,11 @@ from unitcad.arrays.circuit.circuit_svg import outline_path
 from unitcad.arrays.outlines import rounded, slot_profile
 from unitcad.export.drawing import number
 from unitcad.shape import Profile
+from unitcad.text import number as number_of
 
 STEPS = 21
 _LIGHT, _DARK = (247, 251, 255), (8, 64, 129)
+_INK = "#111111"
 _FONT = 'font-family="sans-serif"'
 _MOST_NUMBERS, _MOST_NAMES = 20, 40
 """Units up to which each cell has its number, and each row and column its name."""
@@ -25,7 +31,8 @@ _SCALE_PX = 90.0
 def heat_map_svg(data: Mapping[str, Any], drive: str | None = None, target: str = "centre") -> str:
     """Return the matrix of `crosstalk_matrix.crosstalk` as an SVG document, in per cent.
 
-    Rows drive, columns are moved. `drive`: else that of each row's own motor; `target`: "centre" or "nearest_edge".
+    A row is a unit that vibrates, a column one that it reaches. `drive`: else that of each row's own motor; `target`:
+    "centre" or "nearest_edge".
     """
     places = data["places"]
     names = [place["name"] for place in places]
@@ -34,11 +41,11 @@ def heat_map_svg(data: Mapping[str, Any], drive: str | None = None, target: str 
     n = len(names)
     cell = min(56.0, max(2.0, _PAGE / n))
     left, top = (64.0, 74.0) if n <= _MOST_NAMES else (34.0, 60.0)
-    high = max((value for row in matrix for value in row if value is not None), default=0.0) or 1.0
+    high = _largest(value for row in matrix for value in row if value is not None)
     wide, tall = max(left + n * cell + _SCALE_PX, 470.0), top + n * cell + 20.0
     what = {"centre": "the middle", "nearest_edge": "the nearest edge"}[target]
     driven = " and ".join(sorted(set(drives)))
-    head = f"{data['array']}: % of a unit's motion at its edge that reaches {what} of another ({driven} drive)"
+    head = f"{data['array']}: how much of a unit's motion at its edge reaches {what} of another, % ({driven} drive)"
     parts = [_open(wide, tall), _text(8, 20, head, 12, "start")]
     parts += _cells(matrix, left, top, cell, high)
     for i, name in enumerate(names if n <= _MOST_NAMES else ()):
@@ -51,13 +58,13 @@ def heat_map_svg(data: Mapping[str, Any], drive: str | None = None, target: str 
             for j, value in enumerate(row):
                 if value is not None:
                     at = left + (j + 0.5) * cell, top + (i + 0.5) * cell + 0.35 * size
-                    fill = "#ffffff" if value > 0.55 * high else "#111111"
-                    parts.append(_text(*at, _percent(value), size, "middle", fill))
-    parts.append(_text(left + n * cell / 2, top - 26 if n <= _MOST_NAMES else top - 8, "moved", 11, "middle"))
+                    parts.append(_text(*at, _percent(value), size, "middle", _ink(_share(value, high))))
+    above = top - 26 if n <= _MOST_NAMES else top - 8
+    parts.append(_text(left + n * cell / 2, above, "unit that is reached", 11, "middle"))
     middle = top + n * cell / 2
     turned = f'transform="translate(16 {number(middle)}) rotate(-90)"'
-    parts.append(f'<text {turned} font-size="11" text-anchor="middle">drives</text>')
-    parts += _scale(left + n * cell + 24, top, min(n * cell, 240.0), 0.0, high)
+    parts.append(f'<text {turned} font-size="11" text-anchor="middle">unit that vibrates</text>')
+    parts += _scale(left + n * cell + 24, top, min(n * cell, 240.0), high)
     return "\n".join([*parts, "</svg>", ""])
 
 
@@ -69,8 +76,8 @@ def patch_map_svg(
 ) -> str:
     """Return the patch from outside as an SVG document: sheet, strap slots, units by name, the circuit where given.
 
-    With the `data` of `crosstalk_matrix.crosstalk` each unit is coloured by what all others make at it, in per cent of
-    one unit's level at its edge; `key`: "root_sum_of_squares", or "sum" for the worst phases.
+    With the `data` of `crosstalk_matrix.crosstalk` each unit is coloured by the amplitude that all others together give
+    it, in per cent of one unit's level at its edge; `key`: "root_sum_of_squares", or "sum" for the worst phases.
     """
     drawn = array.sheet.outline if circuit is None else tuple(
         pick(a, b) for pick, a, b in zip((min, min, max, max), array.sheet.outline, circuit.bounds, strict=True)
@@ -80,13 +87,11 @@ def patch_map_svg(
     wide = max((drawn[2] - drawn[0]) * scale + 2 * edge + (_SCALE_PX if data else 0.0), 470.0)
     tall = (drawn[3] - drawn[1]) * scale + top + edge
     values = data["sums"]["own_drive"][key] if data else None
-    low, high = (min(values), max(values)) if values else (0.0, 1.0)
-    low = 0.0 if high - low < 1e-9 else low
-    high = high or 1.0  # a single unit gets nothing
+    high = _largest(values or ())
     how = {"sum": "all in phase", "root_sum_of_squares": "root of the sum of squares"}[key]
-    head = (
-        f"{array.name}: what all others make at each unit, % of one unit's edge level ({how})" if data else array.name
-    )
+    head = array.name
+    if data:
+        head += f": amplitude at each unit from all others, % of one unit's edge level ({how})"
     parts = [_open(wide, tall), _text(8, 20, head, 12, "start")]
     parts.append(
         f'<g transform="translate({number(edge - drawn[0] * scale)} {number(top + drawn[3] * scale)}) '
@@ -98,7 +103,7 @@ def patch_map_svg(
         f'<path d="{outer}{slots}" fill="#e4f2e4" stroke="#4f7f4f" fill-rule="evenodd"><title>sheet</title></path>'
     )
     for i, place in enumerate(array.places):
-        fill = _colour((values[i] - low) / (high - low)) if values else "#ffffff"
+        fill = _colour(_share(values[i], high)) if values else "#ffffff"
         title = place.name if values is None else f"{place.name}: {_percent(values[i])} %"
         parts.append(
             f'<circle cx="{number(place.x)}" cy="{number(-place.y)}" r="{number(place.radius)}" fill="{fill}" '
@@ -111,12 +116,12 @@ def patch_map_svg(
     for i, place in enumerate(array.places):
         x = edge + (place.x - drawn[0]) * scale
         y = top + (drawn[3] - place.y) * scale
-        fill = "#ffffff" if values and values[i] - low > 0.55 * (high - low) else "#111111"
+        fill = _ink(_share(values[i], high)) if values else _INK
         parts.append(_text(x, y - (0.1 if values else -0.35) * size, place.name, size, "middle", fill))
         if values:
             parts.append(_text(x, y + 1.0 * size, _percent(values[i]), size, "middle", fill))
     if values:
-        parts += _scale(wide - _SCALE_PX + 20, top, min(240.0, tall - top - edge), low, high)
+        parts += _scale(wide - _SCALE_PX + 20, top, min(240.0, tall - top - edge), high)
     return "\n".join([*parts, "</svg>", ""])
 
 
@@ -124,7 +129,7 @@ def _cells(matrix: Sequence[Sequence[float | None]], left: float, top: float, ce
     """Draw the cells, those of one colour as one path; runs of one colour in a row are one rectangle."""
     paths: dict[str, list[str]] = {}
     for i, row in enumerate(matrix):
-        steps = ["#d9d9d9" if value is None else _colour(value / high) for value in row]
+        steps = ["#d9d9d9" if value is None else _colour(_share(value, high)) for value in row]
         j = 0
         for colour, run in groupby(steps):
             length = len(list(run))
@@ -136,13 +141,28 @@ def _cells(matrix: Sequence[Sequence[float | None]], left: float, top: float, ce
     return [f'<path fill="{colour}" d="{"".join(parts)}"/>' for colour, parts in sorted(paths.items())]
 
 
+def _largest(values: Iterable[float]) -> float:
+    """Return the value that the scale of colours ends at: the largest, 1 where there is none, as of a single unit."""
+    return max(values, default=0.0) or 1.0
+
+
+def _share(value: float, high: float) -> float:
+    """Return where a value lies from 0 to `high`, as both are written."""
+    return float(_percent(value)) / float(_percent(high))
+
+
 def _colour(share: float) -> str:
     """Return the colour of a share from 0 to 1, in `STEPS` steps."""
-    step = round(min(1.0, max(0.0, share)) * (STEPS - 1)) / (STEPS - 1)
+    step = round(share * (STEPS - 1)) / (STEPS - 1)
     return "#" + "".join(f"{round(a + (b - a) * step):02x}" for a, b in zip(_LIGHT, _DARK, strict=True))
 
 
-def _scale(x: float, y: float, length: float, low: float, high: float) -> list[str]:
+def _ink(share: float) -> str:
+    """Return the colour of what is written on the colour of a share."""
+    return "#ffffff" if share > 0.55 else _INK
+
+
+def _scale(x: float, y: float, length: float, high: float) -> list[str]:
     """Draw the scale of colours, in per cent."""
     part = length / STEPS
     bars = [
@@ -151,7 +171,7 @@ def _scale(x: float, y: float, length: float, low: float, high: float) -> list[s
         for i in range(STEPS)
     ]
     marks = [
-        _text(x + 18, y + length - share * length + 4, f"{_percent(low + share * (high - low))} %", 11, "start")
+        _text(x + 18, y + length - share * length + 4, f"{_percent(share * high)} %", 11, "start")
         for share in (0.0, 0.5, 1.0)
     ]
     return [*bars, *marks]
@@ -165,14 +185,15 @@ def _open(wide: float, tall: float) -> str:
     )
 
 
-def _text(x: float, y: float, content: str, size: float, anchor: str, fill: str = "#111111") -> str:
+def _text(x: float, y: float, content: str, size: float, anchor: str, fill: str = _INK) -> str:
     return (
         f'<text x="{number(x)}" y="{number(y)}" font-size="{number(size)}" text-anchor="{anchor}" fill="{fill}">'
         f"{escape(content)}</text>"
     )
 
 
+@lru_cache(maxsize=4096)
 def _percent(value: float) -> str:
     """Return a fraction in per cent: two digits, three from 100 on."""
     shown = 100.0 * value
-    return f"{shown:.0f}" if shown >= 9.95 or shown == 0.0 else f"{shown:.1f}"
+    return f"{shown:.0f}" if shown >= 9.95 else number_of(shown, 2)
