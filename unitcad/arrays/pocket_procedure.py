@@ -10,6 +10,7 @@ from itertools import groupby
 
 from unitcad import catalogue
 from unitcad.arrays.array import Array
+from unitcad.arrays.hidden_tails import hidden_tails, longer_tails, where_they_end
 from unitcad.arrays.patch_moulds import PatchMoulds
 from unitcad.arrays.tray import hold_strain
 from unitcad.casting import figures as fig
@@ -26,12 +27,15 @@ from unitcad.casting.preparation import cleaning, fall, in_resin, on_plates
 from unitcad.casting.procedure import Procedure, bubbles, pour_of
 from unitcad.casting.time_line import duration, phases
 from unitcad.catalogue import Material
+from unitcad.check.findings import counted
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape.lettering import seen
 from unitcad.text import listed, number
 
 PUSH_MIN = 1.0
 """To push one unit into its pocket and turn it (assumed)."""
+SOLDER_MIN = 3.0
+"""To solder wires to one tail (assumed)."""
 ONCE = frozenset(need.item for need in (*NEEDS, CALIPER))
 """What one piece, dab or roll of is enough for every casting."""
 
@@ -67,6 +71,7 @@ def pocket_procedure(
         *_pieces(moulds),
         Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", f"sheet, {number(mix.net_g, 3)} g net"),
         Item(f"{silicone.name} part B", mix.part_b_g, "g", "bought", f"sheet, {number(mix.net_g, 3)} g net"),
+        *_wires(array),
         *consumed(moulds, [mix], named),
     ]
     return Procedure(
@@ -218,6 +223,15 @@ def _out(moulds: PatchMoulds) -> Iterator[BenchStep]:
 
 def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
     """Say how the units go in, and which way each one's tail points."""
+    if hidden := hidden_tails(array):
+        yield BenchStep(
+            "Wires on hidden tails",
+            f"{counted(len(hidden), 'tail')} would end under the sheet, {where_they_end(hidden)}. Nothing can be "
+            "joined to them once the units are in. Solder wires to the end of each now, longer than this way by what "
+            "the connector needs, and try the motor again. They leave between sheet and skin. Other circuits would do "
+            f"without: {longer_tails(hidden)}",
+            minutes=SOLDER_MIN * len(hidden),
+        )
     widest = max(unit.diameter_mm for unit in array.units) / 2
     strain = max(hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units)
     ordered = sorted(array.places, key=lambda place: place.angle_deg)
@@ -259,6 +273,14 @@ def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
         name = moulds.plan.called(tool.name)
         attitude = "upside down" if tool.upside_down else "as drawn"
         yield Item(name, 1, "piece", f"printed {attitude}", note)
+
+
+def _wires(array: Array) -> Iterator[Item]:
+    """List the wires of the tails that end under the sheet, two for each: a motor has two poles."""
+    if hidden := hidden_tails(array):
+        longest = number(max(tail.short_mm for tail in hidden), 2)
+        note = f"thin and insulated, two for each tail that ends under the sheet, at least {longest} mm and a connector"
+        yield Item("lead wire", 2 * len(hidden), "piece", "bought", note)
 
 
 def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:

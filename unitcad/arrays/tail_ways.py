@@ -78,13 +78,13 @@ def angles(
     for i in asked:
         laid[i] = tails(units[i], points[i].x, points[i].y, chosen[i], i)
     for i in asked:
-        if why := _in_the_way(laid[i], i, points, radii, near[i], laid, slots):
+        if why := in_the_way(laid[i], i, points, radii, near[i], laid, slots):
             raise Blocked(i, _longest(i, (chosen[i],), points, units, radii, near[i], laid, slots), why)
     for i in (i for i in range(len(points)) if i not in asked):
         why = ""
         for angle in _candidates(points[i]):
             drawn = tails(units[i], points[i].x, points[i].y, angle, i)
-            why = _in_the_way(drawn, i, points, radii, near[i], laid, slots)
+            why = in_the_way(drawn, i, points, radii, near[i], laid, slots)
             if not why:
                 chosen[i], laid[i] = angle, drawn
                 break
@@ -115,7 +115,7 @@ def _candidates(point: Point) -> list[float]:
     return sorted(every, key=lambda angle: (angle % 90 != 0, angle % 45 != 0, away(angle), angle))
 
 
-def _in_the_way(
+def in_the_way(
     drawn: Sequence[Tail],
     owner: int,
     points: Sequence[Point],
@@ -156,7 +156,7 @@ def _longest(
 
     def fits(tenths: int) -> bool:
         return any(
-            not _in_the_way(
+            not in_the_way(
                 tails(units[owner], points[owner].x, points[owner].y, angle, owner, tenths / 10),
                 owner, points, radii, near, free, slots,
             )

@@ -36,7 +36,7 @@ NEEDS = (
     Need(r"\bbrush off", "hand brush", 1, "piece", "tool", "for strings and loose bits"),
     Need(r"strip of stiff card", "stiff card or plastic", 1, "strip", "cut", "strikes off where the blade can't pass"),
     Need(r"\bpliers", "flat pliers", 1, "piece", "tool", "to pull cut tongues"),
-    Need(r"\bsolder (the|on)", "soldering iron and solder", 1, "set", "tool", "motor to circuit"),
+    Need(r"\bsolder (the|on|wires)", "soldering iron and solder", 1, "set", "tool", "joins motors, circuits and wires"),
     Need(
         r"release agent, if any", "release agent", 1, "dab", "bought", "for the last cup's bore only; may be left out"
     ),

@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +26,7 @@ from unitcad.arrays.bending import bending_record
 from unitcad.arrays.circuit.circuit_files import has_circuit
 from unitcad.arrays.circuit.tracks import crowded_tracks
 from unitcad.arrays.construction import construction_of
+from unitcad.arrays.hidden_tails import hidden_tails, hidden_tails_warning
 from unitcad.arrays.patch import patch_bodies, patch_parts
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
 from unitcad.arrays.patch_pictures import picture_names, pictures
@@ -205,7 +206,8 @@ def _manifest(
             MeshFinding(**{**each, "path": f"{folder}/{each['path']}"}) for each in manifest["check"]["findings"]
         ]
         every += [_under(folder, part) for part in manifest["parts"]]
-    own_warnings = [*(crowded_tracks(array) if has_circuit(array) else []), *shallow_grooves(moulds)]
+    tracks = crowded_tracks(array) if has_circuit(array) else []
+    own_warnings = [*hidden_tails_warning(array), *tracks, *shallow_grooves(moulds)]
     unit_warnings = [f"{folder}: {line}" for folder, product in units.items() for line in product.manifest["warnings"]]
     return ArrayManifest(
         name=array.name,
@@ -264,6 +266,7 @@ def _record(array: Array, units: dict[str, Product]) -> dict[str, Any]:
             }
             for p in array.places
         ],
+        "hidden_tails": [asdict(tail) for tail in hidden_tails(array)],
     }
 
 

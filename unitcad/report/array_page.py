@@ -61,6 +61,7 @@ def _page(folder: Path, manifest: ArrayManifest, warn: Callable[[str], None]) ->
         f'<p class="line">{escape(_line(array))}</p>',
         _chips(manifest),
         "</div></div>",
+        *_section("Warnings", [_list(manifest["warnings"])]),
         *_section("3D", [VIEW if model else ""]),
         *_section("Warnings", [f"<p>{escape(line)}</p>" for line in manifest["warnings"]]),
         *_section("Patch", [*(shown.of(f"pictures/patch-{side}.png") for side in SIDES), _worn(array)]),
@@ -211,15 +212,29 @@ def _units(folder: Path, manifest: ArrayManifest) -> str:
 
 
 def _places(array: Mapping[str, Any]) -> str:
+    note = "Seen from the back: rows lettered from the top, columns numbered along x."
+    head = ["place", "x, mm", "y, mm", "unit"]
     rows = [
-        (p["name"], number(p["x_mm"], 4), number(p["y_mm"], 4), number(p["angle_deg"], 4), p["unit"].rpartition("/")[2])
-        for p in array["places"]
+        [p["name"], number(p["x_mm"], 4), number(p["y_mm"], 4), p["unit"].rpartition("/")[2]] for p in array["places"]
     ]
-    note = (
-        '<p class="note">Seen from the back: rows lettered from the top, columns numbered along x. The angle is that '
-        "of the tail, counter-clockwise from x.</p>"
+    if array["construction"] == "pockets":
+        hidden = {tail["place"]: tail for tail in array.get("hidden_tails", [])}
+        note += " The angle is that of the tail, counter-clockwise from x."
+        head += ["tail's angle, degrees", "tail's end"]
+        for row, place in zip(rows, array["places"], strict=True):
+            row += [number(place["angle_deg"], 4), _tail_end(hidden.get(place["name"]))]
+    return f'<p class="note">{note}</p>' + _table(head, rows)
+
+
+def _tail_end(hidden: Mapping[str, Any] | None) -> str:
+    """Say where a tail ends: under the sheet it has to be made longer, or wires soldered on."""
+    if hidden is None:
+        return "not under the sheet"
+    blocked, longer = hidden["blocked_by"], f"{hidden['field']} = {number(hidden['length_mm'])} reaches the edge"
+    return (
+        f"under the sheet, {number(hidden['short_mm'], 2)} mm before its edge along the tail: "
+        f"{f'{blocked} is in the way: solder wires on' if blocked else f'{longer}, or solder wires on'}"
     )
-    return note + _table(("place", "x, mm", "y, mm", "angle, degrees", "unit"), rows)
 
 
 def _checks(manifest: ArrayManifest) -> str:
@@ -240,6 +255,11 @@ def _checks(manifest: ArrayManifest) -> str:
         for each in manifest["check"]["findings"]
     )
     return table + (f"<ul>{broken}{meshes}</ul>" if broken or meshes else "")
+
+
+def _list(sentences: Iterable[str]) -> str:
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
+    return f"<ul>{items}</ul>" if items else ""
 
 
 def _files(manifest: ArrayManifest) -> str:

@@ -1,0 +1,94 @@
+"""Tails that end under the sheet: found, told how far before its edge, and what to do."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.hidden_tails import MOST_NAMES, hidden_tails, hidden_tails_warning
+from unitcad.arrays.outlines import rounded
+from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.arrays.pocket_procedure import pocket_procedure
+from unitcad.arrays.tail_ways import tail_half_width, tail_length
+from unitcad.casting.procedure import procedure
+from unitcad.casting.rules import broken_rules
+from unitcad.errors import Refusal
+from unitcad.kernels.mesh import realise
+from unitcad.moulds.mould_set import MouldSet
+from unitcad.pipeline.array_build import build_array
+from unitcad.report import write_report
+from unitcad.shape import Extrude, box, moved, rotated
+
+SIDES = ["layout.columns=2", "layout.rows=1", "sheet.strap_slot_mm=[3, 8]", "unit.fpcb.tail_length_mm=2"]
+
+
+def test_three_tails_of_the_template_come_out() -> None:
+    hidden = {tail.place: tail for tail in hidden_tails(load_array("forearm-pockets"))}
+    assert set(hidden) == {"A3", "B1", "B2", "B3", "C1", "C3"}
+    # The ends lie at 20 + 7 + 10 = 37 mm, the sheet's edge at 38.
+    assert [(hidden[name].short_mm, hidden[name].length_mm) for name in ("A3", "C1", "C3")] == [(1.0, 11.0)] * 3
+    assert {name for name, tail in hidden.items() if tail.blocked_by} == {"B1", "B2", "B3"}
+
+
+@pytest.mark.parametrize("name", ["forearm-pockets", "hex-19"])
+def test_a_tail_longer_by_so_much_has_its_end_out_of_the_sheet(name: str) -> None:
+    """Against solids: a slice across the tail meets the sheet before that length and misses it beyond."""
+    array = load_array(name)
+    plan = realise(Extrude(rounded(array.sheet.outline, array.sheet.corner_mm), -1, 1), 256)
+    for tail in hidden_tails(array):
+        place = array.placed(tail.place)
+        half = tail_half_width(place.unit)
+        end = place.radius + tail_length(place.unit) + tail.short_mm
+
+        def meets(at: float, place=place, half=half) -> bool:
+            slice_ = moved(rotated(box(at, at + 0.01, -half, half, -1, 1), "z", place.angle_deg), place.x, place.y)
+            return (realise(slice_, 256) ^ plan).volume() > 1e-9
+
+        assert meets(end - 0.05)
+        assert not meets(end + 0.02)
+
+
+def test_what_is_said_to_help_helps_and_what_is_blocked_is_refused() -> None:
+    longer = hidden_tails(load_array("forearm-pockets", ["unit.fpcb.tail_length_mm=11"]))
+    assert [tail.place for tail in longer] == ["B1", "B2", "B3"]
+    middle = next(tail for tail in longer if tail.place == "B2")
+    with pytest.raises(Refusal):
+        load_array("forearm-pockets", [f"unit.fpcb.tail_length_mm={middle.length_mm}"])
+
+
+def test_nothing_is_hidden_by_a_sheet_under_the_tails_or_where_one_circuit_serves_all() -> None:
+    assert hidden_tails(load_array("forearm-pockets", ['unit="single-embedded"', "sheet.thickness_mm=1.2"])) == ()
+    assert hidden_tails(load_array("forearm-patch")) == ()
+
+
+def test_a_warning_names_some_places_and_counts_the_others() -> None:
+    array = load_array("hex-19", ["layout.rings=4"])
+    hidden, (said,) = hidden_tails(array), hidden_tails_warning(array)
+    stopped = sum(bool(tail.blocked_by) for tail in hidden)
+    assert stopped > MOST_NAMES
+    assert f"and {stopped - MOST_NAMES} others." in said
+
+
+def test_procedure_manifest_and_page_say_what_to_do(tmp_path: Path) -> None:
+    array = load_array("forearm-pockets", SIDES)
+    hidden = hidden_tails(array)
+    assert hidden
+    spec = MouldSet(array.unit)
+    unit = procedure(spec, [100.0] * len(spec.plan.steps), 1000.0)
+    made = pocket_procedure(patch_moulds(array), 1000.0, 1000.0, {"units/encapsulating": unit})
+    wires, units_in = made.assembly
+    assert (wires.title, units_in.title) == ("Wires on hidden tails", "Units in")
+    assert all(tail.place in wires.text for tail in hidden)
+    (bought,) = [item for item in made.bill if item.item == "lead wire"]
+    assert bought.quantity == 2 * len(hidden)
+    assert broken_rules(made) == []
+    built = build_array(array, tmp_path, only=["unit"], check=False)
+    (warned,) = [line for line in built.manifest["warnings"] if line.startswith("tails end under the sheet")]
+    page = write_report(built.folder).read_text("utf-8")
+    assert "<h2>Warnings</h2>" in page
+    assert warned.split(":")[0] in page
+    assert page.count("reaches the edge, or solder wires on") + page.count("solder wires on</td>") >= len(hidden)
+    assert math.isclose(built.manifest["array"]["hidden_tails"][0]["short_mm"], hidden[0].short_mm)
