@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import csv
 import gzip
+import io
 import json
 import re
 import tomllib
@@ -23,12 +24,14 @@ from unitcad.casting.plates import mould_plates
 from unitcad.casting.procedure import procedure
 from unitcad.casting.rules import broken_rules
 from unitcad.casting.time_line import duration
+from unitcad.casting.written import files as written
 from unitcad.check import Options, check_bytes
 from unitcad.cli.array_summary import array_summary
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.array_build import build_array
+from unitcad.pipeline.array_product import unit_folders
 from unitcad.pipeline.build import Built
 from unitcad.report.bench_page import write_bench
 from unitcad.serve.answers import answered
@@ -104,9 +107,15 @@ def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
     assert used["gloves"] == used["mixing cups and sticks"] == 5 * 2 + 1
     strips = next(item.quantity for item in unit.bill if item.item == "adhesive tape")
     assert used["adhesive tape"] == 5 * strips
-    sizes = [float(re.findall(r"at least ([0-9.]+) ml", i.note)[0]) for i in made.bill if "degassing" in i.item]
-    asked = [float(re.findall(r"at least ([0-9.]+) ml", s.text)[0]) for s in made.pours[0].steps if s.title == "Degas"]
-    assert max(sizes) >= asked[0]
+    (container,) = [item for item in made.bill if "degassing" in item.item]
+    asked = [
+        float(re.findall(r"at least ([0-9.]+) ml", step.text)[0])
+        for pour in (*unit.pours, *made.pours)
+        for step in pour.steps
+        if step.title == "Degas"
+    ]
+    assert (container.quantity, container.made) == (1, "tool")
+    assert container.least_ml == pytest.approx(max(asked), rel=0.05)
     assert broken_rules(made) == []
     steps = [*made.preparation, *made.pours[0].steps, *made.release, *made.assembly]
     drawn = {step.picture for step in steps} - {""}
@@ -115,11 +124,31 @@ def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
     assert f"engraved b{seen(made.label)}" in " ".join(step.text for step in steps)
 
 
+def test_the_bill_of_mixed_units_says_what_each_line_is_for() -> None:
+    place = [{"at": "A2", "unit": "three-layer"}]
+    layout = {"kind": "grid", "columns": 3, "rows": 1, "pitch_mm": 22}
+    array = load_array({"name": "mixed", "array": "pockets", "unit": "encapsulating", "layout": layout, "place": place})
+    units = {}
+    for folder, unit in unit_folders(array).items():
+        spec = MouldSet(unit)
+        units[folder] = procedure(spec, [100.0] * len(spec.plan.steps), 1000.0)
+    made = pocket_procedure(patch_moulds(array), 6000.0, 1000.0, units)
+    blades = [item.note for item in made.bill if item.item == "blade"]
+    assert [note.split(":")[0] for note in blades] == [f"for {folder}" for folder in units] + ["for the sheet"]
+    (silicone,) = [item for item in made.bill if item.item == "ecoflex-00-10 part A"]
+    assert [part.split(":")[0] for part in silicone.note.split("; ")] == [
+        "units/encapsulating, 2 castings",
+        "units/three-layer, 1 casting",
+    ]
+    rows = {row["item"]: row for row in csv.DictReader(io.StringIO(written(made)["bom.csv"]))}
+    assert (rows["gloves"]["unit"], rows["tray"]["unit"], rows[silicone.item]["unit"]) == ("pairs", "piece", "g")
+
+
 def test_the_bench_page_speaks_of_the_sheet(folder: Path) -> None:
-    written = write_bench(folder)
-    assert written is not None
-    packed = re.search(r'id="data">([A-Za-z0-9+/=]*)</script>', written.read_text("utf-8"))
-    written.unlink()
+    page = write_bench(folder)
+    assert page is not None
+    packed = re.search(r'id="data">([A-Za-z0-9+/=]*)</script>', page.read_text("utf-8"))
+    page.unlink()
     assert packed is not None
     content = json.loads(gzip.decompress(base64.b64decode(packed[1])))
     assert (content["casting"]["makes"], content["casting"]["last"]) == ("sheet", "Units in")

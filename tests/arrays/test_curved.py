@@ -265,6 +265,8 @@ def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> No
     items = {item.item: item.quantity for item in made.bill}
     assert items["filament stub"] == items["filament stub, straight"] == 9
     assert (items["syringe"], items["flexible circuit"], items["lid 2"]) == (1, 1, 1)
+    assert (items["degassing container"], items["narrow pliers"]) == (1, 1)
+    assert "flat pliers" not in items  # for tongues that are cut
 
 
 def test_fins_of_the_flat_base_are_greased_and_the_curved_base_is_levelled_under_its_lid(made: Procedure) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import groupby
@@ -12,16 +10,16 @@ from unitcad import catalogue
 from unitcad.arrays.array import Array
 from unitcad.arrays.hidden_tails import hidden_tails, longer_tails, where_they_end
 from unitcad.arrays.patch_moulds import PatchMoulds
+from unitcad.arrays.pocket_bill import castings, counts, pocket_bill
 from unitcad.arrays.tray import hold_strain
 from unitcad.casting import figures as fig
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bench_views import picture_path
-from unitcad.casting.bill import Item, consumed
 from unitcad.casting.figures import STRIKE_AGAIN_MIN, at_room
 from unitcad.casting.finishing import shown
 from unitcad.casting.instructions import TACK, mixed
 from unitcad.casting.joining import joining
-from unitcad.casting.needs import CALIPER, NEEDS, needs
+from unitcad.casting.needs import needs
 from unitcad.casting.plates import mould_plates
 from unitcad.casting.preparation import cleaning, fall, in_resin, on_plates
 from unitcad.casting.procedure import Procedure, bubbles, pour_of
@@ -36,8 +34,6 @@ PUSH_MIN = 1.0
 """To push one unit into its pocket and turn it (assumed)."""
 SOLDER_MIN = 3.0
 """To solder wires to one tail (assumed)."""
-ONCE = frozenset(need.item for need in (*NEEDS, CALIPER))
-"""What one piece, dab or roll of is enough for every casting."""
 
 
 def pocket_procedure(
@@ -67,13 +63,6 @@ def pocket_procedure(
     pour = replace(pour_of(moulds, step, silicone, mix, sheet_mm3, verdict, poured), layer="sheet")
     grams = sheet_mm3 * float(silicone.density_g_cm3) / 1000
     named = needs([*prepared, *poured, *out, *together])
-    own = [
-        *_pieces(moulds),
-        Item(f"{silicone.name} part A", mix.part_a_g, "g", "bought", f"sheet, {number(mix.net_g, 3)} g net"),
-        Item(f"{silicone.name} part B", mix.part_b_g, "g", "bought", f"sheet, {number(mix.net_g, 3)} g net"),
-        *_wires(array),
-        *consumed(moulds, [mix], named),
-    ]
     return Procedure(
         name=array.name,
         label=moulds.plan.label,
@@ -95,34 +84,24 @@ def pocket_procedure(
         eccentricity=None,
         without_ribs=None,
         walls=(),
-        bill=tuple(_added([*_scaled(array, units), *own])),
+        bill=pocket_bill(moulds, silicone, mix, named, units),
         makes="sheet",
         last="Units in",
     )
 
 
-def counts(array: Array) -> list[int]:
-    """Return how many places hold each distinct unit, in the order of `Array.units`."""
-    held = Counter(array.units.index(place.unit) for place in array.places)
-    return [held[i] for i in range(len(array.units))]
-
-
-def _castings(count: int, unit: Procedure) -> int:
-    return math.ceil(count / unit.cells)
-
-
 def _units(array: Array, units: Mapping[str, Procedure]) -> Iterator[BenchStep]:
     """Say how the units are made first: by their own procedures, as often as their mould has to be filled."""
     for count, (folder, unit) in zip(counts(array), units.items(), strict=True):
-        times = _castings(count, unit)
+        times = castings(count, unit)
         cavities = "one cavity" if unit.cells == 1 else f"{unit.cells} cavities"
-        castings = "one casting" if times == 1 else f"{times} castings, one after the other,"
+        filled = "one casting" if times == 1 else f"{times} castings, one after the other,"
         take = "takes" if times == 1 else "take"
         whole, bench = unit.time_line[-1].end_min, sum(phase.bench_min for phase in unit.time_line)  # motors in
         more = "" if unit.cells >= count else " More cavities (moulds.cavities) or a second set of moulds save days."
         yield BenchStep(
             "Cast the units",
-            f"Cast {count} of {unit.name} by {folder}/casting.md, motors in: {castings} in moulds of {cavities} {take} "
+            f"Cast {count} of {unit.name} by {folder}/casting.md, motors in: {filled} in moulds of {cavities} {take} "
             f"{duration(times * whole)}, of which {duration(times * bench)} at the bench. "
             f"The sheet can cure beside them.{more} Try every motor.",
             kind="cure",
@@ -264,59 +243,3 @@ def _measure(array: Array, grams: float, units: Mapping[str, Procedure]) -> Iter
         yield f"A pocket for a unit of {shown(size, 2)} mm: {shown(size - 2 * sheet.hold_mm, 2)} mm across."
     yield f"Weigh the sheet, trimmed: {shown(grams)} g. Less means air or a low strike."
     yield "Each unit as its own procedure says, before it goes in."
-
-
-def _pieces(moulds: PatchMoulds) -> Iterator[Item]:
-    lengths = moulds.spec.moulds
-    note = f"{lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm"
-    for tool in moulds.plan.pieces:
-        name = moulds.plan.called(tool.name)
-        attitude = "upside down" if tool.upside_down else "as drawn"
-        yield Item(name, 1, "piece", f"printed {attitude}", note)
-
-
-def _wires(array: Array) -> Iterator[Item]:
-    """List the wires of the tails that end under the sheet, two for each: a motor has two poles."""
-    if hidden := hidden_tails(array):
-        longest = number(max(tail.short_mm for tail in hidden), 2)
-        note = f"thin and insulated, two for each tail that ends under the sheet, at least {longest} mm and a connector"
-        yield Item("lead wire", 2 * len(hidden), "piece", "bought", note)
-
-
-def _scaled(array: Array, units: Mapping[str, Procedure]) -> Iterator[Item]:
-    """Yield the lines of the units' bills for all units: their pieces once, what goes in as often as it is used."""
-    for spec, count, (folder, unit) in zip(array.units, counts(array), units.items(), strict=True):
-        times = _castings(count, unit)
-        inside = {spec.motor.part or "motor", "flexible circuit", "wire"}
-        for item in unit.bill:
-            if item.made.startswith(("printed", "cut")):
-                yield replace(item, note=f"{item.note} ({folder})" if item.note else folder)
-            elif item.unit == "g":
-                yield replace(item, quantity=times * item.quantity, note=f"{times} x, {item.note}")
-            elif item.item in inside:
-                yield replace(item, quantity=count * item.quantity / unit.cells)
-            elif item.made == "bought" and item.item not in ONCE:
-                yield replace(item, quantity=times * item.quantity)
-            else:
-                yield item
-
-
-def _added(items: Iterable[Item]) -> list[Item]:
-    """Return a bill in which each thing stands once: what is used up is added, of tools the most.
-
-    A thing in two sizes has a line for each.
-    """
-    found: dict[tuple[str, str, str], Item] = {}
-    for item in items:
-        key = item.item, item.unit, "" if item.unit == "g" or item.item in ONCE or item.made == "tool" else item.note
-        there = found.get(key)
-        if there is None:
-            found[key] = item
-        elif item.unit == "g":
-            quantity, note = there.quantity + item.quantity, f"{there.note}; {item.note}"
-            found[key] = replace(there, quantity=quantity, note=note)
-        elif item.made == "bought" and item.item not in ONCE:
-            found[key] = replace(there, quantity=there.quantity + item.quantity)
-        else:
-            found[key] = replace(there, quantity=max(there.quantity, item.quantity))
-    return list(found.values())

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from unitcad.casting.bench_extras import tape_places
 from unitcad.casting.figures import CONTAINER, VACUUM_INHG, Mix
@@ -21,19 +21,27 @@ from unitcad.text import cell, number
 
 @dataclass(frozen=True)
 class Item:
-    """One line: how many of what, how it is made or lies on the printer, and a remark."""
+    """One line: how many of what, how it is made or lies on the printer, and a remark; `least_ml`: of a container."""
 
     item: str
     quantity: float
     unit: str
     made: str
     note: str
+    least_ml: float | None = None
 
 
 def bill(moulds: MouldSet, mixes: list[tuple[Material, Mix]], named: Sequence[Need]) -> tuple[Item, ...]:
     """List pieces, silicone (every pour's mix), motor, circuit or wires, tools and consumables (`named`: by steps)."""
     consumables = consumed(moulds, [mix for _, mix in mixes], named)
     return (*_pieces(moulds), *_silicone(mixes), *_inside(moulds), *consumables)
+
+
+def in_words(items: Iterable[Item]) -> tuple[Item, ...]:
+    """Return a bill as it is read: 1 piece, 9 pieces."""
+    return tuple(
+        item if item.unit == "g" or item.quantity == 1 else replace(item, unit=f"{item.unit}s") for item in items
+    )
 
 
 def to_csv(items: tuple[Item, ...]) -> str:
@@ -130,14 +138,10 @@ def consumed(moulds: MouldSet, mixes: list[Mix], named: Sequence[Need]) -> Itera
             "pad of stacked card", len(prop.pads), "piece", "cut", f"{size}: bears the tongues' {grip_of(moulds)}s"
         )
     if moulds.spec.casting.vacuum:
-        size = f"at least {number(CONTAINER * max(mix.millilitres for mix in mixes), 2)} ml, since silicone foams up"
-        yield Item(
-            "degassing container",
-            pours,
-            "piece",
-            "bought",
-            f"{size}; a chamber that reaches {number(VACUUM_INHG, 3)} inHg",
-        )
+        least = CONTAINER * max(mix.millilitres for mix in mixes)  # one mix after the other
+        chamber = f"a chamber that reaches {number(VACUUM_INHG, 3)} inHg"
+        note = f"at least {number(least, 2)} ml, since silicone foams up; {chamber}; used again for every mix"
+        yield Item("degassing container", 1, "piece", "tool", note, least)
     if lengths.pour == "injected":
         yield from injecting(moulds.spec, mixes)
     elif cups:

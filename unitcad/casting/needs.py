@@ -28,14 +28,15 @@ NEEDS = (
     Need(r"\bpin\b", "pin", 1, "piece", "tool", "for bubbles"),
     Need(r"\bspatula", "blunt spatula", 1, "piece", "tool", "loosens what sticks, from its edge"),
     Need(r"\blevel, or a small spirit level", "level", 1, "piece", "tool", "a phone shows it too"),
-    Need(r"\bpaper\b", "paper", 1, "sheet", "bought", "under corners, and to feel the slit at the seat"),
+    Need(r"\bpaper\b", "paper", 1, "sheet", "bought", "under corners, and to feel slits with"),
     Need(r"\bvice\b", "vice and two boards", 1, "set", "tool", "where the hand can't press a cup on"),
     Need(r"\bpen\b", "pen", 1, "piece", "tool", "marks the tongue"),
     Need(r"\bcotton bud", "cotton buds", 1, "set", "bought", "dry, for grease in the bore"),
     Need(r"\bbrush a thin coat", "small brush", 1, "piece", "tool", "for the first coat of silicone"),
     Need(r"\bbrush off", "hand brush", 1, "piece", "tool", "for strings and loose bits"),
     Need(r"strip of stiff card", "stiff card or plastic", 1, "strip", "cut", "strikes off where the blade can't pass"),
-    Need(r"\bpliers", "flat pliers", 1, "piece", "tool", "to pull cut tongues"),
+    Need(r"\bflat pliers", "flat pliers", 1, "piece", "tool", "to pull cut tongues"),
+    Need(r"\bwith pliers", "narrow pliers", 1, "piece", "tool", "to pull filament out of its pocket"),
     Need(r"\bsolder (the|on|wires)", "soldering iron and solder", 1, "set", "tool", "joins motors, circuits and wires"),
     Need(
         r"release agent, if any", "release agent", 1, "dab", "bought", "for the last cup's bore only; may be left out"
@@ -64,4 +65,4 @@ def _named(text: str) -> frozenset[Need]:
     return frozenset(need for need in NEEDS if re.search(need.words, text.lower()))
 
 
-CALIPER = Need("", "caliper", 1, "piece", "tool", "for the card and the first part")
+CALIPER = Need("", "caliper", 1, "piece", "tool", "to measure with")

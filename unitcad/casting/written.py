@@ -10,7 +10,7 @@ from itertools import count
 import msgspec
 
 from unitcad.casting.bench_step import BenchStep
-from unitcad.casting.bill import to_csv
+from unitcad.casting.bill import in_words, to_csv
 from unitcad.casting.figures import Figure
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.time_line import duration
@@ -26,6 +26,7 @@ UNPRINTED = "Nothing of this tooling has been printed yet: every clearance is a 
 
 def files(procedure: Procedure) -> dict[str, str]:
     """Return casting.md, casting.json and bom.csv."""
+    procedure = replace(procedure, bill=in_words(procedure.bill))
     return {
         "casting.md": to_markdown(procedure),
         "casting.json": to_json(procedure),
