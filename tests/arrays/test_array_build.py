@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from unitcad.arrays.array import Array
 from unitcad.arrays.array_file import array_hash, load_array
 from unitcad.arrays.patch import patch_bodies
 from unitcad.arrays.patch_moulds import patch_moulds
@@ -21,7 +22,7 @@ from unitcad.cache import MemoryStore
 from unitcad.casting.bench_views import picture_path, views
 from unitcad.casting.in_short import in_short
 from unitcad.casting.plates import mould_plates
-from unitcad.casting.procedure import procedure
+from unitcad.casting.procedure import Procedure, procedure
 from unitcad.casting.rules import broken_rules
 from unitcad.casting.time_line import duration
 from unitcad.casting.written import files as written
@@ -124,24 +125,55 @@ def test_the_bill_of_pockets_lists_what_units_and_sheet_use_up() -> None:
     assert f"engraved b{seen(made.label)}" in " ".join(step.text for step in steps)
 
 
-def test_the_bill_of_mixed_units_says_what_each_line_is_for() -> None:
-    place = [{"at": "A2", "unit": "three-layer"}]
-    layout = {"kind": "grid", "columns": 3, "rows": 1, "pitch_mm": 22}
+@pytest.fixture(scope="module")
+def mixed() -> tuple[Array, dict[str, Procedure], Procedure]:
+    """Units of 14 and 17 mm in a list, the first point at the file's origin: array, units' procedures, its own."""
+    layout = {"kind": "list", "points_mm": [[0, 0], [22, 3], [-21, 4]]}
+    place = [{"at": "P2", "unit": "motor-10mm"}]
     array = load_array({"name": "mixed", "array": "pockets", "unit": "encapsulating", "layout": layout, "place": place})
     units = {}
     for folder, unit in unit_folders(array).items():
         spec = MouldSet(unit)
         units[folder] = procedure(spec, [100.0] * len(spec.plan.steps), 1000.0)
-    made = pocket_procedure(patch_moulds(array), 6000.0, 1000.0, units)
+    return array, units, pocket_procedure(patch_moulds(array), 6000.0, 1000.0, units)
+
+
+def test_the_bill_of_mixed_units_says_what_each_line_is_for(
+    mixed: tuple[Array, dict[str, Procedure], Procedure],
+) -> None:
+    _, units, made = mixed
     blades = [item.note for item in made.bill if item.item == "blade"]
     assert [note.split(":")[0] for note in blades] == [f"for {folder}" for folder in units] + ["for the sheet"]
     (silicone,) = [item for item in made.bill if item.item == "ecoflex-00-10 part A"]
     assert [part.split(":")[0] for part in silicone.note.split("; ")] == [
         "units/encapsulating, 2 castings",
-        "units/three-layer, 1 casting",
+        "units/motor-10mm, 1 casting",
     ]
     rows = {row["item"]: row for row in csv.DictReader(io.StringIO(written(made)["bom.csv"]))}
     assert (rows["gloves"]["unit"], rows["tray"]["unit"], rows[silicone.item]["unit"]) == ("pairs", "piece", "g")
+
+
+def test_the_procedure_says_each_units_strain_and_how_a_lists_places_are_named(
+    mixed: tuple[Array, dict[str, Procedure], Procedure],
+) -> None:
+    array, _, made = mixed
+    text = made.assembly[-1].text
+    hold = array.sheet.hold_mm
+    strains = {unit.diameter_mm: 100 * (unit.diameter_mm / (unit.diameter_mm - 2 * hold) - 1) for unit in array.units}
+    assert sorted(strains) == [14.0, 17.0]
+    for size, strain in strains.items():
+        assert f"{strain:.1f} % round {size:g} mm" in text
+    assert "numbered as the file lists them" in text
+    assert "Rows are lettered" not in text
+    assert (array.places[0].x, array.places[0].y) != (0.0, 0.0)
+    assert "from the middle of the listed points' box" in text
+
+
+def test_the_procedure_says_how_to_print_the_tray(mixed: tuple[Array, dict[str, Procedure], Procedure]) -> None:
+    said = " ".join(mixed[2].printing)
+    assert "perimeters" in said
+    assert "Takes about" in said
+    assert "cups" not in said
 
 
 def test_the_bench_page_speaks_of_the_sheet(folder: Path) -> None:

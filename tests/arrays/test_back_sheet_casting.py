@@ -11,7 +11,7 @@ import pytest
 from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
-from unitcad.casting.bench_extras import TAPE_WIDTH, tape_places
+from unitcad.casting.bench_extras import HELD, TAPE_WIDTH, tape_places
 from unitcad.casting.instructions import GREASE
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.written import to_markdown
@@ -104,7 +104,7 @@ def test_pieces_of_split_tools_have_readable_names() -> None:
 
 
 def test_each_piece_of_a_long_tool_is_held_down() -> None:
-    """A strip of tape on either end, and one between any two seams of base and cups, clear of the filaments."""
+    """A strip of tape for each 60 mm, and one between any two seams of base and cups, clear of the filaments."""
     moulds = patch_moulds(load_array("wrist-band"))
     places, half = tape_places(moulds), moulds.plan.layout.cup[0]
     seams = sorted({seam.at for split in moulds.plan.splits for seam in split.seams})
@@ -114,7 +114,12 @@ def test_each_piece_of_a_long_tool_is_held_down() -> None:
         assert all(not at < cell.x < at + TAPE_WIDTH for at in places)
     made = back_sheet_procedure(moulds, [100.0] * 2, 1000.0)
     hold = next(step.text for step in made.pours[0].steps if step.title == "Hold cup 1 down")
-    assert f"{len(places)} strips of tape, one at either end, so that each piece" in hold
+    assert len(places) >= 2 * half / HELD
+    assert f"run {len(places)} strips of tape from" in hold
+    (inner,) = re.findall(r"one at either end, the others ([^;]*) mm from the left one; each piece", hold)
+    assert [float(at) for at in re.findall(r"\d+", inner)] == pytest.approx(
+        [at - places[0] for at in places[1:-1]], rel=0.05
+    )
     (tape,) = [item for item in made.bill if item.item == "adhesive tape"]
     assert tape.quantity == 2 * 2 * len(places)
 

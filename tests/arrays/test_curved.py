@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from unitcad.arrays.array_file import load_array
+from unitcad.arrays.circuit.outline import circuit_body
 from unitcad.arrays.curved_procedure import curved_procedure
 from unitcad.arrays.patch_moulds import PatchMoulds, patch_moulds
+from unitcad.casting.bench_views import views
 from unitcad.casting.figures import RESIN_LAYER_S
 from unitcad.casting.instructions import GREASE
 from unitcad.casting.procedure import Procedure
@@ -21,7 +23,7 @@ from unitcad.check import Options, check_bytes
 from unitcad.errors import Refusal
 from unitcad.export import stl
 from unitcad.export.printing import print_ready
-from unitcad.kernels.mesh import arrays
+from unitcad.kernels.mesh import arrays, realise
 from unitcad.mould_checks import air, check_moulds, mould_checks
 from unitcad.moulds.removal import CAST, Removal
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union
@@ -267,6 +269,17 @@ def test_what_is_weighed_and_bought_is_that_of_both_pours(made: Procedure) -> No
     assert (items["syringe"], items["flexible circuit"], items["lid 2"]) == (1, 1, 1)
     assert (items["degassing container"], items["narrow pliers"]) == (1, 1)
     assert "flat pliers" not in items  # for tongues that are cut
+
+
+def test_the_flat_circuit_goes_whole_into_the_sleeve_laid_flat(made: Procedure) -> None:
+    solder, lay_in, _ = made.assembly
+    assert "until it lies flat" in solder.text
+    view = views(sleeve())[lay_in.picture.removeprefix("steps/").removesuffix(".png")]
+    flat = replace(sleeve().arranged, cast="flat")
+    (circuit,) = [extra for extra in view.extras if extra.colour == circuit_body(flat).colour]
+    there, whole = realise(circuit.shape, 64), realise(circuit_body(flat).shape, 64)
+    assert there.volume() == pytest.approx(whole.volume(), rel=1e-9)
+    assert len(there.decompose()) == 1
 
 
 def test_fins_of_the_flat_base_are_greased_and_the_curved_base_is_levelled_under_its_lid(made: Procedure) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from unitcad.arrays.array_file import array_templates, load_array
 from unitcad.arrays.patch_moulds import patch_moulds
+from unitcad.casting.figures import FDM_ERROR, print_min
 from unitcad.export import slicer, stl
 from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays
@@ -22,10 +23,16 @@ pytestmark = [
 @pytest.mark.parametrize("name", array_templates())
 def test_every_tool_of_an_array_is_sliced(name: str, tmp_path: Path) -> None:
     moulds = patch_moulds(load_array(name))
+    taken = 0.0
     for tool in moulds.plan.pieces:
         if tool.made != "printed":
             continue
         path = tmp_path / f"{tool.name}.stl"
         path.write_bytes(stl.content(*print_ready(*arrays(moulds.mesh(tool)), tool.upside_down), tool.name))
         assert not slicer.needs_repair(path), tool.name
-        assert slicer.slice_file(path, printer_of(moulds.spec)).print_s > 60, tool.name
+        sliced = slicer.slice_file(path, printer_of(moulds.spec))
+        assert sliced.print_s > 60, tool.name
+        taken += sliced.print_s / 60
+    solid = sum(moulds.mesh(tool).volume() for tool in moulds.plan.pieces if tool.made == "printed")
+    low, high = FDM_ERROR
+    assert low <= taken / print_min(moulds.spec, solid, 0.0) <= high

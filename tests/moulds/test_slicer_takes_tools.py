@@ -57,12 +57,13 @@ def test_no_tool_needs_a_repair(source: tuple[str, ...], tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("source", [("embedded",), ("three-layer",), ("encapsulating", "moulds.printer=fdm-0.25")])
-def test_the_procedures_time_is_within_a_third_of_the_slicers(source: tuple[str, ...], tmp_path: Path) -> None:
+def test_the_slicers_time_is_within_the_range_that_the_procedure_says(source: tuple[str, ...], tmp_path: Path) -> None:
     moulds, files = set_of(*source), written(tmp_path, *source)
     with slicer.Pieces(printers()[moulds.spec.moulds.printer]) as pieces:
         taken = pieces.report({path.name: path.read_bytes() for path in files})["print_s"] / 60
     solid = sum(moulds.solids[tool.name].volume() for tool in moulds.plan.tools if tool.made == "printed")
-    assert figures.print_min(moulds.spec, solid, 0.0) == pytest.approx(taken, rel=1 / 3)
+    low, high = figures.FDM_ERROR
+    assert low <= taken / figures.print_min(moulds.spec, solid, 0.0) <= high
 
 
 @pytest.mark.parametrize("locale", ["xx_YY.UTF-8", "de_DE.UTF-8", ""])

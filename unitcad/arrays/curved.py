@@ -115,6 +115,16 @@ def plan(array: Array) -> Plan:
     return curved_plan(array, back_sheet.layers(array)[:-1], laid_in(array), poured(array))
 
 
+def assembly(array: Array) -> tuple[str, ...]:
+    """Write how the flat circuit is laid into the sleeve."""
+    solder, lay_in = back_sheet.assembly(array)
+    flat = (
+        "Open the sleeve until it lies flat and tape its ends down: the circuit is flat, as long as the sheet laid "
+        "flat, and bends with the sleeve when it is worn. It stays flat until the smear is cured."
+    )
+    return f"{solder} {flat}", lay_in
+
+
 CONSTRUCTION = Construction(
     name="back-sheet",
     cast="curved",
@@ -126,6 +136,6 @@ CONSTRUCTION = Construction(
     level=level,
     bodies=bodies,
     plan=plan,
-    assembly=back_sheet.assembly,
+    assembly=assembly,
     greased=back_sheet.greased,
 )

@@ -268,6 +268,7 @@ def _bill(moulds: PatchMoulds, mixes: list[tuple[Material, fig.Mix]], steps: Seq
             yield replace(item, quantity=item.quantity - places)
             yield Item("filament stub, straight", places, "piece", "cut", f"{size}: {_lengths(moulds)} mm long")
         elif item.item == "adhesive tape":
-            yield replace(item, quantity=2 * (len(moulds.plan.steps) - 1))
+            # The last pour is held by bands.
+            yield replace(item, quantity=item.quantity * (1 - 1 / len(moulds.plan.steps)))
         else:
             yield item

@@ -116,7 +116,10 @@ class PatchMoulds(MouldSet):
 
     @cached_property
     def cast_flat(self) -> PatchMoulds | None:
-        """The flat tools and pours of the inner layers alone, where the last pour is cast round the limb; else None."""
+        """The flat tools and pours of the inner layers alone, where the last pour is cast round the limb; else None.
+
+        Its silicone, motors and circuit are those of the whole array, laid flat.
+        """
         plan, spec = self.plan, self.spec
         if plan.standing(plan.steps[-1], "cup") or not plan.of_kind("cup"):
             return None
@@ -128,7 +131,7 @@ class PatchMoulds(MouldSet):
         return PatchMoulds(
             structs.replace(spec, layers=layers),
             replace(plan, tools=tools, steps=steps, dimensions=inner),
-            array=self.array,
+            array=replace(self.arranged, cast="flat"),
         )
 
     @property

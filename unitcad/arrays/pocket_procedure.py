@@ -9,6 +9,7 @@ from itertools import groupby
 from unitcad import catalogue
 from unitcad.arrays.array import Array
 from unitcad.arrays.hidden_tails import hidden_tails, longer_tails, where_they_end
+from unitcad.arrays.layouts import layouts
 from unitcad.arrays.patch_moulds import PatchMoulds
 from unitcad.arrays.pocket_bill import castings, counts, pocket_bill
 from unitcad.arrays.tray import hold_strain
@@ -21,7 +22,7 @@ from unitcad.casting.instructions import TACK, mixed
 from unitcad.casting.joining import joining
 from unitcad.casting.needs import needs
 from unitcad.casting.plates import mould_plates
-from unitcad.casting.preparation import cleaning, fall, in_resin, on_plates
+from unitcad.casting.preparation import cleaning, fall, printing
 from unitcad.casting.procedure import Procedure, bubbles, pour_of
 from unitcad.casting.time_line import duration, phases
 from unitcad.catalogue import Material
@@ -127,10 +128,7 @@ def _and_blade(moulds: PatchMoulds) -> str:
 
 
 def _printing(moulds: PatchMoulds, solid_mm3: float, array: Array, folders: Iterable[str]) -> Iterator[str]:
-    lengths, what = moulds.spec.moulds, "resin" if in_resin(moulds) else "filament"
-    yield on_plates(moulds, f"tray{_and_blade(moulds)}, as they are printed")
-    yield f"Printer {lengths.printer}, layers of {number(lengths.layer_mm, 3)} mm, no supports."
-    yield f"At most {number(solid_mm3 / 1000, 2)} cm3 of {what} (computed: the pieces, solid)."
+    yield from printing(moulds, solid_mm3)
     of_units = zip(folders, array.units, strict=True)
     files = (f"{folder}/{file}" for folder, unit in of_units for file in mould_plates(MouldSet(unit)))
     yield f"The units' moulds: {listed(files)}, as their casting.md says."
@@ -211,8 +209,8 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
             f"without: {longer_tails(hidden)}",
             minutes=SOLDER_MIN * len(hidden),
         )
-    widest = max(unit.diameter_mm for unit in array.units) / 2
-    strain = max(hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units)
+    strains = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units}
+    stretch = listed(f"{number(100 * one, 2)} % round {number(size, 3)} mm" for size, one in sorted(strains.items()))
     ordered = sorted(array.places, key=lambda place: place.angle_deg)
     ways = listed(
         f"{number(angle, 3)} degrees: {' '.join(place.name for place in places)}"
@@ -225,12 +223,12 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
         else ""
     )
     over = number(array.sheet.low, 3)
+    names = layouts()[array.layout["kind"]].naming
     yield BenchStep(
         "Units in",
         f"Lay the sheet down with its back up, as it came out of the tray. Push each unit up into its pocket from "
         f"below, back first, until the pocket's lower edge stands {over} mm over the unit's skin side all round: the "
-        f"pocket stretches by {number(100 * strain, 2)} % round {number(2 * widest, 3)} mm and holds it. Water with "
-        f"a drop of soap helps; it dries.{turned} Rows are lettered from the top, columns numbered from the left.",
+        f"pocket stretches by {stretch} and holds it. Water with a drop of soap helps; it dries.{turned} {names}",
         picture_path("units-in"),
         minutes=PUSH_MIN * len(array.places),
     )

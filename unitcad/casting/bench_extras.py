@@ -22,8 +22,8 @@ CLEAR = 5.0
 """Between a piece that is lifted off and what it was on, mm."""
 BESIDE = 3.0
 """From a filament's middle to tape, mm."""
-LONG = 60.0
-"""Length of a cup from which one strip of tape a side does not hold both its ends, mm (assumed)."""
+HELD = 60.0
+"""Length of a cup's side that one strip of tape holds down, mm (assumed)."""
 TAPE_WIDTH, TAPE_THICKNESS, BELOW_RIM = 8.0, 0.4, 0.8
 _FILM, _MARK = 0.15, 0.6
 """Grease on a tongue, and the width of a pen's mark on it, mm."""
@@ -69,18 +69,26 @@ def along(way: tuple[float, float, float], x: float, y: float, z: float, length:
 def tape_places(moulds: MouldSet) -> tuple[float, ...]:
     """Return where the strips of tape that hold a cup down begin along x, mm.
 
-    One beside the filaments, which leave in the middle; at either end of a long cup; on each piece of split tools.
+    One for each `HELD` mm of it, the outer two at its ends, the others beside filaments, which leave in the middle;
+    one on each piece of split tools.
     """
     plan, half = moulds.plan, moulds.plan.layout.cup[0]
-    if 2 * half <= LONG:
-        return (CORNER_RADIUS - half,)
-    places = [CORNER_RADIUS - half, half - MARK - TAPE_WIDTH]
-    free = [at for cell in plan.layout.cells for at in (cell.x + BESIDE, cell.x - BESIDE - TAPE_WIDTH)]
+    left, right, count = CORNER_RADIUS - half, half - MARK - TAPE_WIDTH, math.ceil(2 * half / HELD)
+    if count == 1:
+        return (left,)
+    beside = [at for cell in plan.layout.cells for at in (cell.x + BESIDE, cell.x - BESIDE - TAPE_WIDTH)]
+    free = [at for at in beside if all(not at < cell.x < at + TAPE_WIDTH for cell in plan.layout.cells)]
+
+    def nearest(wanted: float, among: list[float]) -> float:
+        return min(among, key=lambda at: (abs(at - wanted), at))
+
+    inner = [left + (right - left) * i / (count - 1) for i in range(1, count - 1)]
+    places = {left, right, *(nearest(wanted, free) for wanted in inner if free)}
     seams = sorted({seam.at for split in plan.splits for seam in split.seams if seam.across == "x"})
     for low, high in pairwise((-half, *seams, half)):
-        inside = [[at for at in many if low <= at <= high - TAPE_WIDTH] for many in (places, free)]
-        if not inside[0] and inside[1]:
-            places.append(min(inside[1], key=lambda at: abs(2 * at - low - high)))
+        there = [at for at in free if low <= at <= high - TAPE_WIDTH]
+        if there and not any(low <= at <= high - TAPE_WIDTH for at in places):
+            places.add(nearest((low + high - TAPE_WIDTH) / 2, there))
     return tuple(sorted(places))
 
 

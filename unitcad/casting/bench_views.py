@@ -43,7 +43,7 @@ def views(moulds: MouldSet) -> dict[str, View]:
 
 def _all(moulds: MouldSet) -> Iterator[tuple[str, View]]:
     if moulds.cast_flat:
-        return laid_in_views(moulds, views(moulds.cast_flat))
+        return laid_in_views(moulds, moulds.cast_flat, views(moulds.cast_flat))
     return _views(moulds) if moulds.plan.of_kind("cup") else tray_views(moulds)
 
 

@@ -34,8 +34,10 @@ HELD_BACK_ML = 0.5
 WITHOUT_VACUUM = 0.25
 """Share of the pot life in which bubbles must rise out by themselves (assumed): after it silicone is too thick."""
 FDM_RATE = 950.0
-"""Volume of the pieces, solid, that a filament printer makes in a minute, mm3 for each mm of its layers' height: what
-PrusaSlicer's times come to for six sets, each within a third."""
+"""Volume of the pieces, solid, that a filament printer makes in a minute, mm3 for each mm of its layers' height."""
+FDM_ERROR = 0.64, 1.22
+"""PrusaSlicer's time over what that rate gives, least and most: eight sets of units and six of arrays were sliced.
+Thick pieces are mostly infill and print faster."""
 RESIN_LAYER_S = 10.0
 """What a resin printer takes for a layer, s (assumed)."""
 MOST_ERROR_PCT = 5.0

@@ -17,7 +17,7 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
 from unitcad.moulds.ribs import ribs
 from unitcad.spec import Spec
-from unitcad.text import number, spaced
+from unitcad.text import listed, number, spaced
 
 GREASE = "Grease the flanks"
 """The step that seals slits beside the cavity before the cup hides them."""
@@ -108,11 +108,12 @@ def pour_steps(
         )
         yield lid_held(step, picture("lid-held"))
     else:
+        strips, where = _strips(moulds)
         yield BenchStep(
             f"Hold cup {step.index} down",
             f"{HOLD} cup {step.index} down while it is struck off: on each of the two sides without a pry slot run "
-            f"{_strips(moulds)} from the cup's wall, below the rim, round the plate's edge to its underside, beside "
-            "the filament where there is one. Clamps or weights do as well where they leave the rim free for the "
+            f"{strips} from the cup's wall, below the rim, round the plate's edge to its underside, beside the "
+            f"filament where there is one{where}. Clamps or weights do as well where they leave the rim free for the "
             f"blade. {LEVEL_AGAIN}",
             picture("hold"),
             minutes=fig.HOLD_MIN,
@@ -181,13 +182,15 @@ def rest(spec: Spec, step: Step, silicone: Material, verdict: str) -> BenchStep:
     return BenchStep("Let bubbles rise", verdict, kind="rest", wait_min=fig.rest_min(spec, step.rim, silicone))
 
 
-def _strips(moulds: MouldSet) -> str:
-    """Say how many strips of tape hold a cup on each of two sides, and where."""
-    count = len(tape_places(moulds))
-    if count == 1:
-        return "a strip of tape"
-    pieces = ", so that each piece of cup and base is held," if count > 2 else ""
-    return f"{count} strips of tape, one at either end{pieces}"
+def _strips(moulds: MouldSet) -> tuple[str, str]:
+    """Say how many strips of tape hold a cup on each of two sides, and where they stick."""
+    first, *others = tape_places(moulds)
+    if not others:
+        return "a strip of tape", ""
+    *inner, _ = (number(at - first, 2) for at in others)
+    between = f", {'one' if len(inner) == 1 else 'the others'} {listed(inner)} mm from the left one" if inner else ""
+    each = "; each piece of cup and base has one" if moulds.plan.splits else ""
+    return f"{len(others) + 1} strips of tape", f": one at either end{between}{each}"
 
 
 def _groove(step: Step) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from unitcad.casting import bench_extras as draw
 from unitcad.casting.bench_extras import CLEAR, Extra
 from unitcad.casting.bench_view import OVER, UNDER, Offset, Placed, View
 from unitcad.casting.mouths import sprue_and_vent
-from unitcad.casting.way_out import motor_views
 from unitcad.designs import layer_colour
 from unitcad.export.picture_letters import Name
 from unitcad.kernels.mesh import bounds
@@ -17,8 +17,11 @@ from unitcad.moulds.removal import CAST, Removal, Way
 from unitcad.shape import Common, Shape, box, cut, moved, union
 
 
-def laid_in_views(moulds: MouldSet, flat: Mapping[str, View]) -> Iterator[tuple[str, View]]:
-    """Yield the views of a set whose last pour stands on a base of its own; `flat` are those of the flat tools."""
+def laid_in_views(moulds: MouldSet, cast_flat: MouldSet, flat: Mapping[str, View]) -> Iterator[tuple[str, View]]:
+    """Yield the views of a set whose last pour stands on a base of its own.
+
+    `cast_flat`: the set of the flat tools, `flat`: its views.
+    """
     plan = moulds.plan
     yield "pieces", View(tuple(Placed(piece.name) for piece in plan.pieces), eye=OVER, group="pieces")
     for name, view in flat.items():
@@ -29,7 +32,12 @@ def laid_in_views(moulds: MouldSet, flat: Mapping[str, View]) -> Iterator[tuple[
     for name, view in _last_pour(moulds):
         yield f"pour{plan.steps[-1].index}-{name}", view
     yield from _out(moulds)
-    yield from motor_views(moulds)
+    bodies = {body.name: body for body in (*cast_flat.unit, *cast_flat.laid_later)}
+    for name in ("motor-in", "motor-home"):
+        # What lies flat here has the names of what is cast round the limb: it is drawn as its shapes.
+        parts = [(bodies[part.name], part.moved) for part in flat[name].parts]
+        shapes = (Extra(moved(body.shape, *by), body.colour) for body, by in parts)
+        yield name, replace(flat[name], parts=(), extras=(*shapes, *flat[name].extras))
 
 
 def _last_pour(moulds: MouldSet) -> Iterator[tuple[str, View]]:

@@ -18,6 +18,7 @@ from unitcad.moulds.cup import window_section
 from unitcad.moulds.dents import DENT, TILT_DEG
 from unitcad.moulds.layout import BLADE_HEIGHT
 from unitcad.moulds.mould_set import MouldSet
+from unitcad.moulds.plan import Plan
 from unitcad.moulds.ribs import ribs
 from unitcad.moulds.tongue import GRIP_GAP, GRIP_LENGTH
 from unitcad.shape.lettering import seen
@@ -56,11 +57,11 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> tup
         for t in printed
         if t.upside_down
     )
-    turned = listed(dict.fromkeys(names))
+    turned = listed(dict.fromkeys(names)) if any(tool.upside_down for tool in printed) else ""
+    attitude = f"{turned} upside down, the rest as drawn" if turned else "as drawn"
     count = "one piece" if len(printed) == 1 else f"{len(printed)} pieces"
     lines = [
-        f"{on_plates(moulds, count)} They lie in it as they are printed: "
-        f"{turned} upside down, the rest as drawn. Turn none of them.",
+        f"{on_plates(moulds, count)} They lie in it as they are printed: {attitude}. Turn none of them.",
         f"Printer {spec.moulds.printer}, layers of {number(spec.moulds.layer_mm, 3)} mm, no supports.",
     ]
     standing = plan.dimensions.core_height - moulds.plate[0]
@@ -77,17 +78,19 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> tup
     else:
         lines.append(
             f"{PERIMETERS} perimeters, 20 % infill (assumed). At most {number(solid_mm3 / 1000, 2)} cm3 of filament "
-            f"(computed: the pieces, solid). Elephant foot compensation {number(FOOT_MM, 3)} mm (assumed), for cups "
-            "lie on "
-            "their rims: a first layer that is squeezed out narrows the bore where the layer's edge is."
+            f"(computed: the pieces, solid).{_elephant_foot(plan)}"
         )
+        low, high = (number(error, 2) for error in fig.FDM_ERROR)
         lines.append(
-            f"{takes} (by volume and layer height, within a third of PrusaSlicer's times for other sets). Time and "
-            f"filament, piece by piece: run unitcad build {moulds.source} --slice -o sliced in this folder, on a "
-            "machine with PrusaSlicer. The path that it prints last is the folder that has slicer.json."
+            f"{takes} (by volume and layer height; PrusaSlicer's times for other sets were {low} to {high} times that, "
+            "shortest for thick pieces). Time and filament, piece by piece: run unitcad build "
+            f"{moulds.source} --slice -o sliced in this folder, on a machine with PrusaSlicer. The path that it prints "
+            "last is the folder that has slicer.json."
         )
+    if not plan.of_kind("cup"):
+        return tuple(lines)
     there = [
-        "pins (its plinth has the same play)" if plan.pins else "plinth",
+        "pins (they have the play of the coupon's plinth)" if plan.pins else "plinth",
         *(["tongue"] if plan.of_kind("tongue") else []),
         *(["filament"] if plan.of_kind("stub") else []),
     ]
@@ -97,6 +100,17 @@ def printing(moulds: MouldSet, solid_mm3: float, tallest_mm: float = 0.0) -> tup
         "where they do not."
     )
     return tuple(lines)
+
+
+def _elephant_foot(plan: Plan) -> str:
+    """Say why the first layer must not grow; "" where nothing has to fit there."""
+    if plan.of_kind("cup"):
+        why = "cups lie on their rims: a first layer that is squeezed out narrows the bore where the layer's edge is"
+    elif plan.splits:
+        why = "a first layer that is squeezed out jams the dovetails"
+    else:
+        return ""
+    return f" Elephant foot compensation {number(FOOT_MM, 3)} mm (assumed), for {why}."
 
 
 def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Material]) -> Iterator[BenchStep]:

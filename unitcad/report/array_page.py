@@ -11,6 +11,7 @@ from typing import Any
 from unitcad import files
 from unitcad.arrays.array_file import array_of
 from unitcad.arrays.crosstalk_words import crosstalk_lines
+from unitcad.arrays.layouts import layouts
 from unitcad.casting.time_line import duration
 from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
@@ -212,7 +213,7 @@ def _units(folder: Path, manifest: ArrayManifest) -> str:
 
 
 def _places(array: Mapping[str, Any]) -> str:
-    note = "Seen from the back: rows lettered from the top, columns numbered along x."
+    note = f"Seen from the back. {layouts()[array['layout']['kind']].naming}"
     head = ["place", "x, mm", "y, mm", "unit"]
     rows = [
         [p["name"], number(p["x_mm"], 4), number(p["y_mm"], 4), p["unit"].rpartition("/")[2]] for p in array["places"]

@@ -28,6 +28,7 @@ class LayoutKind:
              origin in their middle; raises Refusal for a table that gives none
     wider    from the table, the radius, the numbers of two points and the distance that they need (mm) to the refusal
              that names the value which would give it
+    naming   how its places are named, seen from outside
     """
 
     name: str
@@ -35,6 +36,7 @@ class LayoutKind:
     table: type[Table]
     points: Callable[[Any, float | None], tuple[Point, ...]]
     wider: Callable[[Any, float | None, tuple[Point, Point], float], Refusal]
+    naming: str = "Rows are lettered from the top, columns numbered from the left."
 
 
 def row_letters(row: int) -> str:

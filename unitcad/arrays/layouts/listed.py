@@ -40,4 +40,5 @@ def wider(table: ListTable, radius: float | None, pair: tuple[Point, Point], dis
     return Refusal(f"layout.points_mm.{other.column}", [x, y], needs(distance, pair), nearest)
 
 
-LAYOUT = LayoutKind("list", "points one by one", ListTable, points, wider)
+NAMING = "Places are numbered as the file lists them. They are measured from the middle of the listed points' box."
+LAYOUT = LayoutKind("list", "points one by one", ListTable, points, wider, NAMING)
