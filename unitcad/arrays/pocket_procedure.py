@@ -53,7 +53,7 @@ def pocket_procedure(
     prepared = (
         BenchStep("Sort the pieces", _sort(moulds), picture_path("pieces"), minutes=fig.SORT_MIN),
         *cleaning(moulds, [silicone]),
-        *joining(moulds, {"base": "tray"}, picture_path("pieces")),
+        *joining(moulds, picture_path("join")),
         BenchStep("Level the bench", _level(moulds), picture_path("level"), minutes=fig.LEVEL_MIN),
     )
     poured = tuple(_pour(moulds, silicone, mix, verdict))

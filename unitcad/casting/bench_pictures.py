@@ -10,7 +10,7 @@ import numpy as np
 
 from unitcad.casting.bench_extras import TOOL, Extra
 from unitcad.casting.bench_views import Placed, View, picture_path, views
-from unitcad.designs import layer_colour
+from unitcad.casting.cast_colour import cast_colour
 from unitcad.export import composite
 from unitcad.export.composite import DrawnBody
 from unitcad.export.picture_letters import Name
@@ -20,8 +20,8 @@ from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Shape, moved, polygon
 from unitcad.shape.tree import Revolve
 
-SIZE = (540, 360)
-"""Of a picture, px."""
+SIZE, MANY = (540, 360), (540, 560)
+"""Of a picture, px; of the pieces where tools are printed in several."""
 _GAP = 9.0
 """Between pieces laid out side by side, mm."""
 _Solid = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
@@ -90,10 +90,12 @@ class BenchPictures:
     def _scene_of(self, kind: _Kind) -> _Scene:
         own = [view for name, view in self._views.items() if self._kinds[name] == kind]
         placed = {key: solids for view in own for key, solids in self._of_view(view)}
+        size = SIZE
         if kind.group == "pieces":
-            placed = _laid_out(placed)
+            placed = _laid_out(_together(self._moulds, placed))
+            size = MANY if self._moulds.plan.splits else SIZE
         points = np.concatenate([vertices for each in placed.values() for vertices, _, _ in each])
-        return _Scene(kind, placed, composite.view(kind.eye, points, SIZE, turned=kind.turned))
+        return _Scene(kind, placed, composite.view(kind.eye, points, size, turned=kind.turned))
 
     def _of_view(self, view: View) -> Iterable[tuple[object, list[_Solid]]]:
         """Yield what a view shows: a key, and the solids that stand for it, made once for all views."""
@@ -114,22 +116,37 @@ class BenchPictures:
 
 
 def _piece_names(moulds: MouldSet, placed: dict[object, list[_Solid]]) -> list[Name]:
-    """Name the pieces laid out: each by itself, tongues and filaments of several cavities by their number."""
+    """Name the tools laid out: each by itself, tongues and filaments of several cavities by their number.
+
+    The pieces of a split tool have their numbers, written on them.
+    """
+    plan = moulds.plan
+    split = {piece.name: (each.tool, str(i)) for each in plan.splits for i, piece in enumerate(each.pieces, 1)}
     runs: dict[str, list[np.ndarray]] = {}
+    numbers: list[Name] = []
     for key, solids in placed.items():
         if isinstance(key, tuple) and isinstance(key[1], Placed):
-            (tool,) = (piece for piece in moulds.plan.pieces if piece.name == key[1].name)
-            own = moulds.plan.called(tool.name).replace(",", "")
+            (tool,) = (piece for piece in plan.pieces if piece.name == key[1].name)
+            points = np.concatenate([vertices for vertices, _, _ in solids])
+            of, numeral = split.get(tool.name, (tool.name, ""))
+            if numeral:
+                low, high = points.min(axis=0), points.max(axis=0)
+                x, y, _ = ((low + high) / 2).tolist()
+                numbers.append(Name(numeral, (x, y, float(high[2])), on=True))
             filament = "straight filament" if tool.step else "filament"
-            name = {"tongue": "tongue", "stub": filament}.get(tool.kind, own)
-            runs.setdefault(name, []).append(np.concatenate([vertices for vertices, _, _ in solids]))
+            name = {"tongue": "tongue", "stub": filament}.get(tool.kind, plan.called(of))
+            runs.setdefault(name, []).append(points)
     names = []
+    split_tools = {plan.called(tool) for tool, _ in split.values()}
     for name, points in runs.items():
         low, high = points[0].min(axis=0), points[0].max(axis=0)
         # At the nearer edge of the upper face, where most pieces are solid.
         at = float(low[0] + high[0]) / 2, float(low[1] + 0.1 * (high[1] - low[1])), float(high[2])
-        names.append(Name(f"{len(points)} {name}s" if len(points) > 1 else name, at))
-    return names
+        if name in split_tools:  # at the left edge of its first piece
+            at = float(low[0]), float(low[1] + high[1]) / 2, float(high[2])
+        many = len(points) > 1 and name not in split_tools
+        names.append(Name(f"{len(points)} {name}s" if many else name, at))
+    return [*numbers, *names]
 
 
 def _keys(view: View) -> Iterable[object]:
@@ -155,7 +172,7 @@ def _shapes(moulds: MouldSet, name: str, unit: bool) -> Iterable[tuple[Shape, tu
     if not unit:
         for step in moulds.plan.steps:
             if step.name == name:
-                return [(shape, layer_colour(step.index - 1)) for shape in step.layer]
+                return [(shape, cast_colour(moulds, step.index)) for shape in step.layer]
     tools = dict.fromkeys((*moulds.plan.tools, *moulds.plan.pieces))
     bodies = (*moulds.unit, *moulds.laid_later, *moulds.pushed_in) if unit else (*tools, *moulds.plan.steps[-1].inserts)
     return [(body.shape, body.colour) for body in bodies if body.name == name]
@@ -177,20 +194,34 @@ def _syringe(moulds: MouldSet, channel: Shape) -> Shape:
     return moved(Revolve(outline), (x0 + x1) / 2, (y0 + y1) / 2, top)
 
 
-def _laid_out(placed: dict[object, list[_Solid]]) -> dict[object, list[_Solid]]:
-    """Lay pieces out side by side in rows, on one plane, in their order."""
-    boxes = {
-        key: (np.min([v.min(axis=0) for v, _, _ in each], axis=0), np.max([v.max(axis=0) for v, _, _ in each], axis=0))
-        for key, each in placed.items()
-    }
-    width = 1.25 * float(np.sqrt(sum(float(np.prod((high - low)[:2] + _GAP)) for low, high in boxes.values())))
+def _together(moulds: MouldSet, placed: dict[object, list[_Solid]]) -> list[dict[object, list[_Solid]]]:
+    """Return what is laid out as one: each piece, or the pieces of a split tool as they belong together, apart."""
+    of: dict[str, tuple[object, int, int]] = {}
+    for split in moulds.plan.splits:
+        of |= {piece.name: (split.tool, *divmod(i, split.columns)) for i, piece in enumerate(split.pieces)}
+    groups: dict[object, dict[object, list[_Solid]]] = {}
+    for key, solids in placed.items():
+        name = key[1].name if isinstance(key, tuple) and isinstance(key[1], Placed) else ""
+        tool, row, column = of.get(name, (key, 0, 0))
+        by = np.array([column * _GAP, -row * _GAP, 0.0])
+        groups.setdefault(tool, {})[key] = [(vertices + by, faces, colour) for vertices, faces, colour in solids]
+    return list(groups.values())
+
+
+def _laid_out(groups: list[dict[object, list[_Solid]]]) -> dict[object, list[_Solid]]:
+    """Lay groups of pieces out side by side in rows, on one plane, in their order."""
+    boxes = []
+    for group in groups:
+        points = np.concatenate([vertices for each in group.values() for vertices, _, _ in each])
+        boxes.append((points.min(axis=0), points.max(axis=0)))
+    width = 1.25 * float(np.sqrt(sum(float(np.prod((high - low)[:2] + _GAP)) for low, high in boxes)))
     spread: dict[object, list[_Solid]] = {}
     x = y = deep = 0.0
-    for key, each in placed.items():
-        low, high = boxes[key]
+    for group, (low, high) in zip(groups, boxes, strict=True):
         if x and x + high[0] - low[0] > width:
             x, y, deep = 0.0, y - deep - _GAP, 0.0
-        shift = np.array([x - low[0], y - high[1], -low[2]])
-        spread[key] = [(vertices + shift, faces, colour) for vertices, faces, colour in each]
+        for key, each in group.items():
+            shift = np.array([x - low[0], y - high[1], -low[2]])
+            spread[key] = [(vertices + shift, faces, colour) for vertices, faces, colour in each]
         x, deep = x + high[0] - low[0] + _GAP, max(deep, high[1] - low[1])
     return spread

@@ -17,7 +17,7 @@ from unitcad.casting.bench_view import ABOVE, OVER, UNDER, Offset, Placed, View
 from unitcad.casting.figures import window_length
 from unitcad.casting.laid_in_views import laid_in_views
 from unitcad.casting.mouths import sprue_and_vent
-from unitcad.casting.piece_views import resin_views
+from unitcad.casting.piece_views import joining_views, resin_views
 from unitcad.casting.tongue_prop import tongue_prop
 from unitcad.casting.tray_views import tray_views
 from unitcad.casting.way_out import motor_views, way_out
@@ -59,6 +59,7 @@ def _views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
     yield "pieces", View(tuple(Placed(piece.name) for piece in plan.pieces), eye=OVER, group="pieces")
     first, (cup_x, cup_y) = plan.steps[0], plan.layout.cup
     yield from resin_views(moulds)
+    yield from joining_views(moulds)
     paper = () if plan.pins else draw.paper_in_slit(moulds)
     pressed = tuple(
         draw.downward(x * 0.8 * cup_x, y * 0.8 * cup_y, first.rim + 5, 8.0) for x in (1, -1) for y in (1, -1)

@@ -7,18 +7,18 @@ from collections.abc import Iterator
 from unitcad.casting.bench_step import BenchStep
 from unitcad.moulds.dovetails import Split
 from unitcad.moulds.mould_set import MouldSet
-from unitcad.text import listed, number, spaced
+from unitcad.text import listed, number
 
 JOIN_MIN = 3.0
 """To join two pieces and seal their seam (assumed)."""
 
 
-def joining(moulds: MouldSet, names: dict[str, str] | None = None, picture: str = "") -> Iterator[BenchStep]:
-    """Say how the pieces of split tools go together and how their seams are sealed. `names`: of tools, where others."""
+def joining(moulds: MouldSet, picture: str) -> Iterator[BenchStep]:
+    """Say how the pieces of split tools go together and how their seams are sealed."""
     plan = moulds.plan
     if not plan.splits:
         return
-    called = {split.tool: (names or {}).get(split.tool, spaced(split.tool)) for split in plan.splits}
+    called = {split.tool: plan.called(split.tool) for split in plan.splits}
     parts = listed(f"{called[split.tool]} in {len(split.pieces)} pieces" for split in plan.splits)
     below = called[plan.splits[0].tool]
     upper = [name for tool, name in called.items() if plan.tool(tool).kind == "cup"]

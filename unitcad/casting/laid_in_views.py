@@ -60,7 +60,7 @@ def _last_pour(moulds: MouldSet) -> Iterator[tuple[str, View]]:
         for shape, way in zip(shapes, ways, strict=True)
     ]
     tops = [_middle(moulds, extra.shape) for extra in raised[-len(ways) :]]
-    places = tuple(Name(cell.name.lower(), at) for cell, at in zip(plan.layout.cells, tops, strict=True))
+    places = tuple(Name(cell.name, at) for cell, at in zip(plan.layout.cells, tops, strict=True))
     # The nearest row has its arrows; the others would hide what is behind them.
     front = min(y for _, y, _ in tops)
     arrows = tuple(

@@ -1,4 +1,4 @@
-"""Views of single pieces: a tongue that is cut, a resin cup's windows, a circuit on its way through the slot."""
+"""Views of single pieces: two that are joined, a tongue that is cut, a resin cup's windows, a circuit in its slot."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterator
 
 from unitcad.casting import bench_extras as draw
-from unitcad.casting.bench_extras import Extra
+from unitcad.casting.bench_extras import CLEAR, Extra
 from unitcad.casting.bench_view import OVER, UNDER, Placed, View
 from unitcad.export.picture_letters import Name
+from unitcad.kernels.mesh import bounds
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.shape import Extrude, Shape, cylinder, moved, polygon, turned, union
 from unitcad.text import number
@@ -17,6 +18,21 @@ BEFORE = 3.0
 """From the cavity's mouth down to what is to go in, mm."""
 SHOWN = 0.25
 """Thickness of a circuit in the picture, at least, mm: the drawn one would hardly be seen."""
+
+
+def joining_views(moulds: MouldSet) -> Iterator[tuple[str, View]]:
+    """Yield the view of a piece of a split tool on its way down onto the next one; none where no tool is split."""
+    for split in moulds.plan.splits[:1]:
+        lying, pushed = split.pieces[:2]
+        x0, y0, z0, x1, _, z1 = bounds(moulds.mesh(pushed))
+        up = z1 - z0 + max(2 * CLEAR, 0.15 * (x1 - x0))
+        left, front, _, right, _, top = bounds(moulds.mesh(lying))
+        names = (
+            Name("piece 1", ((left + right) / 2, front, top)),
+            Name("piece 2", ((x0 + x1) / 2, y0, z1 + up)),
+        )
+        down = draw.downward((x0 + x1) / 2, y0 - 2.0, z1 + up / 2 - CLEAR, 0.6 * up)
+        yield "join", View((Placed(lying.name), Placed(pushed.name, (0.0, 0.0, up))), (down,), names=names)
 
 
 def resin_views(moulds: MouldSet) -> Iterator[tuple[str, View]]:

@@ -135,7 +135,7 @@ def preparation(moulds: MouldSet, views: dict[str, View], silicones: Sequence[Ma
     )
     yield from _cut_tongues(moulds)
     yield from cleaning(moulds, silicones)
-    yield from joining(moulds, picture=picture_path("pieces"))
+    yield from joining(moulds, picture_path("join"))
     lids = " Put each lid on its cup once, cut corner over cut corner." if plan.of_kind("lid") else ""
     on = "Put each cup on the plinth once, dry: its cut corner lets it on one way only. It must sit down"
     if standing := ribs(moulds.spec, plan.layout):

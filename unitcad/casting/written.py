@@ -11,10 +11,10 @@ import msgspec
 
 from unitcad.casting.bench_step import BenchStep
 from unitcad.casting.bill import in_words, to_csv
+from unitcad.casting.cast_colour import cast_colour
 from unitcad.casting.figures import Figure
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.time_line import duration
-from unitcad.designs import layer_colour
 from unitcad.export import svg
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.moulds.plan import Step
@@ -129,7 +129,9 @@ def step_section(moulds: MouldSet, step: Step) -> str:
     bodies = [plan.tool(name) for name in step.tools]
     layers = [(i // cells, shape) for i, shape in enumerate(step.earlier)]
     layers += [(step.index - 1, shape) for shape in step.layer]
-    bodies += [Body(f"layer{i + 1}", "unit", "layer", shape, layer_colour(i), made="cast") for i, shape in layers]
+    bodies += [
+        Body(f"layer{i + 1}", "unit", "layer", shape, cast_colour(moulds, i + 1), made="cast") for i, shape in layers
+    ]
     bodies += step.inserts
     regions = svg.cut(bodies, moulds.segments, y=plan.layout.cells[0].y)
     labels = {region.name: spaced(region.name) for region in regions}

@@ -164,7 +164,11 @@ def _write(pixels: np.ndarray, drawn: np.ndarray, names: Sequence[Name], of: Cam
         ink = picture_letters.written(name.text, SHARPER * LETTER_PX)
         x, y, _ = of.project(np.array(name.at))[0]
         rows, columns = ink.shape
-        left, top = nearest_free(taken, (x, y), (columns, rows))
+        if name.on:
+            left, top = round(x - columns / 2), round(y - rows / 2)
+            left, top = min(max(left, 0), of.size[0] - columns), min(max(top, 0), of.size[1] - rows)
+        else:
+            left, top = nearest_free(taken, (x, y), (columns, rows))
         end = min(max(x, left), left + columns), min(max(y, top), top + rows)
         steps = np.linspace(0, 1, max(int(np.hypot(end[0] - x, end[1] - y)), 2))[:, None]
         line = np.round(np.array([y, x]) + steps * (np.array(end[::-1]) - (y, x))).astype(int)
@@ -176,13 +180,14 @@ def _write(pixels: np.ndarray, drawn: np.ndarray, names: Sequence[Name], of: Cam
         (up, side), (down, far) = np.maximum(low, 0), np.minimum(high.astype(int) + reach, drawn.shape)
         window = np.s_[up:down, side:far]
         mask = np.zeros((down - up, far - side), bool)
-        mask[tuple((line - (up, side)).T)] = True
-        mask = _grown(mask, 1)
-        mask[_disc(window, (x, y), dot)] = True
-        if name.ring:
-            mask[_disc(window, (x, y), dot - 1.2 * SHARPER)] = False
+        if not name.on:
+            mask[tuple((line - (up, side)).T)] = True
+            mask = _grown(mask, 1)
+            mask[_disc(window, (x, y), dot)] = True
+            if name.ring:
+                mask[_disc(window, (x, y), dot - 1.2 * SHARPER)] = False
         mask[top - up : top - up + rows, left - side : left - side + columns] |= ink
-        pixels[window][_grown(mask, SHARPER)] = 255
+        pixels[window][_grown(mask, (3 if name.on else 1) * SHARPER)] = 255
         pixels[window][mask, :3] = 0
         taken[window] |= _grown(mask, 3 * SHARPER)
         taken[max(top - _APART, 0) : top + rows + _APART, max(left - _APART, 0) : left + columns + _APART] = True

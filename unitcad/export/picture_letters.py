@@ -1,4 +1,4 @@
-"""Letters in a picture: lower-case ones and digits as strokes of a round pen, so that no font file is needed."""
+"""Letters in a picture: letters and digits as strokes of a round pen, so that no font file is needed."""
 
 from __future__ import annotations
 
@@ -43,6 +43,32 @@ _LETTERS = {
     "x": "0,4 3.8,0;0,0 3.8,4",
     "y": "0,4 2,0;4,4 1.4,-1.4 .4,-2",
     "z": "0,4 3.6,4 0,0 3.6,0",
+    "A": "0,0 2.2,6 4.4,0;.8,2 3.6,2",
+    "B": "0,0 0,6 2.6,6 3.7,5.2 3.7,4 2.6,3.2 0,3.2;2.6,3.2 4,2.3 4,.9 2.8,0 0,0",
+    "C": "4,4.8 2.9,6 1.4,6 0,4.6 0,1.4 1.4,0 2.9,0 4,1.2",
+    "D": "0,0 0,6 2.4,6 4,4.4 4,1.6 2.4,0 0,0",
+    "E": "3.8,6 0,6 0,0 3.8,0;0,3.1 3,3.1",
+    "F": "3.8,6 0,6 0,0;0,3.1 3,3.1",
+    "G": "4,4.8 2.9,6 1.4,6 0,4.6 0,1.4 1.4,0 2.9,0 4,1 4,2.8 2.4,2.8",
+    "H": "0,0 0,6;4,0 4,6;0,3.1 4,3.1",
+    "I": "0,0 2,0;0,6 2,6;1,6 1,0",
+    "J": "3,6 3,1.2 2,0 .9,0 0,1",
+    "K": "0,0 0,6;4,6 0,2.3;1.5,3.7 4.2,0",
+    "L": "0,6 0,0 3.6,0",
+    "M": "0,0 0,6 2.4,2 4.8,6 4.8,0",
+    "N": "0,0 0,6 4,0 4,6",
+    "O": "0,1.5 0,4.5 1.4,6 2.9,6 4.3,4.5 4.3,1.5 2.9,0 1.4,0 0,1.5",
+    "P": "0,0 0,6 2.7,6 4,5 4,3.7 2.7,2.7 0,2.7",
+    "Q": "0,1.5 0,4.5 1.4,6 2.9,6 4.3,4.5 4.3,1.5 2.9,0 1.4,0 0,1.5;2.7,1.6 4.4,-.3",
+    "R": "0,0 0,6 2.7,6 4,5 4,3.7 2.7,2.7 0,2.7;1.8,2.7 4.2,0",
+    "S": "3.8,5 2.8,6 1.2,6 .1,5 .3,3.8 1.2,3.2 2.8,2.8 3.8,2 3.9,1 2.8,0 1.1,0 0,1",
+    "T": "0,6 4.2,6;2.1,6 2.1,0",
+    "U": "0,6 0,1.4 1.3,0 2.7,0 4,1.4 4,6",
+    "V": "0,6 2.2,0 4.4,6",
+    "W": "0,6 1.5,0 3,4.6 4.5,0 6,6",
+    "X": "0,6 4.2,0;0,0 4.2,6",
+    "Y": "0,6 2.1,3 4.2,6;2.1,3 2.1,0",
+    "Z": "0,6 4.2,6 0,0 4.2,0",
     "0": "0,1.5 0,4.5 1.3,6 2.7,6 4,4.5 4,1.5 2.7,0 1.3,0 0,1.5",
     "1": ".6,4.6 2.2,6 2.2,0",
     "2": "0,4.6 1.2,6 2.9,6 4,4.7 3.8,3.4 0,0 4,0",
@@ -60,22 +86,26 @@ _LETTERS = {
 
 @dataclass(frozen=True)
 class Name:
-    """A name and the point (x, y, z) mm of what it names: under a dot, or in a `ring` where a dot would cover it."""
+    """A name and the point (x, y, z) mm of what it names: under a dot, or in a `ring` where a dot would cover it.
+
+    `on`: the name itself is written there, without a line to it.
+    """
 
     text: str
     at: tuple[float, float, float]
     ring: bool = False
+    on: bool = False
 
 
 @lru_cache(maxsize=256)
 def written(text: str, unit: float) -> np.ndarray:
     """Return a text as a picture (height, width) of truth values, row 0 the highest; `unit` in pixels.
 
-    Capitals are written small, and a character that there is no letter for as a hyphen.
+    A character that there is no letter for is written as a hyphen.
     """
     strokes: list[np.ndarray] = []
     x = 0.0
-    for character in text.lower():
+    for character in text:
         if character == " ":
             x += SPACE
             continue
