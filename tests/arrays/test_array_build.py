@@ -8,7 +8,9 @@ import gzip
 import io
 import json
 import re
+import shutil
 import tomllib
+from html import escape
 from pathlib import Path
 
 import pytest
@@ -30,10 +32,12 @@ from unitcad.check import Options, check_bytes
 from unitcad.cli.array_summary import array_summary
 from unitcad.errors import UnitcadError
 from unitcad.kernels.mesh import realise
+from unitcad.mould_checks import mould_checks
 from unitcad.moulds.mould_set import MouldSet
 from unitcad.pipeline.array_build import build_array
 from unitcad.pipeline.array_product import unit_folders
 from unitcad.pipeline.build import Built
+from unitcad.report import write_report
 from unitcad.report.bench_page import write_bench
 from unitcad.serve.answers import answered
 from unitcad.serve.messages import Ask, Trusted
@@ -174,6 +178,14 @@ def test_the_procedure_says_how_to_print_the_tray(mixed: tuple[Array, dict[str, 
     assert "perimeters" in said
     assert "Takes about" in said
     assert "cups" not in said
+
+
+def test_the_page_says_what_each_mould_check_demands(folder: Path, tmp_path: Path) -> None:
+    page = write_report(shutil.copytree(folder, tmp_path / folder.name)).read_text("utf-8")
+    codes = {finding["code"] for finding in json.loads((folder / "manifest.json").read_bytes())["laws"]}
+    assert codes
+    for code in codes:
+        assert f"<td>{code}</td><td>{escape(mould_checks()[code].demands)}</td>" in page
 
 
 def test_the_bench_page_speaks_of_the_sheet(folder: Path) -> None:

@@ -12,6 +12,7 @@ from unitcad.arrays.array_file import load_array
 from unitcad.arrays.back_sheet_procedure import back_sheet_procedure
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.casting.bench_extras import HELD, TAPE_WIDTH, tape_places
+from unitcad.casting.in_short import pour_warnings
 from unitcad.casting.instructions import GREASE
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.written import to_markdown
@@ -126,3 +127,13 @@ def test_each_piece_of_a_long_tool_is_held_down() -> None:
 
 def test_the_smear_says_its_hours(made: Procedure) -> None:
     assert "of which 4 h a smear's cure" in to_markdown(made)
+
+
+def test_a_pour_that_outlasts_its_pot_life_is_warned_of() -> None:
+    """144 cavities take half a minute each; nine do not."""
+    large = load_array("forearm-patch", ["layout.columns=12", "layout.rows=12"])
+    for array, late in ((large, True), (load_array("forearm-patch"), False)):
+        moulds = patch_moulds(array)
+        pours = back_sheet_procedure(moulds, [100.0] * 2, 1000.0).pours
+        warned = list(pour_warnings((f"pour {pour.index}", pour.verdict) for pour in pours))
+        assert [line.split(" in pour")[0] for line in warned] == ["mixing and pouring outlast the pot life"] * late

@@ -26,6 +26,7 @@ from unitcad.export.printing import print_ready
 from unitcad.kernels.mesh import arrays, realise
 from unitcad.mould_checks import air, check_moulds, mould_checks
 from unitcad.moulds.removal import CAST, Removal
+from unitcad.report.array_view import patch_model
 from unitcad.shape import Shape, box, cut, cylinder, moved, rotated, union
 from unitcad.spec import printer_of
 
@@ -280,6 +281,12 @@ def test_the_flat_circuit_goes_whole_into_the_sleeve_laid_flat(made: Procedure) 
     there, whole = realise(circuit.shape, 64), realise(circuit_body(flat).shape, 64)
     assert there.volume() == pytest.approx(whole.volume(), rel=1e-9)
     assert len(there.decompose()) == 1
+
+
+def test_the_pages_3d_view_lists_motors_and_circuit_once() -> None:
+    parts = patch_model(sleeve().arranged)["unit_apart"]
+    assert list(parts) == ["layer1", "layer2", "motor", "circuit"]
+    assert parts["motor"][2] < parts["layer1"][2] == 0
 
 
 def test_fins_of_the_flat_base_are_greased_and_the_curved_base_is_levelled_under_its_lid(made: Procedure) -> None:

@@ -87,7 +87,17 @@ def test_bubbles_rise_in_the_mould_before_it_is_struck_off() -> None:
 
 
 @pytest.mark.parametrize(
-    ("minutes", "text"), [(0, "0 min"), (59.6, "1 h"), (1240, "20 h 40 min"), (60, "1 h"), (7, "7 min")]
+    ("minutes", "text"),
+    [
+        (0, "0 min"),
+        (59.6, "1 h"),
+        (1240, "20 h 40 min"),
+        (60, "1 h"),
+        (7, "7 min"),
+        (48 * 60, "48 h"),
+        (48 * 60 + 1, "2 days"),
+        (60 * 1146 + 6, "47 days 18 h"),
+    ],
 )
 def test_durations_in_words(minutes: float, text: str) -> None:
     assert duration(minutes) == text

@@ -13,7 +13,7 @@ from unitcad.casting.bill import Item, bill
 from unitcad.casting.eccentricity import UNEVEN, Eccentricity, eccentricity
 from unitcad.casting.figures import Figure, Mix, sourced
 from unitcad.casting.finishing import measurements, motor_in, release
-from unitcad.casting.in_short import STAY
+from unitcad.casting.in_short import LATE, STAY
 from unitcad.casting.instructions import pour_steps
 from unitcad.casting.layer_grid import OffGrid, UnitHeight, off_grid, unit_heights
 from unitcad.casting.needs import needs
@@ -284,7 +284,7 @@ def bubbles(spec: Spec, step: Step, silicone: Material, mix: Mix, cells: int) ->
         stays = f"{STAY}: get a vacuum, or {stand if step.lid else brush}."
         said = f"{stokes} {clears if rise <= allowed else stays}"
     late = work - pot
-    slower = f" All this ends {number(late, 2)} min after the pot life: cool the room, or take a slower silicone."
+    slower = f" {LATE} {number(late, 2)} min after the pot life: cool the room, or take a slower silicone."
     return f"{said}{slower if late > 0 else ''}"
 
 

@@ -40,6 +40,9 @@ def phases(stages: Iterable[tuple[str, Sequence[BenchStep]]]) -> tuple[Phase, ..
 
 
 def duration(minutes: float) -> str:
-    """Return minutes as "20 h 40 min"."""
+    """Return minutes as "20 h 40 min", beyond two days as "3 days 20 h"."""
     hours, rest = divmod(round(minutes), 60)
+    if 60 * hours + rest > 48 * 60:
+        days, hours = divmod(round(minutes / 60), 24)
+        return f"{days} days {hours} h" if hours else f"{days} days"
     return f"{hours} h {rest} min" if hours and rest else f"{hours} h" if hours else f"{rest} min"

@@ -24,11 +24,13 @@ def array_summary(array: Array, built: Built) -> Iterator[str]:
     size = f"{number(box[2] - box[0], 3)} x {number(box[3] - box[1], 3)} mm"
     yield f"{counted(len(array.places), 'unit')} on a sheet of {size}, {number(array.sheet.thickness_mm, 3)} mm thick"
     if manifest["casting"]:
-        yield from in_short(json.loads((built.folder / "casting.json").read_bytes()))
+        told = {f"warning: {line}" for line in manifest["warnings"]}
+        lines = in_short(json.loads((built.folder / "casting.json").read_bytes()))
+        yield from (line for line in lines if line not in told)
         yield from _more_cavities(array)
     if checks := manifest["laws"]:
         check, passed = manifest["check"], sum(entry["ok"] for entry in checks)
-        files = f"{check['errors']} errors and {check['warnings']} warnings in the files"
+        files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
     crosstalk = built.folder / CROSSTALK
     if "estimate" in manifest["outputs"] and crosstalk.is_file():

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Iterator
 
 from unitcad.casting.in_short import in_short
+from unitcad.check.findings import counted
 from unitcad.pipeline.build import Built
 from unitcad.pipeline.folder import PAGE
 from unitcad.pipeline.row import row
@@ -31,7 +32,7 @@ def summary(spec: Spec, built: Built) -> Iterator[str]:
     checks, check = manifest["laws"], manifest["check"]
     if checks:
         passed = sum(entry["ok"] for entry in checks)
-        files = f"{check['errors']} errors and {check['warnings']} warnings in the files"
+        files = f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files"
         yield f"{len(manifest['parts'])} bodies, {passed} of {len(checks)} mould checks passed, {files}"
     if level := manifest["estimate"]:
         yield level["answer"]

@@ -33,6 +33,7 @@ from unitcad.arrays.patch_pictures import picture_names, pictures
 from unitcad.cache import Store, digest
 from unitcad.casting.bench_pictures import pictures as bench_pictures
 from unitcad.casting.bench_views import picture_path, views
+from unitcad.casting.in_short import pour_warnings
 from unitcad.casting.procedure import Procedure
 from unitcad.casting.procedure import procedure as unit_procedure
 from unitcad.casting.written import files as written
@@ -79,6 +80,8 @@ def make_array(array: Array, only: Sequence[str], check: bool, store: Store, sta
             made, files = _patch(moulds, store, stages.beside)
         parts, shared = [*parts, *made], shared | files
     drawn: list[str] = []
+    tracks = crowded_tracks(array) if has_circuit(array) else []
+    warned = [*hidden_tails_warning(array), *tracks, *shallow_grooves(moulds)]
     if {"unit", "moulds"} & set(only):
         with stages("pictures"):
             shown = _pictures(moulds, store)
@@ -90,13 +93,15 @@ def make_array(array: Array, only: Sequence[str], check: bool, store: Store, sta
                 key = geometry_key(moulds, f"section of pour {step.index}")
                 shared[f"step{step.index}-section.svg"] = store.file(key, lambda draw=draw: draw().encode())
             shared |= _step_pictures(moulds, store)
-            own |= _casting(moulds, shape, units)
+            made = _procedure(moulds, shape, units)
+            own |= {path: text.encode() for path, text in written(made).items()}
+            warned += pour_warnings((f"pour {pour.index} ({pour.material})", pour.verdict) for pour in made.pours)
     with stages("circuit and crosstalk"):
         beside, lacking = extras(array, only)
         own |= beside
     listed = {path: FileRecord(bytes=len(content), sha256=digest(content)) for path, content in own.items()}
     listed |= {path: FileRecord(bytes=store.size(sha256), sha256=sha256) for path, sha256 in shared.items()}
-    manifest = _manifest(array, moulds, only, check, shape, units, parts, drawn, own)
+    manifest = _manifest(array, moulds, only, check, shape, units, parts, drawn, own, warned)
     manifest["left_out"] += [LeftOut(what=what, why=why) for what, why in lacking.items()]
     manifest["files"] = dict(sorted(listed.items()))
     return Product(manifest, {**own, "manifest.json": json_bytes(manifest)}, shared)
@@ -164,13 +169,12 @@ def _step_pictures(moulds: PatchMoulds, store: Store) -> dict[str, str]:
     }
 
 
-def _casting(moulds: PatchMoulds, shape: Geometry, units: dict[str, Product]) -> dict[str, bytes]:
-    """Return the procedure's files."""
+def _procedure(moulds: PatchMoulds, shape: Geometry, units: dict[str, Product]) -> Procedure:
+    """Return how the array is cast."""
     volumes = [step["layer_volume_mm3"] for step in shape["steps"]]
     apart = unit_folders(moulds.arranged) if moulds.construction.own_tails else {}
     of_units = {folder: _of_unit(unit, units[folder]) for folder, unit in apart.items()}
-    made = array_procedure(moulds, volumes, printed_mm3(shape["parts"]), of_units)
-    return {path: text.encode() for path, text in written(made).items()}
+    return array_procedure(moulds, volumes, printed_mm3(shape["parts"]), of_units)
 
 
 def _of_unit(unit: Spec, product: Product) -> Procedure:
@@ -193,8 +197,12 @@ def _manifest(
     parts: list[PartRecord],
     drawn: list[str],
     own: dict[str, bytes],
+    warned: list[str],
 ) -> ArrayManifest:
-    """Return the manifest but for its files: the array's own records, and those of its units under their folders."""
+    """Return the manifest but for its files: the array's own records, and those of its units under their folders.
+
+    `warned`: of the array itself.
+    """
     first = next(iter(units.values())).manifest
     findings = mould_findings(moulds.spec, shape) if shape and check and "moulds" in only else []
     meshes: list[MeshFinding] = list(shape["check"]) if shape and check and "moulds" in only else []
@@ -206,8 +214,6 @@ def _manifest(
             MeshFinding(**{**each, "path": f"{folder}/{each['path']}"}) for each in manifest["check"]["findings"]
         ]
         every += [_under(folder, part) for part in manifest["parts"]]
-    tracks = crowded_tracks(array) if has_circuit(array) else []
-    own_warnings = [*hidden_tails_warning(array), *tracks, *shallow_grooves(moulds)]
     unit_warnings = [f"{folder}: {line}" for folder, product in units.items() for line in product.manifest["warnings"]]
     return ArrayManifest(
         name=array.name,
@@ -216,7 +222,7 @@ def _manifest(
         hash=array_hash(array)[:12],
         outputs=list(only),
         label=moulds.plan.label if shape else None,
-        warnings=[*own_warnings, *unit_warnings],
+        warnings=[*warned, *unit_warnings],
         air_ring_mm=first["air_ring_mm"],
         mesh={**first["mesh"], "segments": moulds.segments},
         parts=every,

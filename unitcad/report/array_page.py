@@ -15,6 +15,7 @@ from unitcad.arrays.layouts import layouts
 from unitcad.casting.time_line import duration
 from unitcad.check.findings import counted
 from unitcad.errors import UnitcadError
+from unitcad.mould_checks import mould_checks
 from unitcad.pipeline.folder import ARRAY, BENCH, PAGE
 from unitcad.pipeline.manifest_records import ArrayManifest
 from unitcad.report.array_view import array_model
@@ -154,10 +155,10 @@ def _worn(array: Mapping[str, Any]) -> str:
 
 def _chips(manifest: ArrayManifest) -> str:
     findings, check = manifest["laws"], manifest["check"]
-    held = sum(each["ok"] for each in findings)
-    good = held == len(findings) and not check["errors"]
-    chips = [f"{held} of {len(findings)} mould checks hold"] if findings else ["not checked"]
-    chips.append(f"{check['errors']} errors and {check['warnings']} warnings in the files")
+    passed = sum(each["ok"] for each in findings)
+    good = passed == len(findings) and not check["errors"]
+    chips = [f"{passed} of {len(findings)} mould checks passed"] if findings else ["not checked"]
+    chips.append(f"{counted(check['errors'], 'error')} and {counted(check['warnings'], 'warning')} in the files")
     marked = "".join(f'<li class="chip {"good" if good else "bad"}">{escape(text)}</li>' for text in chips)
     return f'<ul class="chips">{marked}</ul>'
 
@@ -242,9 +243,11 @@ def _checks(manifest: ArrayManifest) -> str:
     findings = manifest["laws"]
     if not findings:
         return ""
-    held = Counter(each["code"] for each in findings if each["ok"])
+    passed = Counter(each["code"] for each in findings if each["ok"])
     every = Counter(each["code"] for each in findings)
-    table = _table(("code", "held"), [(code, f"{held[code]} of {count}") for code, count in sorted(every.items())])
+    meaning = {code: check.demands for code, check in mould_checks().items()}
+    rows = [(code, meaning.get(code, ""), f"{passed[code]} of {count}") for code, count in sorted(every.items())]
+    table = _table(("code", "what it demands", "passed"), rows)
     broken = "".join(
         f"<li>{escape(each['code'])} {escape(each['where'])}: {each['value']:.3g} {escape(each['unit'])}, limit "
         f"{each['limit']:.3g}. {escape(each['advice'])}</li>"

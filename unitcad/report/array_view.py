@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from unitcad.arrays.array import Array
-from unitcad.arrays.patch import patch_parts
+from unitcad.arrays.patch import PatchPart, patch_parts
 from unitcad.arrays.patch_moulds import patch_moulds
 from unitcad.arrays.patch_pictures import laid_elsewhere, taken_apart
 from unitcad.moulds.plan import Step
 from unitcad.pipeline.bodies import glb_content, patch_glb
 from unitcad.report.viewer_models import compressed
+from unitcad.shape import union
+from unitcad.shape.body import Body
 
 BELOW = 14.0
 """How far what is put into a sheet is drawn out of it towards the skin, mm."""
@@ -30,8 +34,8 @@ def patch_model(array: Array) -> dict[str, Any]:
 
     Lengths in mm.
     """
-    parts = patch_parts(array)
-    shared = {part.name for part in parts if not part.places and part.body.kind != "circuit"}
+    parts = _by_kind(patch_parts(array))
+    shared = {part.name for part in parts if part.body.made == "cast" and not part.places}
     return {
         "makes": "patch",
         "unit": patch_glb(patch_moulds(array).blank, parts),
@@ -39,6 +43,17 @@ def patch_model(array: Array) -> dict[str, Any]:
         "row": min((place.y for place in array.places), key=abs),
         "axes": {"y": "along x", "x": "along y", "z": "level"},
     }
+
+
+def _by_kind(parts: Sequence[PatchPart]) -> list[PatchPart]:
+    """Return parts of which those that are put in, each a body of its own round a limb, are one for each kind."""
+    put_in: dict[str, list[Body]] = {}
+    for part in parts:
+        if part.body.made != "cast" and not part.places:
+            put_in.setdefault(part.body.kind, []).append(part.body)
+    kept = [part for part in parts if part.body.made == "cast" or part.places]
+    whole = (replace(bodies[0], name=kind, shape=union(b.shape for b in bodies)) for kind, bodies in put_in.items())
+    return [*kept, *(PatchPart(body.name, body) for body in whole)]
 
 
 def tools_model(array: Array) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 // The bench page: a procedure's steps in large, timers by absolute times, fields, and the cast record that they make.
 (() => {
   "use strict";
-  const { el, clear, number, section, table, theme } = window.unitcad;
+  const { el, clear, duration, number, section, table, theme } = window.unitcad;
   const page = document.getElementById("page");
   const MINUTE = 60000;
   // Of two printed pages in mm²: all, a letter, a step's title, a pour's lines to write on, a unit's, head and schedule; and widths in mm.
@@ -30,11 +30,6 @@
     }
   }
 
-  function duration(minutes) {
-    const all = Math.round(Math.abs(minutes));
-    const [hours, rest] = [Math.floor(all / 60), all % 60];
-    return hours && rest ? `${hours} h ${rest} min` : hours ? `${hours} h` : `${rest} min`;
-  }
   const two = (value) => String(value).padStart(2, "0");
   function remaining(ms) {
     const seconds = Math.floor(Math.abs(ms) / 1000);

@@ -1,7 +1,7 @@
 // The casting procedure: numbered steps, a drawing and the figures of each pour, ready to print.
 (() => {
   "use strict";
-  const { el, number, section, table, framed, partName } = window.unitcad;
+  const { el, duration, number, section, table, framed, partName } = window.unitcad;
   // The figures that are needed first, at the scale.
   const FIRST = [/^part A$/, /^part B$/, /^pot life/, /^cure/, /^rise of/];
 
@@ -28,11 +28,6 @@
     const rows = sliced.pieces.map((piece) => [partName(piece.file.replace(/\.stl$/, "")), minutes(piece.print_s), shown(piece.filament_cm3)]);
     rows.push(["all", minutes(sliced.print_s), shown(sliced.filament_cm3)]);
     return [table(["Piece", "Print time (min)", "Filament (cm³)"], rows, { label: "Print time and filament" }), el("p", {}, `${sliced.slicer}, ${sliced.printer}, layers of ${sliced.layer_mm} mm: ${sliced.note}`)];
-  }
-
-  function duration(minutes) {
-    const [hours, rest] = [Math.floor(Math.round(minutes) / 60), Math.round(minutes) % 60];
-    return hours && rest ? `${hours} h ${rest} min` : hours ? `${hours} h` : `${rest} min`;
   }
 
   function times(data) {

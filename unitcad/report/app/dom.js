@@ -37,6 +37,17 @@ window.unitcad = {};
     return String(Number(value.toPrecision(digits)));
   }
 
+  // 20 h 40 min; beyond two days 3 days 20 h.
+  function duration(minutes) {
+    const all = Math.round(Math.abs(minutes));
+    const [hours, rest] = [Math.floor(all / 60), all % 60];
+    if (all > 48 * 60) {
+      const whole = Math.round(all / 60);
+      return whole % 24 ? `${Math.floor(whole / 24)} days ${whole % 24} h` : `${whole / 24} days`;
+    }
+    return hours && rest ? `${hours} h ${rest} min` : hours ? `${hours} h` : `${rest} min`;
+  }
+
   function bytes(count) {
     return count < 1e3 ? `${count} B` : count < 1e6 ? `${number(count / 1e3, 3)} kB` : `${number(count / 1e6, 3)} MB`;
   }
@@ -125,5 +136,5 @@ window.unitcad = {};
   }
   for (const query of [dark, printed]) query.addEventListener("change", repaint);
 
-  Object.assign(window.unitcad, { el, clear, number, bytes, spoken, section, table, facts, theme });
+  Object.assign(window.unitcad, { el, clear, number, duration, bytes, spoken, section, table, facts, theme });
 })();
