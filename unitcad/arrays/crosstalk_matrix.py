@@ -249,7 +249,7 @@ def crosstalk(
 
 
 def _sums(matrix: np.ndarray) -> dict[str, np.ndarray]:
-    """Return what all other units make at each place, in phase and as the root of the sum of squares, shape (n,)."""
+    """Return the amplitude at each place from all others, in phase and as the root of the sum of squares (n,)."""
     return {"sum": matrix.sum(axis=0), "root_sum_of_squares": np.sqrt((matrix**2).sum(axis=0))}
 
 
@@ -271,7 +271,7 @@ def _nearest(units: Decays, own: np.ndarray) -> tuple[int, int] | None:
 
 
 def _absolute(units: Decays, own: np.ndarray, worst: int) -> dict[str, Any]:
-    """Return what the others make at the worst place in parts of the motors' amplitude: a range over the models.
+    """Return the amplitude at the worst place from the others, in motors' amplitudes: a range over the models.
 
     The models' levels at the edge, each to the ends of its inputs' ranges, times the nominal decay.
     """

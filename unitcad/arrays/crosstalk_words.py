@@ -9,7 +9,8 @@ from typing import Any
 from unitcad.text import listed, number
 
 IN_BRACKETS = (
-    "In brackets: the body's inputs to the ends of their ranges, and how far finite elements differ from the decay."
+    "In brackets is the range: tissue moduli, damping, thicknesses and frequency taken to both ends of their ranges, "
+    "and how far finite elements differ from the computed decay."
 )
 Crosstalk = Mapping[str, Any]
 """What `crosstalk_matrix.crosstalk` returns."""
@@ -95,8 +96,8 @@ def _absolute(block: Mapping[str, Any]) -> str:
         return f"No absolute level: {block['reason']}."
     said = [f"{number(100 * one['low'], 2)} to {number(100 * one['high'], 2)} %" for one in (root, phase)]
     return (
-        f"In parts of the motor's amplitude that is {said[0]} at {block['place']} over the models of the edge level, "
-        f"{said[1]} in phase."
+        f"At {block['place']} that is {said[0]} of the motor's own amplitude, and {said[1]} if all are in phase: the "
+        "models of the level at a unit's edge differ so much."
     )
 
 

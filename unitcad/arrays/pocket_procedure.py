@@ -217,8 +217,8 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
         for angle, places in groupby(ordered, key=lambda place: place.angle_deg)
     )
     turned = (
-        " Turn each one until its tail points where it belongs, counter-clockwise from the sheet's long way to the "
-        f"right, seen from the back: {ways}."
+        " Turn each one until its tail points where it belongs. Angles count counter-clockwise from the way along a "
+        f"row to the right, seen from the back: {ways}."
         if any(unit.fpcb or unit.wires for unit in array.units)
         else ""
     )

@@ -43,7 +43,7 @@ def too_much(
 
     def fault(seams: Sequence[Seam]) -> str:
         taken, limit = weep(array, seams, outline, heights), ROUNDING * WEEP * layer_mm3
-        text = f"the seams of so many pieces would take {taken:.0f} mm3 of silicone, and {limit:.0f} mm3 may get lost"
+        text = f"the seams of so many pieces would take {taken:.0f} mm3 of silicone; at most {limit:.0f} mm3 may"
         return text if taken > limit else ""
 
     return fault

@@ -204,7 +204,7 @@ def _poured(step: Step, cells: int) -> str:
         return "Pour in a thin thread, one cavity after the other, each at one place until it stands over its rim."
     if cells > 1:
         return (
-            "Pour in a thin thread, first beside each cell's earlier layer until that is covered, so that no air stays "
+            "Pour in a thin thread, first beside each unit's earlier layer until that is covered, so that no air stays "
             "in the deep places, then from there outwards until the whole cavity stands over its rim."
         )
     return "Pour in a thin thread at one place until the cavity stands over its rim."

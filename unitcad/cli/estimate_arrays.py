@@ -74,7 +74,7 @@ def _print_details(data: Mapping[str, Any]) -> None:
 
 
 def _sums(data: Mapping[str, Any], names: Sequence[str]) -> Table:
-    """Tabulate what all others make at each unit."""
+    """Tabulate the amplitude at each unit from all others."""
     mixed = len({place["drive"] for place in data["places"]}) > 1
     labels = {"own_drive": "own", "flat": "flat", "axial": "axial", "axial_u_z": "axial u_z"}
     labels = {key: label for key, label in labels.items() if mixed or key != "own_drive"}
@@ -99,7 +99,7 @@ def _matrix(data: Mapping[str, Any], names: Sequence[str]) -> Table:
 
 def _band(data: Mapping[str, Any]) -> Table:
     """Tabulate the nearest neighbour and the worst place over the band."""
-    table = Table("Hz", title=f"nearest neighbour, %; what all others make at {data['worst']['place']}: {_HOW}")
+    table = Table("Hz", title=f"nearest neighbour, %; amplitude at {data['worst']['place']} from all others: {_HOW}")
     for drive in ("flat", "axial"):
         for head in ("middle", "edge", "root", "sum"):
             table.add_column(f"{drive}\n{head}")

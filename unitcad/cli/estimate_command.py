@@ -43,8 +43,8 @@ def estimate(
 ) -> None:
     """Estimate the level at a unit's edge, or an array's crosstalk.
 
-    The first line is the answer: which part of the motor's amplitude reaches the edge, in per cent, by the model with
-    the least error, and what was measured. Of an array: which part of a unit's motion reaches its neighbours. Of
+    The first line is the answer: how much of the motor's amplitude reaches the edge, in per cent, by the model with
+    the least error, and what was measured. Of an array: how much of a unit's motion reaches its neighbours. Of
     several arrays each is compared with the first.
     """
     from unitcad.arrays.array_file import confirm_known, is_array
