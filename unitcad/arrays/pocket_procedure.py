@@ -205,8 +205,8 @@ def _together(array: Array, moulds: PatchMoulds) -> Iterator[BenchStep]:
             "Wires on hidden tails",
             f"{counted(len(hidden), 'tail')} would end under the sheet, {where_they_end(hidden)}. Nothing can be "
             "joined to them once the units are in. Solder wires to the end of each now, longer than this way by what "
-            "the connector needs, and try the motor again. They leave between sheet and skin. Other circuits would do "
-            f"without: {longer_tails(hidden)}",
+            "the connector needs, and try the motor again. They leave between sheet and skin. Longer tails need none "
+            f"where the way is free. {longer_tails(hidden)}",
             minutes=SOLDER_MIN * len(hidden),
         )
     strains = {unit.diameter_mm: hold_strain(unit.diameter_mm / 2, array.sheet.hold_mm) for unit in array.units}
