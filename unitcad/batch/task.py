@@ -169,7 +169,7 @@ def _delivered(job: Job, task: Task, known: Bundle | None, store: SharedStore, a
         except MissingContent:  # the cache is cleared meanwhile
             if not left:
                 raise
-    outcome = _outcome(job, spec, subject_of(spec).folder_name, product.manifest, maker.counts - before)
+    outcome = _of_product(job, spec, product, maker.counts - before)
     bundle = maker.bundle() if isinstance(maker, MemoryStore) and outcome.built else None
     if bundle:
         record_packs.offer_bundle(store, task.geometry, bundle, anew=anew)
@@ -194,11 +194,11 @@ def _locally(job: Job, task: Task) -> VariantOutcome:
     folder = task.out / subject_of(spec).folder_name
     manifest = _finished(folder, spec, task, job.damaged)
     if manifest is not None:
-        return _outcome(job, spec, folder.name, manifest, Counter({"file reused": 1}))
+        return _outcome(job, spec, folder.name, manifest, digest(json_bytes(manifest)), Counter({"file reused": 1}))
     store = _store(task.cache)
     before = Counter(store.counts)
     built = build_into(folder, partial(product_of, spec, task.only, task.check), store, Stages())
-    return _outcome(job, spec, folder.name, built.manifest, store.counts - before)
+    return _outcome(job, spec, folder.name, built.manifest, built.sha256, store.counts - before)
 
 
 def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
@@ -206,7 +206,7 @@ def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
     spec = of_text(job.spec)
     store = MemoryStore(known)
     product = product_of(spec, task.only, task.check, store, Stages())
-    outcome = _outcome(job, spec, subject_of(spec).folder_name, product.manifest, store.counts)
+    outcome = _of_product(job, spec, product, store.counts)
     needed = set(product.shared.values()) & set(store.contents)
     return replace(
         outcome,
@@ -216,7 +216,10 @@ def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
     )
 
 
-def _outcome(job: Job, spec: Made, folder: str, manifest: Manifest, counts: Counter[str]) -> VariantOutcome:
+def _outcome(
+    job: Job, spec: Made, folder: str, manifest: Manifest, sha256: str, counts: Counter[str]
+) -> VariantOutcome:
+    """Return the outcome of a variant that is there; `sha256` is that of its manifest.json."""
     codes = failed_codes(manifest)
     return VariantOutcome(
         job.index,
@@ -224,10 +227,16 @@ def _outcome(job: Job, spec: Made, folder: str, manifest: Manifest, counts: Coun
         folder,
         row(spec, manifest),
         f"broken: {', '.join(codes)}" if codes else "",
-        manifest=digest(json_bytes(manifest)),
+        manifest=sha256,
         built=counts["file built"] + counts["data built"],
         reused=counts["file reused"] + counts["data reused"],
     )
+
+
+def _of_product(job: Job, spec: Made, product: Product, counts: Counter[str]) -> VariantOutcome:
+    """Return the outcome of a variant that was made in memory."""
+    sha256 = digest(product.own["manifest.json"])
+    return _outcome(job, spec, subject_of(spec).folder_name, product.manifest, sha256, counts)
 
 
 def _finished(folder: Path, spec: Made, task: Task, damaged: str) -> Manifest | None:

@@ -36,9 +36,10 @@ def files(procedure: Procedure) -> dict[str, str]:
 
 def to_json(procedure: Procedure) -> str:
     """Write the procedure as JSON: the same records; numbers to nine significant digits."""
-    data = json.loads(json.dumps(msgspec.to_builtins(procedure)), parse_float=lambda text: float(f"{float(text):.9g}"))
-    # Indented by msgspec: json's own indenting is not compiled.
-    return msgspec.json.format(json.dumps(data, allow_nan=False, ensure_ascii=False), indent=1) + "\n"
+    # json refuses what is not finite; msgspec is the faster reader, and json's own indenting is not compiled.
+    exact = json.dumps(msgspec.to_builtins(procedure), allow_nan=False)
+    data = msgspec.json.Decoder(float_hook=lambda text: float(f"{float(text):.9g}")).decode(exact)
+    return msgspec.json.format(msgspec.json.encode(data), indent=1).decode() + "\n"
 
 
 def to_markdown(procedure: Procedure) -> str:

@@ -133,14 +133,17 @@ def whole(folder: Path, *, hashes: bool = False) -> Manifest | None:
     return manifest
 
 
+_SYNCS = 16
+
+
 def sync(results: Iterable[Path]) -> None:
     """Bring the results' own files to the disk; what they share is there since the cache has it. Raises OSError.
 
     Many at once: the file system then writes its log a few times and not once a file.
     """
     paths = [path for result in results for path in _own_files(result)]
-    with ThreadPoolExecutor(16) as pool:
-        list(pool.map(_sync, paths))
+    with ThreadPoolExecutor(_SYNCS) as pool:
+        list(pool.map(_sync, (paths[i::_SYNCS] for i in range(_SYNCS))))
 
 
 def _own_files(folder: str | os.PathLike[str]) -> Iterator[str]:
@@ -153,9 +156,13 @@ def _own_files(folder: str | os.PathLike[str]) -> Iterator[str]:
                 yield entry.path
 
 
-def _sync(path: str) -> None:
-    with open(path, "r+b") as file:
-        os.fsync(file.fileno())
+def _sync(paths: Iterable[str]) -> None:
+    for path in paths:
+        handle = os.open(path, os.O_RDWR)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def held(folder: Path) -> contextlib.AbstractContextManager[None]:

@@ -6,19 +6,31 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-_ENCODER = json.JSONEncoder(allow_nan=False, ensure_ascii=False)  # one for all lines: half the time
+import msgspec
+
+_FAST = msgspec.json.Encoder()
+_STRICT = json.JSONEncoder(allow_nan=False)
 
 
 def json_bytes(data: Mapping[str, Any]) -> bytes:
-    """Return JSON with a line a key, and a line an entry of a list or table; ten times as fast as indented JSON."""
-    short = _ENCODER.encode
+    """Return JSON with a line a key, and a line an entry of a list or table.
+
+    Raises ValueError for a number that is not finite.
+    """
     lines = []
     for key, value in data.items():
         if isinstance(value, list) and value:
-            text = "[\n  " + ",\n  ".join(map(short, value)) + "\n ]"
+            text = b"[\n  " + b",\n  ".join(map(_line, value)) + b"\n ]"
         elif isinstance(value, dict) and value:
-            text = "{\n  " + ",\n  ".join(f"{short(k)}: {short(v)}" for k, v in value.items()) + "\n }"
+            text = b"{\n  " + b",\n  ".join(_line(k) + b": " + _line(v) for k, v in value.items()) + b"\n }"
         else:
-            text = short(value)
-        lines.append(f" {short(key)}: {text}")
-    return ("{\n" + ",\n".join(lines) + "\n}\n").encode()
+            text = _line(value)
+        lines.append(b" " + _line(key) + b": " + text)
+    return b"{\n" + b",\n".join(lines) + b"\n}\n"
+
+
+def _line(value: Any) -> bytes:
+    text = _FAST.encode(value)
+    if b"null" in text:  # msgspec writes what is not finite as null
+        _STRICT.encode(value)
+    return text
