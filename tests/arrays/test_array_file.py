@@ -13,7 +13,8 @@ import pytest
 
 import unitcad
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import array_templates, expanded, is_array, load_array
+from unitcad.arrays.array_file import expanded, load_array
+from unitcad.arrays.array_names import array_templates, is_array
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.layouts import layouts
 from unitcad.arrays.outlines import rounded

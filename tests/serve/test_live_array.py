@@ -17,7 +17,8 @@ import trimesh
 from live import Live
 from running import Server, serving
 
-from unitcad.arrays.array_file import array_templates, load_array
+from unitcad.arrays.array_file import load_array
+from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.crosstalk_maps import heat_map_svg, patch_map_svg
 from unitcad.arrays.crosstalk_matrix import crosstalk
 from unitcad.arrays.patch import patch_parts

@@ -11,7 +11,8 @@ from pathlib import Path
 from unitcad import notebook
 from unitcad.arguments import path, texts
 from unitcad.arrays.array import Array
-from unitcad.arrays.array_file import is_array, load_array, with_formats
+from unitcad.arrays.array_file import load_array, with_formats
+from unitcad.arrays.array_names import is_array
 from unitcad.pipeline import Variant
 from unitcad.pipeline.array_build import build_array
 from unitcad.pipeline.artifacts import OUTPUTS

@@ -1,6 +1,6 @@
 """Array files: a template, a file or plain data to an array with everything settled, or one refusal.
 
-`is_array` tells an array file from a spec: it has the key `array`. A unit is a template, a spec file beside the array
+A unit is a template, a spec file beside the array
 file, or a table of a spec's keys in which `like` names where the others come from.
 """
 
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from unitcad.arrays.array import Array, Placed, Sheet
+from unitcad.arrays.array_names import array_templates
 from unitcad.arrays.array_tables import AskedArray
 from unitcad.arrays.asked_places import layout_of, places_of
 from unitcad.arrays.construction import Construction, construction_of
@@ -37,41 +38,12 @@ from unitcad.validation import custom_templates, default_template, from_data, te
 from unitcad.validation.dotted import ABSENT, at
 from unitcad.validation.faults import line_of
 from unitcad.validation.load import changed, override
-from unitcad.validation.shipped_files import is_path, named_file, shipped_files
+from unitcad.validation.shipped_files import named_file
 from unitcad.validation.tables import Changes, changes_of
 
 _OVERRIDES = ("moulds", "casting", "estimate", "output")
 """Tables of an array file that override those of its units."""
 ArraySource = str | os.PathLike[str] | Mapping[str, object] | Array
-
-
-def array_templates() -> dict[str, Path]:
-    """Return the shipped arrays by name."""
-    return shipped_files("arrays")
-
-
-def is_array(source: object) -> bool:
-    """Tell whether a name, a file or plain data means an array. A file that can't be read means none."""
-    if isinstance(source, Array):
-        return True
-    if isinstance(source, Mapping):
-        return "array" in source
-    if not isinstance(source, str | os.PathLike):
-        return False
-    text = os.fspath(source)
-    if text in array_templates():
-        return text not in templates()
-    if not is_path(text):
-        return False
-    try:
-        return "array" in read_toml(Path(text))
-    except (UnitcadError, OSError):
-        return False
-
-
-def confirm_known(name: str, field: str = "spec", kind: type[Refusal] = WrongArgument) -> None:
-    """Raise `kind`, of that field, for a name of neither a unit's template nor an array's, and no file's path."""
-    named_file(name, templates() | custom_templates() | array_templates(), field, kind)
 
 
 def load_array(source: ArraySource, set: Changes = (), *, lay_tails: bool = True) -> Array:

@@ -23,7 +23,8 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from msgspec import Meta, Struct, field, structs
 
-from unitcad.arrays.array_file import array_templates, confirm_known, expanded, is_array
+from unitcad.arrays.array_file import expanded
+from unitcad.arrays.array_names import array_templates, confirm_known, is_array
 from unitcad.batch.paths import check_path
 from unitcad.cache import digest
 from unitcad.errors import Refusal, UnitcadError, WrongArgument

@@ -22,7 +22,6 @@ from unitcad.cache import Bundle, DiskStore, MemoryStore, MissingContent, Shared
 from unitcad.errors import Refusal, UnitcadError
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.build import TRIES, build_into
-from unitcad.pipeline.json_text import json_bytes
 from unitcad.pipeline.manifest_records import Manifest, failed_codes
 from unitcad.pipeline.product import Product
 from unitcad.pipeline.row import row
@@ -194,11 +193,11 @@ def _locally(job: Job, task: Task) -> VariantOutcome:
     folder = task.out / subject_of(spec).folder_name
     manifest = _finished(folder, spec, task, job.damaged)
     if manifest is not None:
-        return _outcome(job, spec, folder.name, manifest, digest(json_bytes(manifest)), Counter({"file reused": 1}))
+        return _outcome(job, spec, folder.name, manifest, _manifest_sha256(folder), Counter({"file reused": 1}))
     store = _store(task.cache)
     before = Counter(store.counts)
     built = build_into(folder, partial(product_of, spec, task.only, task.check), store, Stages())
-    return _outcome(job, spec, folder.name, built.manifest, built.sha256, store.counts - before)
+    return _outcome(job, spec, folder.name, built.manifest, _manifest_sha256(folder), store.counts - before)
 
 
 def _remotely(job: Job, task: Task, known: Bundle | None) -> VariantOutcome:
@@ -237,6 +236,10 @@ def _of_product(job: Job, spec: Made, product: Product, counts: Counter[str]) ->
     """Return the outcome of a variant that was made in memory."""
     sha256 = digest(product.own["manifest.json"])
     return _outcome(job, spec, subject_of(spec).folder_name, product.manifest, sha256, counts)
+
+
+def _manifest_sha256(folder: Path) -> str:
+    return digest(files.read(folder / "manifest.json", links=False))
 
 
 def _finished(folder: Path, spec: Made, task: Task, damaged: str) -> Manifest | None:

@@ -99,7 +99,8 @@ def _built(
 ) -> bool:
     """Build the specs and print what came out; return whether every check passed."""
     from unitcad.arrays.array import Array
-    from unitcad.arrays.array_file import confirm_known, is_array, load_array
+    from unitcad.arrays.array_file import load_array
+    from unitcad.arrays.array_names import confirm_known, is_array
     from unitcad.cli.output import print_json, progress
     from unitcad.pipeline.array_build import build_array
     from unitcad.pipeline.build import build as build_spec

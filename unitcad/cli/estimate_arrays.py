@@ -23,7 +23,8 @@ def estimate_arrays(
     names: Sequence[str], sets: Sequence[str], hertz: Sequence[float], masses: bool, details: bool, as_json: bool
 ) -> None:
     """Print the crosstalk of arrays and, of several, each over the first. `hertz`: one frequency, or a band."""
-    from unitcad.arrays.array_file import is_array, load_array
+    from unitcad.arrays.array_file import load_array
+    from unitcad.arrays.array_names import is_array
     from unitcad.arrays.crosstalk_matrix import BAND_HZ, crosstalk
     from unitcad.arrays.crosstalk_words import ratio_line, ratios
 

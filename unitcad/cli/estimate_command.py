@@ -47,7 +47,7 @@ def estimate(
     the least error, and what was measured. Of an array: how much of a unit's motion reaches its neighbours. Of
     several arrays each is compared with the first.
     """
-    from unitcad.arrays.array_file import confirm_known, is_array
+    from unitcad.arrays.array_names import confirm_known, is_array
     from unitcad.attenuation.edge.fitted_models import MODELS
     from unitcad.estimating import MECHANICS, estimate_spec, frequency_table_of_spec, neighbours_of_specs
     from unitcad.validation import load

@@ -34,7 +34,7 @@ def init(
 
     Its first line names the schema that an editor checks it with; `unitcad schema -o FILE` writes that.
     """
-    from unitcad.arrays.array_file import array_templates
+    from unitcad.arrays.array_names import array_templates
     from unitcad.arrays.array_tables import AskedArray
     from unitcad.cli.output import print_json
     from unitcad.errors import Refusal, UnitcadError, unknown_name

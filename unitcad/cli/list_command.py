@@ -54,7 +54,7 @@ def _entries(kind: str) -> dict[str, Any]:
             name: _first_comment(path.read_text("utf-8")) for name, path in (templates() | custom_templates()).items()
         }
     if kind == "arrays":
-        from unitcad.arrays.array_file import array_templates
+        from unitcad.arrays.array_names import array_templates
 
         return {name: _first_comment(path.read_text("utf-8")) for name, path in array_templates().items()}
     if kind == "designs":

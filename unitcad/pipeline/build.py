@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from unitcad import files
-from unitcad.cache import MemoryStore, MissingContent, Store, digest
+from unitcad.cache import MemoryStore, MissingContent, Store
 from unitcad.errors import UnitcadError
 from unitcad.pipeline import folder as folders
 from unitcad.pipeline.artifacts import FORMATS, OUTPUTS
@@ -33,11 +33,10 @@ TRIES = 5
 
 @dataclass(frozen=True)
 class Built:
-    """A built variant: its folder, its manifest, and the SHA-256 of manifest.json."""
+    """A built variant: its folder and its manifest."""
 
     folder: Path
     manifest: Manifest
-    sha256: str
 
     @property
     def ok(self) -> bool:
@@ -140,7 +139,7 @@ def build_into(
                     raise _Changed
                 product.place(fresh, store)
                 files.write_new(fresh / "timings.json", json_bytes(timings))
-            return Built(folder, product.manifest, digest(product.own["manifest.json"]))
+            return Built(folder, product.manifest)
         except MissingContent:  # the cache is cleared meanwhile
             if not left:
                 raise

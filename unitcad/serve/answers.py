@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from unitcad.arrays.array_file import is_array
+from unitcad.arrays.array_names import is_array
 from unitcad.errors import Refusal, UnitcadError, UnknownKey
 from unitcad.serve import array_answers, unit_answers
 from unitcad.serve.edits import edited
